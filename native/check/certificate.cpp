@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Cheapest reason first: short edges between corners known to be near; the triangle of the grid node nearest to the piece's
+// centre; those of the nodes around; the exact closest triangle by the hierarchy, which also proves "outside"; then the piece
+// is split, the middle part first, because that is where a bad piece is farthest out.
+#include "check/certificate.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "reference/errors.h"
+#include "reference/parallel.h"
+
+namespace tolvol {
+namespace {
+
+constexpr double kFloor = 0.02;       // of the tolerance: a piece this short is not split further
+constexpr int kBudget = 1 << 20;      // parts looked at before a piece is left unproved
+constexpr double kSmall = 2.0;        // of the tolerance: shorter pieces are worth trying against all eight nodes
+constexpr double kExact = 0.7;        // of the tolerance: shorter pieces are worth an exact search
+constexpr int kStack = 4 * 64;        // splits halve the longest edge at least every second time: 64 levels cover all of double
+
+double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
+
+}  // namespace
+
+struct TriangleCertificate::Piece {
+  glm::dvec3 a, b, c;
+};
+
+TriangleCertificate::TriangleCertificate(const TriangleMesh& reference, const DistanceGrid& grid, const Hierarchy& hierarchy,
+                                         double within, double beyond)
+    : reference_(&reference), grid_(&grid), hierarchy_(&hierarchy), within_(within), within2_(within * within),
+      beyond_(beyond) {}
+
+WitnessTriangle TriangleCertificate::witness(std::uint32_t triangle) const {
+  const glm::uvec3 t = reference_->triangles[triangle];
+  return {reference_->vertices[t.x], reference_->vertices[t.y], reference_->vertices[t.z]};
+}
+
+double TriangleCertificate::distance_bound(const glm::dvec3& p) const {
+  const std::uint32_t triangle = grid_->triangle_near(p);
+  if (triangle == DistanceGrid::kNone) return std::numeric_limits<double>::infinity();
+  FourPoints points;
+  for (int lane = 0; lane < 4; ++lane) points.set(lane, p);
+  double d2[4];
+  witness_distances(witness(triangle), points, d2);
+  return std::sqrt(d2[0]);
+}
+
+template <bool kProve>
+Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
+  const glm::dvec3 &p0 = corners[0], &p1 = corners[1], &p2 = corners[2];
+  {
+    // Every point of a triangle is within L / sqrt(3) of a corner, L its longest edge.
+    const double room = within_ - std::max({bounds.x, bounds.y, bounds.z});
+    const double longest2 = std::max({squared_length(p1 - p0), squared_length(p2 - p1), squared_length(p0 - p2)});
+    if (room > 0 && longest2 <= 3 * room * room) return Verdict::inside;
+  }
+  std::array<Piece, kStack> stack;
+  int top = 0;
+  stack[top++] = {p0, p1, p2};
+  Verdict result = Verdict::inside;
+  std::uint32_t hint = Hierarchy::kNone;
+  for (int looked = 0; top > 0; ++looked) {
+    if (looked == kBudget) return Verdict::unproved;
+    const Piece piece = stack[--top];
+    const glm::dvec3 centre = (piece.a + piece.b + piece.c) * (1.0 / 3);
+    FourPoints points;
+    points.set(0, piece.a), points.set(1, piece.b), points.set(2, piece.c), points.set(3, centre);
+    double centre2 = std::numeric_limits<double>::infinity();  // best known squared distance of the centre
+    std::array<std::uint32_t, 10> tried;
+    int tries = 0;
+    const auto covered_by = [&](std::uint32_t triangle) {
+      if (triangle == DistanceGrid::kNone) return false;
+      for (int i = 0; i < tries; ++i) {
+        if (tried[i] == triangle) return false;
+      }
+      tried[tries++] = triangle;
+      double d2[4];
+      witness_distances(witness(triangle), points, d2);
+      centre2 = std::min(centre2, d2[3]);
+      // Written so that NaN is not covered.
+      return d2[0] <= within2_ && d2[1] <= within2_ && d2[2] <= within2_;
+    };
+    const std::uint32_t guess = grid_->triangle_near(centre);
+    if (covered_by(guess)) continue;
+
+    const double ab2 = squared_length(piece.b - piece.a), bc2 = squared_length(piece.c - piece.b),
+                 ca2 = squared_length(piece.a - piece.c);
+    const double longest2 = std::max({ab2, bc2, ca2});
+    const bool seems_outside = !(centre2 <= within2_);
+    if (guess != DistanceGrid::kNone && (seems_outside || longest2 < kSmall * kSmall * within2_)) {
+      const glm::dvec3 cell = glm::floor((centre - grid_->origin) * (1 / grid_->spacing));
+      bool covered = false;
+      for (int i = 0; i < 8 && !covered; ++i) {
+        const glm::ivec3 node = glm::ivec3(cell) + glm::ivec3(i & 1, (i >> 1) & 1, i >> 2);
+        if (glm::any(glm::lessThan(node, glm::ivec3(0))) || glm::any(glm::greaterThanEqual(node, grid_->nodes))) continue;
+        covered = covered_by(grid_->triangle[grid_->index(node.x, node.y, node.z)]);
+      }
+      if (covered) continue;
+    }
+    if (!(centre2 <= within2_) || longest2 < kExact * kExact * within2_) {
+      if (hint == Hierarchy::kNone) hint = guess;
+      const Hierarchy::Nearest nearest = hierarchy_->nearest(centre, kProve ? beyond_ : within_, hint);
+      if (nearest.triangle == Hierarchy::kNone) return Verdict::outside;
+      hint = nearest.triangle;
+      if (covered_by(nearest.triangle)) continue;
+      // Without a proof to look for, a centre outside ends it.
+      if (!kProve && !(centre2 <= within2_)) return Verdict::unproved;
+    }
+    // Written so that NaN ends here.
+    if (!(longest2 > kFloor * kFloor * within2_)) {
+      if (!kProve) return Verdict::unproved;
+      result = Verdict::unproved;
+      continue;
+    }
+    const glm::dvec3 mab = (piece.a + piece.b) * 0.5, mbc = (piece.b + piece.c) * 0.5, mca = (piece.c + piece.a) * 0.5;
+    if (longest2 > 4 * std::min({ab2, bc2, ca2})) {
+      // A needle is halved: splitting it in four would keep it a needle.
+      if (ab2 == longest2) {
+        stack[top++] = {piece.a, mab, piece.c}, stack[top++] = {mab, piece.b, piece.c};
+      } else if (bc2 == longest2) {
+        stack[top++] = {piece.b, mbc, piece.a}, stack[top++] = {mbc, piece.c, piece.a};
+      } else {
+        stack[top++] = {piece.c, mca, piece.b}, stack[top++] = {mca, piece.a, piece.b};
+      }
+    } else {
+      stack[top++] = {piece.a, mab, mca};
+      stack[top++] = {mab, piece.b, mbc};
+      stack[top++] = {mca, mbc, piece.c};
+      stack[top++] = {mab, mbc, mca};
+    }
+    if (top > kStack - 4) return Verdict::unproved;
+  }
+  return result;
+}
+
+bool TriangleCertificate::inside(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
+  return decide<false>(corners, bounds) == Verdict::inside;
+}
+
+Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
+  return decide<true>(corners, bounds);
+}
+
+std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& options) const {
+  if (pieces.corners < 1 || pieces.corners > 4) {
+    throw InvalidInput("a face must have 1 to 4 corners; triangulate larger ones");
+  }
+  if (pieces.indices.size() % static_cast<std::size_t>(pieces.corners) != 0) {
+    throw InvalidInput("the face array is not a whole number of faces");
+  }
+  const double within = volume_->provable(pieces.mapping_error), beyond = volume_->refutable(pieces.mapping_error);
+  const TriangleCertificate certificate(volume_->reference(), volume_->grid(), volume_->hierarchy(), within, beyond);
+  if (options.progress) options.progress->begin("checking");
+
+  // Exact distances of the used points first: they settle most faces, inside (short edges) or outside, and are shared.
+  std::vector<bool> used(pieces.points.size(), false);
+  for (const std::uint32_t i : pieces.indices) used.at(i) = true;
+  constexpr double kOutside = std::numeric_limits<double>::infinity();
+  std::vector<double> distance(pieces.points.size(), 0);
+  constexpr std::size_t kBlock = 512;
+  parallel_for(distance.size(), kBlock, options.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      if (!used[i]) continue;
+      const glm::dvec3& p = pieces.points[i];
+      const Hierarchy::Nearest nearest = volume_->hierarchy().nearest(p, beyond, volume_->grid().triangle_near(p));
+      distance[i] = nearest.triangle == Hierarchy::kNone ? kOutside : nearest.distance;
+    }
+  });
+
+  std::vector<Verdict> verdicts(pieces.size());
+  parallel_for(verdicts.size(), kBlock, options.threads, [&](std::size_t begin, std::size_t end) {
+    if (options.progress) options.progress->update(static_cast<double>(begin) / static_cast<double>(verdicts.size()));
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::span<const std::uint32_t> corner = pieces.indices.subspan(i * pieces.corners, pieces.corners);
+      const auto triangle = [&](int a, int b, int c) {
+        const std::uint32_t ia = corner[a], ib = corner[b], ic = corner[c];
+        const glm::dvec3 bounds(distance[ia], distance[ib], distance[ic]);
+        if (std::max({bounds.x, bounds.y, bounds.z}) == kOutside) return Verdict::outside;
+        return certificate.verdict({pieces.points[ia], pieces.points[ib], pieces.points[ic]}, bounds);
+      };
+      switch (pieces.corners) {
+        case 1: verdicts[i] = triangle(0, 0, 0); break;
+        case 2: verdicts[i] = triangle(0, 1, 1); break;
+        case 3: verdicts[i] = triangle(0, 1, 2); break;
+        default:
+          verdicts[i] = std::min({triangle(0, 1, 2), triangle(0, 2, 3), triangle(0, 1, 3), triangle(1, 2, 3)});
+      }
+    }
+  });
+  return verdicts;
+}
+
+}  // namespace tolvol

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The question every operation asks: are these pieces within the tolerance?
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "check/tolerance_volume.h"
+#include "reference/progress.h"
+
+namespace tolvol {
+
+/// Ordered: the verdict of a group is the least of its pieces.
+enum class Verdict : std::uint8_t {
+  outside = 0,   ///< proved: some point is farther than the tolerance
+  unproved = 1,  ///< neither was proved; counts as outside wherever something is promised
+  inside = 2,    ///< proved: every point is within the tolerance
+};
+
+/// Pieces of one array of points, all in the volume's frame.
+struct Pieces {
+  std::span<const glm::dvec3> points;
+  std::span<const std::uint32_t> indices;  ///< `corners` a piece
+  int corners = 3;                         ///< 1 point, 2 segment, 3 triangle, 4 quad in both of its triangulations
+  double mapping_error = 0;                ///< Placement::mapping_error() of the points
+
+  std::size_t size() const { return indices.size() / static_cast<std::size_t>(corners); }
+};
+
+class ToleranceCheck {
+ public:
+  struct Options {
+    unsigned threads = 0;
+    Progress* progress = nullptr;
+  };
+
+  virtual ~ToleranceCheck() = default;
+  virtual std::vector<Verdict> check(const Pieces& pieces, const Options& options) const = 0;
+  virtual std::string method() const = 0;
+  /// What computed it: "CPU", or the name of a GL renderer.
+  virtual std::string renderer() const = 0;
+};
+
+/// Gives every piece the least verdict of the pieces with the same label. Throws InvalidInput unless there is a label for each.
+void combine_groups(std::span<Verdict> verdicts, std::span<const std::int32_t> groups);
+
+}  // namespace tolvol

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "check/tolerance_volume.h"
+
+#include <cmath>
+#include <sstream>
+
+#include "check/witness.h"
+#include "reference/errors.h"
+
+namespace tolvol {
+namespace {
+
+std::vector<glm::dvec3> used_only(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles) {
+  const std::vector<bool> used = used_vertices(vertices.size(), triangles);
+  std::vector<glm::dvec3> result;
+  result.reserve(vertices.size());
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    if (used[i]) result.push_back(vertices[i]);
+  }
+  return result;
+}
+
+}  // namespace
+
+ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
+                                 const Placement& placement, double tolerance, const Options& options)
+    : tolerance_(tolerance) {
+  validate(vertices, triangles);
+  size_ = reference_size(vertices, triangles, placement.to_world());
+  if (!(tolerance > 0) || !std::isfinite(tolerance)) {
+    throw InvalidInput("the tolerance must be a positive length");
+  }
+  if (tolerance > size_) {
+    std::ostringstream text;
+    text << "the tolerance " << tolerance << " is larger than the reference, whose size is " << size_;
+    throw InvalidInput(text.str());
+  }
+  const std::vector<glm::dvec3> used = used_only(vertices, triangles);
+  Box world;
+  for (const glm::dvec3& p : used) world.add(placement.world(p));
+  frame_ = Frame(world);
+  const Placement placed = placement.in(frame_);
+  mapping_error_ = placed.mapping_error(used);
+  provable(0);  // throws before any work when the tolerance cannot be held
+  reference_.vertices = placed.frame(vertices);
+  reference_.triangles.assign(triangles.begin(), triangles.end());
+
+  Box box;
+  for (const glm::dvec3& p : used) box.add(placed.frame(p));
+  grid_ = layout_grid(box, frame_tolerance(), options.precision);
+  if (options.progress) options.progress->begin("building the hierarchy");
+  hierarchy_.emplace(reference_);
+  scatter(reference_, grid_, options.threads, options.progress);
+}
+
+std::size_t ToleranceVolume::memory() const {
+  // The hierarchy holds at most two boxes of floats and an index a triangle.
+  return reference_.vertices.size() * sizeof(glm::dvec3) + reference_.triangles.size() * (sizeof(glm::uvec3) + 64) +
+         grid_.memory();
+}
+
+double ToleranceVolume::provable(double mapping_error) const {
+  const double epsilon = frame_tolerance();
+  const double left = epsilon - mapping_error_ - mapping_error - witness_error(1 + 2 * epsilon);  // result faces, too, serve as witnesses
+  if (!(left > 0.5 * epsilon)) {
+    std::ostringstream text;
+    text << "the tolerance " << tolerance_ << " is too small for double precision at these coordinates; "
+         << "move the mesh nearer to the origin or take a larger tolerance";
+    throw InvalidInput(text.str());
+  }
+  return left;
+}
+
+}  // namespace tolvol

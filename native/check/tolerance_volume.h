@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// All points within the tolerance of a reference: the reference in its frame, and what makes asking fast.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "field/distance_grid.h"
+#include "reference/frame.h"
+#include "reference/hierarchy.h"
+
+namespace tolvol {
+
+class ToleranceVolume {
+ public:
+  struct Options {
+    std::optional<double> precision;  ///< grid nodes per tolerance; empty: the finest that fits kGridBudget
+    unsigned threads = 0;             ///< 0: one per core
+    Progress* progress = nullptr;
+  };
+
+  /// `tolerance` in world units. Throws InvalidInput for a bad mesh or for a tolerance that is not finite and positive, that
+  /// is larger than the reference, or that double precision cannot hold at this distance from the origin; ResourceLimit for
+  /// a precision whose grid does not fit. O(m log m + nodes in the band).
+  ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const Placement& placement,
+                  double tolerance, const Options& options);
+  ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const Placement& placement,
+                  double tolerance)
+      : ToleranceVolume(vertices, triangles, placement, tolerance, Options()) {}
+
+  ToleranceVolume(const ToleranceVolume&) = delete;
+  ToleranceVolume& operator=(const ToleranceVolume&) = delete;
+
+  const Frame& frame() const { return frame_; }
+  const TriangleMesh& reference() const { return reference_; }  ///< in the frame, every input vertex
+  const Hierarchy& hierarchy() const { return *hierarchy_; }
+  const DistanceGrid& grid() const { return grid_; }
+
+  double tolerance() const { return tolerance_; }                   ///< world units
+  double frame_tolerance() const { return tolerance_ * frame_.scale(); }
+  double size() const { return size_; }                             ///< world units; what 100 % means
+  double precision() const { return frame_tolerance() / grid_.spacing; }
+  std::size_t memory() const;                                       ///< bytes held
+
+  /// The distance, in the frame, up to which a witness found in floating point proves a piece inside: the tolerance less
+  /// all that rounding may hide, of the witness arithmetic and of mapping both sides into the frame.
+  /// Throws InvalidInput when less than half of the tolerance is left.
+  double provable(double mapping_error) const;
+  /// The distance beyond which a computed one proves a point outside.
+  double refutable(double mapping_error) const { return 2 * frame_tolerance() - provable(mapping_error); }
+
+ private:
+  Frame frame_;
+  TriangleMesh reference_;
+  std::optional<Hierarchy> hierarchy_;
+  DistanceGrid grid_;
+  double tolerance_;
+  double size_;
+  double mapping_error_;
+};
+
+}  // namespace tolvol

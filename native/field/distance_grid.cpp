@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One spacing h = tolerance / precision for all axes. The paper prints h = D / R as well, but its own grids (Table 1) are
+// those of h = epsilon / rho.
+#include "field/distance_grid.h"
+
+#include <cmath>
+#include <sstream>
+
+#include "reference/errors.h"
+
+namespace tolvol {
+namespace {
+
+constexpr double kFinestPrecision = 2;
+constexpr int kLanes = 8;  // rows are padded so that a kernel may touch whole vectors
+
+// Node counts as doubles: a precision far too fine must not overflow an integer before it is refused.
+struct Layout {
+  double h, band, x, y, z, pitch;
+  double bytes() const { return pitch * y * z * (sizeof(float) + sizeof(std::uint32_t)); }
+};
+
+Layout layout(const Box& box, double tolerance, double precision) {
+  const double h = tolerance / precision;
+  // A point within the tolerance is less than (sqrt(3)/2) h from its nearest node, and all eight nodes of its cell are
+  // within sqrt(3) h of it: with this band each of them has an id.
+  const double band = tolerance + std::sqrt(3.0) * h;
+  const glm::dvec3 n = glm::ceil((box.upper - box.lower + 2 * band) / h) + 1.0;
+  return {h, band, n.x, n.y, n.z, std::ceil(n.x / kLanes) * kLanes};
+}
+
+double finest_that_fits(const Box& box, double tolerance) {
+  double precision = kFinestPrecision;
+  // Ends: a coarser grid has fewer nodes, down to the few of a band around a box smaller than a cell.
+  while (layout(box, tolerance, precision).bytes() > kGridBudget) precision /= 2;
+  return precision;
+}
+
+}  // namespace
+
+DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double> precision) {
+  if (precision && !(*precision > 0 && std::isfinite(*precision))) {
+    throw InvalidInput("the precision must be a positive number (grid nodes per tolerance)");
+  }
+  const Layout l = layout(box, tolerance, precision.value_or(finest_that_fits(box, tolerance)));
+  if (l.bytes() > kGridBudget) {
+    std::ostringstream text;
+    text << "a precision of " << *precision << " needs a grid of " << l.bytes() / (1 << 20) << " MB, the limit is "
+         << (kGridBudget >> 20) << " MB; precision " << finest_that_fits(box, tolerance) << " fits";
+    throw ResourceLimit(text.str());
+  }
+  DistanceGrid grid;
+  grid.spacing = l.h;
+  grid.band = l.band;
+  grid.nodes = {static_cast<int>(l.x), static_cast<int>(l.y), static_cast<int>(l.z)};
+  grid.pitch = static_cast<int>(l.pitch);
+  const glm::dvec3 slack = l.h * glm::dvec3(grid.nodes - 1) - (box.upper - box.lower);
+  grid.origin = box.lower - slack * 0.5;
+  return grid;
+}
+
+}  // namespace tolvol

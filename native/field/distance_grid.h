@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Distances to the reference at the nodes of a regular grid, with the closest triangle of each node [Botsch04, §2].
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <optional>
+#include <vector>
+
+#include "reference/progress.h"
+#include "reference/triangle_mesh.h"
+
+namespace tolvol {
+
+/// Memory for distances and ids together; a constant, so that results do not depend on the machine.
+inline constexpr std::size_t kGridBudget = std::size_t{256} << 20;
+
+struct DistanceGrid {
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+
+  glm::dvec3 origin{0};      ///< position of node (0, 0, 0)
+  double spacing = 0;        ///< h, the same along each axis
+  glm::ivec3 nodes{0};       ///< number of nodes along x, y, z
+  int pitch = 0;             ///< nodes from one row to the next, >= nodes.x
+  double band = 0;           ///< nodes farther than this from the reference hold the band and kNone
+  std::vector<float> distance;
+  std::vector<std::uint32_t> triangle;
+
+  std::size_t index(int x, int y, int z) const { return (static_cast<std::size_t>(z) * nodes.y + y) * pitch + x; }
+  std::size_t memory() const { return distance.size() * (sizeof(float) + sizeof(std::uint32_t)); }
+
+  /// The closest triangle of the node nearest to p; kNone outside the grid or beyond the band. O(1).
+  std::uint32_t triangle_near(const glm::dvec3& p) const {
+    const glm::dvec3 c = (p - origin) * (1 / spacing) + 0.5;
+    // Written so that NaN fails as well.
+    if (!(c.x >= 0 && c.y >= 0 && c.z >= 0 && c.x < nodes.x && c.y < nodes.y && c.z < nodes.z)) return kNone;
+    return triangle[index(static_cast<int>(c.x), static_cast<int>(c.y), static_cast<int>(c.z))];
+  }
+};
+
+/// The grid of a reference: its box enlarged by the band, spacing tolerance / precision. `precision` empty: the finest of
+/// 2, 1, 1/2, 1/4, ... that fits kGridBudget. Allocates nothing. Throws ResourceLimit, naming the precision that fits, when
+/// a precision is asked for that does not.
+DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double> precision);
+
+/// Trilinear interpolation needs node values, the witness certificate only ids: both come from scatter().
+/// Exact (float32) unsigned distance and closest triangle at every node within the band of a triangle; ties go to the lower
+/// index, so that the result depends neither on the number of threads nor on the instructions used. O(nodes in the bands).
+void scatter(const TriangleMesh& reference, DistanceGrid& grid, unsigned threads = 0, Progress* progress = nullptr);
+
+}  // namespace tolvol

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Based on the initial band of [Botsch04, §2]: each triangle writes exact distances to the nodes of its enlarged box, the
+// smallest stays. Here the box is enlarged by the whole band, so that no marching is needed and every value is exact, and
+// nodes are taken eight along x at once. Rows that the triangle's box or its plane keep out of the band are skipped.
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+
+#include "field/distance_grid.h"
+#include "reference/parallel.h"
+#include "reference/simd.h"
+
+namespace tolvol {
+namespace {
+
+constexpr int kLanes = 8;
+using Floats = float __attribute__((vector_size(4 * kLanes)));
+using Masks = std::int32_t __attribute__((vector_size(4 * kLanes)));
+
+/// A triangle prepared for many nodes; everything relative to corner a.
+struct Prepared {
+  glm::dvec3 a;
+  Box box;
+  glm::vec3 ab, ac, bc;
+  glm::vec3 gs, gt;  ///< gradients of the barycentric coordinates of b and c
+  glm::vec3 normal;  ///< unit, zero when degenerate
+  float inverse_ab, inverse_ac, inverse_bc;
+  float slab;  ///< |normal . p| of the band about the plane, with the rounding of float32; infinite when degenerate
+};
+
+float safe_inverse(double x) { return x > 0 ? static_cast<float>(std::min(1 / x, 1e30)) : 0.0f; }
+
+Prepared prepare(const TriangleMesh& mesh, std::uint32_t id, double band) {
+  const glm::uvec3 t = mesh.triangles[id];
+  const glm::dvec3 &a = mesh.vertices[t.x], &b = mesh.vertices[t.y], &c = mesh.vertices[t.z];
+  Prepared r;
+  r.a = a;
+  r.box.add(a), r.box.add(b), r.box.add(c);
+  const glm::dvec3 ab = b - a, ac = c - a, bc = c - b, n = glm::cross(ab, ac);
+  const double nn = glm::dot(n, n), ab2 = glm::dot(ab, ab), ac2 = glm::dot(ac, ac);
+  r.ab = ab, r.ac = ac, r.bc = bc;
+  r.inverse_ab = safe_inverse(ab2), r.inverse_ac = safe_inverse(ac2), r.inverse_bc = safe_inverse(glm::dot(bc, bc));
+  // A needle whose height float32 cannot hold is left to its edges: their distances are never too small.
+  constexpr double kThinnestSine = 1e-4;
+  if (nn > kThinnestSine * kThinnestSine * ab2 * ac2 && nn > 0) {
+    r.gs = glm::cross(ac, n) / nn, r.gt = glm::cross(n, ab) / nn, r.normal = n / std::sqrt(nn);
+    r.slab = static_cast<float>(band * 1.001);
+  } else {
+    r.gs = r.gt = glm::vec3(-1e30f), r.normal = glm::vec3(0);  // gs < 0: never inside
+    r.slab = std::numeric_limits<float>::infinity();
+  }
+  return r;
+}
+
+TOLVOL_INLINE Floats clamp01(Floats x) {
+  const Floats zero{}, one = zero + 1.0f;
+  x = x > zero ? x : zero;
+  return x < one ? x : one;
+}
+
+/// Squared distance to the edge o + u e, 0 <= u <= 1, for points (x, y, z) relative to o.
+TOLVOL_INLINE Floats edge_distance(Floats x, float y, float z, const glm::vec3& e, float inverse) {
+  const Floats u = clamp01((x * e.x + (y * e.y + z * e.z)) * inverse);
+  const Floats dx = x - u * e.x, dy = y - u * e.y, dz = z - u * e.z;
+  return dx * dx + dy * dy + dz * dz;
+}
+
+/// One triangle over the nodes of its box in rows z0 <= z < z1.
+TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid, int z0, int z1) {
+  const double h = grid.spacing;
+  const float band = static_cast<float>(grid.band), band2 = band * band, hf = static_cast<float>(h);
+  const glm::dvec3 low = (t.box.lower - grid.band - grid.origin) / h, high = (t.box.upper + grid.band - grid.origin) / h;
+  const int zbegin = std::max(z0, static_cast<int>(std::ceil(low.z)));
+  const int zend = std::min(z1 - 1, static_cast<int>(std::floor(high.z)));
+  const int ybegin = std::max(0, static_cast<int>(std::ceil(low.y)));
+  const int yend = std::min(grid.nodes.y - 1, static_cast<int>(std::floor(high.y)));
+  Floats lane;
+  for (int i = 0; i < kLanes; ++i) lane[i] = static_cast<float>(i) * hf;
+  const Masks ids = Masks{} + static_cast<std::int32_t>(id);
+
+  const glm::vec3 lower = t.box.lower - t.a, upper = t.box.upper - t.a;
+  const glm::vec3 first = grid.origin - t.a;
+  for (int z = zbegin; z <= zend; ++z) {
+    const float pz = first.z + static_cast<float>(z) * hf;
+    const float bz = std::max({0.0f, lower.z - pz, pz - upper.z});
+    for (int y = ybegin; y <= yend; ++y) {
+      const float py = first.y + static_cast<float>(y) * hf;
+      const float by = std::max({0.0f, lower.y - py, py - upper.y});
+      const float room = band2 - by * by - bz * bz;
+      if (room <= 0) continue;
+      const float half = std::sqrt(room);
+      float xlow = lower.x - half, xhigh = upper.x + half;
+      const float plane = t.normal.y * py + t.normal.z * pz;
+      if (std::abs(t.normal.x) > 1e-3f) {
+        const float middle = -plane / t.normal.x, reach = t.slab / std::abs(t.normal.x);
+        xlow = std::max(xlow, middle - reach), xhigh = std::min(xhigh, middle + reach);
+      } else if (std::abs(plane) > t.slab + 1e-3f * std::max(std::abs(xlow), std::abs(xhigh))) {
+        continue;
+      }
+      const int xbegin = std::max(0, static_cast<int>(std::floor((xlow - first.x) / hf)));
+      const int xend = std::min(grid.nodes.x - 1, static_cast<int>(std::ceil((xhigh - first.x) / hf)));
+      const std::size_t row = grid.index(0, y, z);
+      for (int x = xbegin & ~(kLanes - 1); x <= xend; x += kLanes) {
+        const Floats px = (first.x + static_cast<float>(x) * hf) + lane;
+        const Floats s = px * t.gs.x + (py * t.gs.y + pz * t.gs.z), u = px * t.gt.x + (py * t.gt.y + pz * t.gt.z);
+        const Floats off = px * t.normal.x + plane;
+        Floats d = edge_distance(px, py, pz, t.ab, t.inverse_ab);
+        const Floats d2 = edge_distance(px, py, pz, t.ac, t.inverse_ac);
+        const Floats d3 = edge_distance(px - t.ab.x, py - t.ab.y, pz - t.ab.z, t.bc, t.inverse_bc);
+        d = d < d2 ? d : d2;
+        d = d < d3 ? d : d3;
+        const Masks inside = (s >= 0.0f) & (u >= 0.0f) & (s + u <= 1.0f);
+        d = inside ? off * off : d;
+        Floats old;
+        Masks old_ids;
+        __builtin_memcpy(&old, &grid.distance[row + x], sizeof old);
+        const Masks nearer = d < old;
+        // Most rows far from the surface change nothing: their ids need not be touched.
+        bool any = false;
+        for (int i = 0; i < kLanes; ++i) any |= nearer[i] != 0;
+        if (!any) continue;
+        __builtin_memcpy(&old_ids, &grid.triangle[row + x], sizeof old_ids);
+        d = nearer ? d : old;
+        old_ids = nearer ? ids : old_ids;
+        __builtin_memcpy(&grid.distance[row + x], &d, sizeof d);
+        __builtin_memcpy(&grid.triangle[row + x], &old_ids, sizeof old_ids);
+      }
+    }
+  }
+}
+
+TOLVOL_INLINE void splat_all(const TriangleMesh& mesh, DistanceGrid& grid, int z0, int z1, Progress* progress) {
+  const double zlow = grid.origin.z + z0 * grid.spacing - grid.band, zhigh = grid.origin.z + (z1 - 1) * grid.spacing + grid.band;
+  for (std::uint32_t id = 0; id < mesh.triangles.size(); ++id) {
+    if (progress && id % 4096 == 0) progress->update(static_cast<double>(id) / static_cast<double>(mesh.triangles.size()));
+    const glm::uvec3 t = mesh.triangles[id];
+    const double a = mesh.vertices[t.x].z, b = mesh.vertices[t.y].z, c = mesh.vertices[t.z].z;
+    if (std::max({a, b, c}) < zlow || std::min({a, b, c}) > zhigh) continue;
+    splat(prepare(mesh, id, grid.band), id, grid, z0, z1);
+  }
+}
+
+void splat_baseline(const TriangleMesh& mesh, DistanceGrid& grid, int z0, int z1, Progress* progress) {
+  splat_all(mesh, grid, z0, z1, progress);
+}
+TOLVOL_TARGET_AVX2 void splat_avx2(const TriangleMesh& mesh, DistanceGrid& grid, int z0, int z1, Progress* progress) {
+  splat_all(mesh, grid, z0, z1, progress);
+}
+
+/// Slabs of z that hold about equally many triangles; each is owned by one thread.
+std::vector<int> slab_bounds(const TriangleMesh& mesh, const DistanceGrid& grid, unsigned slabs) {
+  std::vector<int> bounds{0};
+  std::vector<double> heights(mesh.triangles.size());
+  for (std::size_t i = 0; i < heights.size(); ++i) heights[i] = mesh.vertices[mesh.triangles[i].x].z;
+  auto begin = heights.begin();
+  for (unsigned i = 1; i < slabs; ++i) {
+    const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() * i / slabs);
+    std::nth_element(begin, middle, heights.end());
+    begin = middle;
+    const int z = static_cast<int>(std::lround((*middle - grid.origin.z) / grid.spacing));
+    bounds.push_back(std::clamp(z, bounds.back(), grid.nodes.z));
+  }
+  bounds.push_back(grid.nodes.z);
+  return bounds;
+}
+
+}  // namespace
+
+void scatter(const TriangleMesh& reference, DistanceGrid& grid, unsigned threads, Progress* progress) {
+  if (progress) progress->begin("measuring distances");
+  const std::size_t size = static_cast<std::size_t>(grid.pitch) * grid.nodes.y * grid.nodes.z;
+  const float band = static_cast<float>(grid.band);
+  grid.distance.assign(size, band * band);
+  grid.triangle.assign(size, DistanceGrid::kNone);
+  const auto kernel = simd_path() == Simd::avx2 ? splat_avx2 : splat_baseline;
+  const std::vector<int> bounds = slab_bounds(reference, grid, thread_count(threads));
+  parallel_for(bounds.size() - 1, 1, threads, [&](std::size_t slab, std::size_t) {
+    kernel(reference, grid, bounds[slab], bounds[slab + 1], progress);
+    float* const begin = grid.distance.data() + grid.index(0, 0, bounds[slab]);
+    float* const end = grid.distance.data() + grid.index(0, 0, bounds[slab + 1]);
+    for (float* d = begin; d != end; ++d) *d = std::sqrt(*d);
+  });
+}
+
+}  // namespace tolvol

@@ -1,0 +1,375 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Branch and bound over pieces of a, after M. Tang, M. Lee, Y. Kim, Interactive Hausdorff Distance Computation for
+// General Polygonal Models, 2009, with a sharper bound, a way to split that ends, and rounding inside the interval.
+//
+// Upper bound of a piece (a triangle). The distance to one triangle T of b is convex, so over the piece it is largest
+// at a corner: U = min over T of the largest distance of a corner to T, found by one search of the hierarchy. Lower
+// bound. The distance to b at any point of a. Splitting. Halving the longest edge brings a piece to the size of the
+// triangles near it. From there it is cut along the edges of the nearest one, by planes perpendicular to it: what lies
+// above T has its largest distance to T at a corner, and the corner is a point of a, so both bounds meet at once.
+// Halving alone would never end along the edges of b where two surfaces touch. Order. The pieces with the largest upper
+// bounds first, in batches of a fixed size, each piece of a batch seeing the lower bound from before it: nothing
+// depends on which thread is faster.
+//
+// Rounding. u = 2^-53; every point has |x| <= 1 in the frame, so that a difference of two is at most 2 long. One
+// operation on the three coordinates of a vector (sum, difference, product with a number) errs by at most u times the
+// length of its result. Powers of two, by which frame and hierarchy scale, are exact.
+// - Placing a vertex errs by u, so the distance between the surfaces changes by at most 2 u.
+// - A split at t <= 1/2 from the nearer end, p + t (q - p), errs by t 2 u, t 2 u and u: 3 u. The true pieces tile the
+// triangle,
+//   so Piece::error, 3 u for each split on the way, bounds how far their corners are from the stored ones.
+// - A witness a + v ab + w ac errs by 2 u (v + w) for the differences, as much for the products, and 2 u for the sums;
+// v + w may
+//   exceed 1 by 2 u, which puts it 4 u outside: 10 u. Its distance, at most 2, has a relative error below 4 u: 8 u.
+//   Together: true distance <= U + error + 20 u, kUpperMargin.
+// - For `lower` the nearest distance itself is not trusted, as a witness need not be the nearest point.
+// certified_distance
+//   separates p from each triangle T near it by a plane: |p - x| >= v . (p - x) / |v| for all x in T and any v, least
+//   at a corner. The difference and the dot product err by 4 u |v| 2, |v| and the quotient by 4 u 2: 16 u. The point p
+//   is off by the error of its piece, 3 u more for a centroid, and 2 u for placing. Together: kLowerMargin, 24 u.
+#include "measure/hausdorff.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "reference/errors.h"
+#include "reference/frame.h"
+#include "reference/hierarchy.h"
+#include "reference/parallel.h"
+
+namespace tolvol {
+namespace {
+
+using glm::dvec3;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kGap = 0.001;                       // of upper: when the interval is narrow
+constexpr double kSplitError = 3 * kUnitRoundoff;    // of one split
+constexpr double kUpperMargin = 20 * kUnitRoundoff;  // derived above, like the next
+constexpr double kLowerMargin = 24 * kUnitRoundoff;
+constexpr double kNoise = 256 * kUnitRoundoff;  // upper - lower below this is rounding: no use in going on
+constexpr double kCoarse = 4;         // a piece so many times longer than the triangle near it is halved, not cut
+constexpr std::size_t kSeeds = 4096;  // triangles asked for a first lower bound
+constexpr std::size_t kChunk = 16384, kBatch = 512;  // pieces that see the same lower bound
+constexpr std::size_t kBlock = 64, kSmallBlock = 8;  // pieces handed to a thread at once
+// The budget: an edge of b that crosses a triangle of a costs a few pieces, so that a subdivided copy needs about ten
+// for each of its triangles. 1 us and, while waiting, 150 bytes each.
+constexpr std::size_t kPieces = 4'000'000, kPiecesPerTriangle = 16;
+
+struct Piece {
+  std::array<dvec3, 3> corner;
+  double error = 0;
+  double upper = 0;
+  std::uint32_t triangle = 0;                // of a
+  std::uint32_t common = Hierarchy::kNone;   // triangle of b that gives `upper`
+  std::uint32_t nearest = Hierarchy::kNone;  // triangle of b nearest to the centroid
+};
+
+struct Sample {
+  double distance = -1;
+  dvec3 point{0};
+  double error = 0;
+  std::uint32_t triangle = 0;
+
+  void improve(const Sample& other) {
+    if (other.distance > distance) *this = other;
+  }
+};
+
+struct Children {
+  std::array<Piece, 3> piece;
+  int count = 0;
+};
+
+TriangleMesh placed(const TriangleMesh& mesh, const Frame& frame) {
+  TriangleMesh copy{std::vector<dvec3>(mesh.vertices.size()), mesh.triangles};
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) copy.vertices[i] = frame.from_world(mesh.vertices[i]);
+  return copy;
+}
+
+void add_used(Box& box, const TriangleMesh& mesh) {
+  for (const glm::uvec3& t : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) box.add(mesh.vertices[t[k]]);
+  }
+}
+
+/// A point between p and q, rounded by less than kSplitError.
+dvec3 between(const dvec3& p, const dvec3& q, double t) { return t <= 0.5 ? p + t * (q - p) : q + (1 - t) * (p - q); }
+
+dvec3 without(const dvec3& v, const dvec3& direction) {
+  const double length2 = glm::dot(direction, direction);
+  return length2 > 0 ? v - glm::dot(v, direction) / length2 * direction : v;
+}
+
+class Search {
+ public:
+  Search(const TriangleMesh& a, const TriangleMesh& b, double bound, const HausdorffOptions& options)
+      : a_(a), b_(b), hierarchy_(b), bound_(bound), options_(options) {}
+
+  void run() {
+    const std::size_t budget = kPieces + kPiecesPerTriangle * a_.triangles.size();
+    seed();
+    first_pass();
+    while (!queue_.empty() && queue_.front().upper > cutoff() && lower_ <= bound_ && pieces_ < budget) refine();
+  }
+
+  double lower() const { return lower_; }
+  double upper() const { return std::max(settled_, queue_.empty() ? 0 : queue_.front().upper); }
+  const Sample& farthest() const { return farthest_; }
+
+ private:
+  /// Pieces whose upper bound is no larger need no more work.
+  double cutoff() const {
+    const double narrow = lower_ / (1 - kGap);
+    return std::max(lower_ <= bound_ ? std::min(bound_, narrow) : narrow, lower_ + kNoise);
+  }
+
+  std::array<dvec3, 3> corners(const TriangleMesh& mesh, std::uint32_t i) const {
+    const glm::uvec3& t = mesh.triangles[i];
+    return {mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]};
+  }
+
+  void report(double fraction) const {
+    if (options_.progress) options_.progress->update(fraction);
+  }
+
+  /// A first lower bound from triangles spread over the mesh: the better it is, the more pieces end at once.
+  void seed() {
+    const std::size_t count = std::min(a_.triangles.size(), kSeeds);
+    std::vector<Sample> samples(count);
+    parallel_for(count, kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const auto triangle = std::uint32_t(i * a_.triangles.size() / count);
+        const std::array<dvec3, 3> p = corners(a_, triangle);
+        const Hierarchy::Nearest middle = hierarchy_.nearest((p[0] + p[1] + p[2]) / 3.0);
+        samples[i] = {middle.distance, (p[0] + p[1] + p[2]) / 3.0, 0, triangle};
+        for (const dvec3& corner : p) {
+          samples[i].improve({hierarchy_.nearest(corner, kInfinity, middle.triangle).distance, corner, 0, triangle});
+        }
+      }
+    });
+    learn(samples);
+  }
+
+  void first_pass() {
+    const std::size_t count = a_.triangles.size();
+    for (std::size_t chunk = 0; chunk < count; chunk += kChunk) {
+      const std::size_t chunk_end = std::min(chunk + kChunk, count);
+      std::vector<Piece> pieces(chunk_end - chunk);
+      std::vector<Sample> samples(pieces.size());
+      parallel_for(pieces.size(), kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
+        std::uint32_t hint = Hierarchy::kNone;
+        for (std::size_t i = begin; i < end; ++i) {
+          pieces[i].triangle = std::uint32_t(chunk + i);
+          pieces[i].corner = corners(a_, pieces[i].triangle);
+          pieces[i].common = hint;
+          samples[i] = evaluate(pieces[i]);
+          hint = pieces[i].common;
+        }
+      });
+      learn(samples);
+      for (const Piece& piece : pieces) keep(piece);
+      report(0.5 * double(chunk_end) / double(count));
+    }
+  }
+
+  void refine() {
+    std::vector<Piece> batch;
+    const double enough = cutoff();
+    while (batch.size() < kBatch && !queue_.empty() && queue_.front().upper > enough) {
+      std::pop_heap(queue_.begin(), queue_.end(), smaller);
+      batch.push_back(queue_.back());
+      queue_.pop_back();
+    }
+    std::vector<Children> children(batch.size());
+    std::vector<Sample> samples(batch.size());
+    parallel_for(batch.size(), kSmallBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        children[i] = split(batch[i]);
+        for (int k = 0; k < children[i].count; ++k) {
+          children[i].piece[k].common = batch[i].nearest;  // the piece cut off above that triangle ends with this guess
+          samples[i].improve(evaluate(children[i].piece[k]));
+        }
+      }
+    });
+    learn(samples);
+    for (const Children& family : children) {
+      for (int k = 0; k < family.count; ++k) keep(family.piece[k]);
+      pieces_ += family.count;
+    }
+    report(0.5 + 0.5 * std::min(1.0, lower_ / std::max(upper(), kNoise)));
+  }
+
+  static constexpr auto smaller = [](const Piece& x, const Piece& y) { return x.upper < y.upper; };
+
+  void keep(const Piece& piece) {
+    if (piece.upper <= cutoff()) {
+      settled_ = std::max(settled_, piece.upper);
+    } else {
+      queue_.push_back(piece);
+      std::push_heap(queue_.begin(), queue_.end(), smaller);
+    }
+  }
+
+  /// Sets upper, common and nearest of a piece; `common` is a guess before. Returns the best lower bound seen,
+  /// uncertified; none for a piece that is settled.
+  Sample evaluate(Piece& piece) const {
+    const double margin = kUpperMargin + piece.error, enough = cutoff();
+    const Hierarchy::Common common = hierarchy_.common(piece.corner, kInfinity, enough - margin, piece.common);
+    piece.common = common.triangle;
+    piece.upper = common.distance + margin;
+    Sample best;
+    if (piece.upper <= enough) return best;
+    const dvec3 middle = (piece.corner[0] + piece.corner[1] + piece.corner[2]) / 3.0;
+    const Hierarchy::Nearest nearest = hierarchy_.nearest(middle, kInfinity, common.triangle);
+    piece.nearest = nearest.triangle;
+    best = {nearest.distance, middle, piece.error, piece.triangle};
+    const std::array<dvec3, 3> t = corners(b_, common.triangle);
+    for (const dvec3& corner : piece.corner) {
+      if (std::sqrt(closest_point(corner, t[0], t[1], t[2]).distance_squared) <= std::max(lower_, best.distance))
+        continue;
+      best.improve(
+          {hierarchy_.nearest(corner, kInfinity, common.triangle).distance, corner, piece.error, piece.triangle});
+    }
+    return best;
+  }
+
+  void learn(const std::vector<Sample>& samples) {
+    Sample best;
+    for (const Sample& sample : samples) best.improve(sample);
+    if (best.distance <= lower_ && farthest_.distance >= 0) return;
+    const double certified = std::max(0.0, certified_distance(best.point) - kLowerMargin - best.error);
+    if (certified > lower_ || farthest_.distance < 0) lower_ = certified, farthest_ = best;
+  }
+
+  double certified_distance(const dvec3& p) const {
+    double bound = hierarchy_.nearest(p).distance;
+    hierarchy_.near(p, bound, [&](std::uint32_t i) { bound = std::min(bound, separation(p, corners(b_, i), bound)); });
+    return bound;
+  }
+
+  /// At most the distance of p from triangle t: the best of some separating planes, or the first that shows `enough`.
+  static double separation(const dvec3& p, const std::array<dvec3, 3>& t, double enough) {
+    double best = 0;
+    const auto along = [&](const dvec3& v) {
+      const double length = glm::length(v);
+      if (length < 1e-150) return;  // its square has lost its bits
+      best = std::max(best, std::min({glm::dot(v, p - t[0]), glm::dot(v, p - t[1]), glm::dot(v, p - t[2])}) / length);
+    };
+    const dvec3 r = p - closest_point(p, t[0], t[1], t[2]).point;
+    along(r);
+    if (best >= enough) return best;
+    // A short r has the direction of its rounding. Orthogonal to the edge (or the face) that the witness lies on it is
+    // sharp.
+    const std::array<dvec3, 3> edge{t[1] - t[0], t[2] - t[1], t[0] - t[2]};
+    int longest = 0;
+    for (int i = 0; i < 3; ++i) {
+      along(without(without(r, edge[i]), edge[i]));
+      if (glm::dot(edge[i], edge[i]) > glm::dot(edge[longest], edge[longest])) longest = i;
+    }
+    const dvec3 base = edge[longest], height = without(without(edge[(longest + 1) % 3], base), base);
+    along(without(without(without(without(r, base), height), base), height));
+    return best;
+  }
+
+  Children split(const Piece& piece) const {
+    const std::array<dvec3, 3> t = corners(b_, piece.nearest);
+    const double reach = std::max({glm::distance(t[0], t[1]), glm::distance(t[1], t[2]), glm::distance(t[2], t[0])});
+    int longest = 0;
+    std::array<double, 3> length;
+    for (int i = 0; i < 3; ++i) {
+      length[i] = glm::distance(piece.corner[i], piece.corner[(i + 1) % 3]);
+      if (length[i] > length[longest]) longest = i;
+    }
+    Children cut;
+    if (length[longest] <= kCoarse * reach) cut = cut_along(piece, t);
+    return cut.count > 0 ? cut : halves(piece, longest, 0.5);
+  }
+
+  /// Two pieces, apart at the point t of the edge from corner i to the next.
+  static Children halves(const Piece& piece, int i, double t) {
+    const int j = (i + 1) % 3;
+    const dvec3 middle = between(piece.corner[i], piece.corner[j], t);
+    Children children{{piece, piece, piece}, 2};
+    children.piece[0].corner[j] = middle;
+    children.piece[1].corner[i] = middle;
+    for (int k = 0; k < 2; ++k) children.piece[k].error += kSplitError;
+    return children;
+  }
+
+  /// Along the edge of t that divides the piece best, by the plane through it and perpendicular to t; none when no edge
+  /// does.
+  static Children cut_along(const Piece& piece, const std::array<dvec3, 3>& t) {
+    const dvec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
+    std::array<double, 3> side{};
+    double best = 0;
+    for (int e = 0; e < 3; ++e) {
+      const dvec3 outward = glm::cross(t[(e + 1) % 3] - t[e], normal);
+      const double norm = glm::length(outward);
+      if (!(norm > 0)) continue;
+      std::array<double, 3> s;
+      for (int i = 0; i < 3; ++i) s[i] = glm::dot(piece.corner[i] - t[e], outward) / norm;
+      const double depth = std::min(*std::max_element(s.begin(), s.end()), -*std::min_element(s.begin(), s.end()));
+      if (depth > best) best = depth, side = s;
+    }
+    if (best <= kNoise) return {};
+    int alone = 0;  // the corner on the one side, or one on the plane
+    for (int i = 0; i < 3; ++i) {
+      if (std::abs(side[i]) <= kNoise) side[i] = 0;
+    }
+    const auto share = [&](int i, int j) { return side[i] / (side[i] - side[j]); };
+    for (int i = 0; i < 3; ++i) {
+      if (side[i] == 0) return halves(piece, (i + 1) % 3, share((i + 1) % 3, (i + 2) % 3));
+      if (side[i] * side[(i + 1) % 3] < 0 && side[i] * side[(i + 2) % 3] < 0) alone = i;
+    }
+    const int i = alone, j = (alone + 1) % 3, k = (alone + 2) % 3;
+    const dvec3 on_j = between(piece.corner[i], piece.corner[j], share(i, j));
+    const dvec3 on_k = between(piece.corner[i], piece.corner[k], share(i, k));
+    Children children{{piece, piece, piece}, 3};
+    children.piece[0].corner = {piece.corner[i], on_j, on_k};
+    if (glm::distance(on_j, piece.corner[k]) < glm::distance(on_k, piece.corner[j])) {
+      children.piece[1].corner = {on_j, piece.corner[j], piece.corner[k]};
+      children.piece[2].corner = {on_j, piece.corner[k], on_k};
+    } else {
+      children.piece[1].corner = {on_j, piece.corner[j], on_k};
+      children.piece[2].corner = {on_k, piece.corner[j], piece.corner[k]};
+    }
+    for (Piece& child : children.piece) child.error += kSplitError;
+    return children;
+  }
+
+  const TriangleMesh &a_, &b_;
+  Hierarchy hierarchy_;
+  double bound_;
+  const HausdorffOptions& options_;
+  std::vector<Piece> queue_;  // a heap, the largest upper bound in front
+  double settled_ = 0;        // the largest upper bound of all pieces that left the queue
+  double lower_ = 0;
+  Sample farthest_;
+  std::size_t pieces_ = 0;
+};
+
+}  // namespace
+
+HausdorffInterval hausdorff(const TriangleMesh& a, const TriangleMesh& b, const HausdorffOptions& options) {
+  validate(a.vertices, a.triangles);
+  validate(b.vertices, b.triangles);
+  if (options.bound && !(*options.bound >= 0)) throw InvalidInput("bound is not a length of 0 or more");
+  if (options.progress) options.progress->begin("measuring");
+  Box box;
+  add_used(box, a);
+  add_used(box, b);
+  const Frame frame(box);
+  const TriangleMesh in_a = placed(a, frame), in_b = placed(b, frame);
+  Search search(in_a, in_b, options.bound ? *options.bound * frame.scale() : kInfinity, options);
+  search.run();
+  // One step outwards for the quotient: it is exact, but for results below the smallest normal number.
+  const Sample& farthest = search.farthest();
+  return {std::max(0.0, std::nextafter(search.lower() / frame.scale(), -kInfinity)),
+          std::nextafter(search.upper() / frame.scale(), kInfinity), frame.to_world(farthest.point), farthest.triangle};
+}
+
+}  // namespace tolvol

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Most changes are settled without looking at a piece: if all pieces of an element are within e of it and its points move by
+// at most m, they are within e + m of what it becomes (the same barycentric combination is the witness). Only when e + m passes
+// the tolerance are the pieces measured again, which usually brings e down.
+#include "operation/coverage.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tolvol {
+namespace {
+
+constexpr double kFloor = 0.1;  // of the tolerance: a shorter piece is not split further
+constexpr int kDeepest = 15;    // levels that 16-bit places hold
+
+FourPoints with_centre(const glm::dvec3 (&c)[3]) {
+  FourPoints points;
+  for (int k = 0; k < 3; ++k) points.set(k, c[k]);
+  points.set(3, (c[0] + c[1] + c[2]) * (1.0 / 3));
+  return points;
+}
+
+double longest_squared(const glm::dvec3 (&c)[3]) {
+  const glm::dvec3 e0 = c[1] - c[0], e1 = c[2] - c[1], e2 = c[0] - c[2];
+  return std::max({glm::dot(e0, e0), glm::dot(e1, e1), glm::dot(e2, e2)});
+}
+
+}  // namespace
+
+Coverage::Coverage(const TriangleMesh& reference, double within, std::size_t element_count)
+    : reference_(&reference), within_(within), within2_(within * within), lists_(element_count) {
+  pool_.reserve(reference.triangles.size() + reference.triangles.size() / 4);
+}
+
+void Coverage::corners(const Piece& piece, glm::dvec3 (&out)[3]) const {
+  const glm::uvec3 t = reference_->triangles[piece.triangle];
+  const glm::dvec3 &a = reference_->vertices[t.x], &b = reference_->vertices[t.y], &c = reference_->vertices[t.z];
+  if (piece.level == 0) {
+    out[0] = a, out[1] = b, out[2] = c;
+    return;
+  }
+  const double unit = std::ldexp(1.0, -piece.level);
+  const glm::dvec3 ab = (b - a) * unit, ac = (c - a) * unit;
+  const int i = piece.i, j = piece.j;
+  const auto at = [&](int s, int t) { return a + static_cast<double>(s) * ab + static_cast<double>(t) * ac; };
+  if (piece.reversed) {
+    out[0] = at(i + 1, j + 1), out[1] = at(i, j + 1), out[2] = at(i + 1, j);
+  } else {
+    out[0] = at(i, j), out[1] = at(i + 1, j), out[2] = at(i, j + 1);
+  }
+}
+
+void Coverage::split(const Piece& piece, std::vector<Piece>& out) {
+  const auto part = [&](int di, int dj, bool reversed) {
+    out.push_back({piece.triangle, static_cast<std::uint16_t>(2 * piece.i + di), static_cast<std::uint16_t>(2 * piece.j + dj),
+                   static_cast<std::uint8_t>(piece.level + 1), reversed, kNone});
+  };
+  if (piece.reversed) {
+    part(1, 1, true), part(0, 1, true), part(1, 0, true), part(1, 1, false);
+  } else {
+    part(0, 0, false), part(1, 0, false), part(0, 1, false), part(0, 0, true);
+  }
+}
+
+void Coverage::push(List& list, const Piece& piece) {
+  std::uint32_t at = free_;
+  if (at != kNone) {
+    free_ = pool_[at].next;
+    pool_[at] = piece;
+  } else {
+    at = static_cast<std::uint32_t>(pool_.size());
+    pool_.push_back(piece);
+  }
+  pool_[at].next = list.head;
+  if (list.head == kNone) list.tail = at;
+  list.head = at;
+}
+
+void Coverage::free(List& list) {
+  if (list.head == kNone) return;
+  pool_[list.tail].next = free_;
+  free_ = list.head;
+  list.head = list.tail = kNone;
+}
+
+void Coverage::own(std::uint32_t element, std::uint32_t triangle) { push(lists_[element], {triangle, 0, 0, 0, false, kNone}); }
+
+bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids, double provable,
+                      std::vector<std::uint32_t>& nearest) {
+  constexpr double kFinestFloor = 1e-3;  // of the tolerance: what an earlier decimation left close to its limit is found again
+  bool all = true;
+  stack_.assign(1, {triangle, 0, 0, 0, false, kNone});
+  std::uint32_t hint = Hierarchy::kNone;
+  while (!stack_.empty()) {
+    const Piece piece = stack_.back();
+    stack_.pop_back();
+    glm::dvec3 c[3];
+    corners(piece, c);
+    const Hierarchy::Common common = hierarchy.common(c, provable, -1, hint);
+    if (common.triangle != Hierarchy::kNone) {
+      hint = common.triangle;
+      const std::uint32_t element = ids[common.triangle];
+      if (element == kNone) continue;
+      List& list = lists_[element];
+      list.distance = std::max(list.distance, common.distance);
+      push(list, piece);
+      continue;
+    }
+    const glm::dvec3 centre = (c[0] + c[1] + c[2]) * (1.0 / 3);
+    const double floor = kFinestFloor * within_;
+    const Hierarchy::Nearest closest = hierarchy.nearest(centre, std::numeric_limits<double>::infinity(), hint);
+    if (closest.distance > provable || longest_squared(c) <= floor * floor || piece.level == kDeepest) {
+      nearest.push_back(closest.triangle);
+      all = false;
+    } else {
+      split(piece, stack_);
+    }
+  }
+  return all;
+}
+
+bool Coverage::place(const Piece& whole, std::uint32_t first) {
+  stack_.assign(1, whole);
+  while (!stack_.empty()) {
+    const Piece piece = stack_.back();
+    stack_.pop_back();
+    glm::dvec3 c[3];
+    corners(piece, c);
+    const FourPoints points = with_centre(c);
+    double centre2 = std::numeric_limits<double>::infinity();
+    const auto covered_by = [&](std::uint32_t i) {
+      double d2[4];
+      witness_distances(candidates_[i].witness, points, d2);
+      const double farthest2 = std::max({d2[0], d2[1], d2[2]});
+      centre2 = std::min(centre2, d2[3]);
+      if (!(farthest2 <= within2_)) return false;
+      candidates_[i].distance = std::max(candidates_[i].distance, std::sqrt(farthest2));
+      moved_.push_back({piece, i});
+      last_ = i;
+      return true;
+    };
+    // The element that took the last piece is as likely as the one that follows from the change.
+    const std::uint32_t second = last_;
+    if (covered_by(first) || (second != first && covered_by(second))) continue;
+    bool covered = false;
+    for (std::uint32_t i = 0; i < candidates_.size() && !covered; ++i) {
+      if (i != first && i != second) covered = covered_by(i);
+    }
+    if (covered) continue;
+    if (!(centre2 <= within2_) || longest_squared(c) <= kFloor * kFloor * within2_ || piece.level == kDeepest) {
+      gap_.point = {points.x[3], points.y[3], points.z[3]};
+      return false;
+    }
+    split(piece, stack_);
+  }
+  return true;
+}
+
+bool Coverage::try_change(std::span<const Element> elements, std::span<const Removed> removed) {
+  candidates_.clear();
+  heirlooms_.clear();
+  moved_.clear();
+  last_ = 0;
+  bool settled = true;
+  for (const Element& e : elements) {
+    const List& list = lists_[e.id];
+    const double distance = list.head == kNone ? 0 : list.distance + e.moved;
+    const bool keeps = distance <= within_;
+    settled &= keeps;
+    candidates_.push_back({e.id, {}, keeps ? distance : 0, !keeps});
+  }
+  for (const Removed& r : removed) {
+    const List& list = lists_[r.id];
+    const double distance = list.distance + r.moved;
+    const bool whole = list.head == kNone || distance <= within_;
+    settled &= whole;
+    if (whole && list.head != kNone) candidates_[r.heir].distance = std::max(candidates_[r.heir].distance, distance);
+    heirlooms_.push_back({r.id, r.heir, whole});
+  }
+  if (settled) return true;
+  for (std::size_t i = 0; i < elements.size(); ++i) {
+    candidates_[i].witness = {elements[i].corners[0], elements[i].corners[1], elements[i].corners[2]};
+  }
+  // What loses its element is the likeliest to fail.
+  for (const Heirloom& h : heirlooms_) {
+    if (h.whole) continue;
+    for (std::uint32_t p = lists_[h.id].head; p != kNone; p = pool_[p].next) {
+      if (!place(pool_[p], h.heir)) return false;
+    }
+  }
+  for (std::uint32_t i = 0; i < candidates_.size(); ++i) {
+    if (!candidates_[i].replaced) continue;
+    for (std::uint32_t p = lists_[candidates_[i].id].head; p != kNone; p = pool_[p].next) {
+      if (!place(pool_[p], i)) return false;
+    }
+  }
+  return true;
+}
+
+void Coverage::commit() {
+  for (const Heirloom& h : heirlooms_) {
+    if (!h.whole) free(lists_[h.id]);
+  }
+  for (const Candidate& c : candidates_) {
+    if (c.replaced) free(lists_[c.id]);
+    lists_[c.id].distance = c.distance;
+  }
+  for (const Heirloom& h : heirlooms_) {
+    List &from = lists_[h.id], &to = lists_[candidates_[h.heir].id];
+    if (!h.whole || from.head == kNone) continue;
+    pool_[from.tail].next = to.head;
+    if (to.head == kNone) to.tail = from.tail;
+    to.head = from.head;
+    from.head = from.tail = kNone;
+  }
+  for (const Moved& m : moved_) push(lists_[candidates_[m.element].id], m.piece);
+}
+
+}  // namespace tolvol

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The backward direction: every piece of the reference has one element of the current mesh (a face; for boundaries an edge) that
+/// is its witness, so that every point of the reference stays within the tolerance of the result.
+///
+/// The certificate with the roles exchanged: a piece whose three corners are within epsilon of one element is within epsilon
+/// of it as a whole. A change of the mesh must find a new witness for each piece of the elements it replaces, splitting pieces
+/// where one element does not do; one piece without a witness refuses the change.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "check/witness.h"
+#include "reference/hierarchy.h"
+#include "reference/triangle_mesh.h"
+
+namespace tolvol {
+
+class Coverage {
+ public:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+
+  /// An element as the change would leave it. Any point of it that the change carries along moves by at most `moved`.
+  struct Element {
+    std::uint32_t id;
+    glm::dvec3 corners[3];
+    double moved;
+  };
+  /// An element that the change removes: its points end up in the element at place `heir`, having moved by at most `moved`.
+  struct Removed {
+    std::uint32_t id;
+    std::uint32_t heir;
+    double moved;
+  };
+  /// Where a change failed: a point of the reference and the nearest of the elements' points.
+  struct Gap {
+    glm::dvec3 point, nearest;
+  };
+
+  /// `within`: the provable distance. Keeps a reference to `reference`.
+  Coverage(const TriangleMesh& reference, double within, std::size_t element_count);
+
+  /// A triangle of the reference that is the element itself.
+  void own(std::uint32_t element, std::uint32_t triangle);
+
+  /// Finds witnesses for a triangle of the reference among the triangles of a hierarchy; `ids[i]` is the element that triangle i
+  /// there is, kNone for one that never changes. Pieces farther than `provable` from all of them count no further; the nearest
+  /// triangles are added to `nearest`. Returns whether all of it is covered.
+  bool assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids, double provable,
+              std::vector<std::uint32_t>& nearest);
+
+  /// Whether all pieces of the elements named have witnesses among `elements`. Nothing changes until commit().
+  bool try_change(std::span<const Element> elements, std::span<const Removed> removed);
+  /// Carries out the last change tried, which must have succeeded.
+  void commit();
+  /// Of the last change that failed.
+  const Gap& gap() const { return gap_; }
+
+ private:
+  struct Piece {
+    std::uint32_t triangle;
+    std::uint16_t i, j;  ///< barycentric place in units of 2^-level: exact, so that the parts cover the whole exactly
+    std::uint8_t level;
+    bool reversed;
+    std::uint32_t next;
+  };
+  struct List {
+    std::uint32_t head = kNone, tail = kNone;
+    double distance = 0;  ///< every piece is within this of the element
+  };
+  struct Moved {
+    Piece piece;
+    std::uint32_t element;
+  };
+
+  void corners(const Piece& piece, glm::dvec3 (&out)[3]) const;
+  static void split(const Piece& piece, std::vector<Piece>& out);
+  bool place(const Piece& whole, std::uint32_t first);
+  void push(List& list, const Piece& piece);
+  void free(List& list);
+
+  const TriangleMesh* reference_;
+  double within_, within2_;
+  std::vector<List> lists_;
+  std::vector<Piece> pool_;
+  std::uint32_t free_ = kNone;
+
+  // The change under trial.
+  struct Candidate {
+    std::uint32_t id;
+    WitnessTriangle witness;
+    double distance;
+    bool replaced;  ///< its own pieces were looked at one by one
+  };
+  std::vector<Candidate> candidates_;
+  struct Heirloom {
+    std::uint32_t id, heir;
+    bool whole;  ///< passed on as it is
+  };
+  std::vector<Heirloom> heirlooms_;
+  std::vector<Moved> moved_;
+  std::vector<Piece> stack_;
+  std::uint32_t last_ = 0;
+  Gap gap_{};
+};
+
+}  // namespace tolvol

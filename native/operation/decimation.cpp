@@ -1,0 +1,338 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What surrounds the loop: certify the input, cut it to a manifold, set up the bounds that were asked for, and carry the result
+// back to the input's vertices, triangles and attributes.
+#include "operation/decimation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <unordered_map>
+
+#include "check/certificate.h"
+#include "operation/boundary.h"
+#include "operation/collapse_loop.h"
+#include "operation/manifold_cut.h"
+#include "operation/wedges.h"
+#include "reference/errors.h"
+
+namespace tolvol {
+namespace {
+
+constexpr std::uint32_t kNone = CutMesh::kNone;
+
+/// What the loop leaves of the tolerance unused, so that an independent measure, with rounding of its own, proves the
+/// result in finite time. Costs no triangles to speak of.
+constexpr double kHeadroom = 1e-4;
+
+class Decimation {
+ public:
+  Decimation(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const Placement& placement,
+             const ToleranceVolume* volume, const DecimationOptions& options)
+      : vertices_(vertices), triangles_(triangles), volume_(volume), options_(options), placement_(placement) {
+    validate(vertices, triangles);
+    if (!volume && options.target_triangles == 0) throw InvalidInput("without a volume a target is needed");
+    if (!options.locked.empty() && options.locked.size() != vertices.size()) {
+      throw InvalidInput("locked must have one value for each vertex");
+    }
+    if (!options.wedges.empty() && options.wedges.size() != 3 * triangles.size()) {
+      throw InvalidInput("wedges must have one label for each corner of each triangle");
+    }
+    placement_ = placement.in(volume ? volume->frame() : own_frame());
+  }
+
+  DecimationResult run() {
+    cut_ = cut_to_manifold(vertices_, triangles_);
+    positions_.resize(cut_.vertex_input.size());
+    for (std::size_t v = 0; v < positions_.size(); ++v) positions_[v] = placement_.frame(vertices_[cut_.vertex_input[v]]);
+    pin();
+    CollapseBounds bounds;
+    if (volume_) bounds = set_bounds();
+    CollapseLoop loop(loop_input(), bounds);
+    const std::size_t apart = cut_.aside.size();
+    loop.run(options_.target_triangles > apart ? options_.target_triangles - apart : 0, options_.progress);
+    result_.stopped_at_target =
+        options_.target_triangles > 0 && loop.triangle_count() + apart <= options_.target_triangles;
+    write(loop);
+    take_attributes(loop);
+    report();
+    return std::move(result_);
+  }
+
+ private:
+  Frame own_frame() const {
+    Box world;
+    for (const glm::dvec3& p : vertices_) world.add(placement_.world(p));
+    return Frame(world);
+  }
+
+  void pin() {
+    pinned_.resize(cut_.vertex_input.size());
+    for (std::size_t v = 0; v < pinned_.size(); ++v) pinned_[v] = cut_.cause[v] != CutCause::none;
+    if (options_.locked.empty()) return;
+    for (std::size_t i = 0; i < vertices_.size(); ++i) {
+      if (options_.locked[i] && cut_.input_vertex[i] != kNone) pin(cut_.input_vertex[i], "asked for");
+    }
+  }
+
+  void pin(std::uint32_t vertex, const std::string& cause) {
+    if (!pinned_[vertex]) ++result_.locked[cause];
+    pinned_[vertex] = true;
+  }
+
+  bool input_is_reference() const {
+    const TriangleMesh& reference = volume_->reference();
+    if (reference.vertices.size() != vertices_.size() || reference.triangles.size() != triangles_.size()) return false;
+    if (!std::equal(triangles_.begin(), triangles_.end(), reference.triangles.begin())) return false;
+    for (std::size_t i = 0; i < vertices_.size(); ++i) {
+      if (placement_.frame(vertices_[i]) != reference.vertices[i]) return false;
+    }
+    return true;
+  }
+
+  CollapseBounds set_bounds() {
+    std::vector<glm::dvec3> used;
+    for (const std::uint32_t i : cut_.vertex_input) used.push_back(vertices_[i]);
+    check_storage(used);
+    const double mapping_error = placement_.mapping_error(used);
+    const double provable = volume_->provable(mapping_error), within = provable * (1 - kHeadroom);
+    identical_ = input_is_reference();
+    if (!identical_) certify_input(mapping_error);
+
+    CollapseBounds bounds;
+    forward_.emplace(volume_->reference(), volume_->grid(), volume_->hierarchy(), within, volume_->refutable(mapping_error));
+    bounds.forward = &*forward_;
+    if (options_.two_sided) {
+      backward_.emplace(volume_->reference(), within, cut_.triangles.size());
+      cover(provable);
+      bounds.backward = &*backward_;
+    } else {
+      boundary_.emplace(*volume_, cut_, positions_, within, provable);
+      for (const std::uint32_t v : boundary_->uncertified()) pin(v, "boundary not near the reference's boundary");
+      if (boundary_->any()) {
+        bounds.boundary_forward = &boundary_->forward();
+        bounds.boundary_backward = &boundary_->backward();
+      }
+    }
+    return bounds;
+  }
+
+  void check_storage(std::span<const glm::dvec3> used) {
+    const double share = placement_.storage_step(used) / volume_->frame_tolerance();
+    std::ostringstream text;
+    text << "at these coordinates the stored type rounds positions by up to " << 100 * share << " % of the tolerance; "
+         << "move the mesh nearer to its origin or take a larger tolerance";
+    if (share > 0.5) throw InvalidInput(text.str());
+    if (share > 0.01) result_.warnings.push_back(text.str());
+  }
+
+  void certify_input(double mapping_error) {
+    const std::vector<glm::dvec3> in_frame = placement_.frame(vertices_);
+    std::vector<std::uint32_t> indices;
+    indices.reserve(3 * triangles_.size());
+    for (const glm::uvec3& t : triangles_) indices.insert(indices.end(), {t.x, t.y, t.z});
+    const std::vector<Verdict> verdicts =
+        Certificate(*volume_).check({in_frame, indices, 3, mapping_error}, {options_.threads, options_.progress});
+    for (std::uint32_t i = 0; i < verdicts.size(); ++i) {
+      if (verdicts[i] == Verdict::inside) continue;
+      ++result_.outside_faces;
+      if (!result_.first_outside) result_.first_outside = i;
+      for (int k = 0; k < 3; ++k) pin(cut_.input_vertex[triangles_[i][k]], "outside the tolerance");
+    }
+    if (result_.outside_faces && options_.outside == DecimationOptions::Outside::error) {
+      std::ostringstream text;
+      text << result_.outside_faces << " faces are not within the tolerance of the reference, the first is face "
+           << *result_.first_outside << "; take a larger tolerance, set the reference anew, or keep them (outside=\"keep\")";
+      throw InvalidInput(text.str());
+    }
+  }
+
+  /// First witnesses for every triangle of the reference.
+  void cover(double provable) {
+    if (identical_) {
+      std::vector<std::uint32_t> element_of(triangles_.size(), kNone);
+      for (std::uint32_t t = 0; t < cut_.triangle_input.size(); ++t) element_of[cut_.triangle_input[t]] = t;
+      for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
+        const std::uint32_t element = element_of[cut_.stand_in[i]];
+        if (element != kNone) backward_->own(element, i);  // what is set aside never changes and covers itself
+      }
+      return;
+    }
+    TriangleMesh elements{positions_, cut_.triangles};
+    std::vector<std::uint32_t> ids(cut_.triangles.size());
+    for (std::uint32_t i = 0; i < ids.size(); ++i) ids[i] = i;
+    for (const std::uint32_t i : cut_.aside) {
+      elements.triangles.emplace_back(cut_.input_vertex[triangles_[i].x], cut_.input_vertex[triangles_[i].y],
+                                      cut_.input_vertex[triangles_[i].z]);
+      ids.push_back(kNone);
+    }
+    const Hierarchy hierarchy(elements);
+    std::vector<std::uint32_t> nearest;
+    std::size_t uncovered = 0, first = 0;
+    for (std::uint32_t i = 0; i < volume_->reference().triangles.size(); ++i) {
+      if (!backward_->assign(i, hierarchy, ids, provable, nearest) && uncovered++ == 0) first = i;
+    }
+    if (uncovered && options_.outside == DecimationOptions::Outside::error) {
+      std::ostringstream text;
+      text << uncovered << " faces of the reference are not within the tolerance of the mesh, the first is face " << first
+           << "; take a larger tolerance, set the reference anew, keep one direction only (two_sided=False), or go on from "
+           << "what there is (outside=\"keep\")";
+      throw InvalidInput(text.str());
+    }
+    for (const std::uint32_t t : nearest) {
+      for (int k = 0; k < 3; ++k) pin(elements.triangles[t][k], "outside the tolerance");
+    }
+  }
+
+  CollapseInput loop_input() {
+    CollapseInput input;
+    input.triangles = cut_.triangles;
+    input.positions = positions_;
+    input.pinned = pinned_;
+    if (!options_.wedges.empty()) {
+      // Labels name wedges at one input vertex; vertices welded from several hold those of all of them.
+      std::unordered_map<std::uint64_t, std::uint32_t> dense;
+      for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
+        glm::uvec3 wedges;
+        for (int k = 0; k < 3; ++k) {
+          const std::uint32_t corner = input_corner(t, k);
+          const std::uint64_t key =
+              (static_cast<std::uint64_t>(triangles_[corner / 3][corner % 3]) << 32) | options_.wedges[corner];
+          wedges[k] = dense.try_emplace(key, static_cast<std::uint32_t>(dense.size())).first->second;
+        }
+        input.wedges.push_back(wedges);
+      }
+      islands_ = island_labels(cut_.triangles, input.wedges);
+    }
+    input.subset = options_.vertices == DecimationOptions::Vertices::subset;
+    input.store = [this](const glm::dvec3& p) { return placement_.frame(placement_.store(p)); };
+    return input;
+  }
+
+  /// The input corner, as 3 * triangle + corner, of a corner of the cut mesh.
+  std::uint32_t input_corner(std::uint32_t triangle, int corner) const {
+    const int k = cut_.reversed[triangle] && corner != 0 ? 3 - corner : corner;
+    return 3 * cut_.triangle_input[triangle] + static_cast<std::uint32_t>(k);
+  }
+
+  void write(const CollapseLoop& loop) {
+    // Result vertices in the order of the input vertices that they continue.
+    std::vector<std::uint32_t> order;
+    std::vector<std::uint32_t> used(positions_.size(), kNone);
+    const auto slot = [&](std::uint32_t v) { return cut_.output_slot[loop.survivor(v)]; };
+    const auto use = [&](std::uint32_t s) {
+      if (used[s] == kNone) used[s] = 0, order.push_back(s);
+    };
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> kept;  // (input triangle, triangle of the cut mesh or kNone)
+    for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
+      if (loop.alive(t)) kept.emplace_back(cut_.triangle_input[t], t);
+    }
+    for (const std::uint32_t i : cut_.aside) kept.emplace_back(i, kNone);
+    std::sort(kept.begin(), kept.end());
+    for (const auto& [input, t] : kept) {
+      for (int k = 0; k < 3; ++k) use(slot(cut_.input_vertex[triangles_[input][k]]));
+    }
+    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return cut_.vertex_input[a] < cut_.vertex_input[b]; });
+    for (std::uint32_t i = 0; i < order.size(); ++i) {
+      const std::uint32_t v = order[i];
+      used[v] = i;
+      const std::uint32_t source = cut_.vertex_input[v];
+      result_.vertex_source.push_back(source);
+      result_.vertices.push_back(loop.moved(v) ? placement_.store(loop.position(v)) : vertices_[source]);
+    }
+    for (const auto& [input, t] : kept) {
+      glm::uvec3 triangle;
+      for (int k = 0; k < 3; ++k) triangle[k] = used[slot(cut_.input_vertex[triangles_[input][k]])];
+      result_.triangles.push_back(triangle);
+      result_.triangle_source.push_back(input);
+      kept_.push_back(t);
+    }
+    result_.vertex_map.assign(vertices_.size(), -1);
+    for (std::size_t i = 0; i < vertices_.size(); ++i) {
+      if (cut_.input_vertex[i] == kNone) continue;
+      result_.vertex_map[i] = static_cast<std::int32_t>(used[slot(cut_.input_vertex[i])]);
+    }
+  }
+
+  void take_attributes(const CollapseLoop& loop) {
+    const glm::dmat3 unit(1);
+    std::vector<std::uint32_t> any_corner(positions_.size(), kNone);
+    for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
+      for (int k = 0; k < 3; ++k) {
+        std::uint32_t& corner = any_corner[cut_.triangles[t][k]];
+        if (corner == kNone) corner = 3 * t + static_cast<std::uint32_t>(k);
+      }
+    }
+    std::optional<Hierarchy> own;
+    const Hierarchy* hierarchy = nullptr;
+    const TriangleMesh input{positions_, cut_.triangles};
+    for (std::size_t i = 0; i < kept_.size(); ++i) {
+      glm::uvec3 triangle(result_.triangle_source[i]);
+      glm::dmat3 weights = unit;
+      for (int k = 0; k < 3 && kept_[i] != kNone; ++k) {
+        const std::uint32_t t = kept_[i];
+        const int corner = cut_.reversed[t] && k != 0 ? 3 - k : k;
+        const std::uint32_t v = loop.survivor(cut_.triangles[t][corner]);
+        if (!loop.moved(v)) {
+          const std::uint32_t source = islands_.empty() ? any_corner[v] : loop.corner_source(t, corner);
+          const std::uint32_t original = input_corner(source / 3, static_cast<int>(source % 3));
+          triangle[k] = original / 3;
+          weights[k] = unit[static_cast<int>(original % 3)];
+          continue;
+        }
+        if (!hierarchy) hierarchy = &own.emplace(input);
+        const Hierarchy::Nearest nearest = hierarchy->nearest_if(
+            loop.position(v), [&](std::uint32_t other) { return islands_.empty() || islands_[other] == islands_[t]; });
+        triangle[k] = cut_.triangle_input[nearest.triangle];
+        weights[k] = nearest.weights;
+        if (cut_.reversed[nearest.triangle]) std::swap(weights[k].y, weights[k].z);
+      }
+      result_.source_triangle.push_back(triangle);
+      result_.source_weights.push_back(weights);
+    }
+  }
+
+  void report() {
+    const auto repair = [&](std::size_t count, const char* kind, const char* message) {
+      if (count) result_.repairs.push_back({kind, count, std::to_string(count) + " " + message});
+    };
+    repair(cut_.duplicates, "duplicate", "exact duplicate faces dropped");
+    repair(cut_.degenerate_on_edge, "degenerate", "degenerate faces on an edge of another face dropped");
+    repair(cut_.aside.size(), "kept_degenerate", "degenerate faces kept as they are");
+    repair(cut_.welded, "welded", "vertices at exactly the position of another joined to it");
+    repair(cut_.cut_edges, "cut", "non-manifold edges held in place");
+    repair(cut_.reversed_count, "misoriented", "faces against their neighbours' orientation, kept so");
+    std::size_t unused = 0;
+    for (const std::uint32_t v : cut_.input_vertex) unused += v == kNone;
+    repair(unused, "unused", "vertices that no face uses are not part of the result");
+    for (const CutCause cause : cut_.cause) {
+      if (cause == CutCause::non_manifold) ++result_.locked["non-manifold"];
+      if (cause == CutCause::degenerate) ++result_.locked["degenerate face"];
+    }
+  }
+
+  std::span<const glm::dvec3> vertices_;
+  std::span<const glm::uvec3> triangles_;
+  const ToleranceVolume* volume_;
+  const DecimationOptions& options_;
+  Placement placement_;
+
+  CutMesh cut_;
+  std::vector<glm::dvec3> positions_;  // of the cut mesh, in the frame
+  std::vector<bool> pinned_;
+  std::vector<std::uint32_t> islands_;  // per triangle of the cut mesh; empty without wedges
+  bool identical_ = false;              // the input is the reference itself
+  std::optional<TriangleCertificate> forward_;
+  std::optional<Coverage> backward_;
+  std::optional<BoundaryBounds> boundary_;
+  std::vector<std::uint32_t> kept_;     // per result triangle: its triangle in the cut mesh
+  DecimationResult result_;
+};
+
+}  // namespace
+
+DecimationResult decimate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
+                          const Placement& placement, const ToleranceVolume* volume, const DecimationOptions& options) {
+  return Decimation(vertices, triangles, placement, volume, options).run();
+}
+
+}  // namespace tolvol

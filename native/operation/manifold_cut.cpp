@@ -1,0 +1,309 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The "local" method of Guéziec et al.: mark the edges to cut, then let the corners that stay connected through uncut edges
+// form the vertices. Deviations: edges are matched in two passes (index, then position), orientation is made consistent on
+// the way, and triangles are cut off whole in the rare case that two distinct edges would end in the same two vertices.
+#include "operation/manifold_cut.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "reference/triangle_mesh.h"
+#include "reference/union_find.h"
+
+namespace tolvol {
+namespace {
+
+constexpr std::uint32_t kNone = CutMesh::kNone;
+
+/// A side is the edge of triangle side / 3 from corner side % 3 to the next.
+using Side = std::uint32_t;
+Side next_corner(Side s) { return s % 3 == 2 ? s - 2 : s + 1; }
+
+std::uint64_t pair_key(std::uint32_t a, std::uint32_t b) {
+  return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
+}
+
+class Cutter {
+ public:
+  Cutter(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles)
+      : input_(triangles), weld_(weld_equal_positions(vertices)) {
+    cut_.stand_in.resize(triangles.size());
+    std::iota(cut_.stand_in.begin(), cut_.stand_in.end(), 0u);
+    const std::vector<bool> used = used_vertices(vertices.size(), triangles);
+    for (std::size_t i = 0; i < vertices.size(); ++i) cut_.welded += used[i] && weld_[i] != i && used[weld_[i]];
+  }
+
+  CutMesh run(std::size_t vertex_count) {
+    sort_out_triangles();
+    mate_.assign(3 * triangles_.size(), kNone);
+    is_cut_.assign(3 * triangles_.size(), false);
+    join_sides();
+    orient();
+    while (!form_vertices()) {
+    }
+    write(vertex_count);
+    return std::move(cut_);
+  }
+
+ private:
+  /// The weld representative of a corner's vertex, and the vertex itself. Corners in the input's order.
+  std::uint32_t welded(Side corner) const { return weld_[vertex(corner)]; }
+  std::uint32_t vertex(Side corner) const { return input_[triangles_[corner / 3]][corner % 3]; }
+
+  void sort_out_triangles() {
+    struct Hash {
+      std::size_t operator()(const std::array<std::uint32_t, 3>& t) const {
+        std::uint64_t h = t[0];
+        h = h * 0x9E3779B97F4A7C15u + t[1];
+        h = h * 0x9E3779B97F4A7C15u + t[2];
+        return h ^ (h >> 29);
+      }
+    };
+    std::unordered_map<std::array<std::uint32_t, 3>, std::uint32_t, Hash> seen(input_.size() * 2);
+    std::vector<std::uint32_t> degenerate;
+    for (std::uint32_t i = 0; i < input_.size(); ++i) {
+      std::array<std::uint32_t, 3> t{weld_[input_[i].x], weld_[input_[i].y], weld_[input_[i].z]};
+      std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+      if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) {
+        degenerate.push_back(i);
+      } else if (const auto [first, added] = seen.try_emplace(t, i); added) {
+        triangles_.push_back(i);
+      } else {
+        cut_.stand_in[i] = first->second;
+        ++cut_.duplicates;
+      }
+    }
+    if (!degenerate.empty()) sort_out_degenerate(degenerate);
+  }
+
+  void sort_out_degenerate(const std::vector<std::uint32_t>& degenerate) {
+    std::unordered_map<std::uint64_t, std::uint32_t> holder;  // an edge, or a point as (p, p): a triangle that has it
+    for (const std::uint32_t i : triangles_) {
+      for (int k = 0; k < 3; ++k) {
+        const std::uint32_t a = weld_[input_[i][k]], b = weld_[input_[i][(k + 1) % 3]];
+        holder.try_emplace(pair_key(a, b), i);
+        holder.try_emplace(pair_key(a, a), i);
+      }
+    }
+    for (const std::uint32_t i : degenerate) {
+      const std::uint32_t a = weld_[input_[i].x], b = weld_[input_[i].y], c = weld_[input_[i].z];
+      const auto found = holder.find(pair_key(a, a == b ? c : b));
+      if (found != holder.end()) {
+        cut_.stand_in[i] = found->second;
+        ++cut_.degenerate_on_edge;
+      } else {
+        cut_.aside.push_back(i);
+      }
+    }
+  }
+
+  /// Sides by their key, those with the same key in a row, in ascending order of side.
+  template <class Key>
+  std::vector<std::pair<std::uint64_t, Side>> sorted_sides(Key&& key) const {
+    std::vector<std::pair<std::uint64_t, Side>> sides;
+    sides.reserve(mate_.size());
+    for (Side s = 0; s < mate_.size(); ++s) {
+      if (mate_[s] == kNone && !is_cut_[s]) sides.emplace_back(key(s), s);
+    }
+    std::sort(sides.begin(), sides.end());
+    return sides;
+  }
+
+  template <class Visit>
+  static void for_each_run(const std::vector<std::pair<std::uint64_t, Side>>& sides, Visit&& visit) {
+    for (std::size_t begin = 0, end; begin < sides.size(); begin = end) {
+      for (end = begin + 1; end < sides.size() && sides[end].first == sides[begin].first;) ++end;
+      visit(std::span(sides).subspan(begin, end - begin));
+    }
+  }
+
+  void join_sides() {
+    for (const bool by_position : {false, true}) {
+      const auto sides = sorted_sides([&](Side s) {
+        return by_position ? pair_key(welded(s), welded(next_corner(s))) : pair_key(vertex(s), vertex(next_corner(s)));
+      });
+      for_each_run(sides, [&](auto run) {
+        if (run.size() == 2) {
+          mate_[run[0].second] = run[1].second;
+          mate_[run[1].second] = run[0].second;
+        } else if (run.size() > 2) {
+          for (const auto& side : run) is_cut_[side.second] = true;
+          ++cut_.cut_edges;
+        }
+      });
+    }
+  }
+
+  void cut_side(Side s) {
+    const Side other = mate_[s];
+    if (other == kNone) return;
+    mate_[s] = mate_[other] = kNone;
+    is_cut_[s] = is_cut_[other] = true;
+    ++cut_.cut_edges;
+  }
+
+  void orient() {
+    flip_.assign(triangles_.size(), false);
+    std::vector<bool> seen(triangles_.size(), false);
+    std::vector<std::uint32_t> queue;
+    for (std::uint32_t seed = 0; seed < triangles_.size(); ++seed) {
+      if (seen[seed]) continue;
+      seen[seed] = true;
+      queue.assign(1, seed);
+      std::size_t flipped = 0;
+      for (std::size_t at = 0; at < queue.size(); ++at) {
+        const std::uint32_t t = queue[at];
+        for (Side s = 3 * t; s < 3 * t + 3; ++s) {
+          const Side other = mate_[s];
+          if (other == kNone) continue;
+          const bool opposed = welded(s) == welded(next_corner(other));  // as neighbours should be
+          const bool flip = flip_[t] != !opposed;
+          if (!seen[other / 3]) {
+            seen[other / 3] = true;
+            flip_[other / 3] = flip;
+            flipped += flip;
+            queue.push_back(other / 3);
+          } else if (flip_[other / 3] != flip) {
+            cut_side(s);  // one-sided, like a Möbius strip
+          }
+        }
+      }
+      cut_.reversed_count += std::min(flipped, queue.size() - flipped);
+    }
+  }
+
+  /// Corners connected through uncut edges form the vertices. False when two different edges ended in the same two vertices:
+  /// their triangles were cut off, and the vertices must be formed anew.
+  bool form_vertices() {
+    UnionFind corners(mate_.size());
+    for (Side s = 0; s < mate_.size(); ++s) {
+      const Side other = mate_[s];
+      if (other == kNone || other < s) continue;
+      const bool opposed = welded(s) == welded(next_corner(other));
+      corners.join(s, opposed ? next_corner(other) : other);
+      corners.join(next_corner(s), opposed ? other : next_corner(other));
+    }
+    corner_vertex_.resize(mate_.size());
+    for (Side s = 0; s < mate_.size(); ++s) corner_vertex_[s] = corners.find(s);
+
+    std::vector<std::pair<std::uint64_t, Side>> sides;
+    sides.reserve(mate_.size());
+    for (Side s = 0; s < mate_.size(); ++s) {
+      sides.emplace_back(pair_key(corner_vertex_[s], corner_vertex_[next_corner(s)]), s);
+    }
+    std::sort(sides.begin(), sides.end());
+    std::vector<std::uint32_t> offenders;
+    for_each_run(sides, [&](auto run) {
+      if (run.size() > 2 || (run.size() == 2 && mate_[run[0].second] != run[1].second)) {
+        for (const auto& side : run) offenders.push_back(side.second / 3);
+      }
+    });
+    for (const std::uint32_t t : offenders) {
+      for (Side s = 3 * t; s < 3 * t + 3; ++s) {
+        cut_side(s);
+        is_cut_[s] = true;
+      }
+    }
+    return offenders.empty();
+  }
+
+  void write(std::size_t vertex_count) {
+    std::vector<std::uint32_t> dense(mate_.size(), kNone);  // union root -> vertex
+    cut_.input_vertex.assign(vertex_count, kNone);
+    std::vector<bool> several(vertex_count, false);  // input vertices that became several
+    for (Side s = 0; s < mate_.size(); ++s) {
+      std::uint32_t& v = dense[corner_vertex_[s]];
+      if (v == kNone) {
+        v = static_cast<std::uint32_t>(cut_.vertex_input.size());
+        cut_.vertex_input.push_back(vertex(s));
+      }
+      cut_.vertex_input[v] = std::min(cut_.vertex_input[v], vertex(s));
+      std::uint32_t& of_input = cut_.input_vertex[vertex(s)];
+      if (of_input != kNone && of_input != v) several[vertex(s)] = true;
+      if (of_input == kNone) of_input = v;
+    }
+    cut_.cause.assign(cut_.vertex_input.size(), CutCause::none);
+    std::unordered_set<std::uint32_t> tied;  // positions (weld representatives) of degenerate triangles set aside
+    for (const std::uint32_t i : cut_.aside) {
+      for (int k = 0; k < 3; ++k) tied.insert(weld_[input_[i][k]]);
+    }
+    for (Side s = 0; s < mate_.size(); ++s) {
+      const std::uint32_t v = dense[corner_vertex_[s]];
+      if (!tied.empty() && cut_.cause[v] == CutCause::none && tied.contains(welded(s))) cut_.cause[v] = CutCause::degenerate;
+      if (several[vertex(s)]) cut_.cause[v] = CutCause::non_manifold;
+      if (is_cut_[s]) {
+        cut_.cause[v] = CutCause::non_manifold;
+        cut_.cause[dense[corner_vertex_[next_corner(s)]]] = CutCause::non_manifold;
+      }
+    }
+    for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
+      glm::uvec3 corners(dense[corner_vertex_[3 * t]], dense[corner_vertex_[3 * t + 1]], dense[corner_vertex_[3 * t + 2]]);
+      if (flip_[t]) std::swap(corners.y, corners.z);
+      cut_.triangles.push_back(corners);
+    }
+    cut_.triangle_input = triangles_;
+    cut_.reversed = flip_;
+    add_aside_vertices();
+    join_slots();
+  }
+
+  /// Triangles set aside need vertices that outlive the decimation: tied ones of the manifold where there are any.
+  void add_aside_vertices() {
+    std::unordered_map<std::uint32_t, std::uint32_t> at_position;
+    for (std::uint32_t v = 0; v < cut_.vertex_input.size(); ++v) {
+      if (cut_.cause[v] != CutCause::none) at_position.try_emplace(weld_[cut_.vertex_input[v]], v);
+    }
+    for (const std::uint32_t i : cut_.aside) {
+      for (int k = 0; k < 3; ++k) {
+        const std::uint32_t input = input_[i][k];
+        if (cut_.input_vertex[input] != kNone) continue;
+        const auto [entry, added] =
+            at_position.try_emplace(weld_[input], static_cast<std::uint32_t>(cut_.vertex_input.size()));
+        if (added) {
+          cut_.vertex_input.push_back(input);
+          cut_.cause.push_back(CutCause::degenerate);
+        }
+        cut_.input_vertex[input] = entry->second;
+      }
+    }
+    // Input vertices that only dropped triangles use follow the vertex at their position.
+    std::unordered_map<std::uint32_t, std::uint32_t> any;
+    for (std::uint32_t i = 0; i < cut_.input_vertex.size(); ++i) {
+      if (cut_.input_vertex[i] != kNone) any.try_emplace(weld_[i], cut_.input_vertex[i]);
+    }
+    for (const glm::uvec3& t : input_) {
+      for (int k = 0; k < 3; ++k) {
+        if (cut_.input_vertex[t[k]] == kNone) cut_.input_vertex[t[k]] = any.at(weld_[t[k]]);
+      }
+    }
+  }
+
+  void join_slots() {
+    std::unordered_map<std::uint32_t, std::uint32_t> slot_at;
+    cut_.output_slot.resize(cut_.vertex_input.size());
+    for (std::uint32_t v = 0; v < cut_.output_slot.size(); ++v) {
+      cut_.output_slot[v] =
+          cut_.cause[v] == CutCause::none ? v : slot_at.try_emplace(weld_[cut_.vertex_input[v]], v).first->second;
+    }
+  }
+
+  std::span<const glm::uvec3> input_;
+  std::vector<std::uint32_t> weld_;
+  std::vector<std::uint32_t> triangles_;      // input triangles that go into the manifold
+  std::vector<Side> mate_;                    // per side: the side joined to it
+  std::vector<bool> is_cut_;                  // per side: cut, so that its vertices are tied
+  std::vector<bool> flip_;
+  std::vector<std::uint32_t> corner_vertex_;  // per corner: the root of its union
+  CutMesh cut_;
+};
+
+}  // namespace
+
+CutMesh cut_to_manifold(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles) {
+  return Cutter(vertices, triangles).run(vertices.size());
+}
+
+}  // namespace tolvol

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// NumPy arrays in and out, checked at the border: dtype, shape, index range. Errors name the argument and what it should be.
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+#include "reference/frame.h"
+
+namespace tolvol::python {
+
+namespace py = pybind11;
+
+/// (n, 3) float32 or float64.
+struct Vertices {
+  std::vector<glm::dvec3> values;
+  Storage storage;
+};
+Vertices to_vertices(const py::object& array, const std::string& name);
+
+/// (m, 3) of any integer type; negative values are refused, large ones by the native validation.
+std::vector<glm::uvec3> to_triangles(const py::object& array, const std::string& name);
+
+/// (m, k) of any integer type, k from 1 to 4, flat; `corners` is set to k.
+std::vector<std::uint32_t> to_faces(const py::object& array, const std::string& name, int& corners);
+
+/// (n,) of any integer type.
+std::vector<std::int32_t> to_labels(const py::object& array, const std::string& name);
+
+/// (4, 4), row-major as NumPy writes it; None is the identity.
+glm::dmat4 to_matrix(const py::object& array);
+
+py::array from_vertices(const std::vector<glm::dvec3>& values, Storage storage);
+py::array_t<std::int32_t> from_triangles(const std::vector<glm::uvec3>& values);
+
+template <class T, class U>
+py::array_t<T> from_vector(const std::vector<U>& values) {
+  py::array_t<T> array(static_cast<py::ssize_t>(values.size()));
+  T* out = array.mutable_data();
+  for (std::size_t i = 0; i < values.size(); ++i) out[i] = static_cast<T>(values[i]);
+  return array;
+}
+
+}  // namespace tolvol::python

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "python/module.h"
+#include "reference/progress.h"
+
+namespace tolvol::python {
+
+void bind_progress(pybind11::module_& module) {
+  namespace py = pybind11;
+  py::class_<Progress>(module, "Progress", py::module_local(),
+                       "What a long call shows to another thread, and how that thread stops it. Poll it; there are no callbacks.")
+      .def(py::init<>())
+      .def_property_readonly("fraction", &Progress::fraction, "Share of the current stage that is done, 0 to 1.")
+      .def_property_readonly("stage", &Progress::stage, "What is being done, in a few words.")
+      .def_property_readonly("count", &Progress::count, "What the stage counts: for decimation the triangles left.")
+      .def_property_readonly("cancelled", &Progress::cancelled)
+      .def("cancel", &Progress::cancel, "Asks the call to stop; it then raises Cancelled within a moment.");
+}
+
+}  // namespace tolvol::python

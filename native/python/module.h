@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// One function per stage; each adds its classes and functions to the module.
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace tolvol::python {
+
+void bind_errors(pybind11::module_& module);
+void bind_progress(pybind11::module_& module);
+void bind_volume(pybind11::module_& module);
+void bind_decimation(pybind11::module_& module);
+void bind_measure(pybind11::module_& module);
+
+}  // namespace tolvol::python

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The point of a triangle that is nearest to a given point.
+#pragma once
+
+#include <glm/glm.hpp>
+
+namespace tolvol {
+
+struct ClosestPoint {
+  glm::dvec3 point;         ///< the witness: weights.x * a + weights.y * b + weights.z * c, up to rounding
+  glm::dvec3 weights;       ///< barycentric, all >= 0, their sum 1 up to rounding
+  double distance_squared;  ///< |p - point|^2, from `point` itself and never from a plane equation: on needles and
+                            ///< degenerate triangles it is still the distance to a point of the triangle
+};
+
+/// Degenerate triangles are the segments or points they are. O(1).
+/// After C. Ericson, Real-Time Collision Detection, 2005, §5.1.5, made safe for degenerate input.
+ClosestPoint closest_point(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);
+
+}  // namespace tolvol

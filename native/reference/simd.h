@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Which instructions the few hot kernels use. Each kernel is one always-inlined body in GCC vector types, instantiated once
+/// for any 64-bit machine and once for AVX2; without fused multiply-adds both give the same bits, so the choice is speed alone.
+#pragma once
+
+#include <atomic>
+
+namespace tolvol {
+
+enum class Simd { baseline, avx2 };
+
+#if defined(__x86_64__)
+#define TOLVOL_HAS_AVX2 1
+#define TOLVOL_TARGET_AVX2 __attribute__((target("avx2")))
+#else
+#define TOLVOL_HAS_AVX2 0
+#define TOLVOL_TARGET_AVX2
+#endif
+#define TOLVOL_INLINE inline __attribute__((always_inline))
+
+inline Simd best_simd() {
+#if TOLVOL_HAS_AVX2
+  if (__builtin_cpu_supports("avx2")) return Simd::avx2;
+#endif
+  return Simd::baseline;
+}
+
+/// The path in use, process-wide. Tests set it to force each; nothing else does.
+inline std::atomic<Simd>& simd_path() {
+  static std::atomic<Simd> path{best_simd()};
+  return path;
+}
+
+}  // namespace tolvol

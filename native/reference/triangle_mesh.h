@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// A triangle mesh as plain arrays, and what must hold before anything is computed from one.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace tolvol {
+
+struct TriangleMesh {
+  std::vector<glm::dvec3> vertices;
+  std::vector<glm::uvec3> triangles;
+};
+
+/// An axis-aligned box; empty until something is added.
+struct Box {
+  glm::dvec3 lower{std::numeric_limits<double>::infinity()};
+  glm::dvec3 upper{-std::numeric_limits<double>::infinity()};
+
+  void add(const glm::dvec3& p) {
+    lower = glm::min(lower, p);
+    upper = glm::max(upper, p);
+  }
+  bool empty() const { return lower.x > upper.x; }
+};
+
+/// Throws InvalidInput, naming the first offender, unless there is at least one triangle, every index is below
+/// `vertices.size()` and every coordinate is finite (unused vertices too). O(n + m).
+void validate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles);
+
+/// For each vertex whether a triangle uses it. O(n + m).
+std::vector<bool> used_vertices(std::size_t vertex_count, std::span<const glm::uvec3> triangles);
+
+/// For each vertex the first vertex with exactly the same coordinates (itself when it is alone). Equal as numbers: -0 is 0.
+/// O(n) expected.
+std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vertices);
+
+}  // namespace tolvol

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reference/hierarchy.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <random>
+#include <thread>
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct Random {
+  std::mt19937 engine;
+  std::normal_distribution<double> normal;
+  explicit Random(unsigned seed) : engine(seed) {}
+  dvec3 point() { return {normal(engine), normal(engine), normal(engine)}; }
+  unsigned below(unsigned n) { return std::uniform_int_distribution<unsigned>(0, n - 1)(engine); }
+};
+
+/// Triangles of all sizes: some as large as the whole, most small, a part degenerate.
+TriangleMesh soup(unsigned seed, unsigned triangles, double scale = 1, dvec3 offset = dvec3(0)) {
+  Random random(seed);
+  TriangleMesh mesh;
+  for (unsigned i = 0; i < triangles; ++i) {
+    const double size = std::pow(10.0, -double(random.below(4)));
+    const dvec3 centre = random.point();
+    for (int k = 0; k < 3; ++k) {
+      const bool repeat = k > 0 && random.below(10) == 0;
+      mesh.vertices.push_back(repeat ? mesh.vertices.back() : offset + scale * (centre + size * random.point()));
+    }
+    mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  return mesh;
+}
+
+ClosestPoint closest(const TriangleMesh& mesh, std::uint32_t i, const dvec3& p) {
+  const glm::uvec3& t = mesh.triangles[i];
+  return closest_point(p, mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]);
+}
+
+template <class Accept>
+Hierarchy::Nearest brute(const TriangleMesh& mesh, const dvec3& p, double radius, Accept&& accept) {
+  Hierarchy::Nearest best;
+  double squared = kInfinity;
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    if (!accept(i)) continue;
+    const ClosestPoint q = closest(mesh, i, p);
+    if (q.distance_squared < squared && std::sqrt(q.distance_squared) <= radius) {
+      squared = q.distance_squared;
+      best = {i, q.point, q.weights, std::sqrt(squared)};
+    }
+  }
+  return best;
+}
+
+const auto all = [](std::uint32_t) { return true; };
+
+TEST(Hierarchy, AgreesWithBruteForceBitForBit) {
+  const TriangleMesh mesh = soup(1, 1500);
+  const Hierarchy hierarchy(mesh);
+  ASSERT_EQ(hierarchy.size(), 1500u);
+  Random random(2);
+  for (int i = 0; i < 2000; ++i) {
+    // from the surface, from close by, from the outside, from afar, from so far that the search is made in doubles
+    const double off = std::array{0.0, 1e-3, 1.0, 30.0, 1e5}[i % 5];
+    const dvec3 p = mesh.vertices[random.below(4500)] + off * random.point();
+    const Hierarchy::Nearest expected = brute(mesh, p, kInfinity, all);
+    const Hierarchy::Nearest found = hierarchy.nearest(p);
+    ASSERT_EQ(found.triangle, expected.triangle) << i;
+    ASSERT_EQ(found.distance, expected.distance);
+    ASSERT_EQ(found.point, expected.point);
+    ASSERT_EQ(found.weights, expected.weights);
+    const Hierarchy::Nearest hinted = hierarchy.nearest(p, kInfinity, random.below(1500));
+    ASSERT_EQ(hinted.triangle, expected.triangle);
+    ASSERT_EQ(hinted.distance, expected.distance);
+  }
+}
+
+TEST(Hierarchy, RadiusIsInclusive) {
+  const TriangleMesh mesh = soup(3, 800);
+  const Hierarchy hierarchy(mesh);
+  Random random(4);
+  int beyond = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const dvec3 p = 2.0 * random.point();
+    const double exact = hierarchy.nearest(p).distance;
+    EXPECT_EQ(hierarchy.nearest(p, exact).distance, exact);
+    EXPECT_EQ(hierarchy.nearest(p, std::nextafter(exact, 0)).triangle, Hierarchy::kNone);
+    const double radius = exact * (0.5 + random.below(100) / 100.0);
+    const Hierarchy::Nearest found = hierarchy.nearest(p, radius, random.below(800));
+    EXPECT_EQ(found.triangle, brute(mesh, p, radius, all).triangle);
+    beyond += found.triangle == Hierarchy::kNone;
+  }
+  EXPECT_GT(beyond, 200);
+  EXPECT_EQ(hierarchy.nearest({0, 0, 0}, -1).triangle, Hierarchy::kNone);
+}
+
+TEST(Hierarchy, NearestAmongTheAccepted) {
+  const TriangleMesh mesh = soup(5, 700);
+  const Hierarchy hierarchy(mesh);
+  Random random(6);
+  for (int i = 0; i < 600; ++i) {
+    const unsigned rest = random.below(7);
+    const auto accept = [&](std::uint32_t t) { return t % 7 == rest; };
+    const dvec3 p = random.point();
+    const Hierarchy::Nearest expected = brute(mesh, p, kInfinity, accept);
+    EXPECT_EQ(hierarchy.nearest_if(p, accept).triangle, expected.triangle);
+    EXPECT_EQ(hierarchy.nearest_if(p, accept, kInfinity, random.below(700)).triangle, expected.triangle);
+  }
+  EXPECT_EQ(hierarchy.nearest_if({0, 0, 0}, [](std::uint32_t) { return false; }).triangle, Hierarchy::kNone);
+}
+
+TEST(Hierarchy, CommonTriangleOfSeveralPoints) {
+  const TriangleMesh mesh = soup(7, 600);
+  const Hierarchy hierarchy(mesh);
+  Random random(8);
+  for (int i = 0; i < 1200; ++i) {
+    const dvec3 centre = random.point() * std::array{1.0, 1.0, 1e3}[i % 3];
+    const double spread = std::array{1e-3, 1e-1, 1.0, 10.0}[i % 4];
+    std::vector<dvec3> points(1 + i % 4);
+    for (dvec3& p : points) p = centre + spread * random.point();
+    std::uint32_t triangle = Hierarchy::kNone;
+    double distance = kInfinity;
+    for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+      double farthest = 0;
+      for (const dvec3& p : points) farthest = std::max(farthest, std::sqrt(closest(mesh, t, p).distance_squared));
+      if (farthest < distance) distance = farthest, triangle = t;
+    }
+    const Hierarchy::Common found = hierarchy.common(points, kInfinity, -1, random.below(600));
+    ASSERT_EQ(found.triangle, triangle);
+    ASSERT_NEAR(found.distance, distance, 1e-15 * distance);
+    EXPECT_EQ(hierarchy.common(points, 0.999 * distance).triangle, Hierarchy::kNone);
+    const Hierarchy::Common early = hierarchy.common(points, kInfinity, 1.5 * distance);
+    EXPECT_LE(early.distance, 1.5 * distance);
+  }
+}
+
+TEST(Hierarchy, TiesGoToTheLowerIndex) {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 2}, {1, 0, 2}, {0, 1, 2}};
+  for (int i = 0; i < 50; ++i) {
+    mesh.triangles.push_back({3, 4, 5});
+    mesh.triangles.push_back({0, 1, 2});
+  }
+  const Hierarchy hierarchy(mesh);
+  EXPECT_EQ(hierarchy.nearest({0.2, 0.2, 0.5}).triangle, 1u);
+  EXPECT_EQ(hierarchy.nearest({0.25, 0.25, 1}, kInfinity, 77).triangle, 0u);
+  EXPECT_EQ(hierarchy.common(std::array{dvec3(0.25, 0.25, 1)}, kInfinity, -1, 77).triangle, 0u);
+}
+
+TEST(Hierarchy, OneTriangleAndAPoint) {
+  TriangleMesh mesh{{{1, 2, 3}, {1, 2, 3}}, {{0, 1, 0}}};
+  const Hierarchy::Nearest found = Hierarchy(mesh).nearest({1, 2, 7});
+  EXPECT_EQ(found.triangle, 0u);
+  EXPECT_EQ(found.distance, 4);
+  mesh.vertices = {{0, 0, 0}, {0, 0, 0}};
+  EXPECT_EQ(Hierarchy(mesh).nearest({3, 4, 0}).distance, 5);
+}
+
+// Neither deep recursion nor a quadratic blow-up: a million triangles in one place, and half of them there.
+TEST(Hierarchy, HeapsOfEqualTriangles) {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1e-3, 0, 0}, {0, 1e-3, 0}, {5, 5, 5}};
+  mesh.triangles.assign(300000, {0, 1, 2});
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_EQ(Hierarchy(mesh).nearest({0, 0, 1}).triangle, 0u);
+  mesh.triangles.assign(300000, {3, 3, 3});
+  EXPECT_EQ(Hierarchy(mesh).nearest({5, 5, 6}).distance, 1);
+  Random random(9);
+  for (int i = 0; i < 300000; ++i) {
+    mesh.vertices.push_back(random.point());
+    const unsigned n = unsigned(mesh.vertices.size());
+    mesh.triangles.push_back({n - 1, n - 2, n - 3});
+  }
+  const Hierarchy hierarchy(mesh);
+  for (int i = 0; i < 100; ++i) EXPECT_LT(hierarchy.nearest(random.point()).distance, 1);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
+}
+
+TEST(Hierarchy, AnyScaleAndAnyPlace) {
+  for (const auto& [scale, offset] : {std::pair{1e-300, 0.0},
+                                      {1e-150, 0.0},
+                                      {1e-20, 0.0},
+                                      {1e-3, 1e6},
+                                      {1.0, 1e12},
+                                      {1e20, 1e22},
+                                      {1e150, 0.0},
+                                      {1e300, 1e301}}) {
+    const TriangleMesh mesh = soup(10, 400, scale, offset * dvec3(1, -1, 0.5));
+    const TriangleMesh unit = soup(10, 400, 1, offset / scale * dvec3(1, -1, 0.5));
+    const Hierarchy hierarchy(mesh), reference(unit);
+    Random random(11);
+    for (int i = 0; i < 100; ++i) {
+      const dvec3 off = random.point() * (i % 2 ? 1.0 : 1e-2);
+      const unsigned vertex = random.below(1200);
+      const Hierarchy::Nearest found = hierarchy.nearest(mesh.vertices[vertex] + scale * off);
+      const Hierarchy::Nearest expected = reference.nearest(unit.vertices[vertex] + off);
+      const double rounding = 1e-14 * (1 + offset / scale);
+      ASSERT_NE(found.triangle, Hierarchy::kNone) << scale;
+      ASSERT_NEAR(found.distance / scale, expected.distance, rounding) << scale;
+    }
+  }
+}
+
+// As far as doubles go; the tree must not be searched as a whole, and no infinity may come out where the answer is
+// finite.
+TEST(Hierarchy, PointsFarAway) {
+  const TriangleMesh mesh = soup(12, 20000);
+  const Hierarchy hierarchy(mesh);
+  Random random(13);
+  for (const double far : {1e2, 1e7, 1e9, 1e12, 1e30, 1e155, 1e300}) {
+    for (int i = 0; i < 20; ++i) {
+      const dvec3 p = far * random.point();
+      double expected = kInfinity;
+      for (const dvec3& v : mesh.vertices) expected = std::min(expected, glm::length(p / far - v / far) * far);
+      const Hierarchy::Nearest found = hierarchy.nearest(p);
+      ASSERT_NE(found.triangle, Hierarchy::kNone) << far;
+      EXPECT_NEAR(found.distance / expected, 1, 1e-15 + 1 / far / far) << far;
+      EXPECT_NEAR(hierarchy.common(std::array{p, p, dvec3(0)}).distance / expected, 1, 8 / far + 1e-7) << far;
+      EXPECT_EQ(hierarchy.nearest(p, 0.9 * expected).triangle, Hierarchy::kNone);
+    }
+  }
+  TriangleMesh tiny = soup(14, 100, 1e-200);
+  EXPECT_NEAR(Hierarchy(tiny).nearest({3e20, 4e20, 0}).distance, 5e20, 1e5);
+}
+
+TEST(Hierarchy, ManyThreadsGetTheSameAnswers) {
+  const TriangleMesh mesh = soup(15, 5000);
+  const Hierarchy hierarchy(mesh);
+  std::vector<std::uint32_t> answers[4];
+  std::vector<std::thread> threads;
+  for (auto& answer : answers) {
+    threads.emplace_back([&] {
+      Random random(16);
+      for (int i = 0; i < 2000; ++i) answer.push_back(hierarchy.nearest(random.point()).triangle);
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const auto& answer : answers) EXPECT_EQ(answer, answers[0]);
+}
+
+}  // namespace
