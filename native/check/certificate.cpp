@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Cheapest reason first: short edges between corners known to be near; the triangle of the grid node nearest to the piece's
 // centre; those of the nodes around; the exact closest triangle by the hierarchy, which also proves "outside"; then the piece
-// is split, the middle part first, because that is where a bad piece is farthest out.
+// is split. Parts are looked at breadth first, because the centres of the large ones show soonest that a piece is outside.
 #include "check/certificate.h"
 
 #include <algorithm>
@@ -15,10 +15,9 @@ namespace tolvol {
 namespace {
 
 constexpr double kFloor = 0.02;       // of the tolerance: a piece this short is not split further
-constexpr int kBudget = 1 << 20;      // parts looked at before a piece is left unproved
+constexpr std::size_t kBudget = 1 << 20;  // parts looked at before a piece is left unproved
 constexpr double kSmall = 2.0;        // of the tolerance: shorter pieces are worth trying against all eight nodes
 constexpr double kExact = 0.7;        // of the tolerance: shorter pieces are worth an exact search
-constexpr int kStack = 4 * 64;        // splits halve the longest edge at least every second time: 64 levels cover all of double
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
@@ -28,15 +27,10 @@ struct TriangleCertificate::Piece {
   glm::dvec3 a, b, c;
 };
 
-TriangleCertificate::TriangleCertificate(const TriangleMesh& reference, const DistanceGrid& grid, const Hierarchy& hierarchy,
-                                         double within, double beyond)
+TriangleCertificate::TriangleCertificate(const std::vector<WitnessTriangle>& reference, const DistanceGrid& grid,
+                                         const Hierarchy& hierarchy, double within, double beyond)
     : reference_(&reference), grid_(&grid), hierarchy_(&hierarchy), within_(within), within2_(within * within),
       beyond_(beyond) {}
-
-WitnessTriangle TriangleCertificate::witness(std::uint32_t triangle) const {
-  const glm::uvec3 t = reference_->triangles[triangle];
-  return {reference_->vertices[t.x], reference_->vertices[t.y], reference_->vertices[t.z]};
-}
 
 double TriangleCertificate::distance_bound(const glm::dvec3& p) const {
   const std::uint32_t triangle = grid_->triangle_near(p);
@@ -44,27 +38,30 @@ double TriangleCertificate::distance_bound(const glm::dvec3& p) const {
   FourPoints points;
   for (int lane = 0; lane < 4; ++lane) points.set(lane, p);
   double d2[4];
-  witness_distances(witness(triangle), points, d2);
+  witness_distances((*reference_)[triangle], points, d2);
   return std::sqrt(d2[0]);
 }
 
 template <bool kProve>
-Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
+Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, double& farthest) const {
   const glm::dvec3 &p0 = corners[0], &p1 = corners[1], &p2 = corners[2];
   {
     // Every point of a triangle is within L / sqrt(3) of a corner, L its longest edge.
-    const double room = within_ - std::max({bounds.x, bounds.y, bounds.z});
+    const double corner = std::max({bounds.x, bounds.y, bounds.z}), room = within_ - corner;
     const double longest2 = std::max({squared_length(p1 - p0), squared_length(p2 - p1), squared_length(p0 - p2)});
-    if (room > 0 && longest2 <= 3 * room * room) return Verdict::inside;
+    if (room > 0 && longest2 <= 3 * room * room) {
+      farthest = corner + std::sqrt(longest2 * (1.0 / 3));
+      return Verdict::inside;
+    }
   }
-  std::array<Piece, kStack> stack;
-  int top = 0;
-  stack[top++] = {p0, p1, p2};
+  thread_local std::vector<Piece> queue;
+  queue.assign(1, {p0, p1, p2});
   Verdict result = Verdict::inside;
+  double farthest2 = 0;  // over the parts proved so far
   std::uint32_t hint = Hierarchy::kNone;
-  for (int looked = 0; top > 0; ++looked) {
-    if (looked == kBudget) return Verdict::unproved;
-    const Piece piece = stack[--top];
+  for (std::size_t next = 0; next < queue.size(); ++next) {
+    if (next == kBudget) return Verdict::unproved;
+    const Piece piece = queue[next];
     const glm::dvec3 centre = (piece.a + piece.b + piece.c) * (1.0 / 3);
     FourPoints points;
     points.set(0, piece.a), points.set(1, piece.b), points.set(2, piece.c), points.set(3, centre);
@@ -78,10 +75,12 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       }
       tried[tries++] = triangle;
       double d2[4];
-      witness_distances(witness(triangle), points, d2);
+      witness_distances((*reference_)[triangle], points, d2);
       centre2 = std::min(centre2, d2[3]);
       // Written so that NaN is not covered.
-      return d2[0] <= within2_ && d2[1] <= within2_ && d2[2] <= within2_;
+      if (!(d2[0] <= within2_ && d2[1] <= within2_ && d2[2] <= within2_)) return false;
+      farthest2 = std::max({farthest2, d2[0], d2[1], d2[2]});
+      return true;
     };
     const std::uint32_t guess = grid_->triangle_near(centre);
     if (covered_by(guess)) continue;
@@ -119,29 +118,29 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
     if (longest2 > 4 * std::min({ab2, bc2, ca2})) {
       // A needle is halved: splitting it in four would keep it a needle.
       if (ab2 == longest2) {
-        stack[top++] = {piece.a, mab, piece.c}, stack[top++] = {mab, piece.b, piece.c};
+        queue.push_back({piece.a, mab, piece.c}), queue.push_back({mab, piece.b, piece.c});
       } else if (bc2 == longest2) {
-        stack[top++] = {piece.b, mbc, piece.a}, stack[top++] = {mbc, piece.c, piece.a};
+        queue.push_back({piece.b, mbc, piece.a}), queue.push_back({mbc, piece.c, piece.a});
       } else {
-        stack[top++] = {piece.c, mca, piece.b}, stack[top++] = {mca, piece.a, piece.b};
+        queue.push_back({piece.c, mca, piece.b}), queue.push_back({mca, piece.a, piece.b});
       }
     } else {
-      stack[top++] = {piece.a, mab, mca};
-      stack[top++] = {mab, piece.b, mbc};
-      stack[top++] = {mca, mbc, piece.c};
-      stack[top++] = {mab, mbc, mca};
+      queue.push_back({piece.a, mab, mca}), queue.push_back({mab, piece.b, mbc});
+      queue.push_back({mca, mbc, piece.c}), queue.push_back({mab, mbc, mca});
     }
-    if (top > kStack - 4) return Verdict::unproved;
   }
+  farthest = std::sqrt(farthest2);
   return result;
 }
 
-bool TriangleCertificate::inside(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
-  return decide<false>(corners, bounds) == Verdict::inside;
+double TriangleCertificate::bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
+  double farthest = 0;
+  return decide<false>(corners, bounds, farthest) == Verdict::inside ? farthest : kUnproved;
 }
 
 Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
-  return decide<true>(corners, bounds);
+  double farthest = 0;
+  return decide<true>(corners, bounds, farthest);
 }
 
 std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& options) const {
@@ -152,7 +151,7 @@ std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& opt
     throw InvalidInput("the face array is not a whole number of faces");
   }
   const double within = volume_->provable(pieces.mapping_error), beyond = volume_->refutable(pieces.mapping_error);
-  const TriangleCertificate certificate(volume_->reference(), volume_->grid(), volume_->hierarchy(), within, beyond);
+  const TriangleCertificate certificate(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within, beyond);
   if (options.progress) options.progress->begin("checking");
 
   // Exact distances of the used points first: they settle most faces, inside (short edges) or outside, and are shared.

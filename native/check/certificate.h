@@ -30,14 +30,18 @@ class Certificate final : public ToleranceCheck {
 class TriangleCertificate {
  public:
   /// `within`: the provable distance, see ToleranceVolume::provable(); `beyond`: the refutable one. In the frame.
-  TriangleCertificate(const TriangleMesh& reference, const DistanceGrid& grid, const Hierarchy& hierarchy, double within,
-                      double beyond);
+  /// Keeps references to the rest. A grid without nodes leaves everything to the hierarchy.
+  TriangleCertificate(const std::vector<WitnessTriangle>& reference, const DistanceGrid& grid, const Hierarchy& hierarchy,
+                      double within, double beyond);
 
-  /// `bounds`: upper bounds on the corners' distances to the reference (from witnesses, never field values); infinity where
+  static constexpr double kUnproved = std::numeric_limits<double>::infinity();
+
+  /// An upper bound, at most within(), on the distance of any point of the triangle to the reference; kUnproved where no
+  /// proof was found. `bounds`: upper bounds on the corners' distances (from witnesses, never field values); infinity where
   /// none is known.
-  bool inside(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
+  double bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
 
-  /// As inside(), and says whether a failure is proved.
+  /// Whether bound() finds one, and if not, whether a point outside proves that there is none.
   Verdict verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
 
   /// An upper bound on the distance of p to the reference, from the grid's guess; infinity where there is none.
@@ -48,10 +52,9 @@ class TriangleCertificate {
  private:
   struct Piece;
   template <bool kProve>
-  Verdict decide(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
-  WitnessTriangle witness(std::uint32_t triangle) const;
+  Verdict decide(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, double& farthest) const;
 
-  const TriangleMesh* reference_;
+  const std::vector<WitnessTriangle>* reference_;
   const DistanceGrid* grid_;
   const Hierarchy* hierarchy_;
   double within_, within2_, beyond_;

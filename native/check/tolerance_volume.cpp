@@ -4,7 +4,6 @@
 #include <cmath>
 #include <sstream>
 
-#include "check/witness.h"
 #include "reference/errors.h"
 
 namespace tolvol {
@@ -51,12 +50,13 @@ ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span
   if (options.progress) options.progress->begin("building the hierarchy");
   hierarchy_.emplace(reference_);
   scatter(reference_, grid_, options.threads, options.progress);
+  witnesses_ = prepare_witnesses(reference_);
 }
 
 std::size_t ToleranceVolume::memory() const {
-  // The hierarchy holds at most two boxes of floats and an index a triangle.
-  return reference_.vertices.size() * sizeof(glm::dvec3) + reference_.triangles.size() * (sizeof(glm::uvec3) + 64) +
-         grid_.memory();
+  constexpr std::size_t kHierarchy = 150;  // bytes a triangle, see hierarchy.h
+  return reference_.vertices.size() * sizeof(glm::dvec3) +
+         reference_.triangles.size() * (sizeof(glm::uvec3) + sizeof(WitnessTriangle) + kHierarchy) + grid_.memory();
 }
 
 double ToleranceVolume::provable(double mapping_error) const {

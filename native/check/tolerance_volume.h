@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "check/witness.h"
 #include "field/distance_grid.h"
 #include "reference/frame.h"
 #include "reference/hierarchy.h"
@@ -36,6 +37,7 @@ class ToleranceVolume {
 
   const Frame& frame() const { return frame_; }
   const TriangleMesh& reference() const { return reference_; }  ///< in the frame, every input vertex
+  const std::vector<WitnessTriangle>& witnesses() const { return witnesses_; }  ///< of the reference, prepared
   const Hierarchy& hierarchy() const { return *hierarchy_; }
   const DistanceGrid& grid() const { return grid_; }
 
@@ -55,6 +57,7 @@ class ToleranceVolume {
  private:
   Frame frame_;
   TriangleMesh reference_;
+  std::vector<WitnessTriangle> witnesses_;
   std::optional<Hierarchy> hierarchy_;
   DistanceGrid grid_;
   double tolerance_;

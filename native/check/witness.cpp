@@ -44,7 +44,7 @@ TOLVOL_INLINE void distances(const WitnessTriangle& t, const FourPoints& p, doub
   Lanes best = edge(x, y, z, t.ab, t.inverse_ab);
   const Lanes other = edge(x, y, z, t.ac, t.inverse_ac);
   best = best < other ? best : other;
-  const Lanes third = edge(x - t.ab.x, y - t.ab.y, z - t.ab.z, t.bc, t.inverse_bc);
+  const Lanes third = edge(x - t.ab.x, y - t.ab.y, z - t.ab.z, t.ac - t.ab, t.inverse_bc);
   best = best < third ? best : third;
 
   const Lanes s = x * t.gs.x + y * t.gs.y + z * t.gs.z, u = x * t.gt.x + y * t.gt.y + z * t.gt.z;
@@ -60,7 +60,8 @@ TOLVOL_TARGET_AVX2 void distances_avx2(const WitnessTriangle& t, const FourPoint
 }  // namespace
 
 WitnessTriangle::WitnessTriangle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c)
-    : a(a), ab(b - a), ac(c - a), bc(c - b) {
+    : a(a), ab(b - a), ac(c - a) {
+  const glm::dvec3 bc = c - b;
   inverse_ab = inverse_or_zero(glm::dot(ab, ab));
   inverse_ac = inverse_or_zero(glm::dot(ac, ac));
   inverse_bc = inverse_or_zero(glm::dot(bc, bc));
@@ -68,6 +69,13 @@ WitnessTriangle::WitnessTriangle(const glm::dvec3& a, const glm::dvec3& b, const
   const double inverse = inverse_or_zero(glm::dot(n, n));
   gs = glm::cross(ac, n) * inverse;
   gt = glm::cross(n, ab) * inverse;
+}
+
+std::vector<WitnessTriangle> prepare_witnesses(const TriangleMesh& mesh) {
+  std::vector<WitnessTriangle> witnesses;
+  witnesses.reserve(mesh.triangles.size());
+  for (const glm::uvec3& t : mesh.triangles) witnesses.emplace_back(mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]);
+  return witnesses;
 }
 
 void witness_distances(const WitnessTriangle& triangle, const FourPoints& points, double out[4]) {

@@ -4,8 +4,10 @@
 #pragma once
 
 #include <glm/glm.hpp>
+#include <vector>
 
 #include "reference/frame.h"
+#include "reference/triangle_mesh.h"
 
 namespace tolvol {
 
@@ -21,10 +23,13 @@ struct WitnessTriangle {
   WitnessTriangle() = default;
   WitnessTriangle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);
 
-  glm::dvec3 a{0}, ab{0}, ac{0}, bc{0};
+  glm::dvec3 a{0}, ab{0}, ac{0};
   glm::dvec3 gs{0}, gt{0};  ///< gradients of the barycentric coordinates of b and c
   double inverse_ab = 0, inverse_ac = 0, inverse_bc = 0;
 };
+
+/// All triangles of a mesh, prepared. O(m).
+std::vector<WitnessTriangle> prepare_witnesses(const TriangleMesh& mesh);
 
 /// Squared distances from the points to witnesses in the triangle: out[i] = |p_i - q_i|^2 in floating point. Any clamped
 /// parameters give a valid upper bound, so a poor parameter (a needle's) costs completeness and never soundness.

@@ -39,7 +39,7 @@ struct DistanceGrid {
 };
 
 /// The grid of a reference: its box enlarged by the band, spacing tolerance / precision. `precision` empty: the finest of
-/// 2, 1, 1/2, 1/4, ... that fits kGridBudget. Allocates nothing. Throws ResourceLimit, naming the precision that fits, when
+/// 1, 1/2, 1/4, ... that fits kGridBudget. Allocates nothing. Throws ResourceLimit, naming the precision that fits, when
 /// a precision is asked for that does not.
 DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double> precision);
 

@@ -116,10 +116,6 @@ TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid
         Masks old_ids;
         __builtin_memcpy(&old, &grid.distance[row + x], sizeof old);
         const Masks nearer = d < old;
-        // Most rows far from the surface change nothing: their ids need not be touched.
-        bool any = false;
-        for (int i = 0; i < kLanes; ++i) any |= nearer[i] != 0;
-        if (!any) continue;
         __builtin_memcpy(&old_ids, &grid.triangle[row + x], sizeof old_ids);
         d = nearer ? d : old;
         old_ids = nearer ? ids : old_ids;

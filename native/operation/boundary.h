@@ -17,8 +17,8 @@ namespace tolvol {
 class BoundaryBounds {
  public:
   /// `within`: what collapses must keep; `provable`: what counts as near at the start.
-  BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh, std::span<const glm::dvec3> positions, double within,
-                 double provable);
+  BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh, std::span<const glm::dvec3> positions,
+                 bool mesh_is_reference, double within, double provable);
   BoundaryBounds(const BoundaryBounds&) = delete;
   BoundaryBounds& operator=(const BoundaryBounds&) = delete;
 
@@ -31,6 +31,7 @@ class BoundaryBounds {
 
  private:
   TriangleMesh reference_;  // boundary edges as degenerate triangles (a, b, b)
+  std::vector<WitnessTriangle> witnesses_;
   DistanceGrid no_grid_;    // segments are found by the hierarchy
   std::optional<Hierarchy> hierarchy_;
   std::optional<TriangleCertificate> forward_;

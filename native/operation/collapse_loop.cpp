@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "reference/errors.h"
 
@@ -17,6 +18,8 @@ namespace {
 constexpr double kBoundaryWeight = 10;        // of a boundary edge's plane, times its squared length
 constexpr double kFoldCosine = 0.2;           // a face's normal turns by less than acos of this
 constexpr double kReach = 2;                  // a minimiser is trusted within this many edge lengths of the edge's middle
+constexpr int kTries = 8;                     // positions strewn around the best one when it fails,
+constexpr double kSpread = 0.3, kWideSpread = 0.6;  // within these shares of the tolerance along each axis, in turn
 constexpr std::size_t kPollInterval = 256;    // steps between two looks at the progress
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
@@ -26,10 +29,10 @@ double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 CollapseLoop::CollapseLoop(CollapseInput input, const CollapseBounds& bounds)
     : bounds_(bounds), subset_(input.subset), store_(std::move(input.store)), triangles_(std::move(input.triangles)),
       positions_(std::move(input.positions)), pinned_(std::move(input.pinned)), wedges_(std::move(input.wedges)) {
-  build();
+  build(input.on_reference);
 }
 
-void CollapseLoop::build() {
+void CollapseLoop::build(bool on_reference) {
   mesh_.request_vertex_status();
   mesh_.request_edge_status();
   mesh_.request_halfedge_status();
@@ -84,7 +87,8 @@ void CollapseLoop::build() {
   }
   distance_.assign(n, 0);
   if (bounds_.forward) {
-    for (std::size_t i = 0; i < n; ++i) distance_[i] = bounds_.forward->distance_bound(positions_[i]);
+    for (std::size_t i = 0; i < n && !on_reference; ++i) distance_[i] = bounds_.forward->distance_bound(positions_[i]);
+    face_distance_.assign(m, on_reference ? 0 : TriangleCertificate::kUnproved);
   }
 }
 
@@ -135,7 +139,7 @@ std::optional<CollapseLoop::Plan> CollapseLoop::plan(Edge e) const {
 void CollapseLoop::push(Edge e) {
   const std::uint32_t i = static_cast<std::uint32_t>(e.idx());
   ++stamps_[i];
-  refused_[i] = false;
+  if (refused_[i]) refused_[i] = false, --refused_count_;
   if (const auto p = plan(e)) heap_.push_back({p->cost, i, stamps_[i]});
 }
 
@@ -176,14 +180,33 @@ bool CollapseLoop::collapse(Edge e) {
   if (outcome != Outcome::done && p->freedom == Freedom::either_way) {
     outcome = std::max(outcome, attempt(mesh_.opposite_halfedge_handle(h), positions_[from(h)]));
   } else if (outcome == Outcome::refused && p->freedom == Freedom::anywhere) {
-    const glm::dvec3 p0 = positions_[from(h)], p1 = positions_[to(h)];
-    for (const glm::dvec3& other : {p0, p1, store_((p0 + p1) * 0.5)}) {
-      outcome = attempt(h, other);
-      if (outcome == Outcome::done) break;
-    }
+    outcome = search(h, p->position);
   }
-  refused_[static_cast<std::size_t>(e.idx())] = outcome == Outcome::refused;
+  if (outcome == Outcome::refused) {
+    refused_[static_cast<std::size_t>(e.idx())] = true;
+    ++refused_count_;
+  }
   return outcome == Outcome::done;
+}
+
+/// Other positions for a collapse whose best one fails a bound: the ends, the middle, then points strewn around the best one.
+/// The sequence depends on the edge alone, so that results repeat.
+CollapseLoop::Outcome CollapseLoop::search(Halfedge h, const glm::dvec3& best) {
+  const glm::dvec3 p0 = positions_[from(h)], p1 = positions_[to(h)];
+  for (const glm::dvec3& position : {p0, p1, store_((p0 + p1) * 0.5)}) {
+    const Outcome outcome = attempt(h, position);
+    if (outcome != Outcome::refused) return outcome;
+  }
+  if (!bounds_.forward) return Outcome::refused;
+  std::mt19937_64 random((static_cast<std::uint64_t>(from(h)) << 32) | to(h));
+  const auto uniform = [&] { return static_cast<double>(random() >> 11) * 0x1p-52 - 1; };
+  for (int i = 0; i < kTries; ++i) {
+    const double spread = (i % 2 ? kWideSpread : kSpread) * bounds_.forward->within();
+    const double x = uniform(), y = uniform(), z = uniform();
+    const Outcome outcome = attempt(h, store_(best + spread * glm::dvec3(x, y, z)));
+    if (outcome != Outcome::refused) return outcome;
+  }
+  return Outcome::refused;
 }
 
 CollapseLoop::Outcome CollapseLoop::attempt(Halfedge h, const glm::dvec3& position) {
@@ -207,7 +230,7 @@ void CollapseLoop::gather_side(Halfedge h, std::uint32_t vertex, const glm::dvec
       Coverage::Element element{static_cast<std::uint32_t>(f), {positions_[t.x], positions_[t.y], positions_[t.z]}, moved};
       element.corners[corner] = position;
       elements_.push_back(element);
-      ring_.push_back({corner, positions_[vertex], {t.x, t.y, t.z}});
+      ring_.push_back({corner, positions_[vertex], {t.x, t.y, t.z}, 0});
     }
     at = mesh_.next_halfedge_handle(mesh_.opposite_halfedge_handle(at));
   } while (at != start);
@@ -242,7 +265,7 @@ bool CollapseLoop::gather(Halfedge h, const glm::dvec3& position) {
     if (place == elements_.size()) {
       const glm::uvec3& t = triangles_[static_cast<std::size_t>(heir)];
       elements_.push_back({static_cast<std::uint32_t>(heir), {positions_[t.x], positions_[t.y], positions_[t.z]}, 0});
-      ring_.push_back({0, positions_[t.x], {t.x, t.y, t.z}});
+      ring_.push_back({0, positions_[t.x], {t.x, t.y, t.z}, 0});
     }
     removed_.push_back({static_cast<std::uint32_t>(f), static_cast<std::uint32_t>(place), std::max(moved0, moved1)});
   }
@@ -305,14 +328,23 @@ bool CollapseLoop::folds_over() const {
 
 bool CollapseLoop::within_bounds(const glm::dvec3& position) {
   if (bounds_.forward) {
+    const double within = bounds_.forward->within();
     new_distance_ = bounds_.forward->distance_bound(position);
-    if (!(new_distance_ <= bounds_.forward->within())) return false;
-    for (std::size_t i = 0; i < elements_.size(); ++i) {
-      if (elements_[i].moved == 0) continue;
-      const RingFace& face = ring_[i];
+    if (!(new_distance_ <= within)) return false;
+    for (std::size_t k = 0; k < elements_.size(); ++k) {
+      const std::size_t i = (suspect_ + k) % elements_.size();
+      const Coverage::Element& element = elements_[i];
+      RingFace& face = ring_[i];
+      // No point of the face moves farther than its moving corner.
+      face.distance = face_distance_[element.id] + element.moved;
+      if (element.moved == 0 || face.distance <= within) continue;
       glm::dvec3 bounds(distance_[face.vertices[0]], distance_[face.vertices[1]], distance_[face.vertices[2]]);
       bounds[face.corner] = new_distance_;
-      if (!bounds_.forward->inside(elements_[i].corners, bounds)) return false;
+      face.distance = bounds_.forward->bound(element.corners, bounds);
+      if (face.distance == TriangleCertificate::kUnproved) {
+        suspect_ = i;
+        return false;
+      }
     }
   }
   return !bounds_.backward || bounds_.backward->try_change(elements_, removed_);
@@ -339,8 +371,10 @@ bool CollapseLoop::boundary_within_bounds(Halfedge h, const glm::dvec3& position
     boundary_removed_.push_back({t, 1, moved_t});
   }
   const glm::dvec3 unknown(std::numeric_limits<double>::infinity());
-  if (moved_s > 0 && !bounds_.boundary_forward->inside(boundary_elements_[0].corners, unknown)) return false;
-  if (moved_t > 0 && !bounds_.boundary_forward->inside(boundary_elements_[1].corners, unknown)) return false;
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (boundary_elements_[i].moved == 0) continue;
+    if (bounds_.boundary_forward->bound(boundary_elements_[i].corners, unknown) == TriangleCertificate::kUnproved) return false;
+  }
   return bounds_.boundary_backward->try_change(boundary_elements_, boundary_removed_);
 }
 
@@ -355,6 +389,7 @@ void CollapseLoop::apply(Halfedge h, const glm::dvec3& position) {
   for (const RingFace& face : ring_) {
     const std::size_t i = static_cast<std::size_t>(&face - ring_.data());
     if (face.vertices[face.corner] == v0) triangles_[elements_[i].id][face.corner] = v1;
+    if (bounds_.forward) face_distance_[elements_[i].id] = face.distance;
   }
   triangle_count_ -= removed_.size();
   mesh_.collapse(h);
@@ -369,7 +404,7 @@ void CollapseLoop::apply(Halfedge h, const glm::dvec3& position) {
 void CollapseLoop::renew(std::uint32_t vertex) {
   const OpenMesh::VertexHandle v(static_cast<int>(vertex));
   for (const auto e : mesh_.ve_range(v)) push(e);
-  if (!bounds_.forward) return;
+  if (refused_count_ == 0) return;
   for (const auto near : mesh_.vv_range(v)) {
     for (const auto e : mesh_.ve_range(near)) {
       const std::size_t i = static_cast<std::size_t>(e.idx());

@@ -30,6 +30,7 @@ struct CollapseInput {
   std::vector<glm::dvec3> positions;       ///< in the frame, as stored
   std::vector<bool> pinned;                ///< per vertex: neither moves nor vanishes
   std::vector<glm::uvec3> wedges;          ///< per triangle and corner: equal at a vertex where attributes are equal; may be empty
+  bool on_reference = false;               ///< every triangle is one of the reference
   bool subset = false;                     ///< every surviving vertex keeps its position
   /// Rounds a position in the frame to what can be stored.
   std::function<glm::dvec3(const glm::dvec3&)> store;
@@ -70,7 +71,7 @@ class CollapseLoop {
   };
   enum class Outcome { impossible, refused, done };
 
-  void build();
+  void build(bool on_reference);
   std::uint32_t from(Halfedge h) const { return static_cast<std::uint32_t>(mesh_.from_vertex_handle(h).idx()); }
   std::uint32_t to(Halfedge h) const { return static_cast<std::uint32_t>(mesh_.to_vertex_handle(h).idx()); }
   std::optional<Plan> plan(Edge e) const;
@@ -79,6 +80,7 @@ class CollapseLoop {
   bool on_boundary(std::uint32_t v) const { return mesh_.is_boundary(OpenMesh::VertexHandle(static_cast<int>(v))); }
   void push(Edge e);
   bool collapse(Edge e);
+  Outcome search(Halfedge h, const glm::dvec3& best);
   Outcome attempt(Halfedge h, const glm::dvec3& position);
   bool gather(Halfedge h, const glm::dvec3& position);
   void gather_side(Halfedge h, std::uint32_t vertex, const glm::dvec3& position, double moved);
@@ -96,12 +98,14 @@ class CollapseLoop {
   std::vector<glm::uvec3> triangles_;
   std::vector<glm::dvec3> positions_;
   std::vector<bool> pinned_, seam_, moved_;
-  std::vector<double> distance_;  ///< upper bound on each vertex's distance to the reference
+  std::vector<double> distance_;       ///< upper bound on each vertex's distance to the reference
+  std::vector<double> face_distance_;  ///< the same for every point of a face
   std::vector<Quadric> quadrics_;
   std::vector<glm::uvec3> wedges_, corner_source_;
   mutable std::vector<std::uint32_t> merged_into_;
   std::vector<std::uint32_t> stamps_;
   std::vector<bool> refused_;  ///< edges that failed a bound and wait for their neighbourhood to change
+  std::size_t refused_count_ = 0;
   std::vector<Entry> heap_;
   std::size_t triangle_count_ = 0;
 
@@ -110,6 +114,7 @@ class CollapseLoop {
     int corner;                 ///< which corner moves
     glm::dvec3 before;          ///< from here
     std::uint32_t vertices[3];
+    double distance;            ///< upper bound on the distance of its points to the reference
   };
   std::vector<Coverage::Element> elements_;
   std::vector<RingFace> ring_;  ///< parallel to elements_
@@ -126,6 +131,7 @@ class CollapseLoop {
   };
   std::vector<NewWedge> new_wedges_;
   double new_distance_ = 0;
+  std::size_t suspect_ = 0;  ///< the face that failed last: of another try at the same collapse it is the likeliest to fail
 };
 
 }  // namespace tolvol

@@ -148,7 +148,6 @@ bool Coverage::place(const Piece& whole, std::uint32_t first) {
     }
     if (covered) continue;
     if (!(centre2 <= within2_) || longest_squared(c) <= kFloor * kFloor * within2_ || piece.level == kDeepest) {
-      gap_.point = {points.x[3], points.y[3], points.z[3]};
       return false;
     }
     split(piece, stack_);
@@ -188,10 +187,14 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
       if (!place(pool_[p], h.heir)) return false;
     }
   }
-  for (std::uint32_t i = 0; i < candidates_.size(); ++i) {
+  for (std::uint32_t k = 0; k < candidates_.size(); ++k) {
+    const std::uint32_t i = (suspect_ + k) % static_cast<std::uint32_t>(candidates_.size());
     if (!candidates_[i].replaced) continue;
     for (std::uint32_t p = lists_[candidates_[i].id].head; p != kNone; p = pool_[p].next) {
-      if (!place(pool_[p], i)) return false;
+      if (!place(pool_[p], i)) {
+        suspect_ = i;
+        return false;
+      }
     }
   }
   return true;

@@ -34,10 +34,6 @@ class Coverage {
     std::uint32_t heir;
     double moved;
   };
-  /// Where a change failed: a point of the reference and the nearest of the elements' points.
-  struct Gap {
-    glm::dvec3 point, nearest;
-  };
 
   /// `within`: the provable distance. Keeps a reference to `reference`.
   Coverage(const TriangleMesh& reference, double within, std::size_t element_count);
@@ -55,8 +51,6 @@ class Coverage {
   bool try_change(std::span<const Element> elements, std::span<const Removed> removed);
   /// Carries out the last change tried, which must have succeeded.
   void commit();
-  /// Of the last change that failed.
-  const Gap& gap() const { return gap_; }
 
  private:
   struct Piece {
@@ -102,8 +96,8 @@ class Coverage {
   std::vector<Heirloom> heirlooms_;
   std::vector<Moved> moved_;
   std::vector<Piece> stack_;
-  std::uint32_t last_ = 0;
-  Gap gap_{};
+  std::uint32_t last_ = 0;     ///< the candidate that took the last piece
+  std::uint32_t suspect_ = 0;  ///< the one whose pieces failed last: tried first, to be refused soon
 };
 
 }  // namespace tolvol

@@ -99,14 +99,14 @@ class Decimation {
     if (!identical_) certify_input(mapping_error);
 
     CollapseBounds bounds;
-    forward_.emplace(volume_->reference(), volume_->grid(), volume_->hierarchy(), within, volume_->refutable(mapping_error));
+    forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within, volume_->refutable(mapping_error));
     bounds.forward = &*forward_;
     if (options_.two_sided) {
       backward_.emplace(volume_->reference(), within, cut_.triangles.size());
       cover(provable);
       bounds.backward = &*backward_;
     } else {
-      boundary_.emplace(*volume_, cut_, positions_, within, provable);
+      boundary_.emplace(*volume_, cut_, positions_, identical_, within, provable);
       for (const std::uint32_t v : boundary_->uncertified()) pin(v, "boundary not near the reference's boundary");
       if (boundary_->any()) {
         bounds.boundary_forward = &boundary_->forward();
@@ -203,6 +203,7 @@ class Decimation {
       }
       islands_ = island_labels(cut_.triangles, input.wedges);
     }
+    input.on_reference = identical_;
     input.subset = options_.vertices == DecimationOptions::Vertices::subset;
     input.store = [this](const glm::dvec3& p) { return placement_.frame(placement_.store(p)); };
     return input;

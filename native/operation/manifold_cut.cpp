@@ -244,6 +244,12 @@ class Cutter {
       if (flip_[t]) std::swap(corners.y, corners.z);
       cut_.triangles.push_back(corners);
     }
+    for (Side s = 0; s < mate_.size(); ++s) {
+      if (mate_[s] != kNone || is_cut_[s]) continue;
+      glm::uvec2 edge(dense[corner_vertex_[s]], dense[corner_vertex_[next_corner(s)]]);
+      if (flip_[s / 3]) std::swap(edge.x, edge.y);
+      cut_.boundary.push_back(edge);
+    }
     cut_.triangle_input = triangles_;
     cut_.reversed = flip_;
     add_aside_vertices();

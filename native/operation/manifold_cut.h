@@ -19,6 +19,7 @@ struct CutMesh {
   std::vector<bool> reversed;                  ///< per triangle: its corners 1 and 2 are swapped against the input
   std::vector<std::uint32_t> vertex_input;     ///< per vertex: the lowest input vertex it stands for
   std::vector<CutCause> cause;                 ///< per vertex: not none = must neither move nor vanish
+  std::vector<glm::uvec2> boundary;            ///< open edges, in the direction of their triangle; edges cut are none
   // The way back.
   std::vector<std::uint32_t> output_slot;      ///< per vertex: vertices with equal slots are one vertex of the result
   std::vector<std::uint32_t> input_vertex;     ///< per input vertex: its manifold vertex; kNone: used by no triangle

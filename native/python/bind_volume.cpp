@@ -109,7 +109,7 @@ void bind_volume(py::module_& module) {
            py::arg("to_world") = py::none(), py::arg("precision") = py::none(), py::arg("threads") = 0,
            py::arg("progress") = py::none(),
            "vertices: (n, 3) float32 or float64, local. triangles: (m, 3) integers. tolerance: world units, at most the size of the\n"
-           "reference. precision: grid nodes per tolerance; None takes the finest of 2, 1, 1/2, ... that fits 256 MB; it changes\n"
+           "reference. precision: grid nodes per tolerance; None takes the finest of 1, 1/2, 1/4, ... that fits 256 MB; it changes\n"
            "speed and never a verdict's truth. Raises InvalidInput (bad mesh or tolerance; the first offender is named) and\n"
            "ResourceLimit (a precision that does not fit). Cost: about 0.1 s for 70,000 triangles.\n"
            "After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 2.")

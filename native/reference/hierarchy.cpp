@@ -95,6 +95,42 @@ struct Hierarchy::Build {
     std::uint32_t begin, end;
   };
 
+  /// Leaves the first of each set of triangles with exactly the same corners in the same order, and chains the others
+  /// to it: a thousand copies would otherwise be a thousand ties to look at in every search.
+  void join_twins(const TriangleMesh& mesh) {
+    const auto corner = [&](const Key& key, int k) -> const glm::dvec3& {
+      return mesh.vertices[mesh.triangles[key.triangle][k]];
+    };
+    const auto order = [&](const Key& x, const Key& y) {  // -1, 0, 1
+      for (int i = 0; i < 9; ++i) {
+        const double u = corner(x, i / 3)[i % 3], v = corner(y, i / 3)[i % 3];
+        if (u != v) return u < v ? -1 : 1;
+      }
+      return 0;
+    };
+    std::size_t kept = 0;
+    std::uint32_t last = kNone;
+    for (std::size_t begin = 0, end; begin < keys.size(); begin = end) {
+      for (end = begin + 1; end < keys.size() && keys[end].code == keys[begin].code;) ++end;
+      if (end - begin > 1) {
+        std::sort(keys.begin() + begin, keys.begin() + end, [&](const Key& x, const Key& y) {
+          const int o = order(x, y);
+          return o != 0 ? o < 0 : x.triangle < y.triangle;
+        });
+      }
+      for (std::size_t i = begin; i < end; ++i) {
+        if (i > begin && order(keys[i - 1], keys[i]) == 0) {
+          if (tree.twin_.empty()) tree.twin_.assign(mesh.triangles.size(), kNone);
+          tree.twin_[last] = keys[i].triangle;
+        } else {
+          keys[kept++] = keys[i];
+        }
+        last = keys[i].triangle;
+      }
+    }
+    keys.resize(kept);
+  }
+
   FloatBox triangle_box(std::uint32_t place) const {
     const Corners& t = tree.corners_[place];
     FloatBox box;
@@ -167,6 +203,7 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh) {
 
   const std::size_t count = mesh.triangles.size();
   Build build{*this, std::vector<Key>(count)};
+  place_.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
     const glm::uvec3& t = mesh.triangles[i];
     const glm::dvec3 &a = mesh.vertices[t.x], &b = mesh.vertices[t.y], &c = mesh.vertices[t.z];
@@ -180,17 +217,17 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh) {
     build.keys[i] = {code, std::uint32_t(i)};
   }
   radix_sort(build.keys);
-  corners_.resize(count);
-  triangle_.resize(count);
-  place_.resize(count);
-  for (std::uint32_t place = 0; place < count; ++place) {
+  build.join_twins(mesh);
+  corners_.resize(build.keys.size());
+  triangle_.resize(build.keys.size());
+  for (std::uint32_t place = 0; place < build.keys.size(); ++place) {
     const std::uint32_t index = build.keys[place].triangle;
     triangle_[place] = index;
-    place_[index] = place;
     for (int k = 0; k < 3; ++k) corners_[place][k] = scaled(mesh.vertices[mesh.triangles[index][k]]);
+    for (std::uint32_t i = index; i != kNone; i = twin(i)) place_[i] = place;
   }
-  nodes_.reserve(count / 3 + 1);
-  build.make({0, std::uint32_t(count)});
+  nodes_.reserve(build.keys.size() / 3 + 1);
+  build.make({0, std::uint32_t(build.keys.size())});
 }
 
 glm::dvec3 Hierarchy::local(const glm::dvec3& p, bool& beyond_reach) const {
@@ -203,16 +240,16 @@ glm::dvec3 Hierarchy::local(const glm::dvec3& p, bool& beyond_reach) const {
   return towards * (kReach / std::max({std::abs(towards.x), std::abs(towards.y), std::abs(towards.z)}));
 }
 
-Hierarchy::Nearest Hierarchy::result(const glm::dvec3& p, std::uint32_t place, bool beyond_reach) const {
+Hierarchy::Nearest Hierarchy::result(const glm::dvec3& p, std::uint32_t triangle, bool beyond_reach) const {
   double scale = scale_;
   if (beyond_reach) {  // from far away the mesh is small, and it is p that must not overflow
     const double far = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z), std::numeric_limits<double>::min()});
     scale = std::min(scale_, std::ldexp(1.0, -std::clamp(std::ilogb(far), -1000, 1000)));
   }
-  const Corners& t = corners_[place];
+  const Corners& t = corners_[place_[triangle]];
   const double ratio = scale / scale_;
   const ClosestPoint q = closest_point(p * scale, t[0] * ratio, t[1] * ratio, t[2] * ratio);
-  return {triangle_[place], q.point * (1 / scale), q.weights, std::sqrt(q.distance_squared) * (1 / scale)};
+  return {triangle, q.point * (1 / scale), q.weights, std::sqrt(q.distance_squared) * (1 / scale)};
 }
 
 template <int Count>
@@ -227,7 +264,7 @@ Hierarchy::Common Hierarchy::common_of(std::span<const glm::dvec3> points, doubl
     Common common{nearest(points[i]).triangle, 0};
     for (const glm::dvec3& p : points) {
       local(p, beyond_reach = false);
-      common.distance = std::max(common.distance, result(p, place_[common.triangle], beyond_reach).distance);
+      common.distance = std::max(common.distance, result(p, common.triangle, beyond_reach).distance);
     }
     return common.distance <= radius ? common : Common{};
   }

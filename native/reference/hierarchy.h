@@ -63,7 +63,7 @@ class Hierarchy {
   template <class Visit>
   void near(const glm::dvec3& p, double radius, Visit&& visit) const;
 
-  std::size_t size() const { return triangle_.size(); }
+  std::size_t size() const { return place_.size(); }
 
  private:
   static constexpr int kWidth = 8;
@@ -80,7 +80,9 @@ class Hierarchy {
   glm::dvec3 scaled(const glm::dvec3& p) const { return p * scale_; }
   /// The local point at which the search for the nearest triangle to p (in the mesh's units) is made.
   glm::dvec3 local(const glm::dvec3& p, bool& beyond_reach) const;
-  Nearest result(const glm::dvec3& p, std::uint32_t place, bool beyond_reach) const;
+  Nearest result(const glm::dvec3& p, std::uint32_t triangle, bool beyond_reach) const;
+  /// The next triangle with exactly the same corners; kNone after the last one.
+  std::uint32_t twin(std::uint32_t triangle) const { return twin_.empty() ? kNone : twin_[triangle]; }
 
   /// Shows `attempt(place)` the triangles whose box is within the bound, which attempt lowers as it finds better ones:
   /// `bound` is the square of a scaled distance. Points are local.
@@ -96,9 +98,10 @@ class Hierarchy {
   Common common_of(std::span<const glm::dvec3> points, double radius, double enough, std::uint32_t hint) const;
 
   std::vector<Node> nodes_;              // nodes_[0] is the root
-  std::vector<Corners> corners_;         // scaled, in the sorted order
+  std::vector<Corners> corners_;         // scaled, in the sorted order; of equal triangles only the first
   std::vector<std::uint32_t> triangle_;  // place in the sorted order -> index in the mesh
   std::vector<std::uint32_t> place_;     // index in the mesh -> place in the sorted order
+  std::vector<std::uint32_t> twin_;      // see twin(); empty when no two triangles are equal
   glm::dvec3 centre_{0};                 // scaled
   double scale_ = 1;                     // a power of two: half the size of the mesh becomes 1/2 to 1
 };
@@ -115,10 +118,11 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
   auto attempt = [&](std::uint32_t place) {
     const Corners& t = corners_[place];
     const double squared = closest_point(q, t[0], t[1], t[2]).distance_squared;
-    if (squared > best_squared || (squared == best_squared && best != kNone && triangle_[place] > triangle_[best]))
-      return;
-    if (!accept(triangle_[place])) return;
-    best = place;
+    if (squared > best_squared) return;
+    std::uint32_t triangle = triangle_[place];
+    while (triangle != kNone && !accept(triangle)) triangle = twin(triangle);
+    if (triangle == kNone || (squared == best_squared && triangle > best)) return;  // kNone is above every index
+    best = triangle;
     best_squared = squared;
     bound = std::min(bound, squared);
   };
@@ -134,10 +138,12 @@ void Hierarchy::near(const glm::dvec3& p, double radius, Visit&& visit) const {
   bool beyond_reach = false;
   const glm::dvec3 at = local(p, beyond_reach);
   if (beyond_reach) {
-    for (const std::uint32_t triangle : triangle_) visit(triangle);
+    for (std::uint32_t triangle = 0; triangle < place_.size(); ++triangle) visit(triangle);
   } else if (!nodes_.empty()) {
     double bound = radius * scale_ * (radius * scale_) * (1 + 1e-12);
-    walk<1>({at}, bound, [&](std::uint32_t place) { visit(triangle_[place]); });
+    walk<1>({at}, bound, [&](std::uint32_t place) {
+      for (std::uint32_t triangle = triangle_[place]; triangle != kNone; triangle = twin(triangle)) visit(triangle);
+    });
   }
 }
 
