@@ -47,7 +47,7 @@ Prepared prepare(const TriangleMesh& mesh, std::uint32_t id, double band) {
     r.gs = glm::cross(ac, n) / nn, r.gt = glm::cross(n, ab) / nn, r.normal = n / std::sqrt(nn);
     r.slab = static_cast<float>(band * 1.001);
   } else {
-    r.gs = r.gt = glm::vec3(-1e30f), r.normal = glm::vec3(0);  // gs < 0: never inside
+    r.gs = r.gt = glm::vec3(std::numeric_limits<float>::quiet_NaN()), r.normal = glm::vec3(0);  // never compares as inside
     r.slab = std::numeric_limits<float>::infinity();
   }
   return r;

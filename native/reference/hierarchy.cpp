@@ -240,16 +240,13 @@ glm::dvec3 Hierarchy::local(const glm::dvec3& p, bool& beyond_reach) const {
   return towards * (kReach / std::max({std::abs(towards.x), std::abs(towards.y), std::abs(towards.z)}));
 }
 
-Hierarchy::Nearest Hierarchy::result(const glm::dvec3& p, std::uint32_t triangle, bool beyond_reach) const {
-  double scale = scale_;
-  if (beyond_reach) {  // from far away the mesh is small, and it is p that must not overflow
-    const double far = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z), std::numeric_limits<double>::min()});
-    scale = std::min(scale_, std::ldexp(1.0, -std::clamp(std::ilogb(far), -1000, 1000)));
-  }
-  const Corners& t = corners_[place_[triangle]];
+Hierarchy::Nearest Hierarchy::seen_from(const glm::dvec3& p, std::uint32_t triangle) const {
+  // From far away the mesh is small, and it is p that must not overflow.
+  const double far = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z), std::numeric_limits<double>::min()});
+  const double scale = std::min(scale_, std::ldexp(1.0, -std::clamp(std::ilogb(far), -1000, 1000)));
   const double ratio = scale / scale_;
-  const ClosestPoint q = closest_point(p * scale, t[0] * ratio, t[1] * ratio, t[2] * ratio);
-  return {triangle, q.point * (1 / scale), q.weights, std::sqrt(q.distance_squared) * (1 / scale)};
+  const Corners& t = corners_[place_[triangle]];
+  return unscaled(triangle, closest_point(p * scale, t[0] * ratio, t[1] * ratio, t[2] * ratio), scale);
 }
 
 template <int Count>
@@ -263,8 +260,7 @@ Hierarchy::Common Hierarchy::common_of(std::span<const glm::dvec3> points, doubl
     if (!beyond_reach) continue;
     Common common{nearest(points[i]).triangle, 0};
     for (const glm::dvec3& p : points) {
-      local(p, beyond_reach = false);
-      common.distance = std::max(common.distance, result(p, common.triangle, beyond_reach).distance);
+      common.distance = std::max(common.distance, seen_from(p, common.triangle).distance);
     }
     return common.distance <= radius ? common : Common{};
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -80,7 +81,11 @@ class Hierarchy {
   glm::dvec3 scaled(const glm::dvec3& p) const { return p * scale_; }
   /// The local point at which the search for the nearest triangle to p (in the mesh's units) is made.
   glm::dvec3 local(const glm::dvec3& p, bool& beyond_reach) const;
-  Nearest result(const glm::dvec3& p, std::uint32_t triangle, bool beyond_reach) const;
+  static Nearest unscaled(std::uint32_t triangle, const ClosestPoint& q, double scale) {
+    return {triangle, q.point * (1 / scale), q.weights, std::sqrt(q.distance_squared) * (1 / scale)};
+  }
+  /// The point of a triangle nearest to p, however far away p is.
+  Nearest seen_from(const glm::dvec3& p, std::uint32_t triangle) const;
   /// The next triangle with exactly the same corners; kNone after the last one.
   std::uint32_t twin(std::uint32_t triangle) const { return twin_.empty() ? kNone : twin_[triangle]; }
 
@@ -112,24 +117,25 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
   bool beyond_reach = false;
   const glm::dvec3 at = local(p, beyond_reach), q = beyond_reach ? at + centre_ : scaled(p);
   std::uint32_t best = kNone;
-  double best_squared = std::numeric_limits<double>::infinity();
-  const double reach = beyond_reach ? best_squared : radius * scale_;
+  ClosestPoint closest{glm::dvec3(0), glm::dvec3(0), std::numeric_limits<double>::infinity()};
+  const double reach = beyond_reach ? closest.distance_squared : radius * scale_;
   double bound = reach * reach * (1 + 1e-12);  // generous: the distance itself is compared at the end
   auto attempt = [&](std::uint32_t place) {
     const Corners& t = corners_[place];
-    const double squared = closest_point(q, t[0], t[1], t[2]).distance_squared;
-    if (squared > best_squared) return;
+    const ClosestPoint candidate = closest_point(q, t[0], t[1], t[2]);
+    if (candidate.distance_squared > closest.distance_squared) return;
     std::uint32_t triangle = triangle_[place];
     while (triangle != kNone && !accept(triangle)) triangle = twin(triangle);
-    if (triangle == kNone || (squared == best_squared && triangle > best)) return;  // kNone is above every index
+    // At a tie the lower index; kNone is above them all.
+    if (triangle == kNone || (candidate.distance_squared == closest.distance_squared && triangle > best)) return;
     best = triangle;
-    best_squared = squared;
-    bound = std::min(bound, squared);
+    closest = candidate;
+    bound = std::min(bound, closest.distance_squared);
   };
   if (hint < place_.size()) attempt(place_[hint]);
   if (!nodes_.empty()) walk<1>({at}, bound, attempt);
   if (best == kNone) return {};
-  const Nearest found = result(p, best, beyond_reach);
+  const Nearest found = beyond_reach ? seen_from(p, best) : unscaled(best, closest, scale_);
   return found.distance <= radius ? found : Nearest{};
 }
 
@@ -200,8 +206,10 @@ void Hierarchy::walk_in(const std::array<glm::dvec3, Count>& points, double& bou
     }
     Entry near[kWidth];
     int count = 0;
-    for (int c = 0; c < kWidth; ++c) {
-      if (squared[c] > limit) continue;
+    unsigned within = 0;
+    for (int c = 0; c < kWidth; ++c) within |= unsigned(squared[c] <= limit) << c;
+    for (; within != 0; within &= within - 1) {
+      const int c = std::countr_zero(within);
       int i = count++;
       for (; i > 0 && near[i - 1].squared > squared[c]; --i) near[i] = near[i - 1];
       near[i] = {squared[c], node.child[c]};

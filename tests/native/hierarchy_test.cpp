@@ -152,6 +152,32 @@ TEST(Hierarchy, TiesGoToTheLowerIndex) {
   EXPECT_EQ(hierarchy.nearest({0.2, 0.2, 0.5}).triangle, 1u);
   EXPECT_EQ(hierarchy.nearest({0.25, 0.25, 1}, kInfinity, 77).triangle, 0u);
   EXPECT_EQ(hierarchy.common(std::array{dvec3(0.25, 0.25, 1)}, kInfinity, -1, 77).triangle, 0u);
+  EXPECT_EQ(hierarchy.nearest_if({0.2, 0.2, 0.5}, [](std::uint32_t i) { return i > 50; }).triangle, 51u);
+  EXPECT_EQ(hierarchy.nearest_if({0.2, 0.2, 0.5}, [](std::uint32_t i) { return i > 98; }).triangle, 99u);
+  EXPECT_EQ(hierarchy.nearest_if({0.2, 0.2, 0.5}, [](std::uint32_t i) { return i % 2 == 0; }).triangle, 0u);
+}
+
+TEST(Hierarchy, NearVisitsAllWithinTheRadius) {
+  TriangleMesh mesh = soup(17, 500);
+  for (unsigned i = 0; i < 500; i += 5) mesh.triangles.push_back(mesh.triangles[i]);
+  const Hierarchy hierarchy(mesh);
+  Random random(18);
+  for (int i = 0; i < 200; ++i) {
+    const dvec3 p = random.point() * (i % 10 == 0 ? 1e9 : 1.0);
+    const double radius = 0.3 * random.below(5) + (i % 10 == 0 ? 2e9 : 0.0);
+    std::vector<int> seen(mesh.triangles.size());
+    hierarchy.near(p, radius, [&](std::uint32_t t) { ++seen[t]; });
+    for (std::uint32_t t = 0; t < seen.size(); ++t) {
+      EXPECT_LE(seen[t], 1);
+      if (std::sqrt(closest(mesh, t, p).distance_squared) <= radius) {
+        EXPECT_EQ(seen[t], 1);
+      }
+    }
+  }
+  const dvec3 corner = mesh.vertices[7];
+  int visited = 0;
+  hierarchy.near(corner, 0, [&](std::uint32_t) { ++visited; });
+  EXPECT_LT(visited, 100);  // not simply all of them
 }
 
 TEST(Hierarchy, OneTriangleAndAPoint) {
@@ -171,7 +197,8 @@ TEST(Hierarchy, HeapsOfEqualTriangles) {
   const auto start = std::chrono::steady_clock::now();
   EXPECT_EQ(Hierarchy(mesh).nearest({0, 0, 1}).triangle, 0u);
   mesh.triangles.assign(300000, {3, 3, 3});
-  EXPECT_EQ(Hierarchy(mesh).nearest({5, 5, 6}).distance, 1);
+  const Hierarchy points(mesh);
+  for (int i = 0; i < 100000; ++i) ASSERT_EQ(points.nearest({5, 5, 6}).distance, 1);
   Random random(9);
   for (int i = 0; i < 300000; ++i) {
     mesh.vertices.push_back(random.point());

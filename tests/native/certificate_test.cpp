@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Judged by measure/hausdorff.h, which shares no code with the certificate.
+#include "check/certificate.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "measure/hausdorff.h"
+#include "reference/errors.h"
+#include "reference/simd.h"
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+const Placement kIdentity(glm::dmat4(1), Storage::float64);
+
+struct Candidates {
+  std::vector<dvec3> points;  // three a candidate, in the world
+  std::vector<std::uint32_t> indices;
+};
+
+std::vector<Verdict> check(const ToleranceVolume& volume, const Candidates& candidates, unsigned threads = 1) {
+  const Placement placed = kIdentity.in(volume.frame());
+  const std::vector<dvec3> in_frame = placed.frame(candidates.points);
+  return Certificate(volume).check({in_frame, candidates.indices, 3, placed.mapping_error(candidates.points)},
+                                   {threads, nullptr});
+}
+
+/// Candidates near the surface: a point of the reference moved by up to 2 epsilon along a random direction, two more around
+/// it; then scaled so that every third has its largest distance within 2 % of epsilon.
+Candidates near_surface(const TriangleMesh& reference, double tolerance, int count, unsigned seed) {
+  std::mt19937 engine(seed);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const auto direction = [&] {
+    dvec3 d;
+    do d = {u(engine), u(engine), u(engine)};
+    while (!(glm::dot(d, d) > 1e-3 && glm::dot(d, d) < 1));
+    return glm::normalize(d);
+  };
+  Candidates result;
+  for (int i = 0; i < count; ++i) {
+    const glm::uvec3 t = reference.triangles[engine() % reference.triangles.size()];
+    const double v = std::abs(u(engine)), w = std::abs(u(engine)) * (1 - v);
+    const dvec3 on = reference.vertices[t.x] * (1 - v - w) + reference.vertices[t.y] * v + reference.vertices[t.z] * w;
+    const double size = tolerance * std::pow(10.0, 2 * u(engine));
+    const double away = i % 3 == 0 ? tolerance * (1 + 0.02 * u(engine)) : tolerance * std::abs(2 * u(engine));
+    const dvec3 base = on + away * direction();
+    for (int k = 0; k < 3; ++k) {
+      result.indices.push_back(std::uint32_t(result.points.size()));
+      result.points.push_back(k == 0 ? base : base + size * direction() * (i % 3 == 0 ? 0.05 : 1.0));
+    }
+  }
+  return result;
+}
+
+struct Score {
+  int inside = 0, outside = 0, wrong_inside = 0, wrong_outside = 0, unproved_clear = 0, clear = 0;
+};
+
+Score judge(const TriangleMesh& reference, double tolerance, const Candidates& candidates, const std::vector<Verdict>& verdicts) {
+  Score score;
+  for (std::size_t i = 0; i < verdicts.size(); ++i) {
+    TriangleMesh one{{candidates.points[3 * i], candidates.points[3 * i + 1], candidates.points[3 * i + 2]}, {{0, 1, 2}}};
+    const HausdorffInterval exact = hausdorff(one, reference, {tolerance, 1, nullptr});
+    score.inside += verdicts[i] == Verdict::inside;
+    score.outside += verdicts[i] == Verdict::outside;
+    score.wrong_inside += verdicts[i] == Verdict::inside && exact.lower > tolerance;
+    score.wrong_outside += verdicts[i] == Verdict::outside && exact.upper <= tolerance;
+    const bool clear = exact.upper < 0.98 * tolerance || exact.lower > 1.02 * tolerance;
+    score.clear += clear;
+    score.unproved_clear += clear && verdicts[i] == Verdict::unproved;
+  }
+  return score;
+}
+
+class RandomCandidates : public testing::TestWithParam<double> {};
+
+TEST_P(RandomCandidates, NoWrongVerdictAndFewUnproved) {
+  const double tolerance = GetParam();
+  for (const TriangleMesh& reference : {shapes::torus(40, 0.01), shapes::box(6)}) {
+    const ToleranceVolume volume(reference.vertices, reference.triangles, kIdentity, tolerance);
+    const Candidates candidates = near_surface(reference, tolerance, 20'000, 3);
+    const Score score = judge(reference, tolerance, candidates, check(volume, candidates));
+    EXPECT_EQ(score.wrong_inside, 0);
+    EXPECT_EQ(score.wrong_outside, 0);
+    EXPECT_LE(score.unproved_clear, score.clear / 1000);
+    EXPECT_GT(score.inside, 1000);
+    EXPECT_GT(score.outside, 1000);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Tolerances, RandomCandidates, testing::Values(0.1, 0.01, 0.0003));
+
+/// A fan of needles of the given height, some degenerate, at an offset from the origin.
+TriangleMesh needles(double height, const dvec3& offset) {
+  std::mt19937 engine(5);
+  std::uniform_real_distribution<double> u(-1, 1);
+  TriangleMesh mesh;
+  for (int i = 0; i < 60; ++i) {
+    const dvec3 a = offset + dvec3(u(engine), u(engine), u(engine)), b = offset + dvec3(u(engine), u(engine), u(engine));
+    const dvec3 c = a + std::abs(u(engine)) * (b - a) + height * dvec3(u(engine), u(engine), u(engine));
+    const unsigned n = unsigned(mesh.vertices.size());
+    mesh.vertices.insert(mesh.vertices.end(), {a, b, i % 7 == 0 ? b : c});
+    mesh.triangles.emplace_back(n, n + 1, n + 2);
+  }
+  return mesh;
+}
+
+TEST(HostileReferences, NoWrongVerdict) {
+  const double tolerance = 1e-3;
+  for (const double offset : {0.0, 1e4}) {
+    for (int exponent = 2; exponent <= 7; ++exponent) {
+      const TriangleMesh reference = needles(std::pow(10.0, -exponent), dvec3(offset));
+      const ToleranceVolume volume(reference.vertices, reference.triangles, kIdentity, tolerance);
+      const Candidates candidates = near_surface(reference, tolerance, 3000, unsigned(exponent));
+      const Score score = judge(reference, tolerance, candidates, check(volume, candidates));
+      EXPECT_EQ(score.wrong_inside, 0) << "height 1e-" << exponent << " offset " << offset;
+      EXPECT_EQ(score.wrong_outside, 0);
+      EXPECT_GT(score.inside, 100);
+    }
+  }
+}
+
+TEST(Certificate, TouchesTheToleranceFromBothSides) {
+  const TriangleMesh plane = shapes::grid(4);
+  const double tolerance = 0.125;
+  const ToleranceVolume volume(plane.vertices, plane.triangles, kIdentity, tolerance);
+  const auto over_one = [&](double z) {  // above a single triangle of the plane
+    return check(volume, {{{0.05, 0.02, z}, {0.2, 0.03, z}, {0.2, 0.18, z}}, {0, 1, 2}})[0];
+  };
+  const auto over_many = [&](double z) {
+    return check(volume, {{{0.1, 0.1, z}, {0.9, 0.2, z}, {0.4, 0.8, z}}, {0, 1, 2}})[0];
+  };
+  for (const double side : {-tolerance, tolerance}) {
+    EXPECT_EQ(over_one(side * (1 - 1e-12)), Verdict::inside);
+    EXPECT_EQ(over_one(side * (1 + 1e-12)), Verdict::outside);
+    // A part that lies across two triangles is proved by one of them, which costs up to (floor)^2 / 2 of the tolerance.
+    EXPECT_EQ(over_many(side * (1 - 5e-4)), Verdict::inside);
+    EXPECT_NE(over_many(side * (1 - 1e-9)), Verdict::outside);
+    EXPECT_EQ(over_many(side * (1 + 1e-9)), Verdict::outside);
+  }
+  EXPECT_NE(over_one(std::nextafter(tolerance, 1)), Verdict::inside) << "outside by the last bit";
+  EXPECT_EQ(over_one(100), Verdict::outside);
+}
+
+TEST(Certificate, LargeAndBentPieces) {
+  const TriangleMesh plane = shapes::grid(50);
+  const ToleranceVolume volume(plane.vertices, plane.triangles, kIdentity, 0.01);
+  // Covers thousands of reference triangles; then one corner leaves the plane by more than the tolerance.
+  EXPECT_EQ(check(volume, {{{0, 0, 0.005}, {1, 0, 0.005}, {0, 1, 0.005}}, {0, 1, 2}})[0], Verdict::inside);
+  EXPECT_EQ(check(volume, {{{0, 0, 0.005}, {1, 0, 0.005}, {0, 1, 0.012}}, {0, 1, 2}})[0], Verdict::outside);
+  // All corners near, the middle not: a chord of the torus.
+  const TriangleMesh torus = shapes::torus(60);
+  const ToleranceVolume ring(torus.vertices, torus.triangles, kIdentity, 0.02);
+  EXPECT_EQ(check(ring, {{{1.4, 0, 0}, {-0.7, 1.2, 0}, {-0.7, -1.2, 0}}, {0, 1, 2}})[0], Verdict::outside);
+}
+
+TEST(Certificate, PointsSegmentsAndQuads) {
+  const TriangleMesh plane = shapes::grid(4);
+  const ToleranceVolume volume(plane.vertices, plane.triangles, kIdentity, 0.1);
+  const Placement placed = kIdentity.in(volume.frame());
+  const auto verdict = [&](const std::vector<dvec3>& points) {
+    std::vector<std::uint32_t> indices(points.size());
+    for (std::uint32_t i = 0; i < indices.size(); ++i) indices[i] = i;
+    const std::vector<dvec3> in_frame = placed.frame(points);
+    return Certificate(volume).check({in_frame, indices, int(points.size()), placed.mapping_error(points)}, {})[0];
+  };
+  EXPECT_EQ(verdict({{0.5, 0.5, 0.09}}), Verdict::inside);
+  EXPECT_EQ(verdict({{0.5, 0.5, 0.11}}), Verdict::outside);
+  EXPECT_EQ(verdict({{0.1, 0.5, 0.09}, {0.9, 0.5, -0.09}}), Verdict::inside);
+  EXPECT_EQ(verdict({{0.1, 0.5, 0.09}, {1.5, 0.5, 0}}), Verdict::outside);
+  EXPECT_EQ(verdict({{0, 0, 0.09}, {1, 0, -0.09}, {1, 1, 0.09}, {0, 1, -0.09}}), Verdict::inside);
+  // Within in one triangulation, outside in the other: a quad is judged in both.
+  const TriangleMesh roof{{{0, 0, 0}, {1, 0, 0.5}, {1, 1, 0}, {0, 1, 0.5}}, {{0, 1, 3}, {1, 2, 3}}};
+  const ToleranceVolume over(roof.vertices, roof.triangles, kIdentity, 0.1);
+  const Placement there = kIdentity.in(over.frame());
+  const std::vector<dvec3> corners = there.frame(roof.vertices);
+  const std::vector<std::uint32_t> quad{0, 1, 2, 3}, halves{0, 1, 3, 1, 2, 3};
+  EXPECT_EQ(Certificate(over).check({corners, quad, 4, 0}, {})[0], Verdict::outside);
+  EXPECT_EQ(Certificate(over).check({corners, halves, 3, 0}, {})[0], Verdict::inside);
+  EXPECT_THROW(Certificate(over).check({corners, quad, 5, 0}, {}), InvalidInput);
+}
+
+TEST(Certificate, SameVerdictsOnAnyThreadsAndInstructions) {
+  const TriangleMesh reference = shapes::torus(30, 0.01);
+  const ToleranceVolume volume(reference.vertices, reference.triangles, kIdentity, 0.01);
+  const Candidates candidates = near_surface(reference, 0.01, 5000, 11);
+  const std::vector<Verdict> one = check(volume, candidates);
+  EXPECT_EQ(one, check(volume, candidates, 2));
+  EXPECT_EQ(one, check(volume, candidates, 5));
+  const Simd best = simd_path();
+  simd_path() = Simd::baseline;
+  EXPECT_EQ(one, check(volume, candidates));
+  simd_path() = best;
+}
+
+TEST(Certificate, HoldsAtAnyPrecision) {
+  const TriangleMesh reference = shapes::torus(30, 0.01);
+  const Candidates candidates = near_surface(reference, 0.03, 3000, 12);
+  for (const double precision : {0.01, 0.1, 0.5, 2.0, 4.0}) {
+    ToleranceVolume::Options options;
+    options.precision = precision;
+    const ToleranceVolume volume(reference.vertices, reference.triangles, kIdentity, 0.03, options);
+    EXPECT_NEAR(volume.precision(), precision, 1e-9);
+    const Score score = judge(reference, 0.03, candidates, check(volume, candidates));
+    EXPECT_EQ(score.wrong_inside + score.wrong_outside, 0);
+    EXPECT_LE(score.unproved_clear, score.clear / 1000);
+  }
+}
+
+TEST(ToleranceVolume, RefusesWhatItCannotHold) {
+  const TriangleMesh mesh = shapes::torus(10);
+  const auto make = [&](double tolerance, const dvec3& offset = dvec3(0)) {
+    std::vector<dvec3> moved = mesh.vertices;
+    for (dvec3& p : moved) p += offset;
+    ToleranceVolume(moved, mesh.triangles, kIdentity, tolerance);
+  };
+  EXPECT_NO_THROW(make(0.01));
+  EXPECT_NO_THROW(make(0.01, dvec3(1e9)));
+  EXPECT_THROW(make(0.01, dvec3(1e15)), InvalidInput) << "double cannot hold 0.01 there";
+  for (const double bad : {0.0, -1.0, 10.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    EXPECT_THROW(make(bad), InvalidInput) << bad;
+  }
+}
+
+TEST(ToleranceVolume, AnyScaleGivesTheSameVerdicts) {
+  const TriangleMesh reference = shapes::torus(20, 0.01);
+  const Candidates candidates = near_surface(reference, 0.02, 2000, 13);
+  const auto verdicts = [&](double scale) {
+    TriangleMesh mesh = reference;
+    Candidates moved = candidates;
+    for (dvec3& p : mesh.vertices) p *= scale;
+    for (dvec3& p : moved.points) p *= scale;
+    const ToleranceVolume volume(mesh.vertices, mesh.triangles, kIdentity, 0.02 * scale);
+    return check(volume, moved);
+  };
+  const std::vector<Verdict> one = verdicts(1);
+  for (const double scale : {0x1p-60, 0x1p-500, 0x1p60, 0x1p500}) EXPECT_EQ(one, verdicts(scale));
+}
+
+TEST(Groups, EveryPieceGetsTheWorstOfItsGroup) {
+  std::vector<Verdict> verdicts{Verdict::inside, Verdict::outside, Verdict::inside, Verdict::unproved};
+  const std::vector<std::int32_t> groups{1, 1, 2, -3};
+  combine_groups(verdicts, groups);
+  EXPECT_EQ(verdicts, (std::vector{Verdict::outside, Verdict::outside, Verdict::inside, Verdict::unproved}));
+  EXPECT_THROW(combine_groups(verdicts, std::span(groups).first(2)), InvalidInput);
+}
+
+}  // namespace

@@ -1,0 +1,391 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Every result is judged by measure/hausdorff.h on what is stored.
+#include "operation/decimation.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <set>
+
+#include "measure/hausdorff.h"
+#include "operation/wedges.h"
+#include "reference/errors.h"
+#include "reference/simd.h"
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+using Options = DecimationOptions;
+
+struct Case {
+  TriangleMesh mesh;
+  glm::dmat4 to_world = glm::dmat4(1);
+  Storage storage = Storage::float32;
+  double percent = 1;
+
+  Placement placement() const { return {to_world, storage}; }
+  double tolerance() const { return percent / 100 * reference_size(mesh.vertices, mesh.triangles, to_world); }
+  std::unique_ptr<ToleranceVolume> volume() const {
+    return std::make_unique<ToleranceVolume>(mesh.vertices, mesh.triangles, placement(), tolerance());
+  }
+  TriangleMesh world(std::vector<dvec3> vertices, std::vector<glm::uvec3> triangles) const {
+    for (dvec3& p : vertices) p = placement().world(p);
+    return {std::move(vertices), std::move(triangles)};
+  }
+};
+
+DecimationResult run(const Case& c, const Options& options = {}) {
+  const auto volume = c.volume();
+  return decimate(c.mesh.vertices, c.mesh.triangles, c.placement(), volume.get(), options);
+}
+
+void expect_within(const Case& c, const DecimationResult& r, bool two_sided = true) {
+  for (const dvec3& p : r.vertices) {
+    if (c.storage == Storage::float32) {
+      ASSERT_EQ(p, dvec3(glm::vec3(p))) << "judged as stored";
+    }
+  }
+  const TriangleMesh result = c.world(r.vertices, r.triangles), reference = c.world(c.mesh.vertices, c.mesh.triangles);
+  const double tolerance = c.tolerance();
+  EXPECT_LE(hausdorff(result, reference, {tolerance, 1, nullptr}).upper, tolerance) << "forward";
+  if (two_sided) {
+    EXPECT_LE(hausdorff(reference, result, {tolerance, 1, nullptr}).upper, tolerance) << "backward";
+  }
+}
+
+/// The maps tell one story: each result triangle is its source with the corners mapped.
+void expect_consistent(const Case& c, const DecimationResult& r) {
+  ASSERT_EQ(r.vertex_map.size(), c.mesh.vertices.size());
+  ASSERT_EQ(r.vertex_source.size(), r.vertices.size());
+  ASSERT_EQ(r.triangle_source.size(), r.triangles.size());
+  ASSERT_EQ(r.source_triangle.size(), r.triangles.size());
+  for (std::size_t i = 0; i < r.triangles.size(); ++i) {
+    const glm::uvec3 source = c.mesh.triangles[r.triangle_source[i]];
+    for (int k = 0; k < 3; ++k) {
+      ASSERT_EQ(r.vertex_map[source[k]], std::int32_t(r.triangles[i][k]));
+      const dvec3 w = r.source_weights[i][k];
+      EXPECT_NEAR(w.x + w.y + w.z, 1, 1e-12);
+      EXPECT_GE(std::min({w.x, w.y, w.z}), 0);
+      const glm::uvec3 from = c.mesh.triangles[r.source_triangle[i][k]];
+      const dvec3 at = c.mesh.vertices[from.x] * w.x + c.mesh.vertices[from.y] * w.y + c.mesh.vertices[from.z] * w.z;
+      const double off = glm::length(c.placement().world(at) - c.placement().world(r.vertices[r.triangles[i][k]]));
+      EXPECT_LE(off, 1.0001 * c.tolerance()) << "attributes come from nearby";
+    }
+  }
+  for (std::size_t v = 0; v < r.vertices.size(); ++v) EXPECT_EQ(r.vertex_map[r.vertex_source[v]], std::int32_t(v));
+}
+
+std::vector<Case> cases() {
+  glm::dmat4 mirrored(1), sheared(1), far_away(1), tiny(1e-6), huge(1e6);
+  mirrored[0][0] = -1;
+  sheared[1][0] = 0.7, sheared[2][1] = -0.4, sheared[0][0] = 3;
+  far_away[3] = {5000, -3000, 100, 1};
+  tiny[3][3] = huge[3][3] = 1;
+  TriangleMesh fins = shapes::grid(12);  // a second sheet through the middle of the first
+  for (unsigned i = 0; i < 12; ++i) {
+    const unsigned a = i * 13 + 6, b = a + 13, n = unsigned(fins.vertices.size());
+    fins.vertices.push_back(fins.vertices[a] + dvec3(0, 0, 0.2));
+    fins.vertices.push_back(fins.vertices[b] + dvec3(0, 0, 0.2));
+    fins.triangles.emplace_back(a, b, n), fins.triangles.emplace_back(b, n + 1, n);
+  }
+  TriangleMesh misoriented = shapes::torus(30);
+  for (std::size_t i = 0; i < misoriented.triangles.size(); i += 3) std::swap(misoriented.triangles[i].y, misoriented.triangles[i].z);
+  TriangleMesh duplicates = shapes::box(8);
+  duplicates.triangles.insert(duplicates.triangles.end(), duplicates.triangles.begin(), duplicates.triangles.begin() + 100);
+  TriangleMesh slivers = shapes::grid(30);  // a plate squeezed to slivers, bent
+  for (dvec3& p : slivers.vertices) p = dvec3(glm::vec3(p.x, p.y * 1e-3, 0.05 * std::sin(9 * p.x)));
+  return {{shapes::torus(40, 0.002)},
+          {shapes::torus(40, 0.02), glm::dmat4(1), Storage::float64},
+          {shapes::box(10)},
+          {shapes::stored(shapes::grid(30))},
+          {shapes::soup(shapes::torus(24))},
+          {shapes::stored(fins)},
+          {misoriented},
+          {duplicates},
+          {slivers},
+          {shapes::torus(30), mirrored},
+          {shapes::torus(30), sheared},
+          {shapes::torus(30), far_away},
+          {shapes::torus(30), tiny},
+          {shapes::torus(30), huge},
+          {shapes::torus(40, 0.002), glm::dmat4(1), Storage::float32, 0.05},
+          {shapes::joined(shapes::box(6), shapes::grid(6)), glm::dmat4(1), Storage::float32, 10}};
+}
+
+TEST(Decimation, KeepsBothDirectionsOnEveryMesh) {
+  int number = 0;
+  for (const Case& c : cases()) {
+    for (const auto vertices : {Options::Vertices::optimal, Options::Vertices::subset}) {
+      SCOPED_TRACE(testing::Message() << "case " << number << (vertices == Options::Vertices::subset ? " subset" : " optimal"));
+      Options options;
+      options.vertices = vertices;
+      const DecimationResult r = run(c, options);
+      expect_within(c, r);
+      expect_consistent(c, r);
+      EXPECT_LT(r.triangles.size(), c.mesh.triangles.size());
+    }
+    ++number;
+  }
+}
+
+TEST(Decimation, OneSidedKeepsForwardAndEveryComponent) {
+  Options options;
+  options.two_sided = false;
+  int number = 0;
+  for (const Case& c : cases()) {
+    SCOPED_TRACE(testing::Message() << "case " << number++);
+    const DecimationResult r = run(c, options);
+    expect_within(c, r, false);
+    EXPECT_FALSE(r.triangles.empty());
+  }
+  const Case spheres{shapes::joined(shapes::torus(10), shapes::box(3)), glm::dmat4(1), Storage::float32, 50};
+  const DecimationResult r = run(spheres, options);
+  std::set<bool> components;
+  for (const std::uint32_t source : r.triangle_source) components.insert(source < 200);
+  EXPECT_EQ(components.size(), 2u);
+}
+
+/// Boundary edges of a mesh as degenerate triangles.
+TriangleMesh outline(const TriangleMesh& mesh) {
+  std::map<std::pair<unsigned, unsigned>, int> count;
+  for (const glm::uvec3& t : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) ++count[std::minmax(t[k], t[(k + 1) % 3])];
+  }
+  TriangleMesh result{mesh.vertices, {}};
+  for (const auto& [edge, uses] : count) {
+    if (uses == 1) result.triangles.emplace_back(edge.first, edge.second, edge.second);
+  }
+  return result;
+}
+
+TEST(Decimation, OneSidedKeepsTheBoundary) {
+  // One-sided, a plate could shrink to one triangle but for its outline.
+  const Case c{shapes::stored(shapes::grid(40))};
+  Options options;
+  options.two_sided = false;
+  const DecimationResult r = run(c, options);
+  const TriangleMesh before = outline(c.mesh), after = outline({r.vertices, r.triangles});
+  const double tolerance = c.tolerance();
+  EXPECT_LE(hausdorff(before, after, {tolerance, 1, nullptr}).upper, tolerance);
+  EXPECT_LE(hausdorff(after, before, {tolerance, 1, nullptr}).upper, tolerance);
+  EXPECT_LE(r.triangles.size(), 20u);
+}
+
+TEST(Decimation, TwoSidedDecides) {
+  // A bump as high as 1.9 epsilon may go one-sided (the result stays within epsilon); two-sided it may not.
+  Case c{shapes::stored(shapes::grid(20)), glm::dmat4(1), Storage::float32, 1};
+  c.mesh.vertices[10 * 21 + 10].z = dvec3(glm::vec3(0, 0, 1.5 * c.tolerance())).z;
+  Options one_sided;
+  one_sided.two_sided = false;
+  const DecimationResult without = run(c, one_sided), with = run(c);
+  expect_within(c, with);
+  EXPECT_LE(without.triangles.size(), with.triangles.size());
+}
+
+TEST(Decimation, SubsetKeepsPositionsBitForBit) {
+  const Case c{shapes::torus(40, 0.002)};
+  Options options;
+  options.vertices = Options::Vertices::subset;
+  const DecimationResult r = run(c, options);
+  for (std::size_t v = 0; v < r.vertices.size(); ++v) EXPECT_EQ(r.vertices[v], c.mesh.vertices[r.vertex_source[v]]);
+  const DecimationResult optimal = run(c);
+  EXPECT_LT(optimal.triangles.size(), r.triangles.size());
+  std::size_t moved = 0;
+  for (std::size_t v = 0; v < optimal.vertices.size(); ++v) {
+    moved += optimal.vertices[v] != c.mesh.vertices[optimal.vertex_source[v]];
+  }
+  EXPECT_GT(moved, optimal.vertices.size() / 2);
+}
+
+TEST(Decimation, TargetStopsItAndToleranceStopsItSooner) {
+  const Case c{shapes::torus(40, 0.002)};
+  Options options;
+  options.target_triangles = 1500;
+  const DecimationResult reached = run(c, options);
+  EXPECT_TRUE(reached.stopped_at_target);
+  EXPECT_LE(reached.triangles.size(), 1500u);
+  EXPECT_GE(reached.triangles.size(), 1498u);
+  options.target_triangles = 10;
+  const DecimationResult missed = run(c, options);
+  EXPECT_FALSE(missed.stopped_at_target);
+  EXPECT_GT(missed.triangles.size(), 10u);
+  expect_within(c, missed);
+}
+
+TEST(Decimation, LockedVerticesStayExactly) {
+  const Case c{shapes::torus(40)};
+  const auto locked = std::make_unique<bool[]>(c.mesh.vertices.size());
+  for (std::size_t i = 0; i < c.mesh.vertices.size(); i += 37) locked[i] = true;
+  Options options;
+  options.locked = {locked.get(), c.mesh.vertices.size()};
+  const DecimationResult r = run(c, options);
+  expect_within(c, r);
+  for (std::size_t i = 0; i < c.mesh.vertices.size(); i += 37) {
+    ASSERT_GE(r.vertex_map[i], 0);
+    EXPECT_EQ(r.vertices[std::size_t(r.vertex_map[i])], c.mesh.vertices[i]);
+    EXPECT_EQ(r.vertex_source[std::size_t(r.vertex_map[i])], i);
+  }
+  EXPECT_GT(r.triangles.size(), run(c).triangles.size());
+  EXPECT_EQ(r.locked.at("asked for"), (c.mesh.vertices.size() + 36) / 37);
+}
+
+TEST(Decimation, OutsideIsAnErrorOrKept) {
+  const Case c{shapes::torus(40)};
+  TriangleMesh bent = c.mesh;
+  bent.vertices[7] += dvec3(0, 0, 5 * c.tolerance());
+  bent = shapes::stored(bent);
+  const auto volume = c.volume();
+  try {
+    decimate(bent.vertices, bent.triangles, c.placement(), volume.get(), {});
+    FAIL();
+  } catch (const InvalidInput& error) {
+    EXPECT_NE(std::string(error.what()).find("faces are not within"), std::string::npos) << error.what();
+  }
+  Options options;
+  options.outside = Options::Outside::keep;
+  const DecimationResult r = decimate(bent.vertices, bent.triangles, c.placement(), volume.get(), options);
+  EXPECT_GT(r.outside_faces, 0u);
+  ASSERT_TRUE(r.first_outside.has_value());
+  EXPECT_GE(r.vertex_map[7], 0);
+  EXPECT_EQ(r.vertices[std::size_t(r.vertex_map[7])], bent.vertices[7]) << "kept as it was";
+  // None got worse.
+  const TriangleMesh result{r.vertices, r.triangles};
+  EXPECT_LE(hausdorff(result, c.mesh).lower, hausdorff(bent, c.mesh).upper);
+}
+
+TEST(Decimation, AgainAndAgainDoesNotDrift) {
+  const Case c{shapes::torus(50, 0.003)};
+  const auto volume = c.volume();
+  DecimationResult r = decimate(c.mesh.vertices, c.mesh.triangles, c.placement(), volume.get(), {});
+  for (int again = 0; again < 4; ++again) {
+    const std::size_t before = r.triangles.size();
+    r = decimate(r.vertices, r.triangles, c.placement(), volume.get(), {});
+    EXPECT_LE(r.triangles.size(), before);
+    expect_within(c, r);
+  }
+}
+
+TEST(Decimation, ThreadsAndInstructionsDoNotChangeABit) {
+  const Case c{shapes::torus(40, 0.003)};
+  const auto with = [&](unsigned threads) {
+    ToleranceVolume::Options volume_options;
+    volume_options.threads = threads;
+    const ToleranceVolume volume(c.mesh.vertices, c.mesh.triangles, c.placement(), c.tolerance(), volume_options);
+    Options options;
+    options.threads = threads;
+    return decimate(c.mesh.vertices, c.mesh.triangles, c.placement(), &volume, options);
+  };
+  const DecimationResult one = with(1), three = with(3);
+  EXPECT_EQ(one.vertices, three.vertices);
+  EXPECT_EQ(one.triangles, three.triangles);
+  const Simd best = simd_path();
+  simd_path() = Simd::baseline;
+  const DecimationResult baseline = with(1);
+  simd_path() = best;
+  EXPECT_EQ(one.vertices, baseline.vertices);
+  EXPECT_EQ(one.triangles, baseline.triangles);
+}
+
+TEST(Decimation, SeamsKeepTheirSides) {
+  // A seam ring around the torus: corners on either side of vertex column 0 differ.
+  const unsigned n = 30;
+  const Case c{shapes::torus(n, 0, 1), glm::dmat4(1), Storage::float32, 3};
+  std::vector<float> values(c.mesh.triangles.size() * 3);
+  for (std::size_t corner = 0; corner < values.size(); ++corner) {
+    const unsigned v = c.mesh.triangles[corner / 3][int(corner % 3)], column = v % n;
+    const unsigned strip = unsigned(corner / 3 / 2) % n;  // the squares of column j span columns j and j + 1
+    values[corner] = float(column == 0 && strip == n - 1 ? n : column);
+  }
+  const std::vector<std::uint32_t> wedges = wedge_labels(c.mesh.triangles, values, 1);
+  for (const auto vertices : {Options::Vertices::optimal, Options::Vertices::subset}) {
+    Options options;
+    options.vertices = vertices;
+    options.wedges = wedges;
+    const DecimationResult r = run(c, options);
+    expect_within(c, r);
+    expect_consistent(c, r);
+    EXPECT_LT(r.triangles.size(), c.mesh.triangles.size() / 2);
+    for (std::size_t i = 0; i < r.triangles.size(); ++i) {
+      float low = float(n), high = 0;
+      for (int k = 0; k < 3; ++k) {
+        float value = 0;
+        for (int w = 0; w < 3; ++w) value += values[3 * r.source_triangle[i][k] + unsigned(w)] * float(r.source_weights[i][k][w]);
+        low = std::min(low, value), high = std::max(high, value);
+      }
+      EXPECT_LT(high - low, float(n) / 2) << "a face that reaches across the seam spans all values";
+    }
+  }
+  // Without wedges faces do reach across: the option matters.
+  const DecimationResult blind = run(c);
+  EXPECT_LE(blind.triangles.size(), c.mesh.triangles.size() / 2);
+}
+
+TEST(Decimation, RepairsAreCounted) {
+  TriangleMesh mesh = shapes::torus(20);
+  mesh.triangles.push_back(mesh.triangles[5]);
+  mesh.triangles.push_back({0, 0, 1});
+  mesh.vertices.push_back({9, 9, 9});
+  const Case c{mesh};
+  const DecimationResult r = run(c);
+  std::map<std::string, std::size_t> repairs;
+  for (const Repair& repair : r.repairs) repairs[repair.kind] = repair.count;
+  EXPECT_EQ(repairs["duplicate"], 1u);
+  EXPECT_EQ(repairs["degenerate"], 1u);
+  EXPECT_EQ(repairs["unused"], 1u);
+  EXPECT_EQ(r.vertex_map.back(), -1);
+  expect_within(c, r);
+}
+
+TEST(Decimation, BadInput) {
+  const Case c{shapes::torus(10)};
+  const auto volume = c.volume();
+  const auto attempt = [&](const TriangleMesh& mesh, const Options& options = {}) {
+    decimate(mesh.vertices, mesh.triangles, c.placement(), volume.get(), options);
+  };
+  TriangleMesh nan = c.mesh, range = c.mesh, empty;
+  nan.vertices[3].y = std::numeric_limits<double>::quiet_NaN();
+  range.triangles[2].z = 100000;
+  EXPECT_THROW(attempt(nan), InvalidInput);
+  EXPECT_THROW(attempt(range), InvalidInput);
+  EXPECT_THROW(attempt(empty), InvalidInput);
+  EXPECT_THROW(attempt({c.mesh.vertices, {}}), InvalidInput);
+  const bool one[1] = {true};
+  Options options;
+  options.locked = one;
+  EXPECT_THROW(attempt(c.mesh, options), InvalidInput);
+  EXPECT_THROW(decimate(c.mesh.vertices, c.mesh.triangles, c.placement(), nullptr, {}), InvalidInput);
+}
+
+TEST(Decimation, StorageThatCannotHoldTheToleranceIsRefused) {
+  Case c{shapes::torus(20), glm::dmat4(1), Storage::float32, 0.1};
+  for (dvec3& p : c.mesh.vertices) p += dvec3(4e3, 0, 0);
+  c.mesh = shapes::stored(c.mesh);
+  EXPECT_FALSE(run(c).warnings.empty()) << "float32 rounds by some per cent of the tolerance";
+  c.percent = 0.01;
+  EXPECT_THROW(run(c), InvalidInput);
+}
+
+TEST(Decimation, StopsWhenCancelled) {
+  const Case c{shapes::torus(40)};
+  const auto volume = c.volume();
+  Progress progress;
+  progress.cancel();
+  Options options;
+  options.progress = &progress;
+  EXPECT_THROW(decimate(c.mesh.vertices, c.mesh.triangles, c.placement(), volume.get(), options), Cancelled);
+}
+
+TEST(Decimation, UnboundedReachesItsTarget) {
+  const Case c{shapes::torus(40)};
+  Options options;
+  options.target_triangles = 100;
+  const DecimationResult r = decimate(c.mesh.vertices, c.mesh.triangles, c.placement(), nullptr, options);
+  EXPECT_TRUE(r.stopped_at_target);
+  EXPECT_GE(r.triangles.size(), 98u);
+}
+
+}  // namespace

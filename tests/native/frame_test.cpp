@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reference/frame.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "reference/errors.h"
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+glm::dmat4 sheared() {
+  glm::dmat4 m(1);
+  m[0] = {2, 0.3, 0, 0}, m[1] = {0.5, -1, 0.2, 0}, m[2] = {0, 0.1, 0.01, 0}, m[3] = {1000, -50, 3, 1};
+  return m;
+}
+
+TEST(Frame, ScalesToAboutOneAtAnySize) {
+  for (const double size : {1e-30, 1e-6, 1.0, 123.0, 1e30}) {
+    const dvec3 centre(5 * size, -size, 0);
+    const Frame frame(Box{centre - size, centre + size});
+    const double radius = glm::length(frame.from_world(centre + size));
+    EXPECT_GT(radius, 0.5);
+    EXPECT_LE(radius, 1.0 + 1e-12);
+    EXPECT_EQ(std::exp2(std::round(std::log2(frame.scale()))), frame.scale()) << "a power of two";
+  }
+}
+
+TEST(Placement, StoredPositionsComeBack) {
+  std::mt19937 engine(1);
+  std::normal_distribution<double> normal;
+  for (const Storage storage : {Storage::float32, Storage::float64}) {
+    const Placement placement = Placement(sheared(), storage).in(Frame(Box{{990, -60, 0}, {1010, -40, 6}}));
+    std::vector<dvec3> points;
+    for (int i = 0; i < 1000; ++i) points.push_back(dvec3(glm::vec3(normal(engine), normal(engine), normal(engine))));
+    const double step = placement.storage_step(points), error = placement.mapping_error(points);
+    for (const dvec3& p : points) {
+      const dvec3 q = placement.frame(p) + 1e-4 * dvec3(normal(engine), normal(engine), normal(engine));
+      const dvec3 back = placement.frame(placement.store(q));
+      EXPECT_LE(glm::length(back - q), step + 1e3 * error);
+      EXPECT_EQ(placement.store(q), storage == Storage::float32 ? dvec3(glm::vec3(placement.store(q))) : placement.store(q));
+    }
+  }
+}
+
+TEST(Placement, MappingErrorCoversLongDouble) {
+  std::mt19937 engine(2);
+  std::normal_distribution<double> normal;
+  const glm::dmat4 m = sheared();
+  const Frame frame(Box{{990, -60, 0}, {1010, -40, 6}});
+  const Placement placement = Placement(m, Storage::float64).in(frame);
+  std::vector<dvec3> points;
+  for (int i = 0; i < 1000; ++i) points.emplace_back(100 * normal(engine), 1e4 * normal(engine), normal(engine));
+  const double bound = placement.mapping_error(points);
+  double worst = 0;
+  for (const dvec3& p : points) {
+    const dvec3 got = placement.frame(p), centre = frame.to_world(dvec3(0));
+    for (int row = 0; row < 3; ++row) {
+      long double exact = m[3][row];
+      for (int column = 0; column < 3; ++column) exact += static_cast<long double>(m[column][row]) * p[column];
+      worst = std::max(worst, std::abs(static_cast<double>(got[row] - (exact - centre[row]) * frame.scale())));
+    }
+  }
+  EXPECT_LE(worst, bound);
+  EXPECT_GE(worst, bound / 100) << "the bound says nothing when it is that wide";
+}
+
+TEST(Placement, RefusesWhatIsNotInvertible) {
+  glm::dmat4 flat(1), projective(1), nan(1);
+  flat[2] = {1, 1, 0, 0}, flat[1] = {1, -1, 0, 0};
+  projective[0][3] = 0.1;
+  nan[3][0] = std::numeric_limits<double>::quiet_NaN();
+  for (const glm::dmat4& m : {flat, projective, nan, glm::dmat4(0)}) {
+    EXPECT_THROW(Placement(m, Storage::float32), InvalidInput);
+  }
+  glm::dmat4 tiny(1e-30);
+  tiny[3][3] = 1;
+  EXPECT_NO_THROW(Placement(tiny, Storage::float32));
+}
+
+TEST(ReferenceSize, LongestDiagonalAfterTheMatrixOfUsedVerticesOnly) {
+  TriangleMesh mesh = shapes::box(1);
+  mesh.vertices.emplace_back(100, 100, 100);  // unused
+  EXPECT_DOUBLE_EQ(reference_size(mesh.vertices, mesh.triangles, glm::dmat4(1)), std::sqrt(3.0));
+  glm::dmat4 shear(1);
+  shear[1][0] = -3;  // x -= 3 y: the diagonal (1, -1, 1) becomes the longest
+  EXPECT_DOUBLE_EQ(reference_size(mesh.vertices, mesh.triangles, shear), std::sqrt(16.0 + 1 + 1));
+  for (dvec3& p : mesh.vertices) p = dvec3(1);
+  EXPECT_THROW(reference_size(mesh.vertices, mesh.triangles, glm::dmat4(1)), InvalidInput);
+}
+
+}  // namespace

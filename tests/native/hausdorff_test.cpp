@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "measure/hausdorff.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <random>
+
+#include "reference/closest_point.h"
+#include "reference/errors.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+struct Random {
+  std::mt19937 engine;
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  explicit Random(unsigned seed) : engine(seed) {}
+  dvec3 point() { return {normal(engine), normal(engine), normal(engine)}; }
+  double share() { return uniform(engine); }
+};
+
+/// n x n squares over [0, 1]^2, moved by `place`.
+template <class Place>
+TriangleMesh grid(unsigned n, Place&& place) {
+  TriangleMesh mesh;
+  for (unsigned i = 0; i <= n; ++i) {
+    for (unsigned j = 0; j <= n; ++j) mesh.vertices.push_back(place(dvec3(i, j, 0) / double(n)));
+  }
+  for (unsigned i = 0; i < n; ++i) {
+    for (unsigned j = 0; j < n; ++j) {
+      const unsigned a = i * (n + 1) + j, b = a + n + 1;
+      mesh.triangles.push_back({a, b, b + 1});
+      mesh.triangles.push_back({a, b + 1, a + 1});
+    }
+  }
+  return mesh;
+}
+
+/// Longitude and latitude.
+TriangleMesh sphere(unsigned n, double radius) {
+  return grid(n, [&](const dvec3& p) {
+    const double longitude = 2 * M_PI * p.x, latitude = M_PI * p.y;
+    return radius * dvec3(std::sin(latitude) * std::cos(longitude), std::sin(latitude) * std::sin(longitude),
+                          std::cos(latitude));
+  });
+}
+
+TriangleMesh box(double half) {
+  TriangleMesh mesh;
+  for (int i = 0; i < 8; ++i) mesh.vertices.push_back(half * dvec3(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1));
+  for (const auto& [a, b, c, d] : {std::array{0u, 1u, 3u, 2u},
+                                   {4u, 6u, 7u, 5u},
+                                   {0u, 4u, 5u, 1u},
+                                   {2u, 3u, 7u, 6u},
+                                   {0u, 2u, 6u, 4u},
+                                   {1u, 5u, 7u, 3u}}) {
+    mesh.triangles.push_back({a, b, c});
+    mesh.triangles.push_back({a, c, d});
+  }
+  return mesh;
+}
+
+TriangleMesh soup(Random& random, int triangles, double size) {
+  TriangleMesh mesh;
+  for (int i = 0; i < triangles; ++i) {
+    const dvec3 centre = random.point();
+    for (int k = 0; k < 3; ++k) mesh.vertices.push_back(centre + size * random.point());
+    mesh.triangles.push_back(glm::uvec3(3 * i) + glm::uvec3(0, 1, 2));
+  }
+  return mesh;
+}
+
+TriangleMesh subdivided(const TriangleMesh& mesh) {
+  TriangleMesh fine;
+  for (const glm::uvec3& t : mesh.triangles) {
+    const dvec3 &a = mesh.vertices[t.x], &b = mesh.vertices[t.y], &c = mesh.vertices[t.z];
+    const auto n = unsigned(fine.vertices.size());
+    for (const dvec3& p : {a, b, c, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0}) fine.vertices.push_back(p);
+    for (const glm::uvec3& s : {glm::uvec3(0, 3, 5), {3, 1, 4}, {5, 4, 2}, {3, 4, 5}})
+      fine.triangles.push_back(s + glm::uvec3(n));
+  }
+  return fine;
+}
+
+double brute(const dvec3& p, const TriangleMesh& mesh) {
+  double squared = std::numeric_limits<double>::infinity();
+  for (const glm::uvec3& t : mesh.triangles) {
+    squared = std::min(squared,
+                       closest_point(p, mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]).distance_squared);
+  }
+  return std::sqrt(squared);
+}
+
+/// What must hold of every answer: the interval in order, narrow unless `narrow` says otherwise, its witness on the
+/// triangle it names and as far away as it says.
+HausdorffInterval measured(const TriangleMesh& a, const TriangleMesh& b, const HausdorffOptions& options = {},
+                           double size = 1, bool narrow = true) {
+  const HausdorffInterval h = hausdorff(a, b, options);
+  EXPECT_LE(0, h.lower);
+  EXPECT_LE(h.lower, h.upper);
+  if (narrow) {
+    EXPECT_LE(h.upper - h.lower, std::max(0.001 * h.upper, 1e-13 * size));
+  }
+  const glm::uvec3& t = a.triangles.at(h.triangle);
+  const double off =
+      std::sqrt(closest_point(h.position, a.vertices[t.x], a.vertices[t.y], a.vertices[t.z]).distance_squared);
+  EXPECT_LE(off, 1e-14 * size);
+  EXPECT_NEAR(brute(h.position, b), h.lower, 2e-14 * size + 1e-9 * h.lower);
+  return h;
+}
+
+void expect_contains(const HausdorffInterval& h, double truth, double rounding = 0) {
+  EXPECT_LE(h.lower, truth + rounding);
+  EXPECT_GE(h.upper, truth - rounding);
+}
+
+TEST(Hausdorff, ParallelPlanes) {
+  for (const double distance : {1.0, 1e-2, 1e-4}) {
+    for (const auto& [n, m] : {std::pair{1u, 40u}, {40u, 1u}, {7u, 11u}}) {
+      const auto h = measured(grid(n, [](const dvec3& p) { return p; }),
+                              grid(m, [&](const dvec3& p) { return p + dvec3(0, 0, distance); }));
+      expect_contains(h, distance);
+    }
+  }
+}
+
+TEST(Hausdorff, Boxes) {
+  expect_contains(measured(box(1), box(1.5), {}, 2), 0.5);
+  expect_contains(measured(box(1.5), box(1), {}, 2), std::sqrt(0.75), 1e-15);
+  expect_contains(measured(box(1), subdivided(subdivided(subdivided(box(1.5)))), {}, 2), 0.5);
+  expect_contains(measured(subdivided(subdivided(box(1.5))), box(1), {}, 2), std::sqrt(0.75), 1e-15);
+}
+
+TEST(Hausdorff, ConcentricSpheres) {
+  const unsigned n = 60;
+  const double radius = 1, larger = 1.1, sag = 1 - std::cos(2 * M_PI / n);  // how far inside the ball a face is at most
+  const auto out = measured(sphere(n, radius), sphere(n + 9, larger)),
+             in = measured(sphere(n + 9, larger), sphere(n, radius));
+  for (const auto& h : {out, in}) {
+    EXPECT_GE(h.upper, larger - radius - larger * sag);
+    EXPECT_LE(h.lower, larger - radius + radius * sag);
+  }
+}
+
+// The farthest point is inside a triangle, far from every corner and midpoint.
+TEST(Hausdorff, CentreOfOneTriangleBetweenThreePoints) {
+  const TriangleMesh a{{{0, 0, 0}, {1, 0, 0}, {0.5, std::sqrt(0.75), 0}}, {{0, 1, 2}}};
+  const TriangleMesh b{a.vertices, {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}}};
+  expect_contains(measured(a, b), 1 / std::sqrt(3.0), 1e-15);
+  expect_contains(measured(b, a), 0);
+}
+
+// A flat one-sided fit: nothing is lost one way, nearly everything the other way.
+TEST(Hausdorff, IsDirected) {
+  const TriangleMesh plate = grid(20, [](const dvec3& p) { return p; });
+  const TriangleMesh corner{{{0, 0, 0}, {0.1, 0, 0}, {0, 0.1, 0}}, {{0, 1, 2}}};
+  EXPECT_LT(measured(corner, plate).upper, 1e-14);
+  expect_contains(measured(plate, corner), std::sqrt(2) - std::sqrt(2) * 0.05, 1e-15);
+}
+
+// Small enough for the truth by sampling: it lies between the largest sample and that plus the spacing.
+TEST(Hausdorff, RandomMeshesAgainstSamples) {
+  Random random(1);
+  for (int round = 0; round < 40; ++round) {
+    const double size = std::pow(10.0, -round % 3);
+    const TriangleMesh a = soup(random, 3, size), b = soup(random, 1 + round % 9, 1);
+    const int n = 60;
+    double largest = 0, spacing = 0;
+    for (const glm::uvec3& t : a.triangles) {
+      const dvec3 &p = a.vertices[t.x], &q = a.vertices[t.y], &r = a.vertices[t.z];
+      spacing = std::max({spacing, glm::distance(p, q) / n, glm::distance(q, r) / n, glm::distance(r, p) / n});
+      for (int i = 0; i <= n; ++i) {
+        for (int j = 0; i + j <= n; ++j) {
+          largest = std::max(largest, brute((double(i) * p + double(j) * q + double(n - i - j) * r) / double(n), b));
+        }
+      }
+    }
+    const HausdorffInterval h = measured(a, b, {}, 10);
+    EXPECT_GE(h.upper, largest - 1e-14);
+    EXPECT_LE(h.lower, largest + spacing);
+    EXPECT_LE(h.upper, 1.001 * (largest + spacing));
+  }
+}
+
+TEST(Hausdorff, NeedlesAndDegenerateTriangles) {
+  Random random(2);
+  for (int round = 0; round < 60; ++round) {
+    TriangleMesh a, b;
+    for (TriangleMesh* mesh : {&a, &b}) {
+      for (unsigned i = 0; i < 40; ++i) {
+        const dvec3 p = random.point(), q = random.point();
+        const double height = i % 4 == 0 ? 0 : std::pow(10.0, -random.share() * 12);
+        mesh->vertices.insert(mesh->vertices.end(),
+                              {p, i % 8 == 0 ? p : q, glm::mix(p, q, random.share()) + height * random.point()});
+        mesh->triangles.push_back(glm::uvec3(3 * i) + glm::uvec3(i % 3, (i + 1) % 3, (i + 2) % 3));
+      }
+    }
+    const HausdorffInterval h = measured(a, b, {}, 10);
+    double largest = 0;
+    for (const glm::uvec3& t : a.triangles) {
+      for (int i = 0; i < 50; ++i) {
+        const dvec3 on =
+            glm::mix(glm::mix(a.vertices[t.x], a.vertices[t.y], random.share()), a.vertices[t.z], random.share());
+        largest = std::max(largest, brute(on, b));
+      }
+    }
+    EXPECT_GE(h.upper, largest - 1e-14);
+    EXPECT_LT(measured(a, a, {}, 10).upper, 1e-13);
+  }
+}
+
+// A point and a segment of a count though they have no area.
+TEST(Hausdorff, DegenerateTrianglesCount) {
+  TriangleMesh plate = grid(4, [](const dvec3& p) { return p; });
+  const TriangleMesh bare = plate;
+  plate.vertices.insert(plate.vertices.end(), {{0.5, 0.5, 3}, {0.5, 0.5, 0}, {0.25, 0.5, 2}});
+  plate.triangles.push_back({25, 26, 25});
+  expect_contains(measured(plate, bare, {}, 3), 3);
+  plate.triangles.back() = {27, 27, 27};
+  expect_contains(measured(plate, bare, {}, 3), 2);
+  plate.triangles.pop_back();  // now unused, and of no account
+  EXPECT_LT(measured(plate, bare).upper, 1e-14);
+  plate.vertices.back() = {1e300, 0, 0};
+  EXPECT_LT(measured(plate, bare).upper, 1e-14);
+}
+
+TEST(Hausdorff, NoDistanceEndsAtRounding) {
+  Random random(3);
+  TriangleMesh rough = sphere(60, 1);
+  for (dvec3& p : rough.vertices) p += 0.01 * random.point();
+  const TriangleMesh fine = subdivided(rough);
+  const auto turn = [](const dvec3& p) { return dvec3(0.36 * p.x - 0.8 * p.y, 0.48 * p.x + 0.6 * p.y, 0.8 * p.x); };
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_LT(measured(rough, rough, {}, 2).upper, 1e-14);
+  EXPECT_LT(measured(fine, rough, {}, 2).upper, 1e-14);
+  EXPECT_LT(measured(rough, fine, {}, 2).upper, 2e-14);
+  EXPECT_LT(measured(grid(1, turn), grid(60, turn)).upper, 2e-14);  // two triangles over 7,200 in their oblique plane
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
+}
+
+// The interval keeps its width where the distance is far smaller than the triangles: float32 rounding, for one.
+TEST(Hausdorff, TinyDistances) {
+  Random random(4);
+  for (const double noise : {1e-4, 1e-7, 1e-10}) {
+    const TriangleMesh plate = grid(1, [](const dvec3& p) { return dvec3(p.x, p.y, 0.3 * p.x - 0.7 * p.y); });
+    TriangleMesh rough = grid(30, [](const dvec3& p) { return dvec3(p.x, p.y, 0.3 * p.x - 0.7 * p.y); });
+    for (dvec3& p : rough.vertices) p += noise * random.point();
+    const HausdorffInterval there = measured(rough, plate), back = measured(plate, rough);
+    EXPECT_GT(there.lower, noise);
+    EXPECT_GT(back.lower, noise);
+    EXPECT_LT(back.upper, 6 * noise);
+  }
+}
+
+TEST(Hausdorff, BoundDecides) {
+  Random random(5);
+  TriangleMesh rough = sphere(40, 1);
+  for (dvec3& p : rough.vertices) p += 0.02 * random.point();
+  for (const auto& [a, b] : {std::pair{sphere(17, 1), rough}, {rough, sphere(17, 1)}}) {
+    const HausdorffInterval free = measured(a, b, {}, 2);
+    const HausdorffInterval tight = measured(a, b, {.bound = free.lower * 1.00001}, 2, false);
+    EXPECT_TRUE(tight.upper <= free.lower * 1.00001 || tight.lower > free.lower * 1.00001);
+    const HausdorffInterval within = measured(a, b, {.bound = tight.upper * 1.000001}, 2);
+    EXPECT_LE(within.upper, tight.upper * 1.000001);
+    const HausdorffInterval beyond = measured(a, b, {.bound = tight.lower * 0.99999}, 2, false);
+    EXPECT_GT(beyond.lower, tight.lower * 0.99999);
+    expect_contains(beyond, tight.lower);
+    const HausdorffInterval wide = measured(a, b, {.bound = 10 * tight.upper}, 2);  // decided at once, and still narrow
+    EXPECT_GE(wide.lower, 0.998 * tight.lower);
+  }
+  // The bound is the distance itself: no arithmetic in doubles can decide that, and the call must end all the same.
+  const TriangleMesh plate = grid(9, [](const dvec3& p) { return p; });
+  const TriangleMesh above = grid(13, [](const dvec3& p) { return p + dvec3(0, 0, 0.1); });
+  expect_contains(measured(plate, above, {.bound = 0.1}), 0.1);
+  EXPECT_THROW(hausdorff(plate, above, {.bound = -1.0}), InvalidInput);
+  EXPECT_THROW(hausdorff(plate, above, {.bound = std::nan("")}), InvalidInput);
+}
+
+TEST(Hausdorff, SameForAnyNumberOfThreads) {
+  Random random(6);
+  TriangleMesh rough = sphere(50, 1);
+  for (dvec3& p : rough.vertices) p += 0.02 * random.point();
+  const TriangleMesh coarse = sphere(8, 1);
+  for (const auto& [a, b] : {std::pair{rough, coarse}, {coarse, rough}}) {
+    for (const std::optional<double> bound : {std::optional<double>(), std::optional(0.05), std::optional(0.2)}) {
+      const HausdorffInterval one = hausdorff(a, b, {bound, 1, nullptr});
+      for (const unsigned threads : {2u, 3u, 7u}) {
+        const HausdorffInterval many = hausdorff(a, b, {bound, threads, nullptr});
+        EXPECT_EQ(many.lower, one.lower);
+        EXPECT_EQ(many.upper, one.upper);
+        EXPECT_EQ(many.position, one.position);
+        EXPECT_EQ(many.triangle, one.triangle);
+      }
+    }
+  }
+}
+
+TEST(Hausdorff, AnyScaleAndAnyPlace) {
+  for (const auto& [scale, offset] :
+       {std::pair{1e-300, 0.0}, {1e-20, 0.0}, {1e20, 0.0}, {1e300, 0.0}, {1.0, 1e6}, {1e-20, 1e-12}}) {
+    const auto move = [&](const dvec3& p) { return offset * dvec3(1, -1, 2) + scale * p; };
+    TriangleMesh inner = box(1), outer = subdivided(box(1.5));
+    for (dvec3& p : inner.vertices) p = move(p);
+    for (dvec3& p : outer.vertices) p = move(p);
+    const double rounding = (1e-15 + 1e-15 * offset / scale) * scale;
+    for (const auto& [h, truth] :
+         {std::pair{hausdorff(inner, outer), 0.5}, {hausdorff(outer, inner), std::sqrt(0.75)}}) {
+      expect_contains(h, truth * scale, rounding);
+      EXPECT_LE(h.upper - h.lower, 0.0011 * h.upper + rounding);
+    }
+  }
+  // One far away from the other, and one tiny beside the other.
+  TriangleMesh far = box(1);
+  for (dvec3& p : far.vertices) p.x += 1e12;
+  expect_contains(hausdorff(box(1), far), 1e12, 1e-3);
+  expect_contains(hausdorff(box(1e-12), box(1)), 1);
+  const HausdorffInterval to_tiny = hausdorff(subdivided(box(1)), box(1e-12));
+  EXPECT_NEAR(to_tiny.lower, std::sqrt(3), 0.002);
+  EXPECT_NEAR(to_tiny.upper, std::sqrt(3), 0.002);
+}
+
+TEST(Hausdorff, RefusesWhatIsNoMesh) {
+  const TriangleMesh good = box(1);
+  TriangleMesh bad = good;
+  bad.vertices[3].y = std::nan("");
+  EXPECT_THROW(hausdorff(bad, good), InvalidInput);
+  EXPECT_THROW(hausdorff(good, bad), InvalidInput);
+  EXPECT_THROW(hausdorff(good, {}), InvalidInput);
+  bad = good;
+  bad.triangles[2].z = 8;
+  EXPECT_THROW(hausdorff(good, bad), InvalidInput);
+}
+
+TEST(Hausdorff, ReportsProgressAndStops) {
+  Progress progress;
+  hausdorff(sphere(20, 1), sphere(21, 1.1), {{}, 1, &progress});
+  EXPECT_STREQ(progress.stage(), "measuring");
+  EXPECT_GT(progress.fraction(), 0.5);
+  EXPECT_LE(progress.fraction(), 1);
+  progress.cancel();
+  EXPECT_THROW(hausdorff(sphere(20, 1), sphere(21, 1.1), {{}, 1, &progress}), Cancelled);
+}
+
+}  // namespace

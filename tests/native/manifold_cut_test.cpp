@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "operation/manifold_cut.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+#include <set>
+
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+
+CutMesh cut(const TriangleMesh& mesh) { return cut_to_manifold(mesh.vertices, mesh.triangles); }
+
+/// An oriented manifold: every directed edge once, and the triangles around a vertex in one fan.
+void expect_manifold(const CutMesh& mesh) {
+  std::set<std::pair<unsigned, unsigned>> directed;
+  std::map<unsigned, std::vector<std::pair<unsigned, unsigned>>> links;
+  for (const glm::uvec3& t : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) {
+      ASSERT_NE(t[k], t[(k + 1) % 3]);
+      ASSERT_TRUE(directed.emplace(t[k], t[(k + 1) % 3]).second);
+      links[t[k]].emplace_back(t[(k + 1) % 3], t[(k + 2) % 3]);
+    }
+  }
+  for (auto& [vertex, link] : links) {
+    std::map<unsigned, unsigned> next(link.begin(), link.end());
+    ASSERT_EQ(next.size(), link.size());
+    std::set<unsigned> ends;
+    for (const auto& [a, b] : link) ends.insert(b);
+    unsigned at = link[0].first;
+    for (const auto& [a, b] : link) {
+      if (!ends.contains(a)) at = a;  // where an open fan starts
+    }
+    std::size_t steps = 0;
+    for (; next.contains(at) && steps < link.size(); ++steps) at = next[at];
+    ASSERT_EQ(steps, link.size()) << "two fans at vertex " << vertex;
+  }
+}
+
+std::size_t tied(const CutMesh& mesh) {
+  return std::size_t(std::count_if(mesh.cause.begin(), mesh.cause.end(), [](CutCause c) { return c != CutCause::none; }));
+}
+
+TEST(ManifoldCut, LeavesAManifoldAlone) {
+  const TriangleMesh mesh = shapes::torus(8);
+  const CutMesh result = cut(mesh);
+  expect_manifold(result);
+  EXPECT_EQ(result.triangles.size(), mesh.triangles.size());
+  EXPECT_EQ(result.vertex_input.size(), mesh.vertices.size());
+  EXPECT_EQ(tied(result) + result.duplicates + result.welded + result.cut_edges + result.reversed_count, 0u);
+  EXPECT_TRUE(result.boundary.empty());
+}
+
+TEST(ManifoldCut, WeldsASoup) {
+  const TriangleMesh mesh = shapes::torus(8), soup = shapes::soup(mesh);
+  const CutMesh result = cut(soup);
+  expect_manifold(result);
+  EXPECT_EQ(result.vertex_input.size(), mesh.vertices.size());
+  EXPECT_EQ(result.welded, soup.vertices.size() - mesh.vertices.size());
+  EXPECT_EQ(tied(result), 0u);
+}
+
+TEST(ManifoldCut, CutsAFinAndTiesItsEdge) {
+  // Three triangles at one edge.
+  const TriangleMesh fin{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}}, {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}}};
+  const CutMesh result = cut(fin);
+  expect_manifold(result);
+  EXPECT_EQ(result.triangles.size(), 3u);
+  EXPECT_EQ(result.cut_edges, 1u);
+  std::set<unsigned> slots;
+  for (std::size_t v = 0; v < result.cause.size(); ++v) {
+    const bool at_edge = result.vertex_input[v] < 2;
+    EXPECT_EQ(result.cause[v] != CutCause::none, at_edge);
+    if (at_edge) slots.insert(result.output_slot[v]);
+  }
+  EXPECT_EQ(slots.size(), 2u) << "both ends are one vertex each in the result";
+}
+
+TEST(ManifoldCut, SplitsTwoFansAtAVertex) {
+  const TriangleMesh bow{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {-1, 0, 0}, {-1, -1, 0}}, {{0, 1, 2}, {0, 3, 4}}};
+  const CutMesh result = cut(bow);
+  expect_manifold(result);
+  EXPECT_EQ(tied(result), 2u);
+}
+
+TEST(ManifoldCut, KeepsTouchingSheetsApart) {
+  // Two boxes that share the positions of one face, but no vertex.
+  TriangleMesh second = shapes::box(2);
+  for (glm::dvec3& p : second.vertices) p.x += 1;
+  const TriangleMesh mesh = shapes::joined(shapes::box(2), second);
+  const CutMesh result = cut(mesh);
+  expect_manifold(result);
+  EXPECT_EQ(result.cut_edges, 0u);
+  EXPECT_EQ(tied(result), 0u);
+  EXPECT_EQ(result.vertex_input.size(), mesh.vertices.size());
+}
+
+TEST(ManifoldCut, DropsExactDuplicatesOnly) {
+  TriangleMesh mesh = shapes::grid(2);
+  mesh.triangles.push_back({mesh.triangles[3].y, mesh.triangles[3].z, mesh.triangles[3].x});  // the same, rotated
+  mesh.triangles.push_back({mesh.triangles[0].x, mesh.triangles[0].z, mesh.triangles[0].y});  // the other side of one
+  const CutMesh result = cut(mesh);
+  expect_manifold(result);
+  EXPECT_EQ(result.duplicates, 1u);
+  EXPECT_EQ(result.stand_in[8], 3u);
+  EXPECT_EQ(result.triangles.size(), 9u);
+}
+
+TEST(ManifoldCut, Degenerates) {
+  TriangleMesh mesh = shapes::grid(2);
+  mesh.triangles.push_back({0, 1, 1});  // on an edge of the grid
+  mesh.triangles.push_back({0, 0, 0});  // on a vertex
+  mesh.vertices.push_back({5, 5, 5});
+  mesh.triangles.push_back({8, 9, 9});  // a segment that nothing else holds
+  const CutMesh result = cut(mesh);
+  expect_manifold(result);
+  EXPECT_EQ(result.degenerate_on_edge, 2u);
+  EXPECT_EQ(result.aside, std::vector<std::uint32_t>{10});
+  EXPECT_NE(result.cause[result.input_vertex[8]], CutCause::none) << "must stay where the segment ends";
+  EXPECT_NE(result.input_vertex[9], CutMesh::kNone);
+}
+
+TEST(ManifoldCut, OrientsConsistently) {
+  TriangleMesh mesh = shapes::torus(8);
+  for (std::size_t i = 0; i < mesh.triangles.size(); i += 5) std::swap(mesh.triangles[i].y, mesh.triangles[i].z);
+  const CutMesh result = cut(mesh);
+  expect_manifold(result);
+  EXPECT_EQ(tied(result), 0u);
+  EXPECT_EQ(result.reversed_count, (mesh.triangles.size() + 4) / 5);
+  for (std::size_t t = 0; t < result.triangles.size(); ++t) {
+    glm::uvec3 c = result.triangles[t];
+    if (result.reversed[t]) std::swap(c.y, c.z);
+    const glm::uvec3 in = mesh.triangles[result.triangle_input[t]];
+    EXPECT_EQ(glm::uvec3(result.vertex_input[c.x], result.vertex_input[c.y], result.vertex_input[c.z]), in);
+  }
+}
+
+TEST(ManifoldCut, CutsAMoebiusStripSomewhere) {
+  TriangleMesh mesh;
+  const unsigned n = 12;
+  for (unsigned i = 0; i < n; ++i) {
+    const double u = 2 * std::numbers::pi * i / n, w = 0.3;
+    for (const double s : {-w, w}) {
+      const double r = 1 + s * std::cos(u / 2);
+      mesh.vertices.emplace_back(r * std::cos(u), r * std::sin(u), s * std::sin(u / 2));
+    }
+  }
+  for (unsigned i = 0; i < n; ++i) {
+    const unsigned a = 2 * i, b = 2 * i + 1, c = i + 1 < n ? a + 2 : 1, d = i + 1 < n ? b + 2 : 0;
+    mesh.triangles.emplace_back(a, c, b), mesh.triangles.emplace_back(b, c, d);
+  }
+  const CutMesh result = cut(mesh);
+  expect_manifold(result);
+  EXPECT_GE(result.cut_edges, 1u);
+  EXPECT_EQ(result.triangles.size(), mesh.triangles.size());
+}
+
+TEST(ManifoldCut, AnySoupBecomesAManifold) {
+  // Random triangles over few vertices: everything that can go wrong does.
+  for (unsigned seed = 0; seed < 300; ++seed) {
+    std::mt19937 engine(seed);
+    TriangleMesh mesh;
+    const unsigned vertices = 4 + engine() % 8, triangles = 1 + engine() % 40;
+    for (unsigned i = 0; i < vertices; ++i) mesh.vertices.emplace_back(engine() % 3, engine() % 3, engine() % 2);
+    for (unsigned i = 0; i < triangles; ++i) mesh.triangles.emplace_back(engine() % vertices, engine() % vertices, engine() % vertices);
+    const CutMesh result = cut(mesh);
+    expect_manifold(result);
+    EXPECT_EQ(result.triangles.size() + result.duplicates + result.degenerate_on_edge + result.aside.size(), triangles);
+    for (const glm::uvec3& t : mesh.triangles) {
+      for (int k = 0; k < 3; ++k) {
+        const std::uint32_t v = result.input_vertex[t[k]];
+        ASSERT_NE(v, CutMesh::kNone);
+        EXPECT_EQ(mesh.vertices[result.vertex_input[v]], mesh.vertices[t[k]]);
+      }
+    }
+  }
+}
+
+}  // namespace

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Meshes for the tests, all made here.
+#pragma once
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "reference/triangle_mesh.h"
+
+namespace tolvol::shapes {
+
+using glm::dvec3;
+
+/// Rounded to float32, as Blender would store it.
+inline TriangleMesh stored(TriangleMesh mesh) {
+  for (dvec3& p : mesh.vertices) p = dvec3(glm::vec3(p));
+  return mesh;
+}
+
+/// n x n squares of side 1 / n in the plane z = 0, each two triangles.
+inline TriangleMesh grid(unsigned n) {
+  TriangleMesh mesh;
+  for (unsigned y = 0; y <= n; ++y) {
+    for (unsigned x = 0; x <= n; ++x) mesh.vertices.emplace_back(double(x) / n, double(y) / n, 0.0);
+  }
+  for (unsigned y = 0; y < n; ++y) {
+    for (unsigned x = 0; x < n; ++x) {
+      const unsigned i = y * (n + 1) + x;
+      mesh.triangles.emplace_back(i, i + 1, i + n + 2);
+      mesh.triangles.emplace_back(i, i + n + 2, i + n + 1);
+    }
+  }
+  return mesh;
+}
+
+/// A closed torus of n x n squares; radii 1 and 0.4, optional noise along the normal.
+inline TriangleMesh torus(unsigned n, double noise = 0, unsigned seed = 1) {
+  std::mt19937 engine(seed);
+  std::normal_distribution<double> normal(0, 1);
+  TriangleMesh mesh;
+  for (unsigned i = 0; i < n; ++i) {
+    for (unsigned j = 0; j < n; ++j) {
+      const double u = 2 * std::numbers::pi * i / n, v = 2 * std::numbers::pi * j / n, r = 0.4 + noise * normal(engine);
+      mesh.vertices.emplace_back((1 + r * std::cos(v)) * std::cos(u), (1 + r * std::cos(v)) * std::sin(u), r * std::sin(v));
+    }
+  }
+  const auto at = [n](unsigned i, unsigned j) { return (i % n) * n + j % n; };
+  for (unsigned i = 0; i < n; ++i) {
+    for (unsigned j = 0; j < n; ++j) {
+      mesh.triangles.emplace_back(at(i, j), at(i + 1, j), at(i + 1, j + 1));
+      mesh.triangles.emplace_back(at(i, j), at(i + 1, j + 1), at(i, j + 1));
+    }
+  }
+  return stored(mesh);
+}
+
+/// The closed surface of a box with n x n squares a side.
+inline TriangleMesh box(unsigned n) {
+  TriangleMesh mesh;
+  std::map<std::array<int, 3>, unsigned> index;
+  const auto vertex = [&](std::array<int, 3> p) {
+    const auto [at, added] = index.try_emplace(p, unsigned(mesh.vertices.size()));
+    if (added) mesh.vertices.emplace_back(double(p[0]) / n, double(p[1]) / n, double(p[2]) / n);
+    return at->second;
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int side = 0; side < 2; ++side) {
+      for (int i = 0; i < int(n); ++i) {
+        for (int j = 0; j < int(n); ++j) {
+          const auto corner = [&](int di, int dj) {
+            std::array<int, 3> p{};
+            p[axis] = side * int(n), p[(axis + 1) % 3] = i + di, p[(axis + 2) % 3] = j + dj;
+            return vertex(p);
+          };
+          const unsigned a = corner(0, 0), b = corner(1, 0), c = corner(1, 1), d = corner(0, 1);
+          if (side) {
+            mesh.triangles.emplace_back(a, b, c), mesh.triangles.emplace_back(a, c, d);
+          } else {
+            mesh.triangles.emplace_back(a, c, b), mesh.triangles.emplace_back(a, d, c);
+          }
+        }
+      }
+    }
+  }
+  return stored(mesh);
+}
+
+/// Every triangle with vertices of its own.
+inline TriangleMesh soup(const TriangleMesh& mesh) {
+  TriangleMesh result;
+  for (const glm::uvec3& t : mesh.triangles) {
+    const unsigned first = unsigned(result.vertices.size());
+    for (int k = 0; k < 3; ++k) result.vertices.push_back(mesh.vertices[t[k]]);
+    result.triangles.emplace_back(first, first + 1, first + 2);
+  }
+  return result;
+}
+
+inline TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
+  const unsigned offset = unsigned(a.vertices.size());
+  a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());
+  for (const glm::uvec3& t : b.triangles) a.triangles.push_back(t + offset);
+  return a;
+}
+
+}  // namespace tolvol::shapes
