@@ -62,17 +62,24 @@ class Cutter {
         return h ^ (h >> 29);
       }
     };
-    std::unordered_map<std::array<std::uint32_t, 3>, std::uint32_t, Hash> seen(input_.size() * 2);
+    // Positions that turn the same way, or the same three vertices either way: Blender, too, holds only one such face. The two
+    // sides of a sheet that has vertices of its own for each stay two.
+    std::unordered_map<std::array<std::uint32_t, 3>, std::uint32_t, Hash> turned(input_.size() * 2), same(input_.size() * 2);
     std::vector<std::uint32_t> degenerate;
     for (std::uint32_t i = 0; i < input_.size(); ++i) {
       std::array<std::uint32_t, 3> t{weld_[input_[i].x], weld_[input_[i].y], weld_[input_[i].z]};
-      std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
       if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) {
         degenerate.push_back(i);
-      } else if (const auto [first, added] = seen.try_emplace(t, i); added) {
+        continue;
+      }
+      std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+      std::array<std::uint32_t, 3> vertices{input_[i].x, input_[i].y, input_[i].z};
+      std::sort(vertices.begin(), vertices.end());
+      const std::uint32_t first = std::min(turned.try_emplace(t, i).first->second, same.try_emplace(vertices, i).first->second);
+      if (first == i) {
         triangles_.push_back(i);
       } else {
-        cut_.stand_in[i] = first->second;
+        cut_.stand_in[i] = cut_.stand_in[first];
         ++cut_.duplicates;
       }
     }

@@ -26,7 +26,7 @@ struct CutMesh {
   std::vector<std::uint32_t> aside;            ///< input triangles that no manifold holds; kept as they are
   std::vector<std::uint32_t> stand_in;         ///< per input triangle: the input triangle that holds its points (itself mostly)
   // What was done.
-  std::size_t duplicates = 0;       ///< exact duplicates of another triangle, dropped
+  std::size_t duplicates = 0;       ///< on the same three vertices, or positions in the same turn, as another; dropped
   std::size_t degenerate_on_edge = 0;  ///< degenerate triangles that lie on another triangle's edge, dropped
   std::size_t welded = 0;           ///< input vertices at exactly the position of another, joined to it for topology
   std::size_t cut_edges = 0;        ///< edges cut because more than two triangles meet there or no orientation fits

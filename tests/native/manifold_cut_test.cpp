@@ -101,12 +101,19 @@ TEST(ManifoldCut, KeepsTouchingSheetsApart) {
 
 TEST(ManifoldCut, DropsExactDuplicatesOnly) {
   TriangleMesh mesh = shapes::grid(2);
-  mesh.triangles.push_back({mesh.triangles[3].y, mesh.triangles[3].z, mesh.triangles[3].x});  // the same, rotated
-  mesh.triangles.push_back({mesh.triangles[0].x, mesh.triangles[0].z, mesh.triangles[0].y});  // the other side of one
+  const glm::uvec3 a = mesh.triangles[3], b = mesh.triangles[0];
+  mesh.triangles.push_back({a.y, a.z, a.x});  // the same, rotated
+  mesh.triangles.push_back({b.x, b.z, b.y});  // the same vertices, turned over
+  const unsigned n = unsigned(mesh.vertices.size());
+  for (int k = 0; k < 3; ++k) mesh.vertices.push_back(mesh.vertices[mesh.triangles[5][k]]);
+  mesh.triangles.push_back({n, n + 2, n + 1});  // the other side of one, on vertices of its own: stays
+  mesh.triangles.push_back({n, n + 1, n + 2});  // this side of it, on vertices of its own
   const CutMesh result = cut(mesh);
   expect_manifold(result);
-  EXPECT_EQ(result.duplicates, 1u);
+  EXPECT_EQ(result.duplicates, 3u);
   EXPECT_EQ(result.stand_in[8], 3u);
+  EXPECT_EQ(result.stand_in[9], 0u);
+  EXPECT_EQ(result.stand_in[11], 5u);
   EXPECT_EQ(result.triangles.size(), 9u);
 }
 
