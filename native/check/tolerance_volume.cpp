@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "field/scatter.h"
 #include "reference/errors.h"
 
 namespace tolvol {

@@ -12,6 +12,7 @@
 #include "field/distance_grid.h"
 #include "reference/frame.h"
 #include "reference/hierarchy.h"
+#include "reference/progress.h"
 
 namespace tolvol {
 

@@ -7,7 +7,6 @@
 #include <optional>
 #include <vector>
 
-#include "reference/progress.h"
 #include "reference/triangle_mesh.h"
 
 namespace tolvol {
@@ -42,10 +41,5 @@ struct DistanceGrid {
 /// 1, 1/2, 1/4, ... that fits kGridBudget. Allocates nothing. Throws ResourceLimit, naming the precision that fits, when
 /// a precision is asked for that does not.
 DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double> precision);
-
-/// Trilinear interpolation needs node values, the witness certificate only ids: both come from scatter().
-/// Exact (float32) unsigned distance and closest triangle at every node within the band of a triangle; ties go to the lower
-/// index, so that the result depends neither on the number of threads nor on the instructions used. O(nodes in the bands).
-void scatter(const TriangleMesh& reference, DistanceGrid& grid, unsigned threads = 0, Progress* progress = nullptr);
 
 }  // namespace tolvol

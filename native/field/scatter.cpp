@@ -2,12 +2,13 @@
 // Based on the initial band of [Botsch04, §2]: each triangle writes exact distances to the nodes of its enlarged box, the
 // smallest stays. Here the box is enlarged by the whole band, so that no marching is needed and every value is exact, and
 // nodes are taken eight along x at once. Rows that the triangle's box or its plane keep out of the band are skipped.
+#include "field/scatter.h"
+
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
 
-#include "field/distance_grid.h"
 #include "reference/parallel.h"
 #include "reference/simd.h"
 

@@ -2,31 +2,30 @@
 // Branch and bound over pieces of a, after M. Tang, M. Lee, Y. Kim, Interactive Hausdorff Distance Computation for
 // General Polygonal Models, 2009, with a sharper bound, a way to split that ends, and rounding inside the interval.
 //
-// Upper bound of a piece (a triangle). The distance to one triangle T of b is convex, so over the piece it is largest
-// at a corner: U = min over T of the largest distance of a corner to T, found by one search of the hierarchy. Lower
-// bound. The distance to b at any point of a. Splitting. Halving the longest edge brings a piece to the size of the
-// triangles near it. From there it is cut along the edges of the nearest one, by planes perpendicular to it: what lies
-// above T has its largest distance to T at a corner, and the corner is a point of a, so both bounds meet at once.
-// Halving alone would never end along the edges of b where two surfaces touch. Order. The pieces with the largest upper
-// bounds first, in batches of a fixed size, each piece of a batch seeing the lower bound from before it: nothing
-// depends on which thread is faster.
+// - Upper bound of a piece (a triangle). The distance to one triangle T of b is convex, so over the piece it is largest
+//   at a corner: U = min over T of the largest distance of a corner to T, found by one search of the hierarchy.
+// - Lower bound. The distance to b at any point of a.
+// - Splitting. Halving the longest edge brings a piece to the size of the triangles near it. From there it is cut along
+//   the edges of the nearest one, by planes perpendicular to it: what lies above T has its largest distance to T at a
+//   corner, and the corner is a point of a, so both bounds meet at once. Halving alone would never end along the edges
+//   of b where two surfaces touch.
+// - Order. The pieces with the largest upper bounds first, in batches of a fixed size, each piece of a batch seeing the
+//   lower bound from before it: nothing depends on which thread is faster.
 //
 // Rounding. u = 2^-53; every point has |x| <= 1 in the frame, so that a difference of two is at most 2 long. One
 // operation on the three coordinates of a vector (sum, difference, product with a number) errs by at most u times the
 // length of its result. Powers of two, by which frame and hierarchy scale, are exact.
 // - Placing a vertex errs by u, so the distance between the surfaces changes by at most 2 u.
 // - A split at t <= 1/2 from the nearer end, p + t (q - p), errs by t 2 u, t 2 u and u: 3 u. The true pieces tile the
-// triangle,
-//   so Piece::error, 3 u for each split on the way, bounds how far their corners are from the stored ones.
+//   triangle, so Piece::error, 3 u for each split on the way, bounds how far their corners are from the stored ones.
 // - A witness a + v ab + w ac errs by 2 u (v + w) for the differences, as much for the products, and 2 u for the sums;
-// v + w may
-//   exceed 1 by 2 u, which puts it 4 u outside: 10 u. Its distance, at most 2, has a relative error below 4 u: 8 u.
-//   Together: true distance <= U + error + 20 u, kUpperMargin.
+//   v + w may exceed 1 by 2 u, which puts it 4 u outside: 10 u. Its distance, at most 2, has a relative error below
+//   4 u: 8 u. Together: true distance <= U + error + 20 u, kUpperMargin.
 // - For `lower` the nearest distance itself is not trusted, as a witness need not be the nearest point.
-// certified_distance
-//   separates p from each triangle T near it by a plane: |p - x| >= v . (p - x) / |v| for all x in T and any v, least
-//   at a corner. The difference and the dot product err by 4 u |v| 2, |v| and the quotient by 4 u 2: 16 u. The point p
-//   is off by the error of its piece, 3 u more for a centroid, and 2 u for placing. Together: kLowerMargin, 24 u.
+//   certified_distance separates p from each triangle T near it by a plane: |p - x| >= v . (p - x) / |v| for all x in T
+//   and any v, least at a corner. The difference and the dot product err by 4 u |v| 2, |v| and the quotient by 4 u 2:
+//   16 u. The point p is off by the error of its piece, 3 u more for a centroid, and 2 u for placing. Together:
+//   kLowerMargin, 24 u.
 #include "measure/hausdorff.h"
 
 #include <algorithm>
@@ -50,13 +49,16 @@ constexpr double kGap = 0.001;                       // of upper: when the inter
 constexpr double kSplitError = 3 * kUnitRoundoff;    // of one split
 constexpr double kUpperMargin = 20 * kUnitRoundoff;  // derived above, like the next
 constexpr double kLowerMargin = 24 * kUnitRoundoff;
-constexpr double kNoise = 256 * kUnitRoundoff;  // upper - lower below this is rounding: no use in going on
-constexpr double kCoarse = 4;         // a piece so many times longer than the triangle near it is halved, not cut
-constexpr std::size_t kSeeds = 4096;  // triangles asked for a first lower bound
-constexpr std::size_t kChunk = 16384, kBatch = 512;  // pieces that see the same lower bound
-constexpr std::size_t kBlock = 64, kSmallBlock = 8;  // pieces handed to a thread at once
+// An interval or a piece shorter than this is rounding: no use in going on.
+constexpr double kNoise = 256 * kUnitRoundoff;
+// A piece so many times longer than the triangle near it is halved, not cut.
+constexpr double kCoarse = 4;
+// Triangles asked for a first lower bound.
+constexpr std::size_t kSeeds = 4096;
+// Pieces that see the same lower bound, and those of them that are handed to a thread at once.
+constexpr std::size_t kChunk = 16384, kBlock = 64, kBatch = 512, kSmallBlock = 8;
 // The budget: an edge of b that crosses a triangle of a costs a few pieces, so that a subdivided copy needs about ten
-// for each of its triangles. 1 us and, while waiting, 150 bytes each.
+// for each of its triangles. 1 us and, while waiting, 100 bytes each.
 constexpr std::size_t kPieces = 4'000'000, kPiecesPerTriangle = 16;
 
 struct Piece {
@@ -196,9 +198,10 @@ class Search {
       }
     });
     learn(samples);
-    for (const Children& family : children) {
-      for (int k = 0; k < family.count; ++k) keep(family.piece[k]);
-      pieces_ += family.count;
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      if (children[i].count == 0) settled_ = std::max(settled_, batch[i].upper);
+      for (int k = 0; k < children[i].count; ++k) keep(children[i].piece[k]);
+      pieces_ += children[i].count;
     }
     report(0.5 + 0.5 * std::min(1.0, lower_ / std::max(upper(), kNoise)));
   }
@@ -206,7 +209,7 @@ class Search {
   static constexpr auto smaller = [](const Piece& x, const Piece& y) { return x.upper < y.upper; };
 
   void keep(const Piece& piece) {
-    if (piece.upper <= cutoff()) {
+    if (piece.upper <= std::max(cutoff(), lower_ + piece.error + kNoise)) {
       settled_ = std::max(settled_, piece.upper);
     } else {
       queue_.push_back(piece);
@@ -275,6 +278,7 @@ class Search {
     return best;
   }
 
+  /// None when the piece is too small.
   Children split(const Piece& piece) const {
     const std::array<dvec3, 3> t = corners(b_, piece.nearest);
     const double reach = std::max({glm::distance(t[0], t[1]), glm::distance(t[1], t[2]), glm::distance(t[2], t[0])});
@@ -285,6 +289,7 @@ class Search {
       if (length[i] > length[longest]) longest = i;
     }
     Children cut;
+    if (length[longest] <= kNoise) return cut;
     if (length[longest] <= kCoarse * reach) cut = cut_along(piece, t);
     return cut.count > 0 ? cut : halves(piece, longest, 0.5);
   }

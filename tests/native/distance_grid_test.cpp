@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "field/scatter.h"
 #include "reference/closest_point.h"
 #include "reference/errors.h"
 #include "reference/simd.h"

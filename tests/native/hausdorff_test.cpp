@@ -119,6 +119,42 @@ void expect_contains(const HausdorffInterval& h, double truth, double rounding =
   EXPECT_GE(h.upper, truth - rounding);
 }
 
+using Long = glm::vec<3, long double>;
+
+/// Exact but for the rounding of long double; not for needles.
+long double exact_distance(const Long& p, const Long& a, const Long& b, const Long& c) {
+  const Long n = glm::cross(b - a, c - a);
+  const Long* corner[] = {&a, &b, &c, &a};
+  bool above = true;
+  long double nearest = std::numeric_limits<long double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    const Long from = *corner[i], edge = *corner[i + 1] - from;
+    const long double t = glm::clamp(glm::dot(p - from, edge) / glm::dot(edge, edge), 0.0L, 1.0L);
+    nearest = std::min(nearest, glm::length(p - from - t * edge));
+    above = above && glm::dot(glm::cross(edge, p - from), n) >= 0;
+  }
+  return above ? std::abs(glm::dot(n, p - a)) / glm::length(n) : nearest;
+}
+
+// From one triangle to another the distance is largest at a corner: known to more digits than a double has.
+TEST(Hausdorff, RoundingIsInside) {
+  Random random(7);
+  for (int round = 0; round < 5000; ++round) {
+    const dvec3 offset = 100.0 * random.point();
+    TriangleMesh a{{}, {{0, 1, 2}}}, b = a;
+    for (int k = 0; k < 3; ++k) a.vertices.push_back(offset + random.point());
+    for (int k = 0; k < 3; ++k) b.vertices.push_back(offset + random.point());
+    long double truth = 0;
+    for (const dvec3& p : a.vertices) {
+      truth = std::max(truth, exact_distance(Long(p), Long(b.vertices[0]), Long(b.vertices[1]), Long(b.vertices[2])));
+    }
+    const HausdorffInterval h = hausdorff(a, b, {.threads = 1});
+    ASSERT_LE(h.lower, truth);
+    ASSERT_GE(h.upper, truth);
+    ASSERT_LT(h.upper - h.lower, 1e-14 * 8);
+  }
+}
+
 TEST(Hausdorff, ParallelPlanes) {
   for (const double distance : {1.0, 1e-2, 1e-4}) {
     for (const auto& [n, m] : {std::pair{1u, 40u}, {40u, 1u}, {7u, 11u}}) {
@@ -273,10 +309,19 @@ TEST(Hausdorff, BoundDecides) {
     const HausdorffInterval wide = measured(a, b, {.bound = 10 * tight.upper}, 2);  // decided at once, and still narrow
     EXPECT_GE(wide.lower, 0.998 * tight.lower);
   }
+  // Once the bound is exceeded nothing more is done for the upper end.
+  const TriangleMesh coarse = sphere(6, 1);
+  EXPECT_GT(measured(coarse, rough, {.bound = 1e-3}, 2, false).upper, 1.01 * measured(coarse, rough, {}, 2).upper);
   // The bound is the distance itself: no arithmetic in doubles can decide that, and the call must end all the same.
   const TriangleMesh plate = grid(9, [](const dvec3& p) { return p; });
   const TriangleMesh above = grid(13, [](const dvec3& p) { return p + dvec3(0, 0, 0.1); });
   expect_contains(measured(plate, above, {.bound = 0.1}), 0.1);
+  // Nor here, where the pieces around the farthest point would have to shrink to nothing.
+  const TriangleMesh a{{{0, 0, 0}, {1, 0, 0}, {0.5, std::sqrt(0.75), 0}}, {{0, 1, 2}}};
+  const TriangleMesh corners{a.vertices, {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}}};
+  const HausdorffInterval sharp = measured(a, corners, {.bound = 1 / std::sqrt(3.0)});
+  expect_contains(sharp, 1 / std::sqrt(3.0), 1e-15);
+  EXPECT_LT(sharp.upper - sharp.lower, 1e-12);
   EXPECT_THROW(hausdorff(plate, above, {.bound = -1.0}), InvalidInput);
   EXPECT_THROW(hausdorff(plate, above, {.bound = std::nan("")}), InvalidInput);
 }
