@@ -209,7 +209,7 @@ class Search {
   static constexpr auto smaller = [](const Piece& x, const Piece& y) { return x.upper < y.upper; };
 
   void keep(const Piece& piece) {
-    if (piece.upper <= std::max(cutoff(), lower_ + piece.error + kNoise)) {
+    if (piece.upper <= cutoff()) {
       settled_ = std::max(settled_, piece.upper);
     } else {
       queue_.push_back(piece);

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tolerance Volumes: keep a mesh within a tolerance of a reference surface."""
+
+import sys
+
+bl_info = {
+    "name": "Tolerance Volumes",
+    "author": "The Tolerance Volumes authors",
+    "version": (0, 1, 0),
+    "blender": (3, 4, 0),
+    "location": "3D View > Sidebar > Tolerance",
+    "description": "Decimate a mesh within a tolerance of its original, proved in both directions",
+    "category": "Mesh",
+}
+
+# Installing a new version over this one reloads this file alone: its parts must be loaded anew too.
+for _name in [name for name in sys.modules if name.startswith(__name__ + ".")]:
+    del sys.modules[_name]
+    globals().pop(_name.removeprefix(__name__ + "."), None)
+
+from . import operators, preferences, properties, ui, volume  # noqa: E402
+
+_PARTS = (preferences, properties, volume, operators, ui)
+
+
+def register():
+    for part in _PARTS:
+        part.register()
+
+
+def unregister():
+    for part in reversed(_PARTS):
+        part.unregister()

@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a decimated mesh keeps beside its geometry, where keeping the elements alone does not do.
+
+UV maps read, for each corner, the input triangle and the weights that the native result names; the decimation kept their
+seams. Other values at corners (colours, custom normals) may differ from face to face anywhere: at a vertex that did not
+move a corner takes the value found there that is nearest to the one it had. An edge takes the marks of all the edges
+that were merged into it. Surviving vertices that moved read attributes, vertex groups and shape keys where they lie
+now; those that did not move keep theirs bit for bit.
+"""
+
+import bpy
+import numpy as np
+
+from .mesh_io import column
+
+# Data type of a Blender attribute -> its value's name, width, array type. Others (text) stay with their element.
+_TYPES = {
+    "FLOAT": ("value", 1, np.float32),
+    "FLOAT2": ("vector", 2, np.float32),
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color", 4, np.float32),
+    "INT": ("value", 1, np.int32),
+    "INT8": ("value", 1, np.int32),
+    "BOOLEAN": ("value", 1, bool),
+}
+# These have their own way: the coordinates, and normals that are stored relative to the shape.
+_NOT_CARRIED = {"position", "custom_normal"}
+_EDGE_MARKS = {
+    "use_seam": bool,
+    "use_edge_sharp": bool,
+    "use_freestyle_mark": bool,
+    "crease": np.float32,
+    "bevel_weight": np.float32,
+}
+
+
+class Carry:
+    """Reads from the mesh as it is; write() puts it into the mesh as it has become."""
+
+    def __init__(self, mesh, source, result):
+        self._source = source
+        self._result = result
+        # Each result vertex reads at one of its corners; only those that moved have to.
+        used, first = np.unique(result.triangles, return_index=True)
+        self._at = np.zeros((len(result.vertices), 3), np.int32)
+        self._at[used] = source.triangles[result.source_triangle.ravel()[first]]
+        self._weights = np.zeros((len(result.vertices), 3))
+        self._weights[used] = result.source_weights.reshape(-1, 3)[first]
+        kept = source.vertices[result.vertex_source]
+        self._moved = np.flatnonzero((kept.view(np.uint32) != result.vertices.view(np.uint32)).any(1))
+        self._points = _attributes(mesh, "POINT") if len(self._moved) else {}
+        self._keys = [column(key.data, "co", 3) for key in mesh.shape_keys.key_blocks] if mesh.shape_keys else []
+        self._corners = {
+            name: values for name, (values, kind) in _attributes(mesh, "CORNER").items() if kind[2] is np.float32
+        }
+        # Before 3.5 UV maps are no attributes.
+        self._uvs = [column(layer.data, "uv", 2) for layer in mesh.uv_layers]
+        self._normals = _custom_normals(mesh)
+        self._edges = column(mesh.edges, "vertices", 2, np.int32)
+        self._marks = _edge_marks(mesh)
+        self._edge_attributes = _attributes(mesh, "EDGE")
+
+    def blend_groups(self, built):
+        """Vertex groups of the vertices that moved, in the BMesh before its vertices are merged."""
+        layer = built.verts.layers.deform.active
+        if layer is None:
+            return
+        built.verts.ensure_lookup_table()
+        verts = built.verts
+        blended = []
+        for row in self._moved.tolist():
+            groups = {}
+            for vertex, weight in zip(self._at[row].tolist(), self._weights[row].tolist()):
+                for group, value in verts[vertex][layer].items():
+                    groups[group] = groups.get(group, 0.0) + weight * value
+            blended.append(groups)
+        for vertex, groups in zip(self._result.vertex_source[self._moved].tolist(), blended):
+            assigned = verts[vertex][layer]
+            assigned.clear()
+            for group, value in groups.items():
+                if value > 0.0:
+                    assigned[group] = min(value, 1.0)
+
+    def write(self, mesh, layout):
+        self._write_vertices(mesh, layout)
+        self._write_edges(mesh, layout)
+        self._write_corners(mesh, layout)
+        mesh.update()
+        self._write_normals(mesh, layout)
+
+    # Vertices -------------------------------------------------------------------------------------------------------
+
+    def _write_vertices(self, mesh, layout):
+        if not len(self._moved):
+            return
+        places = layout.result_vertices[self._moved]
+        at, weights = self._at[self._moved], self._weights[self._moved]
+        coordinates = self._result.vertices[self._moved]
+        _assign(mesh.vertices, "co", 3, np.float32, places, coordinates)
+        for name, (values, kind) in self._points.items():
+            _assign(mesh.attributes[name].data, *kind, places, _blend(values[at], weights))
+        for key, values in zip(mesh.shape_keys.key_blocks if self._keys else (), self._keys):
+            offsets = (values - self._source.vertices)[at]
+            _assign(key.data, "co", 3, np.float32, places, coordinates + _blend(offsets, weights))
+
+    # Edges ----------------------------------------------------------------------------------------------------------
+
+    def _write_edges(self, mesh, layout):
+        if not self._marks and not self._edge_attributes:
+            return
+        count = len(mesh.vertices)
+        keys = _edge_keys(column(mesh.edges, "vertices", 2, np.int32), count)
+        order = np.argsort(keys)
+        merged = _edge_keys(layout.vertices[self._edges], count)
+        found = order[np.searchsorted(keys, merged, sorter=order).clip(max=len(keys) - 1)]
+        takes = np.flatnonzero(keys[found] == merged)
+        found = found[takes]
+        for name, values in self._marks.items():
+            kind = (name, 1, _EDGE_MARKS[name])
+            _merge(mesh.edges, kind, found, values[takes])
+        for name, (values, kind) in self._edge_attributes.items():
+            if name not in mesh.attributes:  # newer Blenders drop a mark that no element has left; it came back above
+                continue
+            _merge(mesh.attributes[name].data, kind, found, values[takes])
+
+    # Corners --------------------------------------------------------------------------------------------------------
+
+    def _write_corners(self, mesh, layout):
+        faces = layout.triangles[:, None]
+        self._corner_at = self._source.corners[self._result.source_triangle[faces, layout.corners].ravel()]
+        self._corner_weights = self._result.source_weights[faces, layout.corners].reshape(-1, 3)
+        for layer, values in zip(mesh.uv_layers, self._uvs):
+            layer.data.foreach_set("uv", _blend(values[self._corner_at], self._corner_weights).ravel())
+        for name, values in self._corners.items():
+            data = mesh.attributes[name].data
+            data.foreach_set(_TYPES[mesh.attributes[name].data_type][0], self._nearest_values(values, layout).ravel())
+
+    def _write_normals(self, mesh, layout):
+        if self._normals is None:
+            return
+        # Blender stores one normal for all corners between two sharp edges, and would mark edges sharp to store more.
+        normals = self._nearest_values(self._normals, layout, _fans(mesh)).astype(np.float64)
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        with _AutoSmooth(mesh):
+            mesh.normals_split_custom_set(normals)
+
+    def _nearest_values(self, values, layout, shared=None):
+        """(corners, width) for the written mesh: read where a vertex moved, chosen where it did not.
+
+        shared: a label for each corner; those with the same get the same value.
+        """
+        values = values.reshape(len(values), -1)
+        read = _blend(values[self._corner_at], self._corner_weights)
+        own = self._source.corners[self._result.triangle_source[layout.triangles][:, None], layout.corners].ravel()
+        had = values[own]
+        if shared is not None:
+            read, had = _mean(read, shared), _mean(had, shared)
+        vertices = self._result.triangles[layout.triangles[:, None], layout.corners].ravel()
+        still = np.ones(len(self._result.vertices), bool)
+        still[self._moved] = False
+        chosen = np.flatnonzero(still[vertices])
+        # All input corners, by vertex; then for each chosen corner the run of those at its vertex.
+        at_vertex = self._source.triangles.ravel()
+        order = np.argsort(at_vertex, kind="stable")
+        starts = np.searchsorted(at_vertex[order], np.arange(len(self._source.vertices) + 1))
+        vertex = self._result.vertex_source[vertices[chosen]]
+        counts = starts[vertex + 1] - starts[vertex]
+        begins = np.cumsum(counts) - counts
+        candidates = np.arange(counts.sum()) - np.repeat(begins - starts[vertex], counts)
+        candidates = self._source.corners.ravel()[order[candidates]]
+        away = np.abs(values[candidates] - np.repeat(had[chosen], counts, axis=0)).sum(1)
+        least = np.repeat(np.minimum.reduceat(away, begins), counts) if len(chosen) else away
+        hits = np.flatnonzero(away == least)
+        which, first = np.unique(np.repeat(np.arange(len(chosen)), counts)[hits], return_index=True)
+        read[chosen[which]] = values[candidates[hits[first]]]
+        return read
+
+
+def _blend(values, weights):
+    """(r, 3, ...) values at three places -> (r, ...): the weighted sum of numbers, the heaviest of anything else."""
+    if values.dtype != np.float32:
+        return values[np.arange(len(values)), np.argmax(weights, 1)]
+    return np.einsum("rk,rk...->r...", weights, values.astype(np.float64)).astype(np.float32)
+
+
+def _mean(values, labels):
+    """(r, width) -> the same, each row the mean of the rows with its label."""
+    sums = np.zeros((labels.max(initial=0) + 1, values.shape[1]))
+    np.add.at(sums, labels, values)
+    return (sums / np.maximum(np.bincount(labels, minlength=len(sums)), 1)[:, None])[labels].astype(np.float32)
+
+
+def _fans(mesh):
+    """A label for each corner of a triangle mesh: equal at a vertex where no sharp edge or flat face lies between."""
+    edges, starts = (column(mesh.loops, name, 1, np.int32) for name in ("edge_index", "vertex_index"))
+    count = len(edges)
+    corner = np.arange(count)
+    following = corner // 3 * 3 + (corner + 1) % 3
+    smooth = np.repeat(column(mesh.polygons, "use_smooth", 1, bool), 3)
+    order = np.argsort(edges, kind="stable")
+    twice = np.bincount(edges, minlength=len(mesh.edges)) == 2
+    pairs = order[twice[edges[order]]].reshape(-1, 2)
+    joined = ~column(mesh.edges, "use_edge_sharp", 1, bool)[edges[pairs[:, 0]]] & smooth[pairs].all(1)
+    pairs = pairs[joined & (starts[pairs[:, 0]] != starts[pairs[:, 1]])]
+    one, two = pairs.T
+    ends = np.concatenate([one, following[one]]), np.concatenate([following[two], two])
+    labels = corner.copy()
+    while True:
+        lowest = np.minimum(labels[ends[0]], labels[ends[1]])
+        before = labels.copy()
+        np.minimum.at(labels, ends[0], lowest)
+        np.minimum.at(labels, ends[1], lowest)
+        labels = labels[labels]
+        if np.array_equal(labels, before):
+            return labels
+
+
+def _attributes(mesh, domain):
+    """name -> (values, (value's name, width, array type)) of the attributes of one domain that an array can hold."""
+    found = {}
+    uv_maps = {layer.name for layer in mesh.uv_layers}
+    for attribute in mesh.attributes:
+        own_way = attribute.name in _NOT_CARRIED or attribute.name in uv_maps
+        if attribute.domain == domain and attribute.data_type in _TYPES and not own_way and attribute.name[0] != ".":
+            kind = _TYPES[attribute.data_type]
+            found[attribute.name] = (column(attribute.data, *kind), kind)
+    return found
+
+
+def _edge_marks(mesh):
+    known = bpy.types.MeshEdge.bl_rna.properties.keys()
+    marks = {name: column(mesh.edges, name, 1, kind) for name, kind in _EDGE_MARKS.items() if name in known}
+    # Writing creases or bevel weights would add their layer to a mesh that has none.
+    return {name: values for name, values in marks.items() if values.any()}
+
+
+def _edge_keys(vertices, count):
+    ends = np.sort(vertices.astype(np.int64), 1)
+    return ends[:, 0] * count + ends[:, 1]
+
+
+def _assign(collection, name, width, dtype, places, values):
+    """Sets some elements of a collection and leaves the others bit for bit."""
+    everything = column(collection, name, width, dtype)
+    everything[places] = values
+    collection.foreach_set(name, everything.ravel())
+
+
+def _merge(collection, kind, places, values):
+    """Marks (flags, creases) of several elements that became one: any of the flags, the largest of the weights."""
+    name, width, dtype = kind
+    everything = column(collection, name, width, dtype)
+    if dtype == np.float32 and width == 1:
+        everything[places] = -np.inf
+        np.maximum.at(everything, places, values)
+    elif dtype is bool:
+        everything[places] = False
+        everything[places[values]] = True
+    else:
+        everything[places] = values
+    collection.foreach_set(name, everything.ravel())
+
+
+class _AutoSmooth:
+    """Before 4.1 custom normals are read and written only while a mesh is set to Auto Smooth."""
+
+    def __init__(self, mesh):
+        self._mesh = mesh
+
+    def __enter__(self):
+        if bpy.app.version < (4, 1):
+            self._before = self._mesh.use_auto_smooth
+            self._mesh.use_auto_smooth = True
+
+    def __exit__(self, *_):
+        if bpy.app.version < (4, 1):
+            self._mesh.use_auto_smooth = self._before
+
+
+def _custom_normals(mesh):
+    """(corners, 3), or None without custom normals."""
+    if not mesh.has_custom_normals:
+        return None
+    if bpy.app.version >= (4, 1):
+        return column(mesh.corner_normals, "vector", 3)
+    with _AutoSmooth(mesh):
+        mesh.calc_normals_split()
+        normals = column(mesh.loops, "normal", 3)
+        mesh.free_normals_split()
+    return normals

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The numbers that a decimated mesh has to prove, whether it is still in memory or was read back from a file."""
+
+from . import measure, volume
+
+_INSIDE = 2  # of the native verdicts; unproved counts as outside
+
+
+def certify(surface, reference, tolerance, kept_faces=0, threads=0, progress=None):
+    """{"forward", "backward", "outside"} of a report: intervals as pairs, for two Surfaces.
+
+    kept_faces: how many faces of the mesh were outside from the start and kept as they are. "outside" then has "rest", the
+    interval of all other faces, unless more than that many are outside.
+    """
+    judge = (tolerance, threads, progress)
+    triangles = surface.arrays.triangles
+    other = reference.world(), reference.arrays.triangles
+    forward, backward = measure.both_ways((surface.world(), triangles), other, *judge)
+    outside = {}
+    if kept_faces:
+        built = volume.native_volume(reference, tolerance, threads, progress)
+        check = built.check(
+            surface.arrays.vertices, triangles, to_world=surface.matrix, threads=threads, progress=progress
+        )
+        inside = triangles[check.verdict >= _INSIDE]
+        if len(triangles) - len(inside) <= kept_faces and len(inside):
+            rest = measure.largest_distance((surface.world(), inside), other, *judge)
+            outside["rest"] = [rest.lower, rest.upper]
+    return {"forward": [forward.lower, forward.upper], "backward": [backward.lower, backward.upper], "outside": outside}

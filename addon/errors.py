@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an operator may end with that is no bug. The message names the object and, where there is one, the remedy."""
+
+# How the message of NotProved begins, wherever it is read again.
+NOT_PROVED = "Not proved"
+
+
+class Refused(Exception):
+    """The operation cannot be done as asked. Nothing was changed."""
+
+
+class NotProved(Refused):
+    """The result could not be certified within the tolerance. Nothing was changed."""
+
+    def __init__(self, intervals):
+        super().__init__(f"{NOT_PROVED}: {intervals}")

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender meshes as arrays: coordinates as they are stored, the triangles that Blender shows, and the 4x4 to the world."""
+
+import hashlib
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+
+@dataclass(frozen=True)
+class MeshArrays:
+    """The base mesh of a datablock, n vertices and m triangles."""
+
+    vertices: np.ndarray  # (n, 3) float32, local space, as stored
+    triangles: np.ndarray  # (m, 3) int32, Blender's own triangulation (loop_triangles)
+    corners: np.ndarray  # (m, 3) int32, the mesh corner (loop) at each triangle corner
+    polygons: np.ndarray  # (m,) int32, the polygon that each triangle is part of
+
+    def fingerprint(self):
+        """Equal for equal coordinates and triangles, whatever the datablock."""
+        digest = hashlib.blake2b(self.vertices.tobytes(), digest_size=16)
+        digest.update(self.triangles.tobytes())
+        return digest.hexdigest()
+
+
+def column(collection, attribute, width=1, dtype=np.float32):
+    """One attribute of a whole collection, (n,) or (n, width)."""
+    values = np.empty(len(collection) * width, dtype)
+    collection.foreach_get(attribute, values)
+    return values if width == 1 else values.reshape(-1, width)
+
+
+def read_mesh(mesh):
+    """The arrays of `mesh`, about 60 ms for 270,000 triangles."""
+    mesh.calc_loop_triangles()
+    triangles = mesh.loop_triangles
+    return MeshArrays(
+        column(mesh.vertices, "co", 3),
+        column(triangles, "vertices", 3, np.int32),
+        column(triangles, "loops", 3, np.int32),
+        column(triangles, "polygon_index", 1, np.int32),
+    )
+
+
+def new_mesh(name, vertices, triangles):
+    """A datablock that holds these coordinates and triangles bit for bit, and nothing else."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(vertices))
+    mesh.vertices.foreach_set("co", np.ascontiguousarray(vertices, np.float32).ravel())
+    mesh.loops.add(triangles.size)
+    mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(triangles, np.int32).ravel())
+    mesh.polygons.add(len(triangles))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+    if bpy.app.version < (4, 0):  # computed, and read-only, from 4.0 on
+        mesh.polygons.foreach_set("loop_total", np.full(len(triangles), 3, np.int32))
+    mesh.update(calc_edges=True)
+    return mesh
+
+
+def matrix_array(matrix):
+    """A mathutils.Matrix as (4, 4) float64."""
+    return np.array(matrix, dtype=np.float64)
+
+
+def to_world(vertices, matrix):
+    """Stored coordinates mapped to the world, (n, 3) float64."""
+    return np.asarray(vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def loose_edges(mesh):
+    """(k, 2) int32: the vertices of the edges that no face uses."""
+    used = np.zeros(len(mesh.edges), bool)
+    used[column(mesh.loops, "edge_index", 1, np.int32)] = True
+    return column(mesh.edges, "vertices", 2, np.int32)[~used]
+
+
+def corner_uvs(mesh):
+    """(corners, 2 * layers) float32: the values of all UV maps, or None when there are none."""
+    if not mesh.uv_layers:
+        return None
+    return np.hstack([column(layer.data, "uv", 2) for layer in mesh.uv_layers])

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""bpy.ops.tolvol: set_reference, clear_reference, check, select_outside, decimate."""
+
+import bpy
+
+from .check import TOLVOL_OT_check, TOLVOL_OT_select_outside
+from .decimate import TOLVOL_OT_decimate
+from .reference import TOLVOL_OT_clear_reference, TOLVOL_OT_set_reference
+
+_CLASSES = (
+    TOLVOL_OT_set_reference,
+    TOLVOL_OT_clear_reference,
+    TOLVOL_OT_check,
+    TOLVOL_OT_select_outside,
+    TOLVOL_OT_decimate,
+)
+
+
+def register():
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def unregister():
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Why an operator cannot run on an object, as text for the panel, the tooltip of the greyed button and scripts."""
+
+from .. import native, volume
+
+
+def object_blocked(ob):
+    """Why nothing can be done with `ob` now, or None."""
+    if native.module is None:
+        return native.reason
+    if ob is None or ob.type != "MESH":
+        return "Select a mesh object"
+    if ob.library is not None or ob.override_library is not None:
+        return f"{ob.name} is linked from another file: Object > Relations > Make Local > All"
+    if ob.mode != "OBJECT":
+        return "Switch to Object Mode"
+    return None
+
+
+def reference_blocked(ob):
+    """Why no reference can be set for `ob` now, or None."""
+    if reason := object_blocked(ob):
+        return reason
+    source = volume.source_object(ob)
+    if source is None:
+        return "Choose the reference object"
+    if not source.data.polygons:
+        return f"{source.name} has no faces"
+    return None
+
+
+def check_blocked(ob):
+    """Why `ob` cannot be compared with its reference now, or None."""
+    if reason := object_blocked(ob):
+        return reason
+    if ob.tolvol.snapshot is None:
+        return "Set the reference first"
+    if reason := volume.stale_reason(ob):
+        return f"The reference is out of date ({reason}): press Update"
+    if not ob.data.polygons:
+        return f"{ob.name} has no faces"
+    return None
+
+
+def decimate_blocked(ob):
+    """Why the mesh of `ob` cannot be decimated now, or None."""
+    if reason := object_blocked(ob):
+        return reason
+    mesh = ob.data
+    if mesh.library is not None or mesh.override_library is not None:
+        return f"The mesh {mesh.name} is linked from another file: Object > Relations > Make Local > All"
+    users = mesh.users - mesh.use_fake_user
+    if users > 1:
+        return f"The mesh {mesh.name} has {users} users: Object > Relations > Make Single User > Object & Data"
+    if not mesh.polygons:
+        return f"{ob.name} has no faces"
+    if any(modifier.type == "MULTIRES" for modifier in ob.modifiers):
+        return "Apply the Multiresolution modifier first"
+    return check_blocked(ob) if ob.tolvol.snapshot else reference_blocked(ob)
+
+
+def allowed(cls, reason):
+    """For an operator's poll: False with the reason in its tooltip."""
+    if reason:
+        cls.poll_message_set(reason)
+    return not reason

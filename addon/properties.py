@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the panel shows and a file keeps, at Object.tolvol. Settings that an operator shares are declared once, here."""
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
+)
+
+
+def tolerance_settings(**options):
+    """name -> property of the tolerance; `options` go to each."""
+    return {
+        "tolerance_mode": EnumProperty(
+            name="Tolerance Unit",
+            description="What the tolerance is given in",
+            items=(
+                ("PERCENT", "% of Size", "Percent of the longest diagonal of the reference's bounding box"),
+                ("LENGTH", "Length", "A length in the world, whatever the size of the reference"),
+            ),
+            **options,
+        ),
+        "tolerance_percent": FloatProperty(
+            name="Tolerance",
+            description="How far the mesh may lie from the reference, in percent of the reference's size",
+            default=1.0,
+            min=1e-6,
+            max=100.0,
+            soft_min=0.01,
+            soft_max=10.0,
+            step=10,
+            precision=3,
+            subtype="PERCENTAGE",
+            **options,
+        ),
+        "tolerance_length": FloatProperty(
+            name="Tolerance",
+            description="How far the mesh may lie from the reference",
+            default=0.01,
+            min=1e-12,
+            soft_max=1.0,
+            step=1,
+            precision=5,
+            subtype="DISTANCE",
+            **options,
+        ),
+    }
+
+
+def decimate_settings(**options):
+    """name -> property of a decimation but for its placement; `options` go to each."""
+    return {
+        "keep": EnumProperty(
+            name="Keep",
+            description="Which way the tolerance holds",
+            items=(
+                (
+                    "BOTH",
+                    "Both Ways",
+                    "The result stays within the tolerance of the reference, and the reference within the tolerance of "
+                    "the result, so nothing is lost",
+                ),
+                (
+                    "ONE",
+                    "One Way",
+                    "The result stays within the tolerance of the reference. Parts of the reference may vanish; its "
+                    "borders and separate pieces stay",
+                ),
+            ),
+            **options,
+        ),
+        "use_target": BoolProperty(
+            name="Stop At",
+            description="Stop at a number of triangles, if the tolerance lets it get that far",
+            **options,
+        ),
+        "target_triangles": IntProperty(
+            name="Triangles",
+            description="The number of triangles to stop at; the tolerance holds, whichever comes first",
+            default=5000,
+            min=1,
+            soft_max=1_000_000,
+            **options,
+        ),
+    }
+
+
+PLACEMENTS = (
+    (
+        "OPTIMAL",
+        "Fewest Triangles",
+        "Vertices move to where they save most triangles. UV maps and attributes are carried over",
+    ),
+    (
+        "SUBSET",
+        "Original Vertices",
+        "Every remaining vertex is an original one, with its UVs and attributes exactly as they are",
+    ),
+)
+
+
+def _get_placement(settings):
+    """What was chosen; until something is, exact UVs for a mesh that has any."""
+    if settings.placement_choice >= 0:
+        return settings.placement_choice
+    mesh = settings.id_data.data
+    return 1 if isinstance(mesh, bpy.types.Mesh) and mesh.uv_layers else 0
+
+
+def _set_placement(settings, value):
+    settings.placement_choice = value
+
+
+class TOLVOL_PG_measurement(bpy.types.PropertyGroup):
+    """The certified distances of one state of a mesh, in world units."""
+
+    fingerprint: StringProperty(description="Of the mesh that was measured; empty: none was")
+    matrix: FloatVectorProperty(size=16, description="Of the object then")
+    tolerance: FloatProperty()
+    forward: FloatProperty(description="The mesh is nowhere farther from the reference than this")
+    backward: FloatProperty(description="The reference is nowhere farther from the mesh than this")
+    forward_within: BoolProperty(description="Proved to be within the tolerance")
+    backward_within: BoolProperty(description="Proved to be within the tolerance")
+    share_outside: FloatProperty(description="Share of the mesh's area that is beyond the tolerance")
+
+
+class TOLVOL_PG_settings(bpy.types.PropertyGroup):
+    __annotations__ = tolerance_settings() | decimate_settings()
+
+    reference_kind: EnumProperty(
+        name="Reference",
+        description="The surface that the tolerance refers to",
+        items=(
+            ("SELF", "This Mesh", "This mesh as it is when the reference is set. It moves along with the object"),
+            (
+                "OBJECT",
+                "Object",
+                "Another object's mesh as it is when the reference is set. It stays where it is in the world",
+            ),
+        ),
+    )
+    reference_object: PointerProperty(
+        name="Object",
+        description="The object whose mesh is the reference",
+        type=bpy.types.Object,
+        poll=lambda settings, ob: ob.type == "MESH" and ob != settings.id_data,
+    )
+    placement: EnumProperty(
+        name="Placement",
+        description="Where the remaining vertices go",
+        items=PLACEMENTS,
+        get=_get_placement,
+        set=_set_placement,
+    )
+    placement_choice: IntProperty(default=-1)
+
+    snapshot: PointerProperty(type=bpy.types.Mesh, description="The reference as it was set; never changed")
+    snapshot_kind: StringProperty()
+    snapshot_object: PointerProperty(type=bpy.types.Object)
+    snapshot_matrix: FloatVectorProperty(size=16)
+    snapshot_size: FloatProperty()
+    snapshot_seconds: FloatProperty(description="How long it took to build the tolerance volume")
+
+    measurement: PointerProperty(type=TOLVOL_PG_measurement)
+    last_run: StringProperty(description="The report of the last decimation, JSON")
+    last_run_of: StringProperty(description="Fingerprint of the mesh it left")
+
+
+def register():
+    bpy.utils.register_class(TOLVOL_PG_measurement)
+    bpy.utils.register_class(TOLVOL_PG_settings)
+    bpy.types.Object.tolvol = PointerProperty(type=TOLVOL_PG_settings)
+
+
+def unregister():
+    del bpy.types.Object.tolvol
+    bpy.utils.unregister_class(TOLVOL_PG_settings)
+    bpy.utils.unregister_class(TOLVOL_PG_measurement)

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The numbers of a run. A run is a dictionary as --report writes it (`decimation_run`), lengths in world units."""
+
+import math
+
+from . import native
+
+# What the certified distance leaves open of itself: Interval is at most this wide, relative to its upper end.
+_RESOLUTION = 0.01
+
+
+def decimation_run(source, result, native_report, check, volume, certified, options, seconds):
+    """What one decimation says of itself.
+
+    source: the MeshArrays that went in; result: the Decimated; native_report: decimate()'s own; check: native check() of
+    the result's triangles; certified: by certify(), of what will be stored; options: two_sided, placement,
+    target_triangles as given.
+    """
+    # Blender keeps vertices that no face uses, so they are no repair here.
+    repairs = [repair for repair in native_report["repairs"] if repair["kind"] != "unused"]
+    if result.coincident:
+        message = f"{result.coincident:,} faces left out that lie exactly on another face"
+        repairs.append({"kind": "coincident", "count": result.coincident, "message": message})
+    return {
+        "version": native.module.__version__,
+        "input": {"vertices": len(source.vertices), "triangles": len(source.triangles)},
+        "output": {"vertices": len(result.vertices), "triangles": len(result.triangles)},
+        "tolerance": {"absolute": volume.tolerance, "percent": 100 * volume.tolerance / volume.size},
+        "two_sided": options["two_sided"],
+        "placement": options["placement"],
+        "target_triangles": options["target_triangles"],
+        "stopped_by": native_report["stopped_by"],
+        "method": check.method,
+        "renderer": check.renderer,
+        "precision": volume.precision,
+        "forward": certified["forward"],
+        "backward": certified["backward"],
+        "seconds": seconds,
+        "repairs": repairs,
+        "locked": native_report["locked"],
+        "outside": native_report["outside"] | certified["outside"],
+        "warnings": native_report["warnings"],
+    }
+
+
+def proved(run):
+    """Whether the certified intervals hold what was promised."""
+    tolerance = run["tolerance"]["absolute"]
+    kept = run["outside"]
+    # Faces that were outside from the start and kept: the rest is within, and the reference no worse than before.
+    forward = kept.get("rest", run["forward"])
+    backward_bound = max(tolerance, kept.get("backward_before", 0.0) * (1 + _RESOLUTION))
+    return forward[1] <= tolerance and (not run["two_sided"] or run["backward"][1] <= backward_bound)
+
+
+def line(run, seconds=None):
+    """A run in one line; every percentage is of the reference's size."""
+    size = 100 * run["tolerance"]["absolute"] / run["tolerance"]["percent"]
+    seconds = sum(run["seconds"].values()) if seconds is None else seconds
+    return (
+        f"{counts(run)}, "
+        f"tolerance {run['tolerance']['percent']:.4g} % = {run['tolerance']['absolute']:.3g}, "
+        f"result within {percent(run['forward'][1], size)}, reference within {percent(run['backward'][1], size)} "
+        f"({'certified' if proved(run) else 'not proved'}), {duration(seconds)}"
+    )
+
+
+def counts(run):
+    """How many triangles a run left, and what kept it from leaving fewer or all of it from being within."""
+    remarks = []
+    if run["target_triangles"] and run["stopped_by"] != "target":
+        remarks.append(f"target {run['target_triangles']:,} not reached within the tolerance")
+    if run["outside"]["faces"]:
+        remarks.append(f"{run['outside']['faces']:,} faces outside kept")
+    remark = f" ({', '.join(remarks)})" if remarks else ""
+    return f"{run['input']['triangles']:,} -> {run['output']['triangles']:,} triangles{remark}"
+
+
+def intervals(run):
+    """Both certified intervals, for a message."""
+    size = 100 * run["tolerance"]["absolute"] / run["tolerance"]["percent"]
+    forward, backward = (
+        f"between {percent(run[way][0], size)} and {percent(run[way][1], size)}" for way in ("forward", "backward")
+    )
+    return f"the result is {forward} of the size from the reference, the reference {backward} from the result"
+
+
+def percent(value, whole):
+    """`value` in % of `whole` with three digits, rounded up: a proved bound must not look smaller than it is."""
+    share = 100 * value / whole
+    if share <= 0:
+        return "0 %"
+    step = 10.0 ** (math.floor(math.log10(share)) - 2)
+    # A last digit is not rounded up for less than a ten-thousandth of it, which is what float32 does to 1 %.
+    return f"{math.ceil(share / step - 1e-4) * step:#.3g}".rstrip(".") + " %"
+
+
+def duration(seconds):
+    return f"{seconds:.1f} s" if seconds >= 0.1 else f"{seconds:.2f} s"

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writing a decimated mesh into a Blender mesh with all that hangs on it.
+
+The triangles that go on stay the faces they are and their vertices are welded onto the survivors by one
+bmesh.ops.weld_verts, so that whatever Blender stores at faces and at surviving vertices is kept as it is. What lies at
+corners and edges is gathered by arrays (carry.py).
+"""
+
+from dataclasses import dataclass
+
+import bmesh
+import bpy
+import numpy as np
+
+from .carry import Carry
+from .errors import Refused
+from .mesh_io import column
+
+
+class MeshMismatch(Refused):
+    """Nothing was written."""
+
+    def __init__(self, reason):
+        super().__init__(f"Blender cannot hold the mesh that was computed: {reason}")
+
+
+@dataclass(frozen=True)
+class Decimated:
+    """The native result of decimate(), as far as Blender can hold it: see there for the arrays."""
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    vertex_map: np.ndarray
+    vertex_source: np.ndarray
+    triangle_source: np.ndarray
+    source_triangle: np.ndarray
+    source_weights: np.ndarray
+    coincident: int  # triangles left out: Blender holds one face on any three vertices
+
+    @classmethod
+    def of(cls, result, source):
+        vertices, vertex_map, vertex_source = result.vertices, result.vertex_map, result.vertex_source
+        # A face that is only a segment or a point may have had vertices at one position joined: it keeps its own.
+        a, b, c = result.triangles.T
+        repeats = source.triangles[result.triangle_source[(a == b) | (b == c) | (c == a)]]
+        own = np.unique(repeats[vertex_source[vertex_map[repeats]] != repeats])
+        vertex_map = vertex_map.copy()
+        vertex_map[own] = len(vertices) + np.arange(len(own))
+        vertices = np.concatenate([vertices, source.vertices[own]])
+        vertex_source = np.concatenate([vertex_source, own.astype(vertex_source.dtype)])
+        triangles = vertex_map[source.triangles[result.triangle_source]]
+        # Two sheets that lay exactly on one another may end on the same vertices; as surfaces they are one.
+        _, first = np.unique(np.sort(triangles, 1), axis=0, return_index=True)
+        kept = np.sort(first)
+        return cls(
+            vertices,
+            triangles[kept],
+            vertex_map,
+            vertex_source,
+            result.triangle_source[kept],
+            result.source_triangle[kept],
+            result.source_weights[kept],
+            len(triangles) - len(kept),
+        )
+
+
+def write_decimated(mesh, source, result):
+    """Turns `mesh`, whose arrays are `source`, into the Decimated `result`.
+
+    First a scratch mesh is built and compared with the result, vertex by vertex and triangle by triangle: the mesh
+    is untouched when MeshMismatch is raised.
+    """
+    carry = Carry(mesh, source, result)
+    built = bmesh.new()
+    try:
+        built.from_mesh(mesh)
+        loose = _loose(built)
+        _triangulate(built, source)
+        _keep_faces(built, source, result.triangle_source)
+        carry.blend_groups(built)
+        _weld(built, _weld_targets(result), loose)
+        layout = _compare(_scratch_arrays(built), source, result)
+        built.to_mesh(mesh)
+    finally:
+        built.free()
+    carry.write(mesh, layout)
+    stored = column(mesh.vertices, "co", 3)[layout.result_vertices]
+    if not np.array_equal(stored.view(np.uint32), result.vertices.view(np.uint32)):
+        raise RuntimeError("the mesh that was written is not the one that was certified")
+
+
+class Layout:
+    """Where vertices and corners of the native result are found in the mesh that was written.
+
+    vertices: (n,) new index of each input vertex, those merged into a survivor have the survivor's
+    result_vertices: (k,) new index of each result vertex
+    triangles, corners: (f,) and (f, 3), the result triangle at each new face, and which of its corners is where
+    """
+
+    def __init__(self, vertices, result_vertices, triangles, corners):
+        self.vertices = vertices
+        self.result_vertices = result_vertices
+        self.triangles = triangles
+        self.corners = corners
+
+
+def _loose(built):
+    return {edge for edge in built.edges if edge.is_wire}
+
+
+def _triangulate(built, source):
+    """Cuts every polygon along the diagonals of its loop_triangles."""
+    faces = built.faces[:]
+    sizes = np.bincount(source.polygons, minlength=len(faces)) + 2
+    starts = np.searchsorted(source.polygons, np.arange(len(faces)))
+    quads = np.flatnonzero(sizes == 4)
+    # The two corners of a quad's diagonal are in both its triangles, and the lowest corner is the polygon's first.
+    one, two = source.corners[starts[quads]], source.corners[starts[quads] + 1]
+    lowest = np.minimum(one.min(1), two.min(1))[:, None]
+    through_first = (one == lowest).any(1) & (two == lowest).any(1)
+    # An n-gon is clipped by the code that makes its loop_triangles; _keep_faces would notice another cut.
+    for chosen, method in (
+        (quads[through_first], {"quad_method": "FIXED"}),
+        (quads[~through_first], {"quad_method": "ALTERNATE"}),
+        (np.flatnonzero(sizes > 4), {"ngon_method": "EAR_CLIP"}),
+    ):
+        if len(chosen):
+            bmesh.ops.triangulate(built, faces=[faces[i] for i in chosen], **method)
+
+
+def _keep_faces(built, source, kept):
+    """Deletes all faces but the triangles `kept` of the source; edges and vertices stay."""
+    faces = built.faces[:]
+    if source.polygons[-1] + 1 == len(source.polygons):  # nothing was cut: face i is triangle i
+        rows = np.arange(len(faces))
+    else:
+        _, present = _scratch_arrays(built)
+        rows = _matching_rows(_rotated(source.triangles)[0], _rotated(present)[0])
+        if rows is None:
+            raise MeshMismatch("its n-gons are cut otherwise than shown. Triangulate them first (Ctrl T in Edit Mode)")
+    stays = np.zeros(len(faces), bool)
+    stays[rows[kept]] = True
+    bmesh.ops.delete(built, geom=[faces[i] for i in np.flatnonzero(~stays)], context="FACES_ONLY")
+
+
+def _weld_targets(result):
+    """(n,) the input vertex that each input vertex is merged onto; itself where it stays."""
+    targets = np.arange(len(result.vertex_map))
+    merged = result.vertex_map >= 0
+    targets[merged] = result.vertex_source[result.vertex_map[merged]]
+    return targets
+
+
+def _weld(built, targets, loose):
+    verts = built.verts[:]
+    gone = np.flatnonzero(targets != np.arange(len(targets)))
+    bmesh.ops.weld_verts(built, targetmap={verts[i]: verts[j] for i, j in zip(gone.tolist(), targets[gone].tolist())})
+    # Edges of deleted faces that became an edge of no other face.
+    stray = [edge for edge in built.edges if edge.is_wire and edge not in loose]
+    bmesh.ops.delete(built, geom=stray, context="EDGES")
+
+
+def _scratch_arrays(built):
+    """(vertices, triangles) as the mesh would be stored; triangles is None when a face has more than three corners."""
+    scratch = bpy.data.meshes.new(".scratch")
+    try:
+        built.to_mesh(scratch)
+        vertices = column(scratch.vertices, "co", 3)
+        if len(scratch.loops) != 3 * len(scratch.polygons):
+            return vertices, None
+        return vertices, column(scratch.loops, "vertex_index", 1, np.int32).reshape(-1, 3)
+    finally:
+        bpy.data.meshes.remove(scratch)
+
+
+def _compare(written, source, result):
+    """The Layout of the written arrays; raises MeshMismatch unless they are the result, triangle by triangle."""
+    vertices, triangles = written
+    targets = _weld_targets(result)
+    stays = targets == np.arange(len(targets))
+    rank = np.cumsum(stays) - 1
+    if not np.array_equal(vertices.view(np.uint32), source.vertices[stays].view(np.uint32)):
+        raise MeshMismatch("its vertices were not merged as computed")
+    result_vertices = rank[result.vertex_source]
+    wanted, wanted_shift = _rotated(result_vertices[result.triangles])
+    present, present_shift = _rotated(triangles) if triangles is not None else (None, None)
+    rows = None if present is None else _matching_rows(present, wanted)
+    if rows is None:
+        raise MeshMismatch("its faces were not merged as computed")
+    corners = (np.arange(3) - present_shift[:, None] + wanted_shift[rows][:, None]) % 3
+    return Layout(rank[targets], result_vertices, rows, corners)
+
+
+def _rotated(triangles):
+    """Each triangle turned so that its lowest vertex comes first, and by how many corners it was turned."""
+    shift = np.argmin(triangles, 1)
+    return np.take_along_axis(triangles, (np.arange(3) + shift[:, None]) % 3, 1), shift
+
+
+def _matching_rows(wanted, present):
+    """For each row of `wanted` the row of `present` that equals it, one to one; None when they differ."""
+    if wanted.shape != present.shape:
+        return None
+    of_wanted, of_present = np.lexsort(wanted.T), np.lexsort(present.T)
+    if not np.array_equal(wanted[of_wanted], present[of_present]):
+        return None
+    rows = np.empty(len(wanted), np.int64)
+    rows[of_wanted] = of_present
+    return rows

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The reference of an object: a snapshot of a mesh and its place, and the native tolerance volumes built of it.
+
+The snapshot is a Mesh datablock that Object.tolvol points to, so that it is saved with the file and followed by undo; it
+is never written to. An object that is its own reference carries it along: snapshot and mesh are mapped to the world by
+the object's present matrix. Another object's reference stays where it was in the world when it was set.
+"""
+
+from collections import OrderedDict
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from . import mesh_io, native
+from .errors import Refused
+
+# Bytes that the volumes used last may hold together; the one in use is kept whatever it holds.
+_KEPT = 600_000_000
+_volumes = OrderedDict()
+
+# What panels show of a mesh (its size, its fingerprint), by object; forgotten whenever any mesh changes.
+_shown = {}
+
+# How far the lengths of an object's axes and the angles between them may stray before it counts as rescaled: ten
+# times what float32 rotations add up to.
+_RIGID = 1e-5
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A mesh and its place in the world."""
+
+    arrays: mesh_io.MeshArrays
+    matrix: np.ndarray  # (4, 4) float64
+
+    def world(self):
+        return mesh_io.to_world(self.arrays.vertices, self.matrix)
+
+    def size(self):
+        """The length that is 100 %."""
+        return native.module.size(self.arrays.vertices, self.arrays.triangles, to_world=self.matrix)
+
+
+def surface_of(ob):
+    """The object's base mesh as it is now."""
+    return Surface(mesh_io.read_mesh(ob.data), mesh_io.matrix_array(ob.matrix_world))
+
+
+def joined(surfaces):
+    """Several Surfaces as one; their coordinates are the world's, in double precision, unless there is only one."""
+    surfaces = list(surfaces)
+    if len(surfaces) == 1:
+        return surfaces[0]
+    vertices, triangles, base = [], [], 0
+    for surface in surfaces:
+        vertices.append(surface.world())
+        triangles.append(surface.arrays.triangles + base)
+        base += len(surface.arrays.vertices)
+    arrays = mesh_io.MeshArrays(np.concatenate(vertices), np.concatenate(triangles).astype(np.int32), None, None)
+    return Surface(arrays, np.eye(4))
+
+
+def source_object(ob):
+    """The object whose mesh a new reference would be taken from, or None."""
+    return ob if ob.tolvol.reference_kind == "SELF" else ob.tolvol.reference_object
+
+
+def reference_of(ob):
+    """The reference as it lies in the world now; the mesh that Set Reference would take when none is set."""
+    settings = ob.tolvol
+    if settings.snapshot is None:
+        source = source_object(ob)
+        if source is None:
+            raise Refused(f"{ob.name} has no reference: choose an object, or This Mesh")
+        return surface_of(source)
+    reason = stale_reason(ob)
+    if reason:
+        raise Refused(f"The reference of {ob.name} is out of date: {reason}. Press Update")
+    own = settings.snapshot_kind == "SELF"
+    matrix = mesh_io.matrix_array(ob.matrix_world) if own else _stored_matrix(settings.snapshot_matrix)
+    return Surface(mesh_io.read_mesh(settings.snapshot), matrix)
+
+
+def set_reference(ob, surface):
+    """Makes `surface` the reference, as chosen by the settings of `ob`."""
+    clear_reference(ob)
+    settings = ob.tolvol
+    settings.snapshot = mesh_io.new_mesh(f".{ob.name} reference", surface.arrays.vertices, surface.arrays.triangles)
+    settings.snapshot_kind = settings.reference_kind
+    settings.snapshot_object = settings.reference_object if settings.reference_kind == "OBJECT" else None
+    settings.snapshot_matrix = surface.matrix.ravel()
+    settings.snapshot_size = surface.size()
+
+
+def clear_reference(ob):
+    snapshot = ob.tolvol.snapshot
+    ob.tolvol.snapshot = None
+    ob.tolvol.measurement.fingerprint = ""
+    if snapshot is not None and snapshot.users == 0:
+        bpy.data.meshes.remove(snapshot)
+
+
+def stale_reason(ob):
+    """Why the reference that is set no longer fits, or None. Cheap enough to draw."""
+    settings = ob.tolvol
+    if settings.snapshot is None:
+        return None
+    if settings.snapshot_kind != settings.reference_kind:
+        return "another one was chosen"
+    if settings.snapshot_kind == "OBJECT" and settings.snapshot_object != settings.reference_object:
+        return "another object was chosen"
+    before, now = _stored_matrix(settings.snapshot_matrix), mesh_io.matrix_array(ob.matrix_world)
+    if settings.snapshot_kind == "SELF" and not same_shape(before, now):
+        return "the object was rescaled"
+    return None
+
+
+def remember(ob, surface, certified, tolerance, share_outside=0.0):
+    """Keeps what was certified of `surface`, the object's mesh as it is now, for the panel."""
+    measurement = ob.tolvol.measurement
+    measurement.fingerprint = surface.arrays.fingerprint()
+    measurement.matrix = surface.matrix.ravel()
+    measurement.tolerance = tolerance
+    measurement.forward, measurement.backward = certified["forward"][1], certified["backward"][1]
+    measurement.forward_within = certified["forward"][1] <= tolerance
+    measurement.backward_within = certified["backward"][1] <= tolerance
+    measurement.share_outside = share_outside
+
+
+def measurement_of(ob):
+    """What was measured last, or None when the mesh, its place or the reference has changed since."""
+    measurement = ob.tolvol.measurement
+    if not measurement.fingerprint or measurement.fingerprint != shown_fingerprint(ob):
+        return None
+    before, now = _stored_matrix(measurement.matrix), mesh_io.matrix_array(ob.matrix_world)
+    moves_along = ob.tolvol.snapshot_kind == "SELF" and same_shape(before, now)
+    return measurement if moves_along or np.array_equal(before, now) else None
+
+
+def same_shape(matrix, other):
+    """Whether two placements differ by a rigid motion only, so that lengths are the same."""
+    metric, metric_other = (m[:3, :3].T @ m[:3, :3] for m in (matrix, other))
+    return np.abs(metric - metric_other).max() <= _RIGID * np.abs(metric).max()
+
+
+def _stored_matrix(values):
+    return np.array(values, np.float64).reshape(4, 4)
+
+
+def native_volume(surface, tolerance, threads=0, progress=None):
+    """The tolerance volume of a surface: built, or the one that was built of the same content before."""
+    key = (surface.arrays.fingerprint(), surface.matrix.tobytes(), tolerance)
+    if key in _volumes:
+        _volumes.move_to_end(key)
+        return _volumes[key]
+    volume = native.module.ToleranceVolume(
+        surface.arrays.vertices,
+        surface.arrays.triangles,
+        tolerance,
+        to_world=surface.matrix,
+        threads=threads,
+        progress=progress,
+    )
+    _volumes[key] = volume
+    while len(_volumes) > 1 and sum(kept.memory for kept in _volumes.values()) > _KEPT:
+        _volumes.popitem(last=False)
+    return volume
+
+
+def exact(value):
+    """The number a person typed: the shortest decimal that Blender's float32 property stands for."""
+    return float(str(np.float32(value)))
+
+
+def tolerance_length(settings, size):
+    """The tolerance in world units; `settings` has the three tolerance properties."""
+    if settings.tolerance_mode == "LENGTH":
+        return exact(settings.tolerance_length)
+    return exact(settings.tolerance_percent) / 100 * size
+
+
+def shown_size(ob):
+    """What 100 % is, for drawing; None while it cannot be known."""
+    if ob.tolvol.snapshot is not None:
+        return ob.tolvol.snapshot_size
+    source = source_object(ob)
+    if source is None or not source.data.polygons or native.module is None:
+        return None
+    key = (source.as_pointer(), "size", mesh_io.matrix_array(source.matrix_world).tobytes())
+    if key not in _shown:
+        try:
+            _shown[key] = surface_of(source).size()
+        except native.module.TolvolError:
+            _shown[key] = None
+    return _shown[key]
+
+
+def shown_fingerprint(ob):
+    """Tells one state of the object's mesh from another, for drawing."""
+    key = (ob.as_pointer(), "fingerprint")
+    if key not in _shown:
+        _shown[key] = mesh_io.read_mesh(ob.data).fingerprint()
+    return _shown[key]
+
+
+@persistent
+def _forget_shown(*_):
+    _shown.clear()
+
+
+@persistent
+def _forget_changed(_scene, depsgraph):
+    if any(update.is_updated_geometry for update in depsgraph.updates):
+        _shown.clear()
+
+
+@persistent
+def _forget_all(*_):
+    _shown.clear()
+    _volumes.clear()
+
+
+def register():
+    bpy.app.handlers.depsgraph_update_post.append(_forget_changed)
+    bpy.app.handlers.undo_post.append(_forget_shown)
+    bpy.app.handlers.redo_post.append(_forget_shown)
+    bpy.app.handlers.load_post.append(_forget_all)
+
+
+def unregister():
+    bpy.app.handlers.load_post.remove(_forget_all)
+    bpy.app.handlers.redo_post.remove(_forget_shown)
+    bpy.app.handlers.undo_post.remove(_forget_shown)
+    bpy.app.handlers.depsgraph_update_post.remove(_forget_changed)
+    _forget_all()

@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Decimates a mesh file within a tolerance, proved in both directions of what is then in the file.
+
+blender --background --python blender_scripts/decimate.py -- IN OUT --tolerance 1%
+"""
+
+import json
+import os
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+import command_line as cli
+from addon import file_io, mesh_io, report, volume
+from addon.certify import certify
+from addon.errors import NOT_PROVED
+
+_DESCRIPTION = """\
+Reduces the meshes of IN to the fewest triangles that stay within the tolerance and writes them to OUT. What is certified is
+OUT as it is read back, before it takes its place. Files: .obj .ply .stl, .gltf and .glb where Blender can read them."""
+
+_EPILOG = """\
+The last line of the output says what was reached; its percentages are of the size of the reference (the longest diagonal of
+its bounding box), its time is that of the whole command. Exit codes: 0 proved; 2 bad usage or input; 3 not proved; 1 a bug.
+OUT is written with 0 alone."""
+
+
+def arguments():
+    parser = cli.Parser("decimate.py", description=_DESCRIPTION, epilog=_EPILOG)
+    parser.add_argument("input", metavar="IN", help="the mesh to decimate")
+    parser.add_argument("output", metavar="OUT", help="where the result goes; the extension says in which format")
+    parser.add_argument(
+        "--tolerance", required=True, type=cli.length, metavar="T", help="N%% of size, or a length in the file's units"
+    )
+    parser.add_argument("--reference", metavar="REF", help="a file that the tolerance refers to (default: IN itself)")
+    parser.add_argument(
+        "--one-sided", action="store_true", help="keep the result near the reference alone: parts of it may vanish"
+    )
+    parser.add_argument(
+        "--placement",
+        choices=("optimal", "subset"),
+        help="optimal: fewest triangles; subset: every vertex is an original one (default: subset with UVs, else optimal)",
+    )
+    parser.add_argument(
+        "--target-triangles",
+        type=cli.whole_number(1),
+        metavar="N",
+        help="stop at N if the tolerance lets it get so far; objects share N by their triangles",
+    )
+    parser.add_argument(
+        "--outside",
+        choices=("error", "keep"),
+        default="error",
+        help="what to do with faces that are not within the tolerance of the reference: stop, or keep them as they are",
+    )
+    parser.add_argument("--report", metavar="FILE.json", help="write the numbers there")
+    parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
+    return parser.parse()
+
+
+class Command:
+    """One run: read, decimate object by object, write beside OUT, read that back, certify it, move it to OUT."""
+
+    def __init__(self, options):
+        self.options = options
+        self.output = Path(options.output)
+        self.started = time.perf_counter()
+        file_io.extension_of(options.input)
+        file_io.extension_of(options.output)
+        cli.require_folder(options.output, "OUT")
+        if options.report:
+            cli.require_folder(options.report, "--report")
+
+    def run(self):
+        reference_file = self._read("--reference", self.options.reference) if self.options.reference else None
+        for ob in reference_file.objects if reference_file else ():
+            ob.name = "reference " + ob.name  # the names are those of IN's objects
+        source = self._read("IN", self.options.input)
+        whole_input = {"file": self.options.input, **source.counts}
+        names = [ob.name for ob in source.objects]
+        reference_objects = self._pair(source.objects, reference_file)
+        references = [volume.surface_of(ob) for ob in reference_objects]
+        tolerance, size = self._tolerance(references)
+        working = tolerance - file_io.rounding(self.options.output, source.objects)
+        if working <= 0:
+            raise cli.Stop(
+                f"--tolerance: {tolerance:.3g} is less than what {self.output.suffix} text rounds away; use .ply for OUT"
+            )
+        runs = [
+            self._decimate(ob, reference, min(working, surface.size()), target)
+            for ob, reference, surface, target in zip(
+                source.objects, reference_objects, references, self._targets(source.objects)
+            )
+        ]
+        repairs = source.repairs + (reference_file.repairs if reference_file else [])
+        whole = self._publish(source.objects, names, references, runs, tolerance, size)
+        whole["input"] = whole_input
+        whole["repairs"] = repairs + whole["repairs"]
+        whole["seconds"]["total"] = time.perf_counter() - self.started
+        if self.options.report:
+            Path(self.options.report).write_text(json.dumps(whole, indent=1) + "\n")
+        for note in [*(repair["message"] for repair in whole["repairs"]), *whole["warnings"]]:
+            print(f"note: {note}")
+        print(report.line(whole, whole["seconds"]["total"]))
+        return 0
+
+    def _read(self, what, path):
+        start = time.perf_counter()
+        found = file_io.read_file(path)
+        self._stage(f"{what} {path}: {found.counts['triangles']:,} triangles", start)
+        return found
+
+    @staticmethod
+    def _stage(text, start):
+        print(f"{text}, {report.duration(time.perf_counter() - start)}", flush=True)
+
+    def _pair(self, objects, reference_file):
+        """The object that each object's tolerance refers to."""
+        if reference_file is None:
+            return objects
+        by_name = {ob.name.removeprefix("reference "): ob for ob in reference_file.objects}
+        if all(ob.name in by_name for ob in objects) and len(by_name) == len(objects):
+            return [by_name[ob.name] for ob in objects]
+        if len(objects) > 1:
+            raise cli.Stop(
+                f"--reference {self.options.reference}: its objects ({', '.join(by_name)}) are not those of IN "
+                f"({', '.join(ob.name for ob in objects)}); give them the same names"
+            )
+        if len(by_name) == 1:
+            return reference_file.objects
+        whole = volume.joined([volume.surface_of(ob) for ob in reference_file.objects]).arrays
+        joined = bpy.data.objects.new("reference", mesh_io.new_mesh("reference", whole.vertices, whole.triangles))
+        bpy.context.collection.objects.link(joined)
+        return [joined]
+
+    def _tolerance(self, references):
+        """(the tolerance, what 100 % is), for the whole file."""
+        size = volume.joined(references).size()
+        tolerance = cli.in_units(self.options.tolerance, size)
+        if tolerance > size:
+            raise cli.Stop(f"--tolerance: {tolerance:.6g} is more than the size of the reference, {size:.6g}")
+        return tolerance, size
+
+    def _targets(self, objects):
+        target = self.options.target_triangles
+        if target is None:
+            return [None] * len(objects)
+        triangles = [len(mesh_io.read_mesh(ob.data).triangles) for ob in objects]
+        return [max(1, target * count // sum(triangles)) for count in triangles]
+
+    def _decimate(self, ob, reference, tolerance, target):
+        """The operator's report of one object."""
+        start = time.perf_counter()
+        if ob.data.users > 1:  # instances in a glTF
+            ob.data = ob.data.copy()
+        bpy.context.view_layer.objects.active = ob
+        if reference is not ob:
+            ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", reference
+        asked = {"target_triangles": target} if target else {"use_target": False}
+        if self.options.placement:
+            asked["placement"] = self.options.placement.upper()
+        try:
+            with file_io.quiet():
+                bpy.ops.tolvol.decimate(
+                    tolerance_length=_not_above(tolerance),
+                    keep="ONE" if self.options.one_sided else "BOTH",
+                    outside=self.options.outside.upper(),
+                    threads=self.options.threads,
+                    **asked,
+                )
+        except RuntimeError as error:
+            message = str(error).removeprefix("Error: ").strip()
+            if "Traceback" in message:
+                raise
+            raise cli.Stop(f"{ob.name}: {message}", cli.NOT_PROVED if NOT_PROVED in message else cli.USAGE) from None
+        run = json.loads(ob.tolvol.last_run)
+        self._stage(f"decimated {ob.name}: {report.counts(run)}", start)
+        return run
+
+    def _publish(self, objects, names, references, runs, tolerance, size):
+        """Writes OUT when what is read back is proved; the report of the whole file."""
+        start = time.perf_counter()
+        try:
+            folder = Path(tempfile.mkdtemp(prefix=".tolvol-", dir=self.output.resolve().parent))
+        except OSError as error:
+            raise cli.Stop(f"OUT {self.output}: {error.strerror}") from None
+        try:
+            file_io.write_file(folder / self.output.name, objects, self.output.parent)
+            bpy.ops.wm.read_factory_settings(use_empty=True)
+            written = file_io.read_file(folder / self.output.name)
+            self._stage(f"wrote {self.output.name} and read it back", start)
+            start = time.perf_counter()
+            found = {ob.name: volume.surface_of(ob) for ob in written.objects}
+            if found.keys() == set(names):
+                judged = [
+                    self._certify(found[name], reference, tolerance, run["outside"]["faces"])
+                    for name, reference, run in zip(names, references, runs)
+                ]
+            else:  # a format of one object
+                kept = sum(run["outside"]["faces"] for run in runs)
+                judged = [self._certify(volume.joined(found.values()), volume.joined(references), tolerance, kept)]
+            whole = self._summary(names, runs, judged, tolerance, size)
+            whole["output"] = {"file": self.options.output, **written.counts}
+            whole["seconds"]["certify"] += time.perf_counter() - start
+            self._stage("certified it both ways", start)
+            if not report.proved(whole):
+                raise cli.Stop(
+                    f"{NOT_PROVED}: {report.intervals(whole)}; {self.output} was not written", cli.NOT_PROVED
+                )
+            # OUT itself last: once it is there, all of it is.
+            for path in sorted(folder.iterdir(), key=lambda path: path.name == self.output.name):
+                os.replace(path, self.output.resolve().parent / path.name)
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+        return whole
+
+    def _certify(self, surface, reference, tolerance, kept):
+        return certify(surface, reference, tolerance, kept, self.options.threads)
+
+    def _summary(self, names, runs, judged, tolerance, size):
+        """The report of the whole file: the worst of its objects, as certified in the file."""
+
+        def worst(pairs):
+            return [max(ends) for ends in zip(*pairs)]
+
+        forward, backward = (worst(part[way] for part in judged) for way in ("forward", "backward"))
+        outside = {"faces": sum(run["outside"]["faces"] for run in runs), "first": None}
+        if outside["faces"]:
+            outside["first"] = next(run["outside"]["first"] for run in runs if run["outside"]["faces"])
+            outside["rest"] = worst(part["outside"].get("rest", part["forward"]) for part in judged)
+            outside["backward_before"] = max(run["outside"].get("backward_before", 0.0) for run in runs)
+        locked = {}
+        for run in runs:
+            for cause, count in run["locked"].items():
+                locked[cause] = locked.get(cause, 0) + count
+        left = sum(run["output"]["triangles"] for run in runs)
+        target = self.options.target_triangles or 0
+        several = len(runs) > 1
+        return {
+            **{key: runs[0][key] for key in ("version", "two_sided", "placement", "method", "renderer")},
+            "tolerance": {"absolute": tolerance, "percent": 100 * tolerance / size},
+            "target_triangles": target,
+            "stopped_by": "target" if target and left <= target else "tolerance",
+            "precision": min(run["precision"] for run in runs),
+            "forward": forward,
+            "backward": backward,
+            "outside": outside,
+            "seconds": {stage: sum(run["seconds"][stage] for run in runs) for stage in runs[0]["seconds"]},
+            "repairs": [
+                {**repair, "message": f"{name}: {repair['message']}" if several else repair["message"]}
+                for name, run in zip(names, runs)
+                for repair in run["repairs"]
+            ],
+            "locked": locked,
+            "warnings": [
+                f"{name}: {text}" if several else text for name, run in zip(names, runs) for text in run["warnings"]
+            ],
+            "objects": [{"name": name, **run} for name, run in zip(names, runs)],
+        }
+
+
+def _not_above(length):
+    """The largest number that Blender's float32 property can stand for and that is not above `length`."""
+    candidate = np.float32(length)
+    while volume.exact(candidate) > length:
+        candidate = np.nextafter(candidate, np.float32(0))
+    return float(candidate)
+
+
+cli.run(__file__, arguments, lambda options: Command(options).run())

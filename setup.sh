@@ -1,0 +1,66 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Installs what a Debian 12 machine lacks and builds the release preset into build/release: the module, and the zip that
+# Blender installs. Nothing is done twice.
+#   sh setup.sh           what the add-on and the demo need
+#   sh setup.sh --tests   also what the tests need
+set -eu
+cd "$(dirname "$0")"
+
+packages="cmake ninja-build g++ python3-dev pybind11-dev python3-numpy libopenmesh-dev libglm-dev libgtest-dev blender"
+targets=addon_zip
+case "${1-}" in
+"") ;;
+--tests)
+  packages="$packages python3-pytest python3-venv libcgal-dev clang-format clang-tidy
+    xvfb xdotool imagemagick libgl1-mesa-dri"
+  targets="all addon_zip"
+  ;;
+*)
+  echo "setup: unknown option $1 (the only one is --tests)" >&2
+  exit 2
+  ;;
+esac
+
+log=build/setup.log
+mkdir -p build
+
+# stage NAME COMMAND...: one line when it is done; what the command said only when it fails
+stage() {
+  name=$1
+  shift
+  started=$(date +%s.%N)
+  if "$@" >"$log" 2>&1; then
+    echo "$started $(date +%s.%N)" | awk -v name="$name" '{ printf "setup: %s, %.1f s\n", name, $2 - $1 }'
+  else
+    cat "$log" >&2
+    echo "setup: failed: $name" >&2
+    exit 1
+  fi
+}
+
+missing=""
+if command -v dpkg-query >/dev/null; then
+  for package in $packages; do
+    dpkg-query -W -f '${db:Status-Status}\n' "$package" 2>/dev/null | grep -qx installed || missing="$missing $package"
+  done
+else
+  echo "setup: not a Debian machine; needed, by Debian's names:" $packages
+fi
+
+if [ -n "$missing" ]; then
+  if [ "$(id -u)" -eq 0 ]; then
+    as_root="env"
+  elif command -v sudo >/dev/null; then
+    as_root="sudo env"
+  else
+    echo "setup: as root, run: apt-get update && apt-get install --no-install-recommends$missing" >&2
+    exit 1
+  fi
+  echo "setup: installing$missing"
+  stage "package lists" $as_root DEBIAN_FRONTEND=noninteractive apt-get -q update
+  stage "packages" $as_root DEBIAN_FRONTEND=noninteractive apt-get -q -y install --no-install-recommends $missing
+fi
+
+stage "configured" cmake --preset release
+stage "built in build/release" cmake --build --preset release --target $targets

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+import pytest
+
+import addon
+from addon import native
+from commands import save
+from scenes import torus_arrays
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _registered():
+    assert native.module is not None, native.reason
+    addon.register()
+    yield
+    addon.unregister()
+
+
+@pytest.fixture(autouse=True)
+def _empty_scene(_registered):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+@pytest.fixture
+def scan(tmp_path):
+    """A file with a rough torus."""
+    return save(tmp_path / "scan.ply", ("scan", *torus_arrays()))

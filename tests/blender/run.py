@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs pytest inside Blender and ends with its exit code, whatever is left registered."""
+
+import os
+import sys
+import traceback
+from pathlib import Path
+
+FOLDER = Path(__file__).resolve().parent
+sys.dont_write_bytecode = True
+sys.path[:0] = [str(FOLDER.parents[1]), str(FOLDER)]
+
+code = 1
+try:
+    import pytest
+
+    arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
+    code = int(pytest.main(["-q", "-p", "no:cacheprovider", f"--rootdir={FOLDER}", *(arguments or [str(FOLDER)])]))
+except BaseException:
+    traceback.print_exc()
+sys.stdout.flush()
+sys.stderr.flush()
+os._exit(code)

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes that the tests make, and a judge that shares nothing with the add-on's own certificates."""
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from mathutils.bvhtree import BVHTree
+
+from addon import mesh_io
+
+
+def add_object(name, vertices, faces, matrix=None):
+    """A new object, selected and active."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(np.asarray(vertices).tolist(), [], [[int(vertex) for vertex in face] for face in faces])
+    return link(bpy.data.objects.new(name, mesh), matrix)
+
+
+def link(ob, matrix=None):
+    bpy.context.collection.objects.link(ob)
+    if matrix is not None:
+        ob.matrix_world = matrix
+    activate(ob)
+    return ob
+
+
+def activate(ob):
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    ob.select_set(True)
+    bpy.context.view_layer.objects.active = ob
+    bpy.context.view_layer.update()
+
+
+def torus_arrays(around=48, across=24, noise=0.004, seed=1):
+    """Vertices and quads of a torus of size 2.5 or so, rough as a scan."""
+    u, v = np.meshgrid(np.arange(around) * 2 * np.pi / around, np.arange(across) * 2 * np.pi / across, indexing="ij")
+    ring = 0.9 + 0.35 * np.cos(v)
+    vertices = np.stack([ring * np.cos(u), ring * np.sin(u), 0.35 * np.sin(v)], -1).reshape(-1, 3)
+    vertices += np.random.default_rng(seed).normal(0, noise, vertices.shape)
+    i, j = (index.ravel() for index in np.meshgrid(np.arange(around), np.arange(across), indexing="ij"))
+    after_i, after_j = (i + 1) % around, (j + 1) % across
+    quads = np.stack([i * across + j, after_i * across + j, after_i * across + after_j, i * across + after_j], 1)
+    return vertices.astype(np.float32), quads
+
+
+def torus(name="torus", matrix=None, **options):
+    return add_object(name, *torus_arrays(**options), matrix)
+
+
+def sheet_arrays(count=30, bumps=0.05):
+    """Vertices and quads of an open wavy square."""
+    x, y = np.meshgrid(np.linspace(-1, 1, count + 1), np.linspace(-1, 1, count + 1), indexing="ij")
+    vertices = np.stack([x, y, bumps * np.sin(3 * x) * np.cos(2 * y)], -1).reshape(-1, 3).astype(np.float32)
+    i, j = (index.ravel() for index in np.meshgrid(np.arange(count), np.arange(count), indexing="ij"))
+    corner = i * (count + 1) + j
+    return vertices, np.stack([corner, corner + count + 1, corner + count + 2, corner + 1], 1)
+
+
+def sheet(name="sheet", matrix=None, **options):
+    return add_object(name, *sheet_arrays(**options), matrix)
+
+
+def world_triangles(ob):
+    """(vertices float64 in the world, triangles) of what is stored."""
+    bpy.context.view_layer.update()
+    arrays = mesh_io.read_mesh(ob.data)
+    return mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world)), arrays.triangles
+
+
+def sampled_distance(surface, other, samples=20_000, seed=7):
+    """The largest distance of random points of one surface from the other, by Blender's own tree: a lower bound."""
+    (vertices, triangles), (other_vertices, other_triangles) = surface, other
+    tree = BVHTree.FromPolygons([Vector(v) for v in other_vertices], other_triangles.tolist())
+    rng = np.random.default_rng(seed)
+    corners = vertices[triangles]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    chosen = corners[rng.choice(len(corners), samples, p=areas / areas.sum())]
+    r, s = np.sqrt(rng.random(samples)), rng.random(samples)
+    weights = np.stack([1 - r, r * (1 - s), r * s], 1)
+    points = np.vstack([np.einsum("nk,nkx->nx", weights, chosen), vertices[np.unique(triangles)]])
+    return max(tree.find_nearest(Vector(point))[3] for point in points)
+
+
+def assert_within(surface, reference, tolerance, both_ways=True):
+    """No sample of one is beyond the tolerance of the other (the tree computes in float32)."""
+    slack = 1e-6 * np.abs(reference[0]).max()
+    assert sampled_distance(surface, reference) <= tolerance + slack
+    if both_ways:
+        assert sampled_distance(reference, surface) <= tolerance + slack

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on as a package: registering, the compiled module, installing it as a zip and installing over it."""
+
+import ast
+import importlib
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import bpy
+import pytest
+import tomllib
+
+import addon
+from addon import native
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def registered():
+    names = {name for kind in (bpy.types.Operator, bpy.types.Panel, bpy.types.PropertyGroup) for name in dir(bpy.types)}
+    handlers = [
+        len(getattr(bpy.app.handlers, name)) for name in dir(bpy.app.handlers) if name.endswith(("_post", "_pre"))
+    ]
+    return {name for name in names if "TOLVOL" in name}, hasattr(bpy.types.Object, "tolvol"), handlers
+
+
+def test_unregister_mirrors_register():
+    after = registered()
+    assert after[0] and after[1]
+    addon.unregister()
+    try:
+        without = registered()
+        assert not without[0] and not without[1] and sum(without[2]) == sum(after[2]) - 4
+    finally:
+        addon.register()
+    assert registered() == after
+
+
+def test_versions_agree():
+    manifest = tomllib.loads((ROOT / "addon/blender_manifest.toml").read_text())
+    project = re.search(r"project\(tolvol VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
+    info = ast.literal_eval((ROOT / "addon/__init__.py").read_text().split("bl_info = ")[1].split("\n}")[0] + "}")
+    assert manifest["version"] == project == ".".join(map(str, info["version"])) == native.module.__version__
+    assert manifest["name"] == info["name"] and info["blender"] == (3, 4, 0)
+
+
+def test_tooltips_and_labels_follow_blender():
+    """Every operator and setting says what it does, without a full stop."""
+    for name in sorted(registered()[0]):
+        cls = getattr(bpy.types, name)
+        if issubclass(cls, bpy.types.Operator):
+            text = getattr(bpy.ops.tolvol, cls.bl_idname.split(".")[1]).get_rna_type().description
+            assert text and not text.endswith(".") and "\n" not in text, name
+        for rna in cls.bl_rna.properties if issubclass(cls, bpy.types.PropertyGroup) else ():
+            assert not rna.description.endswith("."), (name, rna.identifier, rna.description)
+
+
+def test_loaded_module_is_a_private_copy():
+    loaded = Path(native.module.__file__)
+    assert loaded.parent != native.path.parent and re.fullmatch(r"tolvol_[0-9a-f]{16}", loaded.parent.name)
+    mapped = Path("/proc/self/maps").read_text()
+    assert str(loaded) in mapped and str(native.path) not in mapped
+    assert importlib.reload(native).module is native.module  # one content is loaded once
+
+
+def run_blender(script, tmp_path, **environment):
+    """stdout of a Blender with settings of its own; the script's last line must be ok()."""
+    text = "import sys, os, traceback\ndef ok():\n    sys.stdout.flush()\n    os._exit(0)\ntry:\n"
+    text += (
+        "".join(f"    {line}\n" for line in script.splitlines()) + "except BaseException:\n    traceback.print_exc()\n"
+    )
+    text += "sys.stdout.flush()\nos._exit(1)\n"
+    (tmp_path / "script.py").write_text(text)
+    done = subprocess.run(
+        [bpy.app.binary_path, "--background", "--factory-startup", "--python", tmp_path / "script.py"],
+        env=os.environ
+        | dict.fromkeys(("BLENDER_USER_RESOURCES", "BLENDER_USER_SCRIPTS"), str(tmp_path / "user"))
+        | environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def make_zip(path, version=(0, 1, 0), binary=True):
+    """As the build makes it: the add-on's folder under its package name, the module in bin/."""
+    with zipfile.ZipFile(path, "w") as archive:
+        for file in sorted((ROOT / "addon").rglob("*")):
+            if file.is_file() and "__pycache__" not in file.parts:
+                text = file.read_text()
+                if file.name == "__init__.py" and file.parent.name == "addon":
+                    text = text.replace('"version": (0, 1, 0)', f'"version": {version}')
+                archive.writestr(f"tolerance_volumes/{file.relative_to(ROOT / 'addon')}", text)
+        if binary:
+            archive.write(native.path, f"tolerance_volumes/bin/{native.path.name}")
+    return path
+
+
+DECIMATE = """
+bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5)
+assert bpy.ops.tolvol.decimate(tolerance_percent=1) == {'FINISHED'}
+assert len(bpy.context.object.data.polygons) < 1000
+"""
+
+
+def test_zip_installs_and_installs_over_itself(tmp_path):
+    first, second = make_zip(tmp_path / "first.zip"), make_zip(tmp_path / "second.zip", version=(0, 2, 0))
+    out = run_blender(
+        f"""
+import bpy, addon_utils
+def install(path):
+    bpy.ops.preferences.addon_install(filepath=path, overwrite=True)
+    bpy.ops.preferences.addon_enable(module='tolerance_volumes')
+    import tolerance_volumes
+    return tolerance_volumes
+installed = install({str(first)!r})
+assert installed.bl_info['version'] == (0, 1, 0)
+assert os.path.join('user', 'addons') in installed.__file__
+assert bpy.context.preferences.addons['tolerance_volumes'].preferences.threads == 0
+{DECIMATE}
+old = sys.modules['tolerance_volumes.volume']
+installed = install({str(second)!r})
+assert installed.bl_info['version'] == (0, 2, 0)
+assert sys.modules['tolerance_volumes.volume'] is not old
+{DECIMATE}
+bpy.ops.preferences.addon_disable(module='tolerance_volumes')
+assert not hasattr(bpy.types.Object, 'tolvol')
+ok()""",
+        tmp_path,
+        TOLVOL_PYTHON_PATH="",
+    )
+    assert "Error" not in out
+
+
+@pytest.mark.parametrize(
+    ("others", "reason"),
+    [
+        ([], "is missing"),
+        (["tolvol.cpython-39-x86_64-linux-gnu.so"], "tolvol.cpython-39.* is not made for this Blender's Python"),
+    ],
+)
+def test_without_the_module_the_addon_stays_and_says_why(tmp_path, others, reason):
+    archive = make_zip(tmp_path / "addon.zip", binary=False)
+    with zipfile.ZipFile(archive, "a") as extended:
+        for name in others:
+            extended.writestr(f"tolerance_volumes/bin/{name}", b"")
+    run_blender(
+        f"""
+import bpy, re
+bpy.ops.preferences.addon_install(filepath={str(archive)!r})
+bpy.ops.preferences.addon_enable(module='tolerance_volumes')
+import tolerance_volumes
+from tolerance_volumes import native
+from tolerance_volumes.operators import blocked
+assert native.module is None and re.search({reason!r}, native.reason), native.reason
+bpy.ops.mesh.primitive_cube_add()
+assert blocked.decimate_blocked(bpy.context.object) == native.reason
+assert not bpy.ops.tolvol.decimate.poll() and not bpy.ops.tolvol.set_reference.poll()
+bpy.context.object.tolvol.tolerance_percent = 2
+ok()""",
+        tmp_path,
+        TOLVOL_PYTHON_PATH="",
+    )
+
+
+def test_a_module_that_does_not_load_is_a_reason(tmp_path):
+    suffix = importlib.machinery.EXTENSION_SUFFIXES[0]
+    (tmp_path / f"tolvol{suffix}").write_bytes(b"no library")
+    run_blender(
+        f"""
+sys.path.insert(0, {str(ROOT)!r})
+from addon import native
+assert native.module is None and 'does not load' in native.reason, native.reason
+ok()""",
+        tmp_path,
+        TOLVOL_PYTHON_PATH=str(tmp_path),
+    )
+
+
+def test_module_is_looked_for_in_the_environments_folder(tmp_path):
+    (tmp_path / native.path.name).write_bytes(native.path.read_bytes() + b"\0")  # another content, still a library
+    out = run_blender(
+        f"""
+sys.path.insert(0, {str(ROOT)!r})
+from addon import native
+print(native.path)
+assert str(native.path) == {str(tmp_path / native.path.name)!r}
+print(os.path.basename(os.path.dirname(native.module.__file__)))
+ok()""",
+        tmp_path,
+        TOLVOL_PYTHON_PATH=str(tmp_path),
+    )
+    assert Path(native.module.__file__).parent.name not in out and "tolvol_" in out
+
+
+def test_no_module_is_loaded_twice_in_this_process():
+    assert [name for name in sys.modules if re.fullmatch(r"tolvol_[0-9a-f]{16}", name)] == [
+        Path(native.module.__file__).parent.name
+    ]

@@ -1,0 +1,313 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reference, Check, Select Outside; what is refused, with the reason; undo."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from addon import mesh_io, native, volume
+from addon.operators import blocked
+from scenes import activate, add_object, link, sheet, torus, world_triangles
+
+OPERATORS = (bpy.ops.tolvol.set_reference, bpy.ops.tolvol.check, bpy.ops.tolvol.select_outside, bpy.ops.tolvol.decimate)
+
+
+def stored(ob):
+    return [array.tobytes() for array in (*world_triangles(ob), mesh_io.column(ob.data.vertices, "co", 3))]
+
+
+# The reference ------------------------------------------------------------------------------------------------------
+
+
+def test_set_reference_takes_a_snapshot_that_edits_do_not_change():
+    ob = torus()
+    before = mesh_io.read_mesh(ob.data)
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    snapshot = ob.tolvol.snapshot
+    assert snapshot is not ob.data and snapshot.users == 1
+    ob.data.vertices[0].co.x += 1
+    ob.data.update()
+    after = mesh_io.read_mesh(snapshot)
+    assert np.array_equal(after.vertices, before.vertices) and np.array_equal(after.triangles, before.triangles)
+    assert ob.tolvol.snapshot_size == pytest.approx(native.module.size(before.vertices, before.triangles))
+
+
+def test_update_replaces_and_clear_lets_go():
+    ob = torus()
+    bpy.ops.tolvol.set_reference()
+    ob.data.vertices[0].co.x += 1
+    ob.data.update()
+    bpy.ops.tolvol.set_reference()
+    assert ob.tolvol.snapshot.vertices[0].co.x == ob.data.vertices[0].co.x
+    assert len(bpy.data.meshes) == 2  # the first snapshot is gone
+    bpy.ops.tolvol.clear_reference()
+    assert ob.tolvol.snapshot is None and len(bpy.data.meshes) == 1
+    assert not bpy.ops.tolvol.clear_reference.poll()
+
+
+def test_own_reference_moves_along_and_rescaling_makes_it_stale():
+    ob = torus(matrix=Matrix.Diagonal((1, 2, 1, 1)))
+    bpy.ops.tolvol.set_reference()
+    ob.matrix_world = Matrix.Translation((3, 1, 2)) @ Matrix.Rotation(1.1, 4, (1, 1, 0)) @ Matrix.Diagonal((1, 2, 1, 1))
+    bpy.context.view_layer.update()
+    assert volume.stale_reason(ob) is None
+    bpy.ops.tolvol.check()
+    assert ob.tolvol.measurement.forward <= 1e-5 and ob.tolvol.measurement.backward <= 1e-5
+    ob.scale.x *= 1.01
+    bpy.context.view_layer.update()
+    assert volume.stale_reason(ob) == "the object was rescaled"
+    assert not bpy.ops.tolvol.decimate.poll() and not bpy.ops.tolvol.check.poll()
+    with pytest.raises(RuntimeError, match="rescaled.*press Update"):
+        bpy.ops.tolvol.decimate()
+    bpy.ops.tolvol.set_reference()
+    assert volume.stale_reason(ob) is None and bpy.ops.tolvol.decimate.poll()
+
+
+def test_choosing_another_reference_makes_it_stale():
+    other = torus("other")
+    ob = torus()
+    bpy.ops.tolvol.set_reference()
+    ob.tolvol.reference_kind = "OBJECT"
+    assert volume.stale_reason(ob) == "another one was chosen"
+    assert not bpy.ops.tolvol.set_reference.poll()  # which object?
+    ob.tolvol.reference_object = other
+    bpy.ops.tolvol.set_reference()
+    assert volume.stale_reason(ob) is None
+    ob.tolvol.reference_object = torus("third")
+    assert volume.stale_reason(ob) == "another object was chosen"
+
+
+def test_reference_object_cannot_be_the_object_itself_or_no_mesh():
+    ob = torus()
+    poll = type(ob.tolvol).__annotations__["reference_object"].keywords["poll"]
+    assert not poll(ob.tolvol, ob)
+    assert not poll(ob.tolvol, bpy.data.objects.new("empty", None))
+    assert poll(ob.tolvol, torus("other"))
+
+
+# Check and Select Outside -------------------------------------------------------------------------------------------
+
+
+def moved_up(share=0.25, height=0.1):
+    """A flat sheet, then with the vertices beyond x = 1 - 2 share lifted."""
+    ob = sheet(count=20, bumps=0.0)
+    bpy.ops.tolvol.set_reference()
+    for vertex in ob.data.vertices:
+        if vertex.co.x > 1 - 2 * share - 1e-6:
+            vertex.co.z += height
+    ob.data.update()
+    activate(ob)
+    return ob
+
+
+def test_check_measures_both_ways_and_the_share_outside():
+    ob = moved_up()
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.05
+    bpy.ops.tolvol.check()
+    measured = ob.tolvol.measurement
+    assert measured.forward == pytest.approx(0.1, rel=0.011)
+    assert not measured.forward_within and not measured.backward_within
+    # A quarter of the sheet is 0.1 up, and half of the slope (0.1 wide) to it.
+    area = 2 * 2 * 0.75 - 2 * 0.1 + 2 * np.hypot(0.1, 0.1) + 2 * 2 * 0.25
+    assert measured.share_outside == pytest.approx((2 * 2 * 0.25 + np.hypot(0.1, 0.1)) / area, abs=0.01)
+    assert volume.measurement_of(ob) is not None
+    ob.tolvol.tolerance_length = 0.2
+    bpy.ops.tolvol.check()
+    assert ob.tolvol.measurement.forward_within and ob.tolvol.measurement.backward_within
+
+
+def test_measurement_is_dropped_when_mesh_place_or_reference_change():
+    other = torus("other")
+    ob = torus()
+    ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", other
+    bpy.ops.tolvol.set_reference()
+    bpy.ops.tolvol.check()
+    assert volume.measurement_of(ob) is not None
+    ob.location.x = 1
+    bpy.context.view_layer.update()
+    assert volume.measurement_of(ob) is None
+    ob.location.x = 0
+    bpy.context.view_layer.update()
+    assert volume.measurement_of(ob) is not None
+    ob.data.vertices[5].co.z += 0.01
+    ob.data.update()
+    bpy.context.view_layer.update()
+    assert volume.measurement_of(ob) is None
+    bpy.ops.tolvol.check()
+    assert volume.measurement_of(ob) is not None
+    bpy.ops.tolvol.set_reference()
+    assert volume.measurement_of(ob) is None
+
+
+def test_own_measurement_moves_along():
+    ob = torus()
+    bpy.ops.tolvol.decimate(tolerance_percent=1)
+    ob.rotation_euler.x = 1
+    bpy.context.view_layer.update()
+    assert volume.measurement_of(ob) is not None
+
+
+def test_select_outside_selects_those_faces_in_edit_mode():
+    ob = moved_up()
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.05
+    bpy.ops.tolvol.select_outside()
+    assert ob.mode == "EDIT" and tuple(bpy.context.tool_settings.mesh_select_mode) == (False, False, True)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    highest = np.array([max(ob.data.vertices[v].co.z for v in face.vertices) for face in ob.data.polygons])
+    selected = mesh_io.column(ob.data.polygons, "select", 1, bool)
+    assert np.array_equal(selected, highest > 0.05) and selected.any() and not selected.all()
+    assert blocked.check_blocked(ob) is None
+
+
+def test_select_outside_leaves_an_object_that_is_inside_alone():
+    ob = moved_up()
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.2
+    bpy.ops.tolvol.select_outside()
+    assert ob.mode == "OBJECT"
+
+
+# Refused ------------------------------------------------------------------------------------------------------------
+
+
+def refused(match):
+    with pytest.raises(RuntimeError, match=match):
+        bpy.ops.tolvol.decimate()
+
+
+def test_multi_user_mesh_is_refused_with_the_remedy():
+    ob = torus()
+    link(bpy.data.objects.new("twin", ob.data))
+    activate(ob)
+    before = stored(ob)
+    refused("has 2 users.*Make Single User")
+    assert stored(ob) == before
+    ob.data = ob.data.copy()
+    assert bpy.ops.tolvol.decimate() == {"FINISHED"}
+
+
+def test_fake_user_is_no_second_user():
+    ob = torus()
+    ob.data.use_fake_user = True
+    assert bpy.ops.tolvol.decimate() == {"FINISHED"}
+
+
+@pytest.fixture
+def library(tmp_path):
+    torus("linked")
+    path = str(tmp_path / "library.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    return path
+
+
+def test_linked_object_is_refused(library):
+    with bpy.data.libraries.load(library, link=True) as (_, there):
+        there.objects = ["linked"]
+    ob = link(there.objects[0])
+    refused("linked is linked from another file.*Make Local")
+    assert not any(operator.poll() for operator in OPERATORS)
+    assert blocked.decimate_blocked(ob).startswith("linked is linked")
+
+
+def test_linked_mesh_of_a_local_object_is_refused(library):
+    with bpy.data.libraries.load(library, link=True) as (_, there):
+        there.meshes = ["linked"]
+    link(bpy.data.objects.new("local", there.meshes[0]))
+    refused("mesh linked is linked.*Make Local")
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}  # which changes no mesh
+
+
+def test_override_is_refused(library):
+    with bpy.data.libraries.load(library, link=True) as (_, there):
+        there.objects = ["linked"]
+    override = there.objects[0].override_create()
+    link(override)
+    refused("linked is linked.*Make Local")
+
+
+def test_other_modes_no_faces_no_mesh_and_multires_are_refused():
+    assert blocked.decimate_blocked(None) == "Select a mesh object"
+    link(bpy.data.objects.new("empty", None))
+    refused("Select a mesh object")
+    add_object("edge", [(0, 0, 0), (1, 0, 0)], [])
+    refused("edge has no faces")
+    ob = torus()
+    bpy.ops.object.mode_set(mode="EDIT")
+    refused("Switch to Object Mode")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    ob.modifiers.new("multires", "MULTIRES")
+    refused("Apply the Multiresolution modifier first")
+
+
+def test_check_without_reference_is_refused():
+    torus()
+    with pytest.raises(RuntimeError, match="Set the reference first"):
+        bpy.ops.tolvol.check()
+
+
+# Undo ---------------------------------------------------------------------------------------------------------------
+
+
+def test_one_undo_step_restores_everything_bit_for_bit():
+    ob = torus()
+    bpy.ops.ed.undo_push(message="start")
+    before = stored(ob)
+    bpy.ops.tolvol.decimate("EXEC_DEFAULT", True, tolerance_percent=1)
+    after = stored(bpy.data.objects["torus"])
+    assert after != before and bpy.data.objects["torus"].tolvol.snapshot is not None
+    bpy.ops.ed.undo()
+    ob = bpy.data.objects["torus"]
+    assert stored(ob) == before and ob.tolvol.snapshot is None and not ob.tolvol.last_run
+    assert len(bpy.data.meshes) == 1
+    bpy.ops.ed.redo()
+    ob = bpy.data.objects["torus"]
+    assert stored(ob) == after and ob.tolvol.snapshot is not None
+
+
+def test_undo_of_a_second_decimation_keeps_the_reference_of_the_first():
+    torus()
+    bpy.ops.ed.undo_push(message="start")
+    bpy.ops.tolvol.decimate("EXEC_DEFAULT", True, tolerance_percent=0.3)
+    first = stored(bpy.data.objects["torus"])
+    bpy.ops.tolvol.decimate("EXEC_DEFAULT", True, tolerance_percent=1)
+    bpy.ops.ed.undo()
+    ob = bpy.data.objects["torus"]
+    activate(ob)
+    assert stored(ob) == first and len(ob.tolvol.snapshot.vertices) == 48 * 24
+    bpy.ops.tolvol.check()
+    assert ob.tolvol.measurement.forward_within
+
+
+# Settings -----------------------------------------------------------------------------------------------------------
+
+
+def test_placement_follows_uvs_until_it_is_chosen():
+    ob = torus()
+    assert ob.tolvol.placement == "OPTIMAL"
+    ob.data.uv_layers.new()
+    assert ob.tolvol.placement == "SUBSET"
+    ob.tolvol.placement = "OPTIMAL"
+    assert ob.tolvol.placement == "OPTIMAL"
+
+
+def test_settings_not_given_are_the_objects_own_and_those_given_are_kept():
+    ob = torus()
+    ob.tolvol.tolerance_percent, ob.tolvol.keep, ob.tolvol.placement = 2.0, "ONE", "SUBSET"
+    ob.tolvol.use_target, ob.tolvol.target_triangles = True, 700
+    bpy.ops.tolvol.decimate()
+    report = ob.tolvol.last_run
+    assert '"percent": 2.0' in report and '"two_sided": false' in report and '"placement": "subset"' in report
+    assert '"target_triangles": 700' in report
+    bpy.ops.tolvol.decimate(tolerance_percent=1.5, use_target=False)
+    assert ob.tolvol.tolerance_percent == 1.5 and not ob.tolvol.use_target and ob.tolvol.keep == "ONE"
+    # Never the last run's: the next object has its own.
+    other = torus("other")
+    bpy.ops.tolvol.decimate()
+    assert '"percent": 1.0' in other.tolvol.last_run and '"two_sided": true' in other.tolvol.last_run
+
+
+def test_percent_that_was_typed_is_the_percent_that_is_used():
+    ob = torus()
+    ob.tolvol.tolerance_percent = 0.1  # not a float32
+    assert volume.tolerance_length(ob.tolvol, 1.0) == 0.1 / 100

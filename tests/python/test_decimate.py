@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The promise of tolvol.decimate on every kind of mesh."""
+
+import numpy as np
+import pytest
+import tolvol
+
+import meshes
+from judge import assert_promise, assert_sources, decimate, distances
+
+SHEAR = np.array([[1, 0.7, 0.2], [0, 0.6, 0.3], [0, 0, 1.4]])
+SOLIDS = {
+    "sphere": meshes.sphere(4),
+    "torus, noisy": meshes.torus(noise=0.002),
+    "plate, open": meshes.plate(33, bump=0.2),
+    "box with needles 1e-2": meshes.needles(height=1e-2),
+    "box with needles 1e-5": meshes.needles(height=1e-5),
+    "box with needles 1e-7": meshes.needles(height=1e-7),
+    "soup": meshes.soup(*meshes.torus(64, 32)),
+    "non-manifold": meshes.non_manifold(),
+    "misoriented": meshes.misoriented(),
+    "degenerate": meshes.degenerate(),
+    "rod thinner than the tolerance": meshes.rod(levels=4),
+}
+PLACES = {
+    "sheared": meshes.matrix(SHEAR),
+    "mirrored": meshes.matrix(meshes.random_rotation() @ np.diag([-1, 1, 1])),
+    "stretched": meshes.matrix(np.diag([5, 1, 0.2])),
+    "far": meshes.matrix(meshes.random_rotation(), (3e4, -2e4, 1e4)),
+    "tiny": meshes.matrix(1e-6 * np.eye(3)),
+    "huge": meshes.matrix(1e6 * np.eye(3)),
+}
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("placement", ["optimal", "subset"])
+@pytest.mark.parametrize("name", SOLIDS)
+def test_promise_both_ways(name, placement, dtype):
+    vertices, triangles = SOLIDS[name]
+    vertices = vertices.astype(dtype)
+    tolerance = 0.01 * tolvol.size(vertices, triangles)
+    result = decimate(vertices, triangles, tolerance, placement=placement)
+
+    assert result.vertices.dtype == dtype
+    assert result.triangles.dtype == np.int32
+    assert_promise(vertices, triangles, result, tolerance)
+    assert_sources(vertices, triangles, result, tolerance)
+    distinct = len(np.unique(np.sort(triangles, 1), axis=0))
+    assert len(result.triangles) < distinct / 2 or result.report["locked"]
+    assert meshes.component_count(result.vertices, result.triangles) == meshes.component_count(vertices, triangles)
+    assert result.report["triangles_in"] == len(triangles)
+    assert result.report["triangles_out"] == len(result.triangles)
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_promise_holds_in_the_world(name):
+    to_world = PLACES[name]
+    vertices, triangles = meshes.torus(64, 32, noise=0.002)
+    vertices = vertices.astype(np.float32)
+    tolerance = 0.01 * tolvol.size(vertices, triangles, to_world)
+    result = decimate(vertices, triangles, tolerance, to_world)
+    assert len(result.triangles) < len(triangles) / 4
+    assert_promise(vertices, triangles, result, tolerance, to_world)
+    assert_sources(vertices, triangles, result, tolerance, to_world)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1, 1e6])
+def test_stored_coordinates_of_any_scale(scale):
+    vertices, triangles = meshes.torus(64, 32, noise=0.002)
+    vertices = (scale * vertices).astype(np.float32)
+    tolerance = 0.01 * tolvol.size(vertices, triangles)
+    result = decimate(vertices, triangles, tolerance)
+    assert len(result.triangles) < len(triangles) / 4
+    assert_promise(vertices, triangles, result, tolerance)
+
+
+def test_stored_coordinates_far_from_the_origin():
+    # Rounding to float32 moves a coordinate by up to 0.001 here, 3 % of the tolerance: done, with a warning.
+    vertices, triangles = meshes.torus(64, 32)
+    vertices = (vertices + [20000, 0, 0]).astype(np.float32)
+    tolerance = 0.01 * tolvol.size(vertices, triangles)
+    result = decimate(vertices, triangles, tolerance)
+    assert_promise(vertices, triangles, result, tolerance)
+    assert result.report["warnings"]
+    near = vertices - np.float32([20000, 0, 0])
+    assert not decimate(near, triangles, tolerance).report["warnings"]
+
+
+def test_fewer_triangles_at_a_larger_tolerance():
+    vertices, triangles = meshes.torus(noise=0.001)
+    size = tolvol.size(vertices, triangles)
+    counts = [len(decimate(vertices, triangles, share * size).triangles) for share in (0.001, 0.003, 0.01, 0.03)]
+    assert counts == sorted(counts, reverse=True) and len(set(counts)) == 4
+
+
+def test_no_crack_opens_between_the_triangles_of_a_soup():
+    vertices, triangles = meshes.soup(*meshes.torus(64, 32))
+    result = decimate(vertices, triangles, 0.01 * tolvol.size(vertices, triangles))
+    _, weld = np.unique(result.vertices, axis=0, return_inverse=True)
+    edges = np.sort(weld.reshape(-1)[result.triangles][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), 1)
+    _, count = np.unique(edges, axis=0, return_counts=True)
+    assert (count == 2).all()
+
+
+@pytest.mark.parametrize("mesh, kind", [("soup", "weld"), ("non-manifold", "duplicate"), ("degenerate", "degenerate")])
+def test_repairs_are_counted(mesh, kind):
+    vertices, triangles = SOLIDS[mesh]
+    report = decimate(vertices, triangles, 0.01 * tolvol.size(vertices, triangles)).report
+    repair = [r for r in report["repairs"] if kind in r["kind"]]
+    assert repair and repair[0]["count"] > 0 and repair[0]["message"]
+    clean = decimate(*SOLIDS["sphere"], 0.02).report
+    assert clean["repairs"] == []
+
+
+def test_the_input_is_left_alone():
+    vertices, triangles = meshes.torus(48, 24)
+    before = vertices.copy(), triangles.copy()
+    vertices.flags.writeable = triangles.flags.writeable = False
+    decimate(vertices, triangles, 0.05)
+    assert np.array_equal(vertices, before[0]) and np.array_equal(triangles, before[1])
+
+
+def test_decimating_twice_against_one_reference_stays_within_it():
+    vertices, triangles = meshes.torus(noise=0.001)
+    tolerance = 0.01 * tolvol.size(vertices, triangles)
+    volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
+    once = tolvol.decimate(vertices, triangles, volume, target_triangles=2000)
+    twice = tolvol.decimate(once.vertices, once.triangles, volume)
+    assert len(twice.triangles) < len(once.triangles) / 2
+    assert_promise(vertices, triangles, twice, tolerance)
+
+
+def test_another_mesh_than_the_reference():
+    """A coarse sphere within the tolerance of a fine one: neither shares a vertex number with the other."""
+    fine, coarse = meshes.sphere(5), meshes.sphere(4)
+    rotation = meshes.random_rotation()
+    vertices, triangles = coarse[0] @ rotation.T, coarse[1]
+    result = decimate(vertices, triangles, 0.03, reference=fine)
+    assert len(result.triangles) < len(triangles) / 2
+    assert_promise(*fine, result, 0.03)
+
+
+def test_sources_point_where_the_corner_is():
+    vertices, triangles = meshes.torus(noise=0.002)
+    tolerance = 0.01 * tolvol.size(vertices, triangles)
+    result = decimate(vertices, triangles, tolerance, placement="optimal")
+    assert assert_sources(vertices, triangles, result, tolerance) <= 1.5 * tolerance
+
+
+def test_distances_are_as_the_report_says():
+    vertices, triangles = meshes.torus(noise=0.002)
+    tolerance = 0.01 * tolvol.size(vertices, triangles)
+    result = decimate(vertices, triangles, tolerance)
+    forward, backward = distances(vertices, triangles, result)
+    assert 0.5 * tolerance < max(forward.upper, backward.upper) <= tolerance
+    assert result.report["stopped_by"] == "tolerance"
+    assert result.report["seconds"] > 0

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Each option of tolvol.decimate has a test here that fails when the option is ignored."""
+
+import numpy as np
+import pytest
+import tolvol
+
+import meshes
+from judge import assert_promise, assert_sources, decimate, distances
+
+TORUS = meshes.torus(noise=0.001)
+TOLERANCE = 0.01 * tolvol.size(*TORUS)
+
+
+def test_without_a_volume_nothing_but_the_target_stops_it():
+    vertices, triangles = TORUS
+    result = tolvol.decimate(vertices, triangles, None, target_triangles=60)
+    assert 58 < len(result.triangles) <= 60
+    assert distances(vertices, triangles, result)[0].lower > TOLERANCE
+    with pytest.raises(tolvol.InvalidInput, match="target"):
+        tolvol.decimate(vertices, triangles, None)
+
+
+def contains_rows(rows, table):
+    return np.isin(rows.view([("", rows.dtype)] * 3), table.view([("", table.dtype)] * 3)).all()
+
+
+def test_placement_subset_keeps_original_vertices_bit_for_bit():
+    vertices, triangles = TORUS
+    vertices = vertices.astype(np.float32)
+    subset = decimate(vertices, triangles, TOLERANCE, placement="subset")
+    optimal = decimate(vertices, triangles, TOLERANCE, placement="optimal")
+    assert np.array_equal(subset.vertices, vertices[subset.vertex_source])
+    assert not contains_rows(optimal.vertices, vertices)
+    assert len(optimal.triangles) < len(subset.triangles)
+    # Every corner of a subset result reads the attributes of an original corner, unmixed.
+    assert (subset.source_weights.max(-1) == 1).all()
+    assert assert_sources(vertices, triangles, subset, TOLERANCE) == 0
+
+
+def test_two_sided_keeps_what_one_sided_may_lose():
+    vertices, triangles = meshes.spike()
+    both = decimate(vertices, triangles, 0.05, two_sided=True)
+    one = decimate(vertices, triangles, 0.05, two_sided=False)
+    assert_promise(vertices, triangles, both, 0.05)
+    assert_promise(vertices, triangles, one, 0.05, two_sided=False)
+    assert distances(vertices, triangles, one)[1].lower > 0.05
+
+
+def test_one_sided_keeps_boundaries_and_components():
+    plate, ball = meshes.plate(33), meshes.sphere(3, 0.02, (0.5, 0.5, 0.5))
+    vertices, triangles = meshes.join(plate, ball)
+    result = decimate(vertices, triangles, 0.03, two_sided=False)
+    assert meshes.component_count(result.vertices, result.triangles) == 2
+    rim = vertices, meshes.boundary_segments(vertices, triangles)
+    kept = result.vertices, meshes.boundary_segments(result.vertices, result.triangles)
+    assert tolvol.hausdorff(*kept, *rim, bound=0.03).upper <= 0.03
+    assert tolvol.hausdorff(*rim, *kept, bound=0.03).upper <= 0.03
+
+
+@pytest.mark.parametrize("target", [5000, 1001, 400])
+def test_target_triangles(target):
+    vertices, triangles = TORUS
+    result = decimate(vertices, triangles, 3 * TOLERANCE, target_triangles=target)
+    assert target - 2 < len(result.triangles) <= target
+    assert result.report["stopped_by"] == "target"
+    assert_promise(vertices, triangles, result, 3 * TOLERANCE)
+
+
+def test_a_target_that_the_tolerance_forbids():
+    result = decimate(*TORUS, TOLERANCE, target_triangles=20)
+    assert len(result.triangles) > 20
+    assert result.report["stopped_by"] == "tolerance"
+
+
+def test_locked_vertices_stay():
+    vertices, triangles = TORUS
+    locked = vertices[:, 0] > 0.8
+    result = decimate(vertices, triangles, TOLERANCE, locked=locked)
+    kept = result.vertex_map[locked]
+    assert len(np.unique(kept)) == locked.sum()
+    assert np.array_equal(result.vertices[kept], vertices[locked])
+    assert sum(result.report["locked"].values()) == locked.sum()
+    free = decimate(vertices, triangles, TOLERANCE)
+    assert len(np.unique(free.vertex_map[locked])) < locked.sum()
+    assert not free.report["locked"]
+
+
+def with_a_far_patch():
+    """A sphere of which eight neighbouring vertices are pulled far out, and the sphere."""
+    vertices, triangles = meshes.sphere(4)
+    moved = vertices.copy()
+    patch = np.argsort(-vertices[:, 2])[:8]
+    moved[patch] *= 1.5
+    outside = np.isin(triangles, patch).any(1)
+    return moved, triangles, outside, vertices
+
+
+def test_outside_is_an_error_by_default():
+    moved, triangles, outside, vertices = with_a_far_patch()
+    with pytest.raises(tolvol.InvalidInput, match=rf"{outside.sum()}\b.*{np.flatnonzero(outside)[0]}\b"):
+        decimate(moved, triangles, 0.02, reference=(vertices, triangles))
+
+
+def test_outside_keep_leaves_those_faces_as_they_are():
+    moved, triangles, outside, vertices = with_a_far_patch()
+    result = decimate(moved, triangles, 0.02, reference=(vertices, triangles), outside="keep")
+    assert result.report["outside"] == {"faces": outside.sum(), "first": np.flatnonzero(outside)[0]}
+    assert np.isin(np.flatnonzero(outside), result.triangle_source).all()
+    kept = np.isin(result.triangle_source, np.flatnonzero(outside))
+    same = moved[triangles[result.triangle_source[kept]]]
+    assert np.array_equal(result.vertices[result.triangles[kept]], same)
+    assert len(result.triangles) < len(triangles) / 2
+    rest = tolvol.hausdorff(result.vertices, result.triangles[~kept], vertices, triangles, bound=0.02)
+    assert rest.upper <= 0.02
+
+
+def with_a_seam():
+    """The torus in six pieces as a cake is cut, whether each triangle is in an odd one, and the wedges."""
+    vertices, triangles = TORUS
+    centre = vertices[triangles].mean(1)
+    side = (np.arctan2(centre[:, 1], centre[:, 0]) // (np.pi / 3)).astype(int) % 2
+    values = np.zeros((*triangles.shape, 2), np.float32)
+    values[..., 0] = side[:, None]
+    return vertices, triangles, side, tolvol.wedges(triangles, values)
+
+
+@pytest.mark.parametrize("placement", ["optimal", "subset"])
+def test_wedges_keep_corners_on_their_side_of_a_seam(placement):
+    vertices, triangles, side, wedges = with_a_seam()
+
+    def crossing(result):
+        return (side[result.source_triangle] != side[result.triangle_source][:, None]).sum()
+
+    kept = decimate(vertices, triangles, TOLERANCE, wedges=wedges, placement=placement)
+    assert crossing(kept) == 0
+    assert len(kept.triangles) < len(triangles) / 4
+    assert_promise(vertices, triangles, kept, TOLERANCE)
+    assert_sources(vertices, triangles, kept, TOLERANCE)
+    assert crossing(decimate(vertices, triangles, TOLERANCE, placement=placement)) > 0
+
+
+def test_vertices_of_a_seam_keep_their_position():
+    vertices, triangles, side, wedges = with_a_seam()
+    sides = np.zeros((len(vertices), 2), bool)
+    for k in range(3):
+        sides[triangles[:, k], side] = True
+    on_seam = sides.all(1)
+    result = decimate(vertices, triangles, TOLERANCE, wedges=wedges, placement="optimal")
+    continued = on_seam[result.vertex_source]
+    assert continued.any() and not continued.all()
+    assert np.array_equal(result.vertices[continued], vertices[result.vertex_source[continued]])
+    # Both sides still meet along the seam: no vertex of the seam is merged into one that is not.
+    assert on_seam[result.vertex_source[result.vertex_map[on_seam]]].all()
+
+
+def test_to_world_of_the_mesh_is_used():
+    vertices, triangles = TORUS
+    to_world = meshes.matrix(np.diag([2, 1, 0.5]), (3, 0, 0))
+    volume = tolvol.ToleranceVolume(vertices, triangles, TOLERANCE, to_world=to_world)
+    with pytest.raises(tolvol.InvalidInput):
+        tolvol.decimate(vertices, triangles, volume)
+    placed = meshes.transform(to_world, vertices)
+    result = tolvol.decimate(placed, triangles, volume)
+    assert_promise(placed, triangles, result, TOLERANCE)
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+@pytest.mark.parametrize("options", [{}, {"placement": "subset"}, {"two_sided": False}], ids=str)
+def test_threads_change_nothing(options, threads):
+    vertices, triangles = TORUS
+    one = decimate(vertices, triangles, TOLERANCE, threads=1, **options)
+    more = decimate(vertices, triangles, TOLERANCE, threads=threads, **options)
+    for name in ("vertices", "triangles", "vertex_map", "vertex_source", "triangle_source", "source_triangle"):
+        assert np.array_equal(getattr(one, name), getattr(more, name)), name
+    assert np.array_equal(one.source_weights, more.source_weights)
+
+
+@pytest.mark.parametrize("precision", [0.25, 1, 3])
+def test_the_promise_holds_at_any_precision(precision):
+    vertices, triangles = TORUS
+    result = decimate(vertices, triangles, TOLERANCE, precision=precision)
+    assert_promise(vertices, triangles, result, TOLERANCE)

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""tolvol.hausdorff, tolvol.deviation and tolvol.wedges against known answers."""
+
+import numpy as np
+import pytest
+import tolvol
+
+import meshes
+
+
+def raised(mesh, height):
+    return mesh[0] + [0, 0, height], mesh[1]
+
+
+def test_parallel_plates():
+    result = tolvol.hausdorff(*raised(meshes.plate(9), 0.25), *meshes.plate(5))
+    assert result.lower <= 0.25 <= result.upper
+    assert result.upper - result.lower <= 0.01 * result.upper
+    assert result.position[2] == pytest.approx(0.25)
+
+
+def test_the_two_directions_differ():
+    whole, half = meshes.plate(9), meshes.plate(9, side=0.5)
+    there = tolvol.hausdorff(*whole, *half)
+    back = tolvol.hausdorff(*half, *whole)
+    assert there.lower <= np.sqrt(0.5) <= there.upper
+    assert back.upper < 1e-12
+    assert there.position == pytest.approx([1, 1, 0], abs=0.02)
+    assert 1 in np.round(whole[0][whole[1][there.triangle]].max(0)[:2], 6)
+
+
+def test_concentric_spheres():
+    outer, inner = meshes.sphere(5, 1.1), meshes.sphere(5, 1.0)
+    result = tolvol.hausdorff(*outer, *inner)
+    # A sphere of edge length e sags by less than e ** 2 / 4 here.
+    sag = (np.pi / 2 / 2**5) ** 2 / 4
+    assert 0.1 - 1e-9 <= result.upper and result.lower <= 0.1 + 2 * sag
+
+
+def test_against_brute_force():
+    rng = np.random.default_rng(6)
+    for _ in range(5):
+        a, b = rng.standard_normal((2, 30, 3))
+        ta, tb = rng.integers(0, 30, (2, 20, 3)).astype(np.int32)
+        result = tolvol.hausdorff(a, ta, b, tb)
+        weights = rng.dirichlet([0.5, 0.5, 0.5], 300)
+        samples = np.concatenate([weights @ a[t] for t in ta])
+        # Dense samples of b never lie nearer than b itself, so their distance is an upper bound of the true one.
+        dense = np.concatenate([rng.dirichlet([0.7, 0.7, 0.7], 2000) @ b[t] for t in tb])
+        reach = max(np.sqrt(((dense - p) ** 2).sum(1).min()) for p in samples[::20])
+        assert result.upper <= max(reach, result.lower) * 1.15
+        exact = tolvol.ToleranceVolume(b, tb, 0.1 * tolvol.size(b, tb)).distance(samples)
+        assert exact.max() <= result.upper
+        assert exact.max() >= 0.8 * result.lower
+
+
+def test_bound_decides():
+    a, b = raised(meshes.plate(9), 0.25), meshes.plate(9)
+    assert tolvol.hausdorff(*a, *b, bound=0.2500001).upper <= 0.2500001
+    assert tolvol.hausdorff(*a, *b, bound=0.2499999).lower > 0.2499999
+
+
+def test_identical_and_subdivided_surfaces_are_at_zero():
+    vertices, triangles = meshes.torus()
+    assert tolvol.hausdorff(vertices, triangles, vertices, triangles).upper < 1e-12
+    fine = meshes.subdivide(vertices, triangles)
+    assert tolvol.hausdorff(*fine, vertices, triangles).upper < 1e-12
+
+
+def test_segments_and_points_count():
+    plate = meshes.plate(5)
+    segment = np.array([[0.5, 0.5, 0], [0.5, 0.5, 2]]), np.array([[0, 1, 1]], np.int32)
+    point = np.array([[0.5, 0.5, -3.0]]), np.array([[0, 0, 0]], np.int32)
+    assert tolvol.hausdorff(*segment, *plate).upper == pytest.approx(2, rel=0.01)
+    assert tolvol.hausdorff(*point, *plate).lower == pytest.approx(3, rel=0.01)
+    assert tolvol.hausdorff(*plate, *point).upper == pytest.approx(np.sqrt(9.5), rel=0.011)
+
+
+def test_hausdorff_gives_the_same_on_any_number_of_threads():
+    a, b = meshes.torus(noise=0.003), meshes.torus()
+    results = [tolvol.hausdorff(*a, *b, threads=n) for n in (1, 2, 3)]
+    assert len({(r.lower, r.upper, tuple(r.position), r.triangle) for r in results}) == 1
+
+
+def test_deviation_of_parallel_plates():
+    result = tolvol.deviation(*raised(meshes.plate(9), 0.25), *meshes.plate(5), bounds=(0.1, 0.2499, 0.2501))
+    assert result.mean == pytest.approx(0.25) and result.rms == pytest.approx(0.25)
+    assert list(result.share_beyond) == pytest.approx([1, 1, 0])
+    assert result.spacing > 0
+
+
+def test_deviation_weighs_by_area():
+    # A plate of area 1 at distance 0 in 2048 triangles, and one of area 4 at distance 1 in two.
+    large = meshes.plate(2, side=2)
+    vertices, triangles = meshes.join(meshes.plate(33), (large[0] + [0, 0, 1], large[1]))
+    result = tolvol.deviation(vertices, triangles, *meshes.plate(2, side=2), bounds=(0.5,))
+    assert result.mean == pytest.approx(0.8, rel=0.01)
+    assert result.rms == pytest.approx(np.sqrt(0.8), rel=0.01)
+    assert result.share_beyond[0] == pytest.approx(0.8, rel=0.01)
+
+
+def test_deviation_of_a_tilted_plate():
+    # Heights spread evenly over 0 to 1: mean 1/2, root mean square 1/sqrt(3), a quarter beyond 3/4. The tilted plate
+    # stands over a plate wide enough that every closest point is straight below.
+    vertices, triangles = meshes.plate(2)
+    vertices[:, 2] = vertices[:, 0]
+    floor = meshes.plate(2, side=9)
+    result = tolvol.deviation(vertices, triangles, floor[0] - [4, 4, 0], floor[1], bounds=(0.75,))
+    assert result.mean == pytest.approx(1 / 2, rel=0.01)
+    assert result.rms == pytest.approx(1 / np.sqrt(3), rel=0.01)
+    assert result.share_beyond[0] == pytest.approx(0.25, abs=0.01)
+
+
+def test_deviation_gives_the_same_on_any_number_of_threads():
+    a, b = meshes.torus(noise=0.003), meshes.torus()
+    results = [tolvol.deviation(*a, *b, bounds=(0.002,), threads=n) for n in (1, 2, 3)]
+    assert len({(r.mean, r.rms, r.share_beyond[0]) for r in results}) == 1
+
+
+def test_wedges_part_corners_whose_values_differ():
+    vertices, triangles = meshes.plate(9)
+    uv = vertices[:, :2].astype(np.float32)[triangles]
+    whole = tolvol.wedges(triangles, uv)
+    assert whole.dtype == np.int32 and whole.shape == triangles.shape
+    assert len(np.unique(whole)) == len(vertices)
+    right = vertices[triangles].mean(1)[:, 0] > 0.5
+    cut = uv.copy()
+    cut[right] += np.float32(2)
+    parted = tolvol.wedges(triangles, cut)
+    assert len(np.unique(parted)) == len(vertices) + 9
+    pairs = {}
+    for vertex, value, label in zip(triangles.ravel(), map(tuple, cut.reshape(-1, 2)), parted.ravel()):
+        assert pairs.setdefault((vertex, value), label) == label
+
+
+def test_wedges_of_several_layers_differ_when_one_does():
+    triangles = np.array([[0, 1, 2], [2, 1, 3]], np.int32)
+    corners = np.zeros((2, 3, 4), np.float32)
+    assert len(np.unique(tolvol.wedges(triangles, corners))) == 4
+    corners[1, 0, 3] = 1e-30
+    assert len(np.unique(tolvol.wedges(triangles, corners))) == 5

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Long calls show how far they are to another thread, which can stop them."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+import tolvol
+
+import meshes
+
+LARGE = meshes.torus(600, 200, noise=0.0005)
+TOLERANCE = 0.005 * tolvol.size(*LARGE)
+
+
+def watch(call):
+    """Runs call(progress) in a thread; returns progress, thread, and a list that receives result or exception."""
+    progress, outcome = tolvol.Progress(), []
+
+    def work():
+        try:
+            outcome.append(call(progress))
+        except tolvol.TolvolError as error:
+            outcome.append(error)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    return progress, thread, outcome
+
+
+CALLS = {
+    "ToleranceVolume": lambda progress: tolvol.ToleranceVolume(*LARGE, TOLERANCE, progress=progress),
+    "check": lambda progress: VOLUME.check(LARGE[0], LARGE[1], progress=progress),
+    "decimate": lambda progress: tolvol.decimate(*LARGE, VOLUME, progress=progress),
+    "hausdorff": lambda progress: tolvol.hausdorff(*LARGE, *meshes.torus(), progress=progress),
+    "deviation": lambda progress: tolvol.deviation(*LARGE, *meshes.torus(), progress=progress),
+}
+VOLUME = tolvol.ToleranceVolume(*LARGE, TOLERANCE)
+
+
+def test_progress_moves_while_python_runs_on():
+    progress, thread, outcome = watch(CALLS["decimate"])
+    seen = []
+    while thread.is_alive():
+        seen.append((progress.stage, progress.fraction))
+        time.sleep(0.001)
+    assert not isinstance(outcome[0], Exception)
+    assert len(set(seen)) > 5
+    assert all(0 <= fraction <= 1 for _, fraction in seen)
+    assert any(stage for stage, _ in seen)
+    assert not progress.cancelled
+
+
+def test_cancel_from_another_thread():
+    progress, thread, outcome = watch(CALLS["decimate"])
+    while thread.is_alive() and progress.fraction == 0:
+        time.sleep(0.0005)
+    assert thread.is_alive()
+    progress.cancel()
+    thread.join()
+    assert isinstance(outcome[0], tolvol.Cancelled)
+    assert progress.cancelled
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_a_call_that_is_cancelled_before_it_starts(call):
+    progress = tolvol.Progress()
+    progress.cancel()
+    with pytest.raises(tolvol.Cancelled):
+        CALLS[call](progress)
+
+
+def test_progress_changes_no_result():
+    vertices, triangles = meshes.torus(48, 24)
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.03)
+    plain = tolvol.decimate(vertices, triangles, volume)
+    watched = tolvol.decimate(vertices, triangles, volume, progress=tolvol.Progress())
+    assert np.array_equal(plain.vertices, watched.vertices) and np.array_equal(plain.triangles, watched.triangles)

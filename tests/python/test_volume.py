@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""tolvol.ToleranceVolume: what it says of itself, exact distances, verdicts."""
+
+import numpy as np
+import pytest
+import tolvol
+
+import meshes
+
+INSIDE, UNPROVED, OUTSIDE = 2, 1, 0
+PLATE = meshes.plate(9)
+
+
+def test_size_is_the_longest_diagonal_after_to_world():
+    vertices, triangles = meshes.box((0, 0, 0), (1, 2, 3))
+    assert tolvol.size(vertices, triangles) == pytest.approx(np.sqrt(14))
+    # Sheared along x by y: of the four diagonals (1 + s, 2, 3) with s = 2 is the longest.
+    shear = meshes.matrix([[1, 1, 0], [0, 1, 0], [0, 0, 1]])
+    assert tolvol.size(vertices, triangles, shear) == pytest.approx(np.sqrt(9 + 4 + 9))
+    turned = meshes.matrix(meshes.random_rotation(), (100, 0, 0))
+    assert tolvol.size(vertices, triangles, turned) == pytest.approx(np.sqrt(14))
+    lonely = np.concatenate([vertices, [[50, 50, 50]]])
+    assert tolvol.size(lonely, triangles) == pytest.approx(np.sqrt(14))
+
+
+def test_attributes():
+    vertices, triangles = meshes.degenerate()
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.05)
+    assert volume.tolerance == 0.05
+    assert volume.size == tolvol.size(vertices, triangles)
+    assert volume.triangle_count == len(triangles)
+    assert volume.vertex_count == len(vertices)
+    assert volume.spacing == pytest.approx(0.05 / volume.precision)
+    assert volume.memory > volume.grid()[0].size * 4
+    assert volume.seconds > 0
+
+
+@pytest.mark.parametrize("precision", [0.5, 1, 4])
+def test_precision_sets_the_spacing(precision):
+    volume = tolvol.ToleranceVolume(*PLATE, 0.1, precision=precision)
+    assert volume.precision == pytest.approx(precision)
+    assert volume.spacing == pytest.approx(0.1 / precision)
+
+
+def test_precision_falls_by_itself_so_that_a_small_tolerance_fits():
+    vertices, triangles = meshes.torus()
+    usual = tolvol.ToleranceVolume(vertices, triangles, 0.01 * tolvol.size(vertices, triangles)).precision
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.0005 * tolvol.size(vertices, triangles))
+    assert volume.precision < usual
+    assert volume.memory < 300e6
+    with pytest.raises(tolvol.ResourceLimit, match=r"precision \S+ fits"):
+        tolvol.ToleranceVolume(vertices, triangles, volume.tolerance, precision=usual)
+
+
+@pytest.mark.parametrize("to_world", [None, meshes.matrix(100 * np.eye(3), (5, 6, 7))], ids=["local", "placed"])
+def test_grid_holds_exact_distances(to_world):
+    vertices, triangles = meshes.torus(48, 24)
+    tolerance = 0.02 * tolvol.size(vertices, triangles, to_world)
+    volume = tolvol.ToleranceVolume(vertices, triangles, tolerance, to_world=to_world)
+    values, origin, spacing, unit = volume.grid()
+    assert values.dtype == np.float32 and values.ndim == 3
+    assert not values.flags.owndata and not values.flags.writeable
+    assert spacing == volume.spacing
+    z, y, x = np.unravel_index(np.random.default_rng(1).integers(0, values.size, 3000), values.shape)
+    exact = volume.distance(origin + spacing * np.stack([x, y, z], 1))
+    band = tolerance + np.sqrt(3) * spacing
+    near = exact < 0.999 * band
+    assert 100 < near.sum() < 2900
+    assert np.allclose(unit * values[z, y, x][near], exact[near], atol=1e-5 * tolerance + 1e-5 * volume.size)
+    assert (unit * values[z, y, x][exact > 1.001 * band] >= 0.999 * band).all()
+
+
+def test_distance_is_exact():
+    volume = tolvol.ToleranceVolume(*PLATE, 0.1)
+    points = np.array([[0.5, 0.5, 0.3], [0.5, 0.5, -7], [2, 0.5, 0], [-3, -4, 0], [0.25, 0.75, 0]])
+    assert volume.distance(points) == pytest.approx([0.3, 7, 1, 5, 0], abs=1e-12)
+    assert volume.distance(points.astype(np.float32)).dtype == np.float64
+    shifted = meshes.matrix(np.eye(3), (0, 0, 1))
+    assert volume.distance(points, to_world=shifted)[0] == pytest.approx(1.3)
+    assert np.array_equal(volume.distance(points, threads=1), volume.distance(points, threads=3))
+    assert volume.distance(np.empty((0, 3))).shape == (0,)
+
+
+def test_verdicts_on_both_sides_of_the_tolerance():
+    volume = tolvol.ToleranceVolume(*PLATE, 0.1)
+    corners = np.array([[0.2, 0.2, 0], [0.8, 0.3, 0], [0.4, 0.9, 0]])
+    heights = np.array([0, 0.05, 0.0999, 0.1001, 0.3])
+    points = (corners[None] + heights[:, None, None] * [0, 0, 1]).reshape(-1, 3)
+    result = volume.check(points, np.arange(len(points), dtype=np.int32).reshape(-1, 3))
+    assert result.verdict.dtype == np.uint8
+    assert result.verdict.tolist() == [INSIDE, INSIDE, INSIDE, OUTSIDE, OUTSIDE]
+    assert result.method == "certificate" and result.renderer
+
+
+@pytest.mark.parametrize("corners", [1, 2, 3, 4])
+def test_pieces_of_one_to_four_corners(corners):
+    volume = tolvol.ToleranceVolume(*PLATE, 0.1)
+    angle = 2 * np.pi * np.arange(corners) / corners
+    ring = np.stack([0.5 + 0.3 * np.cos(angle), 0.5 + 0.3 * np.sin(angle), 0.05 * (-1.0) ** np.arange(corners)], 1)
+    lifted = ring.copy()
+    lifted[-1, 2] = 0.2
+    points = np.concatenate([ring, lifted])
+    verdict = volume.check(points, np.arange(2 * corners, dtype=np.int32).reshape(2, corners)).verdict
+    assert verdict.tolist() == [INSIDE, OUTSIDE]
+
+
+def test_a_piece_over_a_hole_is_outside_though_its_corners_are_inside():
+    left, right = meshes.plate(9), meshes.plate(9)
+    vertices, triangles = meshes.join(left, (right[0] + [2, 0, 0], right[1]))
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.1)
+    bridge = np.array([[0.9, 0.5, 0], [2.1, 0.5, 0], [2.1, 0.6, 0]])
+    face = np.array([[0, 1, 2]], np.int32)
+    assert (volume.distance(bridge) == 0).all()
+    assert volume.check(bridge, face).verdict.tolist() == [OUTSIDE]
+
+
+def test_groups_take_the_least_verdict_of_their_pieces():
+    volume = tolvol.ToleranceVolume(*PLATE, 0.1)
+    points = np.array([[0.5, 0.5, 0], [0.5, 0.5, 0.5], [0.2, 0.2, 0.01]])
+    faces = np.array([[0], [1], [2]], np.int32)
+    assert volume.check(points, faces).verdict.tolist() == [INSIDE, OUTSIDE, INSIDE]
+    groups = np.array([7, 7, -1], np.int32)
+    assert volume.check(points, faces, groups=groups).verdict.tolist() == [OUTSIDE, OUTSIDE, INSIDE]
+
+
+def test_to_world_of_a_check_is_used():
+    volume = tolvol.ToleranceVolume(*PLATE, 0.1)
+    face = np.array([[0, 1, 8]], np.int32)
+    lift = meshes.matrix(np.eye(3), (0, 0, 0.2))
+    assert volume.check(PLATE[0], face).verdict.tolist() == [INSIDE]
+    assert volume.check(PLATE[0], face, to_world=lift).verdict.tolist() == [OUTSIDE]
+
+
+@pytest.mark.parametrize("name", ["torus", "needles", "far"])
+def test_no_wrong_verdict_on_candidates_about_the_tolerance(name):
+    vertices, triangles = {
+        "torus": meshes.torus(48, 24),
+        "needles": meshes.needles(levels=3, height=1e-4),
+        "far": (meshes.torus(48, 24)[0] + [1e3, -2e3, 3e3], meshes.torus(48, 24)[1]),
+    }[name]
+    tolerance = 0.01 * tolvol.size(vertices, triangles)
+    volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
+    rng = np.random.default_rng(2)
+    count = 600
+    corner = vertices[triangles[rng.integers(0, len(triangles), count)]].mean(1)
+    length = tolerance * 10 ** rng.uniform(-1, 1, (count, 1, 1))
+    points = corner[:, None] + length * rng.standard_normal((count, 3, 3)) * [1, 1, 0.2]
+    faces = np.arange(3, dtype=np.int32)[None]
+    verdict = volume.check(points.reshape(-1, 3), np.arange(3 * count, dtype=np.int32).reshape(-1, 3)).verdict
+    assert {INSIDE, OUTSIDE} <= set(verdict.tolist())
+    for piece, said in zip(points, verdict):
+        truth = tolvol.hausdorff(piece, faces, vertices, triangles, bound=tolerance)
+        if said == INSIDE:
+            assert truth.lower <= tolerance
+        if said == OUTSIDE:
+            assert truth.upper > tolerance
+
+
+def test_check_gives_the_same_on_any_number_of_threads():
+    vertices, triangles = meshes.torus(48, 24)
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.02)
+    moved = vertices + 0.015 * np.random.default_rng(3).standard_normal(vertices.shape)
+    verdicts = [volume.check(moved, triangles, threads=n).verdict for n in (1, 2, 3)]
+    assert len(np.unique(verdicts[0])) > 1
+    assert np.array_equal(verdicts[0], verdicts[1]) and np.array_equal(verdicts[0], verdicts[2])
+    grids = [tolvol.ToleranceVolume(vertices, triangles, 0.02, threads=n).grid()[0] for n in (1, 2, 3)]
+    assert np.array_equal(grids[0], grids[1]) and np.array_equal(grids[0], grids[2])

@@ -1,0 +1,51 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Sets up and runs every test, or only the runners that are named: sh tests/run.sh [native|asan|python|blender|ui|style]...
+# One closing line a runner; what a runner printed is in build/tests/, and is shown when it fails.
+set -eu
+cd "$(dirname "$0")/.."
+
+runners="native asan python blender ui style"
+for name in "$@"; do
+  case " $runners " in
+  *" $name "*) ;;
+  *)
+    echo "tests: unknown runner $name (there are: $runners)" >&2
+    exit 2
+    ;;
+  esac
+done
+[ $# -gt 0 ] || set -- $runners
+
+sh setup.sh --tests
+mkdir -p build/tests
+
+native() { build/release/tests/native/tolvol_tests --gtest_brief=1; }
+asan() {
+  cmake --preset asan && cmake --build --preset asan && build/asan/tests/native/tolvol_tests --gtest_brief=1
+}
+python() { /usr/bin/python3 -m pytest -q -p no:cacheprovider tests/python; }
+blender() { sh tests/blender/run.sh; }
+ui() { sh tests/ui/run.sh; }
+style() { sh tests/style/run.sh; }
+
+failed=""
+for name in "$@"; do
+  log=build/tests/$name.log
+  started=$(date +%s)
+  # In a shell of its own: no runner can end this one, and all of them run.
+  if (set +e; $name) >"$log" 2>&1; then
+    outcome=passed
+  else
+    outcome=FAILED
+    failed="$failed $name"
+    cat "$log"
+  fi
+  echo "$name: $outcome in $(($(date +%s) - started)) s: $(grep -v '^[[:space:]]*$' "$log" | tail -n 1)"
+done
+
+if [ -n "$failed" ]; then
+  echo "tests: failed:$failed"
+  exit 1
+fi
+echo "tests: all passed"

@@ -1,0 +1,74 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Format and lint, and the Python package as pip builds it. Its tools are those of Debian and the ones pinned beside.
+set -eu
+cd "$(dirname "$0")/../.."
+
+venv=build/venv
+pins=tests/style/requirements.txt
+if ! cmp -s "$pins" "$venv/requirements.txt"; then
+  rm -rf "$venv"
+  /usr/bin/python3 -m venv "$venv"
+  "$venv/bin/pip" install --quiet --disable-pip-version-check --requirement "$pins"
+  cp "$pins" "$venv/requirements.txt"
+fi
+
+failed=""
+
+# check NAME: runs the function of that name; all of them run, whatever the first ones say
+check() {
+  if (set +e; "$1"); then
+    echo "$1: ok"
+  else
+    echo "$1: FAILED"
+    failed="$failed $1"
+  fi
+}
+
+licence() {
+  # In one of the first two lines: a script has its #! above.
+  without=$(find . \( -path ./build -o -path ./out -o -path ./.git \) -prune -o -type f \( -name '*.h' -o -name '*.hh' -o \
+    -name '*.cpp' -o -name '*.py' -o -name '*.sh' -o -name 'CMakeLists.txt' -o -name '*.toml' -o -path './.ci/*' \) -print |
+    while read -r file; do
+      head -n 2 "$file" | grep -q 'SPDX-License-Identifier: GPL-3.0-or-later' || echo "$file"
+    done)
+  [ -z "$without" ] || { echo "no licence line in: $without" && return 1; }
+}
+
+clang_format() {
+  find native benchmark tests/native \( -name '*.h' -o -name '*.hh' -o -name '*.cpp' \) -print0 |
+    xargs -0 clang-format --dry-run -Werror
+}
+
+clang_tidy() {
+  # GCC's own options are no business of clang's; its count of warnings in other people's headers is noise.
+  find native -name '*.cpp' -print0 |
+    xargs -0 -n 1 -P "$(nproc)" clang-tidy --quiet -p build/release --extra-arg=-Wno-unknown-warning-option 2>&1 |
+    grep -v 'warnings generated' && return 1
+  return 0
+}
+
+ruff() {
+  "$venv/bin/ruff" check . && "$venv/bin/ruff" format --check .
+}
+
+pip_install() {
+  "$venv/bin/pip" install --quiet --disable-pip-version-check --no-build-isolation --check-build-dependencies \
+    --no-deps --force-reinstall . &&
+    PYTHONPATH=tests/python "$venv/bin/python" -c '
+import sys, meshes, tolvol
+assert tolvol.__file__.startswith(sys.prefix), tolvol.__file__
+vertices, triangles = meshes.torus()
+result = tolvol.decimate(vertices, triangles, tolvol.ToleranceVolume(vertices, triangles, 0.03))
+assert len(result.triangles) < 1000
+'
+}
+
+check licence
+check clang_format
+check ruff
+check clang_tidy
+check pip_install
+
+[ -z "$failed" ] || { echo "style: failed:$failed" && exit 1; }
+echo "style: licence lines, clang-format, ruff, clang-tidy and pip install are in order"

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs the tests of this folder inside Blender's own event loop and ends Blender with an honest exit code.
+
+A test is a generator: wherever it yields, Blender gets the time to handle what the mouse and the keyboard did.
+"""
+
+import importlib
+import os
+import sys
+import time
+import traceback
+from pathlib import Path
+
+import bpy
+
+FOLDER = Path(__file__).resolve().parent
+sys.dont_write_bytecode = True
+sys.path[:0] = [str(FOLDER.parents[1]), str(FOLDER.parent / "blender"), str(FOLDER)]
+# Only before the first window is drawn.
+bpy.context.preferences.view.show_splash = False
+
+import addon  # noqa: E402
+
+_SETTLE = 0.3  # seconds in which Blender handles an event and draws again
+
+
+class Run:
+    def __init__(self, names):
+        modules = [importlib.import_module(path.stem) for path in sorted(FOLDER.glob("test_*.py"))]
+        tests = [value for module in modules for name, value in vars(module).items() if name.startswith("test_")]
+        self.waiting = [test for test in tests if not names or test.__name__ in names]
+        self.failed = 0
+        self.passed = 0
+        self.started = time.time()
+        self.current = None
+
+    def step(self):
+        """Called by Blender's timer; how long until the next call."""
+        try:
+            if self.current is None:
+                if not self.waiting:
+                    self.end()
+                print(f"{self.waiting[0].__name__} ...", flush=True)
+                self.current = self.waiting.pop(0)()
+            pause = next(self.current)
+            return _SETTLE if pause is None else pause
+        except StopIteration:
+            self.passed += 1
+        except Exception:
+            traceback.print_exc()
+            self.failed += 1
+        self.current = None
+        return _SETTLE
+
+    def end(self):
+        counts = f"{self.failed} failed, {self.passed} passed" if self.failed else f"{self.passed} passed"
+        print(f"{counts} in {time.time() - self.started:.1f} s", flush=True)
+        sys.stderr.flush()
+        os._exit(1 if self.failed or not self.passed else 0)
+
+
+addon.register()
+run = Run(sys.argv[sys.argv.index("--") + 1 :])
+bpy.app.timers.register(run.step, first_interval=1.5, persistent=True)

@@ -1,0 +1,33 @@
+#!/bin/sh
+# SPDX-License-Identifier: GPL-3.0-or-later
+# The panel in a real Blender window, worked with mouse and keyboard on a virtual screen: sh tests/ui/run.sh [TEST NAME]...
+# Screenshots and Blender's output go to build/ui/.
+set -eu
+cd "$(dirname "$0")/../.."
+out=build/ui
+mkdir -p "$out"
+rm -f "$out"/*.png "$out/display"
+
+# Xvfb chooses a free display and tells its number.
+Xvfb -displayfd 3 -screen 0 1280x800x24 +extension GLX 3>"$out/display" 2>"$out/xvfb.log" &
+server=$!
+trap 'kill $server 2>/dev/null || true' EXIT INT TERM
+tries=0
+while [ ! -s "$out/display" ]; do
+  tries=$((tries + 1))
+  [ $tries -lt 100 ] || { echo "1 failed: Xvfb does not start (see $out/xvfb.log)"; exit 1; }
+  sleep 0.1
+done
+
+code=0
+DISPLAY=":$(cat "$out/display")" LIBGL_ALWAYS_SOFTWARE=1 timeout 200 \
+  blender --factory-startup --window-geometry 0 0 1280 800 --python-exit-code 5 --python tests/ui/run.py -- "$@" \
+  >"$out/blender.log" 2>&1 || code=$?
+# An exception while a panel is drawn only shows here.
+if grep -q Traceback "$out/blender.log"; then
+  [ "$code" -ne 0 ] || code=1
+fi
+[ "$code" -eq 0 ] || cat "$out/blender.log"
+[ "$code" -ne 124 ] || echo "1 failed: timed out"
+grep -E '^[0-9]+ (passed|failed)' "$out/blender.log" || true
+exit "$code"

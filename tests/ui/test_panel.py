@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel as a person uses it."""
+
+import bpy
+import numpy as np
+
+import scenes
+from addon import job, mesh_io, native, volume
+from window import centre, click, find, key, on_screen, open_tab, press, region, reset, screenshot, view, xdotool
+
+
+def monkey():
+    bpy.ops.mesh.primitive_monkey_add()
+    ob = bpy.context.object
+    ob.modifiers.new("subdivision", "SUBSURF").levels = 3
+    with bpy.context.temp_override(window=view()[0], area=view()[1], object=ob):
+        bpy.ops.object.modifier_apply(modifier="subdivision")
+
+
+def suzanne():
+    return bpy.data.objects["Suzanne"]
+
+
+def stored():
+    arrays = mesh_io.read_mesh(suzanne().data)
+    return arrays.vertices.tobytes(), arrays.triangles.tobytes()
+
+
+def finished(change, seconds=30):
+    """Waits until change() is true."""
+    for _ in range(int(seconds / 0.2)):
+        if change():
+            return
+        yield 0.2
+    raise AssertionError("nothing happened")
+
+
+def assert_proved(ob, reference, percent):
+    now = scenes.world_triangles(ob)
+    tolerance = percent / 100 * native.module.size(*reference)
+    for pair in ((now, reference), (reference, now)):
+        assert native.module.hausdorff(*pair[0], *pair[1], bound=tolerance).upper <= tolerance
+    scenes.assert_within(now, reference, tolerance)
+
+
+def test_decimate_by_mouse_and_undo_by_one_ctrl_z():
+    yield from reset(monkey)
+    yield from open_tab()
+    screenshot("1 first sight")
+    reference, before = scenes.world_triangles(suzanne()), stored()
+    yield from press("tolvol.decimate")
+    yield from finished(lambda: len(suzanne().data.polygons) < 1000)
+    yield 1.0
+    screenshot("2 decimated")
+    assert len(reference[1]) == 62976 and suzanne().tolvol.snapshot is not None
+    assert_proved(suzanne(), reference, 1)
+    after = stored()
+    xdotool("mousemove", *centre())
+    yield
+    key("ctrl+z")
+    yield 1.0
+    assert stored() == before and suzanne().tolvol.snapshot is None
+    screenshot("3 undone")
+    key("ctrl+shift+z")
+    yield 1.0
+    assert stored() == after and suzanne().tolvol.snapshot is not None
+
+
+def test_adjust_last_operation():
+    yield from reset(monkey)
+    yield from open_tab()
+    reference = scenes.world_triangles(suzanne())
+    yield from press("tolvol.decimate")
+    yield from finished(lambda: len(suzanne().data.polygons) < 1000)
+    yield 1.0
+    first = len(suzanne().data.polygons)
+    hud = region("HUD")
+    click(*on_screen(hud, 60, hud.height - 12))  # it is closed at first: only its header
+    yield 1.0
+    hud = region("HUD")
+    place = on_screen(hud, hud.width * 2 // 3, 50)
+    xdotool("mousemove", *place, "sleep", "0.2", "click", "--repeat", 2, "--delay", 60, 1)
+    yield 0.4
+    xdotool("key", "ctrl+a", "type", "3")
+    key("Return")
+    yield from finished(lambda: len(suzanne().data.polygons) < first)
+    yield 1.0
+    screenshot("4 adjusted")
+    assert suzanne().tolvol.tolerance_percent == 3
+    assert len(suzanne().tolvol.snapshot.polygons) == 62976  # of the mesh before, not of the first result
+    assert_proved(suzanne(), reference, 3)
+    xdotool("mousemove", *centre())
+    yield
+    key("ctrl+z")
+    yield 1.0
+    assert len(scenes.world_triangles(suzanne())[1]) == 62976
+
+
+def test_escape_leaves_everything_as_it_was():
+    yield from reset(monkey)
+    yield from open_tab()
+    with bpy.context.temp_override(window=view()[0], area=view()[1], object=suzanne()):
+        suzanne().modifiers.new("more", "SUBSURF").levels = 1  # slow enough to be stopped
+        bpy.ops.object.modifier_apply(modifier="more")
+    yield 0.5
+    before, said, status = stored(), [], job._status
+    job._status = lambda progress: said.append(status(progress)) or said[-1]
+    yield from press("tolvol.decimate")
+    yield from finished(lambda: any("triangles left" in text for text in said))
+    screenshot("5 busy")
+    key("Escape")
+    yield 2.0
+    job._status = status
+    assert any(text.startswith("Decimating") and text.endswith("Esc: Cancel") for text in said)
+    count = len(said)
+    yield 2.0
+    assert len(said) == count  # nothing goes on
+    assert stored() == before and suzanne().tolvol.snapshot is None and not suzanne().tolvol.last_run
+    screenshot("6 stopped")
+
+
+def test_reference_check_and_select_outside():
+    yield from reset(monkey)
+    yield from open_tab()
+    yield from press("tolvol.set_reference")
+    yield from finished(lambda: suzanne().tolvol.snapshot is not None)
+    screenshot("7 reference")
+    co = mesh_io.column(suzanne().data.vertices, "co", 3)
+    lifted = co[:, 2] > 0.9
+    co[lifted, 2] += np.float32(0.1)
+    suzanne().data.vertices.foreach_set("co", co.ravel())
+    suzanne().data.update()
+    yield 0.5
+    yield from press("tolvol.check")
+    yield from finished(lambda: volume.measurement_of(suzanne()) is not None)
+    yield 1.0
+    screenshot("8 checked")
+    measured = suzanne().tolvol.measurement
+    assert not measured.forward_within and 0.05 < measured.forward < 0.2 and 0 < measured.share_outside < 0.2
+    yield from press("tolvol.select_outside", across=0.7)
+    yield from finished(lambda: suzanne().mode == "EDIT")
+    yield 0.5
+    screenshot("9 outside selected")
+    assert (yield from find("tolvol.decimate")) is not None
+    screenshot("10 edit mode")
+    with bpy.context.temp_override(window=view()[0], area=view()[1]):
+        bpy.ops.object.mode_set(mode="OBJECT")
+    chosen = mesh_io.column(suzanne().data.polygons, "select", 1, bool)
+    assert 0 < chosen.sum() < len(chosen) / 4
+
+
+def test_what_is_in_the_way_is_said():
+    yield from reset(monkey)
+    yield from open_tab()
+    yield from press("tolvol.set_reference")
+    suzanne().scale.x = 2
+    yield 0.5
+    screenshot("11 rescaled")
+    before = stored()
+    yield from press("tolvol.decimate")  # greyed
+    yield 1.0
+    assert stored() == before
+    xdotool("mousemove", *centre())
+    suzanne().scale.x = 1
+    twin = suzanne().copy()
+    bpy.context.collection.objects.link(twin)
+    yield 0.5
+    view()[1].tag_redraw()
+    yield 0.5
+    screenshot("12 two users")
+    bpy.data.objects.remove(twin)
+    found = native.module
+    native.module, native.reason = None, "The compiled module tolvol is missing: install the add-on's zip"
+    view()[1].tag_redraw()
+    yield 0.5
+    screenshot("13 no module")
+    native.module, native.reason = found, None
+    view()[1].tag_redraw()
+    yield 0.5

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The hands and eyes of the tests: mouse, keys, screenshots, and where a button is."""
+
+import subprocess
+from pathlib import Path
+
+import bpy
+
+PICTURES = Path(__file__).resolve().parents[2] / "build" / "ui"
+
+
+def xdotool(*arguments):
+    subprocess.run(["xdotool", *map(str, arguments)], check=True)
+
+
+def click(x, y):
+    xdotool("mousemove", x, y, "sleep", "0.1", "click", 1)
+
+
+def key(name):
+    xdotool("key", name)
+
+
+def screenshot(name):
+    subprocess.run(["import", "-window", "root", str(PICTURES / f"{name}.png")], check=True)
+
+
+def view():
+    """The 3D view and its window."""
+    window = bpy.context.window_manager.windows[0]
+    return window, next(area for area in window.screen.areas if area.type == "VIEW_3D")
+
+
+def region(kind):
+    return next(region for region in view()[1].regions if region.type == kind)
+
+
+def on_screen(area_region, x, y):
+    """A place in a region, from its upper left corner, in pixels of the screen (the window fills it)."""
+    window, _ = view()
+    return area_region.x + x, window.height - (area_region.y + area_region.height) + y
+
+
+def centre():
+    middle = region("WINDOW")
+    return on_screen(middle, middle.width // 3, middle.height // 2)
+
+
+def open_tab():
+    """Shows the sidebar with the tab Tolerance."""
+    view()[1].spaces[0].show_region_ui = True
+    yield 0.5
+    sidebar = region("UI")
+    # Tabs hang at the right edge; ours is the last.
+    for y in range(150, 260, 20):
+        click(*on_screen(sidebar, sidebar.width - 12, y))
+        yield 0.3
+        if (yield from find("tolvol.")) is not None:
+            return
+    raise AssertionError("no tab Tolerance")
+
+
+def find(operator, across=0.33):
+    """Moves the mouse down the sidebar until it is over the button of an operator; its place or None.
+
+    across: how far from the left of the sidebar. Blender's Ctrl C over a button copies the Python command that it runs.
+    """
+    sidebar = region("UI")
+    for y in range(30, sidebar.height - 5, 12):
+        place = on_screen(sidebar, int(sidebar.width * across), y)
+        bpy.context.window_manager.clipboard = ""
+        xdotool("mousemove", *place, "sleep", "0.03", "key", "ctrl+c")
+        yield 0.08
+        if f"bpy.ops.{operator}" in bpy.context.window_manager.clipboard:
+            return place
+    return None
+
+
+def press(operator, across=0.33):
+    """Clicks the button of an operator in the sidebar."""
+    place = yield from find(operator, across)
+    assert place is not None, f"no button for {operator}"
+    yield 0.6  # until no tooltip is in the way
+    click(*place)
+    yield 0.3
+
+
+def reset(*make):
+    """A scene with only the object that make() makes, active."""
+    for ob in list(bpy.data.objects):
+        bpy.data.objects.remove(ob)
+    for function in make:
+        function()
+    bpy.ops.ed.undo_push(message="start")
+    xdotool("mousemove", *centre())
+    yield 0.5
