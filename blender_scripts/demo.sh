@@ -36,6 +36,7 @@ cd "$(dirname "$0")/.."
 sh setup.sh
 mkdir -p out
 log=out/demo.log
+trap 'rm -f "$log" out/demo.err' EXIT
 
 # stage NAME SCRIPT ARGUMENT...: runs a script in Blender; one line when it is done; what it said only when it fails
 stage() {
@@ -58,13 +59,12 @@ stage() {
 
 if [ -z "$mesh" ]; then
   mesh=out/suzanne.ply
-  stage "model out/suzanne.ply" models.py suzanne "$mesh"
+  stage "model $mesh" models.py suzanne "$mesh"
 fi
 file=$(basename "$mesh")
 result=out/${file%.*}_decimated.${file##*.}
-stage "decimated $result, out/report.json" decimate.py "$mesh" "$result" --tolerance "$tolerance" --report out/report.json
+stage "decimation to $result" decimate.py "$mesh" "$result" --tolerance "$tolerance" --report out/report.json
 sed -n '$!s/, [0-9.]* s$/&/p' "$log" | sed 's/^/demo:   /'
 line=$(tail -n 1 "$log")
-stage "picture out/picture.png" figures.py "$mesh" "$result" out/picture.png --report out/report.json
-rm -f "$log" out/demo.err
+stage "picture to out/picture.png" figures.py "$mesh" "$result" out/picture.png --report out/report.json
 echo "$line"

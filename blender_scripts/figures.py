@@ -113,9 +113,9 @@ def add_caption(camera, x, y, size, text, material):
     add("caption", curve, camera.matrix_world @ Matrix.Translation((x * width, y * width, -1)))
 
 
-def compose(reference, result, captions):
-    """The two (vertices, triangles) on a floor, lit and framed; captions: two (large, small) texts."""
-    turn = Matrix.Rotation(TURN, 4, "Z")
+def compose(reference, result, captions, up):
+    """The two (vertices, triangles) on a floor, lit and framed; captions: two (large, small) texts; up: "Y" or "Z"."""
+    turn = Matrix.Rotation(TURN, 4, "Z") @ Matrix.Rotation(math.pi / 2 if up == "Y" else 0, 4, "X")
     turned = reference[0][np.unique(reference[1])] @ np.array(turn.to_3x3()).T
     lower, upper = turned.min(0), turned.max(0)
     scale = 1 / float(max(upper[0] - lower[0], upper[2] - lower[2]))
@@ -211,7 +211,9 @@ def main(options):
             raise cli.Stop(f"--report {options.report}: {error}") from None
     reference, result = models.read(options.reference), models.read(options.result)
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    compose(reference, result, captions(reference, result, numbers))
+    # By convention; nothing in the files says so.
+    up = "Y" if Path(options.reference).suffix.lower() == ".obj" else "Z"
+    compose(reference, result, captions(reference, result, numbers), up)
     with file_io.quiet():
         render(Path(options.picture))
     return 0

@@ -15,7 +15,8 @@ namespace tolvol {
 namespace {
 
 constexpr double kFloor = 0.02;       // of the tolerance: a piece this short is not split further
-constexpr std::size_t kBudget = 1 << 20;  // parts looked at before a piece is left unproved
+constexpr std::size_t kBudget = 1 << 20;  // parts looked at before a piece is left unproved,
+constexpr std::size_t kQuickBudget = 1 << 13;  // and where the answer is only one of many tries
 constexpr double kSmall = 2.0;        // of the tolerance: shorter pieces are worth trying against all eight nodes
 constexpr double kExact = 0.7;        // of the tolerance: shorter pieces are worth an exact search
 
@@ -60,7 +61,7 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
   double farthest2 = 0;  // over the parts proved so far
   std::uint32_t hint = Hierarchy::kNone;
   for (std::size_t next = 0; next < queue.size(); ++next) {
-    if (next == kBudget) return Verdict::unproved;
+    if (next == (kProve ? kBudget : kQuickBudget)) return Verdict::unproved;
     const Piece piece = queue[next];
     const glm::dvec3 centre = (piece.a + piece.b + piece.c) * (1.0 / 3);
     FourPoints points;

@@ -8,8 +8,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "reference/errors.h"
-#include "reference/frame.h"
+#include "measure/placed_pair.h"
 #include "reference/hierarchy.h"
 #include "reference/parallel.h"
 
@@ -80,8 +79,6 @@ void cover(const Corners& p, Measure measure, int k, Visit&& visit) {
 
 Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, std::span<const double> bounds,
                     const DeviationOptions& options) {
-  validate(a.vertices, a.triangles);
-  validate(b.vertices, b.triangles);
   for (std::size_t i = 0; i < bounds.size(); ++i) {
     if (!std::isnan(bounds[i])) continue;
     std::ostringstream text;
@@ -89,27 +86,16 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, std::span<cons
     throw InvalidInput(text.str());
   }
   if (options.progress) options.progress->begin("averaging");
-  Box box;
-  for (const TriangleMesh* mesh : {&a, &b}) {
-    for (const glm::uvec3& t : mesh->triangles) {
-      for (int k = 0; k < 3; ++k) box.add(mesh->vertices[t[k]]);
-    }
-  }
-  const Frame frame(box);
-  const auto placed = [&](const TriangleMesh& mesh) {
-    TriangleMesh copy = mesh;
-    for (dvec3& p : copy.vertices) p = frame.from_world(p);
-    return copy;
-  };
-  const TriangleMesh in_a = placed(a), in_b = placed(b);
-  const Hierarchy hierarchy(in_b);
+  const PlacedPair pair(a, b);
+  const Frame& frame = pair.frame;
+  const Hierarchy hierarchy(pair.b);
   std::vector<double> bounds_in_frame(bounds.begin(), bounds.end());
   for (double& bound : bounds_in_frame) bound *= frame.scale();
 
   const std::size_t count = a.triangles.size();
   const auto corners = [&](std::size_t i) {
-    const glm::uvec3& t = in_a.triangles[i];
-    return Corners{in_a.vertices[t.x], in_a.vertices[t.y], in_a.vertices[t.z]};
+    const glm::uvec3& t = pair.a.triangles[i];
+    return Corners{pair.a.vertices[t.x], pair.a.vertices[t.y], pair.a.vertices[t.z]};
   };
   Measure measure = Measure::number;
   double total = double(count);

@@ -34,8 +34,7 @@
 #include <limits>
 #include <vector>
 
-#include "reference/errors.h"
-#include "reference/frame.h"
+#include "measure/placed_pair.h"
 #include "reference/hierarchy.h"
 #include "reference/parallel.h"
 
@@ -70,6 +69,10 @@ struct Piece {
   std::uint32_t nearest = Hierarchy::kNone;  // triangle of b nearest to the centroid
 };
 
+struct Smaller {
+  bool operator()(const Piece& x, const Piece& y) const { return x.upper < y.upper; }
+};
+
 struct Sample {
   double distance = -1;
   dvec3 point{0};
@@ -85,18 +88,6 @@ struct Children {
   std::array<Piece, 3> piece;
   int count = 0;
 };
-
-TriangleMesh placed(const TriangleMesh& mesh, const Frame& frame) {
-  TriangleMesh copy{std::vector<dvec3>(mesh.vertices.size()), mesh.triangles};
-  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) copy.vertices[i] = frame.from_world(mesh.vertices[i]);
-  return copy;
-}
-
-void add_used(Box& box, const TriangleMesh& mesh) {
-  for (const glm::uvec3& t : mesh.triangles) {
-    for (int k = 0; k < 3; ++k) box.add(mesh.vertices[t[k]]);
-  }
-}
 
 /// A point between p and q, rounded by less than kSplitError.
 dvec3 between(const dvec3& p, const dvec3& q, double t) { return t <= 0.5 ? p + t * (q - p) : q + (1 - t) * (p - q); }
@@ -182,7 +173,7 @@ class Search {
     std::vector<Piece> batch;
     const double enough = cutoff();
     while (batch.size() < kBatch && !queue_.empty() && queue_.front().upper > enough) {
-      std::pop_heap(queue_.begin(), queue_.end(), smaller);
+      std::pop_heap(queue_.begin(), queue_.end(), Smaller());
       batch.push_back(queue_.back());
       queue_.pop_back();
     }
@@ -206,14 +197,12 @@ class Search {
     report(0.5 + 0.5 * std::min(1.0, lower_ / std::max(upper(), kNoise)));
   }
 
-  static constexpr auto smaller = [](const Piece& x, const Piece& y) { return x.upper < y.upper; };
-
   void keep(const Piece& piece) {
     if (piece.upper <= cutoff()) {
       settled_ = std::max(settled_, piece.upper);
     } else {
       queue_.push_back(piece);
-      std::push_heap(queue_.begin(), queue_.end(), smaller);
+      std::push_heap(queue_.begin(), queue_.end(), Smaller());
     }
   }
 
@@ -360,16 +349,11 @@ class Search {
 }  // namespace
 
 HausdorffInterval hausdorff(const TriangleMesh& a, const TriangleMesh& b, const HausdorffOptions& options) {
-  validate(a.vertices, a.triangles);
-  validate(b.vertices, b.triangles);
   if (options.bound && !(*options.bound >= 0)) throw InvalidInput("bound is not a length of 0 or more");
   if (options.progress) options.progress->begin("measuring");
-  Box box;
-  add_used(box, a);
-  add_used(box, b);
-  const Frame frame(box);
-  const TriangleMesh in_a = placed(a, frame), in_b = placed(b, frame);
-  Search search(in_a, in_b, options.bound ? *options.bound * frame.scale() : kInfinity, options);
+  const PlacedPair pair(a, b);
+  const Frame& frame = pair.frame;
+  Search search(pair.a, pair.b, options.bound ? *options.bound * frame.scale() : kInfinity, options);
   search.run();
   // One step outwards for the quotient: it is exact, but for results below the smallest normal number.
   const Sample& farthest = search.farthest();

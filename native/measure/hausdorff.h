@@ -33,7 +33,7 @@ struct HausdorffInterval {
 /// surfaces end with an upper of about 1e-15 of the size of both meshes together. Where that would need many millions
 /// of pieces the search stops with the interval it has, and so it does as soon as lower > bound: wider, but true.
 ///
-/// Throws InvalidInput when a mesh is not valid (reference/triangle_mesh.h) or the bound is negative or not a number,
+/// Throws InvalidInput when a mesh is not valid (measure/placed_pair.h) or the bound is negative or not a number,
 /// Cancelled. Shares no code with the check of operations (check/), which it judges. Cost: below 1 us for each triangle
 /// of a and of b, then as much for each piece; 0.1 s between a scan of 270,000 triangles and its decimation to 200,
 /// either way.

@@ -19,7 +19,11 @@ BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mes
       const std::uint32_t a = cut.vertex_input[e.x], b = cut.vertex_input[e.y];
       reference_.triangles.emplace_back(a, b, b);
     }
-    if (reference_.triangles.empty()) return;
+    if (reference_.triangles.empty()) {
+      // Nothing to be near to: the boundary stays as it is.
+      for (const glm::uvec2& e : mesh.boundary) uncertified_.insert(uncertified_.end(), {e.x, e.y});
+      return;
+    }
   }
   witnesses_ = prepare_witnesses(reference_);
   hierarchy_.emplace(reference_);

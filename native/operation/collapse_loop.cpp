@@ -20,7 +20,9 @@ constexpr double kFoldCosine = 0.2;           // a face's normal turns by less t
 constexpr double kReach = 2;                  // a minimiser is trusted within this many edge lengths of the edge's middle
 constexpr int kTries = 8;                     // positions strewn around the best one when it fails,
 constexpr double kSpread = 0.3, kWideSpread = 0.6;  // within these shares of the tolerance along each axis, in turn
-constexpr std::size_t kPollInterval = 256;    // steps between two looks at the progress
+/// Where many collapses cost nothing, on a plate, short edges go first: a weight of the fourth power of the length, which has
+/// the quadrics' unit. Without it one vertex would sweep along a row and leave needles behind.
+constexpr double kLengthWeight = 1e-6;
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
@@ -28,7 +30,9 @@ double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
 CollapseLoop::CollapseLoop(CollapseInput input, const CollapseBounds& bounds)
     : bounds_(bounds), subset_(input.subset), store_(std::move(input.store)), triangles_(std::move(input.triangles)),
-      positions_(std::move(input.positions)), pinned_(std::move(input.pinned)), wedges_(std::move(input.wedges)) {
+      pinned_(std::move(input.pinned)), wedges_(std::move(input.wedges)) {
+  slots_ = std::move(input.slots);
+  for (const Spot& s : input.spots) positions_.push_back(s.position), stored_.push_back(s.stored);
   build(input.on_reference);
 }
 
@@ -47,6 +51,9 @@ void CollapseLoop::build(bool on_reference) {
     if (!mesh_.add_face(corners, 3).is_valid()) throw std::logic_error("the cut mesh is not a manifold");
   }
   triangle_count_ = m;
+  for (std::uint32_t v = 0; v < n; ++v) {
+    if (slots_[v] != v) copies_.try_emplace(slots_[v], 1, slots_[v]).first->second.push_back(v);
+  }
   moved_.assign(n, false);
   seam_.assign(n, false);
   merged_into_.resize(n);
@@ -140,7 +147,10 @@ void CollapseLoop::push(Edge e) {
   const std::uint32_t i = static_cast<std::uint32_t>(e.idx());
   ++stamps_[i];
   if (refused_[i]) refused_[i] = false, --refused_count_;
-  if (const auto p = plan(e)) heap_.push_back({p->cost, i, stamps_[i]});
+  if (const auto p = plan(e)) {
+    const double length2 = squared_length(positions_[from(p->halfedge)] - positions_[to(p->halfedge)]);
+    heap_.push_back({p->cost + kLengthWeight * length2 * length2, i, stamps_[i]});
+  }
 }
 
 void CollapseLoop::run(std::size_t target, Progress* progress) {
@@ -154,8 +164,8 @@ void CollapseLoop::run(std::size_t target, Progress* progress) {
   for (std::size_t i = 0; i < edges; ++i) push(Edge(static_cast<int>(i)));
   std::make_heap(heap_.begin(), heap_.end(), later);
   if (progress) progress->begin("decimating");
-  for (std::size_t step = 0; !heap_.empty() && triangle_count_ > target; ++step) {
-    if (progress && step % kPollInterval == 0) {
+  while (!heap_.empty() && triangle_count_ > target) {
+    if (progress) {
       progress->set_count(triangle_count_);
       progress->update(static_cast<double>(before - triangle_count_) / static_cast<double>(before));
     }
@@ -176,9 +186,9 @@ bool CollapseLoop::collapse(Edge e) {
   const std::optional<Plan> p = plan(e);
   if (!p) return false;
   const Halfedge h = p->halfedge;
-  Outcome outcome = attempt(h, p->freedom == Freedom::anywhere ? store_(p->position) : p->position);
+  Outcome outcome = attempt(h, p->freedom == Freedom::anywhere ? store_(p->position) : spot(to(h)));
   if (outcome != Outcome::done && p->freedom == Freedom::either_way) {
-    outcome = std::max(outcome, attempt(mesh_.opposite_halfedge_handle(h), positions_[from(h)]));
+    outcome = std::max(outcome, attempt(mesh_.opposite_halfedge_handle(h), spot(from(h))));
   } else if (outcome == Outcome::refused && p->freedom == Freedom::anywhere) {
     outcome = search(h, p->position);
   }
@@ -192,9 +202,9 @@ bool CollapseLoop::collapse(Edge e) {
 /// Other positions for a collapse whose best one fails a bound: the ends, the middle, then points strewn around the best one.
 /// The sequence depends on the edge alone, so that results repeat.
 CollapseLoop::Outcome CollapseLoop::search(Halfedge h, const glm::dvec3& best) {
-  const glm::dvec3 p0 = positions_[from(h)], p1 = positions_[to(h)];
-  for (const glm::dvec3& position : {p0, p1, store_((p0 + p1) * 0.5)}) {
-    const Outcome outcome = attempt(h, position);
+  const Spot s0 = spot(from(h)), s1 = spot(to(h));
+  for (const Spot& other : {s0, s1, store_((s0.position + s1.position) * 0.5)}) {
+    const Outcome outcome = attempt(h, other);
     if (outcome != Outcome::refused) return outcome;
   }
   if (!bounds_.forward) return Outcome::refused;
@@ -209,11 +219,14 @@ CollapseLoop::Outcome CollapseLoop::search(Halfedge h, const glm::dvec3& best) {
   return Outcome::refused;
 }
 
-CollapseLoop::Outcome CollapseLoop::attempt(Halfedge h, const glm::dvec3& position) {
+CollapseLoop::Outcome CollapseLoop::attempt(Halfedge h, const Spot& spot) {
+  const glm::dvec3& position = spot.position;
+  if (!std::isfinite(glm::dot(position, glm::dvec3(1)))) return Outcome::refused;  // beyond the range of the stored type
   if (!mesh_.is_collapse_ok(h) || !gather(h, position)) return Outcome::impossible;
   if (!wedges_.empty() && !wedges_fit(h)) return Outcome::impossible;
+  if (!copies_.empty() && !slots_fit(h)) return Outcome::impossible;
   if (folds_over() || !within_bounds(position) || !boundary_within_bounds(h, position)) return Outcome::refused;
-  apply(h, position);
+  apply(h, spot);
   return Outcome::done;
 }
 
@@ -312,6 +325,36 @@ bool CollapseLoop::wedges_fit(Halfedge h) {
   return true;
 }
 
+/// Whether an edge joins the two in the result, be it between copies of them.
+bool CollapseLoop::joined_by_other(std::uint32_t a, std::uint32_t b) const {
+  const auto with_copies = [&](const std::uint32_t& v) {
+    const auto found = copies_.find(slots_[v]);
+    return found == copies_.end() ? std::span(&v, 1) : std::span<const std::uint32_t>(found->second);
+  };
+  for (const std::uint32_t x : with_copies(a)) {
+    for (const std::uint32_t y : with_copies(b)) {
+      if ((x != a || y != b) && mesh_.find_halfedge(OpenMesh::VertexHandle(static_cast<int>(x)),
+                                                    OpenMesh::VertexHandle(static_cast<int>(y))).is_valid()) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+/// The link condition across cuts: the kernel holds copies of a cut vertex for different vertices, the result does not. No new
+/// edge may run beside one that there is between copies, nor a whole face (its three edges then all do).
+bool CollapseLoop::slots_fit(Halfedge h) const {
+  const std::uint32_t v0 = from(h), v1 = to(h);
+  for (std::size_t i = 0; i < elements_.size(); ++i) {
+    const RingFace& face = ring_[i];
+    if (face.vertices[face.corner] != v0) continue;
+    const std::uint32_t a = face.vertices[(face.corner + 1) % 3], b = face.vertices[(face.corner + 2) % 3];
+    if (joined_by_other(v1, a) || joined_by_other(v1, b)) return false;
+  }
+  return true;
+}
+
 bool CollapseLoop::folds_over() const {
   for (std::size_t i = 0; i < elements_.size(); ++i) {
     const auto& c = elements_[i].corners;
@@ -378,7 +421,7 @@ bool CollapseLoop::boundary_within_bounds(Halfedge h, const glm::dvec3& position
   return bounds_.boundary_backward->try_change(boundary_elements_, boundary_removed_);
 }
 
-void CollapseLoop::apply(Halfedge h, const glm::dvec3& position) {
+void CollapseLoop::apply(Halfedge h, const Spot& spot) {
   const std::uint32_t v0 = from(h), v1 = to(h);
   if (bounds_.backward) bounds_.backward->commit();
   if (!boundary_elements_.empty()) bounds_.boundary_backward->commit();
@@ -393,8 +436,9 @@ void CollapseLoop::apply(Halfedge h, const glm::dvec3& position) {
   }
   triangle_count_ -= removed_.size();
   mesh_.collapse(h);
-  moved_[v1] = moved_[v1] || position != positions_[v1];
-  positions_[v1] = position;
+  moved_[v1] = moved_[v1] || spot.position != positions_[v1];
+  positions_[v1] = spot.position;
+  stored_[v1] = spot.stored;
   quadrics_[v1] += quadrics_[v0];
   if (bounds_.forward) distance_[v1] = new_distance_;
   merged_into_[v0] = v1;

@@ -8,6 +8,7 @@
 #include <functional>
 #include <glm/glm.hpp>
 #include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "check/certificate.h"
@@ -25,15 +26,21 @@ struct CollapseBounds {
   Coverage* boundary_backward = nullptr;                  ///< elements are boundary edges, named by their first vertex
 };
 
+/// A position as it is stored, and in the frame: always mapped from what is stored.
+struct Spot {
+  glm::dvec3 stored, position;
+};
+
 struct CollapseInput {
   std::vector<glm::uvec3> triangles;       ///< an oriented manifold with boundary
-  std::vector<glm::dvec3> positions;       ///< in the frame, as stored
+  std::vector<Spot> spots;                 ///< of the vertices
   std::vector<bool> pinned;                ///< per vertex: neither moves nor vanishes
+  std::vector<std::uint32_t> slots;        ///< per vertex: equal for those that are one vertex of the result (all pinned)
   std::vector<glm::uvec3> wedges;          ///< per triangle and corner: equal at a vertex where attributes are equal; may be empty
   bool on_reference = false;               ///< every triangle is one of the reference
   bool subset = false;                     ///< every surviving vertex keeps its position
   /// Rounds a position in the frame to what can be stored.
-  std::function<glm::dvec3(const glm::dvec3&)> store;
+  std::function<Spot(const glm::dvec3&)> store;
 };
 
 class CollapseLoop {
@@ -48,6 +55,7 @@ class CollapseLoop {
   /// The vertex that a vertex was merged into (itself when it survives).
   std::uint32_t survivor(std::uint32_t vertex) const;
   const glm::dvec3& position(std::uint32_t vertex) const { return positions_[vertex]; }
+  const glm::dvec3& stored(std::uint32_t vertex) const { return stored_[vertex]; }
   /// Whether the vertex left its original position.
   bool moved(std::uint32_t vertex) const { return moved_[vertex]; }
   /// Where corner `corner` of a triangle takes its attributes: an input corner as 3 * triangle + corner.
@@ -81,23 +89,28 @@ class CollapseLoop {
   void push(Edge e);
   bool collapse(Edge e);
   Outcome search(Halfedge h, const glm::dvec3& best);
-  Outcome attempt(Halfedge h, const glm::dvec3& position);
+  Outcome attempt(Halfedge h, const Spot& spot);
   bool gather(Halfedge h, const glm::dvec3& position);
   void gather_side(Halfedge h, std::uint32_t vertex, const glm::dvec3& position, double moved);
   bool wedges_fit(Halfedge h);
+  bool slots_fit(Halfedge h) const;
+  bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
   bool folds_over() const;
   bool within_bounds(const glm::dvec3& position);
   bool boundary_within_bounds(Halfedge h, const glm::dvec3& position);
-  void apply(Halfedge h, const glm::dvec3& position);
+  void apply(Halfedge h, const Spot& spot);
+  Spot spot(std::uint32_t vertex) const { return {stored_[vertex], positions_[vertex]}; }
   void renew(std::uint32_t vertex);
 
   OpenMesh::TriConnectivity mesh_;
   CollapseBounds bounds_;
   bool subset_;
-  std::function<glm::dvec3(const glm::dvec3&)> store_;
+  std::function<Spot(const glm::dvec3&)> store_;
   std::vector<glm::uvec3> triangles_;
-  std::vector<glm::dvec3> positions_;
+  std::vector<glm::dvec3> positions_, stored_;
   std::vector<bool> pinned_, seam_, moved_;
+  std::vector<std::uint32_t> slots_;
+  std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> copies_;  ///< by slot, where there are several
   std::vector<double> distance_;       ///< upper bound on each vertex's distance to the reference
   std::vector<double> face_distance_;  ///< the same for every point of a face
   std::vector<Quadric> quadrics_;

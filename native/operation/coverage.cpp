@@ -11,6 +11,7 @@ namespace tolvol {
 namespace {
 
 constexpr double kFloor = 0.1;  // of the tolerance: a shorter piece is not split further
+constexpr std::size_t kBudget = 1 << 14;  // pieces that splitting may add in one change before it is refused
 constexpr int kDeepest = 15;    // levels that 16-bit places hold
 
 FourPoints with_centre(const glm::dvec3 (&c)[3]) {
@@ -87,7 +88,6 @@ void Coverage::own(std::uint32_t element, std::uint32_t triangle) { push(lists_[
 
 bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids, double provable,
                       std::vector<std::uint32_t>& nearest) {
-  constexpr double kFinestFloor = 1e-3;  // of the tolerance: what an earlier decimation left close to its limit is found again
   bool all = true;
   stack_.assign(1, {triangle, 0, 0, 0, false, kNone});
   std::uint32_t hint = Hierarchy::kNone;
@@ -107,9 +107,12 @@ bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::s
       continue;
     }
     const glm::dvec3 centre = (c[0] + c[1] + c[2]) * (1.0 / 3);
-    const double floor = kFinestFloor * within_;
     const Hierarchy::Nearest closest = hierarchy.nearest(centre, std::numeric_limits<double>::infinity(), hint);
-    if (closest.distance > provable || longest_squared(c) <= floor * floor || piece.level == kDeepest) {
+    const double radius = std::sqrt(std::max({glm::dot(c[0] - centre, c[0] - centre), glm::dot(c[1] - centre, c[1] - centre),
+                                              glm::dot(c[2] - centre, c[2] - centre)}));
+    // What an earlier decimation left has a witness for each of its pieces, and those were cut no finer than this.
+    const bool finest = longest_squared(c) <= kFloor * kFloor * within2_ || piece.level == kDeepest;
+    if (closest.distance > provable + radius || finest) {
       nearest.push_back(closest.triangle);
       all = false;
     } else {
@@ -122,6 +125,7 @@ bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::s
 bool Coverage::place(const Piece& whole, std::uint32_t first) {
   stack_.assign(1, whole);
   while (!stack_.empty()) {
+    if (stack_.size() > 1 && ++looked_ > kBudget) return false;
     const Piece piece = stack_.back();
     stack_.pop_back();
     glm::dvec3 c[3];
@@ -160,6 +164,7 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   heirlooms_.clear();
   moved_.clear();
   last_ = 0;
+  looked_ = 0;
   bool settled = true;
   for (const Element& e : elements) {
     const List& list = lists_[e.id];

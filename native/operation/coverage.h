@@ -96,6 +96,7 @@ class Coverage {
   std::vector<Heirloom> heirlooms_;
   std::vector<Moved> moved_;
   std::vector<Piece> stack_;
+  std::size_t looked_ = 0;     ///< pieces looked at in this change
   std::uint32_t last_ = 0;     ///< the candidate that took the last piece
   std::uint32_t suspect_ = 0;  ///< the one whose pieces failed last: tried first, to be refused soon
 };

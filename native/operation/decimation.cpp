@@ -93,6 +93,11 @@ class Decimation {
     std::vector<glm::dvec3> used;
     for (const std::uint32_t i : cut_.vertex_input) used.push_back(vertices_[i]);
     check_storage(used);
+    // Vertices may end up anywhere in the volume.
+    const double reach = 1 + volume_->frame_tolerance();
+    for (int corner = 0; corner < 8; ++corner) {
+      used.push_back(placement_.store(reach * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1)));
+    }
     const double mapping_error = placement_.mapping_error(used);
     const double provable = volume_->provable(mapping_error), within = provable * (1 - kHeadroom);
     identical_ = input_is_reference();
@@ -167,7 +172,8 @@ class Decimation {
     }
     const Hierarchy hierarchy(elements);
     std::vector<std::uint32_t> nearest;
-    std::size_t uncovered = 0, first = 0;
+    std::size_t first = 0;
+    std::size_t& uncovered = result_.uncovered_faces;
     for (std::uint32_t i = 0; i < volume_->reference().triangles.size(); ++i) {
       if (!backward_->assign(i, hierarchy, ids, provable, nearest) && uncovered++ == 0) first = i;
     }
@@ -178,6 +184,10 @@ class Decimation {
            << "what there is (outside=\"keep\")";
       throw InvalidInput(text.str());
     }
+    if (uncovered) {
+      result_.warnings.push_back(std::to_string(uncovered) + " faces of the reference are partly or wholly beyond the tolerance of " +
+                                 "the mesh, as they were before; what is nearest to them was kept");
+    }
     for (const std::uint32_t t : nearest) {
       for (int k = 0; k < 3; ++k) pin(elements.triangles[t][k], "outside the tolerance");
     }
@@ -186,8 +196,9 @@ class Decimation {
   CollapseInput loop_input() {
     CollapseInput input;
     input.triangles = cut_.triangles;
-    input.positions = positions_;
+    for (std::size_t v = 0; v < positions_.size(); ++v) input.spots.push_back({vertices_[cut_.vertex_input[v]], positions_[v]});
     input.pinned = pinned_;
+    input.slots = cut_.output_slot;
     if (!options_.wedges.empty()) {
       // Labels name wedges at one input vertex; vertices welded from several hold those of all of them.
       std::unordered_map<std::uint64_t, std::uint32_t> dense;
@@ -205,7 +216,10 @@ class Decimation {
     }
     input.on_reference = identical_;
     input.subset = options_.vertices == DecimationOptions::Vertices::subset;
-    input.store = [this](const glm::dvec3& p) { return placement_.frame(placement_.store(p)); };
+    input.store = [this](const glm::dvec3& p) {
+      const glm::dvec3 stored = placement_.store(p);
+      return Spot{stored, placement_.frame(stored)};
+    };
     return input;
   }
 
@@ -238,7 +252,7 @@ class Decimation {
       used[v] = i;
       const std::uint32_t source = cut_.vertex_input[v];
       result_.vertex_source.push_back(source);
-      result_.vertices.push_back(loop.moved(v) ? placement_.store(loop.position(v)) : vertices_[source]);
+      result_.vertices.push_back(loop.stored(v));
     }
     for (const auto& [input, t] : kept) {
       glm::uvec3 triangle;

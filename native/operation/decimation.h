@@ -47,6 +47,7 @@ struct DecimationResult {
   std::map<std::string, std::size_t> locked;   ///< vertices that could not move, by cause
   std::size_t outside_faces = 0;               ///< input faces not within the tolerance, kept as they are
   std::optional<std::uint32_t> first_outside;
+  std::size_t uncovered_faces = 0;             ///< reference faces of which a part was not within the tolerance of the input
   std::vector<std::string> warnings;
 };
 

@@ -46,6 +46,7 @@ py::dict make_report(const DecimationResult& r, std::size_t triangles_in, double
   py::dict outside;
   outside["faces"] = r.outside_faces;
   outside["first"] = r.first_outside ? py::object(py::int_(*r.first_outside)) : py::object(py::none());
+  outside["reference_faces"] = r.uncovered_faces;
   report["outside"] = outside;
   report["warnings"] = r.warnings;
   return report;
@@ -139,7 +140,7 @@ void bind_decimation(py::module_& module) {
       .def_readonly("source_weights", &Result::source_weights, "(l, 3, 3) float64: the barycentric weights there.")
       .def_readonly("report", &Result::report,
                     "dict: triangles_in, triangles_out, seconds, stopped_by (\"tolerance\" or \"target\"), repairs (kind, count,\n"
-                    "message), locked (vertices by cause), outside (faces, first), warnings.");
+                    "message), locked (vertices by cause), outside (faces, first, reference_faces), warnings.");
 
   module.def("decimate", &decimate_arrays, py::arg("vertices"), py::arg("triangles"), py::arg("volume").none(true),
              py::arg("to_world") = py::none(), py::arg("placement") = "optimal", py::arg("two_sided") = true,

@@ -8,6 +8,15 @@
 
 namespace tolvol {
 
+double rounded_to_float32(double x) {
+  const volatile float rounded = static_cast<float>(x);
+  return rounded;
+}
+
+glm::dvec3 rounded_to_float32(const glm::dvec3& p) {
+  return {rounded_to_float32(p.x), rounded_to_float32(p.y), rounded_to_float32(p.z)};
+}
+
 Frame::Frame(const Box& world) {
   if (world.empty()) return;
   centre_ = world.lower * 0.5 + world.upper * 0.5;
@@ -74,7 +83,7 @@ std::vector<glm::dvec3> Placement::frame(std::span<const glm::dvec3> stored) con
 
 glm::dvec3 Placement::store(const glm::dvec3& in_frame) const {
   const glm::dvec3 local = glm::dmat3(to_local_) * (frame_.to_world(in_frame) - glm::dvec3(to_world_[3]));
-  return storage_ == Storage::float32 ? glm::dvec3(glm::vec3(local)) : local;
+  return storage_ == Storage::float32 ? rounded_to_float32(local) : local;
 }
 
 double Placement::mapping_error(std::span<const glm::dvec3> stored) const {

@@ -33,6 +33,11 @@ class Frame {
 
 enum class Storage { float32, float64 };
 
+/// The float32 nearest to x. A plain cast there and back is not enough: GCC 12 drops the pair when it vectorises a loop or a
+/// constructor of several.
+double rounded_to_float32(double x);
+glm::dvec3 rounded_to_float32(const glm::dvec3& p);
+
 /// Where one array of vertices lives.
 class Placement {
  public:

@@ -88,18 +88,41 @@ def run_blender(script, tmp_path, **environment):
     return done.stdout
 
 
-def make_zip(path, version=(0, 1, 0), binary=True):
-    """As the build makes it: the add-on's folder under its package name, the module in bin/."""
-    with zipfile.ZipFile(path, "w") as archive:
-        for file in sorted((ROOT / "addon").rglob("*")):
-            if file.is_file() and "__pycache__" not in file.parts:
-                text = file.read_text()
-                if file.name == "__init__.py" and file.parent.name == "addon":
-                    text = text.replace('"version": (0, 1, 0)', f'"version": {version}')
-                archive.writestr(f"tolerance_volumes/{file.relative_to(ROOT / 'addon')}", text)
-        if binary:
-            archive.write(native.path, f"tolerance_volumes/bin/{native.path.name}")
+def package():
+    """The zip that the build makes."""
+    path = ROOT / f"build/release/tolerance_volumes-{native.module.__version__}.zip"
+    assert path.is_file(), "cmake --build build/release --target addon_zip makes it"
     return path
+
+
+def repack(path, text=lambda name, content: content, keep=lambda name: True):
+    """A copy of the package, changed."""
+    with zipfile.ZipFile(package()) as original, zipfile.ZipFile(path, "w") as archive:
+        for entry in original.infolist():
+            if keep(entry.filename) and not entry.is_dir():
+                archive.writestr(entry.filename, text(entry.filename, original.read(entry)))
+    return path
+
+
+def newer(name, content):
+    if name != "tolerance_volumes/__init__.py":
+        return content
+    assert b'"version": (0, 1, 0)' in content
+    return content.replace(b'"version": (0, 1, 0)', b'"version": (0, 2, 0)')
+
+
+def test_package_holds_what_is_here():
+    files = {file.relative_to(ROOT / "addon") for kind in ("*.py", "*.toml") for file in (ROOT / "addon").rglob(kind)}
+    with zipfile.ZipFile(package()) as archive:
+        for file in files:
+            assert archive.read(f"tolerance_volumes/{file}") == (ROOT / "addon" / file).read_bytes(), (
+                f"pack {file} anew"
+            )
+        others = {name for name in archive.namelist() if not name.endswith("/")} - {
+            f"tolerance_volumes/{file}" for file in files
+        }
+    libraries = {name for name in others if re.fullmatch(r"tolerance_volumes/bin/(tolvol\.|lib).*", name)}
+    assert any("/tolvol." in name for name in libraries) and others - libraries == {"tolerance_volumes/LICENSE"}
 
 
 DECIMATE = """
@@ -110,7 +133,7 @@ assert len(bpy.context.object.data.polygons) < 1000
 
 
 def test_zip_installs_and_installs_over_itself(tmp_path):
-    first, second = make_zip(tmp_path / "first.zip"), make_zip(tmp_path / "second.zip", version=(0, 2, 0))
+    first, second = package(), repack(tmp_path / "second.zip", text=newer)
     out = run_blender(
         f"""
 import bpy, addon_utils
@@ -124,6 +147,9 @@ assert installed.bl_info['version'] == (0, 1, 0)
 assert os.path.join('user', 'addons') in installed.__file__
 assert bpy.context.preferences.addons['tolerance_volumes'].preferences.threads == 0
 {DECIMATE}
+with open('/proc/self/maps') as mapped:
+    libraries = [line for line in mapped if 'OpenMesh' in line]
+assert all('/tolvol_' in line for line in libraries), libraries  # that of the package, not the system's
 old = sys.modules['tolerance_volumes.volume']
 installed = install({str(second)!r})
 assert installed.bl_info['version'] == (0, 2, 0)
@@ -146,7 +172,7 @@ ok()""",
     ],
 )
 def test_without_the_module_the_addon_stays_and_says_why(tmp_path, others, reason):
-    archive = make_zip(tmp_path / "addon.zip", binary=False)
+    archive = repack(tmp_path / "addon.zip", keep=lambda name: "/bin/" not in name)
     with zipfile.ZipFile(archive, "a") as extended:
         for name in others:
             extended.writestr(f"tolerance_volumes/bin/{name}", b"")

@@ -46,7 +46,7 @@ DecimationResult run(const Case& c, const Options& options = {}) {
 void expect_within(const Case& c, const DecimationResult& r, bool two_sided = true) {
   for (const dvec3& p : r.vertices) {
     if (c.storage == Storage::float32) {
-      ASSERT_EQ(p, dvec3(glm::vec3(p))) << "judged as stored";
+      ASSERT_EQ(p, rounded_to_float32(p)) << "judged as stored";
     }
   }
   const TriangleMesh result = c.world(r.vertices, r.triangles), reference = c.world(c.mesh.vertices, c.mesh.triangles);
@@ -97,7 +97,7 @@ std::vector<Case> cases() {
   TriangleMesh duplicates = shapes::box(8);
   duplicates.triangles.insert(duplicates.triangles.end(), duplicates.triangles.begin(), duplicates.triangles.begin() + 100);
   TriangleMesh slivers = shapes::grid(30);  // a plate squeezed to slivers, bent
-  for (dvec3& p : slivers.vertices) p = dvec3(glm::vec3(p.x, p.y * 1e-3, 0.05 * std::sin(9 * p.x)));
+  for (dvec3& p : slivers.vertices) p = rounded_to_float32(dvec3(p.x, p.y * 1e-3, 0.05 * std::sin(9 * p.x)));
   return {{shapes::torus(40, 0.002)},
           {shapes::torus(40, 0.02), glm::dmat4(1), Storage::float64},
           {shapes::box(10)},
@@ -178,7 +178,7 @@ TEST(Decimation, OneSidedKeepsTheBoundary) {
 TEST(Decimation, TwoSidedDecides) {
   // A bump as high as 1.9 epsilon may go one-sided (the result stays within epsilon); two-sided it may not.
   Case c{shapes::stored(shapes::grid(20)), glm::dmat4(1), Storage::float32, 1};
-  c.mesh.vertices[10 * 21 + 10].z = dvec3(glm::vec3(0, 0, 1.5 * c.tolerance())).z;
+  c.mesh.vertices[10 * 21 + 10].z = rounded_to_float32(1.5 * c.tolerance());
   Options one_sided;
   one_sided.two_sided = false;
   const DecimationResult without = run(c, one_sided), with = run(c);
@@ -377,6 +377,70 @@ TEST(Decimation, StopsWhenCancelled) {
   Options options;
   options.progress = &progress;
   EXPECT_THROW(decimate(c.mesh.vertices, c.mesh.triangles, c.placement(), volume.get(), options), Cancelled);
+}
+
+TEST(Decimation, CutCopiesNeverMeetInOneFaceTwice) {
+  // Two holes that touch at vertex 3: the two fans there are cut apart, and are one vertex again in the result.
+  const TriangleMesh mesh{{{0, 0, 0}, {1, 0, 0.3}, {0.5, 1, 0}, {0.4, 0.4, 0.5}, {1, 0.3, 1}, {0.8, 0.9, 1}, {0.2, 0.8, 1}, {0.6, 0.5, 1.4}},
+                          {{0, 1, 2}, {7, 5, 4}, {7, 6, 5}, {0, 3, 1}, {7, 4, 6}, {1, 4, 5}, {1, 5, 2}, {2, 5, 6}, {2, 6, 3}, {3, 4, 1}}};
+  for (const bool two_sided : {false, true}) {
+    Options options;
+    options.two_sided = two_sided;
+    const Case c{shapes::stored(mesh), glm::dmat4(1), Storage::float32, 60};
+    std::set<std::set<unsigned>> faces;
+    for (const glm::uvec3& t : run(c, options).triangles) EXPECT_TRUE(faces.insert({t.x, t.y, t.z}).second);
+  }
+}
+
+TEST(Decimation, OneSidedHoldsABoundaryThatTheReferenceDoesNotHave) {
+  const TriangleMesh closed = shapes::box(8);
+  TriangleMesh open{closed.vertices, {closed.triangles.begin(), closed.triangles.begin() + 128}};  // one side
+  const Case c{closed};
+  const auto volume = c.volume();
+  Options options;
+  options.two_sided = false;
+  const DecimationResult r = decimate(open.vertices, open.triangles, c.placement(), volume.get(), options);
+  const double tolerance = c.tolerance();
+  EXPECT_LE(hausdorff(open, {r.vertices, r.triangles}, {tolerance, 1, nullptr}).upper, tolerance);
+  EXPECT_FALSE(r.locked.empty());
+}
+
+TEST(Decimation, KeepGivesUpOnlyWhatWasNeverCovered) {
+  // The mesh is the left quarter of the reference; what it covered it still covers.
+  const TriangleMesh reference = shapes::grid(1);
+  TriangleMesh quarter = shapes::grid(12);
+  for (dvec3& p : quarter.vertices) p.x *= 0.25;
+  const Placement placement(glm::dmat4(1), Storage::float64);
+  const double tolerance = 0.02;
+  const ToleranceVolume volume(reference.vertices, reference.triangles, placement, tolerance);
+  Options options;
+  EXPECT_THROW(decimate(quarter.vertices, quarter.triangles, placement, &volume, options), InvalidInput);
+  options.outside = Options::Outside::keep;
+  const DecimationResult r = decimate(quarter.vertices, quarter.triangles, placement, &volume, options);
+  EXPECT_LT(r.triangles.size(), quarter.triangles.size() / 2);
+  EXPECT_LE(hausdorff(quarter, {r.vertices, r.triangles}, {2 * tolerance, 1, nullptr}).upper, 2 * tolerance);
+  EXPECT_EQ(r.uncovered_faces, 2u);
+  EXPECT_FALSE(r.warnings.empty());
+}
+
+TEST(Decimation, RoundingToFloatIsInsideTheBound) {
+  // Float32 rounds by several per cent of the tolerance here: what is judged is what is stored.
+  Case c{shapes::grid(40), glm::dmat4(1), Storage::float32, 0.08};
+  for (dvec3& p : c.mesh.vertices) p = dvec3(1000 + p.x, p.y - 1000, 0.05 * std::sin(9 * p.x) * std::cos(7 * p.y));
+  c.mesh = shapes::stored(c.mesh);
+  const DecimationResult r = run(c);
+  EXPECT_FALSE(r.warnings.empty());
+  expect_within(c, r);
+}
+
+TEST(Decimation, FlatPlatesEndAtAnyTolerance) {
+  // Every collapse costs nothing here, and the tolerance is far below the triangles' size.
+  for (const double percent : {1.0, 0.05, 0.01}) {
+    const Case c{shapes::stored(shapes::grid(20)), glm::dmat4(1), Storage::float32, percent};
+    const DecimationResult r = run(c);
+    expect_within(c, r);
+    EXPECT_LT(r.triangles.size(), c.mesh.triangles.size() / 5) << percent;
+  }
 }
 
 TEST(Decimation, UnboundedReachesItsTarget) {

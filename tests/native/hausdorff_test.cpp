@@ -377,6 +377,9 @@ TEST(Hausdorff, RefusesWhatIsNoMesh) {
   EXPECT_THROW(hausdorff(good, bad), InvalidInput);
   EXPECT_THROW(hausdorff(good, {}), InvalidInput);
   bad = good;
+  for (dvec3& p : bad.vertices) p *= 1e-310;  // no power of two brings it to 1
+  EXPECT_THROW(hausdorff(bad, bad), InvalidInput);
+  bad = good;
   bad.triangles[2].z = 8;
   EXPECT_THROW(hausdorff(good, bad), InvalidInput);
 }

@@ -82,6 +82,20 @@ TEST(Hierarchy, AgreesWithBruteForceBitForBit) {
   }
 }
 
+// All triangles around a vertex are at distance 0 from it, and boxes rounded the wrong way would lose some.
+TEST(Hierarchy, AgreesAtSharedVertices) {
+  Random random(19);
+  TriangleMesh mesh;
+  for (int i = 0; i < 400; ++i) mesh.vertices.push_back(random.point());
+  for (int i = 0; i < 1500; ++i) mesh.triangles.push_back({random.below(400), random.below(400), random.below(400)});
+  const Hierarchy hierarchy(mesh);
+  for (const dvec3& p : mesh.vertices) {
+    const Hierarchy::Nearest expected = brute(mesh, p, kInfinity, all);
+    ASSERT_EQ(hierarchy.nearest(p).triangle, expected.triangle);
+    ASSERT_EQ(hierarchy.nearest(p, 0).triangle, expected.distance == 0 ? expected.triangle : Hierarchy::kNone);
+  }
+}
+
 TEST(Hierarchy, RadiusIsInclusive) {
   const TriangleMesh mesh = soup(3, 800);
   const Hierarchy hierarchy(mesh);

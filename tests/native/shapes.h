@@ -8,6 +8,7 @@
 #include <random>
 #include <vector>
 
+#include "reference/frame.h"
 #include "reference/triangle_mesh.h"
 
 namespace tolvol::shapes {
@@ -16,7 +17,7 @@ using glm::dvec3;
 
 /// Rounded to float32, as Blender would store it.
 inline TriangleMesh stored(TriangleMesh mesh) {
-  for (dvec3& p : mesh.vertices) p = dvec3(glm::vec3(p));
+  for (dvec3& p : mesh.vertices) p = rounded_to_float32(p);
   return mesh;
 }
 

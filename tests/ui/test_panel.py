@@ -162,6 +162,7 @@ def test_what_is_in_the_way_is_said():
     assert stored() == before
     xdotool("mousemove", *centre())
     suzanne().scale.x = 1
+    suzanne().modifiers.new("on top", "WAVE")
     twin = suzanne().copy()
     bpy.context.collection.objects.link(twin)
     yield 0.5
