@@ -30,7 +30,8 @@ py::tuple decimate_openmesh(const py::object& vertices, const py::object& triang
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   std::vector<glm::dvec3> points;
-  for (const auto handle : mesh.vertices()) points.emplace_back(mesh.point(handle)[0], mesh.point(handle)[1], mesh.point(handle)[2]);
+  for (const auto handle : mesh.vertices())
+    points.emplace_back(mesh.point(handle)[0], mesh.point(handle)[1], mesh.point(handle)[2]);
   std::vector<glm::uvec3> faces;
   for (const auto face : mesh.faces()) {
     glm::uvec3 t;
@@ -38,14 +39,15 @@ py::tuple decimate_openmesh(const py::object& vertices, const py::object& triang
     for (const auto handle : mesh.fv_range(face)) t[k++] = static_cast<unsigned>(handle.idx());
     faces.push_back(t);
   }
-  return py::make_tuple(tolvol::python::from_vertices(points, tolvol::Storage::float32), tolvol::python::from_triangles(faces),
-                        seconds);
+  return py::make_tuple(tolvol::python::from_vertices(points, tolvol::Storage::float32),
+                        tolvol::python::from_triangles(faces), seconds);
 }
 
 }  // namespace
 
 PYBIND11_MODULE(tolvol_baselines, module) {
   module.doc() = "Rival methods in the same process, for benchmarks only.";
-  module.def("decimate_openmesh", &decimate_openmesh, py::arg("vertices"), py::arg("triangles"), py::arg("target_triangles"),
+  module.def("decimate_openmesh", &decimate_openmesh, py::arg("vertices"), py::arg("triangles"),
+             py::arg("target_triangles"),
              "(vertices float32, triangles, seconds) by OpenMesh's DecimaterT with ModQuadricT.");
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Cheapest reason first: short edges between corners known to be near; the triangle of the grid node nearest to the piece's
-// centre; those of the nodes around; the exact closest triangle by the hierarchy, which also proves "outside"; then the piece
-// is split. Parts are looked at breadth first, because the centres of the large ones show soonest that a piece is outside.
+// Cheapest reason first: short edges between corners known to be near; the triangle of the grid node nearest to the
+// piece's centre; those of the nodes around; the exact closest triangle by the hierarchy, which also proves "outside";
+// then the piece is split. Parts are looked at breadth first, because the centres of the large ones show soonest that a
+// piece is outside.
 #include "check/certificate.h"
 
 #include <algorithm>
@@ -14,11 +15,11 @@
 namespace tolvol {
 namespace {
 
-constexpr double kFloor = 0.02;       // of the tolerance: a piece this short is not split further
-constexpr std::size_t kBudget = 1 << 20;  // parts looked at before a piece is left unproved,
+constexpr double kFloor = 0.02;                // of the tolerance: a piece this short is not split further
+constexpr std::size_t kBudget = 1 << 20;       // parts looked at before a piece is left unproved,
 constexpr std::size_t kQuickBudget = 1 << 13;  // and where the answer is only one of many tries
-constexpr double kSmall = 2.0;        // of the tolerance: shorter pieces are worth trying against all eight nodes
-constexpr double kExact = 0.7;        // of the tolerance: shorter pieces are worth an exact search
+constexpr double kSmall = 2.0;  // of the tolerance: shorter pieces are worth trying against all eight nodes
+constexpr double kExact = 0.7;  // of the tolerance: shorter pieces are worth an exact search
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
@@ -30,7 +31,11 @@ struct TriangleCertificate::Piece {
 
 TriangleCertificate::TriangleCertificate(const std::vector<WitnessTriangle>& reference, const DistanceGrid& grid,
                                          const Hierarchy& hierarchy, double within, double beyond)
-    : reference_(&reference), grid_(&grid), hierarchy_(&hierarchy), within_(within), within2_(within * within),
+    : reference_(&reference),
+      grid_(&grid),
+      hierarchy_(&hierarchy),
+      within_(within),
+      within2_(within * within),
       beyond_(beyond) {}
 
 double TriangleCertificate::distance_bound(const glm::dvec3& p) const {
@@ -95,7 +100,8 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       bool covered = false;
       for (int i = 0; i < 8 && !covered; ++i) {
         const glm::ivec3 node = glm::ivec3(cell) + glm::ivec3(i & 1, (i >> 1) & 1, i >> 2);
-        if (glm::any(glm::lessThan(node, glm::ivec3(0))) || glm::any(glm::greaterThanEqual(node, grid_->nodes))) continue;
+        if (glm::any(glm::lessThan(node, glm::ivec3(0))) || glm::any(glm::greaterThanEqual(node, grid_->nodes)))
+          continue;
         covered = covered_by(grid_->triangle[grid_->index(node.x, node.y, node.z)]);
       }
       if (covered) continue;
@@ -182,9 +188,15 @@ std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& opt
         return certificate.verdict({pieces.points[ia], pieces.points[ib], pieces.points[ic]}, bounds);
       };
       switch (pieces.corners) {
-        case 1: verdicts[i] = triangle(0, 0, 0); break;
-        case 2: verdicts[i] = triangle(0, 1, 1); break;
-        case 3: verdicts[i] = triangle(0, 1, 2); break;
+        case 1:
+          verdicts[i] = triangle(0, 0, 0);
+          break;
+        case 2:
+          verdicts[i] = triangle(0, 1, 1);
+          break;
+        case 3:
+          verdicts[i] = triangle(0, 1, 2);
+          break;
         default:
           verdicts[i] = std::min({triangle(0, 1, 2), triangle(0, 2, 3), triangle(0, 1, 3), triangle(1, 2, 3)});
       }

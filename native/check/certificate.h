@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// The witness certificate, the default check.
 ///
-/// Let T be one reference triangle and let each corner p_i of a piece have a witness q_i in T with |p_i - q_i| <= epsilon. Then
-/// every convex combination of the corners is within epsilon of the same combination of the witnesses, which is in T: the
-/// whole piece is inside. This needs a guess for T (the grid's closest-triangle ids), no interpolation, and holds at any
-/// precision. Pieces that no single triangle covers are split.
+/// Let T be one reference triangle and let each corner p_i of a piece have a witness q_i in T with |p_i - q_i| <=
+/// epsilon. Then every convex combination of the corners is within epsilon of the same combination of the witnesses,
+/// which is in T: the whole piece is inside. This needs a guess for T (the grid's closest-triangle ids), no
+/// interpolation, and holds at any precision. Pieces that no single triangle covers are split.
 #pragma once
 
 #include "check/tolerance_check.h"
@@ -17,7 +17,8 @@ class Certificate final : public ToleranceCheck {
   /// Keeps a reference to `volume`, which must outlive this.
   explicit Certificate(const ToleranceVolume& volume) : volume_(&volume) {}
 
-  /// O(pieces) for small pieces: about 50 ns each near the reference; a large piece costs its area over the tolerance squared.
+  /// O(pieces) for small pieces: about 50 ns each near the reference; a large piece costs its area over the tolerance
+  /// squared.
   std::vector<Verdict> check(const Pieces& pieces, const Options& options) const override;
   std::string method() const override { return "certificate"; }
   std::string renderer() const override { return "CPU"; }
@@ -31,14 +32,14 @@ class TriangleCertificate {
  public:
   /// `within`: the provable distance, see ToleranceVolume::provable(); `beyond`: the refutable one. In the frame.
   /// Keeps references to the rest. A grid without nodes leaves everything to the hierarchy.
-  TriangleCertificate(const std::vector<WitnessTriangle>& reference, const DistanceGrid& grid, const Hierarchy& hierarchy,
-                      double within, double beyond);
+  TriangleCertificate(const std::vector<WitnessTriangle>& reference, const DistanceGrid& grid,
+                      const Hierarchy& hierarchy, double within, double beyond);
 
   static constexpr double kUnproved = std::numeric_limits<double>::infinity();
 
-  /// An upper bound, at most within(), on the distance of any point of the triangle to the reference; kUnproved where no
-  /// proof was found. `bounds`: upper bounds on the corners' distances (from witnesses, never field values); infinity where
-  /// none is known.
+  /// An upper bound, at most within(), on the distance of any point of the triangle to the reference; kUnproved where
+  /// no proof was found. `bounds`: upper bounds on the corners' distances (from witnesses, never field values);
+  /// infinity where none is known.
   double bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
 
   /// Whether bound() finds one, and if not, whether a point outside proves that there is none.

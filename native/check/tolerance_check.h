@@ -44,7 +44,8 @@ class ToleranceCheck {
   virtual std::string renderer() const = 0;
 };
 
-/// Gives every piece the least verdict of the pieces with the same label. Throws InvalidInput unless there is a label for each.
+/// Gives every piece the least verdict of the pieces with the same label. Throws InvalidInput unless there is a label
+/// for each.
 void combine_groups(std::span<Verdict> verdicts, std::span<const std::int32_t> groups);
 
 }  // namespace tolvol

@@ -62,7 +62,8 @@ std::size_t ToleranceVolume::memory() const {
 
 double ToleranceVolume::provable(double mapping_error) const {
   const double epsilon = frame_tolerance();
-  const double left = epsilon - mapping_error_ - mapping_error - witness_error(1 + 2 * epsilon);  // result faces, too, serve as witnesses
+  const double left = epsilon - mapping_error_ - mapping_error -
+                      witness_error(1 + 2 * epsilon);  // result faces, too, serve as witnesses
   if (!(left > 0.5 * epsilon)) {
     std::ostringstream text;
     text << "the tolerance " << tolerance_ << " is too small for double precision at these coordinates; "

@@ -24,33 +24,33 @@ class ToleranceVolume {
     Progress* progress = nullptr;
   };
 
-  /// `tolerance` in world units. Throws InvalidInput for a bad mesh or for a tolerance that is not finite and positive, that
-  /// is larger than the reference, or that double precision cannot hold at this distance from the origin; ResourceLimit for
-  /// a precision whose grid does not fit. O(m log m + nodes in the band).
-  ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const Placement& placement,
-                  double tolerance, const Options& options);
-  ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const Placement& placement,
-                  double tolerance)
+  /// `tolerance` in world units. Throws InvalidInput for a bad mesh or for a tolerance that is not finite and positive,
+  /// that is larger than the reference, or that double precision cannot hold at this distance from the origin;
+  /// ResourceLimit for a precision whose grid does not fit. O(m log m + nodes in the band).
+  ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
+                  const Placement& placement, double tolerance, const Options& options);
+  ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
+                  const Placement& placement, double tolerance)
       : ToleranceVolume(vertices, triangles, placement, tolerance, Options()) {}
 
   ToleranceVolume(const ToleranceVolume&) = delete;
   ToleranceVolume& operator=(const ToleranceVolume&) = delete;
 
   const Frame& frame() const { return frame_; }
-  const TriangleMesh& reference() const { return reference_; }  ///< in the frame, every input vertex
+  const TriangleMesh& reference() const { return reference_; }                  ///< in the frame, every input vertex
   const std::vector<WitnessTriangle>& witnesses() const { return witnesses_; }  ///< of the reference, prepared
   const Hierarchy& hierarchy() const { return *hierarchy_; }
   const DistanceGrid& grid() const { return grid_; }
 
-  double tolerance() const { return tolerance_; }                   ///< world units
+  double tolerance() const { return tolerance_; }  ///< world units
   double frame_tolerance() const { return tolerance_ * frame_.scale(); }
-  double size() const { return size_; }                             ///< world units; what 100 % means
+  double size() const { return size_; }  ///< world units; what 100 % means
   double precision() const { return frame_tolerance() / grid_.spacing; }
-  std::size_t memory() const;                                       ///< bytes held
+  std::size_t memory() const;  ///< bytes held
 
-  /// The distance, in the frame, up to which a witness found in floating point proves a piece inside: the tolerance less
-  /// all that rounding may hide, of the witness arithmetic and of mapping both sides into the frame.
-  /// Throws InvalidInput when less than half of the tolerance is left.
+  /// The distance, in the frame, up to which a witness found in floating point proves a piece inside: the tolerance
+  /// less all that rounding may hide, of the witness arithmetic and of mapping both sides into the frame. Throws
+  /// InvalidInput when less than half of the tolerance is left.
   double provable(double mapping_error) const;
   /// The distance beyond which a computed one proves a point outside.
   double refutable(double mapping_error) const { return 2 * frame_tolerance() - provable(mapping_error); }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Branch-free closest point after C. Ericson, Real-Time Collision Detection, 2005, §5.1, in four lanes of double: the nearest
-// points of the three edges and, where it falls inside, the foot of the perpendicular as a barycentric combination. Each is
-// built as a point and measured as a distance between points; a plane distance is never used.
+// Branch-free closest point after C. Ericson, Real-Time Collision Detection, 2005, §5.1, in four lanes of double: the
+// nearest points of the three edges and, where it falls inside, the foot of the perpendicular as a barycentric
+// combination. Each is built as a point and measured as a distance between points; a plane distance is never used.
 #include "check/witness.h"
 
 #include <cstdint>
@@ -55,7 +55,9 @@ TOLVOL_INLINE void distances(const WitnessTriangle& t, const FourPoints& p, doub
 }
 
 void distances_baseline(const WitnessTriangle& t, const FourPoints& p, double out[4]) { distances(t, p, out); }
-TOLVOL_TARGET_AVX2 void distances_avx2(const WitnessTriangle& t, const FourPoints& p, double out[4]) { distances(t, p, out); }
+TOLVOL_TARGET_AVX2 void distances_avx2(const WitnessTriangle& t, const FourPoints& p, double out[4]) {
+  distances(t, p, out);
+}
 
 }  // namespace
 
@@ -74,7 +76,8 @@ WitnessTriangle::WitnessTriangle(const glm::dvec3& a, const glm::dvec3& b, const
 std::vector<WitnessTriangle> prepare_witnesses(const TriangleMesh& mesh) {
   std::vector<WitnessTriangle> witnesses;
   witnesses.reserve(mesh.triangles.size());
-  for (const glm::uvec3& t : mesh.triangles) witnesses.emplace_back(mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]);
+  for (const glm::uvec3& t : mesh.triangles)
+    witnesses.emplace_back(mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]);
   return witnesses;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The one piece of arithmetic that the certificate rests on: upper bounds on the distances of four points to one triangle,
-/// each from an explicit witness in that triangle.
+/// The one piece of arithmetic that the certificate rests on: upper bounds on the distances of four points to one
+/// triangle, each from an explicit witness in that triangle.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -31,20 +31,21 @@ struct WitnessTriangle {
 /// All triangles of a mesh, prepared. O(m).
 std::vector<WitnessTriangle> prepare_witnesses(const TriangleMesh& mesh);
 
-/// Squared distances from the points to witnesses in the triangle: out[i] = |p_i - q_i|^2 in floating point. Any clamped
-/// parameters give a valid upper bound, so a poor parameter (a needle's) costs completeness and never soundness.
-/// Both instruction paths give the same bits. About 20 ns.
+/// Squared distances from the points to witnesses in the triangle: out[i] = |p_i - q_i|^2 in floating point. Any
+/// clamped parameters give a valid upper bound, so a poor parameter (a needle's) costs completeness and never
+/// soundness. Both instruction paths give the same bits. About 20 ns.
 void witness_distances(const WitnessTriangle& triangle, const FourPoints& points, double out[4]);
 
-/// What rounding may hide. If the floating-point result is d^2, the exact distance of p to the exact triangle with the given
-/// corners is at most d + witness_error(R + d), R the largest coordinate magnitude of a corner.
+/// What rounding may hide. If the floating-point result is d^2, the exact distance of p to the exact triangle with the
+/// given corners is at most d + witness_error(R + d), R the largest coordinate magnitude of a corner.
 ///
-/// Derivation, u = 2^-53, per coordinate, M = R + |p|: p - a is off by u M; ab and ac by u 2R each, their products with s and t
-/// round once more, and s + t <= 1 in floating point means at most 1 + u in real arithmetic: with s, t >= 0 together u 6R;
-/// the two subtractions round results of at most M + 2R each. For the edge bc, whose witness is b + w bc, one subtraction
-/// more. Altogether below u (4 M + 14 R). An accepted |p| is at most sqrt(3) R + d, so M <= 2.74 R + d and the sum is below
-/// 25 u (R + d); three coordinates: times sqrt(3). The sum of three squares has a relative error of at most 4u and the squared
-/// threshold of 2u, which moves d by 3u d. 25 sqrt(3) + 3 < 47; 128 leaves room and is a power of two.
+/// Derivation, u = 2^-53, per coordinate, M = R + |p|: p - a is off by u M; ab and ac by u 2R each, their products with
+/// s and t round once more, and s + t <= 1 in floating point means at most 1 + u in real arithmetic: with s, t >= 0
+/// together u 6R; the two subtractions round results of at most M + 2R each. For the edge bc, whose witness is b + w
+/// bc, one subtraction more. Altogether below u (4 M + 14 R). An accepted |p| is at most sqrt(3) R + d, so M <= 2.74 R
+/// + d and the sum is below 25 u (R + d); three coordinates: times sqrt(3). The sum of three squares has a relative
+/// error of at most 4u and the squared threshold of 2u, which moves d by 3u d. 25 sqrt(3) + 3 < 47; 128 leaves room and
+/// is a power of two.
 inline double witness_error(double magnitude) { return 128 * kUnitRoundoff * magnitude; }
 
 }  // namespace tolvol

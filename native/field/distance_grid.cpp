@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One spacing h = tolerance / precision for all axes. The paper prints h = D / R as well, but its own grids (Table 1) are
-// those of h = epsilon / rho.
+// One spacing h = tolerance / precision for all axes. The paper prints h = D / R as well, but its own grids (Table 1)
+// are those of h = epsilon / rho.
 #include "field/distance_grid.h"
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace tolvol {
 namespace {
 
 constexpr double kFinestPrecision = 1;  // finer costs field time and saves the certificate none
-constexpr int kLanes = 8;  // rows are padded so that a kernel may touch whole vectors
+constexpr int kLanes = 8;               // rows are padded so that a kernel may touch whole vectors
 
 // Node counts as doubles: a precision far too fine must not overflow an integer before it is refused.
 struct Layout {

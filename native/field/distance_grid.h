@@ -17,11 +17,11 @@ inline constexpr std::size_t kGridBudget = std::size_t{256} << 20;
 struct DistanceGrid {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
-  glm::dvec3 origin{0};      ///< position of node (0, 0, 0)
-  double spacing = 0;        ///< h, the same along each axis
-  glm::ivec3 nodes{0};       ///< number of nodes along x, y, z
-  int pitch = 0;             ///< nodes from one row to the next, >= nodes.x
-  double band = 0;           ///< nodes farther than this from the reference hold the band and kNone
+  glm::dvec3 origin{0};  ///< position of node (0, 0, 0)
+  double spacing = 0;    ///< h, the same along each axis
+  glm::ivec3 nodes{0};   ///< number of nodes along x, y, z
+  int pitch = 0;         ///< nodes from one row to the next, >= nodes.x
+  double band = 0;       ///< nodes farther than this from the reference hold the band and kNone
   std::vector<float> distance;
   std::vector<std::uint32_t> triangle;
 
@@ -37,9 +37,9 @@ struct DistanceGrid {
   }
 };
 
-/// The grid of a reference: its box enlarged by the band, spacing tolerance / precision. `precision` empty: the finest of
-/// 1, 1/2, 1/4, ... that fits kGridBudget. Allocates nothing. Throws ResourceLimit, naming the precision that fits, when
-/// a precision is asked for that does not.
+/// The grid of a reference: its box enlarged by the band, spacing tolerance / precision. `precision` empty: the finest
+/// of 1, 1/2, 1/4, ... that fits kGridBudget. Allocates nothing. Throws ResourceLimit, naming the precision that fits,
+/// when a precision is asked for that does not.
 DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double> precision);
 
 }  // namespace tolvol

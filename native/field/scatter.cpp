@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Based on the initial band of [Botsch04, §2]: each triangle writes exact distances to the nodes of its enlarged box, the
-// smallest stays. Here the box is enlarged by the whole band, so that no marching is needed and every value is exact, and
-// nodes are taken eight along x at once. Rows that the triangle's box or its plane keep out of the band are skipped.
+// Based on the initial band of [Botsch04, §2]: each triangle writes exact distances to the nodes of its enlarged box,
+// the smallest stays. Here the box is enlarged by the whole band, so that no marching is needed and every value is
+// exact, and nodes are taken eight along x at once. Rows that the triangle's box or its plane keep out of the band are
+// skipped.
 #include "field/scatter.h"
 
 #include <algorithm>
@@ -48,7 +49,8 @@ Prepared prepare(const TriangleMesh& mesh, std::uint32_t id, double band) {
     r.gs = glm::cross(ac, n) / nn, r.gt = glm::cross(n, ab) / nn, r.normal = n / std::sqrt(nn);
     r.slab = static_cast<float>(band * 1.001);
   } else {
-    r.gs = r.gt = glm::vec3(std::numeric_limits<float>::quiet_NaN()), r.normal = glm::vec3(0);  // never compares as inside
+    r.gs = r.gt = glm::vec3(std::numeric_limits<float>::quiet_NaN()),
+    r.normal = glm::vec3(0);  // never compares as inside
     r.slab = std::numeric_limits<float>::infinity();
   }
   return r;
@@ -71,7 +73,8 @@ TOLVOL_INLINE Floats edge_distance(Floats x, float y, float z, const glm::vec3& 
 TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid, int z0, int z1) {
   const double h = grid.spacing;
   const float band = static_cast<float>(grid.band), band2 = band * band, hf = static_cast<float>(h);
-  const glm::dvec3 low = (t.box.lower - grid.band - grid.origin) / h, high = (t.box.upper + grid.band - grid.origin) / h;
+  const glm::dvec3 low = (t.box.lower - grid.band - grid.origin) / h,
+                   high = (t.box.upper + grid.band - grid.origin) / h;
   const int zbegin = std::max(z0, static_cast<int>(std::ceil(low.z)));
   const int zend = std::min(z1 - 1, static_cast<int>(std::floor(high.z)));
   const int ybegin = std::max(0, static_cast<int>(std::ceil(low.y)));
@@ -128,9 +131,11 @@ TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid
 }
 
 TOLVOL_INLINE void splat_all(const TriangleMesh& mesh, DistanceGrid& grid, int z0, int z1, Progress* progress) {
-  const double zlow = grid.origin.z + z0 * grid.spacing - grid.band, zhigh = grid.origin.z + (z1 - 1) * grid.spacing + grid.band;
+  const double zlow = grid.origin.z + z0 * grid.spacing - grid.band,
+               zhigh = grid.origin.z + (z1 - 1) * grid.spacing + grid.band;
   for (std::uint32_t id = 0; id < mesh.triangles.size(); ++id) {
-    if (progress && id % 4096 == 0) progress->update(static_cast<double>(id) / static_cast<double>(mesh.triangles.size()));
+    if (progress && id % 4096 == 0)
+      progress->update(static_cast<double>(id) / static_cast<double>(mesh.triangles.size()));
     const glm::uvec3 t = mesh.triangles[id];
     const double a = mesh.vertices[t.x].z, b = mesh.vertices[t.y].z, c = mesh.vertices[t.z].z;
     if (std::max({a, b, c}) < zlow || std::min({a, b, c}) > zhigh) continue;

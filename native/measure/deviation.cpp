@@ -80,9 +80,9 @@ void cover(const Corners& p, Measure measure, int k, Visit&& visit) {
 Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, std::span<const double> bounds,
                     const DeviationOptions& options) {
   for (std::size_t i = 0; i < bounds.size(); ++i) {
-    if (!std::isnan(bounds[i])) continue;
+    if (bounds[i] >= 0) continue;
     std::ostringstream text;
-    text << "bound " << i << " is not a number";
+    text << "bound " << i << " is not a length of 0 or more";
     throw InvalidInput(text.str());
   }
   if (options.progress) options.progress->begin("averaging");

@@ -28,7 +28,8 @@ struct Deviation {
 /// is cut, k so that each stands for about 1/262,144 of the area, and at least one for each triangle. Nothing random:
 /// equal input gives equal output. Where a has no area at all it is measured along the longest edges of its triangles
 /// instead, and where these have no length either all triangles count alike (spacing 0). Throws InvalidInput when a
-/// mesh is not valid (reference/triangle_mesh.h) or a bound is not a number, Cancelled. Cost: about 1 us a sample.
+/// mesh is not valid (reference/triangle_mesh.h) or a bound is not a length of 0 or more, Cancelled. Cost: about 1 us a
+/// sample.
 Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, std::span<const double> bounds = {},
                     const DeviationOptions& options = {});
 

@@ -5,8 +5,9 @@
 
 namespace tolvol {
 
-BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh, std::span<const glm::dvec3> positions,
-                               bool mesh_is_reference, double within, double provable) {
+BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh,
+                               std::span<const glm::dvec3> positions, bool mesh_is_reference, double within,
+                               double provable) {
   if (mesh.boundary.empty()) return;
   if (mesh_is_reference) {
     reference_.vertices.assign(positions.begin(), positions.end());

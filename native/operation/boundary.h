@@ -32,7 +32,7 @@ class BoundaryBounds {
  private:
   TriangleMesh reference_;  // boundary edges as degenerate triangles (a, b, b)
   std::vector<WitnessTriangle> witnesses_;
-  DistanceGrid no_grid_;    // segments are found by the hierarchy
+  DistanceGrid no_grid_;  // segments are found by the hierarchy
   std::optional<Hierarchy> hierarchy_;
   std::optional<TriangleCertificate> forward_;
   std::optional<Coverage> backward_;

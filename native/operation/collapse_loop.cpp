@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Quadrics and edge order after Garland and Heckbert 1997 (area weights, boundary planes); link condition and connectivity
-// by OpenMesh. A rejected position is not a rejected collapse: where the quadric's minimiser fails a bound, a few others are
-// tried. A rejected edge waits until its two-ring changes.
+// Quadrics and edge order after Garland and Heckbert 1997 (area weights, boundary planes); link condition and
+// connectivity by OpenMesh. A rejected position is not a rejected collapse: where the quadric's minimiser fails a
+// bound, a few others are tried. A rejected edge waits until its two-ring changes.
 #include "operation/collapse_loop.h"
 
 #include <algorithm>
@@ -15,13 +15,13 @@
 namespace tolvol {
 namespace {
 
-constexpr double kBoundaryWeight = 10;        // of a boundary edge's plane, times its squared length
-constexpr double kFoldCosine = 0.2;           // a face's normal turns by less than acos of this
-constexpr double kReach = 2;                  // a minimiser is trusted within this many edge lengths of the edge's middle
-constexpr int kTries = 8;                     // positions strewn around the best one when it fails,
+constexpr double kBoundaryWeight = 10;  // of a boundary edge's plane, times its squared length
+constexpr double kFoldCosine = 0.2;     // a face's normal turns by less than acos of this
+constexpr double kReach = 2;            // a minimiser is trusted within this many edge lengths of the edge's middle
+constexpr int kTries = 8;               // positions strewn around the best one when it fails,
 constexpr double kSpread = 0.3, kWideSpread = 0.6;  // within these shares of the tolerance along each axis, in turn
-/// Where many collapses cost nothing, on a plate, short edges go first: a weight of the fourth power of the length, which has
-/// the quadrics' unit. Without it one vertex would sweep along a row and leave needles behind.
+/// Where many collapses cost nothing, on a plate, short edges go first: a weight of the fourth power of the length,
+/// which has the quadrics' unit. Without it one vertex would sweep along a row and leave needles behind.
 constexpr double kLengthWeight = 1e-6;
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
@@ -29,8 +29,12 @@ double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 }  // namespace
 
 CollapseLoop::CollapseLoop(CollapseInput input, const CollapseBounds& bounds)
-    : bounds_(bounds), subset_(input.subset), store_(std::move(input.store)), triangles_(std::move(input.triangles)),
-      pinned_(std::move(input.pinned)), wedges_(std::move(input.wedges)) {
+    : bounds_(bounds),
+      subset_(input.subset),
+      store_(std::move(input.store)),
+      triangles_(std::move(input.triangles)),
+      pinned_(std::move(input.pinned)),
+      wedges_(std::move(input.wedges)) {
   slots_ = std::move(input.slots);
   for (const Spot& s : input.spots) positions_.push_back(s.position), stored_.push_back(s.stored);
   build(input.on_reference);
@@ -116,7 +120,8 @@ CollapseLoop::Plan CollapseLoop::free_plan(Halfedge h) const {
   if (const auto minimiser = q.minimiser()) {
     const double reach2 = kReach * kReach * squared_length(p1 - p0);
     const double cost_minimiser = q(*minimiser);
-    if (squared_length(*minimiser - middle) <= reach2 && cost_minimiser <= cost) best = *minimiser, cost = cost_minimiser;
+    if (squared_length(*minimiser - middle) <= reach2 && cost_minimiser <= cost)
+      best = *minimiser, cost = cost_minimiser;
   }
   return {h, best, cost, Freedom::anywhere};
 }
@@ -155,7 +160,9 @@ void CollapseLoop::push(Edge e) {
 
 void CollapseLoop::run(std::size_t target, Progress* progress) {
   // Ties go to the lower edge, so that the order is the same everywhere.
-  const auto later = [](const Entry& a, const Entry& b) { return a.cost > b.cost || (a.cost == b.cost && a.edge > b.edge); };
+  const auto later = [](const Entry& a, const Entry& b) {
+    return a.cost > b.cost || (a.cost == b.cost && a.edge > b.edge);
+  };
   const std::size_t edges = mesh_.n_edges(), before = triangle_count_;
   stamps_.assign(edges, 0);
   refused_.assign(edges, false);
@@ -199,8 +206,8 @@ bool CollapseLoop::collapse(Edge e) {
   return outcome == Outcome::done;
 }
 
-/// Other positions for a collapse whose best one fails a bound: the ends, the middle, then points strewn around the best one.
-/// The sequence depends on the edge alone, so that results repeat.
+/// Other positions for a collapse whose best one fails a bound: the ends, the middle, then points strewn around the
+/// best one. The sequence depends on the edge alone, so that results repeat.
 CollapseLoop::Outcome CollapseLoop::search(Halfedge h, const glm::dvec3& best) {
   const Spot s0 = spot(from(h)), s1 = spot(to(h));
   for (const Spot& other : {s0, s1, store_((s0.position + s1.position) * 0.5)}) {
@@ -221,7 +228,8 @@ CollapseLoop::Outcome CollapseLoop::search(Halfedge h, const glm::dvec3& best) {
 
 CollapseLoop::Outcome CollapseLoop::attempt(Halfedge h, const Spot& spot) {
   const glm::dvec3& position = spot.position;
-  if (!std::isfinite(glm::dot(position, glm::dvec3(1)))) return Outcome::refused;  // beyond the range of the stored type
+  if (!std::isfinite(glm::dot(position, glm::dvec3(1))))
+    return Outcome::refused;  // beyond the range of the stored type
   if (!mesh_.is_collapse_ok(h) || !gather(h, position)) return Outcome::impossible;
   if (!wedges_.empty() && !wedges_fit(h)) return Outcome::impossible;
   if (!copies_.empty() && !slots_fit(h)) return Outcome::impossible;
@@ -240,7 +248,8 @@ void CollapseLoop::gather_side(Halfedge h, std::uint32_t vertex, const glm::dvec
     if (f >= 0 && f != skip0 && f != skip1) {
       const glm::uvec3& t = triangles_[static_cast<std::size_t>(f)];
       const int corner = t.x == vertex ? 0 : t.y == vertex ? 1 : 2;
-      Coverage::Element element{static_cast<std::uint32_t>(f), {positions_[t.x], positions_[t.y], positions_[t.z]}, moved};
+      Coverage::Element element{
+          static_cast<std::uint32_t>(f), {positions_[t.x], positions_[t.y], positions_[t.z]}, moved};
       element.corners[corner] = position;
       elements_.push_back(element);
       ring_.push_back({corner, positions_[vertex], {t.x, t.y, t.z}, 0});
@@ -318,7 +327,8 @@ bool CollapseLoop::wedges_fit(Halfedge h) {
     const RingFace& face = ring_[i];
     if (face.vertices[face.corner] != v0) continue;
     const std::uint32_t f = elements_[i].id, wedge = wedges_[f][face.corner];
-    const auto side = std::find_if(sides.begin(), sides.begin() + static_cast<std::ptrdiff_t>(count), [&](const Side& s) { return s.lost == wedge; });
+    const auto side = std::find_if(sides.begin(), sides.begin() + static_cast<std::ptrdiff_t>(count),
+                                   [&](const Side& s) { return s.lost == wedge; });
     if (side == sides.begin() + static_cast<std::ptrdiff_t>(count)) return false;
     new_wedges_.push_back({f, face.corner, side->gained});
   }
@@ -333,8 +343,9 @@ bool CollapseLoop::joined_by_other(std::uint32_t a, std::uint32_t b) const {
   };
   for (const std::uint32_t x : with_copies(a)) {
     for (const std::uint32_t y : with_copies(b)) {
-      if ((x != a || y != b) && mesh_.find_halfedge(OpenMesh::VertexHandle(static_cast<int>(x)),
-                                                    OpenMesh::VertexHandle(static_cast<int>(y))).is_valid()) {
+      if ((x != a || y != b) &&
+          mesh_.find_halfedge(OpenMesh::VertexHandle(static_cast<int>(x)), OpenMesh::VertexHandle(static_cast<int>(y)))
+              .is_valid()) {
         return true;
       }
     }
@@ -342,8 +353,8 @@ bool CollapseLoop::joined_by_other(std::uint32_t a, std::uint32_t b) const {
   return false;
 }
 
-/// The link condition across cuts: the kernel holds copies of a cut vertex for different vertices, the result does not. No new
-/// edge may run beside one that there is between copies, nor a whole face (its three edges then all do).
+/// The link condition across cuts: the kernel holds copies of a cut vertex for different vertices, the result does not.
+/// No new edge may run beside one that there is between copies, nor a whole face (its three edges then all do).
 bool CollapseLoop::slots_fit(Halfedge h) const {
   const std::uint32_t v0 = from(h), v1 = to(h);
   for (std::size_t i = 0; i < elements_.size(); ++i) {
@@ -416,7 +427,8 @@ bool CollapseLoop::boundary_within_bounds(Halfedge h, const glm::dvec3& position
   const glm::dvec3 unknown(std::numeric_limits<double>::infinity());
   for (std::size_t i = 0; i < 2; ++i) {
     if (boundary_elements_[i].moved == 0) continue;
-    if (bounds_.boundary_forward->bound(boundary_elements_[i].corners, unknown) == TriangleCertificate::kUnproved) return false;
+    if (bounds_.boundary_forward->bound(boundary_elements_[i].corners, unknown) == TriangleCertificate::kUnproved)
+      return false;
   }
   return bounds_.boundary_backward->try_change(boundary_elements_, boundary_removed_);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The greedy edge-collapse loop: cheapest edge first, each collapse checked when its turn comes. Works on the cut mesh, in the
-/// volume's frame; knows nothing of files, transforms or reports.
+/// The greedy edge-collapse loop: cheapest edge first, each collapse checked when its turn comes. Works on the cut
+/// mesh, in the volume's frame; knows nothing of files, transforms or reports.
 #pragma once
 
 #include <OpenMesh/Core/Mesh/TriConnectivity.hh>
@@ -32,13 +32,14 @@ struct Spot {
 };
 
 struct CollapseInput {
-  std::vector<glm::uvec3> triangles;       ///< an oriented manifold with boundary
-  std::vector<Spot> spots;                 ///< of the vertices
-  std::vector<bool> pinned;                ///< per vertex: neither moves nor vanishes
-  std::vector<std::uint32_t> slots;        ///< per vertex: equal for those that are one vertex of the result (all pinned)
-  std::vector<glm::uvec3> wedges;          ///< per triangle and corner: equal at a vertex where attributes are equal; may be empty
-  bool on_reference = false;               ///< every triangle is one of the reference
-  bool subset = false;                     ///< every surviving vertex keeps its position
+  std::vector<glm::uvec3> triangles;  ///< an oriented manifold with boundary
+  std::vector<Spot> spots;            ///< of the vertices
+  std::vector<bool> pinned;           ///< per vertex: neither moves nor vanishes
+  std::vector<std::uint32_t> slots;   ///< per vertex: equal for those that are one vertex of the result (all pinned)
+  std::vector<glm::uvec3>
+      wedges;                 ///< per triangle and corner: equal at a vertex where attributes are equal; may be empty
+  bool on_reference = false;  ///< every triangle is one of the reference
+  bool subset = false;        ///< every surviving vertex keeps its position
   /// Rounds a position in the frame to what can be stored.
   std::function<Spot(const glm::dvec3&)> store;
 };
@@ -51,7 +52,9 @@ class CollapseLoop {
   void run(std::size_t target, Progress* progress);
 
   std::size_t triangle_count() const { return triangle_count_; }
-  bool alive(std::uint32_t triangle) const { return !mesh_.status(OpenMesh::FaceHandle(static_cast<int>(triangle))).deleted(); }
+  bool alive(std::uint32_t triangle) const {
+    return !mesh_.status(OpenMesh::FaceHandle(static_cast<int>(triangle))).deleted();
+  }
   /// The vertex that a vertex was merged into (itself when it survives).
   std::uint32_t survivor(std::uint32_t vertex) const;
   const glm::dvec3& position(std::uint32_t vertex) const { return positions_[vertex]; }
@@ -68,7 +71,8 @@ class CollapseLoop {
     double cost;
     std::uint32_t edge, stamp;
   };
-  /// one_way: the end of higher rank stays where it is; either_way: one of the ends does; anywhere: the position is free.
+  /// one_way: the end of higher rank stays where it is; either_way: one of the ends does; anywhere: the position is
+  /// free.
   enum class Freedom { one_way, either_way, anywhere };
   /// How an edge would be collapsed: the start of `halfedge` merges into its end, which goes to `position`.
   struct Plan {
@@ -124,10 +128,10 @@ class CollapseLoop {
 
   // The collapse under trial: the faces that survive it, as they would be.
   struct RingFace {
-    int corner;                 ///< which corner moves
-    glm::dvec3 before;          ///< from here
+    int corner;         ///< which corner moves
+    glm::dvec3 before;  ///< from here
     std::uint32_t vertices[3];
-    double distance;            ///< upper bound on the distance of its points to the reference
+    double distance;  ///< upper bound on the distance of its points to the reference
   };
   std::vector<Coverage::Element> elements_;
   std::vector<RingFace> ring_;  ///< parallel to elements_
@@ -144,7 +148,8 @@ class CollapseLoop {
   };
   std::vector<NewWedge> new_wedges_;
   double new_distance_ = 0;
-  std::size_t suspect_ = 0;  ///< the face that failed last: of another try at the same collapse it is the likeliest to fail
+  std::size_t suspect_ =
+      0;  ///< the face that failed last: of another try at the same collapse it is the likeliest to fail
 };
 
 }  // namespace tolvol

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Most changes are settled without looking at a piece: if all pieces of an element are within e of it and its points move by
-// at most m, they are within e + m of what it becomes (the same barycentric combination is the witness). Only when e + m passes
-// the tolerance are the pieces measured again, which usually brings e down.
+// Most changes are settled without looking at a piece: if all pieces of an element are within e of it and its points
+// move by at most m, they are within e + m of what it becomes (the same barycentric combination is the witness). Only
+// when e + m passes the tolerance are the pieces measured again, which usually brings e down.
 #include "operation/coverage.h"
 
 #include <algorithm>
@@ -10,9 +10,9 @@
 namespace tolvol {
 namespace {
 
-constexpr double kFloor = 0.1;  // of the tolerance: a shorter piece is not split further
+constexpr double kFloor = 0.1;            // of the tolerance: a shorter piece is not split further
 constexpr std::size_t kBudget = 1 << 14;  // pieces that splitting may add in one change before it is refused
-constexpr int kDeepest = 15;    // levels that 16-bit places hold
+constexpr int kDeepest = 15;              // levels that 16-bit places hold
 
 FourPoints with_centre(const glm::dvec3 (&c)[3]) {
   FourPoints points;
@@ -53,8 +53,9 @@ void Coverage::corners(const Piece& piece, glm::dvec3 (&out)[3]) const {
 
 void Coverage::split(const Piece& piece, std::vector<Piece>& out) {
   const auto part = [&](int di, int dj, bool reversed) {
-    out.push_back({piece.triangle, static_cast<std::uint16_t>(2 * piece.i + di), static_cast<std::uint16_t>(2 * piece.j + dj),
-                   static_cast<std::uint8_t>(piece.level + 1), reversed, kNone});
+    out.push_back({piece.triangle, static_cast<std::uint16_t>(2 * piece.i + di),
+                   static_cast<std::uint16_t>(2 * piece.j + dj), static_cast<std::uint8_t>(piece.level + 1), reversed,
+                   kNone});
   };
   if (piece.reversed) {
     part(1, 1, true), part(0, 1, true), part(1, 0, true), part(1, 1, false);
@@ -84,10 +85,12 @@ void Coverage::free(List& list) {
   list.head = list.tail = kNone;
 }
 
-void Coverage::own(std::uint32_t element, std::uint32_t triangle) { push(lists_[element], {triangle, 0, 0, 0, false, kNone}); }
+void Coverage::own(std::uint32_t element, std::uint32_t triangle) {
+  push(lists_[element], {triangle, 0, 0, 0, false, kNone});
+}
 
-bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids, double provable,
-                      std::vector<std::uint32_t>& nearest) {
+bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids,
+                      double provable, std::vector<std::uint32_t>& nearest) {
   bool all = true;
   stack_.assign(1, {triangle, 0, 0, 0, false, kNone});
   std::uint32_t hint = Hierarchy::kNone;
@@ -108,8 +111,9 @@ bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::s
     }
     const glm::dvec3 centre = (c[0] + c[1] + c[2]) * (1.0 / 3);
     const Hierarchy::Nearest closest = hierarchy.nearest(centre, std::numeric_limits<double>::infinity(), hint);
-    const double radius = std::sqrt(std::max({glm::dot(c[0] - centre, c[0] - centre), glm::dot(c[1] - centre, c[1] - centre),
-                                              glm::dot(c[2] - centre, c[2] - centre)}));
+    const double radius =
+        std::sqrt(std::max({glm::dot(c[0] - centre, c[0] - centre), glm::dot(c[1] - centre, c[1] - centre),
+                            glm::dot(c[2] - centre, c[2] - centre)}));
     // What an earlier decimation left has a witness for each of its pieces, and those were cut no finer than this.
     const bool finest = longest_squared(c) <= kFloor * kFloor * within2_ || piece.level == kDeepest;
     if (closest.distance > provable + radius || finest) {

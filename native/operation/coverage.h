@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The backward direction: every piece of the reference has one element of the current mesh (a face; for boundaries an edge) that
-/// is its witness, so that every point of the reference stays within the tolerance of the result.
+/// The backward direction: every piece of the reference has one element of the current mesh (a face; for boundaries an
+/// edge) that is its witness, so that every point of the reference stays within the tolerance of the result.
 ///
-/// The certificate with the roles exchanged: a piece whose three corners are within epsilon of one element is within epsilon
-/// of it as a whole. A change of the mesh must find a new witness for each piece of the elements it replaces, splitting pieces
-/// where one element does not do; one piece without a witness refuses the change.
+/// The certificate with the roles exchanged: a piece whose three corners are within epsilon of one element is within
+/// epsilon of it as a whole. A change of the mesh must find a new witness for each piece of the elements it replaces,
+/// splitting pieces where one element does not do; one piece without a witness refuses the change.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,8 @@ class Coverage {
     glm::dvec3 corners[3];
     double moved;
   };
-  /// An element that the change removes: its points end up in the element at place `heir`, having moved by at most `moved`.
+  /// An element that the change removes: its points end up in the element at place `heir`, having moved by at most
+  /// `moved`.
   struct Removed {
     std::uint32_t id;
     std::uint32_t heir;
@@ -41,9 +42,9 @@ class Coverage {
   /// A triangle of the reference that is the element itself.
   void own(std::uint32_t element, std::uint32_t triangle);
 
-  /// Finds witnesses for a triangle of the reference among the triangles of a hierarchy; `ids[i]` is the element that triangle i
-  /// there is, kNone for one that never changes. Pieces farther than `provable` from all of them count no further; the nearest
-  /// triangles are added to `nearest`. Returns whether all of it is covered.
+  /// Finds witnesses for a triangle of the reference among the triangles of a hierarchy; `ids[i]` is the element that
+  /// triangle i there is, kNone for one that never changes. Pieces farther than `provable` from all of them count no
+  /// further; the nearest triangles are added to `nearest`. Returns whether all of it is covered.
   bool assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids, double provable,
               std::vector<std::uint32_t>& nearest);
 

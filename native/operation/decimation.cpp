@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What surrounds the loop: certify the input, cut it to a manifold, set up the bounds that were asked for, and carry the result
-// back to the input's vertices, triangles and attributes.
+// What surrounds the loop: certify the input, cut it to a manifold, set up the bounds that were asked for, and carry
+// the result back to the input's vertices, triangles and attributes.
 #include "operation/decimation.h"
 
 #include <algorithm>
@@ -43,8 +43,14 @@ class Decimation {
   DecimationResult run() {
     cut_ = cut_to_manifold(vertices_, triangles_);
     positions_.resize(cut_.vertex_input.size());
-    for (std::size_t v = 0; v < positions_.size(); ++v) positions_[v] = placement_.frame(vertices_[cut_.vertex_input[v]]);
+    for (std::size_t v = 0; v < positions_.size(); ++v)
+      positions_[v] = placement_.frame(vertices_[cut_.vertex_input[v]]);
     pin();
+    if (std::none_of(cut_.triangles.begin(), cut_.triangles.end(), [&](const glm::uvec3& t) {
+          return glm::cross(positions_[t.y] - positions_[t.x], positions_[t.z] - positions_[t.x]) != glm::dvec3(0);
+        })) {
+      throw InvalidInput("all faces are degenerate (segments or points): there is no surface to decimate");
+    }
     CollapseBounds bounds;
     if (volume_) bounds = set_bounds();
     CollapseLoop loop(loop_input(), bounds);
@@ -96,7 +102,8 @@ class Decimation {
     // Vertices may end up anywhere in the volume.
     const double reach = 1 + volume_->frame_tolerance();
     for (int corner = 0; corner < 8; ++corner) {
-      used.push_back(placement_.store(reach * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1)));
+      used.push_back(
+          placement_.store(reach * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1)));
     }
     const double mapping_error = placement_.mapping_error(used);
     const double provable = volume_->provable(mapping_error), within = provable * (1 - kHeadroom);
@@ -104,7 +111,8 @@ class Decimation {
     if (!identical_) certify_input(mapping_error);
 
     CollapseBounds bounds;
-    forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within, volume_->refutable(mapping_error));
+    forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within,
+                     volume_->refutable(mapping_error));
     bounds.forward = &*forward_;
     if (options_.two_sided) {
       backward_.emplace(volume_->reference(), within, cut_.triangles.size());
@@ -146,7 +154,8 @@ class Decimation {
     if (result_.outside_faces && options_.outside == DecimationOptions::Outside::error) {
       std::ostringstream text;
       text << result_.outside_faces << " faces are not within the tolerance of the reference, the first is face "
-           << *result_.first_outside << "; take a larger tolerance, set the reference anew, or keep them (outside=\"keep\")";
+           << *result_.first_outside
+           << "; take a larger tolerance, set the reference anew, or keep them (outside=\"keep\")";
       throw InvalidInput(text.str());
     }
   }
@@ -179,13 +188,16 @@ class Decimation {
     }
     if (uncovered && options_.outside == DecimationOptions::Outside::error) {
       std::ostringstream text;
-      text << uncovered << " faces of the reference are not within the tolerance of the mesh, the first is face " << first
-           << "; take a larger tolerance, set the reference anew, keep one direction only (two_sided=False), or go on from "
+      text << uncovered << " faces of the reference are not within the tolerance of the mesh, the first is face "
+           << first
+           << "; take a larger tolerance, set the reference anew, keep one direction only (two_sided=False), or go on "
+              "from "
            << "what there is (outside=\"keep\")";
       throw InvalidInput(text.str());
     }
     if (uncovered) {
-      result_.warnings.push_back(std::to_string(uncovered) + " faces of the reference are partly or wholly beyond the tolerance of " +
+      result_.warnings.push_back(std::to_string(uncovered) +
+                                 " faces of the reference are partly or wholly beyond the tolerance of " +
                                  "the mesh, as they were before; what is nearest to them was kept");
     }
     for (const std::uint32_t t : nearest) {
@@ -196,7 +208,8 @@ class Decimation {
   CollapseInput loop_input() {
     CollapseInput input;
     input.triangles = cut_.triangles;
-    for (std::size_t v = 0; v < positions_.size(); ++v) input.spots.push_back({vertices_[cut_.vertex_input[v]], positions_[v]});
+    for (std::size_t v = 0; v < positions_.size(); ++v)
+      input.spots.push_back({vertices_[cut_.vertex_input[v]], positions_[v]});
     input.pinned = pinned_;
     input.slots = cut_.output_slot;
     if (!options_.wedges.empty()) {
@@ -246,7 +259,8 @@ class Decimation {
     for (const auto& [input, t] : kept) {
       for (int k = 0; k < 3; ++k) use(slot(cut_.input_vertex[triangles_[input][k]]));
     }
-    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return cut_.vertex_input[a] < cut_.vertex_input[b]; });
+    std::sort(order.begin(), order.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return cut_.vertex_input[a] < cut_.vertex_input[b]; });
     for (std::uint32_t i = 0; i < order.size(); ++i) {
       const std::uint32_t v = order[i];
       used[v] = i;
@@ -339,7 +353,7 @@ class Decimation {
   std::optional<TriangleCertificate> forward_;
   std::optional<Coverage> backward_;
   std::optional<BoundaryBounds> boundary_;
-  std::vector<std::uint32_t> kept_;     // per result triangle: its triangle in the cut mesh
+  std::vector<std::uint32_t> kept_;  // per result triangle: its triangle in the cut mesh
   DecimationResult result_;
 };
 

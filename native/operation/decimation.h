@@ -18,13 +18,14 @@ struct DecimationOptions {
   enum class Vertices { optimal, subset };
   enum class Outside { error, keep };
 
-  Vertices vertices = Vertices::optimal;  ///< optimal: fewest triangles; subset: every surviving vertex is an original one
-  bool two_sided = true;                  ///< also keep the whole reference within the tolerance of the result
-  std::size_t target_triangles = 0;       ///< stop at this many; 0: as few as the tolerance allows
-  std::span<const bool> locked = {};      ///< per input vertex, may be empty: neither moves nor vanishes
-  Outside outside = Outside::error;       ///< what to do with input faces that are not within the tolerance
+  Vertices vertices =
+      Vertices::optimal;              ///< optimal: fewest triangles; subset: every surviving vertex is an original one
+  bool two_sided = true;              ///< also keep the whole reference within the tolerance of the result
+  std::size_t target_triangles = 0;   ///< stop at this many; 0: as few as the tolerance allows
+  std::span<const bool> locked = {};  ///< per input vertex, may be empty: neither moves nor vanishes
+  Outside outside = Outside::error;   ///< what to do with input faces that are not within the tolerance
   std::span<const std::uint32_t> wedges = {};  ///< per input corner, may be empty: see wedge_labels()
-  unsigned threads = 0;                   ///< 0: one per core; never changes the result
+  unsigned threads = 0;                        ///< 0: one per core; never changes the result
   Progress* progress = nullptr;
 };
 
@@ -35,25 +36,25 @@ struct Repair {
 };
 
 struct DecimationResult {
-  std::vector<glm::dvec3> vertices;   ///< stored coordinates
+  std::vector<glm::dvec3> vertices;  ///< stored coordinates
   std::vector<glm::uvec3> triangles;
-  std::vector<std::int32_t> vertex_map;        ///< per input vertex: the result vertex it became; -1: no triangle uses it
-  std::vector<std::uint32_t> vertex_source;    ///< per result vertex: the input vertex it continues
+  std::vector<std::int32_t> vertex_map;      ///< per input vertex: the result vertex it became; -1: no triangle uses it
+  std::vector<std::uint32_t> vertex_source;  ///< per result vertex: the input vertex it continues
   std::vector<std::uint32_t> triangle_source;  ///< per result triangle: the input triangle it continues
   std::vector<glm::uvec3> source_triangle;     ///< per result corner: the input triangle whose attributes it takes, ...
   std::vector<glm::dmat3> source_weights;      ///< ... and the barycentric weights there, a column a corner
   bool stopped_at_target = false;
   std::vector<Repair> repairs;
-  std::map<std::string, std::size_t> locked;   ///< vertices that could not move, by cause
-  std::size_t outside_faces = 0;               ///< input faces not within the tolerance, kept as they are
+  std::map<std::string, std::size_t> locked;  ///< vertices that could not move, by cause
+  std::size_t outside_faces = 0;              ///< input faces not within the tolerance, kept as they are
   std::optional<std::uint32_t> first_outside;
-  std::size_t uncovered_faces = 0;             ///< reference faces of which a part was not within the tolerance of the input
+  std::size_t uncovered_faces = 0;  ///< reference faces of which a part was not within the tolerance of the input
   std::vector<std::string> warnings;
 };
 
 /// `volume` null: no tolerance at all, a target is needed (the baseline that the bounded loop is compared with).
-/// Throws InvalidInput for a bad mesh, for input that is outside its reference (unless Outside::keep), and where the stored
-/// type cannot hold the tolerance; Cancelled. About 3 us a triangle.
+/// Throws InvalidInput for a bad mesh, for input that is outside its reference (unless Outside::keep), and where the
+/// stored type cannot hold the tolerance; Cancelled. About 3 us a triangle.
 DecimationResult decimate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                           const Placement& placement, const ToleranceVolume* volume, const DecimationOptions& options);
 

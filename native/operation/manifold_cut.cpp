@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The "local" method of Guéziec et al.: mark the edges to cut, then let the corners that stay connected through uncut edges
-// form the vertices. Deviations: edges are matched in two passes (index, then position), orientation is made consistent on
-// the way, and triangles are cut off whole in the rare case that two distinct edges would end in the same two vertices.
+// The "local" method of Guéziec et al.: mark the edges to cut, then let the corners that stay connected through uncut
+// edges form the vertices. Deviations: edges are matched in two passes (index, then position), orientation is made
+// consistent on the way, and triangles are cut off whole in the rare case that two distinct edges would end in the same
+// two vertices.
 #include "operation/manifold_cut.h"
 
 #include <algorithm>
@@ -62,9 +63,10 @@ class Cutter {
         return h ^ (h >> 29);
       }
     };
-    // Positions that turn the same way, or the same three vertices either way: Blender, too, holds only one such face. The two
-    // sides of a sheet that has vertices of its own for each stay two.
-    std::unordered_map<std::array<std::uint32_t, 3>, std::uint32_t, Hash> turned(input_.size() * 2), same(input_.size() * 2);
+    // Positions that turn the same way, or the same three vertices either way: Blender, too, holds only one such face.
+    // The two sides of a sheet that has vertices of its own for each stay two.
+    std::unordered_map<std::array<std::uint32_t, 3>, std::uint32_t, Hash> turned(input_.size() * 2),
+        same(input_.size() * 2);
     std::vector<std::uint32_t> degenerate;
     for (std::uint32_t i = 0; i < input_.size(); ++i) {
       std::array<std::uint32_t, 3> t{weld_[input_[i].x], weld_[input_[i].y], weld_[input_[i].z]};
@@ -75,7 +77,8 @@ class Cutter {
       std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
       std::array<std::uint32_t, 3> vertices{input_[i].x, input_[i].y, input_[i].z};
       std::sort(vertices.begin(), vertices.end());
-      const std::uint32_t first = std::min(turned.try_emplace(t, i).first->second, same.try_emplace(vertices, i).first->second);
+      const std::uint32_t first =
+          std::min(turned.try_emplace(t, i).first->second, same.try_emplace(vertices, i).first->second);
       if (first == i) {
         triangles_.push_back(i);
       } else {
@@ -182,8 +185,8 @@ class Cutter {
     }
   }
 
-  /// Corners connected through uncut edges form the vertices. False when two different edges ended in the same two vertices:
-  /// their triangles were cut off, and the vertices must be formed anew.
+  /// Corners connected through uncut edges form the vertices. False when two different edges ended in the same two
+  /// vertices: their triangles were cut off, and the vertices must be formed anew.
   bool form_vertices() {
     UnionFind corners(mate_.size());
     for (Side s = 0; s < mate_.size(); ++s) {
@@ -239,7 +242,8 @@ class Cutter {
     }
     for (Side s = 0; s < mate_.size(); ++s) {
       const std::uint32_t v = dense[corner_vertex_[s]];
-      if (!tied.empty() && cut_.cause[v] == CutCause::none && tied.contains(welded(s))) cut_.cause[v] = CutCause::degenerate;
+      if (!tied.empty() && cut_.cause[v] == CutCause::none && tied.contains(welded(s)))
+        cut_.cause[v] = CutCause::degenerate;
       if (several[vertex(s)]) cut_.cause[v] = CutCause::non_manifold;
       if (is_cut_[s]) {
         cut_.cause[v] = CutCause::non_manifold;
@@ -247,7 +251,8 @@ class Cutter {
       }
     }
     for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
-      glm::uvec3 corners(dense[corner_vertex_[3 * t]], dense[corner_vertex_[3 * t + 1]], dense[corner_vertex_[3 * t + 2]]);
+      glm::uvec3 corners(dense[corner_vertex_[3 * t]], dense[corner_vertex_[3 * t + 1]],
+                         dense[corner_vertex_[3 * t + 2]]);
       if (flip_[t]) std::swap(corners.y, corners.z);
       cut_.triangles.push_back(corners);
     }
@@ -305,9 +310,9 @@ class Cutter {
 
   std::span<const glm::uvec3> input_;
   std::vector<std::uint32_t> weld_;
-  std::vector<std::uint32_t> triangles_;      // input triangles that go into the manifold
-  std::vector<Side> mate_;                    // per side: the side joined to it
-  std::vector<bool> is_cut_;                  // per side: cut, so that its vertices are tied
+  std::vector<std::uint32_t> triangles_;  // input triangles that go into the manifold
+  std::vector<Side> mate_;                // per side: the side joined to it
+  std::vector<bool> is_cut_;              // per side: cut, so that its vertices are tied
   std::vector<bool> flip_;
   std::vector<std::uint32_t> corner_vertex_;  // per corner: the root of its union
   CutMesh cut_;

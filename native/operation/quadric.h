@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Quadric error metric: the weighted sum of squared distances to planes. M. Garland, P. Heckbert, "Surface simplification using
-/// quadric error metrics", 1997.
+/// Quadric error metric: the weighted sum of squared distances to planes. M. Garland, P. Heckbert, "Surface
+/// simplification using quadric error metrics", 1997.
 #pragma once
 
 #include <cmath>
@@ -18,8 +18,14 @@ struct Quadric {
   Quadric() = default;
   /// weight * (n . p + d)^2
   Quadric(const glm::dvec3& n, double d, double weight)
-      : xx(weight * n.x * n.x), xy(weight * n.x * n.y), xz(weight * n.x * n.z), yy(weight * n.y * n.y),
-        yz(weight * n.y * n.z), zz(weight * n.z * n.z), b(weight * d * n), c(weight * d * d) {}
+      : xx(weight * n.x * n.x),
+        xy(weight * n.x * n.y),
+        xz(weight * n.x * n.z),
+        yy(weight * n.y * n.y),
+        yz(weight * n.y * n.z),
+        zz(weight * n.z * n.z),
+        b(weight * d * n),
+        c(weight * d * d) {}
 
   Quadric& operator+=(const Quadric& q) {
     xx += q.xx, xy += q.xy, xz += q.xz, yy += q.yy, yz += q.yz, zz += q.zz, b += q.b, c += q.c;

@@ -42,9 +42,8 @@ std::vector<std::uint32_t> island_labels(std::span<const glm::uvec3> triangles, 
       sides.push_back({(static_cast<std::uint64_t>(a) << 32) | b, t, wa, wb});
     }
   }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-    return a.edge != b.edge ? a.edge < b.edge : a.triangle < b.triangle;
-  });
+  std::sort(sides.begin(), sides.end(),
+            [](const Side& a, const Side& b) { return a.edge != b.edge ? a.edge < b.edge : a.triangle < b.triangle; });
   UnionFind islands(triangles.size());
   for (std::size_t i = 1; i < sides.size(); ++i) {
     const Side &a = sides[i - 1], &b = sides[i];

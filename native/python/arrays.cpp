@@ -32,7 +32,7 @@ py::array to_array(const py::object& object, const std::string& name, const char
 
 /// Any integer array as int64, C order.
 py::array_t<std::int64_t, py::array::c_style | py::array::forcecast> to_integers(const py::array& array,
-                                                                                   const std::string& name) {
+                                                                                 const std::string& name) {
   const char kind = array.dtype().kind();
   if (kind != 'i' && kind != 'u') wrong_type(array, name, "an integer array");
   return py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>(array);
@@ -55,7 +55,8 @@ Vertices to_vertices(const py::object& object, const std::string& name) {
   const bool single = py::isinstance<py::array_t<float>>(array);
   if (!single && !py::isinstance<py::array_t<double>>(array)) wrong_type(array, name, "float32 or float64");
   if (array.ndim() != 2 || array.shape(1) != 3) wrong_shape(array, name, "(n, 3)");
-  if (array.shape(0) >= std::numeric_limits<std::int32_t>::max()) throw InvalidInput(name + " has more than 2^31 - 1 rows");
+  if (array.shape(0) >= std::numeric_limits<std::int32_t>::max())
+    throw InvalidInput(name + " has more than 2^31 - 1 rows");
   Vertices result;
   result.storage = single ? Storage::float32 : Storage::float64;
   result.values.resize(static_cast<std::size_t>(array.shape(0)));
@@ -111,6 +112,11 @@ std::vector<std::int32_t> to_labels(const py::object& object, const std::string&
     result.push_back(static_cast<std::int32_t>(data[i]));
   }
   return result;
+}
+
+unsigned to_threads(int threads) {
+  if (threads < 0) throw InvalidInput("threads must not be negative; 0 is one per core");
+  return static_cast<unsigned>(threads);
 }
 
 glm::dmat4 to_matrix(const py::object& object) {

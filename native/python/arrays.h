@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// NumPy arrays in and out, checked at the border: dtype, shape, index range. Errors name the argument and what it should be.
+/// NumPy arrays in and out, checked at the border: dtype, shape, index range. Errors name the argument and what it
+/// should be.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -31,6 +32,9 @@ std::vector<std::uint32_t> to_faces(const py::object& array, const std::string& 
 
 /// (n,) of any integer type.
 std::vector<std::int32_t> to_labels(const py::object& array, const std::string& name);
+
+/// 0: one per core. Throws InvalidInput when negative.
+unsigned to_threads(int threads);
 
 /// (4, 4), row-major as NumPy writes it; None is the identity.
 glm::dmat4 to_matrix(const py::object& array);

@@ -53,9 +53,9 @@ py::dict make_report(const DecimationResult& r, std::size_t triangles_in, double
 }
 
 Result decimate_arrays(const py::object& vertices, const py::object& triangles, const Volume* volume,
-                       const py::object& to_world, const std::string& placement, bool two_sided, std::int64_t target_triangles,
-                       const py::object& locked, const std::string& outside, const py::object& wedges, unsigned threads,
-                       Progress* progress) {
+                       const py::object& to_world, const std::string& placement, bool two_sided,
+                       std::int64_t target_triangles, const py::object& locked, const std::string& outside,
+                       const py::object& wedges, int threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const Placement placed(to_matrix(to_world), v.storage);
@@ -69,7 +69,8 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
   options.target_triangles = static_cast<std::size_t>(target_triangles);
   std::unique_ptr<bool[]> locked_values;
   if (!locked.is_none()) {
-    if (!py::isinstance<py::array_t<bool>>(locked)) throw InvalidInput("locked must be a bool array, one value for each vertex");
+    if (!py::isinstance<py::array_t<bool>>(locked))
+      throw InvalidInput("locked must be a bool array, one value for each vertex");
     const auto view = py::reinterpret_borrow<py::array_t<bool>>(locked).unchecked<1>();
     locked_values = std::make_unique<bool[]>(static_cast<std::size_t>(view.shape(0)));
     for (py::ssize_t i = 0; i < view.shape(0); ++i) locked_values[static_cast<std::size_t>(i)] = view(i);
@@ -80,7 +81,7 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
     for (const glm::uvec3& w : to_triangles(wedges, "wedges")) labels.insert(labels.end(), {w.x, w.y, w.z});
     options.wedges = labels;
   }
-  options.threads = threads;
+  options.threads = to_threads(threads);
   options.progress = progress;
 
   DecimationResult r;
@@ -98,7 +99,8 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
   result.vertex_source = from_vector<std::int32_t>(r.vertex_source);
   result.triangle_source = from_vector<std::int32_t>(r.triangle_source);
   result.source_triangle = from_triangles(r.source_triangle);
-  result.source_weights = py::array_t<double>({static_cast<py::ssize_t>(r.triangles.size()), py::ssize_t{3}, py::ssize_t{3}});
+  result.source_weights =
+      py::array_t<double>({static_cast<py::ssize_t>(r.triangles.size()), py::ssize_t{3}, py::ssize_t{3}});
   auto weights = result.source_weights.mutable_unchecked<3>();
   for (std::size_t i = 0; i < r.source_weights.size(); ++i) {
     for (int corner = 0; corner < 3; ++corner) {
@@ -125,36 +127,46 @@ py::array_t<std::int32_t> wedges(const py::object& triangles, const py::object& 
 }  // namespace
 
 void bind_decimation(py::module_& module) {
-  py::class_<Result>(module, "DecimationResult", py::module_local(), "A decimated mesh, and where each part of it came from.")
+  py::class_<Result>(module, "DecimationResult", py::module_local(),
+                     "A decimated mesh, and where each part of it came from.")
       .def_readonly("vertices", &Result::vertices, "(k, 3), the input's dtype, local coordinates.")
       .def_readonly("triangles", &Result::triangles, "(l, 3) int32.")
       .def_readonly("vertex_map", &Result::vertex_map,
                     "(n,) int32: the result vertex that each input vertex was merged into; -1: no triangle uses it.")
       .def_readonly("vertex_source", &Result::vertex_source,
                     "(k,) int32: the input vertex that each result vertex continues.")
-      .def_readonly("triangle_source", &Result::triangle_source,
-                    "(l,) int32: the input triangle that each result triangle continues: its corners are vertex_map of that\n"
-                    "triangle's corners, in order.")
+      .def_readonly(
+          "triangle_source", &Result::triangle_source,
+          "(l,) int32: the input triangle that each result triangle continues: its corners are vertex_map of that\n"
+          "triangle's corners, in order.")
       .def_readonly("source_triangle", &Result::source_triangle,
                     "(l, 3) int32: for each result corner the input triangle that its attributes are read from.")
       .def_readonly("source_weights", &Result::source_weights, "(l, 3, 3) float64: the barycentric weights there.")
       .def_readonly("report", &Result::report,
-                    "dict: triangles_in, triangles_out, seconds, stopped_by (\"tolerance\" or \"target\"), repairs (kind, count,\n"
+                    "dict: triangles_in, triangles_out, seconds, stopped_by (\"tolerance\" or \"target\"), repairs "
+                    "(kind, count,\n"
                     "message), locked (vertices by cause), outside (faces, first, reference_faces), warnings.");
 
   module.def("decimate", &decimate_arrays, py::arg("vertices"), py::arg("triangles"), py::arg("volume").none(true),
              py::arg("to_world") = py::none(), py::arg("placement") = "optimal", py::arg("two_sided") = true,
              py::arg("target_triangles") = 0, py::arg("locked") = py::none(), py::arg("outside") = "error",
              py::arg("wedges") = py::none(), py::arg("threads") = 0, py::arg("progress") = py::none(),
-             "Fewest triangles within the volume's tolerance: every point of the result within it of the reference and, two_sided,\n"
+             "Fewest triangles within the volume's tolerance: every point of the result within it of the reference "
+             "and, two_sided,\n"
              "every point of the reference within it of the result.\n\n"
-             "placement: \"optimal\" (fewest triangles) or \"subset\" (every surviving vertex is an original one, bit for bit).\n"
-             "target_triangles: stop there if the tolerance lets it get so far; 0: as few as possible. locked: (n,) bool, vertices\n"
-             "that neither move nor vanish. outside: \"error\", or \"keep\" the input faces that are not within the tolerance as\n"
-             "they are. wedges: (m, 3) labels from wedges(). volume None: no tolerance at all, for comparison; a target is needed.\n"
-             "Raises InvalidInput and Cancelled. Cost: about 5 us a triangle. Quadric error metric: M. Garland, P. Heckbert, 1997.");
+             "placement: \"optimal\" (fewest triangles) or \"subset\" (every surviving vertex is an original one, bit "
+             "for bit).\n"
+             "target_triangles: stop there if the tolerance lets it get so far; 0: as few as possible. locked: (n,) "
+             "bool, vertices\n"
+             "that neither move nor vanish. outside: \"error\", or \"keep\" the input faces that are not within the "
+             "tolerance as\n"
+             "they are. wedges: (m, 3) labels from wedges(). volume None: no tolerance at all, for comparison; a "
+             "target is needed.\n"
+             "Raises InvalidInput and Cancelled. Cost: about 5 us a triangle. Quadric error metric: M. Garland, P. "
+             "Heckbert, 1997.");
   module.def("wedges", &wedges, py::arg("triangles"), py::arg("corners"),
-             "(m, 3) int32 labels: two corners have the same label exactly when they are at the same vertex and all their values\n"
+             "(m, 3) int32 labels: two corners have the same label exactly when they are at the same vertex and all "
+             "their values\n"
              "are equal. corners: (m, 3, k) float32, for example UVs.");
 }
 

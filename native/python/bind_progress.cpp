@@ -6,8 +6,9 @@ namespace tolvol::python {
 
 void bind_progress(pybind11::module_& module) {
   namespace py = pybind11;
-  py::class_<Progress>(module, "Progress", py::module_local(),
-                       "What a long call shows to another thread, and how that thread stops it. Poll it; there are no callbacks.")
+  py::class_<Progress>(
+      module, "Progress", py::module_local(),
+      "What a long call shows to another thread, and how that thread stops it. Poll it; there are no callbacks.")
       .def(py::init<>())
       .def_property_readonly("fraction", &Progress::fraction, "Share of the current stage that is done, 0 to 1.")
       .def_property_readonly("stage", &Progress::stage, "What is being done, in a few words.")

@@ -15,15 +15,15 @@ namespace tolvol::python {
 namespace {
 
 std::unique_ptr<Volume> make_volume(const py::object& vertices, const py::object& triangles, double tolerance,
-                                    const py::object& to_world, std::optional<double> precision, unsigned threads,
+                                    const py::object& to_world, std::optional<double> precision, int threads,
                                     Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const Placement placement(to_matrix(to_world), v.storage);
   const py::gil_scoped_release release;
   const auto start = std::chrono::steady_clock::now();
-  auto volume = std::unique_ptr<Volume>(
-      new Volume{{v.values, t, placement, tolerance, {precision, threads, progress}}, v.values.size(), t.size()});
+  auto volume = std::unique_ptr<Volume>(new Volume{
+      {v.values, t, placement, tolerance, {precision, to_threads(threads), progress}}, v.values.size(), t.size()});
   volume->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return volume;
 }
@@ -34,7 +34,7 @@ struct CheckResult {
 };
 
 CheckResult check(const Volume& volume, const py::object& points, const py::object& faces, const py::object& to_world,
-                  const py::object& groups, const std::string& method, unsigned threads, Progress* progress) {
+                  const py::object& groups, const std::string& method, int threads, Progress* progress) {
   if (method != "certificate") throw InvalidInput("unknown method \"" + method + "\"; there is: certificate");
   const Vertices v = to_vertices(points, "points");
   int corners = 3;
@@ -58,23 +58,25 @@ CheckResult check(const Volume& volume, const py::object& points, const py::obje
         throw InvalidInput("point " + std::to_string(i) + " is not finite");
       }
     }
-    verdicts = certificate.check({in_frame, indices, corners, placement.mapping_error(v.values)}, {threads, progress});
+    verdicts = certificate.check({in_frame, indices, corners, placement.mapping_error(v.values)},
+                                 {to_threads(threads), progress});
     if (!groups.is_none()) combine_groups(verdicts, labels);
   }
   return {from_vector<std::uint8_t>(verdicts), certificate.method(), certificate.renderer()};
 }
 
-py::array_t<double> distance(const Volume& volume, const py::object& points, const py::object& to_world, unsigned threads) {
+py::array_t<double> distance(const Volume& volume, const py::object& points, const py::object& to_world, int threads) {
   const Vertices v = to_vertices(points, "points");
   const Placement placement = Placement(to_matrix(to_world), v.storage).in(volume.native.frame());
   std::vector<double> result(v.values.size());
   {
     const py::gil_scoped_release release;
     constexpr std::size_t kBlock = 256;
-    parallel_for(result.size(), kBlock, threads, [&](std::size_t begin, std::size_t end) {
+    parallel_for(result.size(), kBlock, to_threads(threads), [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         const glm::dvec3 p = placement.frame(v.values[i]);
-        if (!std::isfinite(glm::dot(p, glm::dvec3(1)))) throw InvalidInput("point " + std::to_string(i) + " is not finite");
+        if (!std::isfinite(glm::dot(p, glm::dvec3(1))))
+          throw InvalidInput("point " + std::to_string(i) + " is not finite");
         result[i] = volume.native.hierarchy().nearest(p).distance / volume.native.frame().scale();
       }
     });
@@ -108,30 +110,42 @@ void bind_volume(py::module_& module) {
       .def(py::init(&make_volume), py::arg("vertices"), py::arg("triangles"), py::arg("tolerance"),
            py::arg("to_world") = py::none(), py::arg("precision") = py::none(), py::arg("threads") = 0,
            py::arg("progress") = py::none(),
-           "vertices: (n, 3) float32 or float64, local. triangles: (m, 3) integers. tolerance: world units, at most the size of the\n"
-           "reference. precision: grid nodes per tolerance; None takes the finest of 1, 1/2, 1/4, ... that fits 256 MB; it changes\n"
-           "speed and never a verdict's truth. Raises InvalidInput (bad mesh or tolerance; the first offender is named) and\n"
+           "vertices: (n, 3) float32 or float64, local. triangles: (m, 3) integers. tolerance: world units, at most "
+           "the size of the\n"
+           "reference. precision: grid nodes per tolerance; None takes the finest of 1, 1/2, 1/4, ... that fits 256 "
+           "MB; it changes\n"
+           "speed and never a verdict's truth. Raises InvalidInput (bad mesh or tolerance; the first offender is "
+           "named) and\n"
            "ResourceLimit (a precision that does not fit). Cost: about 0.1 s for 70,000 triangles.\n"
            "After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 2.")
       .def("check", &check, py::arg("points"), py::arg("faces"), py::arg("to_world") = py::none(),
            py::arg("groups") = py::none(), py::arg("method") = "certificate", py::arg("threads") = 0,
            py::arg("progress") = py::none(),
-           "Whether faces are within the tolerance, as a whole and not only at their corners. points: (k, 3) float32 or float64.\n"
-           "faces: (m, c) integers, c from 1 (points) to 4 (quads, in every triangulation). groups: (m,) integers; every face gets\n"
-           "the worst verdict of its group. method: \"certificate\". Returns a CheckResult. Cost: about 0.1 us a small face.")
+           "Whether faces are within the tolerance, as a whole and not only at their corners. points: (k, 3) float32 "
+           "or float64.\n"
+           "faces: (m, c) integers, c from 1 (points) to 4 (quads, in every triangulation). groups: (m,) integers; "
+           "every face gets\n"
+           "the worst verdict of its group. method: \"certificate\". Returns a CheckResult. Cost: about 0.1 us a small "
+           "face.")
       .def("distance", &distance, py::arg("points"), py::arg("to_world") = py::none(), py::arg("threads") = 0,
-           "(k,) float64: the exact unsigned distance of (k, 3) points to the reference, in world units. About 1 us a point.")
+           "(k,) float64: the exact unsigned distance of (k, 3) points to the reference, in world units. About 1 us a "
+           "point.")
       .def("grid", &grid,
-           "The distance grid as (distances, origin, spacing, unit): distances is a read-only float32 view (nz, ny, nx) in units of\n"
+           "The distance grid as (distances, origin, spacing, unit): distances is a read-only float32 view (nz, ny, "
+           "nx) in units of\n"
            "`unit` world lengths, capped at the band; origin and spacing are in world units.")
-      .def_property_readonly("tolerance", [](const Volume& v) { return v.native.tolerance(); }, "World units.")
-      .def_property_readonly("size", [](const Volume& v) { return v.native.size(); },
-                             "What 100 % is, world units: the longest box diagonal of the reference.")
-      .def_property_readonly("precision", [](const Volume& v) { return v.native.precision(); }, "Grid nodes per tolerance.")
+      .def_property_readonly(
+          "tolerance", [](const Volume& v) { return v.native.tolerance(); }, "World units.")
+      .def_property_readonly(
+          "size", [](const Volume& v) { return v.native.size(); },
+          "What 100 % is, world units: the longest box diagonal of the reference.")
+      .def_property_readonly(
+          "precision", [](const Volume& v) { return v.native.precision(); }, "Grid nodes per tolerance.")
       .def_property_readonly(
           "spacing", [](const Volume& v) { return v.native.grid().spacing / v.native.frame().scale(); },
           "Between grid nodes, world units.")
-      .def_property_readonly("memory", [](const Volume& v) { return v.native.memory(); }, "Bytes held.")
+      .def_property_readonly(
+          "memory", [](const Volume& v) { return v.native.memory(); }, "Bytes held.")
       .def_readonly("vertex_count", &Volume::vertices)
       .def_readonly("triangle_count", &Volume::triangles)
       .def_readonly("seconds", &Volume::seconds, "Time it took to build.");
@@ -142,10 +156,11 @@ void bind_volume(py::module_& module) {
         const Vertices v = to_vertices(vertices, "vertices");
         const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
         validate(v.values, t);
-        return reference_size(v.values, t, to_matrix(to_world));
+        return reference_size(v.values, t, Placement(to_matrix(to_world), v.storage).to_world());
       },
       py::arg("vertices"), py::arg("triangles"), py::arg("to_world") = py::none(),
-      "What 100 % means, world units: the longest of the four diagonals of the local bounding box of the used vertices, after\n"
+      "What 100 % means, world units: the longest of the four diagonals of the local bounding box of the used "
+      "vertices, after\n"
       "to_world.");
 }
 

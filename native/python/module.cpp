@@ -4,8 +4,10 @@
 PYBIND11_MODULE(tolvol, module) {
   module.doc() =
       "Tolerance volumes: keep a triangle mesh within a tolerance of a reference surface, proved.\n\n"
-      "Vertices are (n, 3) float32 or float64 arrays in local coordinates; to_world is a (4, 4) matrix that maps them to world\n"
-      "units, in which tolerances and distances are given. Triangles are (m, 3) integer arrays. Long calls release the GIL and\n"
+      "Vertices are (n, 3) float32 or float64 arrays in local coordinates; to_world is a (4, 4) matrix that maps them "
+      "to world\n"
+      "units, in which tolerances and distances are given. Triangles are (m, 3) integer arrays. Long calls release the "
+      "GIL and\n"
       "take progress= (a Progress) and threads= (0: one per core; the result never depends on it).";
   module.attr("__version__") = TOLVOL_VERSION;
   tolvol::python::bind_errors(module);

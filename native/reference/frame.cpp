@@ -27,7 +27,8 @@ Frame::Frame(const Box& world) {
   const double radius = largest * glm::length(half / largest);
   int exponent = 0;
   std::frexp(radius, &exponent);
-  scale_ = std::ldexp(1.0, -exponent);
+  constexpr int kSmallest = -1000;  // below, the scale itself would overflow
+  scale_ = std::ldexp(1.0, -std::max(exponent, kSmallest));
 }
 
 Placement::Placement(const glm::dmat4& to_world, Storage storage, const Frame& frame)
@@ -69,8 +70,8 @@ Placement Placement::in(const Frame& frame) const {
 glm::dvec3 Placement::world(const glm::dvec3& stored) const {
   glm::dvec3 result;
   for (int row = 0; row < 3; ++row) {
-    result[row] = to_world_[0][row] * stored.x + to_world_[1][row] * stored.y + to_world_[2][row] * stored.z +
-                  to_world_[3][row];
+    result[row] =
+        to_world_[0][row] * stored.x + to_world_[1][row] * stored.y + to_world_[2][row] * stored.z + to_world_[3][row];
   }
   return result;
 }
@@ -94,9 +95,9 @@ double Placement::mapping_error(std::span<const glm::dvec3> stored) const {
     largest = std::max(largest, std::abs(to_world_[0][row]) * extent.x + std::abs(to_world_[1][row]) * extent.y +
                                     std::abs(to_world_[2][row]) * extent.z + std::abs(to_world_[3][row]));
   }
-  // A row is three products and three sums, hence an error of at most 4u (1 + 4u) times the sum of magnitudes; taking the
-  // centre off adds one more u of at most twice that magnitude; scaling by a power of two adds none. Six u a coordinate,
-  // times sqrt(3) for the length.
+  // A row is three products and three sums, hence an error of at most 4u (1 + 4u) times the sum of magnitudes; taking
+  // the centre off adds one more u of at most twice that magnitude; scaling by a power of two adds none. Six u a
+  // coordinate, times sqrt(3) for the length.
   return 11 * kUnitRoundoff * largest * frame_.scale();
 }
 
@@ -108,8 +109,9 @@ double Placement::storage_step(std::span<const glm::dvec3> stored) const {
   for (const glm::dvec3& p : stored) extent = glm::max(extent, glm::abs(p));
   double step = 0;
   for (int row = 0; row < 3; ++row) {
-    const double coordinate = half_ulp * (std::abs(to_world_[0][row]) * extent.x + std::abs(to_world_[1][row]) * extent.y +
-                                          std::abs(to_world_[2][row]) * extent.z);
+    const double coordinate =
+        half_ulp * (std::abs(to_world_[0][row]) * extent.x + std::abs(to_world_[1][row]) * extent.y +
+                    std::abs(to_world_[2][row]) * extent.z);
     step += coordinate * coordinate;
   }
   return std::sqrt(step) * frame_.scale();
@@ -125,7 +127,8 @@ double reference_size(std::span<const glm::dvec3> stored, std::span<const glm::u
   const glm::dvec3 side = box.upper - box.lower;
   const glm::dmat3 linear(to_world);
   double longest = 0;
-  for (const glm::dvec3 sign : {glm::dvec3(1, 1, 1), glm::dvec3(1, 1, -1), glm::dvec3(1, -1, 1), glm::dvec3(-1, 1, 1)}) {
+  for (const glm::dvec3 sign :
+       {glm::dvec3(1, 1, 1), glm::dvec3(1, 1, -1), glm::dvec3(1, -1, 1), glm::dvec3(-1, 1, 1)}) {
     const glm::dvec3 diagonal = linear * (side * sign);
     longest = std::max(longest, std::hypot(diagonal.x, diagonal.y, diagonal.z));
   }

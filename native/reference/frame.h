@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// From coordinates as they are stored (float32 or float64, local, with a 4x4 matrix) to the frame in which everything is
-/// decided, and back: the frame is the world, centred on the reference and scaled by a power of two to a size of about 1,
-/// so that neither a far origin nor a tiny or huge scale costs accuracy.
+/// From coordinates as they are stored (float32 or float64, local, with a 4x4 matrix) to the frame in which everything
+/// is decided, and back: the frame is the world, centred on the reference and scaled by a power of two to a size of
+/// about 1, so that neither a far origin nor a tiny or huge scale costs accuracy.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -33,8 +33,8 @@ class Frame {
 
 enum class Storage { float32, float64 };
 
-/// The float32 nearest to x. A plain cast there and back is not enough: GCC 12 drops the pair when it vectorises a loop or a
-/// constructor of several.
+/// The float32 nearest to x. A plain cast there and back is not enough: GCC 12 drops the pair when it vectorises a loop
+/// or a constructor of several.
 double rounded_to_float32(double x);
 glm::dvec3 rounded_to_float32(const glm::dvec3& p);
 
@@ -69,8 +69,9 @@ class Placement {
   Frame frame_;
 };
 
-/// What 100 % means: the longest of the four diagonals of the local bounding box of the used vertices, after `to_world`.
-/// Throws InvalidInput when it is zero (all vertices at one point).
-double reference_size(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> triangles, const glm::dmat4& to_world);
+/// What 100 % means: the longest of the four diagonals of the local bounding box of the used vertices, after
+/// `to_world`. Throws InvalidInput when it is zero (all vertices at one point).
+double reference_size(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> triangles,
+                      const glm::dmat4& to_world);
 
 }  // namespace tolvol

@@ -39,7 +39,7 @@ class Hierarchy {
 
   /// The nearest point of the mesh within `radius` (inclusive). Ties go to the lower triangle index, so that the answer
   /// does not depend on the shape of the tree. `hint`: a triangle tried first, to shrink the search; kNone for none.
-  /// About 1 us for a point near the surface of a scan, a quarter of that with a good hint. The coordinates of p are
+  /// About 1 us for a point near the surface of a scan, about half of that with a good hint. The coordinates of p are
   /// finite.
   Nearest nearest(const glm::dvec3& p, double radius = std::numeric_limits<double>::infinity(),
                   std::uint32_t hint = kNone) const {

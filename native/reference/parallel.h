@@ -17,8 +17,9 @@ inline unsigned thread_count(unsigned wanted) {
   return wanted ? wanted : std::max(1u, std::thread::hardware_concurrency());
 }
 
-/// Calls body(begin, end) for blocks of [0, count) on up to `threads` threads, the caller's among them. Blocks are handed
-/// out in order, so body must write only to what its own indices own. The first exception is rethrown after the join.
+/// Calls body(begin, end) for blocks of [0, count) on up to `threads` threads, the caller's among them. Blocks are
+/// handed out in order, so body must write only to what its own indices own. The first exception is rethrown after the
+/// join.
 template <class Body>
 void parallel_for(std::size_t count, std::size_t block, unsigned threads, Body&& body) {
   std::atomic<std::size_t> next{0};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Which instructions the few hot kernels use. Each kernel is one always-inlined body in GCC vector types, instantiated once
-/// for any 64-bit machine and once for AVX2; without fused multiply-adds both give the same bits, so the choice is speed alone.
+/// Which instructions the few hot kernels use. Each kernel is one always-inlined body in GCC vector types, instantiated
+/// once for any 64-bit machine and once for AVX2; without fused multiply-adds both give the same bits, so the choice is
+/// speed alone.
 #pragma once
 
 #include <atomic>

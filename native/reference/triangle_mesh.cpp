@@ -53,7 +53,8 @@ std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vert
   };
   std::unordered_map<glm::dvec3, std::uint32_t, Hash> first(vertices.size() * 2);
   std::vector<std::uint32_t> representative(vertices.size());
-  for (std::uint32_t i = 0; i < vertices.size(); ++i) representative[i] = first.try_emplace(vertices[i], i).first->second;
+  for (std::uint32_t i = 0; i < vertices.size(); ++i)
+    representative[i] = first.try_emplace(vertices[i], i).first->second;
   return representative;
 }
 

@@ -30,8 +30,8 @@ std::vector<Verdict> check(const ToleranceVolume& volume, const Candidates& cand
                                    {threads, nullptr});
 }
 
-/// Candidates near the surface: a point of the reference moved by up to 2 epsilon along a random direction, two more around
-/// it; then scaled so that every third has its largest distance within 2 % of epsilon.
+/// Candidates near the surface: a point of the reference moved by up to 2 epsilon along a random direction, two more
+/// around it; then scaled so that every third has its largest distance within 2 % of epsilon.
 Candidates near_surface(const TriangleMesh& reference, double tolerance, int count, unsigned seed) {
   std::mt19937 engine(seed);
   std::uniform_real_distribution<double> u(-1, 1);
@@ -61,10 +61,12 @@ struct Score {
   int inside = 0, outside = 0, wrong_inside = 0, wrong_outside = 0, unproved_clear = 0, clear = 0;
 };
 
-Score judge(const TriangleMesh& reference, double tolerance, const Candidates& candidates, const std::vector<Verdict>& verdicts) {
+Score judge(const TriangleMesh& reference, double tolerance, const Candidates& candidates,
+            const std::vector<Verdict>& verdicts) {
   Score score;
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
-    TriangleMesh one{{candidates.points[3 * i], candidates.points[3 * i + 1], candidates.points[3 * i + 2]}, {{0, 1, 2}}};
+    TriangleMesh one{{candidates.points[3 * i], candidates.points[3 * i + 1], candidates.points[3 * i + 2]},
+                     {{0, 1, 2}}};
     const HausdorffInterval exact = hausdorff(one, reference, {tolerance, 1, nullptr});
     score.inside += verdicts[i] == Verdict::inside;
     score.outside += verdicts[i] == Verdict::outside;
@@ -101,7 +103,8 @@ TriangleMesh needles(double height, const dvec3& offset) {
   std::uniform_real_distribution<double> u(-1, 1);
   TriangleMesh mesh;
   for (int i = 0; i < 60; ++i) {
-    const dvec3 a = offset + dvec3(u(engine), u(engine), u(engine)), b = offset + dvec3(u(engine), u(engine), u(engine));
+    const dvec3 a = offset + dvec3(u(engine), u(engine), u(engine)),
+                b = offset + dvec3(u(engine), u(engine), u(engine));
     const dvec3 c = a + std::abs(u(engine)) * (b - a) + height * dvec3(u(engine), u(engine), u(engine));
     const unsigned n = unsigned(mesh.vertices.size());
     mesh.vertices.insert(mesh.vertices.end(), {a, b, i % 7 == 0 ? b : c});
@@ -222,7 +225,8 @@ TEST(ToleranceVolume, RefusesWhatItCannotHold) {
   EXPECT_NO_THROW(make(0.01));
   EXPECT_NO_THROW(make(0.01, dvec3(1e9)));
   EXPECT_THROW(make(0.01, dvec3(1e15)), InvalidInput) << "double cannot hold 0.01 there";
-  for (const double bad : {0.0, -1.0, 10.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+  for (const double bad :
+       {0.0, -1.0, 10.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     EXPECT_THROW(make(bad), InvalidInput) << bad;
   }
 }

@@ -68,7 +68,8 @@ TEST(Scatter, NeverUnderestimatesOnNeedlesAndDegenerates) {
   for (int i = 2; i <= 7; ++i) {
     const unsigned n = unsigned(mesh.vertices.size());
     const double y = 0.2 * i;
-    mesh.vertices.insert(mesh.vertices.end(), {{0, y, 0}, {1, y + 0.1, 0.3}, {0.5, y + 0.05 + std::pow(10.0, -i), 0.15}});
+    mesh.vertices.insert(mesh.vertices.end(),
+                         {{0, y, 0}, {1, y + 0.1, 0.3}, {0.5, y + 0.05 + std::pow(10.0, -i), 0.15}});
     mesh.triangles.emplace_back(n, n + 1, n + 2);
   }
   const unsigned n = unsigned(mesh.vertices.size());

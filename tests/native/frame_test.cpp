@@ -36,7 +36,8 @@ TEST(Placement, StoredPositionsComeBack) {
   for (const Storage storage : {Storage::float32, Storage::float64}) {
     const Placement placement = Placement(sheared(), storage).in(Frame(Box{{990, -60, 0}, {1010, -40, 6}}));
     std::vector<dvec3> points;
-    for (int i = 0; i < 1000; ++i) points.push_back(rounded_to_float32(dvec3(normal(engine), normal(engine), normal(engine))));
+    for (int i = 0; i < 1000; ++i)
+      points.push_back(rounded_to_float32(dvec3(normal(engine), normal(engine), normal(engine))));
     const double step = placement.storage_step(points), error = placement.mapping_error(points);
     for (const dvec3& p : points) {
       const dvec3 q = placement.frame(p) + 1e-4 * dvec3(normal(engine), normal(engine), normal(engine));

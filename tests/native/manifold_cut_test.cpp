@@ -42,7 +42,8 @@ void expect_manifold(const CutMesh& mesh) {
 }
 
 std::size_t tied(const CutMesh& mesh) {
-  return std::size_t(std::count_if(mesh.cause.begin(), mesh.cause.end(), [](CutCause c) { return c != CutCause::none; }));
+  return std::size_t(
+      std::count_if(mesh.cause.begin(), mesh.cause.end(), [](CutCause c) { return c != CutCause::none; }));
 }
 
 TEST(ManifoldCut, LeavesAManifoldAlone) {
@@ -173,7 +174,8 @@ TEST(ManifoldCut, AnySoupBecomesAManifold) {
     TriangleMesh mesh;
     const unsigned vertices = 4 + engine() % 8, triangles = 1 + engine() % 40;
     for (unsigned i = 0; i < vertices; ++i) mesh.vertices.emplace_back(engine() % 3, engine() % 3, engine() % 2);
-    for (unsigned i = 0; i < triangles; ++i) mesh.triangles.emplace_back(engine() % vertices, engine() % vertices, engine() % vertices);
+    for (unsigned i = 0; i < triangles; ++i)
+      mesh.triangles.emplace_back(engine() % vertices, engine() % vertices, engine() % vertices);
     const CutMesh result = cut(mesh);
     expect_manifold(result);
     EXPECT_EQ(result.triangles.size() + result.duplicates + result.degenerate_on_edge + result.aside.size(), triangles);

@@ -45,7 +45,8 @@ inline TriangleMesh torus(unsigned n, double noise = 0, unsigned seed = 1) {
   for (unsigned i = 0; i < n; ++i) {
     for (unsigned j = 0; j < n; ++j) {
       const double u = 2 * std::numbers::pi * i / n, v = 2 * std::numbers::pi * j / n, r = 0.4 + noise * normal(engine);
-      mesh.vertices.emplace_back((1 + r * std::cos(v)) * std::cos(u), (1 + r * std::cos(v)) * std::sin(u), r * std::sin(v));
+      mesh.vertices.emplace_back((1 + r * std::cos(v)) * std::cos(u), (1 + r * std::cos(v)) * std::sin(u),
+                                 r * std::sin(v));
     }
   }
   const auto at = [n](unsigned i, unsigned j) { return (i % n) * n + j % n; };

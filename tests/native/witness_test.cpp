@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The judge is long double arithmetic with margins of its own: a computed distance must never be below the exact one by more
-// than witness_error() says.
+// The judge is long double arithmetic with margins of its own: a computed distance must never be below the exact one by
+// more than witness_error() says.
 #include "check/witness.h"
 
 #include <gtest/gtest.h>
@@ -49,11 +49,20 @@ Sample hostile(std::mt19937& engine) {
   s.a = point() * 0.57, s.b = point() * 0.57;
   const double height = std::pow(10.0, -2 - 14 * std::abs(u(engine)));
   switch (engine() % 5) {
-    case 0: s.c = point() * 0.57; break;
-    case 1: s.c = s.a + std::abs(u(engine)) * (s.b - s.a) + height * point(); break;
-    case 2: s.c = s.a + height * point(); break;
-    case 3: s.c = s.b; break;
-    default: s.c = s.b = s.a;
+    case 0:
+      s.c = point() * 0.57;
+      break;
+    case 1:
+      s.c = s.a + std::abs(u(engine)) * (s.b - s.a) + height * point();
+      break;
+    case 2:
+      s.c = s.a + height * point();
+      break;
+    case 3:
+      s.c = s.b;
+      break;
+    default:
+      s.c = s.b = s.a;
   }
   const double reach = std::pow(10.0, -6 * std::abs(u(engine)));
   for (int i = 0; i < 4; ++i) {
@@ -90,7 +99,8 @@ TEST(Witness, ErrorBoundIsNotIdle) {
     double d2[4];
     witness_distances({s.a, s.b, s.c}, s.points, d2);
     for (int k = 0; k < 4; ++k) {
-      worst = std::max(worst, static_cast<double>(exact_distance(s.p[k], s.a, s.b, s.c) - std::sqrt(static_cast<Real>(d2[k]))));
+      worst = std::max(
+          worst, static_cast<double>(exact_distance(s.p[k], s.a, s.b, s.c) - std::sqrt(static_cast<Real>(d2[k]))));
     }
   }
   EXPECT_GT(worst, 0) << "rounding does lead to distances that are too small: the margin is needed";

@@ -73,7 +73,7 @@ def rod(width=0.01, length=1.0, levels=5):
     return vertices, triangles
 
 
-def spike(levels=5, width=0.2, length=1.0):
+def spike(levels=5, width=0.15, length=2.0):
     """A sphere of radius 1 from which a cone of this opening angle and length stands up."""
     vertices, triangles = sphere(levels)
     angle = np.arccos(np.clip(vertices[:, 2], -1, 1))

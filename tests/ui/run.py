@@ -20,6 +20,7 @@ sys.path[:0] = [str(FOLDER.parents[1]), str(FOLDER.parent / "blender"), str(FOLD
 bpy.context.preferences.view.show_splash = False
 
 import addon  # noqa: E402
+from addon import native  # noqa: E402
 
 _SETTLE = 0.3  # seconds in which Blender handles an event and draws again
 
@@ -59,6 +60,9 @@ class Run:
         os._exit(1 if self.failed or not self.passed else 0)
 
 
+if native.module is None:
+    print(f"1 failed: {native.reason}", flush=True)
+    os._exit(1)
 addon.register()
 run = Run(sys.argv[sys.argv.index("--") + 1 :])
 bpy.app.timers.register(run.step, first_interval=1.5, persistent=True)

@@ -57,7 +57,6 @@ def open_tab():
         yield 0.3
         if (yield from find("tolvol.")) is not None:
             return
-    screenshot("no tab")
     raise AssertionError("no tab Tolerance")
 
 
