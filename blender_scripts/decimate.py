@@ -13,13 +13,17 @@ import time
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-import command_line as cli
-from addon import file_io, mesh_io, report, volume
-from addon.certify import certify
-from addon.errors import NOT_PROVED
+try:
+    import command_line as cli
+    import numpy as np
+    from addon import file_io, mesh_io, report, volume
+    from addon.certify import certify
+    from addon.errors import NOT_PROVED
+except ImportError as error:  # left alone, Blender would end with exit code 0
+    print(f"decimate.py: Blender's Python lacks something: {error}; install Debian's python3-numpy", file=sys.stderr)
+    sys.exit(2)
 
 _DESCRIPTION = """\
 Reduces the meshes of IN to the fewest triangles that stay within the tolerance and writes them to OUT. What is certified is

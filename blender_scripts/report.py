@@ -10,8 +10,12 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-import command_line as cli
-from addon import file_io, measure, native, report, volume
+try:
+    import command_line as cli
+    from addon import file_io, measure, native, report, volume
+except ImportError as error:  # left alone, Blender would end with exit code 0
+    print(f"report.py: Blender's Python lacks something: {error}; install Debian's python3-numpy", file=sys.stderr)
+    sys.exit(2)
 
 _DESCRIPTION = """\
 Measures the surface of A against that of B, and B against A: the largest distance as an interval that is certain, the mean

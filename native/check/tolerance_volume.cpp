@@ -6,6 +6,7 @@
 
 #include "field/scatter.h"
 #include "reference/errors.h"
+#include "reference/parallel.h"
 
 namespace tolvol {
 namespace {
@@ -48,10 +49,15 @@ ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span
   Box box;
   for (const glm::dvec3& p : used) box.add(placed.frame(p));
   grid_ = layout_grid(box, frame_tolerance(), options.precision);
-  if (options.progress) options.progress->begin("building the hierarchy");
-  hierarchy_.emplace(reference_);
-  scatter(reference_, grid_, options.threads, options.progress);
-  witnesses_ = prepare_witnesses(reference_);
+  // Side by side: neither needs the other.
+  parallel_for(2, 1, options.threads, [&](std::size_t part, std::size_t) {
+    if (part == 0) {
+      scatter(reference_, grid_, options.threads, options.progress);
+    } else {
+      hierarchy_.emplace(reference_);
+      witnesses_ = prepare_witnesses(reference_);
+    }
+  });
 }
 
 std::size_t ToleranceVolume::memory() const {
