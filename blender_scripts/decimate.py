@@ -16,8 +16,9 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 try:
-    import command_line as cli
     import numpy as np
+
+    import command_line as cli
     from addon import file_io, mesh_io, report, volume
     from addon.certify import certify
     from addon.errors import NOT_PROVED

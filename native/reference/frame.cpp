@@ -27,8 +27,7 @@ Frame::Frame(const Box& world) {
   const double radius = largest * glm::length(half / largest);
   int exponent = 0;
   std::frexp(radius, &exponent);
-  constexpr int kSmallest = -1000;  // below, the scale itself would overflow
-  scale_ = std::ldexp(1.0, -std::max(exponent, kSmallest));
+  scale_ = std::ldexp(1.0, -exponent);
 }
 
 Placement::Placement(const glm::dmat4& to_world, Storage storage, const Frame& frame)
