@@ -42,7 +42,7 @@ double TriangleCertificate::distance_bound(const glm::dvec3& p) const {
   const std::uint32_t triangle = grid_->triangle_near(p);
   if (triangle == DistanceGrid::kNone) return std::numeric_limits<double>::infinity();
   FourPoints points;
-  for (int lane = 0; lane < 4; ++lane) points.set(lane, p);
+  points.set(p, p, p, p);
   double d2[4];
   witness_distances((*reference_)[triangle], points, d2);
   return std::sqrt(d2[0]);
@@ -70,7 +70,7 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
     const Piece piece = queue[next];
     const glm::dvec3 centre = (piece.a + piece.b + piece.c) * (1.0 / 3);
     FourPoints points;
-    points.set(0, piece.a), points.set(1, piece.b), points.set(2, piece.c), points.set(3, centre);
+    points.set(piece.a, piece.b, piece.c, centre);
     double centre2 = std::numeric_limits<double>::infinity();  // best known squared distance of the centre
     std::array<std::uint32_t, 10> tried;
     int tries = 0;

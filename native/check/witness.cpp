@@ -26,6 +26,14 @@ TOLVOL_INLINE Lanes clamp01(Lanes x) {
   return x < one ? x : one;
 }
 
+TOLVOL_INLINE Lanes load(const double (&lanes)[4]) {
+  using Half = double __attribute__((vector_size(16)));
+  Half low, high;
+  __builtin_memcpy(&low, lanes, sizeof low);
+  __builtin_memcpy(&high, lanes + 2, sizeof high);
+  return __builtin_shufflevector(low, high, 0, 1, 2, 3);
+}
+
 TOLVOL_INLINE Lanes squared(Lanes x, Lanes y, Lanes z) { return x * x + y * y + z * z; }
 
 /// Squared distance to the nearest point of the edge o + w e, 0 <= w <= 1; points relative to o.
@@ -35,10 +43,7 @@ TOLVOL_INLINE Lanes edge(Lanes x, Lanes y, Lanes z, const glm::dvec3& e, double 
 }
 
 TOLVOL_INLINE void distances(const WitnessTriangle& t, const FourPoints& p, double out[4]) {
-  Lanes px, py, pz;
-  __builtin_memcpy(&px, p.x, sizeof px);
-  __builtin_memcpy(&py, p.y, sizeof py);
-  __builtin_memcpy(&pz, p.z, sizeof pz);
+  const Lanes px = load(p.x), py = load(p.y), pz = load(p.z);
   const Lanes x = px - t.a.x, y = py - t.a.y, z = pz - t.a.z;
 
   Lanes best = edge(x, y, z, t.ab, t.inverse_ab);

@@ -16,6 +16,14 @@ struct alignas(32) FourPoints {
   double x[4], y[4], z[4];
 
   void set(int lane, const glm::dvec3& p) { x[lane] = p.x, y[lane] = p.y, z[lane] = p.z; }
+  /// Written in the same halves in which witness_distances() reads: a processor forwards a store to a load only whole.
+  void set(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d) {
+    using Half = double __attribute__((vector_size(16)));
+    const Half halves[6] = {{a.x, b.x}, {c.x, d.x}, {a.y, b.y}, {c.y, d.y}, {a.z, b.z}, {c.z, d.z}};
+    __builtin_memcpy(x, &halves[0], sizeof x);
+    __builtin_memcpy(y, &halves[2], sizeof y);
+    __builtin_memcpy(z, &halves[4], sizeof z);
+  }
 };
 
 /// A triangle prepared for witness_distances(); degenerate ones are the segments or points they are.

@@ -16,8 +16,7 @@ constexpr int kDeepest = 15;              // levels that 16-bit places hold
 
 FourPoints with_centre(const glm::dvec3 (&c)[3]) {
   FourPoints points;
-  for (int k = 0; k < 3; ++k) points.set(k, c[k]);
-  points.set(3, (c[0] + c[1] + c[2]) * (1.0 / 3));
+  points.set(c[0], c[1], c[2], (c[0] + c[1] + c[2]) * (1.0 / 3));
   return points;
 }
 
