@@ -35,9 +35,9 @@ class Stopwatch:
     def __init__(self):
         self.seconds = {}
 
-    def __call__(self, name, call):
+    def __call__(self, name, call, *arguments):
         started = time.perf_counter()
-        result = call()
+        result = call(*arguments)
         elapsed = time.perf_counter() - started
         self.seconds[name] = min(elapsed, self.seconds.get(name, elapsed))
         return result
@@ -70,6 +70,9 @@ def measure(name, vertices, triangles, options):
     def decimate(volume):
         return tolvol.decimate(vertices, triangles, volume, two_sided=two_sided, threads=threads)
 
+    def unbounded(count):
+        return tolvol.decimate(vertices, triangles, None, target_triangles=count)
+
     memory = PeakMemory()
     decimate(build())
     held = memory.peak() - memory.before
@@ -77,10 +80,10 @@ def measure(name, vertices, triangles, options):
     timed = Stopwatch()
     for _ in range(REPEATS):
         volume = timed("field", build)
-        result = timed("decimate", lambda: decimate(volume))
+        result = timed("decimate", decimate, volume)
         count = len(result.triangles)
-        timed("unbounded", lambda: tolvol.decimate(vertices, triangles, None, target_triangles=count))
-        timed("openmesh", lambda: tolvol_baselines.decimate_openmesh(vertices, triangles, count))
+        timed("unbounded", unbounded, count)
+        timed("openmesh", tolvol_baselines.decimate_openmesh, vertices, triangles, count)
     seconds = timed.seconds
 
     reference = vertices.astype(np.float64), triangles
