@@ -3,7 +3,14 @@
 
 from . import measure, volume
 
-_INSIDE = 2  # of the native verdicts; unproved counts as outside
+INSIDE = 2  # of the native verdicts; unproved counts as outside
+
+
+def verdicts(surface, reference, tolerance, threads=0, progress=None):
+    """The native verdict of each triangle of a Surface."""
+    built = volume.native_volume(reference, tolerance, threads, progress)
+    arrays, matrix = surface.arrays, surface.matrix
+    return built.check(arrays.vertices, arrays.triangles, to_world=matrix, threads=threads, progress=progress).verdict
 
 
 def certify(surface, reference, tolerance, kept_faces=0, threads=0, progress=None):
@@ -18,11 +25,7 @@ def certify(surface, reference, tolerance, kept_faces=0, threads=0, progress=Non
     forward, backward = measure.both_ways((surface.world(), triangles), other, *judge)
     outside = {}
     if kept_faces:
-        built = volume.native_volume(reference, tolerance, threads, progress)
-        check = built.check(
-            surface.arrays.vertices, triangles, to_world=surface.matrix, threads=threads, progress=progress
-        )
-        inside = triangles[check.verdict >= _INSIDE]
+        inside = triangles[verdicts(surface, reference, tolerance, threads, progress) >= INSIDE]
         if len(triangles) - len(inside) <= kept_faces and len(inside):
             rest = measure.largest_distance((surface.world(), inside), other, *judge)
             outside["rest"] = [rest.lower, rest.upper]

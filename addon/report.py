@@ -9,12 +9,11 @@ from . import native
 _RESOLUTION = 0.01
 
 
-def decimation_run(source, result, native_report, check, volume, certified, options, seconds):
+def decimation_run(source, result, native_report, volume, certified, options, seconds):
     """What one decimation says of itself.
 
-    source: the MeshArrays that went in; result: the Decimated; native_report: decimate()'s own; check: native check() of
-    the result's triangles; certified: by certify(), of what will be stored; options: two_sided, placement,
-    target_triangles as given.
+    source: the MeshArrays that went in; result: the Decimated; native_report: decimate()'s own; certified: by certify(), of
+    what will be stored; options: two_sided, placement, target_triangles as given.
     """
     # Blender keeps vertices that no face uses, so they are no repair here.
     repairs = [repair for repair in native_report["repairs"] if repair["kind"] != "unused"]
@@ -30,8 +29,8 @@ def decimation_run(source, result, native_report, check, volume, certified, opti
         "placement": options["placement"],
         "target_triangles": options["target_triangles"],
         "stopped_by": native_report["stopped_by"],
-        "method": check.method,
-        "renderer": check.renderer,
+        "method": native_report["method"],
+        "renderer": native_report["renderer"],
         "precision": volume.precision,
         "forward": certified["forward"],
         "backward": certified["backward"],

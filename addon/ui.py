@@ -40,6 +40,15 @@ class _Panel:
     bl_category = "Tolerance"
 
 
+class _SubPanel(_Panel):
+    bl_parent_id = "TOLVOL_PT_tolerance"
+
+    @classmethod
+    def poll(cls, context):
+        ob = context.active_object
+        return native.module is not None and ob is not None and ob.type == "MESH"
+
+
 class TOLVOL_PT_tolerance(_Panel, bpy.types.Panel):
     bl_label = "Tolerance"
 
@@ -98,13 +107,8 @@ def _status(context, layout, ob):
         _text(context, layout, f"{triangles:,} triangles, ±{tolerance}{ready}", _GREEN)
 
 
-class TOLVOL_PT_deviation(_Panel, bpy.types.Panel):
+class TOLVOL_PT_deviation(_SubPanel, bpy.types.Panel):
     bl_label = "Deviation"
-    bl_parent_id = "TOLVOL_PT_tolerance"
-
-    @classmethod
-    def poll(cls, context):
-        return _usable(context)
 
     def draw(self, context):
         layout = self.layout
@@ -148,13 +152,8 @@ class TOLVOL_PT_deviation(_Panel, bpy.types.Panel):
             _text(context, column, f"Beyond the tolerance{share}", _RED)
 
 
-class TOLVOL_PT_decimate(_Panel, bpy.types.Panel):
+class TOLVOL_PT_decimate(_SubPanel, bpy.types.Panel):
     bl_label = "Decimate"
-    bl_parent_id = "TOLVOL_PT_tolerance"
-
-    @classmethod
-    def poll(cls, context):
-        return _usable(context)
 
     def draw(self, context):
         layout = self.layout
@@ -173,11 +172,6 @@ class TOLVOL_PT_decimate(_Panel, bpy.types.Panel):
             blocked.check_blocked(ob),
         ):
             _text(context, layout, reason, "ERROR")
-
-
-def _usable(context):
-    ob = context.active_object
-    return native.module is not None and ob is not None and ob.type == "MESH"
 
 
 def _right(layout, text):
@@ -204,12 +198,4 @@ def _text(context, layout, text, icon):
 
 _CLASSES = (TOLVOL_PT_tolerance, TOLVOL_PT_deviation, TOLVOL_PT_decimate)
 
-
-def register():
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
-
-
-def unregister():
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -1,25 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Comparing an object with its reference: certified distances both ways, and the faces that are outside."""
 
+import functools
+
 import bpy
 import numpy as np
 from bpy.props import IntProperty
 
 from .. import native, preferences, report, volume
-from ..certify import certify
+from ..certify import INSIDE, certify, verdicts
 from ..job import JobOperator
 from .blocked import allowed, check_blocked
 
-_INSIDE = 2  # of the native verdicts; unproved counts as outside
 
-
-class TOLVOL_OT_check(JobOperator, bpy.types.Operator):
-    """Measure how far the mesh lies from the reference and the reference from the mesh: the largest distance, proved, \
-and how much of the mesh is beyond the tolerance"""
-
-    bl_idname = "tolvol.check"
-    bl_label = "Check"
-    bl_options = {"REGISTER", "UNDO"}
+class _Comparison(JobOperator):
+    """Prepares both surfaces; what is compared is a static method compare(surface, reference, tolerance, threads, progress)."""
 
     threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
 
@@ -33,18 +28,27 @@ and how much of the mesh is beyond the tolerance"""
         surface, reference = volume.surface_of(ob), volume.reference_of(ob)
         tolerance = volume.tolerance_length(ob.tolvol, reference.size())
         threads = self.threads or preferences.threads(context)
+        return functools.partial(self.compare, surface, reference, tolerance, threads)
 
-        def work(progress):
-            certified = certify(surface, reference, tolerance, 0, threads, progress)
-            beyond = 0.0
-            if certified["forward"][1] > tolerance:
-                own = surface.world(), surface.arrays.triangles
-                other = reference.world(), reference.arrays.triangles
-                found = native.module.deviation(*own, *other, bounds=(tolerance,), threads=threads, progress=progress)
-                beyond = float(found.share_beyond[0])
-            return surface, tolerance, certified, beyond
 
-        return work
+class TOLVOL_OT_check(_Comparison, bpy.types.Operator):
+    """Measure how far the mesh lies from the reference and the reference from the mesh: the largest distance, proved, \
+and how much of the mesh is beyond the tolerance"""
+
+    bl_idname = "tolvol.check"
+    bl_label = "Check"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @staticmethod
+    def compare(surface, reference, tolerance, threads, progress):
+        certified = certify(surface, reference, tolerance, 0, threads, progress)
+        beyond = 0.0
+        if certified["forward"][1] > tolerance:
+            own = surface.world(), surface.arrays.triangles
+            other = reference.world(), reference.arrays.triangles
+            found = native.module.deviation(*own, *other, bounds=(tolerance,), threads=threads, progress=progress)
+            beyond = float(found.share_beyond[0])
+        return surface, tolerance, certified, beyond
 
     def finish(self, context, outcome):
         surface, tolerance, certified, beyond = outcome
@@ -60,43 +64,22 @@ and how much of the mesh is beyond the tolerance"""
             self.report({"INFO"}, f"Within the tolerance both ways: at most {largest} of it, proved")
 
 
-class TOLVOL_OT_select_outside(JobOperator, bpy.types.Operator):
+class TOLVOL_OT_select_outside(_Comparison, bpy.types.Operator):
     """Select the faces that are not proved to be within the tolerance of the reference, in Edit Mode"""
 
     bl_idname = "tolvol.select_outside"
     bl_label = "Select Outside"
     bl_options = {"REGISTER", "UNDO"}
 
-    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
-
-    @classmethod
-    def poll(cls, context):
-        return allowed(cls, check_blocked(context.active_object))
-
-    def prepare(self, context):
-        context.view_layer.update()
-        ob = self.ob
-        surface, reference = volume.surface_of(ob), volume.reference_of(ob)
-        tolerance = volume.tolerance_length(ob.tolvol, reference.size())
-        threads = self.threads or preferences.threads(context)
-
-        def work(progress):
-            built = volume.native_volume(reference, tolerance, threads, progress)
-            return surface, built.check(
-                surface.arrays.vertices,
-                surface.arrays.triangles,
-                to_world=surface.matrix,
-                threads=threads,
-                progress=progress,
-            )
-
-        return work
+    @staticmethod
+    def compare(surface, reference, tolerance, threads, progress):
+        return surface, verdicts(surface, reference, tolerance, threads, progress)
 
     def finish(self, context, outcome):
-        surface, check = outcome
+        surface, verdict = outcome
         mesh = self.ob.data
         outside = np.zeros(len(mesh.polygons), bool)
-        outside[surface.arrays.polygons[check.verdict < _INSIDE]] = True
+        outside[surface.arrays.polygons[verdict < INSIDE]] = True
         if not outside.any():
             self.report({"INFO"}, "No face is outside")
             return

@@ -157,7 +157,6 @@ class _Task:
         decimated = volume.Surface(mesh_io.MeshArrays(result.vertices, result.triangles, None, None), matrix)
         kept = computed.report["outside"]["faces"]
         certified = certify(decimated, self.reference, self.tolerance, kept, threads, progress)
-        check = built.check(result.vertices, result.triangles, to_world=matrix, threads=threads, progress=progress)
         if kept:
             before = measure.largest_distance(
                 (self.reference.world(), self.reference.arrays.triangles),
@@ -169,7 +168,7 @@ class _Task:
             certified["outside"]["backward_before"] = before.upper
         clock.append(time.perf_counter())
         seconds = dict(zip(("field", "decimate", "certify"), np.diff(clock).tolist()))
-        run = report.decimation_run(arrays, result, computed.report, check, built, certified, self.options, seconds)
+        run = report.decimation_run(arrays, result, computed.report, built, certified, self.options, seconds)
         if wedges is not None:
             self._name_corners(run, wedges)
         if not report.proved(run):

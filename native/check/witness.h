@@ -15,7 +15,6 @@ namespace tolvol {
 struct alignas(32) FourPoints {
   double x[4], y[4], z[4];
 
-  void set(int lane, const glm::dvec3& p) { x[lane] = p.x, y[lane] = p.y, z[lane] = p.z; }
   /// Written in the same halves in which witness_distances() reads: a processor forwards a store to a load only whole.
   void set(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d) {
     using Half = double __attribute__((vector_size(16)));

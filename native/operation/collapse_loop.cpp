@@ -34,8 +34,8 @@ CollapseLoop::CollapseLoop(CollapseInput input, const CollapseBounds& bounds)
       store_(std::move(input.store)),
       triangles_(std::move(input.triangles)),
       pinned_(std::move(input.pinned)),
+      slots_(std::move(input.slots)),
       wedges_(std::move(input.wedges)) {
-  slots_ = std::move(input.slots);
   for (const Spot& s : input.spots) positions_.push_back(s.position), stored_.push_back(s.stored);
   build(input.on_reference);
 }
@@ -189,9 +189,9 @@ void CollapseLoop::run(std::size_t target, Progress* progress) {
   }
 }
 
-bool CollapseLoop::collapse(Edge e) {
+void CollapseLoop::collapse(Edge e) {
   const std::optional<Plan> p = plan(e);
-  if (!p) return false;
+  if (!p) return;
   const Halfedge h = p->halfedge;
   Outcome outcome = attempt(h, p->freedom == Freedom::anywhere ? store_(p->position) : spot(to(h)));
   if (outcome != Outcome::done && p->freedom == Freedom::either_way) {
@@ -203,7 +203,6 @@ bool CollapseLoop::collapse(Edge e) {
     refused_[static_cast<std::size_t>(e.idx())] = true;
     ++refused_count_;
   }
-  return outcome == Outcome::done;
 }
 
 /// Other positions for a collapse whose best one fails a bound: the ends, the middle, then points strewn around the

@@ -91,7 +91,7 @@ class CollapseLoop {
   int rank(std::uint32_t vertex) const;
   bool on_boundary(std::uint32_t v) const { return mesh_.is_boundary(OpenMesh::VertexHandle(static_cast<int>(v))); }
   void push(Edge e);
-  bool collapse(Edge e);
+  void collapse(Edge e);
   Outcome search(Halfedge h, const glm::dvec3& best);
   Outcome attempt(Halfedge h, const Spot& spot);
   bool gather(Halfedge h, const glm::dvec3& position);

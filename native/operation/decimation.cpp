@@ -107,8 +107,10 @@ class Decimation {
     }
     const double mapping_error = placement_.mapping_error(used);
     const double provable = volume_->provable(mapping_error), within = provable * (1 - kHeadroom);
+    const Certificate certificate(*volume_);
+    result_.method = certificate.method(), result_.renderer = certificate.renderer();
     identical_ = input_is_reference();
-    if (!identical_) certify_input(mapping_error);
+    if (!identical_) certify_input(certificate, mapping_error);
 
     CollapseBounds bounds;
     forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within,
@@ -138,13 +140,13 @@ class Decimation {
     if (share > 0.01) result_.warnings.push_back(text.str());
   }
 
-  void certify_input(double mapping_error) {
+  void certify_input(const Certificate& certificate, double mapping_error) {
     const std::vector<glm::dvec3> in_frame = placement_.frame(vertices_);
     std::vector<std::uint32_t> indices;
     indices.reserve(3 * triangles_.size());
     for (const glm::uvec3& t : triangles_) indices.insert(indices.end(), {t.x, t.y, t.z});
     const std::vector<Verdict> verdicts =
-        Certificate(*volume_).check({in_frame, indices, 3, mapping_error}, {options_.threads, options_.progress});
+        certificate.check({in_frame, indices, 3, mapping_error}, {options_.threads, options_.progress});
     for (std::uint32_t i = 0; i < verdicts.size(); ++i) {
       if (verdicts[i] == Verdict::inside) continue;
       ++result_.outside_faces;

@@ -44,6 +44,7 @@ struct DecimationResult {
   std::vector<glm::uvec3> source_triangle;     ///< per result corner: the input triangle whose attributes it takes, ...
   std::vector<glm::dmat3> source_weights;      ///< ... and the barycentric weights there, a column a corner
   bool stopped_at_target = false;
+  std::string method, renderer;  ///< of the check that bounded it; empty without a volume
   std::vector<Repair> repairs;
   std::map<std::string, std::size_t> locked;  ///< vertices that could not move, by cause
   std::size_t outside_faces = 0;              ///< input faces not within the tolerance, kept as they are

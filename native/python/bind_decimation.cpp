@@ -41,6 +41,8 @@ py::dict make_report(const DecimationResult& r, std::size_t triangles_in, double
   report["triangles_out"] = r.triangles.size();
   report["seconds"] = seconds;
   report["stopped_by"] = r.stopped_at_target ? "target" : "tolerance";
+  report["method"] = r.method;
+  report["renderer"] = r.renderer;
   report["repairs"] = repairs;
   report["locked"] = locked;
   py::dict outside;
@@ -143,9 +145,9 @@ void bind_decimation(py::module_& module) {
                     "(l, 3) int32: for each result corner the input triangle that its attributes are read from.")
       .def_readonly("source_weights", &Result::source_weights, "(l, 3, 3) float64: the barycentric weights there.")
       .def_readonly("report", &Result::report,
-                    "dict: triangles_in, triangles_out, seconds, stopped_by (\"tolerance\" or \"target\"), repairs "
-                    "(kind, count,\n"
-                    "message), locked (vertices by cause), outside (faces, first, reference_faces), warnings.");
+                    "dict: triangles_in, triangles_out, seconds, stopped_by (\"tolerance\" or \"target\"), method,\n"
+                    "renderer, repairs (kind, count, message), locked (vertices by cause), outside (faces, first, "
+                    "reference_faces), warnings.");
 
   module.def("decimate", &decimate_arrays, py::arg("vertices"), py::arg("triangles"), py::arg("volume").none(true),
              py::arg("to_world") = py::none(), py::arg("placement") = "optimal", py::arg("two_sided") = true,

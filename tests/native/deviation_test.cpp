@@ -7,6 +7,7 @@
 #include <random>
 
 #include "reference/errors.h"
+#include "shapes.h"
 
 namespace {
 
@@ -15,21 +16,7 @@ using glm::dvec3;
 
 /// The square [0, 1]^2 at height z, from n x n squares.
 TriangleMesh plate(unsigned n, double z, double slope = 0) {
-  TriangleMesh mesh;
-  for (unsigned i = 0; i <= n; ++i) {
-    for (unsigned j = 0; j <= n; ++j) {
-      const double x = double(i) / n;
-      mesh.vertices.push_back({x, double(j) / n, z + slope * x});
-    }
-  }
-  for (unsigned i = 0; i < n; ++i) {
-    for (unsigned j = 0; j < n; ++j) {
-      const unsigned a = i * (n + 1) + j, b = a + n + 1;
-      mesh.triangles.push_back({a, b, b + 1});
-      mesh.triangles.push_back({a, b + 1, a + 1});
-    }
-  }
-  return mesh;
+  return shapes::squares(n, [&](const dvec3& p) { return dvec3(p.x, p.y, z + slope * p.x); });
 }
 
 TEST(Deviation, ParallelPlates) {

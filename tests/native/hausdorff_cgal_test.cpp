@@ -10,6 +10,7 @@
 #include <random>
 
 #include "measure/hausdorff.h"
+#include "shapes.h"
 
 namespace {
 
@@ -31,21 +32,9 @@ Surface surface(const TriangleMesh& mesh) {
 TriangleMesh terrain(unsigned n, unsigned seed, double roughness) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(-roughness, roughness);
-  TriangleMesh mesh;
-  for (unsigned i = 0; i <= n; ++i) {
-    for (unsigned j = 0; j <= n; ++j) {
-      const double x = double(i) / n, y = double(j) / n;
-      mesh.vertices.push_back({x, y, 0.1 * std::sin(6 * x) * std::cos(5 * y) + uniform(random)});
-    }
-  }
-  for (unsigned i = 0; i < n; ++i) {
-    for (unsigned j = 0; j < n; ++j) {
-      const unsigned a = i * (n + 1) + j, b = a + n + 1;
-      mesh.triangles.push_back({a, b, b + 1});
-      mesh.triangles.push_back({a, b + 1, a + 1});
-    }
-  }
-  return mesh;
+  return shapes::squares(n, [&](const dvec3& p) {
+    return dvec3(p.x, p.y, 0.1 * std::sin(6 * p.x) * std::cos(5 * p.y) + uniform(random));
+  });
 }
 
 TEST(HausdorffCgal, AgreesWithinItsError) {

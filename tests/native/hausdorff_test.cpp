@@ -9,6 +9,7 @@
 
 #include "reference/closest_point.h"
 #include "reference/errors.h"
+#include "shapes.h"
 
 namespace {
 
@@ -24,26 +25,9 @@ struct Random {
   double share() { return uniform(engine); }
 };
 
-/// n x n squares over [0, 1]^2, moved by `place`.
-template <class Place>
-TriangleMesh grid(unsigned n, Place&& place) {
-  TriangleMesh mesh;
-  for (unsigned i = 0; i <= n; ++i) {
-    for (unsigned j = 0; j <= n; ++j) mesh.vertices.push_back(place(dvec3(i, j, 0) / double(n)));
-  }
-  for (unsigned i = 0; i < n; ++i) {
-    for (unsigned j = 0; j < n; ++j) {
-      const unsigned a = i * (n + 1) + j, b = a + n + 1;
-      mesh.triangles.push_back({a, b, b + 1});
-      mesh.triangles.push_back({a, b + 1, a + 1});
-    }
-  }
-  return mesh;
-}
-
 /// Longitude and latitude.
 TriangleMesh sphere(unsigned n, double radius) {
-  return grid(n, [&](const dvec3& p) {
+  return shapes::squares(n, [&](const dvec3& p) {
     const double longitude = 2 * M_PI * p.x, latitude = M_PI * p.y;
     return radius * dvec3(std::sin(latitude) * std::cos(longitude), std::sin(latitude) * std::sin(longitude),
                           std::cos(latitude));
@@ -158,8 +142,8 @@ TEST(Hausdorff, RoundingIsInside) {
 TEST(Hausdorff, ParallelPlanes) {
   for (const double distance : {1.0, 1e-2, 1e-4}) {
     for (const auto& [n, m] : {std::pair{1u, 40u}, {40u, 1u}, {7u, 11u}}) {
-      const auto h = measured(grid(n, [](const dvec3& p) { return p; }),
-                              grid(m, [&](const dvec3& p) { return p + dvec3(0, 0, distance); }));
+      const auto h =
+          measured(shapes::grid(n), shapes::squares(m, [&](const dvec3& p) { return p + dvec3(0, 0, distance); }));
       expect_contains(h, distance);
     }
   }
@@ -193,7 +177,7 @@ TEST(Hausdorff, CentreOfOneTriangleBetweenThreePoints) {
 
 // A flat one-sided fit: nothing is lost one way, nearly everything the other way.
 TEST(Hausdorff, IsDirected) {
-  const TriangleMesh plate = grid(20, [](const dvec3& p) { return p; });
+  const TriangleMesh plate = shapes::grid(20);
   const TriangleMesh corner{{{0, 0, 0}, {0.1, 0, 0}, {0, 0.1, 0}}, {{0, 1, 2}}};
   EXPECT_LT(measured(corner, plate).upper, 1e-14);
   expect_contains(measured(plate, corner), std::sqrt(2) - std::sqrt(2) * 0.05, 1e-15);
@@ -252,7 +236,7 @@ TEST(Hausdorff, NeedlesAndDegenerateTriangles) {
 
 // A point and a segment of a count though they have no area.
 TEST(Hausdorff, DegenerateTrianglesCount) {
-  TriangleMesh plate = grid(4, [](const dvec3& p) { return p; });
+  TriangleMesh plate = shapes::grid(4);
   const TriangleMesh bare = plate;
   plate.vertices.insert(plate.vertices.end(), {{0.5, 0.5, 3}, {0.5, 0.5, 0}, {0.25, 0.5, 2}});
   plate.triangles.push_back({25, 26, 25});
@@ -275,7 +259,8 @@ TEST(Hausdorff, NoDistanceEndsAtRounding) {
   EXPECT_LT(measured(rough, rough, {}, 2).upper, 1e-14);
   EXPECT_LT(measured(fine, rough, {}, 2).upper, 1e-14);
   EXPECT_LT(measured(rough, fine, {}, 2).upper, 2e-14);
-  EXPECT_LT(measured(grid(1, turn), grid(60, turn)).upper, 2e-14);  // two triangles over 7,200 in their oblique plane
+  EXPECT_LT(measured(shapes::squares(1, turn), shapes::squares(60, turn)).upper,
+            2e-14);  // two triangles over 7,200 in their oblique plane
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
 }
 
@@ -283,8 +268,9 @@ TEST(Hausdorff, NoDistanceEndsAtRounding) {
 TEST(Hausdorff, TinyDistances) {
   Random random(4);
   for (const double noise : {1e-4, 1e-7, 1e-10}) {
-    const TriangleMesh plate = grid(1, [](const dvec3& p) { return dvec3(p.x, p.y, 0.3 * p.x - 0.7 * p.y); });
-    TriangleMesh rough = grid(30, [](const dvec3& p) { return dvec3(p.x, p.y, 0.3 * p.x - 0.7 * p.y); });
+    const TriangleMesh plate =
+        shapes::squares(1, [](const dvec3& p) { return dvec3(p.x, p.y, 0.3 * p.x - 0.7 * p.y); });
+    TriangleMesh rough = shapes::squares(30, [](const dvec3& p) { return dvec3(p.x, p.y, 0.3 * p.x - 0.7 * p.y); });
     for (dvec3& p : rough.vertices) p += noise * random.point();
     const HausdorffInterval there = measured(rough, plate), back = measured(plate, rough);
     EXPECT_GT(there.lower, noise);
@@ -313,8 +299,8 @@ TEST(Hausdorff, BoundDecides) {
   const TriangleMesh coarse = sphere(6, 1);
   EXPECT_GT(measured(coarse, rough, {.bound = 1e-3}, 2, false).upper, 1.01 * measured(coarse, rough, {}, 2).upper);
   // The bound is the distance itself: no arithmetic in doubles can decide that, and the call must end all the same.
-  const TriangleMesh plate = grid(9, [](const dvec3& p) { return p; });
-  const TriangleMesh above = grid(13, [](const dvec3& p) { return p + dvec3(0, 0, 0.1); });
+  const TriangleMesh plate = shapes::grid(9);
+  const TriangleMesh above = shapes::squares(13, [](const dvec3& p) { return p + dvec3(0, 0, 0.1); });
   expect_contains(measured(plate, above, {.bound = 0.1}), 0.1);
   // Nor here, where the pieces around the farthest point would have to shrink to nothing.
   const TriangleMesh a{{{0, 0, 0}, {1, 0, 0}, {0.5, std::sqrt(0.75), 0}}, {{0, 1, 2}}};

@@ -21,20 +21,27 @@ inline TriangleMesh stored(TriangleMesh mesh) {
   return mesh;
 }
 
-/// n x n squares of side 1 / n in the plane z = 0, each two triangles.
-inline TriangleMesh grid(unsigned n) {
+/// n x n squares over [0, 1]^2, each two triangles, with `place` applied to every vertex; vertex (i, j) is i (n + 1) +
+/// j.
+template <class Place>
+TriangleMesh squares(unsigned n, Place&& place) {
   TriangleMesh mesh;
-  for (unsigned y = 0; y <= n; ++y) {
-    for (unsigned x = 0; x <= n; ++x) mesh.vertices.emplace_back(double(x) / n, double(y) / n, 0.0);
+  for (unsigned i = 0; i <= n; ++i) {
+    for (unsigned j = 0; j <= n; ++j) mesh.vertices.push_back(place(dvec3(i, j, 0) / double(n)));
   }
-  for (unsigned y = 0; y < n; ++y) {
-    for (unsigned x = 0; x < n; ++x) {
-      const unsigned i = y * (n + 1) + x;
-      mesh.triangles.emplace_back(i, i + 1, i + n + 2);
-      mesh.triangles.emplace_back(i, i + n + 2, i + n + 1);
+  for (unsigned i = 0; i < n; ++i) {
+    for (unsigned j = 0; j < n; ++j) {
+      const unsigned a = i * (n + 1) + j, b = a + n + 1;
+      mesh.triangles.emplace_back(a, b, b + 1);
+      mesh.triangles.emplace_back(a, b + 1, a + 1);
     }
   }
   return mesh;
+}
+
+/// The same in the plane z = 0.
+inline TriangleMesh grid(unsigned n) {
+  return squares(n, [](const dvec3& p) { return p; });
 }
 
 /// A closed torus of n x n squares; radii 1 and 0.4, optional noise along the normal.

@@ -68,8 +68,8 @@ Sample hostile(std::mt19937& engine) {
   for (int i = 0; i < 4; ++i) {
     const double v = std::abs(u(engine)), w = std::abs(u(engine)) * (1 - v);
     s.p[i] = s.a + v * (s.b - s.a) + w * (s.c - s.a) + reach * point();
-    s.points.set(i, s.p[i]);
   }
+  s.points.set(s.p[0], s.p[1], s.p[2], s.p[3]);
   return s;
 }
 
@@ -125,7 +125,7 @@ TEST(Witness, BothInstructionPathsGiveTheSameBits) {
 TEST(Witness, NotANumberIsNeverNear) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   FourPoints points;
-  for (int i = 0; i < 4; ++i) points.set(i, {nan, 0, 0});
+  points.set({nan, 0, 0}, {0, nan, 0}, {0, 0, nan}, {nan, nan, nan});
   double d2[4];
   witness_distances({dvec3(0), dvec3(1, 0, 0), dvec3(0, 1, 0)}, points, d2);
   for (const double d : d2) EXPECT_FALSE(d <= 1e300);
