@@ -7,13 +7,14 @@
 set -eu
 cd "$(dirname "$0")"
 
-packages="cmake ninja-build g++ python3-dev pybind11-dev python3-numpy libopenmesh-dev libglm-dev libgtest-dev blender"
+packages="cmake ninja-build pkg-config g++ python3-dev pybind11-dev python3-numpy libopenmesh-dev libglm-dev libepoxy-dev libgtest-dev
+  libegl1 libgl1 libgl1-mesa-dri blender"
 targets=addon_zip
 case "${1-}" in
 "") ;;
 --tests)
   packages="$packages python3-pytest python3-venv libcgal-dev clang-format clang-tidy
-    xvfb xdotool imagemagick libgl1-mesa-dri"
+    xvfb xdotool imagemagick"
   targets="all addon_zip"
   ;;
 *)

@@ -11,6 +11,7 @@ void bind_errors(pybind11::module_& module) {
   const py::tuple also_value_error = py::make_tuple(base, py::handle(PyExc_ValueError));
   static py::exception<InvalidInput> invalid_input(module, "InvalidInput", also_value_error);
   static py::exception<ResourceLimit> resource_limit(module, "ResourceLimit", base);
+  static py::exception<GlUnavailable> gl_unavailable(module, "GlUnavailable", base);
   static py::exception<Cancelled> cancelled(module, "Cancelled", base);
   // Module-local: a second copy of the module in the same process must not translate with the classes of the first.
   py::register_local_exception_translator([](std::exception_ptr pointer) {
@@ -20,6 +21,8 @@ void bind_errors(pybind11::module_& module) {
       invalid_input(error.what());
     } catch (const ResourceLimit& error) {
       resource_limit(error.what());
+    } catch (const GlUnavailable& error) {
+      gl_unavailable(error.what());
     } catch (const Cancelled& error) {
       cancelled(error.what());
     }

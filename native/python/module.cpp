@@ -12,6 +12,7 @@ PYBIND11_MODULE(tolvol, module) {
   module.attr("__version__") = TOLVOL_VERSION;
   tolvol::python::bind_errors(module);
   tolvol::python::bind_progress(module);
+  tolvol::python::bind_gl(module);
   tolvol::python::bind_volume(module);
   tolvol::python::bind_decimation(module);
   tolvol::python::bind_measure(module);

@@ -16,6 +16,12 @@ struct ResourceLimit : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// There is no OpenGL 4.5 here, or it failed on the way: whatever was asked of it is unanswered. The message begins
+/// "GL unavailable: " and says why.
+struct GlUnavailable : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 /// The caller asked for a stop through Progress::cancel().
 struct Cancelled : std::runtime_error {
   Cancelled() : std::runtime_error("cancelled") {}

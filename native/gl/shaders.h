@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The files of shaders/, embedded when the project was built by embed_shaders.cmake.
+#pragma once
+
+#include <string_view>
+
+namespace tolvol::gl {
+
+/// By file name, as in "lattice.vert"; without a #version line. Throws std::logic_error for a name that is not there.
+std::string_view shader_source(std::string_view file);
+
+}  // namespace tolvol::gl

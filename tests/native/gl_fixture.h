@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// For tests that need a context: skipped where there is none, unless TOLVOL_REQUIRE_GL is set.
+#pragma once
+
+#include <epoxy/egl.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "gl/context.h"
+#include "gl/objects.h"
+#include "reference/errors.h"
+
+inline void require_gl() {
+  try {
+    tolvol::gl::renderer();
+  } catch (const tolvol::GlUnavailable& error) {
+    if (std::getenv("TOLVOL_REQUIRE_GL")) FAIL() << error.what();
+    GTEST_SKIP() << error.what();
+  }
+}
+
+class GlTest : public testing::Test {
+ protected:
+  void SetUp() override { require_gl(); }
+};
