@@ -17,7 +17,7 @@ class DistanceTexture {
  public:
   /// `distance`: one value a node, in the grid's order and pitch, signed or not; usually grid.distance. Made on the GL
   /// thread. Throws ResourceLimit, naming the precision that fits, when the grid is larger than GL_MAX_3D_TEXTURE_SIZE
-  /// along an axis or than the memory the driver grants; GlUnavailable.
+  /// along an axis; GlUnavailable, also when the driver is out of memory.
   DistanceTexture(const DistanceGrid& grid, std::span<const float> distance, double limit, TextureFormat format);
 
   const gl::Texture& texture() const { return texture_; }
