@@ -40,7 +40,9 @@ TriangleCertificate::TriangleCertificate(const std::vector<WitnessTriangle>& ref
 
 double TriangleCertificate::distance_bound(const glm::dvec3& p) const {
   const std::uint32_t triangle = grid_->triangle_near(p);
-  if (triangle == DistanceGrid::kNone) return std::numeric_limits<double>::infinity();
+  if (triangle == DistanceGrid::kNone) {
+    return grid_->contains(p) ? hierarchy_->nearest(p, within_).distance : std::numeric_limits<double>::infinity();
+  }
   FourPoints points;
   points.set(p, p, p, p);
   double d2[4];

@@ -45,7 +45,8 @@ class TriangleCertificate {
   /// Whether bound() finds one, and if not, whether a point outside proves that there is none.
   Verdict verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
 
-  /// An upper bound on the distance of p to the reference, from the grid's guess; infinity where there is none.
+  /// An upper bound on the distance of p to the reference, from the grid's guess, or from a search where the grid has
+  /// none; infinity when p is not within().
   double distance_bound(const glm::dvec3& p) const;
 
   double within() const { return within_; }

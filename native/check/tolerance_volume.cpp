@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "field/fast_marching.h"
 #include "field/scatter.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
@@ -25,7 +26,7 @@ std::vector<glm::dvec3> used_only(std::span<const glm::dvec3> vertices, std::spa
 
 ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                                  const Placement& placement, double tolerance, const Options& options)
-    : tolerance_(tolerance) {
+    : tolerance_(tolerance), field_(options.field) {
   validate(vertices, triangles);
   size_ = reference_size(vertices, triangles, placement.to_world());
   if (!(tolerance > 0) || !std::isfinite(tolerance)) {
@@ -51,8 +52,10 @@ ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span
   grid_ = layout_grid(box, frame_tolerance(), options.precision);
   // Side by side: neither needs the other.
   parallel_for(2, 1, options.threads, [&](std::size_t part, std::size_t) {
-    if (part == 0) {
+    if (part == 0 && field_ == Field::scatter) {
       scatter(reference_, grid_, options.threads, options.progress);
+    } else if (part == 0) {
+      fast_marching(reference_, grid_, frame_tolerance(), options.threads, options.progress);
     } else {
       hierarchy_.emplace(reference_);
       witnesses_ = prepare_witnesses(reference_);

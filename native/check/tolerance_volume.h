@@ -16,12 +16,16 @@
 
 namespace tolvol {
 
+/// What fills the distance grid: field/scatter.h (exact), or field/fast_marching.h (the paper's way, for comparison).
+enum class Field { scatter, fast_marching };
+
 class ToleranceVolume {
  public:
   struct Options {
     std::optional<double> precision;  ///< grid nodes per tolerance; empty: the finest that fits kGridBudget
     unsigned threads = 0;             ///< 0: one per core
     Progress* progress = nullptr;
+    Field field = Field::scatter;  ///< never changes a verdict's truth
   };
 
   /// `tolerance` in world units. Throws InvalidInput for a bad mesh or for a tolerance that is not finite and positive,
@@ -45,6 +49,7 @@ class ToleranceVolume {
   double tolerance() const { return tolerance_; }  ///< world units
   double frame_tolerance() const { return tolerance_ * frame_.scale(); }
   double size() const { return size_; }  ///< world units; what 100 % means
+  Field field() const { return field_; }
   double precision() const { return frame_tolerance() / grid_.spacing; }
   std::size_t memory() const;  ///< bytes held
 
@@ -64,6 +69,7 @@ class ToleranceVolume {
   double tolerance_;
   double size_;
   double mapping_error_;
+  Field field_;
 };
 
 }  // namespace tolvol

@@ -17,11 +17,12 @@ inline constexpr std::size_t kGridBudget = std::size_t{256} << 20;
 struct DistanceGrid {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
-  glm::dvec3 origin{0};  ///< position of node (0, 0, 0)
-  double spacing = 0;    ///< h, the same along each axis
-  glm::ivec3 nodes{0};   ///< number of nodes along x, y, z
-  int pitch = 0;         ///< nodes from one row to the next, padded(nodes.x)
-  double band = 0;       ///< nodes farther than this from the reference hold the band and kNone
+  glm::dvec3 origin{0};    ///< position of node (0, 0, 0)
+  double spacing = 0;      ///< h, the same along each axis
+  glm::ivec3 nodes{0};     ///< number of nodes along x, y, z
+  int pitch = 0;           ///< nodes from one row to the next, padded(nodes.x)
+  double band = 0;         ///< nodes farther than this from the reference hold the band and kNone
+  bool is_signed = false;  ///< distances are negative inside the reference; otherwise none is
   std::vector<float> distance;
   std::vector<std::uint32_t> triangle;
 
@@ -31,11 +32,16 @@ struct DistanceGrid {
   static constexpr int padded(int row) { return (row + kLanes - 1) / kLanes * kLanes; }
   std::size_t memory() const { return distance.size() * (sizeof(float) + sizeof(std::uint32_t)); }
 
-  /// The closest triangle of the node nearest to p; kNone outside the grid or beyond the band. O(1).
-  std::uint32_t triangle_near(const glm::dvec3& p) const {
+  /// Whether p is nearer to a node than to where the next would be outside the grid. Written so that NaN is not.
+  bool contains(const glm::dvec3& p) const {
     const glm::dvec3 c = (p - origin) * (1 / spacing) + 0.5;
-    // Written so that NaN fails as well.
-    if (!(c.x >= 0 && c.y >= 0 && c.z >= 0 && c.x < nodes.x && c.y < nodes.y && c.z < nodes.z)) return kNone;
+    return c.x >= 0 && c.y >= 0 && c.z >= 0 && c.x < nodes.x && c.y < nodes.y && c.z < nodes.z;
+  }
+  /// The triangle of the node nearest to p, kNone outside the grid: after scatter() a closest one of that node or none
+  /// within the band. O(1).
+  std::uint32_t triangle_near(const glm::dvec3& p) const {
+    if (!contains(p)) return kNone;
+    const glm::dvec3 c = (p - origin) * (1 / spacing) + 0.5;
     return triangle[index(static_cast<int>(c.x), static_cast<int>(c.y), static_cast<int>(c.z))];
   }
 };

@@ -103,6 +103,8 @@ Pseudonormals::Pseudonormals(const TriangleMesh& mesh)
     glm::dvec3 sum(0);
     for (const HalfEdge& e : edge) sum += face_[e.triangle()];
     for (const HalfEdge& e : edge) edge_[e.triangle()][e.corner()] = sum;
+    const auto start = [&](const HalfEdge& e) { return corners_[e.triangle()][e.corner()]; };
+    closed_ = closed_ && edge.size() == 2 && start(edge[0]) != start(edge[1]);
   });
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     for (int k = 0; k < 3; ++k) vertex_[corners_[i][k]] += angle(mesh, corners_[i], k) * face_[i];

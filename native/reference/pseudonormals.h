@@ -29,6 +29,9 @@ class Pseudonormals {
   /// O(m log valence), 60 ms for 270,000 triangles.
   explicit Pseudonormals(const TriangleMesh& mesh);
 
+  /// Every edge has exactly two faces, that run along it in opposite directions; the flat ones count.
+  bool closed() const { return closed_; }
+
   /// At the point of a triangle with these barycentric weights, as closest_point() gives them: exactly zero on the
   /// borders. Not of unit length.
   const glm::dvec3& at(std::uint32_t triangle, const glm::dvec3& weights) const;
@@ -43,6 +46,7 @@ class Pseudonormals {
   std::vector<glm::dvec3> vertex_;               // by welded corner
   std::vector<std::array<glm::dvec3, 3>> edge_;  // from corner k to the next one
   std::vector<glm::dvec3> face_;
+  bool closed_ = true;
 };
 
 }  // namespace tolvol

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Based on [Botsch04, §2] and, for the marching, on J. Sethian, A fast marching level set method for monotonically
+// advancing fronts, 1996. Three deviations:
+// - The paper takes all nodes of the triangles' enlarged boxes for known. Here only those within one cell of the
+// surface
+//   are: to a node farther away than its triangle's box was enlarged another triangle, whose box does not reach it, may
+//   be nearer. So every initial value is exact, and scatter() with a band of one cell is this phase.
+// - Normals at edges are pseudonormals, not interpolated (reference/pseudonormals.h).
+// - Open and closed meshes are marched alike, without a sign. On a closed mesh it is that of the node from which the
+// front
+//   came: the surface is between known nodes only. On others it is estimated as in the initial phase, against the
+//   triangle from which the front came.
+#include "field/fast_marching.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <utility>
+
+#include "field/scatter.h"
+#include "field/signs.h"
+
+namespace tolvol {
+namespace {
+
+// Cells; a little more than one, so that both ends of every grid edge that meets the surface are in for certain.
+constexpr double kInitialBand = 1.001;
+
+class Front {
+ public:
+  Front(const TriangleMesh& reference, const Pseudonormals& normals, DistanceGrid& grid,
+        std::vector<std::uint8_t>& known)
+      : reference_(reference),
+        normals_(normals),
+        grid_(grid),
+        known_(known),
+        origin_(grid.triangle),
+        strides_{1, grid.index(0, 1, 0), grid.index(0, 0, 1)} {
+    for (int z = 0; z < grid.nodes.z; ++z) {
+      for (int y = 0; y < grid.nodes.y; ++y) {
+        for (int x = 0; x < grid.nodes.x; ++x) {
+          const glm::ivec3 at(x, y, z);
+          if (known_[grid.index(x, y, z)]) continue;
+          bool beside = false;
+          for_neighbours(at, [&](std::size_t, const glm::ivec3&, std::size_t other) { beside |= known_[other] != 0; });
+          if (beside) relax(at);
+        }
+      }
+    }
+  }
+
+  void march(double stop, Progress* progress) {
+    constexpr std::size_t kBetween = 1 << 16;  // nodes from one look at the progress to the next
+    float reached = 0;
+    for (std::size_t count = 1; !heap_.empty() && !(static_cast<double>(reached) > stop); ++count) {
+      std::pop_heap(heap_.begin(), heap_.end(), std::greater());
+      const std::uint64_t top = heap_.back();
+      heap_.pop_back();
+      if (progress && count % kBetween == 0) progress->update(std::min(1.0, static_cast<double>(reached) / stop));
+      const std::uint32_t node = static_cast<std::uint32_t>(top);
+      if (known_[node]) continue;  // an older entry of a node that came nearer
+      reached = std::bit_cast<float>(static_cast<std::uint32_t>(top >> 32));
+      conquer(node, reached);
+    }
+  }
+
+ private:
+  /// visit(axis, position, index) for the up to six nodes beside one.
+  template <class Visit>
+  void for_neighbours(const glm::ivec3& at, Visit&& visit) const {
+    const std::size_t node = grid_.index(at.x, at.y, at.z);
+    for (int axis = 0; axis < 3; ++axis) {
+      glm::ivec3 other = at;
+      if (--other[axis] >= 0) visit(axis, other, node - strides_[axis]);
+      other[axis] += 2;
+      if (other[axis] < grid_.nodes[axis]) visit(axis, other, node + strides_[axis]);
+    }
+  }
+
+  /// The distance at a node from the known ones beside it: the solution u of sum over the axes of max(0, u - d)^2 =
+  /// h^2, d the lesser distance of the two nodes along an axis.
+  void relax(const glm::ivec3& at) {
+    constexpr double kFar = std::numeric_limits<double>::infinity();
+    double d[3] = {kFar, kFar, kFar};
+    for_neighbours(at, [&](int axis, const glm::ivec3&, std::size_t other) {
+      if (known_[other]) d[axis] = std::min(d[axis], static_cast<double>(std::abs(grid_.distance[other])));
+    });
+    std::sort(d, d + 3);
+    const double h = grid_.spacing, b = d[1] - d[0], c = d[2] - d[0];
+    double u = h;  // beyond d[0]
+    if (u > b) u = (b + std::sqrt(2 * h * h - b * b)) / 2;
+    if (u > c) u = (b + c + std::sqrt((b + c) * (b + c) - 3 * (b * b + c * c - h * h))) / 3;
+    const float distance = static_cast<float>(d[0] + u);
+    float& held = grid_.distance[grid_.index(at.x, at.y, at.z)];
+    if (!(distance < held)) return;
+    held = distance;
+    heap_.push_back(std::uint64_t{std::bit_cast<std::uint32_t>(distance)} << 32 | grid_.index(at.x, at.y, at.z));
+    std::push_heap(heap_.begin(), heap_.end(), std::greater());
+  }
+
+  void conquer(std::uint32_t node, float distance) {
+    const std::size_t row = node / strides_[1];
+    const glm::ivec3 at(node % strides_[1], row % grid_.nodes.y, row / grid_.nodes.y);
+    std::size_t from = node;  // of the known nodes beside it the nearest to the surface
+    for_neighbours(at, [&](int, const glm::ivec3&, std::size_t other) {
+      if (!known_[other]) return;
+      if (from == node || std::abs(grid_.distance[other]) < std::abs(grid_.distance[from])) from = other;
+    });
+    origin_[node] = origin_[from];
+    const bool inside = normals_.closed() ? std::signbit(grid_.distance[from]) : estimate(at, origin_[node]);
+    grid_.distance[node] = inside ? -distance : distance;
+    known_[node] = 1;
+    for_neighbours(at, [&](int, const glm::ivec3& position, std::size_t other) {
+      if (!known_[other]) relax(position);
+    });
+  }
+
+  bool estimate(const glm::ivec3& at, std::uint32_t triangle) const {
+    const glm::uvec3 t = reference_.triangles[triangle];
+    const glm::dvec3 p = grid_.origin + grid_.spacing * glm::dvec3(at);
+    const auto corner = [&](int k) { return reference_.vertices[t[k]]; };
+    return normals_.inside(p, triangle, closest_point(p, corner(0), corner(1), corner(2)));
+  }
+
+  const TriangleMesh& reference_;
+  const Pseudonormals& normals_;
+  DistanceGrid& grid_;
+  std::vector<std::uint8_t>& known_;
+  std::vector<std::uint32_t> origin_;  // of each known node: the triangle from which the front came
+  const std::size_t strides_[3];
+  // The bits of a distance, which order like it, above those of the node: equal distances go by index.
+  std::vector<std::uint64_t> heap_;
+};
+
+}  // namespace
+
+void fast_marching(const TriangleMesh& reference, DistanceGrid& grid, double stop, unsigned threads,
+                   Progress* progress) {
+  const double band = std::exchange(grid.band, kInitialBand * grid.spacing);
+  scatter(reference, grid, threads, progress);
+  grid.band = band;
+  const Pseudonormals normals(reference);
+  sign_by_triangle(reference, normals, grid, grid.distance, threads);
+  grid.is_signed = true;
+
+  if (progress) progress->begin("marching");
+  std::vector<std::uint8_t> known(grid.distance.size());
+  const float far = static_cast<float>(band);
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    known[i] = grid.triangle[i] != DistanceGrid::kNone;
+    if (!known[i]) grid.distance[i] = far;
+  }
+  Front(reference, normals, grid, known).march(stop, progress);
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    if (!known[i]) grid.distance[i] = far;  // what the front had only touched
+  }
+  spread_signs(grid, known, grid.distance);
+}
+
+}  // namespace tolvol
