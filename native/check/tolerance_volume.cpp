@@ -6,6 +6,7 @@
 
 #include "field/fast_marching.h"
 #include "field/scatter.h"
+#include "field/signs.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
 
@@ -22,11 +23,20 @@ std::vector<glm::dvec3> used_only(std::span<const glm::dvec3> vertices, std::spa
   return result;
 }
 
+/// use(the reference with its faces as they run in the world).
+template <class Use>
+auto in_the_world(const TriangleMesh& reference, bool mirrored, Use&& use) {
+  if (!mirrored) return use(reference);
+  TriangleMesh turned = reference;
+  for (glm::uvec3& t : turned.triangles) std::swap(t.y, t.z);
+  return use(turned);
+}
+
 }  // namespace
 
 ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                                  const Placement& placement, double tolerance, const Options& options)
-    : tolerance_(tolerance), field_(options.field) {
+    : tolerance_(tolerance), field_(options.field), mirrored_(placement.mirrors()) {
   validate(vertices, triangles);
   size_ = reference_size(vertices, triangles, placement.to_world());
   if (!(tolerance > 0) || !std::isfinite(tolerance)) {
@@ -55,12 +65,19 @@ ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span
     if (part == 0 && field_ == Field::scatter) {
       scatter(reference_, grid_, options.threads, options.progress);
     } else if (part == 0) {
-      fast_marching(reference_, grid_, frame_tolerance(), options.threads, options.progress);
+      in_the_world(reference_, mirrored_, [&](const TriangleMesh& mesh) {
+        fast_marching(mesh, grid_, frame_tolerance(), options.threads, options.progress);
+      });
     } else {
       hierarchy_.emplace(reference_);
       witnesses_ = prepare_witnesses(reference_);
     }
   });
+}
+
+std::vector<float> ToleranceVolume::signed_distance() const {
+  return in_the_world(reference_, mirrored_,
+                      [&](const TriangleMesh& mesh) { return tolvol::signed_distance(mesh, grid_); });
 }
 
 std::size_t ToleranceVolume::memory() const {

@@ -45,6 +45,8 @@ class ToleranceVolume {
   const std::vector<WitnessTriangle>& witnesses() const { return witnesses_; }  ///< of the reference, prepared
   const Hierarchy& hierarchy() const { return *hierarchy_; }
   const DistanceGrid& grid() const { return grid_; }
+  /// field/signs.h: the grid's distances, negative inside the reference as it is in the world, mirrored or not.
+  std::vector<float> signed_distance() const;
 
   double tolerance() const { return tolerance_; }  ///< world units
   double frame_tolerance() const { return tolerance_ * frame_.scale(); }
@@ -70,6 +72,7 @@ class ToleranceVolume {
   double size_;
   double mapping_error_;
   Field field_;
+  bool mirrored_;  ///< the reference's triangles run the other way round
 };
 
 }  // namespace tolvol

@@ -31,7 +31,7 @@ Frame::Frame(const Box& world) {
 }
 
 Placement::Placement(const glm::dmat4& to_world, Storage storage, const Frame& frame)
-    : to_world_(to_world), storage_(storage), frame_(frame) {
+    : to_world_(to_world), storage_(storage), mirrors_(false), frame_(frame) {
   for (int column = 0; column < 4; ++column) {
     for (int row = 0; row < 4; ++row) {
       if (!std::isfinite(to_world[column][row])) throw InvalidInput("to_world has a value that is not finite");
@@ -50,7 +50,9 @@ Placement::Placement(const glm::dmat4& to_world, Storage storage, const Frame& f
     if (!(lengths[column] > 0)) throw InvalidInput("to_world is singular: an axis is scaled to zero; give it a scale");
     linear[column] /= lengths[column];
   }
-  if (std::abs(glm::determinant(linear)) < 1e-12) {
+  const double determinant = glm::determinant(linear);
+  mirrors_ = determinant < 0;
+  if (std::abs(determinant) < 1e-12) {
     throw InvalidInput("to_world is singular: it flattens the mesh; give every axis a scale");
   }
   glm::dmat3 inverse = glm::inverse(linear);

@@ -59,6 +59,8 @@ class Placement {
   /// Bound, in frame lengths, on how far store() moves a point whose stored coordinates are no larger than these.
   double storage_step(std::span<const glm::dvec3> stored) const;
 
+  /// Whether `to_world` turns the faces' front to their back.
+  bool mirrors() const { return mirrors_; }
   const glm::dmat4& to_world() const { return to_world_; }
   Storage storage() const { return storage_; }
 
@@ -66,6 +68,7 @@ class Placement {
   glm::dmat4 to_world_;
   glm::dmat4 to_local_;
   Storage storage_;
+  bool mirrors_;
   Frame frame_;
 };
 
