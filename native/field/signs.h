@@ -15,7 +15,7 @@ namespace tolvol {
 /// One value a node, in the grid's order and pitch. Where the reference is closed every sign is right; elsewhere the
 /// surface is continued beyond its boundary (see Pseudonormals), and the values jump across that continuation. Nodes
 /// beyond the band get the sign of those beside them. A grid that is signed already is returned as it is. O(m log
-/// valence + nodes), about the time of scatter().
+/// valence + nodes), about a quarter of the time of scatter().
 std::vector<float> signed_distance(const TriangleMesh& reference, const DistanceGrid& grid, unsigned threads = 0);
 
 /// Gives the nodes that have a triangle their sign; `distance` as grid.distance, not signed so far.

@@ -156,7 +156,8 @@ void bind_volume(py::module_& module) {
            "nx) in units of\n"
            "`unit` world lengths, capped at the band; origin and spacing are in world units. A view, unsigned with "
            "field=\"scatter\". signed:\n"
-           "negative inside, by angle-weighted pseudonormals, a copy that takes about as long as the field; the field "
+           "negative inside, by angle-weighted pseudonormals, a copy made in about a quarter of the field's time; the "
+           "field "
            "\"fast_marching\" is\n"
            "signed anyway. Of an open reference the boundary is extruded, and signed values jump across that.")
       .def_property_readonly(
