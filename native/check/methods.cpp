@@ -5,6 +5,7 @@
 #include "check/certificate.h"
 #include "reference/errors.h"
 #ifdef TOLVOL_GL
+#include "check/gl_certificate.h"
 #include "check/occlusion_query.h"
 #include "check/paper.h"
 #endif
@@ -36,10 +37,12 @@ struct Method {
 constexpr Method kMethods[] = {
     {"certificate", make<Certificate>},
 #ifdef TOLVOL_GL
+    {"gl_certificate", make<GlCertificate>},
     {"occlusion_query", make<OcclusionQuery>},
     {"paper", make_paper<Paper::Margin::half_diagonal>},
     {"paper_half_h", make_paper<Paper::Margin::half_spacing>},
 #else
+    {"gl_certificate", without_gl},
     {"occlusion_query", without_gl},
     {"paper", without_gl},
     {"paper_half_h", without_gl},
