@@ -10,24 +10,22 @@ namespace tolvol {
 class GlCertificate final : public ToleranceCheck {
  public:
   /// Puts the grid's ids and the reference on the GPU: 4 bytes a node, 36 a triangle. Keeps a reference to `volume`,
-  /// which must outlive this. Throws ResourceLimit when this GL holds no buffer that large, GlUnavailable.
+  /// which must outlive this. Throws ResourceLimit when this GL takes no buffer that large, GlUnavailable.
   explicit GlCertificate(const ToleranceVolume& volume);
 
   /// Verdicts are `inside`, as certain as those of Certificate, or `unproved`; never `outside`. Unproved is what is
   /// outside, what the grid names no near triangle for (there is no search for the closest one: on a coarse grid pieces
   /// at nearly the tolerance; all of them in the marched part of a grid that has no ids), what would take more than a
   /// few thousand parts, and everything when float32 would cost more than half of the tolerance (one below about 1e-5
-  /// of the reference). `options.threads` is of no use. Throws GlUnavailable, and then nothing is known.
+  /// of the reference). Throws GlUnavailable, and then nothing is known. A second for a few million small pieces on two
+  /// cores without a GPU.
   std::vector<Verdict> check(const Pieces& pieces, const Options& options) const override;
   std::string method() const override { return "gl_certificate"; }
   std::string renderer() const override { return renderer_; }
 
  private:
-  class Batch;
-
   const ToleranceVolume* volume_;
   std::string renderer_;
-  gl::Program program_;
   gl::Buffer nodes_, a_, ab_, ac_;
 };
 
@@ -44,7 +42,7 @@ class GlCertificate final : public ToleranceCheck {
 /// - for the foot: s ab + t ac has products 4; s + t <= 1 as computed may be 1 + 2u: 4; two subtractions 8;
 /// - for the edge bc instead: x - ab 4, bc = ac - ab 4, the product 4, the subtraction 4.
 /// Either way 30; three coordinates: times sqrt(3), below 52. What the sum of squares and the threshold's own rounding
-/// add is taken off the threshold, see threshold() in the .cpp. 64 leaves room and is a power of two.
+/// add comes off the threshold, see threshold() in the .cpp. 64 leaves room and is a power of two.
 inline double float_error(double magnitude) { return 64 * 0x1p-24 * magnitude; }
 
 }  // namespace tolvol
