@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <numeric>
 #include <span>
@@ -19,7 +20,8 @@ namespace tolvol {
 namespace {
 
 constexpr std::size_t kBatch = 1 << 18;      // triangles on the GPU at a time, 12 MB
-constexpr std::size_t kSlowBatch = 1 << 14;  // of those that may take the whole budget each: a cancel waits for them
+constexpr std::size_t kSlowBatch = 1 << 12;  // of those that may take the whole budget each, to begin with,
+constexpr double kQuick = 0.1;               // and seconds below which the next batch may be larger
 constexpr int kBudget = 1 << 12;             // parts looked at before a triangle is left unproved
 constexpr int kTries = 8;                    // nodes around a part's centre
 constexpr double kShortest = 1.0 / 16;       // of the tolerance: a part this short is not split further
@@ -155,10 +157,16 @@ std::vector<Verdict> GlCertificate::check(const Pieces& pieces, const Options& o
       look_at(open, 1, 1);
     });
     std::erase_if(open, [&](std::uint32_t i) { return proved[i] == 1; });
-    for (std::size_t first = 0; first < open.size(); first += kSlowBatch) {
+    // In steps, for a cancel is seen, and a GPU serves its screen, only between them.
+    std::size_t step = kSlowBatch;
+    for (std::span<const std::uint32_t> rest = open; !rest.empty();) {
       update();
-      const std::span<const std::uint32_t> rest = std::span(open).subspan(first);
-      gl::run([&] { look_at(rest.first(std::min(kSlowBatch, rest.size())), kTries, kBudget); });
+      const std::span<const std::uint32_t> next = rest.first(std::min(step, rest.size()));
+      const auto start = std::chrono::steady_clock::now();
+      gl::run([&] { look_at(next, kTries, kBudget); });
+      const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+      step = took.count() < kQuick ? 2 * step : kSlowBatch;
+      rest = rest.subspan(next.size());
     }
     for (std::size_t i = 0; i < count; ++i) {
       const std::span<const std::uint32_t> own = std::span(proved).subspan(i * per_piece, per_piece);

@@ -123,6 +123,25 @@ TEST_F(GlCertificates, NoWrongAcceptOnNeedles) {
   }
 }
 
+TEST_F(GlCertificates, FindsHoles) {
+  // Candidates in the plane of the reference, where only what is missing of it is outside.
+  const TriangleMesh whole = shapes::grid(40);
+  TriangleMesh plane{whole.vertices, {}};
+  for (std::size_t i = 0; i < whole.triangles.size(); ++i) {
+    if (i / 2 % 37 != 0) plane.triangles.push_back(whole.triangles[i]);
+  }
+  std::mt19937 engine(8);
+  std::uniform_real_distribution<double> u(0, 1);
+  std::vector<dvec3> points;
+  for (int i = 0; i < 5'000; ++i) {
+    const dvec3 base(u(engine), u(engine), 0);
+    for (int k = 0; k < 3; ++k) {
+      points.push_back(glm::clamp(base + 0.3 * dvec3(u(engine) - 0.5, u(engine) - 0.5, 0), dvec3(0), dvec3(1)));
+    }
+  }
+  expect_no_wrong_accept(plane, 0.01, points);
+}
+
 TEST_F(GlCertificates, ProvesWhatDecimationMakes) {
   const TriangleMesh reference = shapes::torus(150, 0.002);
   for (const double tolerance : {0.03, 0.003}) {
@@ -198,10 +217,12 @@ TEST_F(GlCertificates, PointsSegmentsAndQuads) {
   EXPECT_EQ(check_one(volume, {{0.1, 0.5, 0.09}, {1.5, 0.5, 0}}), Verdict::unproved);
   EXPECT_EQ(check_one(volume, {{0, 0, 0.09}, {1, 0, -0.09}, {1, 1, 0.09}, {0, 1, -0.09}}), Verdict::inside);
   EXPECT_EQ(check_one(volume, {{0, 0, 0.09}, {1, 0, -0.09}, {1, 1.2, 0.09}, {0, 1, -0.09}}), Verdict::unproved);
-  // Within in one triangulation, outside in the other: a quad is judged in both.
+  // Within in one triangulation, outside in the other, whichever corner is the first: a quad is judged in both.
   const TriangleMesh roof{{{0, 0, 0}, {1, 0, 0.5}, {1, 1, 0}, {0, 1, 0.5}}, {{0, 1, 3}, {1, 2, 3}}};
   const ToleranceVolume over = volume_of(roof, 0.1);
   EXPECT_EQ(check_one(over, roof.vertices), Verdict::unproved);
+  EXPECT_EQ(check_one(over, {roof.vertices[1], roof.vertices[2], roof.vertices[3], roof.vertices[0]}),
+            Verdict::unproved);
   EXPECT_EQ(check_one(over, {roof.vertices[0], roof.vertices[1], roof.vertices[3]}), Verdict::inside);
 }
 
