@@ -3,11 +3,10 @@
 uniform sampler3D distances;  // frame lengths, never too small
 uniform float bound;
 uniform int cell;
-flat in vec3 corner, edge1, edge2;
-flat in float subdivisions;
 
 bool sample_counts() {
   const vec2 pixel = vec2(ivec2(gl_FragCoord.xy) & (cell - 1));
-  precise const vec3 position = corner + (pixel.x * edge1 + pixel.y * edge2);
-  return pixel.x + pixel.y <= subdivisions && trilinear(distances, position) <= bound;
+  precise const vec3 point = uintBitsToFloat(corner_n.xyz) + (pixel.x * uintBitsToFloat(edge1_slot.xyz) +
+                                                              pixel.y * uintBitsToFloat(edge2_unused.xyz));
+  return pixel.x + pixel.y <= uintBitsToFloat(corner_n.w) && trilinear(distances, point) <= bound;
 }

@@ -4,7 +4,6 @@ uniform sampler3D distances;  // normalised
 uniform vec3 nodes;
 uniform float scale, offset;  // frame length of a texel
 uniform float bound;
-in vec3 position;
 
 bool sample_counts() {
   const float d = texture(distances, (position + 0.5) / nodes).r * scale + offset;

@@ -17,15 +17,24 @@ namespace {
 
 constexpr int kSmallestCell = 64;      // pixels: tiles of renderers that have them are not larger
 constexpr int kSmallestSide = 256;     // pixels: 16 cells keep some processors busy, more make a query dear
+constexpr std::size_t kChunk = 1024;   // triangles drawn before a flush: more leave the caches of a tiled renderer
 constexpr std::size_t kInFlight = 64;  // queries begun before the result of the first is waited for
 // A batch ends with the piece that reaches either of these. The first keeps a buffer below the 128 MB that every GL
 // allows, the second the wait for a cancelled call near a second.
-constexpr std::size_t kBatchParts = std::size_t{1} << 18;
+constexpr std::size_t kBatchParts = std::size_t{1} << 16;
 constexpr std::uint64_t kBatchPoints = std::uint64_t{1} << 25;
 
 std::uint64_t lattice_points(float subdivisions) {
   const auto n = static_cast<std::uint64_t>(subdivisions);
   return (n + 1) * (n + 2) / 2;
+}
+
+void draw_parts(std::size_t begin, std::size_t end) {
+  for (; begin < end; begin += kChunk) {
+    const std::size_t count = std::min(kChunk, end - begin);
+    glDrawArrays(GL_TRIANGLES, static_cast<GLint>(3 * begin), static_cast<GLsizei>(3 * count));
+    if (count == kChunk) glFlush();
+  }
 }
 
 }  // namespace
@@ -39,9 +48,9 @@ struct LatticeCheck::Batch {
 
 LatticeCheck::Programs::Programs(std::string_view counting)
     : query({{GL_VERTEX_SHADER, {"lattice.vert"}},
-             {GL_FRAGMENT_SHADER, {"trilinear.glsl", counting, "query_samples.frag"}}}),
+             {GL_FRAGMENT_SHADER, {"lattice_part.glsl", "trilinear.glsl", counting, "query_samples.frag"}}}),
       slots({{GL_VERTEX_SHADER, {"lattice.vert"}},
-             {GL_FRAGMENT_SHADER, {"trilinear.glsl", counting, "count_samples.frag"}}}) {}
+             {GL_FRAGMENT_SHADER, {"lattice_part.glsl", "trilinear.glsl", counting, "count_samples.frag"}}}) {}
 
 LatticeCheck::LatticeCheck(const ToleranceVolume& volume, float margin)
     : volume_(&volume), margin_(margin), renderer_(gl::renderer().name()) {}
@@ -59,7 +68,9 @@ std::vector<Verdict> LatticeCheck::check_groups(const Pieces& pieces, std::span<
   if (groups.size() != pieces.size()) throw InvalidInput("groups must have one label for each face");
   std::vector<std::uint32_t> order(pieces.size()), labels(pieces.size());
   std::iota(order.begin(), order.end(), 0u);
-  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return groups[a] < groups[b]; });
+  if (!std::is_sorted(groups.begin(), groups.end())) {
+    std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return groups[a] < groups[b]; });
+  }
   for (std::size_t i = 1; i < order.size(); ++i) {
     labels[order[i]] = labels[order[i - 1]] + (groups[order[i]] != groups[order[i - 1]]);
   }
@@ -79,6 +90,7 @@ std::vector<Verdict> LatticeCheck::decide(const Pieces& pieces, std::span<const 
   for (std::size_t next = 0; next < order.size();) {
     if (options.progress) options.progress->update(static_cast<double>(next) / static_cast<double>(order.size()));
     Batch batch;
+    batch.parts.reserve(kBatchParts + 4);
     for (std::uint64_t points = 0; next < order.size() && batch.parts.size() < kBatchParts && points < kBatchPoints;
          ++next) {
       const std::uint32_t piece = order[next], label = labels[piece];
@@ -110,10 +122,11 @@ std::vector<Verdict> LatticeCheck::decide(const Pieces& pieces, std::span<const 
 bool LatticeCheck::add_piece(const Pieces& pieces, std::size_t piece, std::uint32_t slot,
                              std::vector<Part>& parts) const {
   const DistanceGrid& grid = volume_->grid();
+  const double per_spacing = 1 / grid.spacing;
   const std::size_t corners = static_cast<std::size_t>(pieces.corners);
   const std::span<const std::uint32_t> corner = pieces.indices.subspan(piece * corners, corners);
   const auto add = [&](int a, int b, int c) {
-    const auto in_grid = [&](int k) { return (pieces.points[corner[k]] - grid.origin) / grid.spacing; };
+    const auto in_grid = [&](int k) { return (pieces.points[corner[k]] - grid.origin) * per_spacing; };
     return add_parts({in_grid(a), in_grid(b), in_grid(c)}, slot, parts);
   };
   switch (corners) {
@@ -141,7 +154,7 @@ std::vector<std::uint64_t> LatticeCheck::draw(const Batch& batch, float bound, b
     program.set("margin", margin_);
     program.set("bound", bound);
     program.set("cell", cell);
-    program.set("cells", side / cell);
+    program.set("cells_log2", std::countr_zero(static_cast<unsigned>(side / cell)));
     use(program);
     program.use();
     const gl::Framebuffer framebuffer = gl::Framebuffer::without_attachments(side, side);
@@ -154,7 +167,7 @@ std::vector<std::uint64_t> LatticeCheck::draw(const Batch& batch, float bound, b
       gl::Buffer slots(counts.size() * sizeof(std::uint32_t), nullptr);
       slots.clear();
       slots.bind_storage(1);
-      glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(3 * batch.parts.size()));
+      draw_parts(0, batch.parts.size());
       std::vector<std::uint32_t> read(counts.size());
       slots.read(0, slots.bytes(), read.data());
       counts.assign(read.begin(), read.end());
@@ -168,7 +181,7 @@ std::vector<std::uint64_t> LatticeCheck::draw(const Batch& batch, float bound, b
       if (flight.size() <= place) flight.emplace_back(GL_SAMPLES_PASSED);
       const std::size_t first = slot ? batch.ends[slot - 1] : 0;
       flight[place].begin();
-      glDrawArrays(GL_TRIANGLES, static_cast<GLint>(3 * first), static_cast<GLsizei>(3 * (batch.ends[slot] - first)));
+      draw_parts(first, batch.ends[slot]);
       flight[place].end();
     }
   });

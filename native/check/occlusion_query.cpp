@@ -99,7 +99,8 @@ bool OcclusionQuery::add_parts(const Corners& corners, std::uint32_t slot, std::
     if (!(p.x >= 1 && p.y >= 1 && p.z >= 1 && p.x <= last.x && p.y <= last.y && p.z <= last.z)) return false;
   }
   const glm::dvec3 along = corners[1] - corners[0], across = corners[2] - corners[0];
-  const double longest = std::max({glm::length(along), glm::length(across), glm::length(across - along)});
+  const glm::dvec3 third = across - along;
+  const double longest = std::sqrt(std::max({glm::dot(along, along), glm::dot(across, across), glm::dot(third, third)}));
   const double pieces = std::max(1.0, std::ceil(longest / kLargestPart));
   const auto n = static_cast<float>(std::max(1.0, std::ceil(longest / pieces)));
   const glm::dvec3 step1 = along / pieces, step2 = across / pieces;
