@@ -66,19 +66,19 @@ OcclusionQuery::OcclusionQuery(const ToleranceVolume& volume) : LatticeCheck(vol
   });
 }
 
-// What float32 hides, u = 2^-24, G the largest number of nodes along an axis. In grid spacings, per coordinate: the
-// corner rounds by u G; the edges, each once, together by u G after the multiplication, whose own rounding is as much,
-// because i/n + j/n <= 1; the two sums by u G each. 5 u G in three coordinates is below 9 u G h; doubles, which bring
-// the corners into the grid, and n, which they round, are far below the 11 counted here. In the interpolation, t is
-// exact and every term is a product of non-negative factors: for each axis 1 - t, a product and a sum round by u of the
-// result each, 9 u of at most epsilon; 10 leave room for the bound's own rounding. What the witnesses behind the nodes
-// hide is in provable() already.
+// What float32 hides, u = 2^-24, G the largest number of nodes along an axis. GLSL rounds sums and products correctly
+// but to either side: by 2u. In grid spacings, per coordinate: the corner is sent with an error of u G, the edges,
+// because i/n + j/n <= 1, together with u G; their multiplication rounds by 2u G together, the two sums by 2u G each.
+// 8 u G in three coordinates is below 14 u G h; doubles, which bring the corners into the grid, and n, which they round,
+// are far below the 16 counted here. In the interpolation t is exact and every term is a product of non-negative
+// factors: for each axis 1 - t, a product and a sum round by 2u of the result each, 18 u of at most epsilon; 20 leave
+// room for the bound's own rounding. What the witnesses behind the nodes hide is in provable() already.
 float OcclusionQuery::bound(double mapping_error) const {
   constexpr double kUnit = 0x1p-24;
   const DistanceGrid& grid = volume().grid();
   const double h = grid.spacing, epsilon = volume().frame_tolerance(), between = 1 / std::sqrt(3.0) + std::sqrt(0.75),
                provable = volume().provable(mapping_error),
-               rounding = kUnit * (11 * h * std::max({grid.nodes.x, grid.nodes.y, grid.nodes.z}) + 10 * epsilon);
+               rounding = kUnit * (16 * h * std::max({grid.nodes.x, grid.nodes.y, grid.nodes.z}) + 20 * epsilon);
   const double bound = provable - between * h - rounding;
   if (!(bound > 0)) {
     // Half of the tolerance for the steps between samples.
