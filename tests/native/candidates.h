@@ -51,9 +51,8 @@ class Maker {
   /// A triangle of the reference with one corner moved by 0.5 to 1.7 tolerances.
   void spike(Points& points) {
     const glm::uvec3 t = some_triangle();
-    points.push_back(reference_->vertices[t.x] + uniform(0.5, 1.7) * tolerance_ * direction());
-    points.push_back(reference_->vertices[t.y]);
-    points.push_back(reference_->vertices[t.z]);
+    for (int k = 0; k < 3; ++k) points.push_back(reference_->vertices[t[k]]);
+    points[points.size() - 1 - engine_() % 3] += uniform(0.5, 1.7) * tolerance_ * direction();
   }
   /// Any size, any place within two tolerances.
   void anyhow(Points& points) {

@@ -243,7 +243,7 @@ TEST_P(ProvingCheck, CanBeCancelledAndNamesItself) {
 }
 
 #ifdef TOLVOL_GL
-INSTANTIATE_TEST_SUITE_P(Methods, ProvingCheck, testing::Values("certificate", "occlusion_query"),
+INSTANTIATE_TEST_SUITE_P(Methods, ProvingCheck, testing::Values("certificate", "gl_certificate", "occlusion_query"),
                          [](const auto& info) { return std::string(info.param); });
 #else
 INSTANTIATE_TEST_SUITE_P(Methods, ProvingCheck, testing::Values("certificate"),
