@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Differs from certificate.cpp in what a GPU is bad at: no hierarchy, hence no proof of "outside"; parts are walked
+// depth first by counting, without a stack. Candidates that the nearest triangle does not settle are collected and
+// looked at again, so that the many quick ones never wait for the few slow ones beside them.
+#include "check/gl_certificate.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+#include <span>
+#include <sstream>
+
+#include "gl/context.h"
+#include "reference/errors.h"
+#include "reference/parallel.h"
+
+namespace tolvol {
+namespace {
+
+constexpr std::size_t kBatch = 1 << 18;      // triangles on the GPU at a time, 12 MB
+constexpr std::size_t kSlowBatch = 1 << 12;  // of those that may take the whole budget each, to begin with,
+constexpr double kQuick = 0.1;               // and seconds below which the next batch may be larger
+constexpr int kBudget = 1 << 12;             // parts looked at before a triangle is left unproved
+constexpr int kTries = 8;                    // nodes around a part's centre
+constexpr double kShortest = 1.0 / 16;       // of the tolerance: a part this short is not split further
+constexpr GLuint kGroup = 64;                // local_size_x of certificate.comp
+constexpr float kFar = 16;                   // a coordinate far from any reference, whose are below 1, and tolerance
+
+/// A squared distance in floating point, at most this, is of a distance of at most `within`: the two sums, the squares
+/// and this number's own rounding each change it by a factor of at most 1 + 2^-23, and there is room for twice as many.
+float threshold(double within) { return static_cast<float>(within * within * (1 - 0x1p-20)); }
+
+struct CertificateProgram : gl::Program {
+  CertificateProgram() : Program({{GL_COMPUTE_SHADER, {"witness.glsl", "split.glsl", "certificate.comp"}}}) {}
+};
+
+/// Throws ResourceLimit unless GL takes a buffer of that many bytes. On the GL thread.
+void require_room(std::size_t bytes, const char* what) {
+  GLint64 limit = 0;
+  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &limit);
+  if (bytes <= static_cast<std::size_t>(limit)) return;
+  std::ostringstream text;
+  text << what << " take " << (bytes >> 20) << " MB, more than this GL holds in one buffer (" << (limit >> 20)
+       << " MB); the method certificate has no such limit";
+  throw ResourceLimit(text.str());
+}
+
+using Corners = std::array<std::uint8_t, 3>;
+
+/// The triangles of a piece, as its corners' numbers.
+std::span<const Corners> triangles_of(int corners) {
+  static constexpr Corners kPoint[] = {{0, 0, 0}}, kSegment[] = {{0, 1, 1}}, kTriangle[] = {{0, 1, 2}},
+                           kQuad[] = {{0, 1, 2}, {0, 2, 3}, {0, 1, 3}, {1, 2, 3}};
+  static constexpr std::span<const Corners> kTriangles[] = {kPoint, kSegment, kTriangle, kQuad};
+  return kTriangles[corners - 1];
+}
+
+/// Nine coordinates a triangle of the pieces from `begin` on.
+std::vector<float> corners_to_send(const Pieces& pieces, std::size_t begin, std::size_t count, double magnitude,
+                                   unsigned threads) {
+  const std::span<const Corners> triangles = triangles_of(pieces.corners);
+  std::vector<float> result(9 * count * triangles.size());
+  constexpr std::size_t kBlock = 4096;
+  parallel_for(count, kBlock, threads, [&](std::size_t first, std::size_t last) {
+    float* to = result.data() + 9 * first * triangles.size();
+    for (std::size_t i = begin + first; i < begin + last; ++i) {
+      for (const Corners& triangle : triangles) {
+        for (const std::uint8_t corner : triangle) {
+          const glm::dvec3& p = pieces.points[pieces.indices[i * static_cast<std::size_t>(pieces.corners) + corner]];
+          for (int k = 0; k < 3; ++k) {
+            // Written so that NaN is far as well: GLSL promises nothing of it.
+            *to++ = std::abs(p[k]) <= magnitude ? static_cast<float>(p[k]) : kFar;
+          }
+        }
+      }
+    }
+  });
+  return result;
+}
+
+}  // namespace
+
+GlCertificate::GlCertificate(const ToleranceVolume& volume) : volume_(&volume), renderer_(gl::renderer().name()) {
+  const std::vector<std::uint32_t>& nodes = volume.grid().triangle;
+  const std::vector<WitnessTriangle>& reference = volume.witnesses();
+  const auto coordinates = [&](glm::dvec3 WitnessTriangle::*member) {
+    std::vector<float> values;
+    values.reserve(3 * reference.size());
+    for (const WitnessTriangle& t : reference) {
+      for (int k = 0; k < 3; ++k) values.push_back(static_cast<float>((t.*member)[k]));
+    }
+    return values;
+  };
+  gl::run([&] {
+    require_room(nodes.size() * sizeof(std::uint32_t), "the ids at the grid's nodes");
+    require_room(3 * reference.size() * sizeof(float), "the corners of the reference's triangles");
+    nodes_ = gl::Buffer(nodes);
+    a_ = gl::Buffer(coordinates(&WitnessTriangle::a));
+    ab_ = gl::Buffer(coordinates(&WitnessTriangle::ab));
+    ac_ = gl::Buffer(coordinates(&WitnessTriangle::ac));
+    gl::of_context<CertificateProgram>();
+  });
+}
+
+std::vector<Verdict> GlCertificate::check(const Pieces& pieces, const Options& options) const {
+  require_valid(pieces);
+  std::vector<Verdict> verdicts(pieces.size(), Verdict::unproved);
+  const double tolerance = volume_->frame_tolerance(), magnitude = 1 + 2 * tolerance;
+  const double within = volume_->provable(pieces.mapping_error) - float_error(magnitude);
+  if (options.progress) options.progress->begin("checking");
+  if (!(within > 0.5 * tolerance) || pieces.size() == 0) return verdicts;
+
+  const std::size_t per_piece = triangles_of(pieces.corners).size(), per_batch = kBatch / per_piece,
+                    most = std::min(pieces.size(), per_batch) * per_piece;
+  gl::Buffer corners, open_candidates, results;
+  gl::run([&] {
+    corners = gl::Buffer(9 * most * sizeof(float), nullptr);
+    open_candidates = gl::Buffer(most * sizeof(std::uint32_t), nullptr);
+    results = gl::Buffer(most * sizeof(std::uint32_t), nullptr);
+  });
+  std::vector<std::uint32_t> open, proved;
+  const auto look_at = [&](std::span<const std::uint32_t> candidates, int tries, int budget) {
+    // All state anew: between two of these, others may have used the context.
+    const gl::Program& program = gl::of_context<CertificateProgram>();
+    const DistanceGrid& grid = volume_->grid();
+    program.use();
+    program.set("open_count", static_cast<unsigned>(candidates.size()));
+    program.set("origin", glm::vec3(grid.origin));
+    program.set("spacing", static_cast<float>(grid.spacing));
+    program.set("nodes", grid.nodes);
+    program.set("pitch", grid.pitch);
+    program.set("within2", threshold(within));
+    program.set("shortest", static_cast<float>(kShortest * within));
+    program.set("tries", tries);
+    program.set("budget", budget);
+    const gl::Buffer* const bindings[] = {&corners, &open_candidates, &results, &nodes_, &a_, &ab_, &ac_};
+    for (GLuint i = 0; i < std::size(bindings); ++i) bindings[i]->bind_storage(i);
+    open_candidates.write(0, candidates.size_bytes(), candidates.data());
+    glDispatchCompute((static_cast<GLuint>(candidates.size()) + kGroup - 1) / kGroup, 1, 1);
+    results.read(0, proved.size() * sizeof(std::uint32_t), proved.data());
+  };
+
+  for (std::size_t begin = 0; begin < pieces.size(); begin += per_batch) {
+    const auto update = [&] {
+      if (options.progress) options.progress->update(static_cast<double>(begin) / static_cast<double>(pieces.size()));
+    };
+    update();
+    const std::size_t count = std::min(per_batch, pieces.size() - begin);
+    const std::vector<float> sent = corners_to_send(pieces, begin, count, magnitude, options.threads);
+    open.resize(count * per_piece), proved.resize(count * per_piece);
+    std::iota(open.begin(), open.end(), 0u);
+    gl::run([&] {
+      corners.write(0, sent.size() * sizeof(float), sent.data());
+      results.clear();
+      look_at(open, 1, 1);
+    });
+    std::erase_if(open, [&](std::uint32_t i) { return proved[i] == 1; });
+    // In steps, for a cancel is seen, and a GPU serves its screen, only between them.
+    std::size_t step = kSlowBatch;
+    for (std::span<const std::uint32_t> rest = open; !rest.empty();) {
+      update();
+      const std::span<const std::uint32_t> next = rest.first(std::min(step, rest.size()));
+      const auto start = std::chrono::steady_clock::now();
+      gl::run([&] { look_at(next, kTries, kBudget); });
+      const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+      step = took.count() < kQuick ? 2 * step : kSlowBatch;
+      rest = rest.subspan(next.size());
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::span<const std::uint32_t> own = std::span(proved).subspan(i * per_piece, per_piece);
+      if (std::ranges::all_of(own, [](std::uint32_t p) { return p == 1; })) verdicts[begin + i] = Verdict::inside;
+    }
+  }
+  return verdicts;
+}
+
+}  // namespace tolvol

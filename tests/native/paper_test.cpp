@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The paper's check as printed: what it gets right, and how often it is wrong.
+#include "check/paper.h"
+
+#include <gtest/gtest.h>
+
+#include "candidates.h"
+#include "check/methods.h"
+#include "gl_fixture.h"
+#include "reference/errors.h"
+
+namespace {
+
+using namespace tolvol;
+using candidates::ask;
+using candidates::kIdentity;
+using candidates::Maker;
+using candidates::Points;
+
+constexpr double kTolerance = 0.05;
+
+class PaperChecks : public GlTest {
+ protected:
+  static std::unique_ptr<ToleranceVolume> make_volume(const TriangleMesh& reference, double precision) {
+    ToleranceVolume::Options options;
+    options.precision = precision;
+    return std::make_unique<ToleranceVolume>(reference.vertices, reference.triangles, kIdentity, kTolerance, options);
+  }
+};
+
+TEST_F(PaperChecks, SeesAParallelPlaneOnBothSidesOfItsBound) {
+  const double precision = 4;
+  const std::unique_ptr<ToleranceVolume> volume = make_volume(shapes::grid(4), precision);
+  const std::pair<Paper::Margin, double> margins[] = {{Paper::Margin::half_diagonal, std::sqrt(3.0) / 2},
+                                                      {Paper::Margin::half_spacing, 0.5}};
+  for (const auto& [margin, share] : margins) {
+    const Paper check(*volume, margin);
+    const double bound = kTolerance * (1 - share / precision);
+    // A step of the 8 bits is 2/255 of the tolerance, and the hardware's filter loses about as much.
+    const double step = 0.02 * kTolerance;
+    for (const double side : {-1.0, 1.0}) {
+      for (const double z : {0.0, bound - step, bound + step, 5.0}) {
+        const Points points{{0.1, 0.1, side * z}, {0.9, 0.1, side * z}, {0.5, 0.9, side * z}};
+        EXPECT_EQ(ask(check, *volume, points).at(0), z < bound ? Verdict::inside : Verdict::outside) << side * z;
+      }
+    }
+  }
+}
+
+// The numbers are the point: this is what "not conservative" means. Measured at the paper's precision: 66 % of those
+// outside with h/2, and with (sqrt(3)/2) h still most of the small ones.
+TEST_F(PaperChecks, AcceptsSpikesThatTheOthersDoNot) {
+  constexpr int kSpikes = 10'000;
+  const TriangleMesh torus = shapes::torus(128);
+  for (const double precision : {1.1, 4.0}) {
+    const std::unique_ptr<ToleranceVolume> volume = make_volume(torus, precision);
+    Maker maker(torus, kTolerance, 5);
+    Points points;
+    for (int i = 0; i < kSpikes; ++i) maker.spike(points);
+    const int outside = candidates::farther(points, torus, kTolerance);
+    for (const char* method : {"paper", "paper_half_h", "certificate", "gl_certificate", "occlusion_query"}) {
+      if (precision < 2 && std::string(method) == "occlusion_query") continue;
+      const std::vector<Verdict> verdicts = ask(*make_check(method, *volume), *volume, points);
+      const Points in = candidates::accepted(points, verdicts);
+      const int wrong = candidates::farther(in, torus, kTolerance);
+      std::printf("  precision %.1f, %s: %zu of %d spikes accepted, %d of %d outside ones wrongly\n", precision, method,
+                  in.size() / 3, kSpikes, wrong, outside);
+      if (std::string(method).starts_with("paper")) {
+        EXPECT_GT(wrong, outside / 20) << method;
+        EXPECT_LT(wrong, outside) << method;
+      } else {
+        EXPECT_EQ(wrong, 0) << method;
+      }
+    }
+  }
+}
+
+TEST_F(PaperChecks, WhatIsSmallerThanAPixelIsNotDrawn) {
+  const std::unique_ptr<ToleranceVolume> volume = make_volume(shapes::grid(4), 1.1);
+  const Points far{{0.5, 0.5, 1.6 * kTolerance}, {0.5001, 0.5, 1.6 * kTolerance}, {0.5, 0.5001, 1.6 * kTolerance}};
+  EXPECT_EQ(ask(Paper(*volume, Paper::Margin::half_diagonal), *volume, far).at(0), Verdict::inside);
+}
+
+TEST_F(PaperChecks, SaysThatItIsNotConservativeAndIsRefusedByCoarseGrids) {
+  const std::unique_ptr<ToleranceVolume> volume = make_volume(shapes::grid(4), 0.6);
+  EXPECT_EQ(Paper(*volume, Paper::Margin::half_spacing).method(), "paper, h/2 (not conservative)");
+  EXPECT_THROW(Paper(*volume, Paper::Margin::half_diagonal), InvalidInput);
+  const std::unique_ptr<ToleranceVolume> fine = make_volume(shapes::grid(4), 1.1);
+  EXPECT_EQ(Paper(*fine, Paper::Margin::half_diagonal).method(), "paper (not conservative)");
+  EXPECT_THROW(Paper(*make_volume(shapes::grid(4), 0.4), Paper::Margin::half_spacing), InvalidInput);
+}
+
+TEST_F(PaperChecks, LargerThanTheFramebufferOrNotFiniteIsUnproved) {
+  const std::unique_ptr<ToleranceVolume> volume = make_volume(shapes::grid(4), 4);
+  const Paper check(*volume, Paper::Margin::half_diagonal);
+  EXPECT_EQ(ask(check, *volume, {{0, 0, 0}, {1e6, 0, 0}, {0, 1, 0}}).at(0), Verdict::unproved);
+  EXPECT_NE(ask(check, *volume, {{0, 0, 0}, {std::nan(""), 0, 0}, {0, 1, 0}}).at(0), Verdict::inside);
+}
+
+}  // namespace
