@@ -6,6 +6,7 @@
 
 #include <limits>
 #include <random>
+#include <thread>
 
 #include "check/certificate.h"
 #include "gl_fixture.h"
@@ -277,6 +278,19 @@ TEST_F(GlCertificates, BatchesDoNotShow) {
   const std::vector<Verdict> of_quads = check(method, volume, many, 4);
   for (std::size_t i = 0; i < of_quads.size(); ++i) ASSERT_EQ(of_quads[i], quads[i % quads.size()]);
   EXPECT_TRUE(check(method, volume, {}).empty());
+}
+
+TEST_F(GlCertificates, AnswersTwoThreadsAtATime) {
+  const TriangleMesh torus = shapes::torus(40, 0.01);
+  const ToleranceVolume volume = volume_of(torus, 0.05);
+  const GlCertificate method(volume);
+  const std::vector<dvec3> first = hostile(torus, 0.05, 3'000, 1), second = hostile(torus, 0.05, 2'000, 2);
+  const std::vector<Verdict> of_first = check(method, volume, first), of_second = check(method, volume, second);
+  std::thread other([&] {
+    for (int i = 0; i < 10; ++i) EXPECT_EQ(check(method, volume, second), of_second);
+  });
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(check(method, volume, first), of_first);
+  other.join();
 }
 
 TEST_F(GlCertificates, IsCancelled) {
