@@ -8,17 +8,16 @@
 #include <random>
 #include <thread>
 
+#include "candidates.h"
 #include "check/certificate.h"
 #include "gl_fixture.h"
-#include "measure/hausdorff.h"
 #include "shapes.h"
 
 namespace {
 
 using namespace tolvol;
+using candidates::kIdentity;
 using glm::dvec3;
-
-const Placement kIdentity(glm::dmat4(1), Storage::float64);
 
 class GlCertificates : public GlTest {};
 
@@ -71,18 +70,6 @@ std::vector<dvec3> hostile(const TriangleMesh& reference, double tolerance, int 
   return points;
 }
 
-/// The accepted ones.
-TriangleMesh accepted(const std::vector<dvec3>& points, const std::vector<Verdict>& verdicts) {
-  TriangleMesh mesh;
-  for (std::size_t i = 0; i < verdicts.size(); ++i) {
-    if (verdicts[i] != Verdict::inside) continue;
-    const unsigned first = static_cast<unsigned>(mesh.vertices.size());
-    for (std::size_t k = 0; k < 3; ++k) mesh.vertices.push_back(points[3 * i + k]);
-    mesh.triangles.emplace_back(first, first + 1, first + 2);
-  }
-  return mesh;
-}
-
 /// Triangles with two long edges and the given height, some of them segments and points.
 TriangleMesh needles(double height, const dvec3& offset) {
   std::mt19937 engine(5);
@@ -98,12 +85,13 @@ TriangleMesh needles(double height, const dvec3& offset) {
   return mesh;
 }
 
-void expect_no_wrong_accept(const TriangleMesh& reference, double tolerance, const std::vector<dvec3>& points) {
-  const ToleranceVolume volume = volume_of(reference, tolerance);
+void expect_no_wrong_accept(const TriangleMesh& reference, double tolerance, const std::vector<dvec3>& points,
+                            std::optional<double> precision = {}) {
+  const ToleranceVolume volume = volume_of(reference, tolerance, precision);
   const std::vector<Verdict> verdicts = check(GlCertificate(volume), volume, points);
-  const TriangleMesh inside = accepted(points, verdicts);
-  EXPECT_GT(inside.triangles.size(), verdicts.size() / 20);
-  EXPECT_LE(hausdorff(inside, reference, {tolerance}).upper, tolerance);
+  const candidates::Points inside = candidates::accepted(points, verdicts);
+  EXPECT_GT(inside.size() / 3, verdicts.size() / 20);
+  EXPECT_EQ(candidates::farther(inside, reference, tolerance), 0);
   EXPECT_EQ(std::count(verdicts.begin(), verdicts.end(), Verdict::outside), 0);
 }
 
@@ -113,6 +101,14 @@ TEST_F(GlCertificates, NoWrongAccept) {
       SCOPED_TRACE(tolerance);
       expect_no_wrong_accept(reference, tolerance, hostile(reference, tolerance, 20'000, 3));
     }
+  }
+}
+
+TEST_F(GlCertificates, NoWrongAcceptAtAnyPrecision) {
+  const TriangleMesh reference = shapes::torus(30, 0.01);
+  for (const double precision : {0.05, 0.5, 4.0}) {
+    SCOPED_TRACE(precision);
+    expect_no_wrong_accept(reference, 0.03, hostile(reference, 0.03, 5'000, 4), precision);
   }
 }
 
