@@ -6,18 +6,18 @@
 
 #include <limits>
 #include <random>
+#include <thread>
 
+#include "candidates.h"
 #include "check/certificate.h"
 #include "gl_fixture.h"
-#include "measure/hausdorff.h"
 #include "shapes.h"
 
 namespace {
 
 using namespace tolvol;
+using candidates::kIdentity;
 using glm::dvec3;
-
-const Placement kIdentity(glm::dmat4(1), Storage::float64);
 
 class GlCertificates : public GlTest {};
 
@@ -70,18 +70,6 @@ std::vector<dvec3> hostile(const TriangleMesh& reference, double tolerance, int 
   return points;
 }
 
-/// The accepted ones.
-TriangleMesh accepted(const std::vector<dvec3>& points, const std::vector<Verdict>& verdicts) {
-  TriangleMesh mesh;
-  for (std::size_t i = 0; i < verdicts.size(); ++i) {
-    if (verdicts[i] != Verdict::inside) continue;
-    const unsigned first = static_cast<unsigned>(mesh.vertices.size());
-    for (std::size_t k = 0; k < 3; ++k) mesh.vertices.push_back(points[3 * i + k]);
-    mesh.triangles.emplace_back(first, first + 1, first + 2);
-  }
-  return mesh;
-}
-
 /// Triangles with two long edges and the given height, some of them segments and points.
 TriangleMesh needles(double height, const dvec3& offset) {
   std::mt19937 engine(5);
@@ -97,12 +85,13 @@ TriangleMesh needles(double height, const dvec3& offset) {
   return mesh;
 }
 
-void expect_no_wrong_accept(const TriangleMesh& reference, double tolerance, const std::vector<dvec3>& points) {
-  const ToleranceVolume volume = volume_of(reference, tolerance);
+void expect_no_wrong_accept(const TriangleMesh& reference, double tolerance, const std::vector<dvec3>& points,
+                            std::optional<double> precision = {}) {
+  const ToleranceVolume volume = volume_of(reference, tolerance, precision);
   const std::vector<Verdict> verdicts = check(GlCertificate(volume), volume, points);
-  const TriangleMesh inside = accepted(points, verdicts);
-  EXPECT_GT(inside.triangles.size(), verdicts.size() / 20);
-  EXPECT_LE(hausdorff(inside, reference, {tolerance}).upper, tolerance);
+  const candidates::Points inside = candidates::accepted(points, verdicts);
+  EXPECT_GT(inside.size() / 3, verdicts.size() / 20);
+  EXPECT_EQ(candidates::farther(inside, reference, tolerance), 0);
   EXPECT_EQ(std::count(verdicts.begin(), verdicts.end(), Verdict::outside), 0);
 }
 
@@ -112,6 +101,14 @@ TEST_F(GlCertificates, NoWrongAccept) {
       SCOPED_TRACE(tolerance);
       expect_no_wrong_accept(reference, tolerance, hostile(reference, tolerance, 20'000, 3));
     }
+  }
+}
+
+TEST_F(GlCertificates, NoWrongAcceptAtAnyPrecision) {
+  const TriangleMesh reference = shapes::torus(30, 0.01);
+  for (const double precision : {0.05, 0.5, 4.0}) {
+    SCOPED_TRACE(precision);
+    expect_no_wrong_accept(reference, 0.03, hostile(reference, 0.03, 5'000, 4), precision);
   }
 }
 
@@ -277,6 +274,19 @@ TEST_F(GlCertificates, BatchesDoNotShow) {
   const std::vector<Verdict> of_quads = check(method, volume, many, 4);
   for (std::size_t i = 0; i < of_quads.size(); ++i) ASSERT_EQ(of_quads[i], quads[i % quads.size()]);
   EXPECT_TRUE(check(method, volume, {}).empty());
+}
+
+TEST_F(GlCertificates, AnswersTwoThreadsAtATime) {
+  const TriangleMesh torus = shapes::torus(40, 0.01);
+  const ToleranceVolume volume = volume_of(torus, 0.05);
+  const GlCertificate method(volume);
+  const std::vector<dvec3> first = hostile(torus, 0.05, 3'000, 1), second = hostile(torus, 0.05, 2'000, 2);
+  const std::vector<Verdict> of_first = check(method, volume, first), of_second = check(method, volume, second);
+  std::thread other([&] {
+    for (int i = 0; i < 10; ++i) EXPECT_EQ(check(method, volume, second), of_second);
+  });
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(check(method, volume, first), of_first);
+  other.join();
 }
 
 TEST_F(GlCertificates, IsCancelled) {
