@@ -153,19 +153,14 @@ Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::
 }
 
 std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& options) const {
-  if (pieces.corners < 1 || pieces.corners > 4) {
-    throw InvalidInput("a face must have 1 to 4 corners; triangulate larger ones");
-  }
-  if (pieces.indices.size() % static_cast<std::size_t>(pieces.corners) != 0) {
-    throw InvalidInput("the face array is not a whole number of faces");
-  }
+  require_valid(pieces);
   const double within = volume_->provable(pieces.mapping_error), beyond = volume_->refutable(pieces.mapping_error);
   const TriangleCertificate certificate(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within, beyond);
   if (options.progress) options.progress->begin("checking");
 
   // Exact distances of the used points first: they settle most faces, inside (short edges) or outside, and are shared.
   std::vector<bool> used(pieces.points.size(), false);
-  for (const std::uint32_t i : pieces.indices) used.at(i) = true;
+  for (const std::uint32_t i : pieces.indices) used[i] = true;
   constexpr double kOutside = std::numeric_limits<double>::infinity();
   std::vector<double> distance(pieces.points.size(), 0);
   constexpr std::size_t kBlock = 512;

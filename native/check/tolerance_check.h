@@ -38,11 +38,21 @@ class ToleranceCheck {
   };
 
   virtual ~ToleranceCheck() = default;
+  /// A verdict for each piece. Throws InvalidInput for pieces that are not valid, Cancelled.
   virtual std::vector<Verdict> check(const Pieces& pieces, const Options& options) const = 0;
+  /// The same, but every piece gets the least verdict of the pieces with its label. Throws InvalidInput also unless
+  /// there is a label for each.
+  virtual std::vector<Verdict> check_groups(const Pieces& pieces, std::span<const std::int32_t> groups,
+                                            const Options& options) const;
+  /// As reports name it; one whose verdicts are no proofs says "(not conservative)".
   virtual std::string method() const = 0;
   /// What computed it: "CPU", or the name of a GL renderer.
   virtual std::string renderer() const = 0;
 };
+
+/// Throws InvalidInput, naming the first offender, unless there are 1 to 4 corners, a whole number of pieces, and a
+/// point for every index.
+void require_valid(const Pieces& pieces);
 
 /// Gives every piece the least verdict of the pieces with the same label. Throws InvalidInput unless there is a label
 /// for each.

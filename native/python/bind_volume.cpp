@@ -3,7 +3,6 @@
 
 #include <chrono>
 
-#include "check/certificate.h"
 #include "check/tolerance_volume.h"
 #include "python/arrays.h"
 #include "python/module.h"
@@ -43,34 +42,33 @@ struct CheckResult {
 
 CheckResult check(const Volume& volume, const py::object& points, const py::object& faces, const py::object& to_world,
                   const py::object& groups, const std::string& method, int threads, Progress* progress) {
-  if (method != "certificate") throw InvalidInput("unknown method \"" + method + "\"; there is: certificate");
   const Vertices v = to_vertices(points, "points");
   int corners = 3;
   const std::vector<std::uint32_t> indices = to_faces(faces, "faces", corners);
   const Placement placement = Placement(to_matrix(to_world), v.storage).in(volume.native.frame());
   std::vector<std::int32_t> labels;
   if (!groups.is_none()) labels = to_labels(groups, "groups");
-  const Certificate certificate(volume.native);
+  const ToleranceCheck::Options options{to_threads(threads), progress};
+  std::shared_ptr<const ToleranceCheck> by;
   std::vector<Verdict> verdicts;
   {
     const py::gil_scoped_release release;
-    for (std::size_t i = 0; i < indices.size(); ++i) {
-      if (indices[i] >= v.values.size()) {
-        throw InvalidInput("faces[" + std::to_string(i / static_cast<std::size_t>(corners)) + "] uses point " +
-                           std::to_string(indices[i]) + ", but there are only " + std::to_string(v.values.size()));
-      }
-    }
     const std::vector<glm::dvec3> in_frame = placement.frame(v.values);
     for (std::size_t i = 0; i < in_frame.size(); ++i) {
       if (!std::isfinite(glm::dot(in_frame[i], glm::dvec3(1)))) {
         throw InvalidInput("point " + std::to_string(i) + " is not finite");
       }
     }
-    verdicts = certificate.check({in_frame, indices, corners, placement.mapping_error(v.values)},
-                                 {to_threads(threads), progress});
-    if (!groups.is_none()) combine_groups(verdicts, labels);
+    const Pieces pieces{in_frame, indices, corners, placement.mapping_error(v.values)};
+    by = volume.check(method);
+    try {
+      verdicts = groups.is_none() ? by->check(pieces, options) : by->check_groups(pieces, labels, options);
+    } catch (const GlUnavailable&) {
+      volume.forget(method);
+      throw;
+    }
   }
-  return {from_vector<std::uint8_t>(verdicts), certificate.method(), certificate.renderer()};
+  return {from_vector<std::uint8_t>(verdicts), by->method(), by->renderer()};
 }
 
 py::array_t<double> distance(const Volume& volume, const py::object& points, const py::object& to_world, int threads) {

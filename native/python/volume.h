@@ -2,6 +2,12 @@
 /// The Python class ToleranceVolume holds this.
 #pragma once
 
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "check/methods.h"
 #include "check/tolerance_volume.h"
 
 namespace tolvol::python {
@@ -10,6 +16,22 @@ struct Volume {
   ToleranceVolume native;
   std::size_t vertices, triangles;
   double seconds = 0;  ///< to build
+
+  /// Made on first use and kept: those of GL hold textures and buffers. From any thread, without the GIL.
+  std::shared_ptr<const ToleranceCheck> check(const std::string& method) const {
+    const std::lock_guard lock(mutex);
+    std::shared_ptr<const ToleranceCheck>& kept = checks[method];
+    if (!kept) kept = make_check(method, native);
+    return kept;
+  }
+  /// One whose GL failed is made anew the next time.
+  void forget(const std::string& method) const {
+    const std::lock_guard lock(mutex);
+    checks.erase(method);
+  }
+
+  mutable std::mutex mutex;
+  mutable std::map<std::string, std::shared_ptr<const ToleranceCheck>> checks;
 };
 
 }  // namespace tolvol::python
