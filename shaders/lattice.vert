@@ -1,25 +1,28 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Draws candidate triangles so that each pixel is one point of a lattice on the candidate: corners at (0, 0),
-// (n + 3/2, 0) and (0, n + 3/2) cover exactly the pixel centres (i + 1/2, j + 1/2) with i + j <= n, and pixel (i, j)
-// stands for corner 0 + i/n (corner 1 - corner 0) + j/n (corner 2 - corner 0). After [Botsch04, §4], whose triangle of
-// edge n leaves out its own corners.
-layout(std430, binding = 0) readonly buffer Points { float points[]; };        // x, y, z
-layout(std430, binding = 1) readonly buffer Corners { uint corners[]; };       // three a candidate
-layout(std430, binding = 2) readonly buffer Subdivisions { uint lattice[]; };  // n, at least 1
-uniform vec2 framebuffer;  // its size in pixels
+// (n + margin, 0) and (0, n + margin). With a margin of 3/2 they cover exactly the pixel centres (i + 1/2, j + 1/2) with
+// i + j <= n, and pixel (i, j) stands for corner + i edge1 + j edge2. With none they are the triangle of [Botsch04, §4],
+// which leaves out its own corners. Every candidate has a square cell of the framebuffer; they take turns.
+layout(std430, binding = 0) readonly buffer Parts { vec4 parts[]; };  // corner, n; edge1, slot; edge2, unused
+uniform float margin;
+uniform int cell, cells;  // pixels along a cell, cells along the framebuffer
 
-flat out vec3 corner0, edge1, edge2;  // edges divided by n
-flat out uint candidate;
-
-vec3 point(uint i) { return vec3(points[3 * i], points[3 * i + 1], points[3 * i + 2]); }
+flat out vec3 corner, edge1, edge2;  // in grid spacings; edges divided by n
+flat out float subdivisions;
+flat out uint slot;
+out vec3 position;  // of the pixel's centre
 
 void main() {
-  candidate = uint(gl_VertexID) / 3;
-  const uint corner = uint(gl_VertexID) % 3;
-  const float n = float(lattice[candidate]);
-  corner0 = point(corners[3 * candidate]);
-  edge1 = (point(corners[3 * candidate + 1]) - corner0) / n;
-  edge2 = (point(corners[3 * candidate + 2]) - corner0) / n;
-  const vec2 pixel = corner == 1 ? vec2(n + 1.5, 0) : corner == 2 ? vec2(0, n + 1.5) : vec2(0);
-  gl_Position = vec4(2 * pixel / framebuffer - 1, 0, 1);
+  const int part = gl_VertexID / 3, which = gl_VertexID % 3;
+  const vec4 first = parts[3 * part], second = parts[3 * part + 1];
+  corner = first.xyz;
+  edge1 = second.xyz;
+  edge2 = parts[3 * part + 2].xyz;
+  subdivisions = first.w;
+  slot = floatBitsToUint(second.w);
+  const float side = subdivisions + margin;
+  const vec2 pixel = vec2(which == 1 ? side : 0, which == 2 ? side : 0);
+  position = corner + pixel.x * edge1 + pixel.y * edge2;
+  const vec2 place = vec2(part % cells, part / cells % cells);
+  gl_Position = vec4(2 * (place + pixel / cell) / cells - 1, 0, 1);
 }

@@ -4,6 +4,10 @@
 
 #include "check/certificate.h"
 #include "reference/errors.h"
+#ifdef TOLVOL_GL
+#include "check/occlusion_query.h"
+#include "check/paper.h"
+#endif
 
 namespace tolvol {
 namespace {
@@ -13,6 +17,17 @@ std::unique_ptr<ToleranceCheck> make(const ToleranceVolume& volume) {
   return std::make_unique<Check>(volume);
 }
 
+#ifdef TOLVOL_GL
+template <Paper::Margin kMargin>
+std::unique_ptr<ToleranceCheck> make_paper(const ToleranceVolume& volume) {
+  return std::make_unique<Paper>(volume, kMargin);
+}
+#else
+std::unique_ptr<ToleranceCheck> without_gl(const ToleranceVolume&) {
+  throw GlUnavailable("GL unavailable: this module was built without it (TOLVOL_GL=OFF)");
+}
+#endif
+
 struct Method {
   const char* name;
   std::unique_ptr<ToleranceCheck> (*make)(const ToleranceVolume&);
@@ -20,6 +35,15 @@ struct Method {
 
 constexpr Method kMethods[] = {
     {"certificate", make<Certificate>},
+#ifdef TOLVOL_GL
+    {"occlusion_query", make<OcclusionQuery>},
+    {"paper", make_paper<Paper::Margin::half_diagonal>},
+    {"paper_half_h", make_paper<Paper::Margin::half_spacing>},
+#else
+    {"occlusion_query", without_gl},
+    {"paper", without_gl},
+    {"paper_half_h", without_gl},
+#endif
 };
 
 }  // namespace

@@ -21,6 +21,7 @@ class DistanceTexture {
   DistanceTexture(const DistanceGrid& grid, std::span<const float> distance, double limit, TextureFormat format);
 
   const gl::Texture& texture() const { return texture_; }
+  void filter_linearly() { texture_.filter_linearly(); }
   /// What a texel holds is `scale` * its value + `offset`, in frame lengths: 1 and 0 for float32.
   float scale() const { return scale_; }
   float offset() const { return offset_; }

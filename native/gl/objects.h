@@ -14,6 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include "gl/context.h"
+
 namespace tolvol::gl {
 
 /// The name of one GL object; movable.
@@ -157,5 +159,19 @@ class VertexArray {
  private:
   Object object_;
 };
+
+/// The one T of the current context, made on first use, on the GL thread: for programs, which take long to compile.
+template <class T>
+T& of_context() {
+  // Never destroyed at the end of the process, when the driver may be gone before.
+  static T* kept = nullptr;
+  static unsigned made_in = 0;
+  if (!kept || made_in != generation()) {
+    delete std::exchange(kept, nullptr);
+    kept = new T;
+    made_in = generation();
+  }
+  return *kept;
+}
 
 }  // namespace tolvol::gl

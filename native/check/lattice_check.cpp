@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Based on [Botsch04, §4]. Candidates are not all drawn in one corner: each has a cell of a framebuffer of several, so
+// that a renderer that deals tiles out to its processors can use more than one. The framebuffer has no attachments:
+// nothing is written but the counts.
+#include "check/lattice_check.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+
+#include "gl/context.h"
+#include "reference/errors.h"
+
+namespace tolvol {
+namespace {
+
+constexpr int kSmallestCell = 64;      // pixels: tiles of renderers that have them are not larger
+constexpr int kSmallestSide = 256;     // pixels: 16 cells keep some processors busy, more make a query dear
+constexpr std::size_t kInFlight = 64;  // queries begun before the result of the first is waited for
+// A batch ends with the piece that reaches either of these. The first keeps a buffer below the 128 MB that every GL
+// allows, the second the wait for a cancelled call near a second.
+constexpr std::size_t kBatchParts = std::size_t{1} << 18;
+constexpr std::uint64_t kBatchPoints = std::uint64_t{1} << 25;
+
+std::uint64_t lattice_points(float subdivisions) {
+  const auto n = static_cast<std::uint64_t>(subdivisions);
+  return (n + 1) * (n + 2) / 2;
+}
+
+}  // namespace
+
+/// Consecutive slots, each with the parts of its pieces.
+struct LatticeCheck::Batch {
+  std::vector<Part> parts;
+  std::vector<std::size_t> ends;      // of each slot's parts
+  std::vector<std::uint32_t> labels;  // what the slots stand for
+};
+
+LatticeCheck::Programs::Programs(std::string_view counting)
+    : query({{GL_VERTEX_SHADER, {"lattice.vert"}},
+             {GL_FRAGMENT_SHADER, {"trilinear.glsl", counting, "query_samples.frag"}}}),
+      slots({{GL_VERTEX_SHADER, {"lattice.vert"}},
+             {GL_FRAGMENT_SHADER, {"trilinear.glsl", counting, "count_samples.frag"}}}) {}
+
+LatticeCheck::LatticeCheck(const ToleranceVolume& volume, float margin)
+    : volume_(&volume), margin_(margin), renderer_(gl::renderer().name()) {}
+
+std::vector<Verdict> LatticeCheck::check(const Pieces& pieces, const Options& options) const {
+  require_valid(pieces);
+  std::vector<std::uint32_t> each(pieces.size());
+  std::iota(each.begin(), each.end(), 0u);
+  return decide(pieces, each, each, false, options);
+}
+
+std::vector<Verdict> LatticeCheck::check_groups(const Pieces& pieces, std::span<const std::int32_t> groups,
+                                                const Options& options) const {
+  require_valid(pieces);
+  if (groups.size() != pieces.size()) throw InvalidInput("groups must have one label for each face");
+  std::vector<std::uint32_t> order(pieces.size()), labels(pieces.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return groups[a] < groups[b]; });
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    labels[order[i]] = labels[order[i - 1]] + (groups[order[i]] != groups[order[i - 1]]);
+  }
+  return decide(pieces, order, labels, true, options);
+}
+
+std::vector<Verdict> LatticeCheck::decide(const Pieces& pieces, std::span<const std::uint32_t> order,
+                                          std::span<const std::uint32_t> labels, bool queries,
+                                          const Options& options) const {
+  if (options.progress) options.progress->begin("checking");
+  const float bound = this->bound(pieces.mapping_error);
+  struct Sum {
+    std::uint64_t counted = 0, points = 0;
+    bool drawn = true;
+  };
+  std::vector<Sum> sums(order.empty() ? 0 : labels[order.back()] + 1);
+  for (std::size_t next = 0; next < order.size();) {
+    if (options.progress) options.progress->update(static_cast<double>(next) / static_cast<double>(order.size()));
+    Batch batch;
+    for (std::uint64_t points = 0; next < order.size() && batch.parts.size() < kBatchParts && points < kBatchPoints;
+         ++next) {
+      const std::uint32_t piece = order[next], label = labels[piece];
+      if (batch.labels.empty() || batch.labels.back() != label) {
+        batch.labels.push_back(label);
+        batch.ends.push_back(batch.parts.size());
+      }
+      const std::size_t first = batch.parts.size();
+      const auto slot = static_cast<std::uint32_t>(batch.labels.size() - 1);
+      if (!add_piece(pieces, piece, slot, batch.parts)) sums[label].drawn = false;
+      for (std::size_t i = first; i < batch.parts.size(); ++i) {
+        const std::uint64_t of_part = lattice_points(batch.parts[i].subdivisions);
+        sums[label].points += of_part;
+        points += of_part;
+      }
+      batch.ends.back() = batch.parts.size();
+    }
+    const std::vector<std::uint64_t> counts = draw(batch, bound, queries);
+    for (std::size_t slot = 0; slot < counts.size(); ++slot) sums[batch.labels[slot]].counted += counts[slot];
+  }
+  std::vector<Verdict> verdicts(pieces.size());
+  for (std::size_t i = 0; i < verdicts.size(); ++i) {
+    const Sum& sum = sums[labels[i]];
+    verdicts[i] = sum.drawn ? verdict(sum.counted, sum.points) : Verdict::unproved;
+  }
+  return verdicts;
+}
+
+bool LatticeCheck::add_piece(const Pieces& pieces, std::size_t piece, std::uint32_t slot,
+                             std::vector<Part>& parts) const {
+  const DistanceGrid& grid = volume_->grid();
+  const std::size_t corners = static_cast<std::size_t>(pieces.corners);
+  const std::span<const std::uint32_t> corner = pieces.indices.subspan(piece * corners, corners);
+  const auto add = [&](int a, int b, int c) {
+    const auto in_grid = [&](int k) { return (pieces.points[corner[k]] - grid.origin) / grid.spacing; };
+    return add_parts({in_grid(a), in_grid(b), in_grid(c)}, slot, parts);
+  };
+  switch (corners) {
+    case 1:
+      return add(0, 0, 0);
+    case 2:
+      return add(0, 1, 1);
+    case 3:
+      return add(0, 1, 2);
+    default:
+      return add(0, 1, 2) && add(0, 2, 3) && add(0, 1, 3) && add(1, 2, 3);
+  }
+}
+
+std::vector<std::uint64_t> LatticeCheck::draw(const Batch& batch, float bound, bool queries) const {
+  std::vector<std::uint64_t> counts(batch.ends.size(), 0);
+  if (batch.parts.empty()) return counts;
+  float largest = 0;
+  for (const Part& part : batch.parts) largest = std::max(largest, part.subdivisions);
+  // A pixel more on both sides than the margin needs.
+  const int cell = static_cast<int>(std::bit_ceil(std::max<unsigned>(kSmallestCell, static_cast<unsigned>(largest) + 2)));
+  const int side = std::max(cell, kSmallestSide);
+  gl::run([&] {
+    const gl::Program& program = queries ? programs().query : programs().slots;
+    program.set("margin", margin_);
+    program.set("bound", bound);
+    program.set("cell", cell);
+    program.set("cells", side / cell);
+    use(program);
+    program.use();
+    const gl::Framebuffer framebuffer = gl::Framebuffer::without_attachments(side, side);
+    framebuffer.bind();
+    const gl::VertexArray nothing = gl::VertexArray::make();
+    nothing.bind();
+    const gl::Buffer parts(batch.parts);
+    parts.bind_storage(0);
+    if (!queries) {
+      gl::Buffer slots(counts.size() * sizeof(std::uint32_t), nullptr);
+      slots.clear();
+      slots.bind_storage(1);
+      glDrawArrays(GL_TRIANGLES, 0, static_cast<GLsizei>(3 * batch.parts.size()));
+      std::vector<std::uint32_t> read(counts.size());
+      slots.read(0, slots.bytes(), read.data());
+      counts.assign(read.begin(), read.end());
+      return;
+    }
+    std::vector<gl::Query> flight;
+    for (std::size_t slot = 0; slot < counts.size() + kInFlight; ++slot) {
+      const std::size_t place = slot % kInFlight;
+      if (slot >= kInFlight && slot - kInFlight < counts.size()) counts[slot - kInFlight] = flight[place].result();
+      if (slot >= counts.size()) continue;
+      if (flight.size() <= place) flight.emplace_back(GL_SAMPLES_PASSED);
+      const std::size_t first = slot ? batch.ends[slot - 1] : 0;
+      flight[place].begin();
+      glDrawArrays(GL_TRIANGLES, static_cast<GLint>(3 * first), static_cast<GLsizei>(3 * (batch.ends[slot] - first)));
+      flight[place].end();
+    }
+  });
+  return counts;
+}
+
+}  // namespace tolvol

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// What the checks have in common that draw candidates with the distance texture and count pixels [Botsch04, §4].
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "check/tolerance_check.h"
+#include "gl/objects.h"
+
+namespace tolvol {
+
+class LatticeCheck : public ToleranceCheck {
+ public:
+  /// Counts in shader storage, one counter a piece. O(points of the lattices).
+  std::vector<Verdict> check(const Pieces& pieces, const Options& options) const override;
+  /// One occlusion query a label, many of them in flight.
+  std::vector<Verdict> check_groups(const Pieces& pieces, std::span<const std::int32_t> groups,
+                                    const Options& options) const override;
+  std::string renderer() const override { return renderer_; }
+
+ protected:
+  /// A triangle to draw, as lattice.vert reads it; lengths in grid spacings, from node (0, 0, 0).
+  struct Part {
+    glm::vec3 corner;
+    float subdivisions;
+    glm::vec3 edge1;  ///< divided by the subdivisions, like edge2
+    std::uint32_t slot;
+    glm::vec3 edge2;
+    float unused;
+  };
+  using Corners = std::array<glm::dvec3, 3>;  ///< of a triangle, in grid spacings from node (0, 0, 0)
+
+  struct Programs {
+    /// `counting`: the file that defines sample_counts().
+    explicit Programs(std::string_view counting);
+    gl::Program query, slots;
+  };
+
+  /// `margin`: see lattice.vert. Throws GlUnavailable.
+  LatticeCheck(const ToleranceVolume& volume, float margin);
+
+  /// The distance, in the frame, that samples are compared with. Throws InvalidInput when there is none.
+  virtual float bound(double mapping_error) const = 0;
+  /// Appends what to draw for a triangle; false when it cannot be drawn, and nothing is then known of it.
+  virtual bool add_parts(const Corners& corners, std::uint32_t slot, std::vector<Part>& parts) const = 0;
+  /// Binds texture and uniforms; on the GL thread.
+  virtual void use(const gl::Program& program) const = 0;
+  virtual const Programs& programs() const = 0;
+  /// `counted` pixels, of lattices with `points` points together.
+  virtual Verdict verdict(std::uint64_t counted, std::uint64_t points) const = 0;
+
+  const ToleranceVolume& volume() const { return *volume_; }
+
+ private:
+  struct Batch;
+  std::vector<Verdict> decide(const Pieces& pieces, std::span<const std::uint32_t> order,
+                              std::span<const std::uint32_t> labels, bool queries, const Options& options) const;
+  bool add_piece(const Pieces& pieces, std::size_t piece, std::uint32_t slot, std::vector<Part>& parts) const;
+  std::vector<std::uint64_t> draw(const Batch& batch, float bound, bool queries) const;
+
+  const ToleranceVolume* volume_;
+  float margin_;
+  std::string renderer_;
+};
+
+}  // namespace tolvol

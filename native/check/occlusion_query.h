@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The paper's check by occlusion queries [Botsch04, §4], made conservative.
+///
+/// A candidate is drawn so that its pixels are the points of a lattice on it, n subdivisions an edge, spacing at most
+/// that of the grid; the points at which the interpolated distance is at most eps' are counted. Inside only if all of
+/// them were: whatever is not drawn is not proved. The rest is unproved; outside is never claimed.
+#pragma once
+
+#include <optional>
+
+#include "check/lattice_check.h"
+#include "field/distance_texture.h"
+
+namespace tolvol {
+
+class OcclusionQuery final : public LatticeCheck {
+ public:
+  /// Keeps a reference to `volume`, which must outlive this. Throws InvalidInput when the grid is too coarse, naming the
+  /// precision that will do: eps' is eps - 1.44 h less the rounding of float32, so 4 is good and 1.45 useless;
+  /// ResourceLimit when the grid is too large for a texture; GlUnavailable. O(nodes).
+  explicit OcclusionQuery(const ToleranceVolume& volume);
+  std::string method() const override { return "occlusion_query"; }
+
+ private:
+  float bound(double mapping_error) const override;
+  bool add_parts(const Corners& corners, std::uint32_t slot, std::vector<Part>& parts) const override;
+  void use(const gl::Program& program) const override;
+  const Programs& programs() const override;
+  Verdict verdict(std::uint64_t counted, std::uint64_t points) const override;
+
+  std::optional<DistanceTexture> texture_;
+};
+
+}  // namespace tolvol

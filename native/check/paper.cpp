@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// [Botsch04, §4] as printed, but for what is larger than a framebuffer: that stays unproved. Its distances are those of
+// the volume's grid, whichever way it was filled.
+#include "check/paper.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "gl/context.h"
+#include "reference/errors.h"
+
+namespace tolvol {
+
+Paper::Paper(const ToleranceVolume& volume, Margin margin) : LatticeCheck(volume, 0), margin_(margin) {
+  bound(0);  // throws before any work when the grid is too coarse
+  gl::run([&] {
+    texture_.emplace(volume.grid(), volume.grid().distance, volume.frame_tolerance(), TextureFormat::normalised8);
+    texture_->filter_linearly();
+    largest_ = gl::Framebuffer::largest();
+    programs();
+  });
+}
+
+std::string Paper::method() const {
+  return margin_ == Margin::half_diagonal ? "paper (not conservative)" : "paper, h/2 (not conservative)";
+}
+
+float Paper::bound(double) const {
+  const double share = margin_ == Margin::half_diagonal ? std::sqrt(0.75) : 0.5;
+  const double bound = volume().frame_tolerance() - share * volume().grid().spacing;
+  if (!(bound > 0)) {
+    std::ostringstream text;
+    text << "the method paper needs a finer grid: at a precision of " << volume().precision()
+         << " its margin is more than the tolerance; take precision=1.1";
+    throw InvalidInput(text.str());
+  }
+  return static_cast<float>(bound);
+}
+
+bool Paper::add_parts(const Corners& corners, std::uint32_t slot, std::vector<Part>& parts) const {
+  const glm::dvec3 along = corners[1] - corners[0], across = corners[2] - corners[0];
+  const double longest = std::max({glm::length(along), glm::length(across), glm::length(across - along)});
+  const double l = std::ceil(longest);
+  // Written so that NaN fails as well.
+  if (!(l + 2 <= largest_)) return false;
+  // Of a candidate that is one point nothing is drawn; the division must not be by zero.
+  const double steps = std::max(l, 1.0);
+  parts.push_back({corners[0], static_cast<float>(l), along / steps, slot, across / steps, 0});
+  return true;
+}
+
+void Paper::use(const gl::Program& program) const {
+  texture_->texture().bind(0);
+  program.set("distances", 0);
+  program.set("nodes", glm::vec3(volume().grid().nodes));
+  program.set("scale", texture_->scale());
+  program.set("offset", texture_->offset());
+}
+
+const LatticeCheck::Programs& Paper::programs() const {
+  struct Own : Programs {
+    Own() : Programs("paper.frag") {}
+  };
+  return gl::of_context<Own>();
+}
+
+Verdict Paper::verdict(std::uint64_t counted, std::uint64_t) const {
+  return counted == 0 ? Verdict::inside : Verdict::outside;
+}
+
+}  // namespace tolvol
