@@ -14,4 +14,4 @@ vec3 outside_colour(vec2 at, float period, vec3 colour, vec3 stripe) {
 }
 
 // A light beside the eye and an even sky; 1 where the surface faces the eye.
-float head_light(vec3 normal, vec3 to_eye) { return mix(0.38, 1, abs(dot(normal, to_eye))); }
+float head_light(vec3 normal, vec3 to_eye) { return mix(0.5, 1, abs(dot(normal, to_eye))); }

@@ -13,7 +13,7 @@ in vec3 place;
 out vec4 colour;  // multiplied by alpha
 
 const vec3 kClay = vec3(0.93, 0.90, 0.86), kShell = vec3(0.16, 0.52, 0.78);
-const float kAbsorption = 0.55;  // of a stretch as long as the tolerance, as an exponent
+const float kAbsorption = 0.4;  // of a stretch as long as the tolerance, as an exponent
 
 void main() {
   const vec3 ray = place - eye;
@@ -39,7 +39,7 @@ void main() {
       abs(signed_distance(field, entry + e.yyx)) - abs(signed_distance(field, entry - e.yyx)));
   const float facing = clamp(abs(dot(normalize(gradient + 1e-6), direction)), 0, 1);
   const float rim = pow(1 - facing, 3);
-  const float alpha = 1 - exp(-kAbsorption * passage.inside / tolerance) * (1 - 0.6 * rim);
+  const float alpha = 1 - exp(-kAbsorption * passage.inside / tolerance) * (1 - 0.7 * rim);
   const vec3 shell = kShell * mix(0.55, 1, facing) + 0.35 * pow(facing, 40);
   colour = vec4(shell * alpha, alpha) + (1 - alpha) * colour;
 }

@@ -52,13 +52,15 @@ void validate(const Camera& camera) {
   require_angle(camera.angle);
 }
 
-Camera framing(std::span<const glm::dvec3> world, std::span<const glm::uvec3> triangles, const glm::dvec3& direction,
-               const glm::dvec3& up, double angle, double aspect) {
-  if (!finite(direction) || !finite(up)) throw InvalidInput("the camera's direction and up must be finite");
-  require_direction(direction, up);
-  require_angle(angle);
-  if (!(aspect > 0 && std::isfinite(aspect))) throw InvalidInput("the picture's width and height must be positive");
-  const Axes axes(-direction, up);
+Camera framing(std::span<const glm::dvec3> world, std::span<const glm::uvec3> triangles, const Framing& how) {
+  if (!finite(how.direction) || !finite(how.up)) throw InvalidInput("the camera's direction and up must be finite");
+  require_direction(how.direction, how.up);
+  require_angle(how.angle);
+  if (!(how.aspect > 0 && std::isfinite(how.aspect))) {
+    throw InvalidInput("the picture's width and height must be positive");
+  }
+  if (!(how.room >= 0 && std::isfinite(how.room))) throw InvalidInput("the room around the mesh must not be negative");
+  const Axes axes(-how.direction, how.up);
   const glm::dmat3 to_view = glm::transpose(glm::dmat3(axes.right, axes.above, axes.forward));
   const std::vector<bool> used = used_vertices(world.size(), triangles);
   Box box;  // in view axes
@@ -66,23 +68,26 @@ Camera framing(std::span<const glm::dvec3> world, std::span<const glm::uvec3> tr
     if (used[i]) box.add(to_view * world[i]);
   }
   const glm::dvec3 centre = 0.5 * box.lower + 0.5 * box.upper;
-  const double above = std::tan(glm::radians(angle) / 2) / kMargin, right = above * aspect;
+  const double above = std::tan(glm::radians(how.angle) / 2) / kMargin, right = above * how.aspect;
   double distance = 0;
   for (std::size_t i = 0; i < world.size(); ++i) {
     if (!used[i]) continue;
     const glm::dvec3 p = to_view * world[i] - centre;
-    distance = std::max({distance, std::abs(p.x) / right - p.z, std::abs(p.y) / above - p.z});
+    const double z = p.z - how.room;
+    distance = std::max({distance, (std::abs(p.x) + how.room) / right - z, (std::abs(p.y) + how.room) / above - z});
   }
-  // A flat mesh seen edge on, or a single point, would have the eye within it.
+  // A flat mesh seen edge on would have the eye within it.
   const glm::dvec3 extent = box.upper - box.lower;
-  distance = std::max({distance, extent.x, extent.y, extent.z, std::numeric_limits<double>::min()});
+  distance = std::max({distance, extent.x, extent.y, extent.z});
+  if (!(distance > 0)) distance = 1;
   const glm::dvec3 target = glm::transpose(to_view) * centre;
-  Camera camera{target - distance * axes.forward, target, up, angle};
+  const Camera camera{target - distance * axes.forward, target, how.up, how.angle};
   validate(camera);
   return camera;
 }
 
-View::View(const Camera& camera, const Frame& frame, double aspect, const Box& box) : eye(frame.from_world(camera.eye)) {
+View::View(const Camera& camera, const Frame& frame, double aspect, const Box& box)
+    : eye(frame.from_world(camera.eye)) {
   const Axes axes(camera.target - camera.eye, camera.up);
   const double half = std::tan(glm::radians(camera.angle) / 2);
   forward = axes.forward, right = axes.right * half * aspect, above = axes.above * half;

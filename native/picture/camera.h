@@ -20,10 +20,19 @@ struct Camera {
 /// angle is between 0 and 180 degrees, without either.
 void validate(const Camera& camera);
 
-/// The camera that sees all used vertices as large as a picture of this width over height can, looking against
-/// `direction`. Throws InvalidInput like validate() does. O(n).
-Camera framing(std::span<const glm::dvec3> world, std::span<const glm::uvec3> triangles, const glm::dvec3& direction,
-               const glm::dvec3& up, double angle, double aspect);
+/// How framing() looks.
+struct Framing {
+  glm::dvec3 direction{0.55, -1,
+                       0.4};  ///< from the mesh to the eye; the front, right and above of a model of Blender's
+  glm::dvec3 up{0, 0, 1};
+  double angle = 30;  ///< the height of the picture in degrees
+  double aspect = 1;  ///< its width over its height
+  double room = 0;    ///< kept around the mesh, world units
+};
+
+/// The camera that sees all used vertices of a mesh as large as the picture can show them. Throws InvalidInput like
+/// validate() does. O(n).
+Camera framing(std::span<const glm::dvec3> world, std::span<const glm::uvec3> triangles, const Framing& how);
 
 /// A camera as the shaders take it.
 struct View {

@@ -19,8 +19,8 @@ void resolve(const std::vector<std::uint8_t>& drawn, int row, const glm::ivec2& 
   parallel_for(static_cast<std::size_t>(count.y), 64, 0, [&](std::size_t begin, std::size_t end) {
     for (std::size_t y = begin; y < end; ++y) {
       const std::size_t image_row = static_cast<std::size_t>(image.height - 1 - from.y) - y;
-      std::uint8_t* out = &image.pixels[4 * (image_row * static_cast<std::size_t>(image.width) +
-                                             static_cast<std::size_t>(from.x))];
+      std::uint8_t* out =
+          &image.pixels[4 * (image_row * static_cast<std::size_t>(image.width) + static_cast<std::size_t>(from.x))];
       for (int x = 0; x < count.x; ++x, out += 4) {
         unsigned sum[4] = {};
         for (int j = 0; j < samples; ++j) {

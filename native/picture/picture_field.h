@@ -25,7 +25,7 @@ class PictureField {
   PictureField(const TriangleMesh& reference, double tolerance, unsigned threads = 0, Progress* progress = nullptr);
 
   const gl::Texture& texture() const { return texture_->texture(); }  ///< in units of spacing()
-  const Box& box() const { return box_; }                              ///< of the reference
+  const Box& box() const { return box_; }                             ///< of the reference
   const glm::dvec3& origin() const { return grid_.origin; }
   double spacing() const { return grid_.spacing; }
   const glm::ivec3& nodes() const { return grid_.nodes; }

@@ -13,9 +13,9 @@ constexpr float kStripe = 12;  // pixels from one stripe to the next
 
 DistanceRenderer::DistanceRenderer(const PictureField& field) : field_(&field) {
   gl::run([&] {
-    faces_ = gl::Program(
-        {{GL_VERTEX_SHADER, {"mesh.vert"}},
-         {GL_FRAGMENT_SHADER, {"signed_distance.glsl", "distance_colour.glsl", "render_distance.frag"}}});
+    faces_ =
+        gl::Program({{GL_VERTEX_SHADER, {"mesh.vert"}},
+                     {GL_FRAGMENT_SHADER, {"signed_distance.glsl", "distance_colour.glsl", "render_distance.frag"}}});
     edges_ = gl::Program({{GL_VERTEX_SHADER, {"mesh.vert"}}, {GL_FRAGMENT_SHADER, {"edge.frag"}}});
     signed_ = transfer_texture(Transfer::signed_distance);
     magnitude_ = transfer_texture(Transfer::magnitude);

@@ -10,12 +10,12 @@
 namespace tolvol {
 namespace {
 
-constexpr int kTile = 512;      // samples: a wish to stop is heeded between tiles
-constexpr int kFarNodes = 40;   // along the longest side; more cost more to fill than they save in steps
+constexpr int kTile = 512;     // samples: a wish to stop is heeded between tiles
+constexpr int kFarNodes = 40;  // along the longest side; more cost more to fill than they save in steps
 
 glm::vec4 plane_in_nodes(const VolumeRenderer::Cut& cut, const Frame& frame, const PictureField& field) {
-  const glm::dvec3 normal = cut.normal / glm::max(glm::max(std::abs(cut.normal.x), std::abs(cut.normal.y)),
-                                                  std::abs(cut.normal.z));
+  const glm::dvec3 normal =
+      cut.normal / glm::max(glm::max(std::abs(cut.normal.x), std::abs(cut.normal.y)), std::abs(cut.normal.z));
   // NaN fails as well.
   if (!(glm::length(normal) >= 1) || !(glm::length(cut.point) < std::numeric_limits<double>::infinity())) {
     throw InvalidInput("the cut's point and normal must be finite and its normal not zero");
@@ -37,8 +37,8 @@ VolumeRenderer::VolumeRenderer(const PictureField& field, const Hierarchy& hiera
     for (std::size_t i = begin; i < end; ++i) {
       const int j = static_cast<int>(i);
       const glm::dvec3 node = glm::dvec3(j % size.x, j / size.x % size.y, j / (size.x * size.y)) * far_spacing_;
-      distances[i] = static_cast<float>(hierarchy.nearest(field.origin() + field.spacing() * node).distance /
-                                        field.spacing());
+      distances[i] =
+          static_cast<float>(hierarchy.nearest(field.origin() + field.spacing() * node).distance / field.spacing());
     }
   });
   gl::run([&] {

@@ -45,17 +45,13 @@ Camera make_camera(const Vector& eye, const Vector& target, const Vector& up, do
 
 double aspect(const Size& size) { return static_cast<double>(size[0]) / size[1]; }
 
-constexpr double kAngle = 30;
-// From the front, the right and above, as a model with +Z up and its face to -Y is usually shown.
-const Vector kDirection{0.55, -1, 0.4}, kUp{0, 0, 1};
-
 Camera frame_mesh(const py::object& vertices, const py::object& triangles, const Size& size, const Vector& direction,
-                  const Vector& up, double angle, const py::object& to_world) {
+                  const Vector& up, double angle, double room, const py::object& to_world) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   validate(v.values, t);
   const Placement placement(to_matrix(to_world), v.storage);
-  return framing(placement.frame(v.values), t, vector(direction), vector(up), angle, aspect(size));
+  return framing(placement.frame(v.values), t, {vector(direction), vector(up), angle, aspect(size), room});
 }
 
 py::array_t<std::uint8_t> colours(const std::string& transfer) {
@@ -93,14 +89,16 @@ py::array_t<std::uint8_t> to_array(const Image& image) {
 }
 
 Camera camera_or_framing(const std::optional<Camera>& camera, const Vertices& v, const std::vector<glm::uvec3>& t,
-                         const Placement& placement, const Size& size) {
+                         const Placement& placement, const Size& size, double room) {
   if (camera) return *camera;
   validate(v.values, t);
-  return framing(placement.frame(v.values), t, vector(kDirection), vector(kUp), kAngle, aspect(size));
+  Framing how;
+  how.aspect = aspect(size), how.room = room;
+  return framing(placement.frame(v.values), t, how);
 }
 
-py::array_t<std::uint8_t> render_distance(const py::object& vertices, const py::object& triangles,
-                                          const Volume& volume, const std::optional<Camera>& camera, const Size& size,
+py::array_t<std::uint8_t> render_distance(const py::object& vertices, const py::object& triangles, const Volume& volume,
+                                          const std::optional<Camera>& camera, const Size& size,
                                           const std::string& transfer, const py::object& to_world, bool edges,
                                           int samples, int threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
@@ -112,7 +110,7 @@ py::array_t<std::uint8_t> render_distance(const py::object& vertices, const py::
   {
     const py::gil_scoped_release release;
     require(options.resolution);
-    const Camera from = camera_or_framing(camera, v, t, placement, size);
+    const Camera from = camera_or_framing(camera, v, t, placement, size, 0);
     image = draw_picture(volume, thread_count, progress, [&](Pictures& pictures) {
       if (!pictures.distance) pictures.distance.emplace(pictures.field);
       const Frame& frame = volume.native.frame();
@@ -131,17 +129,17 @@ py::array_t<std::uint8_t> render_volume(const Volume& volume, const std::optiona
   if (vertices.is_none() != triangles.is_none()) {
     throw InvalidInput("vertices and triangles must both be given, or neither for the reference itself");
   }
-  Vertices v;
+  Vertices v{{}, Storage::float64};
   std::vector<glm::uvec3> t;
   if (vertices.is_none()) {
-    v.storage = Storage::float64;
-    for (const glm::dvec3& p : volume.native.reference().vertices) v.values.push_back(volume.native.frame().to_world(p));
+    for (const glm::dvec3& p : volume.native.reference().vertices)
+      v.values.push_back(volume.native.frame().to_world(p));
     t = volume.native.reference().triangles;
   } else {
     v = to_vertices(vertices, "vertices");
     t = to_triangles(triangles, "triangles");
   }
-  const Placement placement(to_matrix(to_world), v.storage);
+  const Placement placement(vertices.is_none() ? glm::dmat4(1) : to_matrix(to_world), v.storage);
   VolumeRenderer::Options options{std::nullopt, {{size[0], size[1]}, samples}, progress};
   if (cut) options.cut = {vector(cut->first), vector(cut->second)};
   const unsigned thread_count = to_threads(threads);
@@ -149,7 +147,7 @@ py::array_t<std::uint8_t> render_volume(const Volume& volume, const std::optiona
   {
     const py::gil_scoped_release release;
     require(options.resolution);
-    const Camera from = camera_or_framing(camera, v, t, placement, size);
+    const Camera from = camera_or_framing(camera, v, t, placement, size, volume.native.tolerance());
     image = draw_picture(volume, thread_count, progress, [&](Pictures& pictures) {
       if (!pictures.volume) pictures.volume.emplace(pictures.field, volume.native.hierarchy(), thread_count);
       const Frame& frame = volume.native.frame();
@@ -167,17 +165,19 @@ py::array_t<std::uint8_t> render_volume(const Volume& volume, const std::optiona
 }  // namespace
 
 void bind_picture(py::module_& module) {
-  py::class_<Camera>(module, "Camera", py::module_local(), "From where a picture is taken, in perspective; world units.")
-      .def(py::init(&make_camera), py::arg("eye"), py::arg("target"), py::arg("up") = kUp, py::arg("angle") = kAngle,
+  py::class_<Camera>(module, "Camera", py::module_local(),
+                     "From where a picture is taken, in perspective; world units.")
+      .def(py::init(&make_camera), py::arg("eye"), py::arg("target"), py::arg("up") = vector(Framing().up),
+           py::arg("angle") = Framing().angle,
            "eye, target, up: three numbers each. angle: the height of the picture in degrees. Raises InvalidInput when "
            "there is no\n"
            "such view.")
       .def_static("framing", &frame_mesh, py::arg("vertices"), py::arg("triangles"), py::arg("size") = Size{1024, 1024},
-                  py::arg("direction") = kDirection, py::arg("up") = kUp, py::arg("angle") = kAngle,
-                  py::arg("to_world") = py::none(),
+                  py::arg("direction") = vector(Framing().direction), py::arg("up") = vector(Framing().up),
+                  py::arg("angle") = Framing().angle, py::arg("room") = 0.0, py::arg("to_world") = py::none(),
                   "The camera that sees all of a mesh, as large as a picture of `size` (width, height) can show it, "
                   "from `direction`,\n"
-                  "which leads from the mesh to the eye.")
+                  "which leads from the mesh to the eye. room: kept around the mesh, world units.")
       .def_property_readonly("eye", [](const Camera& c) { return vector(c.eye); })
       .def_property_readonly("target", [](const Camera& c) { return vector(c.target); })
       .def_property_readonly("up", [](const Camera& c) { return vector(c.up); })
