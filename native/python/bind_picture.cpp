@@ -73,7 +73,9 @@ Image draw_picture(const Volume& volume, unsigned threads, Progress* progress, D
   try {
     if (!volume.pictures) {
       volume.pictures.reset(new Pictures{
-          {volume.native.reference(), volume.native.frame_tolerance(), threads, progress}, std::nullopt, std::nullopt});
+          {volume.native.reference(), volume.native.mirrored(), volume.native.frame_tolerance(), threads, progress},
+          std::nullopt,
+          std::nullopt});
     }
     return draw(*volume.pictures);
   } catch (const GlUnavailable&) {

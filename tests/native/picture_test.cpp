@@ -69,7 +69,7 @@ Resolution resolution(int width, int height, int samples = 1) { return {{width, 
 /// A picture of `mesh` against `reference`.
 Image draw(const TriangleMesh& mesh, const TriangleMesh& reference, const DistanceRenderer::Options& options,
            const Camera& camera = from_above()) {
-  const PictureField field(reference, kEpsilon);
+  const PictureField field(reference, false, kEpsilon);
   return DistanceRenderer(field).render({mesh.vertices, mesh.triangles, world(), field}, camera, kFrame, options);
 }
 
@@ -77,7 +77,7 @@ class Picture : public GlTest {};
 
 TEST_F(Picture, CentreHasTheTransferColourOfItsDistance) {
   const TriangleMesh reference = sphere(1);
-  const PictureField field(reference, kEpsilon);
+  const PictureField field(reference, false, kEpsilon);
   EXPECT_EQ(field.precision(), PictureField::kPrecision);
   DistanceRenderer renderer(field);
   for (const Transfer transfer : {Transfer::signed_distance, Transfer::magnitude}) {
@@ -100,7 +100,7 @@ TEST_F(Picture, CentreHasTheTransferColourOfItsDistance) {
 
 TEST_F(Picture, DistancesAreWithinTwoPerCentWhereTheReferenceIsSmooth) {
   // Read from the field itself: colours would round them.
-  const PictureField field(shapes::torus(96), kEpsilon);
+  const PictureField field(shapes::torus(96), false, kEpsilon);
   std::vector<float> texels(std::size_t(field.nodes().x) * std::size_t(field.nodes().y) * std::size_t(field.nodes().z));
   gl::run([&] {
     glGetTextureImage(field.texture().name(), 0, GL_RED, GL_FLOAT, GLsizei(texels.size() * sizeof(float)),
@@ -130,6 +130,16 @@ TEST_F(Picture, DistancesAreWithinTwoPerCentWhereTheReferenceIsSmooth) {
     worst = std::max(worst, std::abs(std::abs(value) * field.spacing() - hierarchy.nearest(p).distance));
   }
   EXPECT_LT(worst, 0.02 * kEpsilon);
+}
+
+TEST_F(Picture, AMirroredReferenceHasItsInsideWhereItIsInTheWorld) {
+  const TriangleMesh reference = sphere(1), mesh = sphere(1 + 0.9 * kEpsilon);
+  const Image image = draw(mesh, reference, {.resolution = resolution(65, 65)});
+  const PictureField field(reference, true, kEpsilon);
+  const Image mirrored = DistanceRenderer(field).render({mesh.vertices, mesh.triangles, world(), field}, from_above(),
+                                                        kFrame, {.resolution = resolution(65, 65)});
+  EXPECT_GT(centre(image)[0], centre(image)[2]) << "outside is red";
+  EXPECT_GT(centre(mirrored)[2], centre(mirrored)[0]);
 }
 
 TEST_F(Picture, WhatIsOutOfToleranceIsStriped) {
@@ -200,7 +210,7 @@ TEST_F(Picture, TilesMakeOnePicture) {
 
 TEST_F(Picture, EveryMeshIsDrawnAsIfItWereTheFirst) {
   const TriangleMesh reference = sphere(1);
-  const PictureField field(reference, kEpsilon);
+  const PictureField field(reference, false, kEpsilon);
   DistanceRenderer renderer(field);
   const auto picture = [&](DistanceRenderer& by, const TriangleMesh& mesh, int size) {
     return by.render({mesh.vertices, mesh.triangles, world(), field}, from_above(), kFrame,
@@ -285,7 +295,7 @@ TEST_F(Picture, MeshesThatCannotBeDrawnAreRefused) {
 TEST_F(Picture, StopsWhenAskedTo) {
   const TriangleMesh mesh = sphere(1);
   Progress progress;
-  const PictureField field(mesh, kEpsilon);
+  const PictureField field(mesh, false, kEpsilon);
   DistanceRenderer renderer(field);
   const DrawnMesh drawn{mesh.vertices, mesh.triangles, world(), field};
   progress.cancel();
@@ -296,7 +306,7 @@ TEST_F(Picture, StopsWhenAskedTo) {
 
 TEST_F(Picture, ALostContextIsSaid) {
   const TriangleMesh mesh = sphere(1);
-  const PictureField field(mesh, kEpsilon);
+  const PictureField field(mesh, false, kEpsilon);
   DistanceRenderer renderer(field);
   const DrawnMesh drawn{mesh.vertices, mesh.triangles, world(), field};
   gl::shutdown();
@@ -307,7 +317,7 @@ TEST_F(Picture, ALostContextIsSaid) {
 /// The volume of a sphere of radius 1, with another mesh in it.
 Image draw_volume(const TriangleMesh& mesh, const VolumeRenderer::Options& options) {
   const TriangleMesh reference = sphere(1);
-  const PictureField field(reference, kEpsilon);
+  const PictureField field(reference, false, kEpsilon);
   VolumeRenderer renderer(field, Hierarchy(reference));
   Camera camera = from_above();
   camera.angle *= 1.25;
