@@ -191,7 +191,9 @@ def captions(reference, result, numbers):
 
 
 def arguments():
-    parser = cli.Parser("comparison_picture.py", description="Makes a picture of two meshes side by side, with their edges.")
+    parser = cli.Parser(
+        "comparison_picture.py", description="Makes a picture of two meshes side by side, with their edges."
+    )
     parser.add_argument("reference", metavar="REFERENCE")
     parser.add_argument("result", metavar="RESULT")
     parser.add_argument("picture", metavar="PICTURE.png")

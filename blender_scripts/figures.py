@@ -22,7 +22,7 @@ from addon.native import module as tolvol  # noqa: E402
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
 VOLUME_TOLERANCE = 0.04  # of the size: so large that it can be seen
 VOLUME_SIZE = (760, 640)
-PANEL = (460, 400)
+PANEL = (372, 324)
 HEADING = 64
 LEGEND = 190
 
@@ -45,8 +45,10 @@ def draw_volume(path, mesh, like):
     page = pictures.Page(VOLUME_SIZE[0] + LEGEND, VOLUME_SIZE[1])
     page.image(0, 0, tolvol.render_volume(volume, view, VOLUME_SIZE, cut=(middle, (1, 0, 0)), samples=3))
     page.text(VOLUME_SIZE[0], pictures.MARGIN, "All points within ε\nof the reference", 12)
-    page.legend(VOLUME_SIZE[0], 90, VOLUME_SIZE[1] - 110, "signed", volume.tolerance, volume.size)
-    page.save(path)
+    # What is cut open is beyond the mesh, so that the section begins at it.
+    bar = VOLUME_SIZE[0], 90, VOLUME_SIZE[1] - 110
+    page.legend(*bar, "signed", volume.tolerance, volume.size, lowest=0, outside=False)
+    page.save(path, step=3)
 
 
 def draw_distances(path, mesh, tolerance, like):
@@ -56,25 +58,36 @@ def draw_distances(path, mesh, tolerance, like):
     regardless = by_modifier(*mesh, len(result.triangles))
     view = pictures.camera(*mesh, PANEL, like)
     page = pictures.Page(2 * PANEL[0] + LEGEND, HEADING + 2 * PANEL[1])
-    for column, (surface, name) in enumerate(((within, "within the tolerance"), (regardless, "Blender's Decimate modifier"))):
+    for column, (surface, name) in enumerate(
+        ((within, "within the tolerance"), (regardless, "Blender's Decimate modifier"))
+    ):
         x = column * PANEL[0]
         farthest = tolvol.hausdorff(*surface, *mesh).upper / volume.tolerance
         page.text(x + PANEL[0] / 2, 14, f"{len(surface[1]):,} triangles, {name}", 12, ha="center")
-        page.text(x + PANEL[0] / 2, 38, f"every point within {farthest:.2f} ε of the reference", 9, pictures.FAINT, ha="center")
+        page.text(
+            x + PANEL[0] / 2,
+            38,
+            f"every point within {farthest:.2f} ε of the reference",
+            9,
+            pictures.FAINT,
+            ha="center",
+        )
         for row, transfer in enumerate(("signed", "magnitude")):
             pixels = tolvol.render_distance(*surface, volume, view, PANEL, transfer, edges=True, samples=3)
             page.image(x, HEADING + row * PANEL[1], pixels)
     for row, transfer in enumerate(("signed", "magnitude")):
         page.legend(2 * PANEL[0], HEADING + 20 + row * PANEL[1], PANEL[1] - 40, transfer, volume.tolerance, volume.size)
-    page.save(path)
+    page.save(path, step=3)
 
 
 def arguments():
     parser = cli.Parser("figures.py", description="Makes the pictures of the tolerance volume and of distances.")
     parser.add_argument("mesh", nargs="?", metavar="MESH", help=".obj, .ply or .stl")
     parser.add_argument("--output", default=PICTURES, metavar="FOLDER", help="where to (default: docs/pictures)")
-    parser.add_argument("--tolerance", default=(1.0, True), type=cli.length, metavar="T", help="N%% of size, or a length")
-    return parser.parse(least=0)
+    parser.add_argument(
+        "--tolerance", default=(1.0, True), type=cli.length, metavar="T", help="N%% of size, or a length"
+    )
+    return parser.parse(may_be_empty=True)
 
 
 def main(options):
