@@ -18,7 +18,7 @@ for _name in [name for name in sys.modules if name.startswith(__name__ + ".")]:
     del sys.modules[_name]
     globals().pop(_name.removeprefix(__name__ + "."), None)
 
-from . import operators, preferences, properties, ui, volume  # noqa: E402
+from . import native, operators, preferences, properties, ui, volume  # noqa: E402
 
 _PARTS = (preferences, properties, volume, operators, ui)
 
@@ -31,3 +31,4 @@ def register():
 def unregister():
     for part in reversed(_PARTS):
         part.unregister()
+    native.shutdown()

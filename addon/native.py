@@ -77,3 +77,9 @@ def _load_copy(path, name):
 
 
 module, path, reason = _load()
+
+
+def shutdown():
+    """Ends the module's GL thread, if there is one; what needs it starts it again."""
+    if module is not None:
+        module.shutdown()

@@ -47,9 +47,9 @@ class Parser(argparse.ArgumentParser):
     def error(self, message):
         raise Stop(f"{message}; see --help")
 
-    def parse(self):
+    def parse(self, may_be_empty=False):
         words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
-        if not words:
+        if not words and not may_be_empty:
             self.error("no arguments after --")
         # "-1%" would count as an option: a value goes with the option before it.
         valued = {name for action in self._actions for name in action.option_strings if action.nargs is None}

@@ -19,6 +19,7 @@ try:
     import numpy as np
 
     import command_line as cli
+    import pictures
     from addon import file_io, mesh_io, report, volume
     from addon.certify import certify
     from addon.errors import NOT_PROVED
@@ -65,6 +66,11 @@ def arguments():
         help="what to do with faces that are not within the tolerance of the reference: stop, or keep them as they are",
     )
     parser.add_argument("--report", metavar="FILE.json", help="write the numbers there")
+    parser.add_argument(
+        "--picture",
+        metavar="FILE.png",
+        help="draw the result there, coloured by its distance to the reference; needs OpenGL",
+    )
     parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
     return parser.parse()
 
@@ -81,6 +87,8 @@ class Command:
         cli.require_folder(options.output, "OUT")
         if options.report:
             cli.require_folder(options.report, "--report")
+        if options.picture:
+            pictures.require("--picture", options.picture)
 
     def run(self):
         reference_file = self._read("--reference", self.options.reference) if self.options.reference else None
@@ -218,6 +226,10 @@ class Command:
                 raise cli.Stop(
                     f"{NOT_PROVED}: {report.intervals(whole)}; {self.output} was not written", cli.NOT_PROVED
                 )
+            if self.options.picture:
+                start = time.perf_counter()
+                self._draw(volume.joined(found.values()), volume.joined(references), tolerance)
+                self._stage(f"drew {self.options.picture}", start)
             # OUT itself last: once it is there, all of it is.
             for path in sorted(folder.iterdir(), key=lambda path: path.name == self.output.name):
                 os.replace(path, self.output.resolve().parent / path.name)
@@ -227,6 +239,11 @@ class Command:
 
     def _certify(self, surface, reference, tolerance, kept):
         return certify(surface, reference, tolerance, kept, self.options.threads)
+
+    def _draw(self, result, reference, tolerance):
+        surfaces = [(surface.world(), surface.arrays.triangles) for surface in (result, reference)]
+        like = self.options.reference or self.options.input
+        pictures.save_deviation(self.options.picture, *surfaces, tolerance, like, self.options.threads)
 
     def _summary(self, names, runs, judged, tolerance, size):
         """The report of the whole file: the worst of its objects, as certified in the file."""

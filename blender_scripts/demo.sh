@@ -66,5 +66,5 @@ result=out/${file%.*}_decimated.${file##*.}
 stage "decimation to $result" decimate.py "$mesh" "$result" --tolerance "$tolerance" --report out/report.json
 sed -n '$!s/, [0-9.]* s$/&/p' "$log" | sed 's/^/demo:   /'
 line=$(tail -n 1 "$log")
-stage "picture to out/picture.png" figures.py "$mesh" "$result" out/picture.png --report out/report.json
+stage "picture to out/picture.png" comparison_picture.py "$mesh" "$result" out/picture.png --report out/report.json
 echo "$line"

@@ -1,221 +1,103 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A picture of a reference and its result side by side, with their edges, by Cycles on the CPU.
+"""The pictures of docs/pictures that show what the tolerance volume is and what it keeps, on any mesh.
 
-blender --background --python blender_scripts/figures.py -- REFERENCE RESULT PICTURE.png [--report REPORT.json]
+blender --background --python blender_scripts/figures.py -- [MESH] [--output FOLDER] [--tolerance 1%]
 
-REPORT.json is what decimate.py wrote; the picture then states what it proves.
+volume.png: the tolerance volume around MESH, half of it cut away. distance.png: MESH decimated within the tolerance, and to
+as many triangles by Blender's own Decimate modifier, coloured by the distance to MESH. Without MESH: Blender's monkey.
 """
 
-import json
-import math
 import sys
 from pathlib import Path
 
 import bpy
-import numpy as np
-from mathutils import Matrix, Vector
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import command_line as cli  # noqa: E402
 import models  # noqa: E402
-from addon import file_io, mesh_io, report  # noqa: E402
+import pictures  # noqa: E402
+from addon import mesh_io  # noqa: E402
+from addon.native import module as tolvol  # noqa: E402
 
-WIDTH, HEIGHT = 1280, 640
-SAMPLES = 40  # one large light and an even sky leave so little noise that no denoiser is needed (Debian has none)
-BACKGROUND = (0.90, 0.91, 0.93)
-REFERENCE_COLOUR = (0.20, 0.36, 0.55)
-RESULT_COLOUR = (0.83, 0.36, 0.10)
-TEXT_COLOUR = (0.03, 0.035, 0.05)
-LENS, SENSOR = 85, 36  # mm: long, so that both are seen from nearly the same side
-TURN = math.radians(25)  # of both, about the vertical
-ELEVATION = math.radians(9)  # of the camera
-GAP = 0.10  # between the two; the reference is 1 wide or high, whichever is more
-MARGIN = 0.16  # beside them
-CAPTION = 0.38  # below and above them
+PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"
+VOLUME_TOLERANCE = 0.04  # of the size: so large that it can be seen
+VOLUME_SIZE = (760, 640)
+PANEL = (372, 324)
+HEADING = 64
+LEGEND = 190
 
 
-def new_material(name, build):
-    """A material whose surface is the socket that build(node_tree) returns."""
-    material = bpy.data.materials.new(name)
-    material.use_nodes = True
-    tree = material.node_tree
-    tree.nodes.clear()
-    output = tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(build(tree), output.inputs["Surface"])
-    return material
-
-
-def clay(colour, wire_pixels, wire_strength):
-    """A dull surface with every edge drawn, as wide on the picture wherever it lies."""
-
-    def build(tree):
-        surface = tree.nodes.new("ShaderNodeBsdfPrincipled")
-        surface.inputs["Base Color"].default_value = (*colour, 1)
-        surface.inputs["Roughness"].default_value = 0.6
-        edge = tree.nodes.new("ShaderNodeBsdfDiffuse")
-        edge.inputs["Color"].default_value = (*(0.12 * c for c in colour), 1)
-        wire = tree.nodes.new("ShaderNodeWireframe")
-        wire.use_pixel_size = True
-        wire.inputs["Size"].default_value = wire_pixels
-        strength = tree.nodes.new("ShaderNodeMath")
-        strength.operation = "MULTIPLY"
-        strength.inputs[1].default_value = wire_strength
-        tree.links.new(wire.outputs["Fac"], strength.inputs[0])
-        mix = tree.nodes.new("ShaderNodeMixShader")
-        tree.links.new(strength.outputs["Value"], mix.inputs["Fac"])
-        tree.links.new(surface.outputs["BSDF"], mix.inputs[1])
-        tree.links.new(edge.outputs["BSDF"], mix.inputs[2])
-        return mix.outputs["Shader"]
-
-    return new_material("clay", build)
-
-
-def ink():
-    def build(tree):
-        node = tree.nodes.new("ShaderNodeEmission")
-        node.inputs["Color"].default_value = (*TEXT_COLOUR, 1)
-        return node.outputs["Emission"]
-
-    return new_material("ink", build)
-
-
-def add(name, data, matrix=None):
-    ob = bpy.data.objects.new(name, data)
-    ob.matrix_world = matrix or Matrix()
+def by_modifier(vertices, triangles, count):
+    """What Blender's Decimate modifier makes of a mesh: at most `count` triangles."""
+    ob = bpy.data.objects.new("modifier", mesh_io.new_mesh("modifier", vertices, triangles))
     bpy.context.scene.collection.objects.link(ob)
-    return ob
+    modifier = ob.modifiers.new("decimate", "DECIMATE")
+    modifier.ratio = count / len(triangles)
+    evaluated = ob.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return models.arrays(bpy.data.objects.new("decimated", bpy.data.meshes.new_from_object(evaluated)))
 
 
-def look_at(position, target):
-    direction = Vector(target) - Vector(position)
-    return Matrix.Translation(position) @ direction.to_track_quat("-Z", "Y").to_matrix().to_4x4()
+def draw_volume(path, mesh, like):
+    vertices, triangles = mesh
+    volume = tolvol.ToleranceVolume(*mesh, VOLUME_TOLERANCE * tolvol.size(*mesh))
+    view = pictures.camera(*mesh, VOLUME_SIZE, like, volume.tolerance)
+    middle = (vertices[triangles].max((0, 1)) + vertices[triangles].min((0, 1))) / 2
+    page = pictures.Page(VOLUME_SIZE[0] + LEGEND, VOLUME_SIZE[1])
+    page.image(0, 0, tolvol.render_volume(volume, view, VOLUME_SIZE, cut=(middle, (1, 0, 0)), samples=3))
+    page.text(VOLUME_SIZE[0], pictures.MARGIN, "All points within ε\nof the reference", 12)
+    # What is cut open is beyond the mesh, so that the section begins at it.
+    bar = VOLUME_SIZE[0], 90, VOLUME_SIZE[1] - 110
+    page.legend(*bar, "signed", volume.tolerance, volume.size, lowest=0, outside=False)
+    page.save(path, step=3)
 
 
-def add_light(position, target, size, power):
-    data = bpy.data.lights.new("light", "AREA")
-    data.shape, data.size, data.energy = "DISK", size, power
-    add("light", data, look_at(position, target))
-
-
-def add_floor():
-    """Invisible but for the shadows on it."""
-    mesh = bpy.data.meshes.new("floor")
-    mesh.from_pydata([(-50, -50, 0), (50, -50, 0), (50, 50, 0), (-50, 50, 0)], [], [(0, 1, 2, 3)])
-    add("floor", mesh).is_shadow_catcher = True
-
-
-def add_caption(camera, x, y, size, text, material):
-    """Text in the plane of the picture: x, y and size in units of the picture's width, (0, 0) its centre."""
-    width = SENSOR / LENS  # of the picture at distance 1
-    curve = bpy.data.curves.new("caption", "FONT")
-    curve.body, curve.align_x, curve.size = text, "CENTER", size * width
-    curve.materials.append(material)
-    add("caption", curve, camera.matrix_world @ Matrix.Translation((x * width, y * width, -1)))
-
-
-def compose(reference, result, captions, up):
-    """The two (vertices, triangles) on a floor, lit and framed; captions: two (large, small) texts; up: "Y" or "Z"."""
-    turn = Matrix.Rotation(TURN, 4, "Z") @ Matrix.Rotation(math.pi / 2 if up == "Y" else 0, 4, "X")
-    turned = reference[0][np.unique(reference[1])] @ np.array(turn.to_3x3()).T
-    lower, upper = turned.min(0), turned.max(0)
-    scale = 1 / float(max(upper[0] - lower[0], upper[2] - lower[2]))
-    width, depth, height = (scale * (upper - lower)).tolist()
-    foot = Vector((*(lower + upper)[:2] / 2, lower[2]))
-    shift = (width + GAP) / 2
-    to_scene = Matrix.Scale(scale, 4) @ Matrix.Translation(-foot) @ turn
-    # The reference's edges are so many that at full strength they would be all there is to see.
-    looks = clay(REFERENCE_COLOUR, 0.55, 0.55), clay(RESULT_COLOUR, 1.1, 0.9)
-    for arrays, look, x in zip((reference, result), looks, (-shift, shift)):
-        mesh = mesh_io.new_mesh("model", *arrays)
-        mesh.materials.append(look)
-        add("model", mesh, Matrix.Translation((x, 0, 0)) @ to_scene)
-    add_floor()
-
-    target = Vector((0, 0, 0.4 * height))
-    span = max(2 * width + GAP + MARGIN, (height + CAPTION) * WIDTH / HEIGHT)
-    distance = span * LENS / SENSOR + depth / 2
-    view = Vector((0, -math.cos(ELEVATION), math.sin(ELEVATION)))
-    data = bpy.data.cameras.new("camera")
-    data.lens, data.sensor_width = LENS, SENSOR
-    camera = add("camera", data, look_at(target + distance * view, target))
-    bpy.context.scene.camera = camera
-    add_light((-2.5, -2.5, 3.5), target, 1.5, 120)
-    material, bottom = ink(), -HEIGHT / WIDTH / 2
-    for x, (large, small) in zip((-shift, shift), captions):
-        add_caption(camera, x / span, bottom + 0.052, 0.026, large, material)
-        add_caption(camera, x / span, bottom + 0.024, 0.015, small, material)
-
-
-def render(picture):
-    scene = bpy.context.scene
-    scene.world = bpy.data.worlds.new("world")
-    scene.world.use_nodes = True
-    sky = scene.world.node_tree.nodes["Background"]
-    sky.inputs["Color"].default_value = (*BACKGROUND, 1)
-    sky.inputs["Strength"].default_value = 0.6
-
-    scene.render.engine = "CYCLES"
-    scene.cycles.device = "CPU"
-    scene.cycles.samples = SAMPLES
-    scene.cycles.use_denoising = False
-    scene.cycles.max_bounces = 1
-    scene.view_settings.view_transform = "Standard"
-    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = WIDTH, HEIGHT, 100
-
-    # An even background behind the shadows: only the compositor gives one that no light touches.
-    scene.render.film_transparent = True
-    scene.use_nodes = True
-    tree = scene.node_tree
-    tree.nodes.clear()
-    layers = tree.nodes.new("CompositorNodeRLayers")
-    over = tree.nodes.new("CompositorNodeAlphaOver")
-    over.inputs[1].default_value = (*BACKGROUND, 1)
-    output = tree.nodes.new("CompositorNodeComposite")
-    tree.links.new(layers.outputs["Image"], over.inputs[2])
-    tree.links.new(over.outputs["Image"], output.inputs["Image"])
-
-    scene.render.image_settings.color_mode = "RGB"
-    scene.render.image_settings.compression = 100
-    scene.render.filepath = str(picture.resolve())
-    bpy.ops.render.render(write_still=True)
-
-
-def captions(reference, result, numbers):
-    """What is proved is said only where a report says so."""
-    large = [f"{len(triangles):,} triangles" for _, triangles in (reference, result)]
-    if numbers is None:
-        return [(large[0], "reference"), (large[1], "result")]
-    size = 100 * numbers["tolerance"]["absolute"] / numbers["tolerance"]["percent"]
-    forward, backward = (report.percent(numbers[direction][1], size) for direction in ("forward", "backward"))
-    return [(large[0], "reference"), (large[1], f"within {forward} of the reference, which is within {backward} of it")]
+def draw_distances(path, mesh, tolerance, like):
+    volume = tolvol.ToleranceVolume(*mesh, tolerance)
+    result = tolvol.decimate(*mesh, volume)
+    within = result.vertices, result.triangles
+    regardless = by_modifier(*mesh, len(result.triangles))
+    view = pictures.camera(*mesh, PANEL, like)
+    page = pictures.Page(2 * PANEL[0] + LEGEND, HEADING + 2 * PANEL[1])
+    for column, (surface, name) in enumerate(
+        ((within, "within the tolerance"), (regardless, "Blender's Decimate modifier"))
+    ):
+        x = column * PANEL[0]
+        farthest = tolvol.hausdorff(*surface, *mesh).upper / volume.tolerance
+        page.text(x + PANEL[0] / 2, 14, f"{len(surface[1]):,} triangles, {name}", 12, ha="center")
+        page.text(
+            x + PANEL[0] / 2,
+            38,
+            f"every point within {farthest:.2f} ε of the reference",
+            9,
+            pictures.FAINT,
+            ha="center",
+        )
+        for row, transfer in enumerate(("signed", "magnitude")):
+            pixels = tolvol.render_distance(*surface, volume, view, PANEL, transfer, edges=True, samples=3)
+            page.image(x, HEADING + row * PANEL[1], pixels)
+    for row, transfer in enumerate(("signed", "magnitude")):
+        page.legend(2 * PANEL[0], HEADING + 20 + row * PANEL[1], PANEL[1] - 40, transfer, volume.tolerance, volume.size)
+    page.save(path, step=3)
 
 
 def arguments():
-    parser = cli.Parser("figures.py", description="Makes a picture of two meshes side by side, with their edges.")
-    parser.add_argument("reference", metavar="REFERENCE")
-    parser.add_argument("result", metavar="RESULT")
-    parser.add_argument("picture", metavar="PICTURE.png")
+    parser = cli.Parser("figures.py", description="Makes the pictures of the tolerance volume and of distances.")
+    parser.add_argument("mesh", nargs="?", metavar="MESH", help=".obj, .ply or .stl")
+    parser.add_argument("--output", default=PICTURES, metavar="FOLDER", help="where to (default: docs/pictures)")
     parser.add_argument(
-        "--report", metavar="REPORT.json", help="what decimate.py wrote: the picture states what it proves"
+        "--tolerance", default=(1.0, True), type=cli.length, metavar="T", help="N%% of size, or a length"
     )
-    return parser.parse()
+    return parser.parse(may_be_empty=True)
 
 
 def main(options):
-    cli.require_folder(options.picture, "PICTURE")
-    numbers = None
-    if options.report:
-        try:
-            numbers = json.loads(Path(options.report).read_text())
-        except (OSError, ValueError) as error:
-            raise cli.Stop(f"--report {options.report}: {error}") from None
-    reference, result = models.read(options.reference), models.read(options.result)
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    # By convention; nothing in the files says so.
-    up = "Y" if Path(options.reference).suffix.lower() == ".obj" else "Z"
-    compose(reference, result, captions(reference, result, numbers), up)
-    with file_io.quiet():
-        render(Path(options.picture))
+    volume, distance = (Path(options.output) / name for name in ("volume.png", "distance.png"))
+    for path in (volume, distance):
+        pictures.require("--output", path)
+    mesh = models.read(options.mesh) if options.mesh else models.arrays(models.build("suzanne"))
+    like = options.mesh or ""
+    draw_volume(volume, mesh, like)
+    draw_distances(distance, mesh, cli.in_units(options.tolerance, tolvol.size(*mesh)), like)
     return 0
 
 

@@ -45,6 +45,7 @@ class ToleranceVolume {
   const std::vector<WitnessTriangle>& witnesses() const { return witnesses_; }  ///< of the reference, prepared
   const Hierarchy& hierarchy() const { return *hierarchy_; }
   const DistanceGrid& grid() const { return grid_; }
+  bool mirrored() const { return mirrored_; }  ///< the reference's triangles run the other way round
   /// field/signs.h: the grid's distances, negative inside the reference as it is in the world, mirrored or not.
   std::vector<float> signed_distance() const;
 
@@ -72,7 +73,7 @@ class ToleranceVolume {
   double size_;
   double mapping_error_;
   Field field_;
-  bool mirrored_;  ///< the reference's triangles run the other way round
+  bool mirrored_;
 };
 
 }  // namespace tolvol

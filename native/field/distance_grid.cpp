@@ -28,24 +28,25 @@ Layout layout(const Box& box, double tolerance, double precision) {
   return {h, band, n.x, n.y, n.z, std::ceil(n.x / DistanceGrid::kLanes) * DistanceGrid::kLanes};
 }
 
-double finest_that_fits(const Box& box, double tolerance) {
-  double precision = kFinestPrecision;
+}  // namespace
+
+double precision_that_fits(const Box& box, double tolerance, double finest) {
+  double precision = finest;
   // Ends: a coarser grid has fewer nodes, down to the few of a band around a box smaller than a cell.
   while (layout(box, tolerance, precision).bytes() > kGridBudget) precision /= 2;
   return precision;
 }
 
-}  // namespace
-
 DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double> precision) {
   if (precision && !(*precision > 0 && std::isfinite(*precision))) {
     throw InvalidInput("the precision must be a positive number (grid nodes per tolerance)");
   }
-  const Layout l = layout(box, tolerance, precision.value_or(finest_that_fits(box, tolerance)));
+  const Layout l = layout(box, tolerance, precision.value_or(precision_that_fits(box, tolerance, kFinestPrecision)));
   if (l.bytes() > kGridBudget) {
     std::ostringstream text;
     text << "a precision of " << *precision << " needs a grid of " << l.bytes() / (1 << 20) << " MB, the limit is "
-         << (kGridBudget >> 20) << " MB; precision " << finest_that_fits(box, tolerance) << " fits";
+         << (kGridBudget >> 20) << " MB; precision " << precision_that_fits(box, tolerance, kFinestPrecision)
+         << " fits";
     throw ResourceLimit(text.str());
   }
   DistanceGrid grid;

@@ -46,6 +46,9 @@ struct DistanceGrid {
   }
 };
 
+/// The finest of `finest`, `finest` / 2, `finest` / 4, ... whose grid fits kGridBudget.
+double precision_that_fits(const Box& box, double tolerance, double finest);
+
 /// The grid of a reference: its box enlarged by the band, spacing tolerance / precision. `precision` empty: the finest
 /// of 1, 1/2, 1/4, ... that fits kGridBudget. Allocates nothing. Throws ResourceLimit, naming the precision that fits,
 /// when a precision is asked for that does not.

@@ -16,4 +16,5 @@ PYBIND11_MODULE(tolvol, module) {
   tolvol::python::bind_volume(module);
   tolvol::python::bind_decimation(module);
   tolvol::python::bind_measure(module);
+  tolvol::python::bind_picture(module);
 }

@@ -12,5 +12,6 @@ void bind_gl(pybind11::module_& module);
 void bind_volume(pybind11::module_& module);
 void bind_decimation(pybind11::module_& module);
 void bind_measure(pybind11::module_& module);
+void bind_picture(pybind11::module_& module);
 
 }  // namespace tolvol::python

@@ -12,6 +12,8 @@
 
 namespace tolvol::python {
 
+struct Pictures;  // bind_picture.cpp
+
 struct Volume {
   ToleranceVolume native;
   std::size_t vertices, triangles;
@@ -32,6 +34,8 @@ struct Volume {
 
   mutable std::mutex mutex;
   mutable std::map<std::string, std::shared_ptr<const ToleranceCheck>> checks;
+  mutable std::mutex drawing{};  ///< held while a picture is drawn: one at a time
+  mutable std::shared_ptr<Pictures> pictures{};
 };
 
 }  // namespace tolvol::python

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures of deviations with legends: what tolvol renders, put together on a white page by matplotlib."""
+
+from pathlib import Path
+
+import numpy as np
+
+import command_line as cli
+from addon.native import module as tolvol
+
+DPI = 100  # so that a point of type is 100/72 pixels
+INK, FAINT = "#1b1e25", "#6a6f7a"
+WIDTH, HEIGHT, LEGEND = 800, 700, 230  # pixels, of a picture of one mesh and of the legend beside it
+MARGIN = 20
+EDGES_UP_TO = 5000  # triangles: more edges than that hide the colours
+STRIPE = 12  # pixels from one stripe to the next, as rendered
+
+# From the front, the right and above, by the convention of the formats: nothing in a file says which way is up.
+_VIEWS = {"Y": {"direction": (0.55, 0.4, 1), "up": (0, 1, 0)}, "Z": {"direction": (0.55, -1, 0.4), "up": (0, 0, 1)}}
+
+
+def require(option, path):
+    """What a picture needs must be there before the work begins."""
+    cli.require_folder(path, option)
+    if Path(path).suffix.lower() != ".png":
+        raise cli.Stop(f"{option} {path}: the extension must be .png")
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError as error:
+        raise cli.Stop(f"{option}: {error}; install Debian's python3-matplotlib") from None
+    try:
+        tolvol.renderer()
+    except tolvol.GlUnavailable as error:
+        raise cli.Stop(f"{option}: {error}") from None
+
+
+def camera(vertices, triangles, size, path="", room=0.0):
+    """The view of a mesh, upright as files like `path` have it."""
+    view = _VIEWS["Y" if Path(path).suffix.lower() in {".obj", ".gltf", ".glb"} else "Z"]
+    return tolvol.Camera.framing(vertices, triangles, size, room=room, **view)
+
+
+class Page:
+    """A white page; places are in pixels from its upper left corner."""
+
+    def __init__(self, width, height):
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        self.width, self.height = width, height
+        self.figure = Figure((width / DPI, height / DPI), dpi=DPI, facecolor="white")
+        FigureCanvasAgg(self.figure)
+
+    def image(self, x, y, pixels):
+        self.figure.figimage(pixels, x, self.height - y - pixels.shape[0])
+
+    def text(self, x, y, text, size=10, colour=INK, **options):
+        """`y` is where the first line's top is."""
+        options = {"va": "top", **options}
+        self.figure.text(x / self.width, 1 - y / self.height, text, size=size, color=colour, **options)
+
+    def legend(self, x, y, height, transfer, tolerance, size, shares=None, lowest=None, outside=True):
+        """The colours with their lengths.
+
+        tolerance, size: in the units of the mesh; lowest: what the bar begins with, in tolerances; outside: also explain the
+        stripes; shares: of the area within a quarter, half and all of the tolerance, as text below.
+        """
+        bar = height - 50 - 28 * outside - (116 if shares is not None else 0)
+        colours, whole = tolvol.transfer_colours(transfer), -1 if transfer == "signed" else 0
+        lowest = whole if lowest is None else lowest
+        axes = self.figure.add_axes((x / self.width, 1 - (y + bar) / self.height, 18 / self.width, bar / self.height))
+        axes.imshow(colours[:, None], aspect="auto", origin="lower", extent=(0, 1, whole, 1))
+        axes.set_ylim(lowest, 1)
+        ticks = np.linspace(lowest, 1, 5)
+        axes.set_yticks(ticks, [self._label(tick, tolerance) for tick in ticks], size=9, color=INK)
+        axes.yaxis.tick_right()
+        axes.set_xticks([])
+        for spine in axes.spines.values():
+            spine.set_edgecolor(FAINT)
+        axes.tick_params(color=FAINT)
+        y += bar + 22
+        if outside:
+            self.image(x, y, stripes(18, 18))
+            self.text(x + 26, y + 1, "outside the tolerance", 9)
+            y += 28
+        self.text(x, y, f"ε = {tolerance:.3g} = {100 * tolerance / size:.3g} % of size", 9, FAINT)
+        if shares is not None:
+            within = [f"{100 * share:.1f} % within {part}ε" for part, share in zip(("¼ ", "½ ", ""), shares)]
+            self.text(x, y + 30, "\n".join(["Of the area", *within, f"{self._percent(1 - shares[-1])} outside"]), 9)
+
+    @staticmethod
+    def _percent(share):
+        """A little that is outside must not read as nothing."""
+        return f"{100 * share:.1f} %" if share == 0 or share >= 0.0005 else "< 0.1 %"
+
+    @staticmethod
+    def _label(part, tolerance):
+        name = {-1: "−ε", 0: "0", 1: "ε"}.get(part)
+        length = f"{part * tolerance:.3g}".replace("-", "−")
+        return f" {name} = {length}" if name and part else f" {name or length}"
+
+    def save(self, path, step=1):
+        """step: of the 256 levels of a channel that are kept; with 3 nobody sees it and the file is a fifth smaller."""
+        from PIL import Image
+
+        self.figure.canvas.draw()
+        levels = np.asarray(self.figure.canvas.buffer_rgba())[..., :3].astype(int)
+        levels = np.where(levels == 255, 255, np.minimum((levels + step // 2) // step * step, 255))
+        Image.fromarray(levels.astype(np.uint8)).save(path, format="PNG", optimize=True)
+
+
+def stripes(width, height):
+    """What tolvol draws where a mesh is outside."""
+    y, x = np.mgrid[:height, :width]
+    colours = np.array(tolvol.OUTSIDE_COLOURS, np.uint8)
+    return colours[((x - y) % STRIPE >= STRIPE / 2).astype(int)]
+
+
+def shares_within(surface, reference, tolerance, threads=0):
+    """Shares of the area of a (vertices, triangles) within a quarter, half and all of the tolerance of another."""
+    bounds = [tolerance / 4, tolerance / 2, tolerance]
+    spread = tolvol.deviation(*surface, *reference, bounds=bounds, threads=threads)
+    return [1 - float(share) for share in spread.share_beyond]
+
+
+def save_deviation(path, surface, reference, tolerance, like="", threads=0):
+    """A picture of a surface against the reference, both (vertices, triangles) in the world; like: the file it is from."""
+    volume = tolvol.ToleranceVolume(*reference, tolerance, threads=threads)
+    view = camera(*surface, (WIDTH, HEIGHT), like)
+    edges = len(surface[1]) <= EDGES_UP_TO
+    pixels = tolvol.render_distance(*surface, volume, view, (WIDTH, HEIGHT), edges=edges, threads=threads)
+    page = Page(WIDTH + LEGEND, HEIGHT)
+    page.image(0, 0, pixels)
+    shares = shares_within(surface, reference, tolerance, threads)
+    page.text(WIDTH + MARGIN, MARGIN, f"{len(surface[1]):,} triangles", 12)
+    page.text(WIDTH + MARGIN, MARGIN + 22, f"distance to the reference,\n{len(reference[1]):,} triangles", 9, FAINT)
+    page.legend(WIDTH + MARGIN, MARGIN + 70, HEIGHT - 2 * MARGIN - 70, "signed", tolerance, volume.size, shares)
+    page.save(path)

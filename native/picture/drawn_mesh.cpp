@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "picture/drawn_mesh.h"
+
+#include <limits>
+
+#include "reference/errors.h"
+
+namespace tolvol {
+namespace {
+
+constexpr double kReach = 1e9;  // in nodes: beyond it the products of float32 matrices overflow before they are clipped
+
+/// Room for a mesh of about the same size: one that changes every frame is not allotted anew.
+void write_into(gl::Buffer& buffer, std::size_t bytes, const void* data) {
+  if (buffer.bytes() < bytes || buffer.bytes() / 2 > bytes) buffer = gl::Buffer(bytes, nullptr);
+  buffer.write(0, bytes, data);
+}
+
+}  // namespace
+
+DrawnMesh::DrawnMesh(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> t, const Placement& placement,
+                     const PictureField& field)
+    : triangles(t) {
+  validate(stored, t);
+  if (t.size() > std::numeric_limits<GLsizei>::max() / 3) throw InvalidInput("too many triangles for one picture");
+  const std::vector<bool> used = used_vertices(stored.size(), t);
+  nodes.resize(stored.size());
+  for (std::size_t i = 0; i < stored.size(); ++i) {
+    if (!used[i]) continue;
+    const glm::dvec3 p = placement.frame(stored[i]);
+    nodes[i] = field.node(p);
+    if (!(glm::dot(nodes[i], nodes[i]) < kReach * kReach)) {
+      throw InvalidInput("vertex " + std::to_string(i) + " is too far from the reference to be drawn");
+    }
+    box.add(p);
+  }
+}
+
+void MeshBuffers::write(const DrawnMesh& mesh) {
+  count_ = static_cast<GLsizei>(3 * mesh.triangles.size());
+  write_into(vertices_, mesh.nodes.size() * sizeof(glm::vec3), mesh.nodes.data());
+  write_into(indices_, mesh.triangles.size() * sizeof(glm::uvec3), mesh.triangles.data());
+  array_ = gl::VertexArray::make();
+  array_.bind();
+  glBindVertexBuffer(0, vertices_.name(), 0, sizeof(glm::vec3));
+  glVertexAttribFormat(0, 3, GL_FLOAT, GL_FALSE, 0);
+  glVertexAttribBinding(0, 0);
+  glEnableVertexAttribArray(0);
+  glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices_.name());
+}
+
+void MeshBuffers::draw() const {
+  array_.bind();
+  glDrawElements(GL_TRIANGLES, count_, GL_UNSIGNED_INT, nullptr);
+}
+
+}  // namespace tolvol

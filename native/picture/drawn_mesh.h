@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// A mesh as GL draws it: in the coordinates of a field's nodes, float32.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "gl/objects.h"
+#include "picture/picture_field.h"
+#include "reference/frame.h"
+
+namespace tolvol {
+
+struct DrawnMesh {
+  std::vector<glm::vec3> nodes;  ///< a vertex each
+  std::span<const glm::uvec3> triangles;
+  Box box;  ///< of the used vertices, in the frame
+
+  /// `placement` leads to the field's frame. `triangles` must outlive this. Throws InvalidInput for a bad mesh (the
+  /// first offender is named), also for one so far from the reference that float32 cannot draw it.
+  DrawnMesh(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> triangles, const Placement& placement,
+            const PictureField& field);
+};
+
+/// Its place on the GPU, kept from one mesh to the next. On the GL thread.
+class MeshBuffers {
+ public:
+  void write(const DrawnMesh& mesh);
+  /// With the vertices as attribute 0.
+  void draw() const;
+
+ private:
+  gl::VertexArray array_;
+  gl::Buffer vertices_, indices_;
+  GLsizei count_ = 0;
+};
+
+}  // namespace tolvol

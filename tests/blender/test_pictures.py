@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""--picture of the commands, and the figures."""
+
+import os
+
+import bpy
+import numpy as np
+import pytest
+
+from addon import native
+from commands import command, decimate, succeeded
+
+
+@pytest.fixture(autouse=True)
+def _needs_gl():
+    try:
+        native.module.renderer()
+    except native.module.GlUnavailable as error:
+        if os.environ.get("TOLVOL_REQUIRE_GL"):
+            raise
+        pytest.skip(str(error))
+
+
+def pixels(path):
+    """(height, width, 4) uint8, top row first."""
+    image = bpy.data.images.load(str(path))
+    width, height = image.size
+    values = np.empty(4 * width * height, np.float32)
+    image.pixels.foreach_get(values)
+    bpy.data.images.remove(image)
+    return np.rint(255 * values.reshape(height, width, 4)[::-1]).astype(np.uint8)
+
+
+def marked(picture):
+    """Pixels of the mesh's part of a picture in the first of the colours of what is outside."""
+    return int((picture[:, :800, :3] == np.array(native.module.OUTSIDE_COLOURS[0])).all(-1).sum())
+
+
+def test_decimate_draws_its_result(scan, tmp_path):
+    picture = tmp_path / "picture.png"
+    succeeded(decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", "--picture", picture))
+    drawn = pixels(picture)
+    assert drawn.shape[1] > drawn.shape[0] > 400 and marked(drawn) == 0
+    assert len(np.unique(drawn.reshape(-1, 4), axis=0)) > 1000
+
+
+def test_a_picture_needs_a_folder_and_a_png(scan, tmp_path):
+    for name, said in (("nowhere/a.png", "does not exist"), ("a.jpg", ".png")):
+        code, _, error = decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", "--picture", tmp_path / name)
+        assert code == 2 and said in error
+    assert not (tmp_path / "out.ply").exists()
+
+
+def test_figures_are_drawn_of_any_mesh(scan, tmp_path):
+    assert command("figures.py", scan, "--output", tmp_path, "--tolerance", "2%")[::2] == (0, "")
+    volume, distance = pixels(tmp_path / "volume.png"), pixels(tmp_path / "distance.png")
+    for picture in (volume, distance):
+        assert len(np.unique(picture.reshape(-1, 4), axis=0)) > 1000
+    code, _, error = command("figures.py", scan, "--output", tmp_path / "nowhere")
+    assert code == 2 and "does not exist" in error
