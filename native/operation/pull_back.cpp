@@ -107,6 +107,7 @@ void PullBack::make_rings(std::size_t vertex_count) {
   };
   each_use([&](std::uint32_t v, std::uint32_t) { ++ring_start_[v + 1]; });
   for (std::size_t v = 0; v < vertex_count; ++v) ring_start_[v + 1] += ring_start_[v];
+  seen_.assign(faces_.size() / corners_, 0);
   ring_.resize(ring_start_.back());
   std::vector<std::uint32_t> next(ring_start_.begin(), ring_start_.end() - 1);
   each_use([&](std::uint32_t v, std::uint32_t f) { ring_[next[v]++] = f; });
@@ -174,17 +175,21 @@ PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, Progress* pr
   return result;
 }
 
-PullBack::Moving PullBack::moving(std::vector<std::uint32_t> vertices) const {
+PullBack::Moving PullBack::moving(std::vector<std::uint32_t> vertices) {
   Moving result{std::move(vertices), {}};
   result.faces = faces_around(result.vertices);
   return result;
 }
 
-std::vector<std::uint32_t> PullBack::faces_around(std::span<const std::uint32_t> vertices) const {
+/// Each once.
+std::vector<std::uint32_t> PullBack::faces_around(std::span<const std::uint32_t> vertices) {
+  ++now_;
   std::vector<std::uint32_t> faces;
-  for (const std::uint32_t v : vertices) faces.insert(faces.end(), ring(v).begin(), ring(v).end());
-  std::sort(faces.begin(), faces.end());
-  faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
+  for (const std::uint32_t v : vertices) {
+    for (const std::uint32_t f : ring(v)) {
+      if (std::exchange(seen_[f], now_) != now_) faces.push_back(f);
+    }
+  }
   return faces;
 }
 

@@ -50,7 +50,7 @@ class PullBack {
   /// is not finite, and where the stored type cannot hold the tolerance. About 1 us a vertex.
   Start start(std::span<const glm::dvec3> stored, Progress* progress);
 
-  Moving moving(std::vector<std::uint32_t> vertices) const;
+  Moving moving(std::vector<std::uint32_t> vertices);
 
   /// Moves each vertex from `before`, its stored position now, towards `after`, and makes where it ends the new state.
   /// All faces of the new state are inside; see constrain.h for what else holds of the factors. Throws InvalidInput,
@@ -94,7 +94,7 @@ class PullBack {
   double over_triangulations(std::uint32_t face, Bound&& bound) const;
   double reach_by_certificate(std::uint32_t face) const;
   std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Progress* progress);
-  std::vector<std::uint32_t> faces_around(std::span<const std::uint32_t> vertices) const;
+  std::vector<std::uint32_t> faces_around(std::span<const std::uint32_t> vertices);
 
   glm::dvec3 stored_at(const Held& held, double factor) const;
   void place(const Held& held, double factor);
@@ -121,6 +121,8 @@ class PullBack {
   std::vector<Spot> state_, trial_;
   std::vector<double> step_;                 // per vertex: from state_ to trial_
   std::vector<double> reach_, trial_reach_;  // per face: no point of it is farther from the reference
+  std::vector<std::uint64_t> seen_;          // per face: when faces_around() last met it,
+  std::uint64_t now_ = 0;                    // ... in calls
   std::vector<std::uint32_t> held_index_;    // per vertex: its place among the held ones, kNone
 };
 
