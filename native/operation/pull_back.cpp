@@ -128,13 +128,13 @@ PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, Progress* pr
         placement_.store(reach * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1)));
   }
   const double mapping_error = placement_.mapping_error(extremes);
-  const double provable = volume_->provable(mapping_error), refutable = volume_->refutable(mapping_error);
-  within_ = provable * (1 - kHeadroom);
-  const auto certificate = [&](double within) {
-    return TriangleCertificate(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within, refutable);
-  };
-  certificate_.assign(1, certificate(within_));
-  const TriangleCertificate whole = certificate(provable);
+  provable_ = volume_->provable(mapping_error);
+  within_ = provable_ * (1 - kHeadroom);
+  certificates_.clear();
+  for (const double within : {provable_, within_}) {
+    certificates_.emplace_back(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within,
+                               volume_->refutable(mapping_error));
+  }
 
   state_.resize(stored.size());
   if (progress) progress->begin("checking");
@@ -160,14 +160,15 @@ PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, Progress* pr
   result.outside = select(count, threads_, [&](std::size_t i) {
     if (progress && i % kBlock == 0) progress->update(0.5 + 0.5 * static_cast<double>(i) / static_cast<double>(count));
     const std::uint32_t f = static_cast<std::uint32_t>(i);
-    reach_[f] = reach_by_certificate(f);
-    if (reach_[f] <= within_) return false;
-    // Inside but for the headroom: nothing is known of it beyond the state as it is.
-    reach_[f] = within_;
-    const double all = over_triangulations(f, [&](const glm::dvec3(&corners)[3], const glm::dvec3&) {
-      return whole.verdict(corners, glm::dvec3(kUnknown)) == Verdict::inside ? 0.0 : kUnproved;
-    });
-    return all != 0;
+    reach_[f] = provable_;  // nothing is known of it beyond the state as it is, unless:
+    const double reach = reach_by_certificate(f);
+    if (reach != kUnproved) {
+      reach_[f] = reach;
+      return false;
+    }
+    return over_triangulations(f, [&](const glm::dvec3(&corners)[3], const glm::dvec3& distances) {
+             return certificates_.front().verdict(corners, distances) == Verdict::inside ? 0 : kUnproved;
+           }) == kUnproved;
   });
   for (const std::uint32_t f : result.outside) {
     for (const std::uint32_t v : corners_of(f)) frozen_[v] = true;
@@ -197,7 +198,7 @@ double PullBack::distance_of(const glm::dvec3& at) const {
   const double box = 1 + 2 * volume_->frame_tolerance();
   // Written so that NaN is outside.
   if (!(std::abs(at.x) <= box && std::abs(at.y) <= box && std::abs(at.z) <= box)) return kFar;
-  const Hierarchy::Nearest nearest = volume_->hierarchy().nearest(at, within_, volume_->grid().triangle_near(at));
+  const Hierarchy::Nearest nearest = volume_->hierarchy().nearest(at, provable_, volume_->grid().triangle_near(at));
   return nearest.triangle == Hierarchy::kNone ? kFar : nearest.distance;
 }
 
@@ -237,11 +238,17 @@ double PullBack::over_triangulations(std::uint32_t face, Bound&& bound) const {
 
 double PullBack::reach_by_certificate(std::uint32_t face) const {
   for (const std::uint32_t v : corners_of(face)) {
-    if (trial_[v].distance == kFar) return kUnproved;
+    if (trial_[v].distance > within_) return kUnproved;
   }
-  return over_triangulations(face, [&](const glm::dvec3(&corners)[3], const glm::dvec3& distances) {
-    return certificate_.front().bound(corners, distances);
-  });
+  // First as Certificate decides, so that it proves the face again; then the headroom.
+  double reach = kUnproved;
+  for (const TriangleCertificate& certificate : certificates_) {
+    reach = over_triangulations(face, [&](const glm::dvec3(&corners)[3], const glm::dvec3& distances) {
+      return certificate.bound(corners, distances);
+    });
+    if (reach <= within_ || reach == kUnproved) break;
+  }
+  return reach;
 }
 
 /// Which of these faces are not inside as their corners are now tried; writes trial_reach_ of all.
@@ -512,7 +519,7 @@ bool PullBack::attempt(Held& held, double factor) {
     return true;
   }
   const double distance = distance_of(to.at), step = step_[v];
-  if (distance == kFar) return false;
+  if (distance > within_) return false;
   trial_[v] = {to.at, distance};
   step_[v] = glm::length(to.at - state_[v].at);
   const auto faces = ring(v);

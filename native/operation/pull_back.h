@@ -116,8 +116,8 @@ class PullBack {
   unsigned threads_;
   std::vector<std::uint32_t> ring_start_, ring_;  // vertex -> its faces
   std::vector<bool> frozen_;
-  double within_ = 0;
-  std::vector<TriangleCertificate> certificate_;  // none before start()
+  double provable_ = 0, within_ = 0;               // what the certificate decides by, and what of it is used
+  std::vector<TriangleCertificate> certificates_;  // for the two; none before start()
   std::vector<Spot> state_, trial_;
   std::vector<double> step_;                 // per vertex: from state_ to trial_
   std::vector<double> reach_, trial_reach_;  // per face: no point of it is farther from the reference
