@@ -83,7 +83,7 @@ Guard::Correction Guard::constrain(std::span<const float> positions) {
   const PullBack::Moving moving = pull_back_.moving(changed(positions));
   std::vector<glm::dvec3> before, after;
   for (const std::uint32_t v : moving.vertices) before.push_back(at(last_, v)), after.push_back(at(positions, v));
-  const PullBack::Result ends = pull_back_.move(moving, before, after, PullBack::Mode::pull_back, nullptr);
+  const PullBack::Result ends = pull_back_.move(moving, before, after, PullBack::Mode::settle, nullptr);
   Correction correction;
   for (std::size_t i = 0; i < moving.vertices.size(); ++i) {
     const std::uint32_t v = moving.vertices[i];

@@ -34,7 +34,8 @@ constexpr double kHeadroom = 1e-4;
 constexpr double kEasy = 0.98, kComfort = 0.97;
 constexpr double kRise = 1.0 / 64;       // what no factor can rise by in the end
 constexpr double kShrink = 0.75;         // of a factor, in each round in which a face of the vertex fails
-constexpr int kAdvances = 12;            // steps towards the surface; a plane takes one
+constexpr int kCrossings = 8;            // tries to find where a vertex leaves the volume; a plane takes one
+constexpr double kClose = 0.002;         // of the provable distance: near enough to that place
 constexpr double kInflate = 0x1p-50;     // rounding of a step's length and of adding it, relative
 constexpr std::size_t kBlock = 1024;     // faces or vertices, for work of about 10 ns each, and
 constexpr std::size_t kSmallBlock = 32;  // for work of about 1 us each
@@ -308,9 +309,9 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
   std::vector<std::uint32_t> failed = failing(moving.faces, progress);
   if (!failed.empty()) {
     std::vector<Held> held = hold(moving, before, after, std::move(failed), progress);
-    if (mode == Mode::pull_back) {
+    if (mode != Mode::reset) {
       pull(held, progress);
-      let_go(held, progress);
+      let_go(held, mode, progress);
     }
     for (const Held& h : held) {
       const auto place = std::lower_bound(vertices.begin(), vertices.end(), h.vertex) - vertices.begin();
@@ -369,36 +370,52 @@ void PullBack::place(const Held& held, double factor) {
   step_[v] = glm::length(trial_[v].at - state_[v].at);
 }
 
-/// The largest factor up to `from` at which the vertex itself is within `target` of the reference, or a factor above
-/// it: back by the excess of the distance, which cannot skip such a place.
-double PullBack::advance(const Held& held, double from, double target) const {
-  double factor = from;
-  std::uint32_t hint = kNone;
-  for (int i = 0; i < kAdvances && factor > 0; ++i) {
-    const Hierarchy::Nearest nearest = volume_->hierarchy().nearest(placement_.frame(stored_at(held, factor)),
-                                                                    std::numeric_limits<double>::infinity(), hint);
-    if (nearest.distance <= target) return factor;
-    factor -= (nearest.distance - target) / held.length;
-    hint = nearest.triangle;
+/// A factor at which the vertex itself is about `target` from the reference, at the most, between one where it is
+/// nearer and one where it is farther: false position, in which an end that stays twice counts half (Illinois).
+double PullBack::crossing(const Held& held, double target, Along near, Along far) const {
+  double near_excess = near.distance - target, far_excess = far.distance - target;
+  for (int i = 0; i < kCrossings && near_excess < -kClose * within_; ++i) {
+    const double factor = near.factor + (far.factor - near.factor) * near_excess / (near_excess - far_excess);
+    const Along next = along(held, factor, far.triangle);
+    if (next.distance <= target) {
+      near = next, near_excess = next.distance - target, far_excess /= 2;
+    } else {
+      far = next, far_excess = next.distance - target, near_excess /= 2;
+    }
   }
-  return std::max(factor, 0.0);
+  return near.factor;
+}
+
+PullBack::Along PullBack::along(const Held& held, double factor, std::uint32_t hint) const {
+  const glm::dvec3 at = placement_.frame(stored_at(held, factor));
+  const std::uint32_t guess = volume_->grid().triangle_near(at);
+  const Hierarchy::Nearest nearest = volume_->hierarchy().nearest(at, std::numeric_limits<double>::infinity(),
+                                                                  guess == DistanceGrid::kNone ? hint : guess);
+  return {factor, nearest.distance, nearest.triangle};
+}
+
+/// Finds where the vertex leaves the volume if nothing else held it, and puts it a little before that.
+void PullBack::release(Held& held) {
+  // A wish at the end of the world tells nothing: all of the volume is in this box.
+  const double box = 1 + 2 * volume_->frame_tolerance();
+  const glm::dvec3 from = state_[held.vertex].at, way = placement_.frame(held.after) - from;
+  double exit = 1;
+  for (int k = 0; k < 3; ++k) {
+    if (way[k] != 0) exit = std::min(exit, std::max(0.0, (std::copysign(box, way[k]) - from[k]) / way[k]));
+  }
+  const Along far = along(held, exit, kNone), near = along(held, 0, far.triangle);
+  held.factor = held.limit = 1;
+  if (far.distance > within_) {
+    held.limit = near.distance < within_ ? crossing(held, within_, near, far) : 0;
+    held.factor = near.distance < kComfort * within_ ? crossing(held, kComfort * within_, near, far) : 0;
+  }
+  place(held, held.factor);
 }
 
 /// Step (2).
 void PullBack::pull(std::vector<Held>& held, Progress* progress) {
   parallel_for(held.size(), kSmallBlock, threads_, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      Held& h = held[i];
-      // Not from a wish at the end of the world: all of the volume is in this box.
-      const double box = 1 + 2 * volume_->frame_tolerance();
-      const glm::dvec3 from = state_[h.vertex].at, way = placement_.frame(h.after) - from;
-      for (int k = 0; k < 3; ++k) {
-        if (way[k] != 0) h.limit = std::min(h.limit, std::max(0.0, (std::copysign(box, way[k]) - from[k]) / way[k]));
-      }
-      h.limit = advance(h, h.limit, within_);
-      h.factor = h.limit < 1 ? advance(h, h.limit, kComfort * within_) : 1;
-      place(h, h.factor);
-    }
+    for (std::size_t i = begin; i < end; ++i) release(held[i]);
   });
   std::vector<std::uint32_t> changed;
   for (const Held& h : held) changed.push_back(h.vertex);
@@ -447,7 +464,7 @@ std::uint32_t PullBack::colour(std::vector<Held>& held) const {
 }
 
 /// Step (3). Ends, because from its second turn on a vertex goes forward by kRise or not at all.
-void PullBack::let_go(std::vector<Held>& held, Progress* progress) {
+void PullBack::let_go(std::vector<Held>& held, Mode mode, Progress* progress) {
   std::vector<std::uint32_t> unknown;
   std::vector<std::vector<std::uint32_t>> due(colour(held));
   for (std::uint32_t i = 0; i < held.size(); ++i) {
@@ -476,7 +493,7 @@ void PullBack::let_go(std::vector<Held>& held, Progress* progress) {
         for (std::size_t i = begin; i < end; ++i) {
           Held& h = held[turn[i]];
           const double factor = h.factor;
-          raise(h, !searched[turn[i]]);
+          raise(h, mode, !searched[turn[i]]);
           raised[i] = h.factor > factor;
         }
       });
@@ -493,8 +510,9 @@ void PullBack::let_go(std::vector<Held>& held, Progress* progress) {
   }
 }
 
-void PullBack::raise(Held& held, bool search) {
-  const double grain = std::min(kRise, (1 - kComfort) * within_ / held.length);
+void PullBack::raise(Held& held, Mode mode, bool search) {
+  const double little = (1 - kComfort) * within_ / held.length;
+  const double rise = mode == Mode::settle ? std::max(kRise, little) : kRise, grain = std::min(rise, little);
   while (held.factor < 1) {
     if (held.limit >= 1 && attempt(held, 1)) return;
     if (search) {
@@ -505,7 +523,7 @@ void PullBack::raise(Held& held, bool search) {
         next = (lower + upper) / 2;
       }
     }
-    if (!attempt(held, std::min(1.0, held.factor + kRise))) return;
+    if (!attempt(held, std::min(1.0, held.factor + rise))) return;
     search = true;
   }
 }

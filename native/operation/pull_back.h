@@ -21,7 +21,8 @@ namespace tolvol {
 class PullBack {
  public:
   enum class Mode {
-    pull_back,  ///< as far as the tolerance lets each vertex go
+    pull_back,  ///< as far as the tolerance lets each vertex go: none can rise by 1/64 of its motion alone
+    settle,     ///< the same but for the last 3 % of the tolerance, which take most of the time
     reset,      ///< all the way back or not at all, the one step back of [Botsch04, §5]
   };
 
@@ -71,9 +72,15 @@ class PullBack {
     glm::dvec3 before, after;  ///< stored
     double length;             ///< of the motion, in the frame
     double factor = 0;
-    double limit = 1;         ///< beyond it the vertex itself is outside
+    double limit = 1;         ///< about where the vertex itself leaves the volume; 1 only if it does not
     std::uint32_t blame = 0;  ///< place in the vertex's ring of the face that refused last
     std::uint32_t colour = 0;
+  };
+
+  /// A place on the way of a vertex, and the distance there.
+  struct Along {
+    double factor, distance;
+    std::uint32_t triangle;  ///< the nearest
   };
 
   // Both prove nothing when they are taken for upper bounds.
@@ -100,13 +107,15 @@ class PullBack {
   void place(const Held& held, double factor);
   std::vector<Held> hold(const Moving& moving, std::span<const glm::dvec3> before, std::span<const glm::dvec3> after,
                          std::vector<std::uint32_t> failed, Progress* progress);
-  double advance(const Held& held, double from, double target) const;
+  Along along(const Held& held, double factor, std::uint32_t hint) const;
+  double crossing(const Held& held, double target, Along near, Along far) const;
+  void release(Held& held);
   void pull(std::vector<Held>& held, Progress* progress);
-  void let_go(std::vector<Held>& held, Progress* progress);
+  void let_go(std::vector<Held>& held, Mode mode, Progress* progress);
   std::uint32_t colour(std::vector<Held>& held) const;
   template <class Visit>
   void held_around(std::uint32_t vertex, Visit&& visit) const;
-  void raise(Held& held, bool search);
+  void raise(Held& held, Mode mode, bool search);
   bool attempt(Held& held, double factor);
 
   const ToleranceVolume* volume_;
