@@ -31,6 +31,7 @@ ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const gl
     if (before[v] == after[v]) continue;
     moved.push_back(v), from.push_back(before[v]), to.push_back(after[v]);
   }
+  if (options.progress) options.progress->begin("pulling back");
   const PullBack::Moving moving = pull_back.moving(std::move(moved));
   const PullBack::Result ends = pull_back.move(moving, from, to, options.mode, options.progress);
   result.vertices.assign(after.begin(), after.end());

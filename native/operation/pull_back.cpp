@@ -174,6 +174,7 @@ PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, Progress* pr
   for (const std::uint32_t f : result.outside) {
     for (const std::uint32_t v : corners_of(f)) frozen_[v] = true;
   }
+  any_frozen_ = !result.outside.empty();
   return result;
 }
 
@@ -286,7 +287,6 @@ std::vector<std::uint32_t> PullBack::failing(std::span<const std::uint32_t> face
 PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3> before,
                                 std::span<const glm::dvec3> after, Mode mode, Progress* progress) {
   const std::vector<std::uint32_t>& vertices = moving.vertices;
-  if (progress) progress->begin("pulling back");
   const auto each = [&](auto&& body) {
     parallel_for(vertices.size(), kBlock, threads_, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) body(i, vertices[i]);
@@ -321,7 +321,7 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
       held_index_[h.vertex] = kNone;
     }
   }
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
+  for (std::size_t i = 0; any_frozen_ && i < vertices.size(); ++i) {
     if (!frozen_[vertices[i]]) continue;
     result.factors[i] = 0, result.reached[i] = before[i];
     ++result.held_back;

@@ -125,6 +125,7 @@ class PullBack {
   unsigned threads_;
   std::vector<std::uint32_t> ring_start_, ring_;  // vertex -> its faces
   std::vector<bool> frozen_;
+  bool any_frozen_ = false;
   double provable_ = 0, within_ = 0;               // what the certificate decides by, and what of it is used
   std::vector<TriangleCertificate> certificates_;  // for the two; none before start()
   std::vector<Spot> state_, trial_;

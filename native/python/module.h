@@ -11,6 +11,7 @@ void bind_progress(pybind11::module_& module);
 void bind_gl(pybind11::module_& module);
 void bind_volume(pybind11::module_& module);
 void bind_constrain(pybind11::module_& module);
+void bind_smoothing(pybind11::module_& module);
 void bind_decimation(pybind11::module_& module);
 void bind_measure(pybind11::module_& module);
 
