@@ -11,6 +11,7 @@
 #include "check/certificate.h"
 #include "operation/boundary.h"
 #include "operation/collapse_loop.h"
+#include "operation/input.h"
 #include "operation/manifold_cut.h"
 #include "operation/wedges.h"
 #include "reference/errors.h"
@@ -98,7 +99,7 @@ class Decimation {
   CollapseBounds set_bounds() {
     std::vector<glm::dvec3> used;
     for (const std::uint32_t i : cut_.vertex_input) used.push_back(vertices_[i]);
-    check_storage(used);
+    if (const auto warning = storage_warning(*volume_, placement_, used)) result_.warnings.push_back(*warning);
     // Vertices may end up anywhere in the volume.
     const double reach = 1 + volume_->frame_tolerance();
     for (int corner = 0; corner < 8; ++corner) {
@@ -131,15 +132,6 @@ class Decimation {
     return bounds;
   }
 
-  void check_storage(std::span<const glm::dvec3> used) {
-    const double share = placement_.storage_step(used) / volume_->frame_tolerance();
-    std::ostringstream text;
-    text << "at these coordinates the stored type rounds positions by up to " << 100 * share << " % of the tolerance; "
-         << "move the mesh nearer to its origin or take a larger tolerance";
-    if (share > 0.5) throw InvalidInput(text.str());
-    if (share > 0.01) result_.warnings.push_back(text.str());
-  }
-
   void certify_input(const Certificate& certificate, double mapping_error) {
     const std::vector<glm::dvec3> in_frame = placement_.frame(vertices_);
     std::vector<std::uint32_t> indices;
@@ -154,11 +146,7 @@ class Decimation {
       for (int k = 0; k < 3; ++k) pin(cut_.input_vertex[triangles_[i][k]], "outside the tolerance");
     }
     if (result_.outside_faces && options_.outside == DecimationOptions::Outside::error) {
-      std::ostringstream text;
-      text << result_.outside_faces << " faces are not within the tolerance of the reference, the first is face "
-           << *result_.first_outside
-           << "; take a larger tolerance, set the reference anew, or keep them (outside=\"keep\")";
-      throw InvalidInput(text.str());
+      refuse_outside(result_.outside_faces, *result_.first_outside);
     }
   }
 

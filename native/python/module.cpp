@@ -14,6 +14,8 @@ PYBIND11_MODULE(tolvol, module) {
   tolvol::python::bind_progress(module);
   tolvol::python::bind_gl(module);
   tolvol::python::bind_volume(module);
+  tolvol::python::bind_constrain(module);
+  tolvol::python::bind_smoothing(module);
   tolvol::python::bind_decimation(module);
   tolvol::python::bind_measure(module);
   tolvol::python::bind_picture(module);

@@ -1,0 +1,370 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What is stored is judged by measure/hausdorff.h and once more by the certificate, whole.
+#include "operation/constrain.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <memory>
+
+#include "check/certificate.h"
+#include "measure/hausdorff.h"
+#include "reference/errors.h"
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+using Mode = PullBack::Mode;
+using Points = std::vector<dvec3>;
+
+struct Scene {
+  TriangleMesh mesh;
+  glm::dmat4 to_world = glm::dmat4(1);
+  Storage storage = Storage::float32;
+  double percent = 1;
+
+  Placement placement() const { return {to_world, storage}; }
+  double tolerance() const { return percent / 100 * reference_size(mesh.vertices, mesh.triangles, to_world); }
+  std::unique_ptr<ToleranceVolume> volume(double share = 1) const {
+    return std::make_unique<ToleranceVolume>(mesh.vertices, mesh.triangles, placement(), share * tolerance());
+  }
+  dvec3 stored(const dvec3& p) const { return storage == Storage::float32 ? rounded_to_float32(p) : p; }
+  /// Every vertex moved by `motion(v)`, a world vector in tolerances.
+  template <class Motion>
+  Points wish(Motion&& motion) const {
+    const glm::dmat3 back = glm::inverse(glm::dmat3(to_world));
+    Points result;
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
+      result.push_back(stored(mesh.vertices[v] + back * (tolerance() * dvec3(motion(v)))));
+    return result;
+  }
+};
+
+std::vector<std::uint32_t> flat(const std::vector<glm::uvec3>& triangles) {
+  std::vector<std::uint32_t> indices;
+  for (const glm::uvec3& t : triangles) indices.insert(indices.end(), {t.x, t.y, t.z});
+  return indices;
+}
+
+ConstrainResult run(const Scene& scene, const Points& wish, const ConstrainOptions& options = {}) {
+  return constrain(scene.mesh.vertices, wish, flat(scene.mesh.triangles), 3, scene.placement(), *scene.volume(),
+                   options);
+}
+
+/// Noise of a standard deviation of so many tolerances along each axis.
+auto noise(double deviation, unsigned seed = 1) {
+  return [deviation, engine = std::mt19937(seed), normal = std::normal_distribution<double>()](std::size_t) mutable {
+    const double x = normal(engine), y = normal(engine), z = normal(engine);
+    return deviation * dvec3(x, y, z);
+  };
+}
+
+std::vector<Verdict> verdicts(const ToleranceVolume& volume, const Placement& placement, const Points& points,
+                              const std::vector<std::uint32_t>& faces, int corners = 3) {
+  const Placement placed = placement.in(volume.frame());
+  const Points in_frame = placed.frame(points);
+  return Certificate(volume).check({in_frame, faces, corners, placed.mapping_error(points)}, {1, nullptr});
+}
+
+bool all_inside(const std::vector<Verdict>& verdicts) {
+  return std::all_of(verdicts.begin(), verdicts.end(), [](Verdict v) { return v == Verdict::inside; });
+}
+
+void expect_inside(const Scene& scene, const ConstrainResult& r) {
+  const auto world = [&](Points points) {
+    for (dvec3& p : points) p = scene.placement().world(p);
+    return TriangleMesh{points, scene.mesh.triangles};
+  };
+  const double tolerance = scene.tolerance();
+  EXPECT_LE(hausdorff(world(r.vertices), world(scene.mesh.vertices), {tolerance, 1, nullptr}).upper, tolerance);
+  EXPECT_TRUE(all_inside(verdicts(*scene.volume(), scene.placement(), r.vertices, flat(scene.mesh.triangles))));
+}
+
+bool same_bits(const dvec3& a, const dvec3& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+
+/// Positions are those of the factors, bit for bit.
+void expect_on_the_way(const Scene& scene, const Points& wish, const ConstrainResult& r) {
+  ASSERT_EQ(r.vertices.size(), wish.size());
+  ASSERT_EQ(r.factors.size(), wish.size());
+  std::size_t held_back = 0;
+  for (std::size_t v = 0; v < wish.size(); ++v) {
+    const dvec3& before = scene.mesh.vertices[v];
+    const double f = r.factors[v];
+    ASSERT_TRUE(f >= 0 && f <= 1);
+    held_back += f < 1;
+    const dvec3 expected = f == 1 ? wish[v] : f == 0 ? before : scene.stored(before + f * (wish[v] - before));
+    ASSERT_TRUE(same_bits(r.vertices[v], expected)) << v;
+  }
+  EXPECT_EQ(r.held_back, held_back);
+}
+
+std::vector<Scene> scenes() {
+  glm::dmat4 mirrored(1), sheared(1), far_away(1), tiny(1e-6), huge(1e6);
+  mirrored[0][0] = -1;
+  sheared[1][0] = 0.7, sheared[2][1] = -0.4, sheared[0][0] = 3;
+  far_away[3] = {5000, -3000, 100, 1};
+  tiny[3][3] = huge[3][3] = 1;
+  TriangleMesh slivers = shapes::grid(30);
+  for (dvec3& p : slivers.vertices) p = rounded_to_float32(dvec3(p.x, p.y * 1e-3, 0.05 * std::sin(9 * p.x)));
+  TriangleMesh odd = shapes::box(6);  // faces that are points and segments, twice the same, a vertex without a face
+  odd.triangles.insert(odd.triangles.end(), {{0, 0, 0}, {0, 1, 1}, odd.triangles[0], odd.triangles[7]});
+  odd.vertices.emplace_back(100, 100, 100);
+  return {{shapes::torus(40, 0.002)},
+          {shapes::torus(40, 0.02), glm::dmat4(1), Storage::float64},
+          {shapes::box(10)},
+          {shapes::stored(shapes::grid(30))},
+          {shapes::soup(shapes::torus(24))},
+          {slivers},
+          {odd},
+          {shapes::torus(30), mirrored},
+          {shapes::torus(30), sheared},
+          {shapes::torus(30), far_away},
+          {shapes::torus(30), tiny},
+          {shapes::torus(30), huge},
+          {shapes::torus(24), glm::dmat4(1), Storage::float32, 0.05},
+          {shapes::joined(shapes::box(6), shapes::grid(6)), glm::dmat4(1), Storage::float32, 10}};
+}
+
+TEST(Constrain, APlanePushedFarBeyondReachesTheTolerance) {
+  for (const double far : {1.05, 3.0, 1e3, 1e30}) {
+    const Scene plane{shapes::grid(20), glm::dmat4(1), Storage::float64};
+    const Points wish = plane.wish([&](std::size_t) { return dvec3(0, 0, far); });
+    const ConstrainResult r = run(plane, wish);
+    for (const dvec3& p : r.vertices) {
+      EXPECT_GE(p.z, 0.95 * plane.tolerance());
+      EXPECT_LE(p.z, plane.tolerance());
+    }
+    EXPECT_EQ(r.held_back, wish.size());
+  }
+}
+
+TEST(Constrain, AWishThatIsInsideIsGranted) {
+  const Scene scene{shapes::torus(40)};
+  const Points wish = scene.wish(noise(0.05));
+  for (const Mode mode : {Mode::pull_back, Mode::reset}) {
+    const ConstrainResult r = run(scene, wish, {.mode = mode});
+    EXPECT_EQ(r.held_back, 0u);
+    for (std::size_t v = 0; v < wish.size(); ++v) ASSERT_TRUE(same_bits(r.vertices[v], wish[v]));
+  }
+}
+
+TEST(Constrain, EveryFaceIsInsideOnEveryMesh) {
+  int number = 0;
+  for (const Scene& scene : scenes()) {
+    SCOPED_TRACE(testing::Message() << "scene " << number++);
+    const Points wish = scene.wish(noise(0.6));
+    const ConstrainResult pulled = run(scene, wish), reset = run(scene, wish, {.mode = Mode::reset});
+    expect_inside(scene, pulled);
+    expect_inside(scene, reset);
+    expect_on_the_way(scene, wish, pulled);
+    expect_on_the_way(scene, wish, reset);
+    EXPECT_GT(pulled.held_back, 0u);
+    EXPECT_GT(reset.held_back, pulled.held_back);
+    for (std::size_t v = 0; v < wish.size(); ++v) {
+      EXPECT_TRUE(reset.factors[v] == 0 || reset.factors[v] == 1);
+      EXPECT_GE(pulled.factors[v], reset.factors[v]);
+    }
+  }
+}
+
+/// For each vertex, its faces.
+std::vector<std::vector<std::uint32_t>> rings(const Scene& scene) {
+  std::vector<std::vector<std::uint32_t>> result(scene.mesh.vertices.size());
+  for (std::uint32_t f = 0; f < scene.mesh.triangles.size(); ++f) {
+    for (int k = 0; k < 3; ++k) result[scene.mesh.triangles[f][k]].push_back(f);
+  }
+  return result;
+}
+
+TEST(Constrain, OnlyVerticesOfFailingFacesAreHeldBack) {
+  const Scene scene{shapes::torus(40)};
+  const Points wish = scene.wish(noise(0.5));
+  const ConstrainResult r = run(scene, wish);
+  const std::vector<Verdict> wished =
+      verdicts(*scene.volume(1 - 2e-4), scene.placement(), wish, flat(scene.mesh.triangles));
+  const auto ring = rings(scene);
+  std::size_t untouched = 0;
+  for (std::size_t v = 0; v < wish.size(); ++v) {
+    // A face that would be inside with all its wishes granted fails only where one of them is not.
+    const bool failed = std::any_of(ring[v].begin(), ring[v].end(), [&](std::uint32_t f) {
+      const glm::uvec3 t = scene.mesh.triangles[f];
+      bool other = false;
+      for (int k = 0; k < 3; ++k) other = other || (t[k] != v && r.factors[t[k]] < 1);
+      return wished[f] != Verdict::inside || other;
+    });
+    if (!failed) {
+      EXPECT_EQ(r.factors[v], 1) << v;
+      ++untouched;
+    }
+  }
+  EXPECT_GT(untouched, wish.size() / 4);
+  EXPECT_GT(r.held_back, 50u);
+}
+
+TEST(Constrain, NoFactorCanRiseAlone) {
+  for (const double deviation : {0.5, 3.0}) {
+    const Scene scene{shapes::torus(40)};
+    const Points wish = scene.wish(noise(deviation));
+    const ConstrainResult r = run(scene, wish);
+    const auto ring = rings(scene);
+    // Nearer to its end than the headroom that is kept no vertex has to go.
+    const auto volume = scene.volume(1 - 2e-4);
+    std::size_t tried = 0;
+    for (std::size_t v = 0; v < wish.size(); ++v) {
+      if (r.factors[v] == 1) continue;
+      const double f = std::min(1.0, r.factors[v] + 1.0 / 64);
+      Points raised = r.vertices;
+      raised[v] = f == 1 ? wish[v] : scene.stored(scene.mesh.vertices[v] + f * (wish[v] - scene.mesh.vertices[v]));
+      std::vector<std::uint32_t> faces;
+      for (const std::uint32_t i : ring[v]) {
+        for (int k = 0; k < 3; ++k) faces.push_back(scene.mesh.triangles[i][k]);
+      }
+      EXPECT_FALSE(all_inside(verdicts(*volume, scene.placement(), raised, faces))) << v << " at " << r.factors[v];
+      ++tried;
+    }
+    EXPECT_GT(tried, 50u);
+  }
+}
+
+TEST(Constrain, TheResultDoesNotDependOnThreads) {
+  const Scene scene{shapes::torus(80)};
+  const Points wish = scene.wish(noise(0.6));
+  const ConstrainResult one = run(scene, wish, {.threads = 1});
+  for (const unsigned threads : {2u, 3u, 7u}) {
+    const ConstrainResult more = run(scene, wish, {.threads = threads});
+    EXPECT_EQ(one.factors, more.factors);
+    EXPECT_TRUE(std::equal(one.vertices.begin(), one.vertices.end(), more.vertices.begin(), same_bits));
+  }
+}
+
+TEST(Constrain, CornersThatStayAreChecked) {
+  // A single vertex of a fine plate far in front of it would be a spike between neighbours that stay.
+  Scene scene{shapes::stored(shapes::grid(10))};
+  Points wish = scene.mesh.vertices;
+  wish[60] += dvec3(0, 0, 10 * scene.tolerance());
+  const ConstrainResult r = run(scene, wish);
+  expect_inside(scene, r);
+  EXPECT_EQ(r.held_back, 1u);
+  EXPECT_NEAR(r.factors[60], 0.1, 0.005);
+}
+
+TEST(Constrain, PointsSegmentsAndQuads) {
+  // A valley x = 0 between two slopes. Vertices at the same height on either side: points on the slopes are inside,
+  // what spans the valley is not.
+  const TriangleMesh valley{{{-1, -1, 1}, {-1, 1, 1}, {0, -1, 0}, {0, 1, 0}, {1, -1, 1}, {1, 1, 1}},
+                            {{0, 2, 1}, {2, 3, 1}, {2, 4, 3}, {4, 5, 3}}};
+  const Placement placement(glm::dmat4(1), Storage::float64);
+  const ToleranceVolume volume(valley.vertices, valley.triangles, placement, 0.05);
+  // Corners beside the valley, two of them go up the slopes.
+  const Points before{{-0.05, -0.5, 0.05}, {0.05, -0.5, 0.05}, {0.05, 0.5, 0.05}, {-0.05, 0.5, 0.05}};
+  Points after = before;
+  after[0] = {-0.5, -0.5, 0.5}, after[2] = {0.5, 0.5, 0.5};
+  const auto factors = [&](const std::vector<std::uint32_t>& faces, int corners) {
+    const ConstrainResult r = constrain(before, after, faces, corners, placement, volume);
+    EXPECT_TRUE(all_inside(verdicts(volume, placement, r.vertices, faces, corners)));
+    return r.factors;
+  };
+  EXPECT_EQ(factors({0, 1, 2, 3}, 1), (std::vector<double>{1, 1, 1, 1}));
+  EXPECT_LT(factors({0, 1}, 2)[0], 1) << "a segment across";
+  EXPECT_EQ(factors({3, 0}, 2), (std::vector<double>{1, 1, 1, 1})) << "a segment on one slope";
+  // Two triangles around the diagonal 1-3 leave out the diagonal 0-2; the quad has both.
+  const std::vector<double> split = factors({0, 1, 3, 1, 2, 3}, 3), quad = factors({0, 1, 2, 3}, 4);
+  EXPECT_LT(quad[0] + quad[2], split[0] + split[2]);
+  EXPECT_EQ(factors({0, 1, 3, 3}, 4), factors({0, 1, 3}, 3)) << "a quad that is a triangle";
+}
+
+TEST(Constrain, OutsideIsAnErrorOrKept) {
+  const Scene scene{shapes::torus(40)};
+  Points before = scene.mesh.vertices;
+  before[7] += dvec3(0, 0, 5 * scene.tolerance());
+  before[7] = rounded_to_float32(before[7]);
+  const Points wish = scene.wish(noise(0.1));
+  const auto volume = scene.volume();
+  const std::vector<std::uint32_t> faces = flat(scene.mesh.triangles);
+  const std::vector<Verdict> found = verdicts(*volume, scene.placement(), before, faces);
+  const auto first = std::find_if(found.begin(), found.end(), [](Verdict v) { return v != Verdict::inside; });
+  const std::ptrdiff_t count = std::count_if(first, found.end(), [](Verdict v) { return v != Verdict::inside; });
+  try {
+    constrain(before, wish, faces, 3, scene.placement(), *volume);
+    FAIL();
+  } catch (const InvalidInput& error) {
+    const std::string expected = std::to_string(count) +
+                                 " faces are not within the tolerance of the reference, the first is face " +
+                                 std::to_string(first - found.begin());
+    EXPECT_EQ(std::string(error.what()).find(expected), 0u) << error.what();
+  }
+  const ConstrainResult r =
+      constrain(before, wish, faces, 3, scene.placement(), *volume, {.outside = ConstrainOptions::Outside::keep});
+  EXPECT_EQ(r.outside_faces, std::size_t(count));
+  EXPECT_EQ(r.first_outside, std::uint32_t(first - found.begin()));
+  const std::vector<Verdict> after = verdicts(*volume, scene.placement(), r.vertices, faces);
+  std::size_t moved = 0;
+  for (std::size_t f = 0; f < found.size(); ++f) {
+    EXPECT_EQ(found[f] == Verdict::inside, after[f] == Verdict::inside);
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t v = scene.mesh.triangles[f][k];
+      EXPECT_TRUE(found[f] == Verdict::inside || r.vertices[v] == before[v]);
+      moved += r.vertices[v] != before[v];
+    }
+  }
+  EXPECT_GT(moved, before.size());
+}
+
+template <class Call>
+void expect_refused(Call&& call, const std::string& text) {
+  try {
+    call();
+    ADD_FAILURE() << "not refused: " << text;
+  } catch (const InvalidInput& error) {
+    EXPECT_NE(std::string(error.what()).find(text), std::string::npos) << error.what();
+  }
+}
+
+TEST(Constrain, BadInput) {
+  const Scene scene{shapes::torus(20)};
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  Points wish = scene.mesh.vertices;
+  wish[300].y = nan, wish[17].x = infinity;
+  expect_refused([&] { run(scene, wish); }, "the wish for vertex 17 is not finite");
+  wish = scene.mesh.vertices;
+  wish[5].z = 1.7e308;
+  glm::dmat4 scaled(100);
+  scaled[3][3] = 1;
+  expect_refused([&] { run({shapes::torus(20), scaled, Storage::float64}, wish); }, "vertex 5 is too far away");
+  expect_refused([&] { run(scene, Points(3)); }, "after 3");
+  Scene broken = scene;
+  broken.mesh.vertices[9].x = nan;
+  const auto volume = scene.volume();
+  const auto with = [&](const Points& before, std::vector<std::uint32_t> faces, int corners) {
+    constrain(before, before, faces, corners, scene.placement(), *volume);
+  };
+  expect_refused([&] { with(broken.mesh.vertices, {0, 1, 2}, 3); }, "vertex 9 is not finite");
+  expect_refused([&] { with(scene.mesh.vertices, {0, 1, 2, 0, 1, 400}, 3); }, "face 1 uses vertex 400");
+  expect_refused([&] { with(scene.mesh.vertices, {0, 1, 2, 3}, 3); }, "whole number of faces");
+  expect_refused([&] { with(scene.mesh.vertices, {0, 1, 2, 3, 4}, 5); }, "1 to 4 corners");
+  with(scene.mesh.vertices, {}, 3);
+  with({}, {}, 3);
+}
+
+TEST(Constrain, CoarselyStoredCoordinatesAreNamed) {
+  glm::dmat4 far_away(1);
+  far_away[3] = {-1e5, 0, 0, 1};
+  Scene scene{shapes::torus(20), far_away};
+  for (dvec3& p : scene.mesh.vertices) p = rounded_to_float32(p + dvec3(1e5, 0, 0));
+  scene.percent = 10;
+  EXPECT_EQ(run(scene, scene.mesh.vertices).warnings.size(), 1u);
+  scene.percent = 0.2;
+  expect_refused([&] { run(scene, scene.mesh.vertices); }, "rounds positions");
+}
+
+TEST(Constrain, CanBeCancelled) {
+  const Scene scene{shapes::torus(40)};
+  Progress progress;
+  progress.cancel();
+  EXPECT_THROW(run(scene, scene.wish(noise(0.5)), {.progress = &progress}), Cancelled);
+}
+
+}  // namespace
