@@ -1,24 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The paper asks one global query about the deformed mesh and blocks what does not pass. So does this, by the
-// certificate; and it looks for the share of the way that does pass.
+// certificate; for what does not pass it looks for the share of the way that does, or has vertices pulled back.
 #include "operation/deformation.h"
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <sstream>
 
 #include "check/certificate.h"
+#include "operation/constrain.h"
+#include "operation/input.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
 
 namespace tolvol {
 namespace {
 
-/// Halvings of the way: the permitted fraction is known to a thousandth of it.
+/// Of the way: the permitted fraction is known to a thousandth of it.
 constexpr int kHalvings = 10;
 
 constexpr std::size_t kBlock = 1024;
+
+using Mode = DeformationOptions::Mode;
 
 class Deformation {
  public:
@@ -49,23 +52,24 @@ class Deformation {
   }
 
   DeformationResult run() {
-    wish();
+    carry();
     if (volume_) {
-      check_storage();
       bound();
+    } else {
+      result_.vertices = after_;
     }
     const Placement world = placement_.in({});
     for (std::size_t i = 0; i < before_.size(); ++i) {
       if (result_.vertices[i] == before_[i]) continue;
       ++result_.moved;
-      result_.largest_motion =
-          std::max(result_.largest_motion, glm::length(world.world(result_.vertices[i]) - world.world(before_[i])));
+      const double motion = glm::length(world.world(result_.vertices[i]) - world.world(before_[i]));
+      result_.largest_motion = std::max(result_.largest_motion, motion);
     }
     return std::move(result_);
   }
 
  private:
-  void wish() {
+  void carry() {
     if (options_.progress) options_.progress->begin("deforming");
     const Placement world = placement_.in({});
     after_.assign(before_.begin(), before_.end());
@@ -76,7 +80,7 @@ class Deformation {
         const glm::dvec3 p = world.world(before_[i]);
         const std::optional<glm::dvec3> displacement = lattice_.displacement(p);
         if (!displacement) ++outside;
-        // Mapping to the world and back would round even where nothing moved.
+        // Mapping to the world and back would round even where nothing moves.
         if (!displacement || *displacement == glm::dvec3(0)) continue;
         after_[i] = world.store(p + *displacement);
         if (!std::isfinite(glm::dot(after_[i], glm::dvec3(1)))) {
@@ -85,42 +89,70 @@ class Deformation {
       }
     });
     result_.outside_lattice = outside;
-    result_.vertices = after_;
-  }
-
-  void check_storage() {
-    const double share =
-        std::max(placement_.storage_step(before_), placement_.storage_step(after_)) / volume_->frame_tolerance();
-    std::ostringstream text;
-    text << "at these coordinates the stored type rounds positions by up to " << 100 * share << " % of the tolerance; "
-         << "move the mesh nearer to its origin or take a larger tolerance";
-    if (share > 0.5) throw InvalidInput(text.str());
-    if (share > 0.01) result_.warnings.push_back(text.str());
   }
 
   void bound() {
     result_.method = certificate_->method(), result_.renderer = certificate_->renderer();
-    std::vector<std::uint32_t> failing = not_inside(after_, faces_);
-    if (failing.empty()) return;
-    result_.outside_faces = failing.size();
-    result_.first_outside = failing.front();
-    if (const std::vector<std::uint32_t> already = not_inside(before_, faces_); !already.empty()) {
-      std::ostringstream text;
-      text << already.size() << " faces are not within the tolerance of the reference before the deformation, the "
-           << "first is face " << already.front() << "; take a larger tolerance or set the reference anew";
-      throw InvalidInput(text.str());
+    warn_of_rounding();
+    if (options_.outside == DeformationOptions::Outside::keep) keep_outside();
+    std::vector<std::uint32_t> failing = leaving(after_);
+    if (failing.empty()) {
+      result_.vertices = after_;
+    } else {
+      result_.leaving = {failing.size(), failing.front()};
+      options_.mode == Mode::pull_back ? pull_back() : search(std::move(failing));
     }
-    std::vector<glm::dvec3> permitted(before_.begin(), before_.end());
+    for (std::size_t i = 0; i < after_.size(); ++i) result_.held_back += result_.vertices[i] != after_[i];
+  }
+
+  void warn_of_rounding() {
+    for (const std::span<const glm::dvec3> stored : {before_, std::span<const glm::dvec3>(after_)}) {
+      const std::optional<std::string> warning = storage_warning(*volume_, placement_, stored);
+      if (warning && result_.warnings.empty()) result_.warnings.push_back(*warning);
+    }
+  }
+
+  /// What is outside to begin with stays as it is, and is asked about no more.
+  void keep_outside() {
+    const std::vector<std::uint32_t> outside = not_inside(before_, faces_);
+    if (outside.empty()) return;
+    result_.outside = {outside.size(), outside.front()};
+    kept_.assign(faces_.size() / corners_, false);
+    for (const std::uint32_t face : outside) {
+      kept_[face] = true;
+      for (const std::uint32_t v : corners_of(face)) {
+        result_.held_back += after_[v] != before_[v];
+        after_[v] = before_[v];
+      }
+    }
+  }
+
+  void pull_back() {
+    result_.permitted_fraction = std::nullopt;
+    ConstrainOptions options;
+    if (options_.outside == DeformationOptions::Outside::keep) options.outside = ConstrainOptions::Outside::keep;
+    options.threads = options_.threads, options.progress = options_.progress;
+    result_.vertices =
+        constrain(before_, after_, faces_, static_cast<int>(corners_), placement_, *volume_, options).vertices;
+  }
+
+  void search(std::vector<std::uint32_t> failing) {
+    if (options_.outside == DeformationOptions::Outside::error) {
+      const std::vector<std::uint32_t> outside = not_inside(before_, faces_);
+      if (!outside.empty()) refuse_outside(outside.size(), outside.front());
+    }
+    result_.vertices.assign(before_.begin(), before_.end());
+    std::vector<glm::dvec3> permitted = result_.vertices;
     double inside = 0, outside = 1;
     for (int halving = 0; halving < kHalvings; ++halving) {
       const double middle = 0.5 * (inside + outside);
       std::vector<glm::dvec3> state = at(middle);
-      // What failed farther out is likeliest to fail here, and asked first.
+      // What failed farther out is likeliest to fail here, and is asked first.
       std::vector<std::uint32_t> still = not_inside(state, only(failing));
-      if (!still.empty()) {
-        for (std::uint32_t& i : still) i = failing[i];
+      if (still.empty()) {
+        still = leaving(state);
       } else {
-        still = not_inside(state, faces_);
+        for (std::uint32_t& i : still) i = failing[i];
       }
       if (still.empty()) {
         inside = middle;
@@ -131,11 +163,7 @@ class Deformation {
       }
     }
     result_.permitted_fraction = inside;
-    if (options_.mode == DeformationOptions::Mode::farthest) {
-      result_.vertices = std::move(permitted);
-    } else {
-      result_.vertices.assign(before_.begin(), before_.end());
-    }
+    if (options_.mode == Mode::farthest) result_.vertices = std::move(permitted);
   }
 
   /// The stored state at a share of the way.
@@ -149,17 +177,21 @@ class Deformation {
     return state;
   }
 
+  std::span<const std::uint32_t> corners_of(std::uint32_t face) const {
+    return faces_.subspan(std::size_t{face} * corners_, corners_);
+  }
+
   std::vector<std::uint32_t> only(const std::vector<std::uint32_t>& faces) const {
     std::vector<std::uint32_t> result;
     result.reserve(faces.size() * corners_);
-    for (const std::uint32_t i : faces) {
-      const auto corner = faces_.begin() + static_cast<std::ptrdiff_t>(i * corners_);
-      result.insert(result.end(), corner, corner + static_cast<std::ptrdiff_t>(corners_));
+    for (const std::uint32_t face : faces) {
+      const std::span<const std::uint32_t> corners = corners_of(face);
+      result.insert(result.end(), corners.begin(), corners.end());
     }
     return result;
   }
 
-  /// Which of the faces are not certified to be inside, in order.
+  /// Which of the faces are not certified to be inside, ascending.
   std::vector<std::uint32_t> not_inside(std::span<const glm::dvec3> stored,
                                         std::span<const std::uint32_t> faces) const {
     std::vector<glm::dvec3> points(stored.size());
@@ -176,6 +208,13 @@ class Deformation {
     return result;
   }
 
+  /// Those of all faces, but for the ones that are kept as they are.
+  std::vector<std::uint32_t> leaving(std::span<const glm::dvec3> stored) const {
+    std::vector<std::uint32_t> result = not_inside(stored, faces_);
+    if (!kept_.empty()) std::erase_if(result, [&](std::uint32_t face) { return kept_[face]; });
+    return result;
+  }
+
   std::span<const glm::dvec3> before_;
   std::span<const std::uint32_t> faces_;
   std::size_t corners_;
@@ -185,6 +224,7 @@ class Deformation {
   const DeformationOptions& options_;
   std::optional<Certificate> certificate_;
   std::vector<glm::dvec3> after_;
+  std::vector<bool> kept_;  // per face; empty: none is
   DeformationResult result_;
 };
 

@@ -100,17 +100,29 @@ struct Result {
 DeformationOptions::Mode to_mode(const std::string& mode) {
   if (mode == "blocked") return DeformationOptions::Mode::blocked;
   if (mode == "farthest") return DeformationOptions::Mode::farthest;
-  throw InvalidInput("mode must be \"blocked\" or \"farthest\", not \"" + mode + "\"");
+  if (mode == "pull_back") return DeformationOptions::Mode::pull_back;
+  throw InvalidInput("mode must be \"blocked\", \"farthest\" or \"pull_back\", not \"" + mode + "\"");
+}
+
+DeformationOptions::Outside to_outside(const std::string& outside) {
+  if (outside == "error") return DeformationOptions::Outside::error;
+  if (outside == "keep") return DeformationOptions::Outside::keep;
+  throw InvalidInput("outside must be \"error\" or \"keep\", not \"" + outside + "\"");
 }
 
 py::dict make_report(const DeformationResult& r, double seconds) {
-  py::dict report, outside;
+  const auto counted = [](const FaceCount& count) {
+    py::dict entry;
+    entry["faces"] = count.faces, entry["first"] = count.first;
+    return entry;
+  };
+  py::dict report;
   report["permitted_fraction"] = r.permitted_fraction;
-  outside["faces"] = r.outside_faces;
-  outside["first"] = r.first_outside ? py::object(py::int_(*r.first_outside)) : py::object(py::none());
-  report["outside"] = outside;
+  report["leaving"] = counted(r.leaving);
+  report["outside"] = counted(r.outside);
   report["outside_lattice"] = r.outside_lattice;
   report["moved"] = r.moved;
+  report["held_back"] = r.held_back;
   report["largest_motion"] = r.largest_motion;
   report["method"] = r.method;
   report["renderer"] = r.renderer;
@@ -120,8 +132,8 @@ py::dict make_report(const DeformationResult& r, double seconds) {
 }
 
 Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, const py::object& triangles,
-                     const Volume* volume, const py::object& to_world, const std::string& mode, int threads,
-                     Progress* progress) {
+                     const Volume* volume, const py::object& to_world, const std::string& mode,
+                     const std::string& outside, int threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   int corners = 3;
   std::vector<std::uint32_t> faces;
@@ -130,6 +142,7 @@ Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, c
   const Placement placed(to_matrix(to_world), v.storage);
   DeformationOptions options;
   options.mode = to_mode(mode);
+  options.outside = to_outside(outside);
   options.threads = to_threads(threads);
   options.progress = progress;
   DeformationResult r;
@@ -183,28 +196,35 @@ void bind_deformation(py::module_& module) {
           "report", &Result::report,
           "dict: permitted_fraction (0 to 1: the share of the way at which the whole mesh is certified to be inside, "
           "found by\n"
-          "bisection; 1 without a volume), outside (faces, first: of the deformation as wished), outside_lattice "
-          "(vertices\n"
-          "that are not in the box), moved (vertices of the result that are not where they were), largest_motion "
-          "(world\n"
-          "units), method, renderer, seconds, warnings.");
+          "bisection to a thousandth; 1 without a volume; None where vertices were pulled back instead), leaving "
+          "(faces, first: of the\n"
+          "deformation as wished, not certified to be inside), outside (faces, first: outside to begin with and kept "
+          "as they\n"
+          "are), outside_lattice (vertices that are not in the box), moved and held_back (vertices of the result that "
+          "are not\n"
+          "where they were, or not where they were to go), largest_motion (world units), method, renderer, seconds, "
+          "warnings.");
 
-  module.def("deform", &deform_arrays, py::arg("vertices"), py::arg("lattice"), py::arg("triangles") = py::none(),
-             py::arg("volume").none(true) = py::none(), py::arg("to_world") = py::none(), py::arg("mode") = "blocked",
-             py::arg("threads") = 0, py::arg("progress") = py::none(),
-             "Deforms the space in the box of `lattice`, and with it the mesh; vertices outside of the box stay where "
-             "they are.\n\n"
-             "vertices: (n, 3) float32 or float64, local. triangles: (m, 3) integers, or (m, 4) for quads in every "
-             "triangulation;\n"
-             "needed with a volume. volume: a ToleranceVolume that the result has to stay in, or None. mode: what "
-             "becomes of a\n"
-             "deformation that is not certified inside as a whole: \"blocked\" (nothing moves; the report says how far "
-             "it may go) or\n"
-             "\"farthest\" (every vertex goes the permitted share of its way). Raises InvalidInput (a mesh that is "
-             "outside to begin\n"
-             "with, too) and Cancelled. Cost: about 0.3 us a vertex, and with a volume one check, some twelve when it "
-             "is not inside.\n"
-             "M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.");
+  module.def(
+      "deform", &deform_arrays, py::arg("vertices"), py::arg("lattice"), py::arg("triangles") = py::none(),
+      py::arg("volume").none(true) = py::none(), py::arg("to_world") = py::none(), py::arg("mode") = "blocked",
+      py::arg("outside") = "error", py::arg("threads") = 0, py::arg("progress") = py::none(),
+      "Deforms the space in the box of `lattice`, and with it the mesh; vertices outside of the box stay where "
+      "they are.\n\n"
+      "vertices: (n, 3) float32 or float64, local. triangles: (m, 3) integers, or (m, 4) for quads in every "
+      "triangulation\n"
+      "(a triangle among them repeats a corner); needed with a volume. volume: a ToleranceVolume that the result "
+      "has to stay\n"
+      "in, or None. mode: what becomes of a deformation that is not certified inside as a whole: \"blocked\" "
+      "(nothing moves;\n"
+      "the report says how far it may go), \"farthest\" (every vertex goes that permitted share of its way) or "
+      "\"pull_back\"\n"
+      "(each vertex goes as far as it may, see constrain). outside: \"error\", or \"keep\" the vertices of "
+      "faces that are\n"
+      "outside to begin with where they are. Raises InvalidInput and Cancelled. Cost: about 0.3 us a vertex, "
+      "and with a\n"
+      "volume one check; when that fails some twelve, or constrain.\n"
+      "M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.");
 }
 
 }  // namespace tolvol::python

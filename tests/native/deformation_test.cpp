@@ -131,7 +131,7 @@ TEST(Deformation, InsideItIsCarriedOutWhole) {
   EXPECT_EQ(r.permitted_fraction, 1);
   EXPECT_EQ(r.vertices, deform(c.mesh.vertices, {}, 3, c.placement(), nullptr, lattice, {}).vertices);
   EXPECT_LE(c.distance(r), c.tolerance);
-  EXPECT_EQ(r.outside_faces, 0u);
+  EXPECT_EQ(r.leaving.faces, 0u);
   EXPECT_EQ(r.method, "certificate");
   EXPECT_EQ(r.renderer, "CPU");
 }
@@ -142,18 +142,58 @@ TEST(Deformation, BlockedNothingMovesAndTheFractionIsCertified) {
   const DeformationResult blocked = c.run(lattice);
   EXPECT_EQ(blocked.vertices, c.mesh.vertices);
   EXPECT_EQ(blocked.moved, 0u);
-  EXPECT_GT(blocked.outside_faces, 0u);
-  ASSERT_TRUE(blocked.first_outside);
+  EXPECT_GT(blocked.leaving.faces, 0u);
+  ASSERT_TRUE(blocked.leaving.first);
+  EXPECT_EQ(blocked.held_back, blocked.vertices.size());
   // The torus is lifted off its rim: the whole way is four tolerances.
-  EXPECT_NEAR(blocked.permitted_fraction, 0.25, 0.002);
+  EXPECT_NEAR(*blocked.permitted_fraction, 0.25, 0.002);
   EXPECT_LE(blocked.permitted_fraction, 0.25);
 
   const DeformationResult farthest = c.run(lattice, {.mode = Mode::farthest});
   EXPECT_EQ(farthest.permitted_fraction, blocked.permitted_fraction);
-  EXPECT_NEAR(farthest.largest_motion, 0.2 * farthest.permitted_fraction, 1e-6);
+  EXPECT_NEAR(farthest.largest_motion, 0.2 * *farthest.permitted_fraction, 1e-6);
   const double distance = c.distance(farthest);
   EXPECT_LE(distance, c.tolerance);
   EXPECT_GT(distance, 0.95 * c.tolerance);
+}
+
+TEST(Deformation, PulledBackEachVertexGoesAsFarAsItMay) {
+  const Case c;
+  const LatticeDeformation lattice = lifted(0.2);
+  const std::vector<dvec3> wish = deform(c.mesh.vertices, {}, 3, c.placement(), nullptr, lattice, {}).vertices;
+  const DeformationResult r = c.run(lattice, {.mode = Mode::pull_back});
+  const double farthest = c.run(lattice, {.mode = Mode::farthest}).largest_motion;
+  EXPECT_LE(c.distance(r), c.tolerance);
+  EXPECT_FALSE(r.permitted_fraction);
+  std::size_t held = 0, beyond = 0;
+  for (std::size_t i = 0; i < wish.size(); ++i) {
+    held += r.vertices[i] != wish[i];
+    beyond += glm::length(r.vertices[i] - c.mesh.vertices[i]) > 1.2 * farthest;
+  }
+  EXPECT_EQ(r.held_back, held);
+  EXPECT_GT(beyond, wish.size() / 4);  // the flanks of the torus slide along it
+}
+
+TEST(Deformation, WhatIsOutsideToBeginWithIsKept) {
+  Case c;
+  const ToleranceVolume volume(c.mesh.vertices, c.mesh.triangles, c.placement(), c.tolerance);
+  c.mesh.vertices[100] = rounded_to_float32(1.5 * c.mesh.vertices[100]);
+  const std::vector<std::uint32_t> faces = indices(c.mesh);
+  for (const double height : {0.02, 0.2}) {
+    for (const Mode mode : {Mode::blocked, Mode::farthest, Mode::pull_back}) {
+      const Options options{.mode = mode, .outside = Options::Outside::keep};
+      const DeformationResult r = deform(c.mesh.vertices, faces, 3, c.placement(), &volume, lifted(height), options);
+      EXPECT_EQ(r.outside.faces, 6u);
+      EXPECT_EQ(r.vertices[100], c.mesh.vertices[100]);
+      EXPECT_EQ(r.leaving.faces > 0, height == 0.2);
+      EXPECT_EQ(r.moved > 0, height == 0.02 || mode != Mode::blocked);
+      EXPECT_GE(r.held_back, 7u);
+      TriangleMesh rest = c.world(r.vertices);
+      std::erase_if(rest.triangles, [](const glm::uvec3& t) { return t.x == 100 || t.y == 100 || t.z == 100; });
+      const TriangleMesh reference = shapes::torus(48);
+      EXPECT_LE(hausdorff(rest, reference, {c.tolerance, 1, nullptr}).upper, c.tolerance);
+    }
+  }
 }
 
 TEST(Deformation, HostileStatesAreNeverAcceptedOutside) {
@@ -164,10 +204,11 @@ TEST(Deformation, HostileStatesAreNeverAcceptedOutside) {
     c.tolerance = seed % 2 ? 0.02 : 0.1;
     if (seed % 3 == 0) c.to_world = glm::dmat4(1, 0, 0, 0, 0.9, -0.05, 0, 0, 0, 0.3, 20, 0, 500, 0, 3, 1);
     const LatticeDeformation lattice = shaken(c.tolerance * (1 << seed % 5), seed, c.to_world * kAroundTorus);
-    const DeformationResult r = c.run(lattice, {.mode = Mode::farthest});
+    const Mode mode = seed % 4 ? Mode::farthest : Mode::pull_back;
+    const DeformationResult r = c.run(lattice, {.mode = mode});
     for (const dvec3& p : r.vertices) EXPECT_EQ(p, rounded_to_float32(p));
     EXPECT_LE(c.distance(r), c.tolerance) << seed;
-    EXPECT_GT(r.permitted_fraction, 0) << seed;
+    EXPECT_GT(r.moved, 0u) << seed;
   }
 }
 
@@ -197,8 +238,10 @@ TEST(Deformation, AMeshThatIsOutsideAlreadyIsRefused) {
   const ToleranceVolume volume(c.mesh.vertices, c.mesh.triangles, c.placement(), c.tolerance);
   std::vector<dvec3> vertices = c.mesh.vertices;
   vertices[100] *= 1.5;
-  expect_refused("6 faces are not within the tolerance of the reference before",
-                 [&] { deform(vertices, indices(c.mesh), 3, c.placement(), &volume, shaken(0.01), {}); });
+  for (const Mode mode : {Mode::blocked, Mode::farthest, Mode::pull_back}) {
+    expect_refused("6 faces are not within the tolerance of the reference, the first is face",
+                   [&] { deform(vertices, indices(c.mesh), 3, c.placement(), &volume, shaken(0.01), {.mode = mode}); });
+  }
 }
 
 TEST(Deformation, BadArraysAreRefused) {

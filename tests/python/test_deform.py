@@ -110,7 +110,7 @@ def test_outside_of_the_lattice_nothing_moves():
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("mode", ["blocked", "farthest"])
+@pytest.mark.parametrize("mode", ["blocked", "farthest", "pull_back"])
 def test_inside_it_is_carried_out_whole(volume, mode, dtype):
     vertices, triangles = TORUS[0].astype(dtype), TORUS[1]
     result = tolvol.deform(vertices, bent(), triangles, volume, mode=mode)
@@ -126,7 +126,8 @@ def test_blocked_and_as_far_as_permitted(volume):
     assert np.array_equal(blocked.vertices, vertices)
     assert 0.247 <= blocked.report["permitted_fraction"] <= 0.25
     verdict = volume.check(tolvol.deform(vertices, lifted(0.2)).vertices, triangles).verdict
-    assert blocked.report["outside"] == {"faces": (verdict < 2).sum(), "first": np.argmax(verdict < 2)}
+    assert blocked.report["leaving"] == {"faces": (verdict < 2).sum(), "first": np.argmax(verdict < 2)}
+    assert blocked.report["held_back"] == len(vertices)
     farthest = tolvol.deform(vertices, lifted(0.2), triangles, volume, mode="farthest")
     assert farthest.report["permitted_fraction"] == blocked.report["permitted_fraction"]
     lift = 0.2 * blocked.report["permitted_fraction"]
@@ -149,8 +150,31 @@ def test_hostile_meshes_stay_within_as_stored(seed):
     lattice = bent(tolerance * 12, domain=domain, seed=seed)
     result = tolvol.deform(vertices, lattice, triangles, volume, to_world=to_world, mode="farthest")
     assert result.vertices.dtype == np.float32
-    assert 0 < result.report["permitted_fraction"] < 1
+    pulled = tolvol.deform(vertices, lattice, triangles, volume, to_world=to_world, mode="pull_back")
+    assert 0 < result.report["permitted_fraction"] < 1 and 0 < pulled.report["held_back"]
+    assert judged(vertices, pulled.vertices, triangles, to_world, tolerance) <= tolerance
     assert judged(vertices, result.vertices, triangles, to_world, tolerance) <= tolerance
+
+
+def test_pulled_back_each_vertex_goes_as_far_as_it_may(volume):
+    vertices, triangles = TORUS
+    wish = tolvol.deform(vertices, lifted(0.2)).vertices
+    pulled = tolvol.deform(vertices, lifted(0.2), triangles, volume, mode="pull_back")
+    assert np.array_equal(pulled.vertices, tolvol.constrain(vertices, wish, triangles, volume).vertices)
+    assert pulled.report["permitted_fraction"] is None and pulled.report["leaving"]["faces"] > 0
+    assert pulled.report["held_back"] == (pulled.vertices != wish).any(1).sum()
+    assert judged(vertices, pulled.vertices, triangles, bound=0.05) <= 0.05
+
+
+def test_what_is_outside_to_begin_with_can_be_kept(volume):
+    vertices, triangles = TORUS[0].copy(), TORUS[1]
+    vertices[40] *= 1.3
+    outside = volume.check(vertices, triangles).verdict < 2
+    kept = tolvol.deform(vertices, lifted(0.02), triangles, volume, outside="keep")
+    assert kept.report["outside"] == {"faces": outside.sum(), "first": outside.argmax()}
+    frozen = np.unique(triangles[outside])
+    assert np.array_equal(kept.vertices[frozen], vertices[frozen]) and kept.report["held_back"] == len(frozen)
+    assert kept.report["moved"] == len(vertices) - len(frozen)
 
 
 def test_quads_are_kept_in_every_triangulation():
@@ -222,6 +246,7 @@ def test_bad_arguments_are_refused(volume):
     refused("no faces", vertices, lattice, triangles[:0], volume)
     refused("face 2014 uses vertex 2047, but there are only 2047", vertices[:-1], lattice, triangles, volume)
     refused('mode must be "blocked"', vertices, lattice, triangles, volume, mode="push")
+    refused('outside must be "error" or "keep"', vertices, lattice, triangles, volume, outside="ignore")
     refused("threads must not be negative", vertices, lattice, threads=-1)
     refused("too far to be stored", vertices.astype(np.float32), lifted(1e39))
     with pytest.raises(tolvol.InvalidInput, match="needs at least 2"):
@@ -232,8 +257,8 @@ def test_a_mesh_that_is_outside_already_is_refused(volume):
     vertices, triangles = TORUS[0].copy(), TORUS[1]
     vertices[40] *= 1.3
     outside = volume.check(vertices, triangles).verdict < 2
-    message = f"^{outside.sum()} faces are not within .* before the deformation, the first is face {outside.argmax()};"
-    for mode in ("blocked", "farthest"):
+    message = f"^{outside.sum()} faces are not within the tolerance of the reference, the first is face {outside.argmax()};"
+    for mode in ("blocked", "farthest", "pull_back"):
         with pytest.raises(tolvol.InvalidInput, match=message):
             tolvol.deform(vertices, bent(), triangles, volume, mode=mode)
     # Where the deformation as a whole ends inside there is nothing to refuse.
