@@ -257,7 +257,9 @@ def test_a_mesh_that_is_outside_already_is_refused(volume):
     vertices, triangles = TORUS[0].copy(), TORUS[1]
     vertices[40] *= 1.3
     outside = volume.check(vertices, triangles).verdict < 2
-    message = f"^{outside.sum()} faces are not within the tolerance of the reference, the first is face {outside.argmax()};"
+    message = (
+        f"^{outside.sum()} faces are not within the tolerance of the reference, the first is face {outside.argmax()};"
+    )
     for mode in ("blocked", "farthest", "pull_back"):
         with pytest.raises(tolvol.InvalidInput, match=message):
             tolvol.deform(vertices, bent(), triangles, volume, mode=mode)
