@@ -20,7 +20,7 @@ from addon import file_io, measure, native, report  # noqa: E402
 POINTS = 4  # of the lattice, along each axis
 ROOM = 0.06  # between the model and the lattice, of the box
 PULL = 5.0  # tolerances by which the wish moves control points; vertices follow half as far
-GAP = 0.3  # between the two, which the lattices need
+GAP, MARGIN = 0.3, 0.4  # between and beside the two, which the lattices need
 # Distance over tolerance from 0 to 1, a ramp that greys as well; beyond it a colour that the ramp has not.
 RAMP = ((0.0, (0.93, 0.93, 0.88)), (0.35, (0.95, 0.75, 0.35)), (0.7, (0.45, 0.55, 0.75)), (1.0, (0.05, 0.12, 0.35)))
 BEYOND = (0.85, 0.0, 0.45)
@@ -99,7 +99,7 @@ def add_cage(points, model):
 def add_legend(camera, tolerance_text):
     """A bar of the colours at the top: from 0 to the tolerance, and beyond."""
     width, (long, high) = figures.SENSOR / figures.LENS, BAR
-    top = figures.HEIGHT / figures.WIDTH / 2 - 0.03
+    top = figures.HEIGHT / figures.WIDTH / 2 - 0.015
     x = np.array([-0.5, 0.5, 0.5, 0.9]) * long
     vertices = np.array([(a, b * high + top, 0) for a in x for b in (0, -1)]) * width
     mesh = bpy.data.meshes.new("legend")
@@ -148,7 +148,7 @@ def main(options):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     look = deviation_material(lit=True)
     states = [(result.vertices, triangles) for result in (wish, bounded)]
-    objects, camera = figures.compose(*states, (look, look), captions, "Z", GAP)
+    objects, camera = figures.compose(*states, (look, look), captions, "Z", GAP, MARGIN)
     for ob, result in zip(objects, (wish, bounded)):
         ob.data.polygons.foreach_set("use_smooth", np.ones(len(triangles), bool))
         set_deviation(ob.data, volume.distance(result.vertices) / tolerance)

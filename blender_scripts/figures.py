@@ -113,9 +113,9 @@ def add_caption(camera, x, y, size, text, material):
     add("caption", curve, camera.matrix_world @ Matrix.Translation((x * width, y * width, -1)))
 
 
-def compose(reference, result, looks, captions, up, gap=GAP):
+def compose(reference, result, looks, captions, up, gap=GAP, margin=MARGIN):
     """The two (vertices, triangles) on a floor, lit and framed; looks: two materials; captions: two (large, small) texts;
-    up: "Y" or "Z"; gap: between the two. Returns the two objects and the camera."""
+    up: "Y" or "Z"; gap: between the two; margin: beside them. Returns the two objects and the camera."""
     turn = Matrix.Rotation(TURN, 4, "Z") @ Matrix.Rotation(math.pi / 2 if up == "Y" else 0, 4, "X")
     turned = reference[0][np.unique(reference[1])] @ np.array(turn.to_3x3()).T
     lower, upper = turned.min(0), turned.max(0)
@@ -132,7 +132,7 @@ def compose(reference, result, looks, captions, up, gap=GAP):
     add_floor()
 
     target = Vector((0, 0, 0.4 * height))
-    span = max(2 * width + gap + MARGIN, (height + CAPTION) * WIDTH / HEIGHT)
+    span = max(2 * width + gap + margin, (height + CAPTION) * WIDTH / HEIGHT)
     distance = span * LENS / SENSOR + depth / 2
     view = Vector((0, -math.cos(ELEVATION), math.sin(ELEVATION)))
     data = bpy.data.cameras.new("camera")

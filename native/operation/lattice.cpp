@@ -133,6 +133,11 @@ LatticeAxis::LatticeAxis(const std::string& name, unsigned size, unsigned degree
                        " control points, not " + std::to_string(degree));
   }
   knots_ = clamped_knots(name, size, degree, knots);
+  for (unsigned span = degree; span < size; ++span) {
+    for (unsigned j = 1; j <= degree; ++j) {
+      for (unsigned r = 0; r < j; ++r) reciprocals_.push_back(1 / (knots_[span + 1 + r] - knots_[span + 1 - j + r]));
+    }
+  }
   if (degree + 1 == size) return;  // one polynomial, and it reproduces its parameter
   double values[kMaxDegree + 1];
   std::vector<double> places(knots_.size(), 0.0);
@@ -150,6 +155,7 @@ unsigned LatticeAxis::span(const std::vector<double>& breaks, double value) cons
 /// Fills in the basis functions; returns where the grid at rest is at this parameter, and its derivative there.
 LatticeAxis::Rest LatticeAxis::evaluate(unsigned span, double parameter, double* values) const {
   double left[kMaxDegree + 1], right[kMaxDegree + 1];
+  const double* reciprocal = &reciprocals_[(span - degree_) * std::size_t{degree_} * (degree_ + 1) / 2];
   double slope = 0;
   values[0] = 1;
   for (unsigned j = 1; j <= degree_; ++j) {
@@ -158,7 +164,7 @@ LatticeAxis::Rest LatticeAxis::evaluate(unsigned span, double parameter, double*
     double saved = 0;
     slope = 0;
     for (unsigned r = 0; r < j; ++r) {
-      const double share = values[r] / (right[r + 1] + left[j - r]);
+      const double share = values[r] * *reciprocal++;
       slope += share;
       values[r] = saved + right[r + 1] * share;
       saved = left[j - r] * share;

@@ -56,8 +56,9 @@ class LatticeAxis {
   unsigned span(const std::vector<double>& breaks, double value) const;
 
   unsigned size_, degree_;
-  std::vector<double> knots_;   // from 0 to 1
-  std::vector<double> places_;  // of the knots, by the grid at rest; empty when they are the knots themselves
+  std::vector<double> knots_;        // from 0 to 1
+  std::vector<double> reciprocals_;  // of the knot differences that evaluate() needs, a span after the other
+  std::vector<double> places_;       // of the knots, by the grid at rest; empty when they are the knots themselves
 };
 
 class LatticeDeformation {
