@@ -20,7 +20,7 @@ from addon import file_io, measure, native, report  # noqa: E402
 POINTS = 4  # of the lattice, along each axis
 ROOM = 0.06  # between the model and the lattice, of the box
 PULL = 5.0  # tolerances by which the wish moves control points; vertices follow half as far
-GAP, MARGIN = 0.3, 0.4  # between and beside the two, which the lattices need
+GAP, MARGIN = 0.34, 0.5  # between and beside the two, which the lattices need
 # Distance over tolerance from 0 to 1, a ramp that greys as well; beyond it a colour that the ramp has not.
 RAMP = ((0.0, (0.93, 0.93, 0.88)), (0.35, (0.95, 0.75, 0.35)), (0.7, (0.45, 0.55, 0.75)), (1.0, (0.05, 0.12, 0.35)))
 BEYOND = (0.85, 0.0, 0.45)

@@ -10,16 +10,7 @@ import meshes
 
 
 def smooth(vertices, triangles, volume):
-    """Umbrella steps of a user's own, held within the volume."""
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    edges = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0)
-    count = np.bincount(edges[:, 0], minlength=len(vertices))[:, None]
-    for _ in range(5):
-        total = np.zeros(vertices.shape)
-        np.add.at(total, edges[:, 0], vertices[edges[:, 1]])
-        wish = (0.5 * vertices + 0.5 * total / count).astype(vertices.dtype)
-        vertices = tolvol.constrain(vertices, wish, triangles, volume).vertices
-    return vertices, triangles
+    return tolvol.smooth(vertices, triangles, volume, operator="laplacian", iterations=5).vertices, triangles
 
 
 def decimate(vertices, triangles, volume):
