@@ -43,6 +43,43 @@ def read_mesh(mesh):
     )
 
 
+def whole_quads(mesh, arrays):
+    """(m, 3), or (m, 4) with quads whole and triangles with a repeated corner: faces for checks in every triangulation.
+
+    arrays: those of the mesh. Of faces with more corners the triangles that Blender shows.
+    """
+    sizes = column(mesh.polygons, "loop_total", 1, np.int32)
+    quad = sizes == 4
+    if not quad.any():
+        return arrays.triangles
+    corners = column(mesh.polygons, "loop_start", 1, np.int32)[quad][:, None] + np.arange(4)
+    quads = column(mesh.loops, "vertex_index", 1, np.int32)[corners]
+    others = arrays.triangles[~quad[arrays.polygons]]
+    return np.concatenate([quads, others[:, [0, 1, 2, 2]]])
+
+
+def triangles_at(mesh, vertices):
+    """(m, 3) int32: how Blender would triangulate the mesh if its vertices were there."""
+    scratch = mesh.copy()
+    try:
+        scratch.vertices.foreach_set("co", vertices.ravel())
+        return read_mesh(scratch).triangles
+    finally:
+        bpy.data.meshes.remove(scratch)
+
+
+def move_vertices(mesh, before, after):
+    """Writes coordinates bit for bit; shape keys keep their motion from the basis. before: the present ones."""
+    mesh.vertices.foreach_set("co", after.ravel())
+    if mesh.shape_keys:
+        for key in mesh.shape_keys.key_blocks:
+            basis = key == mesh.shape_keys.reference_key
+            key.data.foreach_set("co", (after if basis else column(key.data, "co", 3) + (after - before)).ravel())
+    # Blender keeps the triangles it has through foreach_set and update(); one vertex set by itself makes it cut anew.
+    mesh.vertices[0].co = mesh.vertices[0].co
+    mesh.update()
+
+
 def new_mesh(name, vertices, triangles):
     """A datablock that holds these coordinates and triangles bit for bit, and nothing else."""
     mesh = bpy.data.meshes.new(name)

@@ -104,6 +104,17 @@ PLACEMENTS = (
 )
 
 
+DEFORM_MODES = (
+    ("BLOCKED", "Block", "Change nothing and say how far it may go"),
+    (
+        "FARTHEST",
+        "As Far as Permitted",
+        "Carry every vertex the same share of its way, as far as the tolerance permits",
+    ),
+    ("PULL_BACK", "Pull Back", "Carry every vertex as far as the tolerance permits there, and all others all the way"),
+)
+
+
 def _get_placement(settings):
     """What was chosen; until something is, exact UVs for a mesh that has any."""
     if settings.placement_choice >= 0:
@@ -158,6 +169,17 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
         set=_set_placement,
     )
     placement_choice: IntProperty(default=-1)
+    lattice: PointerProperty(
+        name="Lattice",
+        description="The lattice that carries the mesh along",
+        type=bpy.types.Object,
+        poll=lambda _settings, ob: ob.type == "LATTICE",
+    )
+    deform_mode: EnumProperty(
+        name="Beyond",
+        description="What becomes of a deformation that would leave the tolerance",
+        items=DEFORM_MODES,
+    )
 
     snapshot: PointerProperty(type=bpy.types.Mesh, description="The reference as it was set; never changed")
     snapshot_kind: StringProperty()

@@ -174,6 +174,20 @@ class TOLVOL_PT_decimate(_SubPanel, bpy.types.Panel):
             _text(context, layout, reason, "ERROR")
 
 
+class TOLVOL_PT_deform(_SubPanel, bpy.types.Panel):
+    bl_label = "Deform"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.active_object.tolvol
+        layout.prop(settings, "lattice")
+        layout.prop(settings, "deform_mode")
+        layout.operator("tolvol.deform", text="Deform")
+
+
 def _right(layout, text):
     row = layout.row()
     row.alignment = "RIGHT"
@@ -196,6 +210,6 @@ def _text(context, layout, text, icon):
         column.label(text=line, icon="BLANK1" if i else icon)
 
 
-_CLASSES = (TOLVOL_PT_tolerance, TOLVOL_PT_deviation, TOLVOL_PT_decimate)
+_CLASSES = (TOLVOL_PT_tolerance, TOLVOL_PT_deviation, TOLVOL_PT_decimate, TOLVOL_PT_deform)
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

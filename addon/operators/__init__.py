@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""bpy.ops.tolvol: set_reference, clear_reference, check, select_outside, decimate."""
+"""bpy.ops.tolvol: set_reference, clear_reference, check, select_outside, decimate, deform."""
 
 import bpy
 
 from .check import TOLVOL_OT_check, TOLVOL_OT_select_outside
 from .decimate import TOLVOL_OT_decimate
+from .deform import TOLVOL_OT_deform
 from .reference import TOLVOL_OT_clear_reference, TOLVOL_OT_set_reference
 
 _CLASSES = (
@@ -13,6 +14,7 @@ _CLASSES = (
     TOLVOL_OT_check,
     TOLVOL_OT_select_outside,
     TOLVOL_OT_decimate,
+    TOLVOL_OT_deform,
 )
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -119,10 +119,10 @@ unsigned to_threads(int threads) {
   return static_cast<unsigned>(threads);
 }
 
-glm::dmat4 to_matrix(const py::object& object) {
+glm::dmat4 to_matrix(const py::object& object, const std::string& name) {
   if (object.is_none()) return glm::dmat4(1);
   const py::array_t<double, py::array::c_style | py::array::forcecast> array(object);
-  if (array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4) wrong_shape(array, "to_world", "(4, 4)");
+  if (array.ndim() != 2 || array.shape(0) != 4 || array.shape(1) != 4) wrong_shape(array, name, "(4, 4)");
   const auto view = array.unchecked<2>();
   glm::dmat4 result;
   for (int row = 0; row < 4; ++row) {

@@ -37,7 +37,7 @@ std::vector<std::int32_t> to_labels(const py::object& array, const std::string& 
 unsigned to_threads(int threads);
 
 /// (4, 4), row-major as NumPy writes it; None is the identity.
-glm::dmat4 to_matrix(const py::object& array);
+glm::dmat4 to_matrix(const py::object& array, const std::string& name = "to_world");
 
 py::array from_vertices(const std::vector<glm::dvec3>& values, Storage storage);
 py::array_t<std::int32_t> from_triangles(const std::vector<glm::uvec3>& values);

@@ -17,6 +17,7 @@ PYBIND11_MODULE(tolvol, module) {
   tolvol::python::bind_constrain(module);
   tolvol::python::bind_smoothing(module);
   tolvol::python::bind_decimation(module);
+  tolvol::python::bind_deformation(module);
   tolvol::python::bind_measure(module);
   tolvol::python::bind_picture(module);
 }

@@ -13,6 +13,7 @@ void bind_volume(pybind11::module_& module);
 void bind_constrain(pybind11::module_& module);
 void bind_smoothing(pybind11::module_& module);
 void bind_decimation(pybind11::module_& module);
+void bind_deformation(pybind11::module_& module);
 void bind_measure(pybind11::module_& module);
 void bind_picture(pybind11::module_& module);
 

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Freeform deformation by a Lattice object, within the tolerance."""
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty, IntProperty, StringProperty
+
+from .. import mesh_io, native, preferences, report, volume
+from ..certify import certify
+from ..errors import NotProved, Refused
+from ..job import JobOperator
+from ..properties import DEFORM_MODES
+from .blocked import allowed, decimate_blocked
+
+
+class TOLVOL_OT_deform(JobOperator, bpy.types.Operator):
+    """Carry the mesh along with a lattice, within the tolerance of the reference. Without a reference this mesh as it \
+is becomes it. The points of the lattice are taken as control points of a B-spline of degree 3, or less where there are \
+fewer than 4 along an axis, whatever its own interpolation. Vertices outside of the lattice stay where they are"""
+
+    bl_idname = "tolvol.deform"
+    bl_label = "Lattice Deform in Tolerance"
+    bl_options = {"REGISTER", "UNDO"}
+
+    lattice: StringProperty(
+        name="Lattice",
+        description="The lattice object; if none is given, the one chosen in the panel, or else the selected one",
+        options={"SKIP_SAVE"},
+    )
+    mode: EnumProperty(
+        name="Beyond",
+        description="What becomes of a deformation that would leave the tolerance",
+        items=DEFORM_MODES,
+        options={"SKIP_SAVE"},
+    )
+    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+
+    @classmethod
+    def poll(cls, context):
+        return allowed(cls, decimate_blocked(context.active_object))
+
+    def draw(self, _context):
+        self.layout.use_property_split = True
+        self.layout.prop_search(self, "lattice", bpy.data, "objects")
+        self.layout.prop(self, "mode")
+
+    def prepare(self, context):
+        context.view_layer.update()
+        ob = self.ob
+        cage = self._chosen(context)
+        self.lattice = cage.name
+        if not self.properties.is_property_set("mode"):
+            self.mode = ob.tolvol.deform_mode
+        surface, reference = volume.surface_of(ob), volume.reference_of(ob)
+        tolerance = volume.tolerance_length(ob.tolvol, reference.size())
+        threads = self.threads or preferences.threads(context)
+        faces = mesh_io.whole_quads(ob.data, surface.arrays)
+        return _Task(surface, faces, reference, tolerance, native_lattice(cage), self.mode.lower(), threads).run
+
+    def finish(self, context, outcome):
+        task, result, certified = outcome
+        ob, run = self.ob, result.report
+        if task.mode == "blocked" and run["leaving"]["faces"]:
+            raise Refused(
+                f"Blocked: {run['leaving']['faces']:,} faces of {ob.name} would leave the tolerance. "
+                f"{100 * run['permitted_fraction']:.1f} % of the way is permitted: choose As Far as Permitted, "
+                "or Pull Back to hold back only the vertices there"
+            )
+        if not run["moved"]:
+            why = "the tolerance permits none of it" if run["leaving"]["faces"] else "it is at rest, or somewhere else"
+            raise Refused(f"{self.lattice} does not move {ob.name}: {why}")
+        # Blender may cut the faces otherwise where they are now.
+        triangles = mesh_io.triangles_at(ob.data, result.vertices)
+        if not np.array_equal(triangles, task.surface.arrays.triangles):
+            certified = task.certify(result.vertices, triangles, native.module.Progress())
+        mesh_io.move_vertices(ob.data, task.surface.arrays.vertices, result.vertices)
+        if ob.tolvol.snapshot is None:
+            volume.set_reference(ob, task.reference)
+        ob.tolvol.lattice, ob.tolvol.deform_mode = bpy.data.objects[self.lattice], self.mode
+        volume.remember(ob, volume.surface_of(ob), certified, task.tolerance)
+        for warning in (*run["warnings"], *_twice(ob)):
+            self.report({"WARNING"}, warning)
+        self.report({"INFO"}, _line(task, result, certified))
+
+    def _chosen(self, context):
+        selected = [ob for ob in context.selected_objects if ob.type == "LATTICE"]
+        if self.properties.is_property_set("lattice"):
+            chosen = bpy.data.objects.get(self.lattice)
+        else:
+            chosen = self.ob.tolvol.lattice or (selected[0] if len(selected) == 1 else None)
+        if chosen is None or chosen.type != "LATTICE":
+            raise Refused(f"{self.lattice or self.ob.name}: choose a lattice object, or select one beside the mesh")
+        return chosen
+
+
+def native_lattice(cage):
+    """The tolvol.Lattice of a Lattice object, in the world."""
+    data = cage.data
+    shape = (data.points_u, data.points_v, data.points_w)
+    # Blender counts along u first. At rest its points are a regular grid.
+    rest, now = (
+        mesh_io.column(data.points, name, 3).astype(np.float64).reshape(*shape[::-1], 3).transpose(2, 1, 0, 3)
+        for name in ("co", "co_deform")
+    )
+    box = np.diag([*(rest[-1, -1, -1] - rest[0, 0, 0]), 1.0])
+    box[:3, 3] = rest[0, 0, 0]
+    matrix = mesh_io.matrix_array(cage.matrix_world)
+    try:
+        # A point that was not moved is exactly at rest, so that what it carries stays bit for bit.
+        points = native.module.lattice_points(shape, matrix @ box) + (now - rest) @ matrix[:3, :3].T
+        return native.module.Lattice(points, matrix @ box)
+    except native.module.TolvolError as error:
+        raise Refused(f"{cage.name}: {error}") from None
+
+
+class _Task:
+    """What runs in the thread: arrays in, arrays and numbers out."""
+
+    def __init__(self, surface, faces, reference, tolerance, lattice, mode, threads):
+        self.surface = surface
+        self.faces = faces
+        self.reference = reference
+        self.tolerance = tolerance
+        self.lattice = lattice
+        self.mode = mode
+        self.threads = threads
+        self.size = None
+
+    def run(self, progress):
+        built = volume.native_volume(self.reference, self.tolerance, self.threads, progress)
+        self.size = built.size
+        result = native.module.deform(
+            self.surface.arrays.vertices,
+            self.lattice,
+            self.faces,
+            built,
+            to_world=self.surface.matrix,
+            mode=self.mode,
+            threads=self.threads,
+            progress=progress,
+        )
+        certified = None
+        if result.report["moved"]:
+            certified = self.certify(result.vertices, self.surface.arrays.triangles, progress)
+        return self, result, certified
+
+    def certify(self, vertices, triangles, progress):
+        deformed = volume.Surface(mesh_io.MeshArrays(vertices, triangles, None, None), self.surface.matrix)
+        certified = certify(deformed, self.reference, self.tolerance, 0, self.threads, progress)
+        lower, upper = certified["forward"]
+        if upper > self.tolerance:
+            size = self.size
+            raise NotProved(
+                f"the result is between {report.percent(lower, size)} and {report.percent(upper, size)} of the size "
+                "from the reference"
+            )
+        return certified
+
+
+def _twice(ob):
+    """Warnings for modifiers that would deform the mesh by the same lattice once more."""
+    for modifier in ob.modifiers:
+        if modifier.type == "LATTICE" and modifier.object == ob.tolvol.lattice:
+            yield f"{ob.name} also has the modifier {modifier.name} with {modifier.object.name}: remove it"
+
+
+def _line(task, result, certified):
+    run, size = result.report, task.size
+    remarks = [f"{run['moved']:,} of {len(result.vertices):,} vertices moved"]
+    if run["leaving"]["faces"]:
+        if run["permitted_fraction"] is None:
+            remarks.append(f"{run['held_back']:,} held back")
+        else:
+            remarks.append(f"{100 * run['permitted_fraction']:.1f} % of the way")
+    if run["outside_lattice"]:
+        remarks.append(f"{run['outside_lattice']:,} are outside of the lattice")
+    forward, backward = (report.percent(certified[way][1], size) for way in ("forward", "backward"))
+    return (
+        f"{', '.join(remarks)}, tolerance {100 * task.tolerance / size:.4g} % = {task.tolerance:.3g}, "
+        f"result within {forward} (certified), reference within {backward}"
+    )

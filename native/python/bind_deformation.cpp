@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "operation/deformation.h"
+#include "python/arrays.h"
+#include "python/module.h"
+#include "python/volume.h"
+#include "reference/errors.h"
+
+namespace tolvol::python {
+namespace {
+
+using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// Any array of numbers as float64 in C order.
+Doubles to_doubles(const py::object& object, const std::string& name, const std::string& expected) {
+  if (!py::isinstance<py::array>(object)) throw InvalidInput(name + " must be a NumPy array, " + expected);
+  const char kind = py::reinterpret_borrow<py::array>(object).dtype().kind();
+  if (kind != 'f' && kind != 'i' && kind != 'u') throw InvalidInput(name + " must be numbers, " + expected);
+  return Doubles(object);
+}
+
+struct PythonLattice {
+  glm::uvec3 size, degree;
+  LatticeDeformation native;
+};
+
+unsigned to_unsigned(const py::handle& object, const std::string& name) {
+  if (!py::isinstance<py::int_>(object)) throw InvalidInput(name + " must be an integer, or three");
+  const auto value = py::cast<std::int64_t>(object);
+  if (value < 0 || value > std::numeric_limits<std::int32_t>::max()) {
+    throw InvalidInput(name + " is out of range: " + std::to_string(value));
+  }
+  return static_cast<unsigned>(value);
+}
+
+/// One value for all axes, or three.
+glm::uvec3 to_three(const py::object& object, const std::string& name) {
+  if (!py::isinstance<py::sequence>(object)) return glm::uvec3(to_unsigned(object, name));
+  const auto sequence = py::reinterpret_borrow<py::sequence>(object);
+  if (sequence.size() != 3) throw InvalidInput(name + " must be an integer, or three");
+  return {to_unsigned(sequence[0], name), to_unsigned(sequence[1], name), to_unsigned(sequence[2], name)};
+}
+
+std::unique_ptr<PythonLattice> make_lattice(const py::object& points, const py::object& domain,
+                                            const py::object& degree, const py::object& weights,
+                                            const py::object& knots) {
+  const Doubles p = to_doubles(points, "points", "(nu, nv, nw, 3)");
+  if (p.ndim() != 4 || p.shape(3) != 3) throw InvalidInput("points must have shape (nu, nv, nw, 3)");
+  Lattice lattice;
+  lattice.size = {p.shape(0), p.shape(1), p.shape(2)};
+  for (py::ssize_t i = 0; i + 2 < p.size(); i += 3) {
+    lattice.points.emplace_back(p.data()[i], p.data()[i + 1], p.data()[i + 2]);
+  }
+  lattice.domain = to_matrix(domain, "domain");
+  lattice.degree =
+      degree.is_none() ? glm::min(glm::uvec3(3), glm::max(lattice.size, 2u) - 1u) : to_three(degree, "degree");
+  if (!weights.is_none()) {
+    const Doubles w = to_doubles(weights, "weights", "(nu, nv, nw)");
+    if (w.ndim() != 3 || !std::equal(w.shape(), w.shape() + 3, p.shape())) {
+      throw InvalidInput("weights must have one value for each control point, shape (nu, nv, nw)");
+    }
+    lattice.weights.assign(w.data(), w.data() + w.size());
+  }
+  if (!knots.is_none()) {
+    if (!py::isinstance<py::sequence>(knots) || py::len(knots) != 3) {
+      throw InvalidInput("knots must be three: an array or None for each axis");
+    }
+    const auto three = py::reinterpret_borrow<py::sequence>(knots);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const py::object along = three[axis];
+      if (along.is_none()) continue;
+      const Doubles k = to_doubles(along, "knots", "(n + degree + 1,)");
+      if (k.ndim() != 1 || k.size() == 0) throw InvalidInput("knots must have shape (n + degree + 1,)");
+      lattice.knots[axis].assign(k.data(), k.data() + k.size());
+    }
+  }
+  return std::make_unique<PythonLattice>(PythonLattice{lattice.size, lattice.degree, LatticeDeformation(lattice)});
+}
+
+Doubles lattice_points(const py::object& shape, const py::object& domain) {
+  const glm::uvec3 size = to_three(shape, "shape");
+  const std::vector<glm::dvec3> rest = rest_points(size, to_matrix(domain, "domain"));
+  Doubles result({py::ssize_t{size.x}, py::ssize_t{size.y}, py::ssize_t{size.z}, py::ssize_t{3}});
+  double* out = result.mutable_data();
+  for (const glm::dvec3& p : rest) {
+    for (int axis = 0; axis < 3; ++axis) *out++ = p[axis];
+  }
+  return result;
+}
+
+struct Result {
+  py::array vertices;
+  py::dict report;
+};
+
+DeformationOptions::Mode to_mode(const std::string& mode) {
+  if (mode == "blocked") return DeformationOptions::Mode::blocked;
+  if (mode == "farthest") return DeformationOptions::Mode::farthest;
+  if (mode == "pull_back") return DeformationOptions::Mode::pull_back;
+  throw InvalidInput("mode must be \"blocked\", \"farthest\" or \"pull_back\", not \"" + mode + "\"");
+}
+
+DeformationOptions::Outside to_outside(const std::string& outside) {
+  if (outside == "error") return DeformationOptions::Outside::error;
+  if (outside == "keep") return DeformationOptions::Outside::keep;
+  throw InvalidInput("outside must be \"error\" or \"keep\", not \"" + outside + "\"");
+}
+
+py::dict make_report(const DeformationResult& r, double seconds) {
+  const auto counted = [](const FaceCount& count) {
+    py::dict entry;
+    entry["faces"] = count.faces, entry["first"] = count.first;
+    return entry;
+  };
+  py::dict report;
+  report["permitted_fraction"] = r.permitted_fraction;
+  report["leaving"] = counted(r.leaving);
+  report["outside"] = counted(r.outside);
+  report["outside_lattice"] = r.outside_lattice;
+  report["moved"] = r.moved;
+  report["held_back"] = r.held_back;
+  report["largest_motion"] = r.largest_motion;
+  report["method"] = r.method;
+  report["renderer"] = r.renderer;
+  report["seconds"] = seconds;
+  report["warnings"] = r.warnings;
+  return report;
+}
+
+Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, const py::object& triangles,
+                     const Volume* volume, const py::object& to_world, const std::string& mode,
+                     const std::string& outside, int threads, Progress* progress) {
+  const Vertices v = to_vertices(vertices, "vertices");
+  int corners = 3;
+  std::vector<std::uint32_t> faces;
+  if (!triangles.is_none()) faces = to_faces(triangles, "triangles", corners);
+  if (volume && triangles.is_none()) throw InvalidInput("with a volume triangles are needed, to be kept within it");
+  const Placement placed(to_matrix(to_world), v.storage);
+  DeformationOptions options;
+  options.mode = to_mode(mode);
+  options.outside = to_outside(outside);
+  options.threads = to_threads(threads);
+  options.progress = progress;
+  DeformationResult r;
+  double seconds = 0;
+  {
+    const py::gil_scoped_release release;
+    const auto start = std::chrono::steady_clock::now();
+    r = deform(v.values, faces, corners, placed, volume ? &volume->native : nullptr, lattice.native, options);
+    seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+  return {from_vertices(r.vertices, v.storage), make_report(r, seconds)};
+}
+
+}  // namespace
+
+void bind_deformation(py::module_& module) {
+  py::class_<PythonLattice>(module, "Lattice", py::module_local(),
+                            "Control points of a trivariate NURBS function that deforms the space of a box.\n\n"
+                            "At rest the points are the regular grid of the box (lattice_points), and then nothing is "
+                            "deformed, whatever the\n"
+                            "degree and the knots.")
+      .def(py::init(&make_lattice), py::arg("points"), py::arg("domain") = py::none(), py::arg("degree") = py::none(),
+           py::arg("weights") = py::none(), py::arg("knots") = py::none(),
+           "points: (nu, nv, nw, 3), where the control points are now, world units, at least 2 along each axis. "
+           "domain: (4, 4),\n"
+           "maps the unit cube to the box in the world, origin + 3 edges; None is the unit cube. degree: an integer "
+           "or three, from\n"
+           "1 to the number of points less 1, which is Bernstein's (at most 15); None is 3, or as much as the points "
+           "allow.\n"
+           "weights: (nu, nv, nw), positive; None is all equal. knots: for each axis an array of points + degree + 1 "
+           "values,\n"
+           "clamped, or None, which is uniform. Raises InvalidInput.\n"
+           "T. W. Sederberg, S. R. Parry, Free-form deformation of solid geometric models, 1986; L. Piegl, W. Tiller, "
+           "The NURBS\n"
+           "Book, 1997.")
+      .def_property_readonly(
+          "shape", [](const PythonLattice& l) { return py::make_tuple(l.size.x, l.size.y, l.size.z); },
+          "Control points along each axis.")
+      .def_property_readonly(
+          "degree", [](const PythonLattice& l) { return py::make_tuple(l.degree.x, l.degree.y, l.degree.z); },
+          "Along each axis.");
+
+  module.def("lattice_points", &lattice_points, py::arg("shape"), py::arg("domain") = py::none(),
+             "(nu, nv, nw, 3) float64: the control points of a Lattice at rest. shape: an integer or three, at least "
+             "2. domain: as for\n"
+             "Lattice. Raises InvalidInput.");
+
+  py::class_<Result>(module, "DeformationResult", py::module_local(), "A deformed mesh.")
+      .def_readonly("vertices", &Result::vertices, "(n, 3), the input's dtype, local coordinates.")
+      .def_readonly(
+          "report", &Result::report,
+          "dict: permitted_fraction (0 to 1: the share of the way at which the whole mesh is certified to be inside, "
+          "found by\n"
+          "bisection to a thousandth; 1 without a volume; None where vertices were pulled back instead), leaving "
+          "(faces, first: of the\n"
+          "deformation as wished, not certified to be inside), outside (faces, first: outside to begin with and kept "
+          "as they\n"
+          "are), outside_lattice (vertices that are not in the box), moved and held_back (vertices of the result that "
+          "are not\n"
+          "where they were, or not where they were to go), largest_motion (world units), method, renderer, seconds, "
+          "warnings.");
+
+  module.def(
+      "deform", &deform_arrays, py::arg("vertices"), py::arg("lattice"), py::arg("triangles") = py::none(),
+      py::arg("volume").none(true) = py::none(), py::arg("to_world") = py::none(), py::arg("mode") = "blocked",
+      py::arg("outside") = "error", py::arg("threads") = 0, py::arg("progress") = py::none(),
+      "Deforms the space in the box of `lattice`, and with it the mesh; vertices outside of the box stay where "
+      "they are.\n\n"
+      "vertices: (n, 3) float32 or float64, local. triangles: (m, 3) integers, or (m, 4) for quads in every "
+      "triangulation\n"
+      "(a triangle among them repeats a corner); needed with a volume. volume: a ToleranceVolume that the result "
+      "has to stay\n"
+      "in, or None. mode: what becomes of a deformation that is not certified inside as a whole: \"blocked\" "
+      "(nothing moves;\n"
+      "the report says how far it may go), \"farthest\" (every vertex goes that permitted share of its way) or "
+      "\"pull_back\"\n"
+      "(each vertex goes as far as it may, see constrain). outside: \"error\", or \"keep\" the vertices of "
+      "faces that are\n"
+      "outside to begin with where they are. Raises InvalidInput and Cancelled. Cost: about 0.3 us a vertex, "
+      "and with a\n"
+      "volume one check; when that fails some twelve, or constrain.\n"
+      "M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.");
+}
+
+}  // namespace tolvol::python

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Chains of operations, each against the same reference, stay within the tolerance; bounded each against its own input,
+as an operation with an error bound of its own would be, they drift out."""
+
+import numpy as np
+import pytest
+import tolvol
+
+import meshes
+
+
+def smooth(vertices, triangles, volume):
+    return tolvol.smooth(vertices, triangles, volume, operator="laplacian", iterations=5).vertices, triangles
+
+
+def decimate(vertices, triangles, volume):
+    result = tolvol.decimate(vertices, triangles, volume, two_sided=False)
+    return result.vertices, result.triangles
+
+
+def deform(vertices, triangles, volume):
+    """Drawn upwards by far more than the tolerance."""
+    lower, size = vertices.min(0) - 0.2, np.ptp(vertices, axis=0) + 0.4
+    domain = meshes.matrix(np.diag(size), lower)
+    points = tolvol.lattice_points(4, domain)
+    points[:, 1:3, 2:] += [0, 0, 10 * volume.tolerance]
+    lattice = tolvol.Lattice(points, domain)
+    return tolvol.deform(vertices, lattice, triangles, volume, mode="pull_back").vertices, triangles
+
+
+CHAIN = (decimate, smooth, deform, decimate, smooth)
+
+
+@pytest.mark.parametrize(("shape", "percent"), [("torus", 0.5), ("spike", 2.0)])
+def test_one_reference_for_the_whole_chain_keeps_it_inside_and_one_a_step_does_not(shape, percent):
+    vertices, triangles = meshes.torus(noise=0.002) if shape == "torus" else meshes.spike()
+    reference = vertices.astype(np.float32), triangles
+    tolerance = percent / 100 * tolvol.size(*reference)
+    volume = tolvol.ToleranceVolume(*reference, tolerance)
+    one, each = reference, reference
+    drift = []
+    for step in CHAIN:
+        one = step(*one, volume)
+        each = step(*each, tolvol.ToleranceVolume(*each, tolerance))
+        assert one[0].dtype == np.float32
+        bounded = tolvol.hausdorff(*one, *reference, bound=tolerance).upper
+        assert bounded <= tolerance, step.__name__
+        drift.append((step.__name__, bounded, tolvol.hausdorff(*each, *reference).lower))
+    print(f"\n{shape}, {percent} %: distance from the reference in tolerances")
+    for name, bounded, drifted in drift:
+        print(
+            f"  {name:9} one reference at most {bounded / tolerance:.3f}, one a step at least {drifted / tolerance:.3f}"
+        )
+    assert len(one[1]) < len(triangles) / 2
+    assert drift[-1][2] > 1.5 * tolerance
