@@ -5,6 +5,7 @@
 #include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 #include <chrono>
 
+#include "bind_permission_grid.h"
 #include "python/arrays.h"
 
 namespace {
@@ -50,4 +51,5 @@ PYBIND11_MODULE(tolvol_baselines, module) {
   module.def("decimate_openmesh", &decimate_openmesh, py::arg("vertices"), py::arg("triangles"),
              py::arg("target_triangles"),
              "(vertices float32, triangles, seconds) by OpenMesh's DecimaterT with ModQuadricT.");
+  tolvol::baselines::bind_permission_grid(module);
 }

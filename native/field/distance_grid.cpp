@@ -12,7 +12,6 @@ namespace tolvol {
 namespace {
 
 constexpr double kFinestPrecision = 1;  // finer costs field time and saves the certificate none
-constexpr int kLanes = 8;               // rows are padded so that a kernel may touch whole vectors
 
 // Node counts as doubles: a precision far too fine must not overflow an integer before it is refused.
 struct Layout {
@@ -26,7 +25,7 @@ Layout layout(const Box& box, double tolerance, double precision) {
   // within sqrt(3) h of it: with this band each of them has an id.
   const double band = tolerance + std::sqrt(3.0) * h;
   const glm::dvec3 n = glm::ceil((box.upper - box.lower + 2 * band) / h) + 1.0;
-  return {h, band, n.x, n.y, n.z, std::ceil(n.x / kLanes) * kLanes};
+  return {h, band, n.x, n.y, n.z, std::ceil(n.x / DistanceGrid::kLanes) * DistanceGrid::kLanes};
 }
 
 double finest_that_fits(const Box& box, double tolerance) {

@@ -20,12 +20,15 @@ struct DistanceGrid {
   glm::dvec3 origin{0};  ///< position of node (0, 0, 0)
   double spacing = 0;    ///< h, the same along each axis
   glm::ivec3 nodes{0};   ///< number of nodes along x, y, z
-  int pitch = 0;         ///< nodes from one row to the next, >= nodes.x
+  int pitch = 0;         ///< nodes from one row to the next, padded(nodes.x)
   double band = 0;       ///< nodes farther than this from the reference hold the band and kNone
   std::vector<float> distance;
   std::vector<std::uint32_t> triangle;
 
   std::size_t index(int x, int y, int z) const { return (static_cast<std::size_t>(z) * nodes.y + y) * pitch + x; }
+  /// Rows are padded so that a kernel may touch whole vectors.
+  static constexpr int kLanes = 8;
+  static constexpr int padded(int row) { return (row + kLanes - 1) / kLanes * kLanes; }
   std::size_t memory() const { return distance.size() * (sizeof(float) + sizeof(std::uint32_t)); }
 
   /// The closest triangle of the node nearest to p; kNone outside the grid or beyond the band. O(1).

@@ -16,7 +16,7 @@
 namespace tolvol {
 namespace {
 
-constexpr int kLanes = 8;
+constexpr int kLanes = DistanceGrid::kLanes;
 using Floats = float __attribute__((vector_size(4 * kLanes)));
 using Masks = std::int32_t __attribute__((vector_size(4 * kLanes)));
 
