@@ -16,6 +16,10 @@
 
 namespace tolvol {
 
+/// The share of the tolerance that operations leave unused, so that an independent measure, with rounding of its own,
+/// proves a result in finite time. Costs no triangles to speak of.
+inline constexpr double kHeadroom = 1e-4;
+
 class ToleranceVolume {
  public:
   struct Options {

@@ -21,10 +21,6 @@ namespace {
 
 constexpr std::uint32_t kNone = CutMesh::kNone;
 
-/// What the loop leaves of the tolerance unused, so that an independent measure, with rounding of its own, proves the
-/// result in finite time. Costs no triangles to speak of.
-constexpr double kHeadroom = 1e-4;
-
 class Decimation {
  public:
   Decimation(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const Placement& placement,
