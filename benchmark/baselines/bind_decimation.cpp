@@ -8,6 +8,7 @@
 
 #include "baselines/checked_ring.h"
 #include "baselines/module.h"
+#include "baselines/permission_ring.h"
 #include "baselines/vertex_samples.h"
 #include "check/certificate.h"
 #include "operation/decimation.h"
@@ -20,16 +21,26 @@ namespace {
 namespace py = pybind11;
 using Seconds = std::chrono::duration<double>;
 
+constexpr double kPermissionPrecision = 4;           // what Zelinka and Garland recommend
+constexpr std::optional<double> kCoarse = 1.0 / 16;  // of a volume that nobody asks
+
 /// A rival and what it needs, built within a time of its own.
 struct Rival {
+  std::unique_ptr<PermissionGrid> grid;
   std::unique_ptr<ToleranceCheck> check;
   std::unique_ptr<RingCheck> ring;
   std::size_t memory = 0;  ///< bytes of the grid it asks
 };
 
-Rival make_rival(const std::string& method, const ToleranceVolume& volume) {
+Rival make_rival(const std::string& method, const ToleranceVolume& volume, std::optional<double> precision,
+                 unsigned threads) {
   Rival rival;
-  if (method == "vertex_samples") {
+  if (method == "permission_grid") {
+    rival.grid = std::make_unique<PermissionGrid>(volume.reference(), volume.frame_tolerance(),
+                                                  precision.value_or(kPermissionPrecision), threads);
+    rival.ring = std::make_unique<PermissionRing>(*rival.grid);
+    rival.memory = rival.grid->memory();
+  } else if (method == "vertex_samples") {
     rival.ring = std::make_unique<VertexSamples>(volume.frame_tolerance());
   } else if (method == "certificate") {
     rival.check = std::make_unique<Certificate>(volume);
@@ -59,9 +70,13 @@ py::tuple decimate_by(const py::object& vertices, const py::object& triangles, d
   std::size_t memory = 0;
   {
     const py::gil_scoped_release release;
-    const auto start = std::chrono::steady_clock::now();
-    const ToleranceVolume volume(v.values, t, placed, tolerance, {precision, options.threads, nullptr});
-    const Rival rival = make_rival(method, volume);
+    // A rival that does not ask the volume does not wait for it: only its frame is used.
+    const bool asks_volume = method != "permission_grid" && method != "vertex_samples";
+    auto start = std::chrono::steady_clock::now();
+    const ToleranceVolume volume(v.values, t, placed, tolerance,
+                                 {asks_volume ? precision : kCoarse, options.threads, nullptr});
+    if (!asks_volume) start = std::chrono::steady_clock::now();
+    const Rival rival = make_rival(method, volume, precision, options.threads);
     const auto built = std::chrono::steady_clock::now();
     options.rival = rival.ring.get();
     result = decimate(v.values, t, placed, &volume, options);

@@ -58,7 +58,7 @@ void decimate_within(Mesh& mesh, const ToleranceVolume& volume, double factor = 
   decimater.module(tolerance).set_volume(volume);
   ASSERT_TRUE(decimater.initialize());
   if (factor < 1) decimater.module(tolerance).set_error_tolerance_factor(factor);
-  decimater.decimate(0, false);
+  decimater.decimate(mesh.n_vertices(), false);
 }
 
 double forward(const TriangleMesh& from, const TriangleMesh& to, double bound = kTolerance) {
@@ -71,7 +71,7 @@ using Meshes = testing::Types<FloatMesh, DoubleMesh>;
 TYPED_TEST_SUITE(ModTolerance, Meshes);
 
 TYPED_TEST(ModTolerance, KeepsTheTolerance) {
-  const TriangleMesh reference = shapes::torus(60, 0.004);
+  const TriangleMesh reference = shapes::torus(40, 0.004);
   auto mesh = to_openmesh<TypeParam>(reference);
   const ToleranceVolume volume = volume_of(mesh, kTolerance);
   decimate_within(mesh, volume);
@@ -82,13 +82,12 @@ TYPED_TEST(ModTolerance, KeepsTheTolerance) {
 }
 
 TYPED_TEST(ModTolerance, KeepsOneToleranceThroughAChain) {
-  const TriangleMesh reference = shapes::torus(60, 0.004);
+  const TriangleMesh reference = shapes::torus(40, 0.004);
   auto mesh = to_openmesh<TypeParam>(reference);
   const ToleranceVolume volume = volume_of(mesh, kTolerance);
   decimate_within(mesh, volume, 0.3);
   EXPECT_LE(forward(from_openmesh(mesh), reference, 0.3 * kTolerance), 0.3 * kTolerance) << "the factor holds";
   const std::size_t first = from_openmesh(mesh).triangles.size();
-  decimate_within(mesh, volume);  // faces deleted, not yet collected
   mesh.garbage_collection();
   decimate_within(mesh, volume);
   const TriangleMesh result = from_openmesh(mesh);

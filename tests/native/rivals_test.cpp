@@ -2,7 +2,10 @@
 // The decimation with other methods in charge: each must decide, and keep exactly what it is about.
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "baselines/checked_ring.h"
+#include "baselines/permission_ring.h"
 #include "baselines/vertex_samples.h"
 #include "check/certificate.h"
 #include "measure/hausdorff.h"
@@ -102,6 +105,85 @@ TEST(VertexSamples, KeepVerticesAndNoMore) {
     EXPECT_LE(farthest, kTolerance * (1 + 1e-9));
     EXPECT_GT(farthest, 0.9 * kTolerance);
     EXPECT_GT(hausdorff(result.mesh, mesh, {std::nullopt, 1, nullptr}).lower, kTolerance) << "the other direction";
+  }
+}
+
+/// Clips the triangle by the six planes of a box and tells whether something is left.
+bool overlaps(const dvec3 (&corners)[3], const dvec3& low, double edge) {
+  std::vector<dvec3> polygon(corners, corners + 3);
+  for (int plane = 0; plane < 6 && !polygon.empty(); ++plane) {
+    const int axis = plane % 3;
+    const double sign = plane < 3 ? 1 : -1, at = low[axis] + (plane < 3 ? 0 : edge);
+    std::vector<dvec3> kept;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const dvec3 &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+      const double da = sign * (a[axis] - at), db = sign * (b[axis] - at);
+      if (da >= 0) kept.push_back(a);
+      if ((da < 0) != (db < 0)) kept.push_back(a + (b - a) * (da / (da - db)));
+    }
+    polygon = std::move(kept);
+  }
+  return !polygon.empty();
+}
+
+TEST(PermissionRing, PermitsExactlyWhatOverlapsPermittedCellsAlone) {
+  const baselines::PermissionGrid grid(shapes::torus(40), 0.15, 5);
+  std::mt19937 engine(1);
+  std::uniform_real_distribution<double> around(-1.5, 1.5), exponent(-2.5, 0);
+  std::normal_distribution<double> normal;
+  std::size_t permitted = 0, refused_between = 0;
+  for (int i = 0; i < 150000; ++i) {
+    const double size = 0.8 * std::pow(10, exponent(engine));
+    const dvec3 middle(around(engine), around(engine), 0.4 * around(engine));
+    dvec3 corners[3];
+    for (dvec3& c : corners) c = middle + size * dvec3(normal(engine), normal(engine), normal(engine));
+    if (i % 5 == 0) corners[2] = corners[i % 2];                         // a segment
+    if (i % 7 == 0) corners[0].z = corners[1].z = corners[2].z = 0.123;  // parallel to two axes
+    bool inside = true, corners_inside = true;
+    for (const dvec3& c : corners) corners_inside &= grid.permits(grid.cell_of(c));
+    if (!corners_inside) {
+      ASSERT_FALSE(permits(grid, corners)) << i;
+      continue;
+    }
+    const glm::ivec3 low =
+        glm::min(glm::min(grid.cell_of(corners[0]), grid.cell_of(corners[1])), grid.cell_of(corners[2]));
+    const glm::ivec3 high =
+        glm::max(glm::max(grid.cell_of(corners[0]), grid.cell_of(corners[1])), grid.cell_of(corners[2]));
+    for (int z = low.z; z <= high.z && inside; ++z) {
+      for (int y = low.y; y <= high.y && inside; ++y) {
+        for (int x = low.x; x <= high.x && inside; ++x) {
+          const glm::ivec3 cell(x, y, z);
+          inside =
+              grid.permits(cell) || !overlaps(corners, grid.origin() + dvec3(cell) * grid.spacing(), grid.spacing());
+        }
+      }
+    }
+    ASSERT_EQ(permits(grid, corners), inside) << i;
+    ++(inside ? permitted : refused_between);
+  }
+  EXPECT_GT(permitted, 1000u);
+  EXPECT_GT(refused_between, 1000u);
+}
+
+TEST(PermissionRing, RefusesWhatIsOutsideTheGrid) {
+  const baselines::PermissionGrid grid(shapes::grid(8), 0.1, 4);
+  const dvec3 inside[3] = {{0.1, 0.1, 0}, {0.9, 0.1, 0}, {0.1, 0.9, 0.01}};
+  EXPECT_TRUE(permits(grid, inside));
+  const dvec3 far_away[3] = {{0.1, 0.1, 0}, {0.9, 0.1, 0}, {0.1, 50, 0}};
+  EXPECT_FALSE(permits(grid, far_away));
+}
+
+TEST(PermissionRing, KeepsTheTolerance) {
+  const TriangleMesh mesh = shapes::torus(60, 0.004);
+  const ToleranceVolume volume = volume_of(mesh);
+  std::size_t before = mesh.triangles.size();
+  for (const double precision : {2.0, 4.0, 8.0}) {
+    const baselines::PermissionGrid grid(volume.reference(), volume.frame_tolerance(), precision);
+    baselines::PermissionRing ring(grid);
+    const Decimated result = by(ring, mesh, volume);
+    EXPECT_LE(hausdorff(result.mesh, mesh, {kTolerance, 1, nullptr}).upper, kTolerance);
+    EXPECT_LT(result.mesh.triangles.size(), before) << "a finer grid loses less of the tolerance";
+    before = result.mesh.triangles.size();
   }
 }
 
