@@ -6,8 +6,8 @@ blender --background --python blender_scripts/comparison.py -- [MESH...] [--tole
 
 MESH: .obj, .ply, .stl, or a model of blender_scripts/models.py; suzanne by default. Every method runs in the product's own
 loop, so that the method alone differs. `time / QEM`: building what it asks and decimating, over the loop without any check
-down to the same count; best of three turns (one, where it takes over 20 s). Distances are certified upper ends, in tolerances. --write puts the table
-between its two comment lines in a Markdown file.
+down to the same count; best of three turns, or one where it takes over 20 s. Distances are certified upper ends, in
+tolerances. --write puts the table between its two comment lines in a Markdown file.
 """
 
 import json
@@ -32,7 +32,8 @@ EQUAL = 1.1  # which is one with at most so many times the triangles
 
 
 class Method:
-    """One way to decide; `run(vertices, triangles, tolerance, threads)` -> (vertices, triangles, bytes of its grid, precision)."""
+    """One way to decide: `run(vertices, triangles, tolerance, threads)` gives vertices, triangles, bytes of its grid, and
+    nodes or cells per tolerance."""
 
     def __init__(self, name, promise, run):
         self.name, self.promise, self.run = name, promise, run
@@ -73,7 +74,9 @@ def equal_grid(enough, *case):
     """The entry of the coarsest finer permission grid that leaves at most `enough` triangles; None: none that fits does."""
     for precision in FINER:
         try:
-            entry = measure(Method(f"{METHODS['grid'].name}, finer", "forward", rival("permission_grid", precision)), *case)
+            entry = measure(
+                Method(f"{METHODS['grid'].name}, finer", "forward", rival("permission_grid", precision)), *case
+            )
         except RuntimeError:  # over the grid's memory limit
             return None
         if entry["triangles"] <= enough:
@@ -82,12 +85,15 @@ def equal_grid(enough, *case):
 
 
 def measure(method, vertices, triangles, tolerance, threads):
+    def unbounded(count):
+        return tolvol.decimate(vertices, triangles, None, target_triangles=count)
+
     timed = Stopwatch()
     for turn in range(REPEATS):
         if turn and timed.seconds["bounded"] > LONG:
             break
         points, faces, memory, precision = timed("bounded", method.run, vertices, triangles, tolerance, threads)
-        timed("unbounded", lambda: tolvol.decimate(vertices, triangles, None, target_triangles=len(faces)))
+        timed("unbounded", unbounded, len(faces))
     reference, stored = (vertices.astype(np.float64), triangles), (points.astype(np.float64), faces)
 
     def farthest(a, b, promised):
@@ -118,7 +124,9 @@ def compare(vertices, triangles, tolerance, threads):
 
 def kept(entry):
     """Whether what the method promises holds."""
-    return (entry["promise"] == "none" or entry["forward"] <= 1) and (entry["promise"] != "both" or entry["backward"] <= 1)
+    return (entry["promise"] == "none" or entry["forward"] <= 1) and (
+        entry["promise"] != "both" or entry["backward"] <= 1
+    )
 
 
 def distance(value, promised):
@@ -155,7 +163,9 @@ def percentages(text):
 def arguments():
     parser = cli.Parser("comparison.py", description=__doc__.split("\n\n")[0], epilog=__doc__.split("\n\n")[2])
     parser.add_argument("mesh", nargs="*", metavar="MESH", default=["suzanne"], help="a file, or a model's name")
-    parser.add_argument("--tolerance", type=percentages, default="1%,0.3%,0.1%", metavar="T,...", help="default: %(default)s")
+    parser.add_argument(
+        "--tolerance", type=percentages, default="1%,0.3%,0.1%", metavar="T,...", help="default: %(default)s"
+    )
     parser.add_argument("--write", metavar="FILE.md", help="put the table there")
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
     parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")

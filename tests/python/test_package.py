@@ -30,7 +30,17 @@ def example(tmp_path_factory):
         os.makedirs(folder / "examples", exist_ok=True)
         (folder / "examples" / source.name).write_text(source.read_text())
     prefix = f"-DCMAKE_PREFIX_PATH={folder / 'installed'}"
-    run("cmake", "-G", "Ninja", "-S", folder / "examples", "-B", folder / "build", prefix, "-DCMAKE_CXX_FLAGS=-Wall -Werror")
+    run(
+        "cmake",
+        "-G",
+        "Ninja",
+        "-S",
+        folder / "examples",
+        "-B",
+        folder / "build",
+        prefix,
+        "-DCMAKE_CXX_FLAGS=-Wall -Werror",
+    )
     run("cmake", "--build", folder / "build")
     return folder / "build" / "decimate_with_openmesh"
 
@@ -76,4 +86,16 @@ def test_headers_stand_alone(example, tmp_path):
     source = tmp_path / "header.cpp"
     for header in headers:
         source.write_text(f"#include <{header}>\n#include <{header}>\n")
-        run("c++", "-std=c++20", "-Wall", "-Werror", "-Wno-psabi", "-fsyntax-only", "-I", include, "-I", include / "tolvol", source)
+        run(
+            "c++",
+            "-std=c++20",
+            "-Wall",
+            "-Werror",
+            "-Wno-psabi",
+            "-fsyntax-only",
+            "-I",
+            include,
+            "-I",
+            include / "tolvol",
+            source,
+        )

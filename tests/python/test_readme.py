@@ -10,7 +10,9 @@ import tolvol
 
 import meshes
 
-BLOCKS = re.findall(r"^```python\n(.*?)^```", (Path(__file__).resolve().parents[2] / "README.md").read_text(), re.M | re.S)
+BLOCKS = re.findall(
+    r"^```python\n(.*?)^```", (Path(__file__).resolve().parents[2] / "README.md").read_text(), re.M | re.S
+)
 
 
 def run(block):
@@ -27,9 +29,9 @@ def block_with(word):
     return found[0]
 
 
-def farthest(positions, names):
+def distance(names, bound):
     triangles = names["triangles"]
-    return tolvol.hausdorff(positions, triangles, names["vertices"], triangles).upper
+    return tolvol.hausdorff(names["positions"], triangles, names["vertices"], triangles, bound=bound)
 
 
 @pytest.mark.parametrize("block", BLOCKS)
@@ -48,5 +50,6 @@ def test_five_lines_keep_a_smoothing_loop_within_the_tolerance():
     without = "".join(line for line in block.splitlines(keepends=True) if "# added" not in line)
     assert block.count("# added") == 5 and "tolvol" not in without
     kept, free = run(block), run(without)
-    assert farthest(kept["positions"], kept) <= kept["tolerance"] < farthest(free["positions"], free)
-    assert np.linalg.norm(kept["positions"] - kept["vertices"], axis=1).max() > 0.9 * kept["tolerance"]
+    tolerance = kept["tolerance"]
+    assert distance(kept, tolerance).upper <= tolerance < distance(free, tolerance).lower
+    assert np.linalg.norm(kept["positions"] - kept["vertices"], axis=1).max() > 0.9 * tolerance
