@@ -213,11 +213,11 @@ CollapseLoop::Outcome CollapseLoop::search(Halfedge h, const glm::dvec3& best) {
     const Outcome outcome = attempt(h, other);
     if (outcome != Outcome::refused) return outcome;
   }
-  if (!bounds_.forward) return Outcome::refused;
+  if (!(bounds_.within > 0)) return Outcome::refused;
   std::mt19937_64 random((static_cast<std::uint64_t>(from(h)) << 32) | to(h));
   const auto uniform = [&] { return static_cast<double>(random() >> 11) * 0x1p-52 - 1; };
   for (int i = 0; i < kTries; ++i) {
-    const double spread = (i % 2 ? kWideSpread : kSpread) * bounds_.forward->within();
+    const double spread = (i % 2 ? kWideSpread : kSpread) * bounds_.within;
     const double x = uniform(), y = uniform(), z = uniform();
     const Outcome outcome = attempt(h, store_(best + spread * glm::dvec3(x, y, z)));
     if (outcome != Outcome::refused) return outcome;
@@ -380,6 +380,7 @@ bool CollapseLoop::folds_over() const {
 }
 
 bool CollapseLoop::within_bounds(const glm::dvec3& position) {
+  if (bounds_.rival) return bounds_.rival->accepts(elements_, removed_);
   if (bounds_.forward) {
     const double within = bounds_.forward->within();
     new_distance_ = bounds_.forward->distance_bound(position);
@@ -434,6 +435,7 @@ bool CollapseLoop::boundary_within_bounds(Halfedge h, const glm::dvec3& position
 
 void CollapseLoop::apply(Halfedge h, const Spot& spot) {
   const std::uint32_t v0 = from(h), v1 = to(h);
+  if (bounds_.rival) bounds_.rival->commit();
   if (bounds_.backward) bounds_.backward->commit();
   if (!boundary_elements_.empty()) bounds_.boundary_backward->commit();
   for (const NewWedge& n : new_wedges_) {

@@ -14,6 +14,7 @@
 #include "check/certificate.h"
 #include "operation/coverage.h"
 #include "operation/quadric.h"
+#include "operation/ring_check.h"
 #include "reference/progress.h"
 
 namespace tolvol {
@@ -24,6 +25,8 @@ struct CollapseBounds {
   Coverage* backward = nullptr;
   const TriangleCertificate* boundary_forward = nullptr;  ///< on the reference's boundary edges
   Coverage* boundary_backward = nullptr;                  ///< elements are boundary edges, named by their first vertex
+  RingCheck* rival = nullptr;                             ///< asked in place of all of them
+  double within = 0;  ///< the provable distance; 0: nothing is promised, and no second position is tried
 };
 
 /// A position as it is stored, and in the frame: always mapped from what is stored.

@@ -21,10 +21,6 @@ namespace {
 
 constexpr std::uint32_t kNone = CutMesh::kNone;
 
-/// What the loop leaves of the tolerance unused, so that an independent measure, with rounding of its own, proves the
-/// result in finite time. Costs no triangles to speak of.
-constexpr double kHeadroom = 1e-4;
-
 class Decimation {
  public:
   Decimation(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const Placement& placement,
@@ -32,6 +28,7 @@ class Decimation {
       : vertices_(vertices), triangles_(triangles), volume_(volume), options_(options), placement_(placement) {
     validate(vertices, triangles);
     if (!volume && options.target_triangles == 0) throw InvalidInput("without a volume a target is needed");
+    if (!volume && options.rival) throw InvalidInput("without a volume there is no tolerance for a rival to keep");
     if (!options.locked.empty() && options.locked.size() != vertices.size()) {
       throw InvalidInput("locked must have one value for each vertex");
     }
@@ -108,12 +105,19 @@ class Decimation {
     }
     const double mapping_error = placement_.mapping_error(used);
     const double provable = volume_->provable(mapping_error), within = provable * (1 - kHeadroom);
+    CollapseBounds bounds;
+    bounds.within = within;
+    if (options_.rival) {
+      options_.rival->begin({positions_, cut_.triangles}, mapping_error);
+      result_.method = options_.rival->method(), result_.renderer = options_.rival->renderer();
+      bounds.rival = options_.rival;
+      return bounds;
+    }
     const Certificate certificate(*volume_);
     result_.method = certificate.method(), result_.renderer = certificate.renderer();
     identical_ = input_is_reference();
     if (!identical_) certify_input(certificate, mapping_error);
 
-    CollapseBounds bounds;
     forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within,
                      volume_->refutable(mapping_error));
     bounds.forward = &*forward_;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "check/tolerance_volume.h"
+#include "operation/ring_check.h"
 
 namespace tolvol {
 
@@ -25,7 +26,8 @@ struct DecimationOptions {
   std::span<const bool> locked = {};  ///< per input vertex, may be empty: neither moves nor vanishes
   Outside outside = Outside::error;   ///< what to do with input faces that are not within the tolerance
   std::span<const std::uint32_t> wedges = {};  ///< per input corner, may be empty: see wedge_labels()
-  unsigned threads = 0;                        ///< 0: one per core; never changes the result
+  RingCheck* rival = nullptr;  ///< for comparisons: decides in place of all that is certified; nothing is promised
+  unsigned threads = 0;        ///< 0: one per core; never changes the result
   Progress* progress = nullptr;
 };
 
