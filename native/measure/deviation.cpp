@@ -15,13 +15,14 @@
 #include "measure/placed_pair.h"
 #include "measure/split.h"
 #include "reference/parallel.h"
+#include "reference/pseudonormals.h"
 
 namespace tolvol {
 namespace {
 
 using glm::dvec3;
 
-constexpr double kPieces = 131072;         // at first; a spacing of about 0.3 % of the size of a scan
+constexpr double kPieces = 65536;          // at first; a spacing of about 0.4 % of the size of a scan
 constexpr std::size_t kBudget = 524288;    // pieces when it ends, or kBudgetPerTriangle for each triangle
 constexpr std::size_t kBudgetPerTriangle = 4;
 constexpr double kEnough = 0.001;          // of the largest distance: the width of the range of the mean
@@ -91,7 +92,9 @@ struct Piece {
   double weight = 0;
   DistanceBounds bounds;
   double distance = 0;  // of its point
+  bool inside = false;  // its point, where b is closed
 
+  double signed_distance() const { return inside ? -distance : distance; }
   double gap() const { return weight * (bounds.mean.upper - bounds.mean.lower); }
 };
 
@@ -144,16 +147,37 @@ class Distribution {
   std::vector<Step> steps_;
 };
 
+/// Inside or outside of a closed mesh; nothing is inside of another.
+class SideOf {
+ public:
+  explicit SideOf(const TriangleMesh& b) : normals_(b) {
+    double volume = 0;
+    for (const glm::uvec3& t : b.triangles) {
+      volume += glm::dot(b.vertices[t.x], glm::cross(b.vertices[t.y], b.vertices[t.z]));
+    }
+    turn_ = volume < 0 ? -1 : 1;
+  }
+
+  bool known() const { return normals_.closed(); }
+  bool inside(const dvec3& p, const Hierarchy::Nearest& nearest) const {
+    return known() && turn_ * glm::dot(p - nearest.point, normals_.at(nearest.triangle, nearest.weights)) < 0;
+  }
+
+ private:
+  Pseudonormals normals_;
+  double turn_;
+};
+
 class Cover {
  public:
   Cover(const TriangleMesh& a, const TriangleMesh& b, const DeviationOptions& options)
-      : b_(b), hierarchy_(b), options_(options) {
+      : b_(b), hierarchy_(b), sides_(b), options_(options) {
     for (const Measure measure : {area, length, number}) {
       measure_ = measure;
       total_ = Sum();
       pieces_.clear();
       for (const glm::uvec3& t : a.triangles) {
-        pieces_.push_back({simplex_of({a.vertices[t.x], a.vertices[t.y], a.vertices[t.z]}, measure), 0, {}, 0});
+        pieces_.push_back({simplex_of({a.vertices[t.x], a.vertices[t.y], a.vertices[t.z]}, measure), 0, {}, 0, false});
         total_.add(measure_of(pieces_.back().simplex));
       }
       if (total_.value() > 0) break;
@@ -164,7 +188,7 @@ class Cover {
       const double whole = measure_of(triangle.simplex), parts = whole / total_.value() * kPieces;
       const int k = std::max(1, int(std::lround(measure_ == area ? std::sqrt(parts) : parts)));
       const double share = measure_ == number ? 1 : 1.0 / (measure_ == area ? double(k) * k : k);
-      cut(triangle.simplex, k, [&](const Simplex& part) { pieces_.push_back({part, whole * share, {}, 0}); });
+      cut(triangle.simplex, k, [&](const Simplex& part) { pieces_.push_back({part, whole * share, {}, 0, false}); });
     }
     budget_ = std::max({kBudget, kBudgetPerTriangle * a.triangles.size(), pieces_.size()});
   }
@@ -175,6 +199,7 @@ class Cover {
   }
 
   const std::vector<Piece>& pieces() const { return pieces_; }
+  bool has_sides() const { return sides_.known(); }
   double spacing() const {
     if (measure_ == number) return 0;
     const double each = total_.value() / double(pieces_.size());
@@ -192,7 +217,10 @@ class Cover {
           pieces_[i].bounds = distance_bounds(pieces_[i].simplex, b_, hierarchy_, hint);
           hint = pieces_[i].bounds.nearest;
           const dvec3 point = point_in(pieces_[i].simplex, i);
-          pieces_[i].distance = hierarchy_.nearest(point, std::numeric_limits<double>::infinity(), hint).distance;
+          const Hierarchy::Nearest nearest =
+              hierarchy_.nearest(point, std::numeric_limits<double>::infinity(), hint);
+          pieces_[i].distance = nearest.distance;
+          pieces_[i].inside = sides_.inside(point, nearest);
         }
       });
       if (options_.progress) options_.progress->update(double(chunk + count) / double(budget_));
@@ -227,7 +255,7 @@ class Cover {
     std::vector<Piece> parts;
     for (const std::size_t i : worst) {
       const std::size_t before = parts.size();
-      halve(pieces_[i], [&](const Simplex& part) { parts.push_back({part, measure_of(part), {}, 0}); });
+      halve(pieces_[i], [&](const Simplex& part) { parts.push_back({part, measure_of(part), {}, 0, false}); });
       if (parts.size() > before) pieces_[i].weight = -1;
     }
     std::erase_if(pieces_, [](const Piece& piece) { return piece.weight < 0; });
@@ -247,12 +275,43 @@ class Cover {
 
   const TriangleMesh& b_;
   Hierarchy hierarchy_;
+  SideOf sides_;
   const DeviationOptions& options_;
   Measure measure_ = number;
   Sum total_;
   std::size_t budget_ = 0;
   std::vector<Piece> pieces_;
 };
+
+Estimate estimate(double value, double lower, double upper) {
+  return {std::clamp(value, lower, upper), {lower, upper}};
+}
+
+/// In the frame.
+Sides sides_of(const std::vector<Piece>& pieces) {
+  Sum weight, mean, mean_lower, mean_upper, inside, inside_lower, inside_upper;
+  Sides sides;
+  for (const Piece& piece : pieces) {
+    const Range &value = piece.bounds.value, &average = piece.bounds.mean;
+    // A piece that is nowhere at 0 is on one side.
+    const bool crosses = !(value.lower > 0);
+    weight.add(piece.weight);
+    mean.add(piece.weight * piece.signed_distance());
+    mean_lower.add(piece.weight * (crosses || piece.inside ? -average.upper : average.lower));
+    mean_upper.add(piece.weight * (crosses || !piece.inside ? average.upper : -average.lower));
+    inside.add(piece.inside ? piece.weight : 0);
+    inside_lower.add(piece.inside && !crosses ? piece.weight : 0);
+    inside_upper.add(piece.inside || crosses ? piece.weight : 0);
+    Range& own = piece.inside ? sides.inside : sides.outside;
+    own.lower = std::max(own.lower, piece.distance);
+    if (crosses || piece.inside) sides.inside.upper = std::max(sides.inside.upper, value.upper);
+    if (crosses || !piece.inside) sides.outside.upper = std::max(sides.outside.upper, value.upper);
+  }
+  const double whole = weight.value();
+  sides.mean = estimate(mean.value() / whole, mean_lower.value() / whole, mean_upper.value() / whole);
+  sides.share_inside = estimate(inside.value() / whole, inside_lower.value() / whole, inside_upper.value() / whole);
+  return sides;
+}
 
 void require(bool good, const char* what, std::size_t i, const char* is_not) {
   if (good) return;
@@ -292,9 +351,6 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
     square_upper.add(piece.weight * of.mean_square.upper);
   }
   const double whole = weight.value();
-  const auto estimate = [](double value, double lower, double upper) {
-    return Estimate{std::clamp(value, lower, upper), {lower, upper}};
-  };
   const auto average = [&](const Sum& sum) { return sum.value() / whole / scale; };
   const auto root = [&](const Sum& sum) { return std::sqrt(sum.value() / whole) / scale; };
   result.mean = estimate(average(mean), average(mean_lower), average(mean_upper));
@@ -313,8 +369,15 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
     result.percentiles.push_back(
         {seen.percentile(p) / scale, {least.percentile(p) / scale, most.percentile(p) / scale}});
   }
+  if (cover.has_sides()) {
+    Sides& sides = result.sides.emplace(sides_of(pieces));
+    for (double* length : {&sides.mean.value, &sides.mean.range.lower, &sides.mean.range.upper, &sides.inside.lower,
+                           &sides.inside.upper, &sides.outside.lower, &sides.outside.upper}) {
+      *length /= scale;
+    }
+  }
   for (const Piece& piece : pieces) {
-    result.distances.push_back(piece.distance / scale);
+    result.distances.push_back(piece.signed_distance() / scale);
     result.weights.push_back(piece.weight / whole);
   }
   result.spacing = cover.spacing() / scale;

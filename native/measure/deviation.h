@@ -3,7 +3,7 @@
 /// as a range that holds it, where hausdorff.h is about the largest distance.
 #pragma once
 
-#include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,17 +26,25 @@ struct Estimate {
   Range range;
 };
 
+/// On which side of a closed surface; outside is above 0.
+struct Sides {
+  Estimate mean;          ///< with its sign: the shift of the one surface against the other
+  Estimate share_inside;  ///< of the area
+  Range inside, outside;  ///< the largest distance on each side, 0 or more
+};
+
 struct Deviation {
   Estimate mean, rms;                  ///< of the distance from a to b, weighted by area, in the units of the meshes
   double mean_error;                   ///< the standard error of mean.value is at most this
   std::vector<Estimate> share_beyond;  ///< for each bound the share of the area of a that is farther than it, 0 to 1
   std::vector<Estimate> percentiles;   ///< for each p the least distance that p % of the area of a does not exceed
-  std::vector<double> distances;       ///< of the samples
+  std::optional<Sides> sides;          ///< where b is closed
+  std::vector<double> distances;       ///< of the samples; where b is closed with their sign
   std::vector<double> weights;         ///< the share of the area that each sample stands for, together 1
   double spacing;                      ///< side of the square that a sample stands for, in the middle
 };
 
-/// Covers a with pieces of about 1/131,072 of its area, at least one for each triangle, and cuts the worst until the
+/// Covers a with pieces of about 1/65,536 of its area, at least one for each triangle, and cuts the worst until the
 /// range of the mean is no wider than 0.1 % of the largest distance that was seen, or the pieces are half a million
 /// (four for each triangle where that is more). A piece gives the exact distance of one of its points to the estimates,
 /// and bounds on the distance over all of it (measure/distance_bounds.h) to the ranges. The points are fixed, equal
@@ -46,6 +54,10 @@ struct Deviation {
 /// 1e-12 of the size of the meshes (more only where nearly all the area is in needles); between surfaces nearer to each
 /// other than `spacing` they are wide. Where a has no area at all it is measured along the longest edges of its
 /// triangles instead, and where these have no length either all triangles count alike (spacing 0).
+///
+/// b is closed when each of its edges has two faces that run along it in opposite directions. What is inside is told by
+/// its angle-weighted pseudonormals (reference/pseudonormals.h), turned round where its volume is negative: certain
+/// unless b intersects itself.
 ///
 /// Throws InvalidInput when a mesh is not valid (reference/triangle_mesh.h), a bound is not a length of 0 or more or a
 /// percentile is not one, Cancelled. Cost: 2 to 10 us and 200 bytes a piece.

@@ -24,6 +24,8 @@ using Values = std::array<double, 3>;  // at the corners of a piece
 
 // Triangles whose planes are worth asking for: more of them cost more than another four pieces.
 constexpr int kMostTriangles = 64;
+// Of the distance: a piece that is so short is known well enough by one point, as nothing changes faster than one to one.
+constexpr double kShort = 1e-4;
 
 /// At each corner of a piece the least value of linear functions as above, one for each triangle.
 class Below {
@@ -110,6 +112,12 @@ DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, cons
     bounds.mean_square.upper += squared / k;
     spread += glm::dot(arm, arm);
     r = std::max(r, glm::length(arm));
+  }
+
+  if (r <= kShort * d) {
+    bounds.value = bounds.mean = {d - r, d + r};
+    bounds.mean_square = {(d - r) * (d - r), (d + r) * (d + r)};
+    return bounds;
   }
 
   Below below(piece, c, nearest.point);

@@ -57,6 +57,17 @@ void bind_measure(py::module_& module) {
       "us a\n"
       "triangle. Raises InvalidInput, Cancelled.");
 
+  py::class_<Sides>(module, "Sides", py::module_local(), "The two sides of a closed surface; outside is above 0.")
+      .def_property_readonly(
+          "mean", [](const Sides& s) { return s.mean.value; }, "With its sign, weighted by area.")
+      .def_property_readonly("mean_range", [](const Sides& s) { return to_pair(s.mean.range); })
+      .def_property_readonly(
+          "share_inside", [](const Sides& s) { return s.share_inside.value; }, "Of the area, 0 to 1.")
+      .def_property_readonly("share_inside_range", [](const Sides& s) { return to_pair(s.share_inside.range); })
+      .def_property_readonly(
+          "inside", [](const Sides& s) { return to_pair(s.inside); }, "Range of the largest distance inside, 0 or more.")
+      .def_property_readonly(
+          "outside", [](const Sides& s) { return to_pair(s.outside); }, "The same outside.");
   py::class_<Deviation>(module, "Deviation", py::module_local(),
                         "What deviation found; distances in the units of the meshes. A `..._range` is the interval that "
                         "the true number is in,\n"
@@ -80,10 +91,11 @@ void bind_measure(py::module_& module) {
           "percentiles_range", [](const Deviation& d) { return ranges_of(d.percentiles); }, "(p, 2) float64.")
       .def_property_readonly(
           "distances", [](const Deviation& d) { return from_vector<double>(d.distances); },
-          "(samples,) float64, for histograms.")
+          "(samples,) float64, for histograms; below 0 inside, where b is closed.")
       .def_property_readonly(
           "weights", [](const Deviation& d) { return from_vector<double>(d.weights); },
           "(samples,) float64: the share of the area that each sample stands for, together 1.")
+      .def_readonly("sides", &Deviation::sides, "Sides where b is closed, else None.")
       .def_readonly("spacing", &Deviation::spacing, "Side of the square that a sample stands for, in the middle.");
   module.def(
       "deviation",

@@ -32,7 +32,7 @@ TEST(Deviation, ParallelPlates) {
     }
     EXPECT_NEAR(d.share_beyond[0].range.lower, 1, 1e-12);
     EXPECT_EQ(d.share_beyond[1].range.upper, 0);
-    EXPECT_NEAR(d.distances.size(), 131072, 20000);
+    EXPECT_NEAR(d.distances.size(), 65536, 10000);
     EXPECT_NEAR(d.spacing, std::sqrt(1.0 / double(d.distances.size())), 1e-12);
   }
 }
@@ -52,7 +52,7 @@ TEST(Deviation, LinearDistance) {
   const double bounds[] = {0.1, 0.5, 0.9}, percentiles[] = {10, 50, 99.9};
   const Deviation d = deviation(plate(3, 0, 1), floor, {bounds, percentiles});
   expect(d.mean, 0.5, 2 * d.mean_error);
-  EXPECT_LT(d.mean_error, 1e-5);
+  EXPECT_LT(d.mean_error, 2e-5);
   EXPECT_LT(d.mean.range.upper - d.mean.range.lower, 1e-6);
   expect(d.rms, std::sqrt(1 / 3.0), 1e-4);
   for (int i = 0; i < 3; ++i) {
@@ -81,14 +81,19 @@ TEST(Deviation, FoldsBetweenTheSamples) {
   for (int i = 0; i < 4; ++i) expect(d.percentiles[i], percentiles[i] / 100 * largest, 0.005 * largest);
 }
 
-// Far apart for their size: a point in the middle of a sphere of many triangles, and a sphere around another.
+// In the middle of a torus everything is as near as everything else; the piece is short, or as long as that is far.
 TEST(Deviation, ManyTrianglesAlikeFar) {
-  const TriangleMesh outer = shapes::torus(128);
-  const TriangleMesh dot{{{0, 0, 0}, {1e-3, 0, 0}, {0, 1e-3, 0}}, {{0, 1, 2}}};
-  const Deviation d = deviation(dot, outer);
-  EXPECT_NEAR(d.mean.value, 0.6, 1e-3);
-  EXPECT_LE(d.mean.range.lower, d.mean.value);
-  EXPECT_LT(d.mean.range.upper - d.mean.range.lower, 1e-3 * 0.6);
+  const TriangleMesh outer = shapes::torus(40);
+  for (const double length : {1e-3, 0.5}) {
+    const TriangleMesh disc{{{0, 0, 0}, {length, 0, 0}, {0, length, 0}}, {{0, 1, 2}}};
+    const Deviation d = deviation(disc, outer);
+    // The distance from the inner ring, 0.6 - |x|, but for its 40 corners: the sides sag by 0.3 %.
+    const double mean = 0.6 - length * (std::sqrt(2) + std::asinh(1)) / (3 * std::sqrt(2));
+    EXPECT_NEAR(d.mean.value, mean, 2e-3);
+    EXPECT_LE(d.mean.range.lower, d.mean.value);
+    EXPECT_GE(d.mean.range.upper, d.mean.value);
+    EXPECT_LT(d.mean.range.upper - d.mean.range.lower, 1e-3 * 0.6);
+  }
 }
 
 TEST(Deviation, RefinedUntilTheMeanIsKnown) {
@@ -107,13 +112,47 @@ TEST(Deviation, RefinedUntilTheMeanIsKnown) {
   }
 }
 
+TEST(Deviation, SignedWhereTheReferenceIsClosed) {
+  TriangleMesh box = shapes::box(3);
+  // The square [0, 1] x [0.5, 1.5] at z = 0.25: half inside, up to 0.25 deep; half outside, up to 0.5.
+  const TriangleMesh plate = shapes::squares(4, [](const dvec3& p) { return p + dvec3(0, 0.5, 0.25); });
+  const double deepest = 0.25, mean_outside = 0.25;
+  double mean_inside = 0;
+  const int n = 400;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      const double x = (i + 0.5) / n, y = 0.5 + (j + 0.5) / (2 * n);
+      mean_inside += std::min({x, 1 - x, 1 - y, 0.25}) / n / n;
+    }
+  }
+  for (const bool inside_out : {false, true}) {
+    if (inside_out) {
+      for (glm::uvec3& t : box.triangles) std::swap(t.x, t.y);
+    }
+    const Deviation d = deviation(plate, box);
+    ASSERT_TRUE(d.sides.has_value());
+    expect(d.sides->share_inside, 0.5, 1e-3);
+    expect(d.sides->mean, (mean_outside - mean_inside) / 2, 1e-4);
+    EXPECT_LE(d.sides->inside.lower, deepest + 1e-12);
+    EXPECT_GE(d.sides->inside.upper, deepest);
+    EXPECT_NEAR(d.sides->inside.lower, deepest, 1e-3);
+    EXPECT_LE(d.sides->outside.lower, 0.5);
+    EXPECT_GE(d.sides->outside.upper, 0.5);
+    EXPECT_NEAR(d.sides->outside.upper, 0.5, 1e-2);
+    EXPECT_NEAR(*std::min_element(d.distances.begin(), d.distances.end()), -deepest, 1e-3);
+    EXPECT_NEAR(*std::max_element(d.distances.begin(), d.distances.end()), 0.5, 1e-2);
+  }
+  box.triangles.pop_back();
+  EXPECT_FALSE(deviation(plate, box).sides.has_value());
+}
+
 TEST(Deviation, WeightsAddUpToOne) {
   const Deviation d = deviation(shapes::torus(30, 0.01), shapes::torus(20));
   double sum = 0, mean = 0;
   ASSERT_EQ(d.distances.size(), d.weights.size());
   for (std::size_t i = 0; i < d.weights.size(); ++i) {
     sum += d.weights[i];
-    mean += d.weights[i] * d.distances[i];
+    mean += d.weights[i] * std::abs(d.distances[i]);
   }
   EXPECT_NEAR(sum, 1, 1e-9);
   EXPECT_NEAR(mean, d.mean.value, 1e-9);
@@ -179,7 +218,7 @@ TEST(Deviation, AnyScaleAndAnyPlace) {
     EXPECT_NEAR(d.rms.value / scale, 0.25, 1e-9);
     EXPECT_NEAR(d.share_beyond[0].value, 1, 1e-12);
     EXPECT_EQ(d.share_beyond[1].value, 0);
-    EXPECT_NEAR(d.spacing / scale, 1 / 362.0, 1e-4);
+    EXPECT_NEAR(d.spacing / scale, 1 / 256.0, 2e-4);
   }
 }
 
