@@ -2,8 +2,10 @@
 // Stratified sampling: pieces that are refined where the bounds on the mean over a piece are far apart, and in each one
 // point that is as good as random. The middle of each piece would do where the pieces are short beside the distances;
 // where they are not it misses most of the folds of the distance, and the mean came out 0.5 % of the largest too low
-// between a scan and its decimation within 0.1 %. Every statistic is one of a distribution by area: of the distances
-// at the points for the estimate, of the lower and of the upper bounds of the pieces for the ends of its range.
+// between a scan and its decimation within 0.1 %. Which pieces are refined must not depend on their points, or else
+// these are no longer random: the bounds are from the middle. Every statistic is one of a distribution by area: of the
+// distances at the points for the estimate, of the lower and of the upper bounds of the pieces for the ends of its
+// range.
 #include "measure/deviation.h"
 
 #include <algorithm>
@@ -22,10 +24,10 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kPieces = 65536;          // at first; a spacing of about 0.4 % of the size of a scan
-constexpr std::size_t kBudget = 524288;    // pieces when it ends, or kBudgetPerTriangle for each triangle
+constexpr double kPieces = 65536;        // at first; a spacing of about 0.4 % of the size of a scan
+constexpr std::size_t kBudget = 524288;  // pieces when it ends, or kBudgetPerTriangle for each triangle
 constexpr std::size_t kBudgetPerTriangle = 4;
-constexpr double kEnough = 0.001;          // of the largest distance: the width of the range of the mean
+constexpr double kEnough = 0.001;                   // of the largest distance: the width of the range of the mean
 constexpr std::size_t kChunk = 16384, kBlock = 64;  // pieces between two looks at the progress; for one thread at once
 
 /// What a piece weighs in the averages, by the number of corners of the pieces.
@@ -58,9 +60,7 @@ void cut(const Simplex& s, int k, Visit&& visit) {
     for (int i = 0; i < k; ++i) visit(Simplex{{at(i), at(i + 1), at(i + 1)}, length});
   }
   if (s.corners == area) {
-    const auto at = [&](int i, int j) {
-      return p[0] + double(i) / k * (p[1] - p[0]) + double(j) / k * (p[2] - p[0]);
-    };
+    const auto at = [&](int i, int j) { return p[0] + double(i) / k * (p[1] - p[0]) + double(j) / k * (p[2] - p[0]); };
     for (int i = 0; i < k; ++i) {
       for (int j = 0; i + j < k; ++j) {
         visit(Simplex{{at(i, j), at(i + 1, j), at(i, j + 1)}, area});
@@ -217,8 +217,7 @@ class Cover {
           pieces_[i].bounds = distance_bounds(pieces_[i].simplex, b_, hierarchy_, hint);
           hint = pieces_[i].bounds.nearest;
           const dvec3 point = point_in(pieces_[i].simplex, i);
-          const Hierarchy::Nearest nearest =
-              hierarchy_.nearest(point, std::numeric_limits<double>::infinity(), hint);
+          const Hierarchy::Nearest nearest = hierarchy_.nearest(point, std::numeric_limits<double>::infinity(), hint);
           pieces_[i].distance = nearest.distance;
           pieces_[i].inside = sides_.inside(point, nearest);
         }

@@ -24,7 +24,8 @@ using Values = std::array<double, 3>;  // at the corners of a piece
 
 // Triangles whose planes are worth asking for: more of them cost more than another four pieces.
 constexpr int kMostTriangles = 64;
-// Of the distance: a piece that is so short is known well enough by one point, as nothing changes faster than one to one.
+// Of the distance: a piece that is so short is known well enough by one point, as nothing changes faster than one to
+// one.
 constexpr double kShort = 1e-4;
 
 /// At each corner of a piece the least value of linear functions as above, one for each triangle.
@@ -37,8 +38,8 @@ class Below {
         least_(values(apart_, glm::distance(centroid, nearest))) {}
 
   void add(const std::array<dvec3, 3>& t) {
-    const double gap = std::min({glm::dot(apart_, centroid_ - t[0]), glm::dot(apart_, centroid_ - t[1]),
-                                 glm::dot(apart_, centroid_ - t[2])});
+    const double gap = std::min(
+        {glm::dot(apart_, centroid_ - t[0]), glm::dot(apart_, centroid_ - t[1]), glm::dot(apart_, centroid_ - t[2])});
     const Values common = values(apart_, gap);
     if (loss(common) == 0) return;
     const dvec3 r = centroid_ - closest_point(centroid_, t[0], t[1], t[2]).point;

@@ -65,18 +65,19 @@ void bind_measure(py::module_& module) {
           "share_inside", [](const Sides& s) { return s.share_inside.value; }, "Of the area, 0 to 1.")
       .def_property_readonly("share_inside_range", [](const Sides& s) { return to_pair(s.share_inside.range); })
       .def_property_readonly(
-          "inside", [](const Sides& s) { return to_pair(s.inside); }, "Range of the largest distance inside, 0 or more.")
+          "inside", [](const Sides& s) { return to_pair(s.inside); },
+          "Range of the largest distance inside, 0 or more.")
       .def_property_readonly(
           "outside", [](const Sides& s) { return to_pair(s.outside); }, "The same outside.");
-  py::class_<Deviation>(module, "Deviation", py::module_local(),
-                        "What deviation found; distances in the units of the meshes. A `..._range` is the interval that "
-                        "the true number is in,\n"
-                        "whatever lies between the samples.")
+  py::class_<Deviation>(
+      module, "Deviation", py::module_local(),
+      "What deviation found; distances in the units of the meshes. A `..._range` is the interval that "
+      "the true number is in,\n"
+      "whatever lies between the samples.")
       .def_property_readonly(
           "mean", [](const Deviation& d) { return d.mean.value; }, "Weighted by area, as all of these.")
       .def_property_readonly("mean_range", [](const Deviation& d) { return to_pair(d.mean.range); })
-      .def_readonly("mean_error", &Deviation::mean_error,
-                    "The standard error of the mean is at most this.")
+      .def_readonly("mean_error", &Deviation::mean_error, "The standard error of the mean is at most this.")
       .def_property_readonly("rms", [](const Deviation& d) { return d.rms.value; })
       .def_property_readonly("rms_range", [](const Deviation& d) { return to_pair(d.rms.range); })
       .def_property_readonly(
@@ -108,11 +109,14 @@ void bind_measure(py::module_& module) {
       py::arg("vertices_a"), py::arg("triangles_a"), py::arg("vertices_b"), py::arg("triangles_b"),
       py::arg("bounds") = std::vector<double>(), py::arg("percentiles") = std::vector<double>(), py::arg("threads") = 0,
       py::arg("progress") = py::none(),
-      "Mean, RMS, percentiles (0 to 100) and shares beyond bounds of the distance from a to b, over the area of a, each "
+      "Mean, RMS, percentiles (0 to 100) and shares beyond bounds of the distance from a to b, over the area of a, "
+      "each "
       "with the\n"
-      "range that it is certainly in. Refined until the range of the mean is no wider than 0.1 % of the largest distance "
+      "range that it is certainly in. Refined until the range of the mean is no wider than 0.1 % of the largest "
+      "distance "
       "or there\n"
-      "are half a million samples (four for each triangle where that is more). World coordinates, deterministic. Cost: 2 "
+      "are half a million samples (four for each triangle where that is more). World coordinates, deterministic. Cost: "
+      "2 "
       "to 10 us\n"
       "a sample. Raises InvalidInput, Cancelled.");
 }
