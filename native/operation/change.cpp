@@ -83,7 +83,7 @@ bool Change::prepare_flip(Edge e) {
   const auto add = [&](std::uint32_t id, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
     const auto& p = mesh_->positions_;
     elements_.push_back({id, {p[x], p[y], p[z]}, kAnywhere});
-    faces_.push_back({0, p[x], {x, y, z}, 0});
+    faces_.push_back({false, 0, p[x], {x, y, z}, 0});
   };
   add(first, b, d, c), add(second, a, c, d);
   if (mesh_->wedges_.empty()) return true;
@@ -141,7 +141,7 @@ void Change::gather_side(std::uint32_t vertex, const glm::dvec3& position, doubl
           static_cast<std::uint32_t>(f), {positions[t.x], positions[t.y], positions[t.z]}, moved};
       element.corners[corner] = position;
       elements_.push_back(element);
-      faces_.push_back({corner, positions[vertex], {t.x, t.y, t.z}, 0});
+      faces_.push_back({true, corner, positions[vertex], {t.x, t.y, t.z}, 0});
     }
     at = mesh.next_halfedge_handle(mesh.opposite_halfedge_handle(at));
   } while (at != start);
@@ -175,7 +175,7 @@ bool Change::gather(Halfedge h, const glm::dvec3& position) {
     if (place == elements_.size()) {
       const glm::uvec3& t = mesh_->triangles_[static_cast<std::size_t>(heir)];
       elements_.push_back({static_cast<std::uint32_t>(heir), {mesh_->positions_[t.x], mesh_->positions_[t.y], mesh_->positions_[t.z]}, 0});
-      faces_.push_back({0, mesh_->positions_[t.x], {t.x, t.y, t.z}, 0});
+      faces_.push_back({false, 0, mesh_->positions_[t.x], {t.x, t.y, t.z}, 0});
     }
     removed_.push_back({static_cast<std::uint32_t>(f), static_cast<std::uint32_t>(place), std::max(moved0, moved1)});
   }

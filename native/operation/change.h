@@ -22,7 +22,8 @@ class Change {
 
   /// A face as the change would leave it; its corners are in Coverage::Element.
   struct Face {
-    int corner;         ///< which corner moves
+    bool moves;         ///< whether a corner of it moves: `corner`,
+    int corner;
     glm::dvec3 before;  ///< from here
     std::uint32_t vertices[3];
     double distance;  ///< upper bound on the distance of its points to the reference

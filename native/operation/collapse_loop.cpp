@@ -12,7 +12,6 @@ namespace {
 constexpr double kBoundaryWeight = 10;  // of a boundary edge's plane, times its squared length
 constexpr double kReach = 2;            // a minimiser is trusted within this many edge lengths of the edge's middle
 constexpr int kFits = 5;                // steps of the fit before a collapse is refused
-constexpr std::size_t kStride = 4;
 /// Where many collapses cost nothing, on a plate, short edges go first: a weight of the fourth power of the length,
 /// which has the quadrics' unit. Without it one vertex would sweep along a row and leave needles behind.
 constexpr double kLengthWeight = 1e-6;
@@ -21,7 +20,7 @@ double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
 }  // namespace
 
-CollapseLoop::CollapseLoop(BoundedMesh& mesh) : mesh_(mesh), change_(mesh), fit_(mesh, kStride) { sum_quadrics(); }
+CollapseLoop::CollapseLoop(BoundedMesh& mesh) : mesh_(mesh), change_(mesh), fit_(mesh) { sum_quadrics(); }
 
 void CollapseLoop::sum_quadrics() {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
@@ -162,7 +161,7 @@ void CollapseLoop::collapse(Edge e) {
 /// Other positions for a collapse whose best one fails a bound.
 CollapseLoop::Outcome CollapseLoop::search(Halfedge h, const glm::dvec3& best) {
   const Spot s0 = mesh_.spot(mesh_.from(h)), s1 = mesh_.spot(mesh_.to(h));
-  if (mesh_.bounds().backward) {
+  if (mesh_.bounds().forward) {
     glm::dvec3 position = best;
     for (int i = 0; i < kFits; ++i) {
       if (!change_.prepare_collapse(h, mesh_.store(position))) return Outcome::impossible;

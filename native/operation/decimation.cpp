@@ -12,6 +12,7 @@
 #include "operation/boundary.h"
 #include "operation/collapse_loop.h"
 #include "operation/manifold_cut.h"
+#include "operation/refinement.h"
 #include "operation/wedges.h"
 #include "reference/errors.h"
 
@@ -56,6 +57,7 @@ class Decimation {
     BoundedMesh mesh(mesh_input(), bounds);
     const std::size_t apart = cut_.aside.size();
     CollapseLoop(mesh).run(options_.target_triangles > apart ? options_.target_triangles - apart : 0, options_.progress);
+    if (volume_ && std::getenv("THOROUGH")) Refinement(mesh).run(0, [] { return false; }, options_.progress);
     result_.stopped_at_target =
         options_.target_triangles > 0 && mesh.triangle_count() + apart <= options_.target_triangles;
     write(mesh);
