@@ -73,14 +73,29 @@ bool BoundedMesh::joined_by_other(std::uint32_t a, std::uint32_t b) const {
   };
   for (const std::uint32_t x : with_copies(a)) {
     for (const std::uint32_t y : with_copies(b)) {
-      if ((x != a || y != b) &&
-          mesh_.find_halfedge(handle(x), handle(y))
-              .is_valid()) {
+      if ((x != a || y != b) && mesh_.find_halfedge(handle(x), handle(y)).is_valid()) {
         return true;
       }
     }
   }
   return false;
+}
+
+/// A vertex of higher rank can only be the one that stays.
+int BoundedMesh::rank(std::uint32_t vertex) const {
+  return pinned_[vertex] ? 4 : (seam_[vertex] ? 2 : 0) + (on_boundary(vertex) ? 1 : 0);
+}
+
+BoundedMesh::Merge BoundedMesh::merge(Edge e) const {
+  const Halfedge h = mesh_.halfedge_handle(e, 0);
+  const std::uint32_t v0 = from(h), v1 = to(h);
+  const int rank0 = rank(v0), rank1 = rank(v1);
+  if (pinned_[v0] && pinned_[v1]) return {Freedom::none, h};
+  // A boundary vertex never leaves the boundary, not even for a vertex that must stay.
+  if (rank0 > rank1 && on_boundary(v1) && !on_boundary(v0)) return {Freedom::none, h};
+  if (rank1 > rank0 && on_boundary(v0) && !on_boundary(v1)) return {Freedom::none, h};
+  if (rank0 == rank1) return {movable(v0) ? Freedom::anywhere : Freedom::either_way, h};
+  return {Freedom::one_way, rank0 > rank1 ? mesh_.opposite_halfedge_handle(h) : h};
 }
 
 void BoundedMesh::apply(Change& change) {

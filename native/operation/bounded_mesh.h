@@ -55,7 +55,6 @@ class BoundedMesh {
 
   const OpenMesh::TriConnectivity& connectivity() const { return mesh_; }
   const Bounds& bounds() const { return bounds_; }
-  bool subset() const { return subset_; }
   std::size_t triangle_count() const { return triangle_count_; }
   bool alive(std::uint32_t triangle) const { return !mesh_.status(face(triangle)).deleted(); }
   /// The vertex that a vertex was merged into (itself when it survives).
@@ -67,9 +66,6 @@ class BoundedMesh {
   Spot store(const glm::dvec3& position) const { return store_(position); }
   /// Whether the vertex left its original position.
   bool moved(std::uint32_t vertex) const { return moved_[vertex]; }
-  bool pinned(std::uint32_t vertex) const { return pinned_[vertex]; }
-  /// Whether attributes differ around the vertex.
-  bool on_seam(std::uint32_t vertex) const { return seam_[vertex]; }
   bool on_boundary(std::uint32_t vertex) const { return mesh_.is_boundary(handle(vertex)); }
   /// Where corner `corner` of a triangle takes its attributes: an input corner as 3 * triangle + corner.
   std::uint32_t corner_source(std::uint32_t triangle, int corner) const { return corner_source_[triangle][corner]; }
@@ -80,6 +76,18 @@ class BoundedMesh {
   static Face face(std::uint32_t triangle) { return Face(static_cast<int>(triangle)); }
   static Edge edge(std::uint32_t edge) { return Edge(static_cast<int>(edge)); }
 
+  /// none: the edge stays. one_way: the start of `halfedge` may merge into its end, which stays where it is.
+  /// either_way: or the other way around. anywhere: the end may also go to any position.
+  enum class Freedom { none, one_way, either_way, anywhere };
+  struct Merge {
+    Freedom freedom;
+    Halfedge halfedge;
+  };
+  /// How the ends of an edge may become one vertex, by what each of them must keep.
+  Merge merge(Edge e) const;
+  /// Whether a vertex may move by itself.
+  bool movable(std::uint32_t vertex) const { return !subset_ && !pinned_[vertex] && !seam_[vertex]; }
+
   /// Carries out a change whose last try succeeded on this mesh as it is.
   void apply(Change& change);
 
@@ -87,6 +95,7 @@ class BoundedMesh {
   friend class Change;
 
   void build(bool on_reference);
+  int rank(std::uint32_t vertex) const;
   bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
 
   OpenMesh::TriConnectivity mesh_;

@@ -95,7 +95,7 @@ bool Change::prepare_flip(Edge e) {
   if (corner(first, a).wedge != corner(second, a).wedge || corner(first, b).wedge != corner(second, b).wedge) {
     return false;
   }
-  new_wedges_ = {{first, 0, corner(first, b)},  {first, 1, corner(second, d)}, {first, 2, corner(first, c)},
+  new_wedges_ = {{first, 0, corner(first, b)},   {first, 1, corner(second, d)}, {first, 2, corner(first, c)},
                  {second, 0, corner(second, a)}, {second, 1, corner(first, c)}, {second, 2, corner(second, d)}};
   return true;
 }
@@ -137,8 +137,7 @@ void Change::gather_side(std::uint32_t vertex, const glm::dvec3& position, doubl
     if (f >= 0 && f != skip0 && f != skip1) {
       const glm::uvec3& t = mesh_->triangles_[static_cast<std::size_t>(f)];
       const int corner = t.x == vertex ? 0 : t.y == vertex ? 1 : 2;
-      Coverage::Element element{
-          static_cast<std::uint32_t>(f), {positions[t.x], positions[t.y], positions[t.z]}, moved};
+      Coverage::Element element{static_cast<std::uint32_t>(f), {positions[t.x], positions[t.y], positions[t.z]}, moved};
       element.corners[corner] = position;
       elements_.push_back(element);
       faces_.push_back({true, corner, positions[vertex], {t.x, t.y, t.z}, 0});
@@ -150,7 +149,8 @@ void Change::gather_side(std::uint32_t vertex, const glm::dvec3& position, doubl
 bool Change::gather(Halfedge h, const glm::dvec3& position) {
   const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
   const std::uint32_t v0 = mesh_->from(h), v1 = mesh_->to(h);
-  const double moved0 = glm::length(mesh_->positions_[v0] - position), moved1 = glm::length(mesh_->positions_[v1] - position);
+  const double moved0 = glm::length(mesh_->positions_[v0] - position),
+               moved1 = glm::length(mesh_->positions_[v1] - position);
   const int skip0 = mesh.face_handle(h).idx(), skip1 = mesh.opposite_face_handle(h).idx();
   gather_side(v0, position, moved0, skip0, skip1);
   const std::size_t of_v0 = elements_.size();
@@ -174,15 +174,16 @@ bool Change::gather(Halfedge h, const glm::dvec3& position) {
     while (place < elements_.size() && elements_[place].id != static_cast<std::uint32_t>(heir)) ++place;
     if (place == elements_.size()) {
       const glm::uvec3& t = mesh_->triangles_[static_cast<std::size_t>(heir)];
-      elements_.push_back({static_cast<std::uint32_t>(heir), {mesh_->positions_[t.x], mesh_->positions_[t.y], mesh_->positions_[t.z]}, 0});
+      elements_.push_back({static_cast<std::uint32_t>(heir),
+                           {mesh_->positions_[t.x], mesh_->positions_[t.y], mesh_->positions_[t.z]},
+                           0});
       faces_.push_back({false, 0, mesh_->positions_[t.x], {t.x, t.y, t.z}, 0});
     }
     removed_.push_back({static_cast<std::uint32_t>(f), static_cast<std::uint32_t>(place), std::max(moved0, moved1)});
   }
   // The last closed shape, a tetrahedron, is kept: two coinciding faces would be left of it.
   if (of_v0 == 1 && apex[0] != Coverage::kNone && apex[1] != Coverage::kNone) {
-    const Halfedge across = mesh.find_halfedge(BoundedMesh::handle(apex[0]),
-                                                BoundedMesh::handle(apex[1]));
+    const Halfedge across = mesh.find_halfedge(BoundedMesh::handle(apex[0]), BoundedMesh::handle(apex[1]));
     for (const Halfedge side : {across, mesh.opposite_halfedge_handle(across)}) {
       if (!mesh.is_boundary(side) && mesh_->to(mesh.next_halfedge_handle(side)) == v1) return false;
     }

@@ -22,7 +22,7 @@ class Change {
 
   /// A face as the change would leave it; its corners are in Coverage::Element.
   struct Face {
-    bool moves;         ///< whether a corner of it moves: `corner`,
+    bool moves;  ///< whether a corner of it moves: `corner`,
     int corner;
     glm::dvec3 before;  ///< from here
     std::uint32_t vertices[3];
@@ -91,7 +91,8 @@ class Change {
   std::vector<int> neighbours_;
   Coverage::Trial backward_, boundary_backward_;
   double new_distance_ = 0;
-  std::size_t suspect_ = 0;  ///< the face that failed last: of another try at the same place it is the likeliest to fail
+  std::size_t suspect_ =
+      0;  ///< the face that failed last: of another try at the same place it is the likeliest to fail
 };
 
 }  // namespace tolvol

@@ -39,7 +39,8 @@ void CollapseLoop::sum_quadrics() {
     if (!connectivity.is_boundary(h)) continue;
     const glm::uvec3& t = mesh_.triangle(static_cast<std::uint32_t>(connectivity.opposite_face_handle(h).idx()));
     const glm::dvec3 &a = mesh_.position(mesh_.from(h)), &b = mesh_.position(mesh_.to(h)), edge = b - a;
-    const glm::dvec3 face = glm::cross(mesh_.position(t.y) - mesh_.position(t.x), mesh_.position(t.z) - mesh_.position(t.x));
+    const glm::dvec3 face =
+        glm::cross(mesh_.position(t.y) - mesh_.position(t.x), mesh_.position(t.z) - mesh_.position(t.x));
     const glm::dvec3 normal = glm::cross(edge, face);
     const double length = glm::length(normal);
     if (!(length > 0)) continue;
@@ -67,27 +68,15 @@ CollapseLoop::Plan CollapseLoop::free_plan(Halfedge h) const {
   return {h, best, cost, Freedom::anywhere};
 }
 
-/// A vertex of higher rank can only be the one that stays.
-int CollapseLoop::rank(std::uint32_t vertex) const {
-  return mesh_.pinned(vertex) ? 4 : (mesh_.on_seam(vertex) ? 2 : 0) + (mesh_.on_boundary(vertex) ? 1 : 0);
-}
-
 std::optional<CollapseLoop::Plan> CollapseLoop::plan(Edge e) const {
-  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
-  Halfedge h = connectivity.halfedge_handle(e, 0);
-  const std::uint32_t v0 = mesh_.from(h), v1 = mesh_.to(h);
-  if (mesh_.pinned(v0) && mesh_.pinned(v1)) return std::nullopt;
-  const int rank0 = rank(v0), rank1 = rank(v1);
-  // A boundary vertex never leaves the boundary, not even for a vertex that must stay.
-  if (rank0 > rank1 && mesh_.on_boundary(v1) && !mesh_.on_boundary(v0)) return std::nullopt;
-  if (rank1 > rank0 && mesh_.on_boundary(v0) && !mesh_.on_boundary(v1)) return std::nullopt;
-  const bool either = rank0 == rank1;
-  if (either && !mesh_.subset() && !mesh_.on_seam(v0)) return free_plan(h);
-  const Quadric q = quadrics_[v0] + quadrics_[v1];
-  const double cost0 = q(mesh_.position(v0)), cost1 = q(mesh_.position(v1));
-  const bool keep0 = either ? cost0 < cost1 : rank0 > rank1;
-  if (keep0) h = connectivity.opposite_halfedge_handle(h);
-  return Plan{h, mesh_.position(mesh_.to(h)), keep0 ? cost0 : cost1, either ? Freedom::either_way : Freedom::one_way};
+  auto [freedom, h] = mesh_.merge(e);
+  if (freedom == Freedom::none) return std::nullopt;
+  if (freedom == Freedom::anywhere) return free_plan(h);
+  const Quadric q = quadrics_[mesh_.from(h)] + quadrics_[mesh_.to(h)];
+  const double cost0 = q(mesh_.position(mesh_.from(h))), cost1 = q(mesh_.position(mesh_.to(h)));
+  const bool keep0 = freedom == Freedom::either_way && cost0 < cost1;
+  if (keep0) h = mesh_.connectivity().opposite_halfedge_handle(h);
+  return Plan{h, mesh_.position(mesh_.to(h)), keep0 ? cost0 : cost1, freedom};
 }
 
 void CollapseLoop::push(Edge e) {
@@ -95,7 +84,8 @@ void CollapseLoop::push(Edge e) {
   ++stamps_[i];
   if (refused_[i]) refused_[i] = false, --refused_count_;
   if (const auto p = plan(e)) {
-    const double length2 = squared_length(mesh_.position(mesh_.from(p->halfedge)) - mesh_.position(mesh_.to(p->halfedge)));
+    const double length2 =
+        squared_length(mesh_.position(mesh_.from(p->halfedge)) - mesh_.position(mesh_.to(p->halfedge)));
     heap_.push_back({p->cost + kLengthWeight * length2 * length2, i, stamps_[i]});
   }
 }
@@ -137,8 +127,8 @@ void CollapseLoop::collapse(Edge e) {
   if (!p) return;
   change_.begin();
   Halfedge h = p->halfedge;
-  Outcome outcome = change_.try_collapse(h, p->freedom == Freedom::anywhere ? mesh_.store(p->position)
-                                                                            : mesh_.spot(mesh_.to(h)));
+  Outcome outcome =
+      change_.try_collapse(h, p->freedom == Freedom::anywhere ? mesh_.store(p->position) : mesh_.spot(mesh_.to(h)));
   if (outcome != Outcome::possible && p->freedom == Freedom::either_way) {
     const Halfedge other = mesh_.connectivity().opposite_halfedge_handle(h);
     const Outcome second = change_.try_collapse(other, mesh_.spot(mesh_.from(h)));

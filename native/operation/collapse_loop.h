@@ -31,9 +31,7 @@ class CollapseLoop {
     double cost;
     std::uint32_t edge, stamp;
   };
-  /// one_way: the end of higher rank stays where it is; either_way: one of the ends does; anywhere: the position is
-  /// free.
-  enum class Freedom { one_way, either_way, anywhere };
+  using Freedom = BoundedMesh::Freedom;
   /// How an edge would be collapsed: the start of `halfedge` merges into its end, which goes to `position`.
   struct Plan {
     Halfedge halfedge;
@@ -45,7 +43,6 @@ class CollapseLoop {
   void sum_quadrics();
   std::optional<Plan> plan(Edge e) const;
   Plan free_plan(Halfedge h) const;
-  int rank(std::uint32_t vertex) const;
   void push(Edge e);
   void collapse(Edge e);
   Outcome search(Halfedge h, const glm::dvec3& best);

@@ -192,7 +192,8 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
     const double distance = list.distance + r.moved;
     const bool whole = list.head == kNone || distance <= within_;
     settled &= whole;
-    if (whole && list.head != kNone) trial.candidates_[r.heir].distance = std::max(trial.candidates_[r.heir].distance, distance);
+    if (whole && list.head != kNone)
+      trial.candidates_[r.heir].distance = std::max(trial.candidates_[r.heir].distance, distance);
     trial.heirlooms_.push_back({r.id, r.heir, whole});
   }
   if (settled) return true;

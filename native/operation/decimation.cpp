@@ -4,6 +4,7 @@
 #include "operation/decimation.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <sstream>
 #include <unordered_map>
@@ -56,8 +57,12 @@ class Decimation {
     if (volume_) bounds = set_bounds();
     BoundedMesh mesh(mesh_input(), bounds);
     const std::size_t apart = cut_.aside.size();
-    CollapseLoop(mesh).run(options_.target_triangles > apart ? options_.target_triangles - apart : 0, options_.progress);
-    if (volume_ && std::getenv("THOROUGH")) Refinement(mesh).run(0, [] { return false; }, options_.progress);
+    const std::size_t target = options_.target_triangles > apart ? options_.target_triangles - apart : 0;
+    CollapseLoop(mesh).run(target, options_.progress);
+    if (volume_ && options_.effort == DecimationOptions::Effort::thorough) {
+      Refinement(mesh).run(
+          target, [&] { return result_.stopped_at_time = out_of_time(); }, options_.progress);
+    }
     result_.stopped_at_target =
         options_.target_triangles > 0 && mesh.triangle_count() + apart <= options_.target_triangles;
     write(mesh);
@@ -67,6 +72,11 @@ class Decimation {
   }
 
  private:
+  bool out_of_time() const {
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start_;
+    return options_.max_seconds > 0 && spent.count() > options_.max_seconds;
+  }
+
   Frame own_frame() const {
     Box world;
     for (const glm::dvec3& p : vertices_) world.add(placement_.world(p));
@@ -354,6 +364,7 @@ class Decimation {
   std::span<const glm::uvec3> triangles_;
   const ToleranceVolume* volume_;
   const DecimationOptions& options_;
+  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   Placement placement_;
 
   CutMesh cut_;
