@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Certified distances between two surfaces, in the world, of the coordinates as they are stored."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from . import native
 
 
 @dataclass(frozen=True)
 class Interval:
-    """The true largest distance lies between the two."""
+    """The true largest distance lies between the two; at `position`, on that face of the surface, it is at least `lower`."""
 
     lower: float
     upper: float
+    position: tuple = ()
+    triangle: int = -1
 
     def within(self, tolerance):
         return self.upper <= tolerance
@@ -26,12 +28,13 @@ def largest_distance(from_surface, to_surface, tolerance=None, threads=0, progre
 
     def measured(**options):
         found = native.module.hausdorff(*from_surface, *to_surface, threads=threads, progress=progress, **options)
-        return Interval(found.lower, found.upper)
+        return Interval(found.lower, found.upper, found.position, found.triangle)
 
     interval = measured()
     if tolerance is not None and interval.lower <= tolerance < interval.upper:
         decided = measured(bound=tolerance)
-        interval = Interval(max(interval.lower, decided.lower), min(interval.upper, decided.upper))
+        best = max(interval, decided, key=lambda found: found.lower)
+        interval = replace(best, upper=min(interval.upper, decided.upper))
     return interval
 
 

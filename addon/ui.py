@@ -117,6 +117,7 @@ class TOLVOL_PT_deviation(_SubPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("tolvol.check")
         row.operator("tolvol.select_outside")
+        layout.operator("tolvol.save_report", text="Save Report...")
 
     def _draw_measured(self, context, ob):
         """The same rows whether there is a measurement or not: buttons below do not jump."""

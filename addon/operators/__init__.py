@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""bpy.ops.tolvol: set_reference, clear_reference, check, select_outside, decimate, deform."""
+"""bpy.ops.tolvol: set_reference, clear_reference, check, select_outside, save_report, decimate, deform."""
 
 import bpy
 
@@ -7,12 +7,14 @@ from .check import TOLVOL_OT_check, TOLVOL_OT_select_outside
 from .decimate import TOLVOL_OT_decimate
 from .deform import TOLVOL_OT_deform
 from .reference import TOLVOL_OT_clear_reference, TOLVOL_OT_set_reference
+from .report import TOLVOL_OT_save_report
 
 _CLASSES = (
     TOLVOL_OT_set_reference,
     TOLVOL_OT_clear_reference,
     TOLVOL_OT_check,
     TOLVOL_OT_select_outside,
+    TOLVOL_OT_save_report,
     TOLVOL_OT_decimate,
     TOLVOL_OT_deform,
 )

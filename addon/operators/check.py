@@ -13,8 +13,8 @@ from ..job import JobOperator
 from .blocked import allowed, check_blocked
 
 
-class _Comparison(JobOperator):
-    """Prepares both surfaces; what is compared is a static method compare(surface, reference, tolerance, threads, progress)."""
+class Comparison(JobOperator):
+    """Prepares both surfaces; what is compared is compare(surface, reference, tolerance, threads, progress), in the thread."""
 
     threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
 
@@ -31,7 +31,7 @@ class _Comparison(JobOperator):
         return functools.partial(self.compare, surface, reference, tolerance, threads)
 
 
-class TOLVOL_OT_check(_Comparison, bpy.types.Operator):
+class TOLVOL_OT_check(Comparison, bpy.types.Operator):
     """Measure how far the mesh lies from the reference and the reference from the mesh: the largest distance, proved, \
 and how much of the mesh is beyond the tolerance"""
 
@@ -64,7 +64,7 @@ and how much of the mesh is beyond the tolerance"""
             self.report({"INFO"}, f"Within the tolerance both ways: at most {largest} of it, proved")
 
 
-class TOLVOL_OT_select_outside(_Comparison, bpy.types.Operator):
+class TOLVOL_OT_select_outside(Comparison, bpy.types.Operator):
     """Select the faces that are not proved to be within the tolerance of the reference, in Edit Mode"""
 
     bl_idname = "tolvol.select_outside"

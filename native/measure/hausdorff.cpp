@@ -16,8 +16,8 @@
 // operation on the three coordinates of a vector (sum, difference, product with a number) errs by at most u times the
 // length of its result. Powers of two, by which frame and hierarchy scale, are exact.
 // - Placing a vertex errs by u, so the distance between the surfaces changes by at most 2 u.
-// - A split at t <= 1/2 from the nearer end, p + t (q - p), errs by t 2 u, t 2 u and u: 3 u. The true pieces tile the
-//   triangle, so Piece::error, 3 u for each split on the way, bounds how far their corners are from the stored ones.
+// - The true pieces tile the triangle, so Piece::error, kSplitError for each split on the way, bounds how far their
+//   corners are from the stored ones.
 // - A witness a + v ab + w ac errs by 2 u (v + w) for the differences, as much for the products, and 2 u for the sums;
 //   v + w may exceed 1 by 2 u, which puts it 4 u outside: 10 u. Its distance, at most 2, has a relative error below
 //   4 u: 8 u. Together: true distance <= U + error + 20 u, kUpperMargin.
@@ -35,6 +35,7 @@
 #include <vector>
 
 #include "measure/placed_pair.h"
+#include "measure/split.h"
 #include "reference/hierarchy.h"
 #include "reference/parallel.h"
 
@@ -45,13 +46,10 @@ using glm::dvec3;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kGap = 0.001;                       // of upper: when the interval is narrow
-constexpr double kSplitError = 3 * kUnitRoundoff;    // of one split
 constexpr double kUpperMargin = 20 * kUnitRoundoff;  // derived above, like the next
 constexpr double kLowerMargin = 24 * kUnitRoundoff;
 // An interval or a piece shorter than this is rounding: no use in going on.
 constexpr double kNoise = 256 * kUnitRoundoff;
-// A piece so many times longer than the triangle near it is halved, not cut.
-constexpr double kCoarse = 4;
 // Triangles asked for a first lower bound.
 constexpr std::size_t kSeeds = 4096;
 // Pieces that see the same lower bound, and those of them that are handed to a thread at once.
@@ -88,9 +86,6 @@ struct Children {
   std::array<Piece, 3> piece;
   int count = 0;
 };
-
-/// A point between p and q, rounded by less than kSplitError.
-dvec3 between(const dvec3& p, const dvec3& q, double t) { return t <= 0.5 ? p + t * (q - p) : q + (1 - t) * (p - q); }
 
 dvec3 without(const dvec3& v, const dvec3& direction) {
   const double length2 = glm::dot(direction, direction);
@@ -269,69 +264,12 @@ class Search {
 
   /// None when the piece is too small.
   Children split(const Piece& piece) const {
-    const std::array<dvec3, 3> t = corners(b_, piece.nearest);
-    const double reach = std::max({glm::distance(t[0], t[1]), glm::distance(t[1], t[2]), glm::distance(t[2], t[0])});
-    int longest = 0;
-    std::array<double, 3> length;
-    for (int i = 0; i < 3; ++i) {
-      length[i] = glm::distance(piece.corner[i], piece.corner[(i + 1) % 3]);
-      if (length[i] > length[longest]) longest = i;
+    const Parts parts = tolvol::split(piece.corner, corners(b_, piece.nearest));
+    Children children{{piece, piece, piece}, parts.count};
+    for (int i = 0; i < parts.count; ++i) {
+      children.piece[i].corner = parts.corners[i];
+      children.piece[i].error += kSplitError;
     }
-    Children cut;
-    if (length[longest] <= kNoise) return cut;
-    if (length[longest] <= kCoarse * reach) cut = cut_along(piece, t);
-    return cut.count > 0 ? cut : halves(piece, longest, 0.5);
-  }
-
-  /// Two pieces, apart at the point t of the edge from corner i to the next.
-  static Children halves(const Piece& piece, int i, double t) {
-    const int j = (i + 1) % 3;
-    const dvec3 middle = between(piece.corner[i], piece.corner[j], t);
-    Children children{{piece, piece, piece}, 2};
-    children.piece[0].corner[j] = middle;
-    children.piece[1].corner[i] = middle;
-    for (int k = 0; k < 2; ++k) children.piece[k].error += kSplitError;
-    return children;
-  }
-
-  /// Along the edge of t that divides the piece best, by the plane through it and perpendicular to t; none when no edge
-  /// does.
-  static Children cut_along(const Piece& piece, const std::array<dvec3, 3>& t) {
-    const dvec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
-    std::array<double, 3> side{};
-    double best = 0;
-    for (int e = 0; e < 3; ++e) {
-      const dvec3 outward = glm::cross(t[(e + 1) % 3] - t[e], normal);
-      const double norm = glm::length(outward);
-      if (!(norm > 0)) continue;
-      std::array<double, 3> s;
-      for (int i = 0; i < 3; ++i) s[i] = glm::dot(piece.corner[i] - t[e], outward) / norm;
-      const double depth = std::min(*std::max_element(s.begin(), s.end()), -*std::min_element(s.begin(), s.end()));
-      if (depth > best) best = depth, side = s;
-    }
-    if (best <= kNoise) return {};
-    int alone = 0;  // the corner on the one side, or one on the plane
-    for (int i = 0; i < 3; ++i) {
-      if (std::abs(side[i]) <= kNoise) side[i] = 0;
-    }
-    const auto share = [&](int i, int j) { return side[i] / (side[i] - side[j]); };
-    for (int i = 0; i < 3; ++i) {
-      if (side[i] == 0) return halves(piece, (i + 1) % 3, share((i + 1) % 3, (i + 2) % 3));
-      if (side[i] * side[(i + 1) % 3] < 0 && side[i] * side[(i + 2) % 3] < 0) alone = i;
-    }
-    const int i = alone, j = (alone + 1) % 3, k = (alone + 2) % 3;
-    const dvec3 on_j = between(piece.corner[i], piece.corner[j], share(i, j));
-    const dvec3 on_k = between(piece.corner[i], piece.corner[k], share(i, k));
-    Children children{{piece, piece, piece}, 3};
-    children.piece[0].corner = {piece.corner[i], on_j, on_k};
-    if (glm::distance(on_j, piece.corner[k]) < glm::distance(on_k, piece.corner[j])) {
-      children.piece[1].corner = {on_j, piece.corner[j], piece.corner[k]};
-      children.piece[2].corner = {on_j, piece.corner[k], on_k};
-    } else {
-      children.piece[1].corner = {on_j, piece.corner[j], on_k};
-      children.piece[2].corner = {on_k, piece.corner[j], piece.corner[k]};
-    }
-    for (Piece& child : children.piece) child.error += kSplitError;
     return children;
   }
 

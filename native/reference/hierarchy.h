@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "reference/closest_point.h"
@@ -61,6 +62,7 @@ class Hierarchy {
                 double enough = -1, std::uint32_t hint = kNone) const;
 
   /// visit(index) for every triangle within `radius` (inclusive) of p, and for some that are not: those whose box is.
+  /// A visit that returns false is the last one; it may also return nothing.
   template <class Visit>
   void near(const glm::dvec3& p, double radius, Visit&& visit) const;
 
@@ -141,14 +143,26 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
 
 template <class Visit>
 void Hierarchy::near(const glm::dvec3& p, double radius, Visit&& visit) const {
+  const auto goes_on = [&](std::uint32_t triangle) {
+    if constexpr (std::is_same_v<decltype(visit(triangle)), bool>) {
+      return visit(triangle);
+    } else {
+      visit(triangle);
+      return true;
+    }
+  };
   bool beyond_reach = false;
   const glm::dvec3 at = local(p, beyond_reach);
   if (beyond_reach) {
-    for (std::uint32_t triangle = 0; triangle < place_.size(); ++triangle) visit(triangle);
+    for (std::uint32_t triangle = 0; triangle < place_.size() && goes_on(triangle);) ++triangle;
   } else if (!nodes_.empty()) {
     double bound = radius * scale_ * (radius * scale_) * (1 + 1e-12);
+    bool more = true;
     walk<1>({at}, bound, [&](std::uint32_t place) {
-      for (std::uint32_t triangle = triangle_[place]; triangle != kNone; triangle = twin(triangle)) visit(triangle);
+      for (std::uint32_t triangle = triangle_[place]; more && triangle != kNone; triangle = twin(triangle)) {
+        more = goes_on(triangle);
+      }
+      if (!more) bound = -1;  // nothing is within it
     });
   }
 }

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -22,24 +23,139 @@ TriangleMesh plate(unsigned n, double z, double slope = 0) {
 TEST(Deviation, ParallelPlates) {
   const double bounds[] = {0.2, 0.3};
   for (const auto& [n, m] : {std::pair{1u, 30u}, {30u, 1u}}) {
-    const Deviation d = deviation(plate(n, 0), plate(m, 0.25), bounds);
-    EXPECT_NEAR(d.mean, 0.25, 1e-14);
-    EXPECT_NEAR(d.rms, 0.25, 1e-14);
-    EXPECT_NEAR(d.share_beyond[0], 1, 1e-12);
-    EXPECT_EQ(d.share_beyond[1], 0);
-    EXPECT_NEAR(d.samples, 262144, 20000);
-    EXPECT_NEAR(d.spacing, std::sqrt(1.0 / double(d.samples)), 1e-12);
+    const double percentiles[] = {0, 50, 100};
+    const Deviation d = deviation(plate(n, 0), plate(m, 0.25), {bounds, percentiles});
+    for (const Estimate& e : {d.mean, d.rms, d.percentiles[0], d.percentiles[1], d.percentiles[2]}) {
+      EXPECT_NEAR(e.value, 0.25, 1e-14);
+      EXPECT_NEAR(e.range.lower, 0.25, 1e-14);
+      EXPECT_NEAR(e.range.upper, 0.25, 1e-4);
+    }
+    EXPECT_NEAR(d.share_beyond[0].range.lower, 1, 1e-12);
+    EXPECT_EQ(d.share_beyond[1].range.upper, 0);
+    EXPECT_NEAR(d.distances.size(), 65536, 10000);
+    EXPECT_NEAR(d.spacing, std::sqrt(1.0 / double(d.distances.size())), 1e-12);
   }
 }
 
-// Distance x over [0, 1]: mean 1/2, rms 1/sqrt 3, share beyond t is 1 - t.
+/// Whether the truth is in the range, and the estimate near it.
+void expect(const Estimate& e, double truth, double error, const char* what = "") {
+  EXPECT_LE(e.range.lower, truth + 1e-12) << what;
+  EXPECT_GE(e.range.upper, truth - 1e-12) << what;
+  EXPECT_NEAR(e.value, truth, error) << what;
+  EXPECT_LE(e.range.lower, e.value) << what;
+  EXPECT_GE(e.range.upper, e.value) << what;
+}
+
+// Distance x over [0, 1]: mean 1/2, rms 1/sqrt 3, share beyond t is 1 - t, the p-th percentile is p.
 TEST(Deviation, LinearDistance) {
   const TriangleMesh floor{{{-9, -9, 0}, {9, -9, 0}, {9, 9, 0}, {-9, 9, 0}}, {{0, 1, 2}, {0, 2, 3}}};
-  const double bounds[] = {0.1, 0.5, 0.9};
-  const Deviation d = deviation(plate(3, 0, 1), floor, bounds);
-  EXPECT_NEAR(d.mean, 0.5, 1e-6);
-  EXPECT_NEAR(d.rms, std::sqrt(1 / 3.0), 1e-5);
-  for (int i = 0; i < 3; ++i) EXPECT_NEAR(d.share_beyond[i], 1 - bounds[i], 2 * d.spacing);
+  const double bounds[] = {0.1, 0.5, 0.9}, percentiles[] = {10, 50, 99.9};
+  const Deviation d = deviation(plate(3, 0, 1), floor, {bounds, percentiles});
+  expect(d.mean, 0.5, 2 * d.mean_error);
+  EXPECT_LT(d.mean_error, 2e-5);
+  EXPECT_LT(d.mean.range.upper - d.mean.range.lower, 1e-6);
+  expect(d.rms, std::sqrt(1 / 3.0), 1e-4);
+  for (int i = 0; i < 3; ++i) {
+    expect(d.share_beyond[i], 1 - bounds[i], 1e-3);
+    expect(d.percentiles[i], percentiles[i] / 100, 1e-3);
+    EXPECT_LT(d.percentiles[i].range.upper - d.percentiles[i].range.lower, 4 * d.spacing);
+  }
+}
+
+// A fold of the distance in every square of b, and squares smaller than the pieces of a: |x - nearest k / 300|.
+TEST(Deviation, FoldsBetweenTheSamples) {
+  const unsigned n = 300;
+  TriangleMesh walls;  // b: planes x = k / n, so that the distance from z = 0 within is that to the nearest
+  for (unsigned i = 0; i <= n; ++i) {
+    const unsigned first = unsigned(walls.vertices.size());
+    const double x = i / double(n);
+    walls.vertices.insert(walls.vertices.end(), {{x, -1, -1}, {x, 5, -1}, {x, -1, 5}});
+    walls.triangles.push_back(glm::uvec3(first) + glm::uvec3(0, 1, 2));
+  }
+  const double percentiles[] = {25, 50, 75, 95};
+  const Deviation d = deviation(plate(1, 0), walls, {{}, percentiles});
+  const double largest = 0.5 / n;
+  EXPECT_GT(d.spacing, 0.2 * largest);  // or else the case is none
+  expect(d.mean, largest / 2, 0.001 * largest);
+  expect(d.rms, largest / std::sqrt(3), 0.001 * largest);
+  for (int i = 0; i < 4; ++i) expect(d.percentiles[i], percentiles[i] / 100 * largest, 0.005 * largest);
+}
+
+// In the middle of a torus everything is as near as everything else; the piece is short, or as long as that is far.
+TEST(Deviation, ManyTrianglesAlikeFar) {
+  const TriangleMesh outer = shapes::torus(40);
+  for (const double length : {1e-3, 0.5}) {
+    const TriangleMesh disc{{{0, 0, 0}, {length, 0, 0}, {0, length, 0}}, {{0, 1, 2}}};
+    const Deviation d = deviation(disc, outer);
+    // The distance from the inner ring, 0.6 - |x|, but for its 40 corners: the sides sag by 0.3 %.
+    const double mean = 0.6 - length * (std::sqrt(2) + std::asinh(1)) / (3 * std::sqrt(2));
+    EXPECT_NEAR(d.mean.value, mean, 2e-3);
+    EXPECT_LE(d.mean.range.lower, d.mean.value);
+    EXPECT_GE(d.mean.range.upper, d.mean.value);
+    EXPECT_LT(d.mean.range.upper - d.mean.range.lower, 1e-3 * 0.6);
+  }
+}
+
+TEST(Deviation, RefinedUntilTheMeanIsKnown) {
+  // Noise that four pieces a square see badly, and 16 well.
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(0, 0.01);
+  TriangleMesh rough = plate(40, 0);
+  for (dvec3& p : rough.vertices) p.z += normal(random);
+  for (const auto& [a, b] : {std::pair{rough, plate(3, 0)}, {plate(3, 0), rough}}) {
+    const Deviation d = deviation(a, b);
+    const double largest = *std::max_element(d.distances.begin(), d.distances.end());
+    const double width = d.mean.range.upper - d.mean.range.lower;
+    EXPECT_TRUE(width <= 0.001 * largest || d.distances.size() > 520000) << width / largest;
+    EXPECT_LE(d.distances.size(), 524288u);
+    EXPECT_LT(width, 0.02 * largest);
+  }
+}
+
+TEST(Deviation, SignedWhereTheReferenceIsClosed) {
+  TriangleMesh box = shapes::box(3);
+  // The square [0, 1] x [0.5, 1.5] at z = 0.25: half inside, up to 0.25 deep; half outside, up to 0.5.
+  const TriangleMesh plate = shapes::squares(4, [](const dvec3& p) { return p + dvec3(0, 0.5, 0.25); });
+  const double deepest = 0.25, mean_outside = 0.25;
+  double mean_inside = 0;
+  const int n = 400;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      const double x = (i + 0.5) / n, y = 0.5 + (j + 0.5) / (2 * n);
+      mean_inside += std::min({x, 1 - x, 1 - y, 0.25}) / n / n;
+    }
+  }
+  for (const bool inside_out : {false, true}) {
+    if (inside_out) {
+      for (glm::uvec3& t : box.triangles) std::swap(t.x, t.y);
+    }
+    const Deviation d = deviation(plate, box);
+    ASSERT_TRUE(d.sides.has_value());
+    expect(d.sides->share_inside, 0.5, 1e-3);
+    expect(d.sides->mean, (mean_outside - mean_inside) / 2, 1e-4);
+    EXPECT_LE(d.sides->inside.lower, deepest + 1e-12);
+    EXPECT_GE(d.sides->inside.upper, deepest);
+    EXPECT_NEAR(d.sides->inside.lower, deepest, 1e-3);
+    EXPECT_LE(d.sides->outside.lower, 0.5);
+    EXPECT_GE(d.sides->outside.upper, 0.5);
+    EXPECT_NEAR(d.sides->outside.upper, 0.5, 1e-2);
+    EXPECT_NEAR(*std::min_element(d.distances.begin(), d.distances.end()), -deepest, 1e-3);
+    EXPECT_NEAR(*std::max_element(d.distances.begin(), d.distances.end()), 0.5, 1e-2);
+  }
+  box.triangles.pop_back();
+  EXPECT_FALSE(deviation(plate, box).sides.has_value());
+}
+
+TEST(Deviation, WeightsAddUpToOne) {
+  const Deviation d = deviation(shapes::torus(30, 0.01), shapes::torus(20));
+  double sum = 0, mean = 0;
+  ASSERT_EQ(d.distances.size(), d.weights.size());
+  for (std::size_t i = 0; i < d.weights.size(); ++i) {
+    sum += d.weights[i];
+    mean += d.weights[i] * std::abs(d.distances[i]);
+  }
+  EXPECT_NEAR(sum, 1, 1e-9);
+  EXPECT_NEAR(mean, d.mean.value, 1e-9);
 }
 
 // By area, not by triangles: half of the area in two triangles, the other half in two thousand.
@@ -50,10 +166,10 @@ TEST(Deviation, WeightedByArea) {
   mesh.vertices.insert(mesh.vertices.end(), fine.vertices.begin(), fine.vertices.end());
   for (const glm::uvec3& t : fine.triangles) mesh.triangles.push_back(t + glm::uvec3(shift));
   const double bounds[] = {2};
-  const Deviation d = deviation(mesh, plate(1, 0), bounds);
-  EXPECT_NEAR(d.mean, 2, 1e-12);
-  EXPECT_NEAR(d.rms, std::sqrt(5), 1e-12);
-  EXPECT_NEAR(d.share_beyond[0], 0.5, 1e-12);
+  const Deviation d = deviation(mesh, plate(1, 0), {bounds});
+  expect(d.mean, 2, 1e-12);
+  expect(d.rms, std::sqrt(5), 1e-12);
+  expect(d.share_beyond[0], 0.5, 1e-12);
 }
 
 TEST(Deviation, EveryTriangleHasASample) {
@@ -63,8 +179,8 @@ TEST(Deviation, EveryTriangleHasASample) {
     mesh.triangles.push_back(glm::uvec3(4 + 3 * i) + glm::uvec3(0, 1, 2));
   }
   const double bounds[] = {4};
-  const Deviation d = deviation(mesh, plate(1, 0), bounds);
-  EXPECT_NEAR(d.share_beyond[0], 300 * 0.5e-6 / (1 + 300 * 0.5e-6), 1e-12);
+  const Deviation d = deviation(mesh, plate(1, 0), {bounds});
+  expect(d.share_beyond[0], 300 * 0.5e-6 / (1 + 300 * 0.5e-6), 1e-12);
 }
 
 TEST(Deviation, WithoutArea) {
@@ -72,22 +188,22 @@ TEST(Deviation, WithoutArea) {
   // Two segments of length 1 and 3, at heights 1 and 2.
   const TriangleMesh segments{{{0, 0, 1}, {1, 0, 1}, {0, 0, 2}, {0, 3, 2}, {0, 1, 2}}, {{0, 1, 0}, {2, 4, 3}}};
   const double bounds[] = {1.5};
-  const Deviation lines = deviation(segments, floor, bounds);
-  EXPECT_NEAR(lines.share_beyond[0], 0.75, 1e-12);
+  const Deviation lines = deviation(segments, floor, {bounds});
+  expect(lines.share_beyond[0], 0.75, 1e-12);
   // Beyond the plate the distance of the second one is sqrt(4 + (y - 1)^2), 1 <= y <= 3.
   const double slanted = 2 * std::sqrt(2.0) + 2 * std::asinh(1.0);
-  EXPECT_NEAR(lines.mean, (1 * 1 + 1 * 2 + slanted) / 4, 1e-6);
+  expect(lines.mean, (1 * 1 + 1 * 2 + slanted) / 4, 1e-6);
   EXPECT_GT(lines.spacing, 0);
   const TriangleMesh points{{{0.5, 0.5, 1}, {0.5, 0.5, 3}}, {{0, 0, 0}, {1, 1, 1}}};
-  const Deviation dots = deviation(points, floor, bounds);
-  EXPECT_DOUBLE_EQ(dots.mean, 2);
-  EXPECT_DOUBLE_EQ(dots.rms, std::sqrt(5));
-  EXPECT_DOUBLE_EQ(dots.share_beyond[0], 0.5);
+  const Deviation dots = deviation(points, floor, {bounds});
+  expect(dots.mean, 2, 1e-14);
+  expect(dots.rms, std::sqrt(5), 1e-14);
+  expect(dots.share_beyond[0], 0.5, 1e-14);
   EXPECT_EQ(dots.spacing, 0);
-  EXPECT_EQ(dots.samples, 2u);
-  EXPECT_DOUBLE_EQ(deviation(floor, points).share_beyond.size(), 0);
+  EXPECT_EQ(dots.distances.size(), 2u);
+  EXPECT_EQ(deviation(floor, points).share_beyond.size(), 0u);
   const TriangleMesh point{{{7, 7, 7}}, {{0, 0, 0}}};
-  EXPECT_EQ(deviation(point, point).mean, 0);
+  EXPECT_EQ(deviation(point, point).mean.value, 0);
 }
 
 TEST(Deviation, AnyScaleAndAnyPlace) {
@@ -97,12 +213,12 @@ TEST(Deviation, AnyScaleAndAnyPlace) {
       for (dvec3& p : mesh->vertices) p = offset * dvec3(1, -1, 2) + scale * p;
     }
     const double bounds[] = {0.24 * scale, 0.26 * scale};
-    const Deviation d = deviation(a, b, bounds);
-    EXPECT_NEAR(d.mean / scale, 0.25, 1e-9);
-    EXPECT_NEAR(d.rms / scale, 0.25, 1e-9);
-    EXPECT_NEAR(d.share_beyond[0], 1, 1e-12);
-    EXPECT_EQ(d.share_beyond[1], 0);
-    EXPECT_NEAR(d.spacing / scale, 1 / 512.0, 1e-4);
+    const Deviation d = deviation(a, b, {bounds});
+    EXPECT_NEAR(d.mean.value / scale, 0.25, 1e-9);
+    EXPECT_NEAR(d.rms.value / scale, 0.25, 1e-9);
+    EXPECT_NEAR(d.share_beyond[0].value, 1, 1e-12);
+    EXPECT_EQ(d.share_beyond[1].value, 0);
+    EXPECT_NEAR(d.spacing / scale, 1 / 256.0, 2e-4);
   }
 }
 
@@ -112,27 +228,33 @@ TEST(Deviation, SameForAnyNumberOfThreads) {
   TriangleMesh rough = plate(120, 0);
   for (dvec3& p : rough.vertices) p.z += normal(random);
   const double bounds[] = {0.01};
-  const Deviation one = deviation(rough, plate(3, 0), bounds, {1, nullptr});
+  const Deviation one = deviation(rough, plate(3, 0), {bounds, {}, 1, nullptr});
   for (const unsigned threads : {2u, 5u}) {
-    const Deviation many = deviation(rough, plate(3, 0), bounds, {threads, nullptr});
-    EXPECT_EQ(many.mean, one.mean);
-    EXPECT_EQ(many.rms, one.rms);
-    EXPECT_EQ(many.share_beyond, one.share_beyond);
+    const Deviation many = deviation(rough, plate(3, 0), {bounds, {}, threads, nullptr});
+    EXPECT_EQ(many.mean.value, one.mean.value);
+    EXPECT_EQ(many.rms.range.upper, one.rms.range.upper);
+    EXPECT_EQ(many.share_beyond[0].value, one.share_beyond[0].value);
+    EXPECT_EQ(many.distances, one.distances);
+    EXPECT_EQ(many.weights, one.weights);
   }
 }
 
 TEST(Deviation, BadInputProgressAndCancel) {
   const TriangleMesh good = plate(2, 0);
   const double bounds[] = {1, std::nan("")};
-  EXPECT_THROW(deviation(good, good, bounds), InvalidInput);
+  EXPECT_THROW(deviation(good, good, {bounds}), InvalidInput);
+  for (const double wrong : {-1.0, 100.1, std::nan("")}) {
+    const double percentiles[] = {50, wrong};
+    EXPECT_THROW(deviation(good, good, {{}, percentiles}), InvalidInput);
+  }
   EXPECT_THROW(deviation({}, good), InvalidInput);
   EXPECT_THROW(deviation(good, {{{0, 0, std::nan("")}}, {{0, 0, 0}}}), InvalidInput);
   Progress progress;
-  deviation(good, good, {}, {1, &progress});
+  deviation(good, good, {{}, {}, 1, &progress});
   EXPECT_STREQ(progress.stage(), "averaging");
   EXPECT_EQ(progress.fraction(), 1);
   progress.cancel();
-  EXPECT_THROW(deviation(good, good, {}, {1, &progress}), Cancelled);
+  EXPECT_THROW(deviation(good, good, {{}, {}, 1, &progress}), Cancelled);
 }
 
 }  // namespace

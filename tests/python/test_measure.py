@@ -111,6 +111,51 @@ def test_deviation_of_a_tilted_plate():
     assert result.share_beyond[0] == pytest.approx(0.25, abs=0.01)
 
 
+def test_deviation_ranges_hold_the_truth():
+    vertices, triangles = meshes.plate(9)
+    vertices[:, 2] = vertices[:, 0]
+    floor = meshes.plate(2, side=9)
+    result = tolvol.deviation(
+        vertices, triangles, floor[0] - [4, 4, 0], floor[1], bounds=(0.25, 0.75), percentiles=(50, 90, 99.9)
+    )
+    for value, (lower, upper), truth in (
+        (result.mean, result.mean_range, 1 / 2),
+        (result.rms, result.rms_range, 1 / np.sqrt(3)),
+        *zip(result.share_beyond, result.share_beyond_range, (0.75, 0.25)),
+        *zip(result.percentiles, result.percentiles_range, (0.5, 0.9, 0.999)),
+    ):
+        assert lower - 1e-12 <= truth <= upper + 1e-12 and lower <= value <= upper
+        assert value == pytest.approx(truth, abs=0.001) and upper - lower < 0.02
+    assert abs(result.mean - 1 / 2) <= 3 * result.mean_error < 1e-4
+    assert result.sides is None and result.distances.min() >= 0
+    assert result.weights.sum() == pytest.approx(1) and len(result.weights) == len(result.distances)
+    assert (result.weights * result.distances).sum() == pytest.approx(result.mean, abs=1e-4)
+
+
+def test_deviation_of_a_closed_reference_has_sides():
+    # A plate through a torus: a disc of the hole's radius and what is beyond the ring are outside.
+    torus = meshes.torus(48, 24)
+    vertices, triangles = meshes.plate(33, side=3.0)
+    result = tolvol.deviation(vertices - [1.5, 1.5, 0], triangles, *torus)
+    ring = np.pi * (1.4**2 - 0.6**2) / 9
+    lower, upper = result.sides.share_inside_range
+    assert lower <= result.sides.share_inside <= upper
+    assert result.sides.share_inside == pytest.approx(ring, abs=0.005)
+    assert result.sides.inside[0] <= 0.4 and result.sides.inside[1] >= 0.39
+    farthest = np.hypot(1.5, 1.5) - 1.4
+    assert result.sides.outside[0] <= farthest + 0.01 and result.sides.outside[1] >= farthest
+    assert result.distances.min() == pytest.approx(-0.4, abs=0.01)
+    assert result.sides.mean_range[0] <= result.sides.mean <= result.sides.mean_range[1]
+    assert result.sides.mean == pytest.approx((result.weights * result.distances).sum())
+    turned = tolvol.deviation(vertices - [1.5, 1.5, 0], triangles, torus[0], torus[1][:, ::-1])
+    assert turned.sides.share_inside == pytest.approx(result.sides.share_inside, abs=1e-3)
+
+
+def test_deviation_refuses_percentiles_that_are_none():
+    with pytest.raises(tolvol.InvalidInput, match="percentile 1 is not between 0 and 100"):
+        tolvol.deviation(*meshes.plate(3), *meshes.plate(3), percentiles=(50, 101))
+
+
 def test_deviation_gives_the_same_on_any_number_of_threads():
     a, b = meshes.torus(noise=0.003), meshes.torus()
     results = [tolvol.deviation(*a, *b, bounds=(0.002,), threads=n) for n in (1, 2, 3)]

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The deviation of an object and its reference as a file."""
+
+from pathlib import Path
+
+import bpy
+from bpy.props import StringProperty
+
+from .. import deviation
+from ..errors import Refused
+from .check import Comparison
+
+# Shares of the tolerance that are reported as bands.
+_BANDS = (0.25, 0.5, 0.75)
+
+
+class TOLVOL_OT_save_report(Comparison, bpy.types.Operator):
+    """Measure how far the mesh lies from the reference and the reference from the mesh, and save it: a page to read \
+(.html), a table (.csv) or all numbers (.json)"""
+
+    bl_idname = "tolvol.save_report"
+    bl_label = "Save Report"
+
+    filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: StringProperty(
+        default=";".join(f"*{extension}" for extension in deviation.EXTENSIONS), options={"HIDDEN", "SKIP_SAVE"}
+    )
+    check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+
+    _browsing = False
+
+    def invoke(self, context, event):
+        if self.filepath:
+            return super().invoke(context, event)
+        self._browsing = True
+        folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
+        self.filepath = str(folder / f"{bpy.path.clean_name(context.active_object.name)} deviation.html")
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        if self._browsing:  # the file is chosen: measure with progress and Esc
+            return bpy.ops.tolvol.save_report("INVOKE_DEFAULT", filepath=self.filepath, threads=self.threads)
+        return super().execute(context)
+
+    def prepare(self, context):
+        path = Path(bpy.path.abspath(self.filepath))
+        if path.suffix.lower() not in deviation.EXTENSIONS:
+            raise Refused(f"{path.name} does not end in {', '.join(deviation.EXTENSIONS)}")
+        if not path.parent.is_dir():
+            raise Refused(f"The folder {path.parent} does not exist")
+        self._path = path
+        self._about = {
+            "a": _counted(self.ob.name, self.ob.data),
+            "b": _counted("its reference", self.ob.tolvol.snapshot),
+        }
+        units = context.scene.unit_settings
+        self._unit = "m" if units.system != "NONE" and units.scale_length == 1 else "units"
+        return super().prepare(context)
+
+    def compare(self, surface, reference, tolerance, threads, progress):
+        bounds = [share * tolerance for share in _BANDS]
+        return deviation.deviation(
+            surface, reference, reference.size(), tolerance, bounds, self._unit, threads, progress
+        )
+
+    def finish(self, context, outcome):
+        try:
+            deviation.save(outcome | self._about, self._path)
+        except OSError as error:
+            raise Refused(f"{self._path}: {error.strerror}") from None
+        self.report({"INFO"}, f"Saved {self._path}")
+
+
+def _counted(name, mesh):
+    mesh.calc_loop_triangles()
+    return {"name": name, "vertices": len(mesh.vertices), "triangles": len(mesh.loop_triangles)}

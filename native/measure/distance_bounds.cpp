@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Let c be the centroid of the piece, p_i its corners, r the largest |p_i - c| and d(x) the distance to b.
+//
+// - Above. The distance to the triangle T nearest to c is convex, and so is its square: over the piece they are at most
+//   the largest of their values at the corners, and on average at most the mean of these. d is nowhere larger.
+// - Below. The triangle nearest to any point of the piece is within d(c) + 2 r of c. For each such triangle there are
+//   linear functions that its distance nowhere falls below, one for each plane that separates it from c; the least of
+//   one such function for each triangle is concave, so that over the piece it is at least the least of its values at
+//   the corners, and on average at least their mean. Two planes are tried: the one at the point nearest to c, and the
+//   one parallel to that of T, without which the triangles beside T would seem to come nearer.
+// - Below, where that is too many triangles, because the surfaces are far apart for their size: for x = sum w_i p_i and
+//   every y, |x - y|^2 = sum w_i |p_i - y|^2 - sum w_i |p_i - x|^2 (Lagrange), hence d(x)^2 >= sum w_i d(p_i)^2 -
+//   sum w_i |p_i - x|^2. For k corners the last term is at most r^2, and sum |p_i - c|^2 / (k + 1) on average.
+#include "measure/distance_bounds.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tolvol {
+namespace {
+
+using glm::dvec3;
+using Values = std::array<double, 3>;  // at the corners of a piece
+
+// Triangles whose planes are worth asking for: more of them cost more than another four pieces.
+constexpr int kMostTriangles = 64;
+// Of the distance: a piece that is so short is known well enough by one point, as nothing changes faster than one to
+// one.
+constexpr double kShort = 1e-4;
+
+/// At each corner of a piece the least value of linear functions as above, one for each triangle.
+class Below {
+ public:
+  Below(const Simplex& piece, const dvec3& centroid, const dvec3& nearest)
+      : piece_(piece),
+        centroid_(centroid),
+        apart_(direction(centroid - nearest)),
+        least_(values(apart_, glm::distance(centroid, nearest))) {}
+
+  void add(const std::array<dvec3, 3>& t) {
+    const double gap = std::min(
+        {glm::dot(apart_, centroid_ - t[0]), glm::dot(apart_, centroid_ - t[1]), glm::dot(apart_, centroid_ - t[2])});
+    const Values common = values(apart_, gap);
+    if (loss(common) == 0) return;
+    const dvec3 r = centroid_ - closest_point(centroid_, t[0], t[1], t[2]).point;
+    const Values own = values(direction(r), glm::length(r));
+    const Values& better = loss(own) <= loss(common) ? own : common;
+    for (int i = 0; i < piece_.corners; ++i) least_[i] = std::min(least_[i], better[i]);
+  }
+
+  double least() const { return std::max(0.0, *std::min_element(least_.begin(), least_.begin() + piece_.corners)); }
+  double mean() const {
+    double sum = 0;
+    for (int i = 0; i < piece_.corners; ++i) sum += least_[i];
+    return std::max(0.0, sum / piece_.corners);
+  }
+
+ private:
+  static dvec3 direction(const dvec3& v) {
+    const double length = glm::length(v);
+    return length > 0 ? v / length : dvec3(0);
+  }
+
+  /// Of the function that is `at_centroid` there and grows along the unit vector `normal`.
+  Values values(const dvec3& normal, double at_centroid) const {
+    Values result{};
+    for (int i = 0; i < piece_.corners; ++i) {
+      result[i] = at_centroid + glm::dot(normal, piece_.corner[i] - centroid_);
+    }
+    return result;
+  }
+
+  /// By how much `least_` would fall.
+  double loss(const Values& v) const {
+    double sum = 0;
+    for (int i = 0; i < piece_.corners; ++i) sum += std::max(0.0, least_[i] - v[i]);
+    return sum;
+  }
+
+  const Simplex& piece_;
+  dvec3 centroid_, apart_;
+  Values least_;
+};
+
+}  // namespace
+
+dvec3 Simplex::centroid() const {
+  dvec3 sum(0);
+  for (int i = 0; i < corners; ++i) sum += corner[i];
+  return sum / double(corners);
+}
+
+DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, const Hierarchy& hierarchy,
+                               std::uint32_t hint) {
+  const auto triangle = [&](std::uint32_t i) {
+    const glm::uvec3& t = b.triangles[i];
+    return std::array{b.vertices[t.x], b.vertices[t.y], b.vertices[t.z]};
+  };
+  const dvec3 c = piece.centroid();
+  const int k = piece.corners;
+  DistanceBounds bounds;
+  const Hierarchy::Nearest nearest = hierarchy.nearest(c, std::numeric_limits<double>::infinity(), hint);
+  const double d = nearest.distance;
+  bounds.nearest = nearest.triangle;
+
+  const std::array<dvec3, 3> t = triangle(nearest.triangle);
+  double r = 0, spread = 0;
+  for (int i = 0; i < k; ++i) {
+    const double squared = closest_point(piece.corner[i], t[0], t[1], t[2]).distance_squared;
+    const dvec3 arm = piece.corner[i] - c;
+    bounds.value.upper = std::max(bounds.value.upper, std::sqrt(squared));
+    bounds.mean.upper += std::sqrt(squared) / k;
+    bounds.mean_square.upper += squared / k;
+    spread += glm::dot(arm, arm);
+    r = std::max(r, glm::length(arm));
+  }
+
+  if (r <= kShort * d) {
+    bounds.value = bounds.mean = {d - r, d + r};
+    bounds.mean_square = {(d - r) * (d - r), (d + r) * (d + r)};
+    return bounds;
+  }
+
+  Below below(piece, c, nearest.point);
+  int seen = 0;
+  hierarchy.near(c, d + 2 * r, [&](std::uint32_t i) {
+    if (++seen > kMostTriangles) return false;
+    below.add(triangle(i));
+    return true;
+  });
+  if (seen <= kMostTriangles) {
+    bounds.value.lower = below.least();
+    bounds.mean.lower = below.mean();
+  } else {
+    double least = std::numeric_limits<double>::infinity(), sum = 0;
+    for (int i = 0; i < k; ++i) {
+      const double at =
+          hierarchy.nearest(piece.corner[i], std::numeric_limits<double>::infinity(), nearest.triangle).distance;
+      least = std::min(least, at * at);
+      sum += at * at / k;
+    }
+    bounds.value.lower = std::max(d - r, std::sqrt(std::max(0.0, least - r * r)));
+    bounds.value.lower = std::max(0.0, bounds.value.lower);
+    bounds.mean_square.lower = std::max(0.0, sum - spread / (k + 1));
+    // d = d^2 / d, and d is nowhere larger than value.upper.
+    bounds.mean.lower = std::max(bounds.value.lower, bounds.mean_square.lower / bounds.value.upper);
+  }
+  bounds.mean_square.lower = std::max(bounds.mean_square.lower, bounds.mean.lower * bounds.mean.lower);
+  return bounds;
+}
+
+}  // namespace tolvol

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Halving alone would never end along the edges of the other surface where the two touch; cutting alone would go round
+// in circles far from it.
+//
+// Rounding, u = 2^-53: a point at t <= 1/2 from the nearer end, p + t (q - p), with |p|, |q| <= 1 errs by t 2 u for the
+// difference, as much for the product and u for the sum: kSplitError, 3 u.
+#include "measure/split.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tolvol {
+namespace {
+
+using glm::dvec3;
+
+// A piece so many times longer than the triangle near it is halved, not cut.
+constexpr double kCoarse = 4;
+// A piece, or what would be cut off it, that is thinner than this is rounding.
+constexpr double kNoise = 256 * kUnitRoundoff;
+
+dvec3 between(const dvec3& p, const dvec3& q, double t) { return t <= 0.5 ? p + t * (q - p) : q + (1 - t) * (p - q); }
+
+/// Two parts, apart at the point s of the edge from corner i to the next.
+Parts halves(const TriangleCorners& p, int i, double s) {
+  const int j = (i + 1) % 3;
+  Parts parts{{p, p, p}, 2};
+  parts.corners[0][j] = parts.corners[1][i] = between(p[i], p[j], s);
+  return parts;
+}
+
+/// None when no edge of t divides the piece.
+Parts cut_along(const TriangleCorners& p, const TriangleCorners& t) {
+  const dvec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
+  std::array<double, 3> side{};
+  double best = 0;
+  for (int e = 0; e < 3; ++e) {
+    const dvec3 outward = glm::cross(t[(e + 1) % 3] - t[e], normal);
+    const double norm = glm::length(outward);
+    if (!(norm > 0)) continue;
+    std::array<double, 3> s;
+    for (int i = 0; i < 3; ++i) s[i] = glm::dot(p[i] - t[e], outward) / norm;
+    const double depth = std::min(*std::max_element(s.begin(), s.end()), -*std::min_element(s.begin(), s.end()));
+    if (depth > best) best = depth, side = s;
+  }
+  if (best <= kNoise) return {};
+  for (double& s : side) {
+    if (std::abs(s) <= kNoise) s = 0;
+  }
+  const auto share = [&](int i, int j) { return side[i] / (side[i] - side[j]); };
+  int alone = 0;  // the corner on the one side
+  for (int i = 0; i < 3; ++i) {
+    if (side[i] == 0) return halves(p, (i + 1) % 3, share((i + 1) % 3, (i + 2) % 3));
+    if (side[i] * side[(i + 1) % 3] < 0 && side[i] * side[(i + 2) % 3] < 0) alone = i;
+  }
+  const int i = alone, j = (alone + 1) % 3, k = (alone + 2) % 3;
+  const dvec3 on_j = between(p[i], p[j], share(i, j)), on_k = between(p[i], p[k], share(i, k));
+  if (glm::distance(on_j, p[k]) < glm::distance(on_k, p[j])) {
+    return {{{{p[i], on_j, on_k}, {on_j, p[j], p[k]}, {on_j, p[k], on_k}}}, 3};
+  }
+  return {{{{p[i], on_j, on_k}, {on_j, p[j], on_k}, {on_k, p[j], p[k]}}}, 3};
+}
+
+}  // namespace
+
+Parts split(const TriangleCorners& piece, const TriangleCorners& t) {
+  const double reach = std::max({glm::distance(t[0], t[1]), glm::distance(t[1], t[2]), glm::distance(t[2], t[0])});
+  int longest = 0;
+  std::array<double, 3> length;
+  for (int i = 0; i < 3; ++i) {
+    length[i] = glm::distance(piece[i], piece[(i + 1) % 3]);
+    if (length[i] > length[longest]) longest = i;
+  }
+  Parts parts;
+  if (length[longest] <= kNoise) return parts;
+  if (length[longest] <= kCoarse * reach) parts = cut_along(piece, t);
+  return parts.count > 0 ? parts : halves(piece, longest, 0.5);
+}
+
+}  // namespace tolvol

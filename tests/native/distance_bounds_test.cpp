@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "measure/distance_bounds.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+/// Means over the piece by dense samples, evenly spread: the middles of n x n equal parts.
+struct Truth {
+  double least = 1e300, most = 0, mean = 0, mean_square = 0;
+
+  Truth(const Simplex& s, const Hierarchy& hierarchy, int n = 24) {
+    int count = 0;
+    const auto add = [&](const dvec3& p) {
+      const double d = hierarchy.nearest(p).distance;
+      least = std::min(least, d), most = std::max(most, d);
+      mean += d, mean_square += d * d;
+      ++count;
+    };
+    const auto& p = s.corner;
+    if (s.corners == 1) add(p[0]);
+    for (int i = 0; s.corners == 2 && i < n; ++i) add(glm::mix(p[0], p[1], (i + 0.5) / n));
+    for (int i = 0; s.corners == 3 && i < n; ++i) {
+      for (int j = 0; i + j < n; ++j) {
+        for (const int up : {1, 2}) {
+          if (up == 2 && i + j + 1 == n) continue;
+          const double u = (3 * i + up) / (3.0 * n), v = (3 * j + up) / (3.0 * n);
+          add(p[0] + u * (p[1] - p[0]) + v * (p[2] - p[0]));
+        }
+      }
+    }
+    mean /= count, mean_square /= count;
+  }
+};
+
+void expect_holds(const DistanceBounds& b, const Truth& truth, double sampling) {
+  EXPECT_LE(b.value.lower, truth.least + 1e-12);
+  EXPECT_GE(b.value.upper, truth.most - 1e-12);
+  EXPECT_LE(b.mean.lower, truth.mean + sampling);
+  EXPECT_GE(b.mean.upper, truth.mean - sampling);
+  EXPECT_LE(b.mean_square.lower, truth.mean_square + 2 * truth.most * sampling);
+  EXPECT_GE(b.mean_square.upper, truth.mean_square - 2 * truth.most * sampling);
+}
+
+// Pieces of every length, some touching or crossing the surface, against needles, scans and a coarse mesh.
+TEST(DistanceBounds, HoldWhateverThePiece) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal(0, 1);
+  const auto vector = [&] { return dvec3(normal(random), normal(random), normal(random)); };
+  TriangleMesh needles;
+  for (unsigned i = 0; i < 40; ++i) {
+    const dvec3 p = vector();
+    needles.vertices.insert(needles.vertices.end(), {p, p + vector(), p + 1e-7 * vector()});
+    needles.triangles.push_back(glm::uvec3(3 * i) + glm::uvec3(0, 1, 2));
+  }
+  for (const TriangleMesh& b : {needles, shapes::torus(40, 0.01), shapes::torus(5), shapes::box(1)}) {
+    const Hierarchy hierarchy(b);
+    for (int i = 0; i < 400; ++i) {
+      const int corners = 1 + i % 3;
+      const double reach = std::pow(10, -4 * double(random() % 100) / 100);
+      const dvec3 at = b.vertices[random() % b.vertices.size()] + (i % 7 ? reach * vector() : dvec3(0));
+      const Simplex s{{at, at + reach * vector(), at + reach * vector()}, corners};
+      const Truth truth(s, hierarchy);
+      const DistanceBounds bounds = distance_bounds(s, b, hierarchy, Hierarchy::kNone);
+      const double longest = std::max(glm::distance(s.corner[0], s.corner[1]), glm::distance(s.corner[0], s.corner[2]));
+      expect_holds(bounds, truth, 0.002 * longest);  // 24 parts a side
+      EXPECT_EQ(bounds.nearest, hierarchy.nearest(s.centroid()).triangle);
+      const DistanceBounds hinted = distance_bounds(s, b, hierarchy, std::uint32_t(i % b.triangles.size()));
+      EXPECT_EQ(hinted.mean.lower, bounds.mean.lower);
+    }
+  }
+}
+
+TEST(DistanceBounds, ExactOverAPlane) {
+  const TriangleMesh plane = shapes::grid(4);  // many triangles, one plane
+  const Hierarchy hierarchy(plane);
+  const Simplex s{{{{0.4, 0.4, 0.1}, {0.6, 0.41, 0.2}, {0.45, 0.6, 0.3}}}, 3};
+  const DistanceBounds bounds = distance_bounds(s, plane, hierarchy, Hierarchy::kNone);
+  EXPECT_NEAR(bounds.value.lower, 0.1, 1e-14);
+  EXPECT_NEAR(bounds.mean.lower, 0.2, 1e-14);
+}
+
+// The surfaces almost parallel: ten times smaller pieces, a hundred times narrower ranges.
+TEST(DistanceBounds, NarrowFasterThanThePieces) {
+  const TriangleMesh torus = shapes::torus(100);
+  const Hierarchy hierarchy(torus);
+  double before = 0;
+  for (const double length : {0.02, 0.002}) {
+    const Simplex s{{{{1.5, -length, -length}, {1.5, length, -length}, {1.5, 0, length}}}, 3};
+    const DistanceBounds bounds = distance_bounds(s, torus, hierarchy, Hierarchy::kNone);
+    const double width = bounds.mean.upper - bounds.mean.lower;
+    if (before > 0) {
+      EXPECT_LT(width, before / 50);
+    }
+    before = width;
+  }
+}
+
+}  // namespace

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "measure/split.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+dvec3 twice_area(const TriangleCorners& p) { return glm::cross(p[1] - p[0], p[2] - p[0]); }
+
+TEST(Split, PartsAreAllOfThePieceAndTurnedAlike) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto point = [&] { return dvec3(uniform(random), uniform(random), uniform(random)); };
+  int threes = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const TriangleCorners piece{point(), point(), point()}, t{point(), point(), point()};
+    const Parts parts = split(piece, t);
+    ASSERT_GE(parts.count, 2);
+    threes += parts.count == 3;
+    dvec3 sum(0);
+    for (int k = 0; k < parts.count; ++k) {
+      const dvec3 part = twice_area(parts.corners[k]);
+      EXPECT_GT(glm::dot(part, twice_area(piece)), 0);
+      sum += part;
+    }
+    EXPECT_LT(glm::distance(sum, twice_area(piece)), 1e-14);
+  }
+  EXPECT_GT(threes, 200);
+}
+
+// Once for each edge: then every part lies above the triangle or beside it.
+TEST(Split, CutsAlongTheEdges) {
+  const TriangleCorners t{dvec3(0, 0, 0), dvec3(1, 0, 0), dvec3(0, 1, 0)};
+  std::vector<TriangleCorners> open{{dvec3(-1, -1, 0.2), dvec3(2.9, -1, 0.3), dvec3(-1, 2.9, 0.1)}};
+  double above = 0;
+  for (int round = 0; round < 3; ++round) {
+    std::vector<TriangleCorners> next;
+    for (const TriangleCorners& piece : open) {
+      const Parts parts = split(piece, t);
+      next.insert(next.end(), parts.corners.begin(), parts.corners.begin() + parts.count);
+    }
+    open.swap(next);
+  }
+  for (const TriangleCorners& p : open) {
+    const auto inside = [](const dvec3& q) { return q.x > -1e-12 && q.y > -1e-12 && q.x + q.y < 1 + 1e-12; };
+    if (std::all_of(p.begin(), p.end(), inside)) above += twice_area(p).z / 2;
+  }
+  EXPECT_NEAR(above, 0.5, 1e-12);
+}
+
+TEST(Split, LongPiecesAreHalvedAndTinyOnesLeft) {
+  const TriangleCorners t{dvec3(0), dvec3(0.1, 0, 0), dvec3(0, 0.1, 0)};
+  const Parts halves = split({dvec3(0), dvec3(1, 0, 0), dvec3(0, 0.5, 0)}, t);
+  ASSERT_EQ(halves.count, 2);
+  EXPECT_EQ(halves.corners[0][2], dvec3(0.5, 0.25, 0));  // the middle of the longest edge
+  EXPECT_EQ(split({dvec3(0.5), dvec3(0.5), dvec3(0.5)}, t).count, 0);
+  EXPECT_EQ(split({dvec3(0), dvec3(1, 0, 0), dvec3(0.5, 0, 0)}, {dvec3(0.2), dvec3(0.2), dvec3(0.2)}).count, 2);
+}
+
+}  // namespace

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Save Report with the file browser."""
+
+import os
+import tempfile
+from pathlib import Path
+
+import bpy
+
+from test_panel import finished, monkey, suzanne
+from window import key, open_tab, press, reset, screenshot, xdotool
+
+
+def test_save_report_by_mouse():
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"  # in this window
+    yield from reset(monkey)
+    yield from open_tab()
+    yield from press("tolvol.decimate")
+    yield from finished(lambda: len(suzanne().data.polygons) < 1000)
+    yield 1.0
+    home = os.environ["HOME"]
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["HOME"] = folder
+        try:
+            yield from press("tolvol.save_report")
+            yield 1.0
+            screenshot("14 file browser")
+            xdotool("mousemove", 640, 400)
+            yield
+            key("Return")
+            saved = Path(folder) / "Suzanne deviation.html"
+            yield from finished(saved.is_file)
+            yield 1.0
+            screenshot("15 saved")
+            assert "Suzanne from its reference" in saved.read_text()
+        finally:
+            os.environ["HOME"] = home
