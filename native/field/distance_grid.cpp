@@ -45,8 +45,7 @@ DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double>
   if (l.bytes() > kGridBudget) {
     std::ostringstream text;
     text << "a precision of " << *precision << " needs a grid of " << l.bytes() / (1 << 20) << " MB, the limit is "
-         << (kGridBudget >> 20) << " MB; precision " << precision_that_fits(box, tolerance, kFinestPrecision)
-         << " fits";
+         << (kGridBudget >> 20) << " MB; precision " << precision_that_fits(box, tolerance, *precision) << " fits";
     throw ResourceLimit(text.str());
   }
   DistanceGrid grid;
