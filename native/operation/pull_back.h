@@ -95,11 +95,13 @@ class PullBack {
     return std::span(ring_).subspan(ring_start_[vertex], ring_start_[vertex + 1] - ring_start_[vertex]);
   }
   void make_rings(std::size_t vertex_count);
+  bool is_own(std::uint32_t face) const;
   double distance_of(const glm::dvec3& at) const;
   double reach_by_motion(std::uint32_t face) const;
   template <class Bound>
   double over_triangulations(std::uint32_t face, Bound&& bound) const;
   double reach_by_certificate(std::uint32_t face) const;
+  void measure(std::span<const std::uint32_t> faces, Progress* progress);
   std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Progress* progress);
   std::vector<std::uint32_t> faces_around(std::span<const std::uint32_t> vertices);
 
