@@ -31,7 +31,7 @@ constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 constexpr double kEasy = 0.98, kComfort = 0.97;
 constexpr double kGuess = 0.7;           // of the provable distance: up to here the grid's guess of a distance does
 constexpr double kRise = 1.0 / 64;       // what no factor can rise by in the end
-constexpr double kShrink = 0.75;         // of a factor, in each round in which a face of the vertex fails
+constexpr double kShrink = 0.5;          // of a factor, in each round in which a face of the vertex fails
 constexpr int kCrossings = 8;            // tries to find where a vertex leaves the volume; a plane takes one
 constexpr double kClose = 0.002;         // of the provable distance: near enough to that place
 constexpr double kInflate = 0x1p-50;     // rounding of a step's length and of adding it, relative
@@ -331,7 +331,7 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
     std::vector<Held> held = hold(moving, before, after, std::move(failed), progress);
     if (mode != Mode::reset) {
       pull(held, progress);
-      let_go(held, mode, progress);
+      if (mode != Mode::halve) let_go(held, mode, progress);
     }
     for (const Held& h : held) {
       const auto place = std::lower_bound(vertices.begin(), vertices.end(), h.vertex) - vertices.begin();

@@ -23,6 +23,7 @@ class PullBack {
   enum class Mode {
     pull_back,  ///< as far as the tolerance lets each vertex go: none can rise by 1/64 of its motion alone
     settle,     ///< the same but for the last 3 % of the tolerance, which take most of the time
+    halve,      ///< factors are halved until all faces are inside: quick, for steps that are repeated
     reset,      ///< all the way back or not at all, the one step back of [Botsch04, §5]
   };
 
