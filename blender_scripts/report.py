@@ -11,6 +11,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 try:
     import command_line as cli
+    import pictures
     from addon import deviation, file_io, report, volume
 except ImportError as error:  # left alone, Blender would end with exit code 0
     print(f"report.py: Blender's Python lacks something: {error}; install Debian's python3-numpy", file=sys.stderr)
@@ -56,6 +57,11 @@ def arguments():
         metavar="FILE",
         help=f"write it there, as the extension says: {' '.join(deviation.EXTENSIONS)}; may be given more than once",
     )
+    parser.add_argument(
+        "--picture",
+        metavar="FILE.png",
+        help="draw A there, coloured by its distance to B up to the tolerance; needs OpenGL",
+    )
     parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
     return parser.parse()
 
@@ -65,6 +71,8 @@ def main(options):
         file_io.extension_of(path)
     for path in options.report:
         cli.require_folder(path, "--report")
+    if options.picture:
+        pictures.require("--picture", options.picture)
     surfaces, files = [], []
     for path in (options.a, options.b):
         found = file_io.read_file(path)
@@ -77,12 +85,43 @@ def main(options):
     result |= {"a": files[0], "b": files[1]}
     for way, label in (("forward", "A from B"), ("backward", "B from A")):
         print(_line(result[way], label, size))
+    drawn = _pictures(options, surfaces, result)
     for path in options.report:
         try:
-            deviation.save(result, path)
+            deviation.save(result, path, drawn)
         except OSError as error:
             raise cli.Stop(f"--report {path}: {error.strerror}") from None
+    if options.picture:
+        try:
+            Path(options.picture).write_bytes(drawn[0][1])
+        except OSError as error:
+            raise cli.Stop(f"--picture {options.picture}: {error.strerror}") from None
     return 0
+
+
+def _pictures(options, surfaces, result):
+    """(caption, PNG) pairs of A from B and B from A, as far as something needs them and they can be drawn."""
+    pages = [path for path in options.report if Path(path).suffix.lower() == ".html"]
+    reason = pictures.missing() if pages else None
+    if reason:
+        print(f"note: no pictures in {pages[0]}: {reason}")
+        return ()
+    if not (pages or options.picture):
+        return ()
+    # Without a tolerance the colours end at the largest distance, short of which nothing can be told apart either.
+    largest = max(result[way]["largest"][1] for way in ("forward", "backward"))
+    tolerance = result["tolerance"]["absolute"] if result["tolerance"] else max(largest, 1e-6 * result["size"])
+    a, b = ((surface.world(), surface.arrays.triangles) for surface in surfaces)
+    wanted = [(options.a, options.b, a, b)]
+    if pages:
+        wanted.append((options.b, options.a, b, a))
+    return [
+        (
+            f"{Path(path).name} coloured by its distance to {Path(other_path).name}",
+            pictures.deviation(surface, other, tolerance, result["size"], path, options.threads),
+        )
+        for path, other_path, surface, other in wanted
+    ]
 
 
 def _line(way, label, size):

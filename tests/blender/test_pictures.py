@@ -44,6 +44,26 @@ def test_decimate_draws_its_result(scan, tmp_path):
     assert len(np.unique(drawn.reshape(-1, 4), axis=0)) > 1000
 
 
+def test_a_report_shows_what_is_outside(scan, tmp_path):
+    succeeded(decimate(scan, tmp_path / "out.ply", "--tolerance", "2%"))
+    picture, page = tmp_path / "picture.png", tmp_path / "page.html"
+    for tolerance, outside in (("3%", False), ("0.5%", True)):
+        options = "--tolerance", tolerance, "--picture", picture, "--report", page
+        code, out, error = command("report.py", tmp_path / "out.ply", scan, *options)
+        assert (code, error) == (0, "") and "note" not in out
+        assert (marked(pixels(picture)) > 100) == outside
+        assert page.read_text().count("data:image/png;base64,") == 2
+    assert command("report.py", tmp_path / "out.ply", scan, "--picture", picture)[0] == 0
+    assert marked(pixels(picture)) == 0  # without a tolerance the colours reach as far as the surface does
+
+
+def test_a_page_without_gl_says_what_it_lacks(scan, tmp_path):
+    hidden = "import os; os.environ['__EGL_VENDOR_LIBRARY_FILENAMES'] = '/dev/null'"
+    code, out, _ = command("report.py", scan, scan, "--report", tmp_path / "page.html", before=hidden)
+    assert code == 0 and "note: no pictures in" in out and "GL unavailable: " in out
+    assert "data:image/png" not in (tmp_path / "page.html").read_text()
+
+
 def test_a_picture_needs_a_folder_and_a_png(scan, tmp_path):
     for name, said in (("nowhere/a.png", "does not exist"), ("a.jpg", ".png")):
         code, _, error = decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", "--picture", tmp_path / name)
