@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "bind_permission_grid.h"
-
-#include "permission_grid.h"
+#include "baselines/module.h"
+#include "baselines/permission_grid.h"
 #include "python/arrays.h"
 
 namespace tolvol::baselines {

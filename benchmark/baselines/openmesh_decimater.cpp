@@ -5,20 +5,21 @@
 #include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 #include <chrono>
 
-#include "bind_permission_grid.h"
+#include "baselines/module.h"
 #include "python/arrays.h"
 
+namespace tolvol::baselines {
 namespace {
 
 namespace py = pybind11;
 using Mesh = OpenMesh::TriMesh_ArrayKernelT<>;
 
 py::tuple decimate_openmesh(const py::object& vertices, const py::object& triangles, std::size_t target_triangles) {
-  const auto v = tolvol::python::to_vertices(vertices, "vertices").values;
+  const auto v = python::to_vertices(vertices, "vertices").values;
   Mesh mesh;
   const auto start = std::chrono::steady_clock::now();
   for (const glm::dvec3& p : v) mesh.add_vertex(Mesh::Point(glm::vec3(p).x, glm::vec3(p).y, glm::vec3(p).z));
-  for (const glm::uvec3& t : tolvol::python::to_triangles(triangles, "triangles")) {
+  for (const glm::uvec3& t : python::to_triangles(triangles, "triangles")) {
     mesh.add_face(mesh.vertex_handle(t.x), mesh.vertex_handle(t.y), mesh.vertex_handle(t.z));
   }
   OpenMesh::Decimater::DecimaterT<Mesh> decimater(mesh);
@@ -40,16 +41,15 @@ py::tuple decimate_openmesh(const py::object& vertices, const py::object& triang
     for (const auto handle : mesh.fv_range(face)) t[k++] = static_cast<unsigned>(handle.idx());
     faces.push_back(t);
   }
-  return py::make_tuple(tolvol::python::from_vertices(points, tolvol::Storage::float32),
-                        tolvol::python::from_triangles(faces), seconds);
+  return py::make_tuple(python::from_vertices(points, Storage::float32), python::from_triangles(faces), seconds);
 }
 
 }  // namespace
 
-PYBIND11_MODULE(tolvol_baselines, module) {
-  module.doc() = "Rival methods in the same process, for benchmarks only.";
+void bind_openmesh(py::module_& module) {
   module.def("decimate_openmesh", &decimate_openmesh, py::arg("vertices"), py::arg("triangles"),
              py::arg("target_triangles"),
              "(vertices float32, triangles, seconds) by OpenMesh's DecimaterT with ModQuadricT.");
-  tolvol::baselines::bind_permission_grid(module);
 }
+
+}  // namespace tolvol::baselines

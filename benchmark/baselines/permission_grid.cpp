@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // After [Zelinka and Garland 2002], with the exact distance of each cell's centre where they rasterise the volume.
-#include "permission_grid.h"
+#include "baselines/permission_grid.h"
 
 #include <algorithm>
 #include <cmath>

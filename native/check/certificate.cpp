@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 
+#include "reference/closest_point.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
 
@@ -48,6 +49,13 @@ double TriangleCertificate::distance_bound(const glm::dvec3& p) const {
   double d2[4];
   witness_distances((*reference_)[triangle], points, d2);
   return std::sqrt(d2[0]);
+}
+
+std::optional<glm::dvec3> TriangleCertificate::near(const glm::dvec3& p) const {
+  const std::uint32_t triangle = grid_->triangle_near(p);
+  if (triangle == DistanceGrid::kNone) return std::nullopt;
+  const WitnessTriangle& t = (*reference_)[triangle];
+  return closest_point(p, t.a, t.a + t.ab, t.a + t.ac).point;
 }
 
 template <bool kProve>

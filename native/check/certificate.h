@@ -7,6 +7,8 @@
 /// interpolation, and holds at any precision. Pieces that no single triangle covers are split.
 #pragma once
 
+#include <optional>
+
 #include "check/tolerance_check.h"
 #include "check/witness.h"
 
@@ -48,6 +50,9 @@ class TriangleCertificate {
   /// An upper bound on the distance of p to the reference, from the grid's guess, or from a search where the grid has
   /// none; infinity when p is not within().
   double distance_bound(const glm::dvec3& p) const;
+
+  /// A point of the reference near p: the nearest of the triangle that the grid proposes there.
+  std::optional<glm::dvec3> near(const glm::dvec3& p) const;
 
   double within() const { return within_; }
 

@@ -91,11 +91,11 @@ void Coverage::own(std::uint32_t element, std::uint32_t triangle) {
 bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids,
                       double provable, std::vector<std::uint32_t>& nearest) {
   bool all = true;
-  stack_.assign(1, {triangle, 0, 0, 0, false, kNone});
+  std::vector<Piece> stack{{triangle, 0, 0, 0, false, kNone}};
   std::uint32_t hint = Hierarchy::kNone;
-  while (!stack_.empty()) {
-    const Piece piece = stack_.back();
-    stack_.pop_back();
+  while (!stack.empty()) {
+    const Piece piece = stack.back();
+    stack.pop_back();
     glm::dvec3 c[3];
     corners(piece, c);
     const Hierarchy::Common common = hierarchy.common(c, provable, -1, hint);
@@ -119,88 +119,100 @@ bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::s
       nearest.push_back(closest.triangle);
       all = false;
     } else {
-      split(piece, stack_);
+      split(piece, stack);
     }
   }
   return all;
 }
 
-bool Coverage::place(const Piece& whole, std::uint32_t first) {
-  stack_.assign(1, whole);
-  while (!stack_.empty()) {
-    if (stack_.size() > 1 && ++looked_ > kBudget) return false;
-    const Piece piece = stack_.back();
-    stack_.pop_back();
+void Coverage::sample(std::uint32_t element, std::size_t stride, std::vector<Sample>& out) const {
+  std::size_t skip = 0;
+  for (std::uint32_t p = lists_[element].head; p != kNone; p = pool_[p].next) {
+    if (skip-- > 0) continue;
+    skip = stride - 1;
+    glm::dvec3 c[3];
+    corners(pool_[p], c);
+    out.push_back({(c[0] + c[1] + c[2]) * (1.0 / 3), 0.5 * glm::length(glm::cross(c[1] - c[0], c[2] - c[0]))});
+  }
+}
+
+bool Coverage::place(const Piece& whole, std::uint32_t first, Trial& trial) const {
+  trial.stack_.assign(1, whole);
+  while (!trial.stack_.empty()) {
+    if (trial.stack_.size() > 1 && ++trial.looked_ > kBudget) return false;
+    const Piece piece = trial.stack_.back();
+    trial.stack_.pop_back();
     glm::dvec3 c[3];
     corners(piece, c);
     const FourPoints points = with_centre(c);
     double centre2 = std::numeric_limits<double>::infinity();
     const auto covered_by = [&](std::uint32_t i) {
       double d2[4];
-      witness_distances(candidates_[i].witness, points, d2);
+      witness_distances(trial.candidates_[i].witness, points, d2);
       const double farthest2 = std::max({d2[0], d2[1], d2[2]});
       centre2 = std::min(centre2, d2[3]);
       if (!(farthest2 <= within2_)) return false;
-      candidates_[i].distance = std::max(candidates_[i].distance, std::sqrt(farthest2));
-      moved_.push_back({piece, i});
-      last_ = i;
+      trial.candidates_[i].distance = std::max(trial.candidates_[i].distance, std::sqrt(farthest2));
+      trial.moved_.push_back({piece, i});
+      trial.last_ = i;
       return true;
     };
     // The element that took the last piece is as likely as the one that follows from the change.
-    const std::uint32_t second = last_;
+    const std::uint32_t second = trial.last_;
     if (covered_by(first) || (second != first && covered_by(second))) continue;
     bool covered = false;
-    for (std::uint32_t i = 0; i < candidates_.size() && !covered; ++i) {
+    for (std::uint32_t i = 0; i < trial.candidates_.size() && !covered; ++i) {
       if (i != first && i != second) covered = covered_by(i);
     }
     if (covered) continue;
     if (!(centre2 <= within2_) || longest_squared(c) <= kFloor * kFloor * within2_ || piece.level == kDeepest) {
       return false;
     }
-    split(piece, stack_);
+    split(piece, trial.stack_);
   }
   return true;
 }
 
-bool Coverage::try_change(std::span<const Element> elements, std::span<const Removed> removed) {
-  candidates_.clear();
-  heirlooms_.clear();
-  moved_.clear();
-  last_ = 0;
-  looked_ = 0;
+bool Coverage::try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial) const {
+  trial.candidates_.clear();
+  trial.heirlooms_.clear();
+  trial.moved_.clear();
+  trial.last_ = 0;
+  trial.looked_ = 0;
   bool settled = true;
   for (const Element& e : elements) {
     const List& list = lists_[e.id];
     const double distance = list.head == kNone ? 0 : list.distance + e.moved;
     const bool keeps = distance <= within_;
     settled &= keeps;
-    candidates_.push_back({e.id, {}, keeps ? distance : 0, !keeps});
+    trial.candidates_.push_back({e.id, {}, keeps ? distance : 0, !keeps});
   }
   for (const Removed& r : removed) {
     const List& list = lists_[r.id];
     const double distance = list.distance + r.moved;
     const bool whole = list.head == kNone || distance <= within_;
     settled &= whole;
-    if (whole && list.head != kNone) candidates_[r.heir].distance = std::max(candidates_[r.heir].distance, distance);
-    heirlooms_.push_back({r.id, r.heir, whole});
+    if (whole && list.head != kNone)
+      trial.candidates_[r.heir].distance = std::max(trial.candidates_[r.heir].distance, distance);
+    trial.heirlooms_.push_back({r.id, r.heir, whole});
   }
   if (settled) return true;
   for (std::size_t i = 0; i < elements.size(); ++i) {
-    candidates_[i].witness = {elements[i].corners[0], elements[i].corners[1], elements[i].corners[2]};
+    trial.candidates_[i].witness = {elements[i].corners[0], elements[i].corners[1], elements[i].corners[2]};
   }
   // What loses its element is the likeliest to fail.
-  for (const Heirloom& h : heirlooms_) {
+  for (const Trial::Heirloom& h : trial.heirlooms_) {
     if (h.whole) continue;
     for (std::uint32_t p = lists_[h.id].head; p != kNone; p = pool_[p].next) {
-      if (!place(pool_[p], h.heir)) return false;
+      if (!place(pool_[p], h.heir, trial)) return false;
     }
   }
-  for (std::uint32_t k = 0; k < candidates_.size(); ++k) {
-    const std::uint32_t i = (suspect_ + k) % static_cast<std::uint32_t>(candidates_.size());
-    if (!candidates_[i].replaced) continue;
-    for (std::uint32_t p = lists_[candidates_[i].id].head; p != kNone; p = pool_[p].next) {
-      if (!place(pool_[p], i)) {
-        suspect_ = i;
+  for (std::uint32_t k = 0; k < trial.candidates_.size(); ++k) {
+    const std::uint32_t i = (trial.suspect_ + k) % static_cast<std::uint32_t>(trial.candidates_.size());
+    if (!trial.candidates_[i].replaced) continue;
+    for (std::uint32_t p = lists_[trial.candidates_[i].id].head; p != kNone; p = pool_[p].next) {
+      if (!place(pool_[p], i, trial)) {
+        trial.suspect_ = i;
         return false;
       }
     }
@@ -208,23 +220,23 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   return true;
 }
 
-void Coverage::commit() {
-  for (const Heirloom& h : heirlooms_) {
+void Coverage::commit(const Trial& trial) {
+  for (const Trial::Heirloom& h : trial.heirlooms_) {
     if (!h.whole) free(lists_[h.id]);
   }
-  for (const Candidate& c : candidates_) {
+  for (const Trial::Candidate& c : trial.candidates_) {
     if (c.replaced) free(lists_[c.id]);
     lists_[c.id].distance = c.distance;
   }
-  for (const Heirloom& h : heirlooms_) {
-    List &from = lists_[h.id], &to = lists_[candidates_[h.heir].id];
+  for (const Trial::Heirloom& h : trial.heirlooms_) {
+    List &from = lists_[h.id], &to = lists_[trial.candidates_[h.heir].id];
     if (!h.whole || from.head == kNone) continue;
     pool_[from.tail].next = to.head;
     if (to.head == kNone) to.tail = from.tail;
     to.head = from.head;
     from.head = from.tail = kNone;
   }
-  for (const Moved& m : moved_) push(lists_[candidates_[m.element].id], m.piece);
+  for (const Moved& m : trial.moved_) push(lists_[trial.candidates_[m.element].id], m.piece);
 }
 
 }  // namespace tolvol

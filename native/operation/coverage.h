@@ -48,10 +48,19 @@ class Coverage {
   bool assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids, double provable,
               std::vector<std::uint32_t>& nearest);
 
-  /// Whether all pieces of the elements named have witnesses among `elements`. Nothing changes until commit().
-  bool try_change(std::span<const Element> elements, std::span<const Removed> removed);
-  /// Carries out the last change tried, which must have succeeded.
-  void commit();
+  /// Points that stand for the pieces of an element, every `stride`-th of them.
+  struct Sample {
+    glm::dvec3 point;
+    double area;
+  };
+  void sample(std::uint32_t element, std::size_t stride, std::vector<Sample>& out) const;
+
+  class Trial;
+  /// Whether all pieces of the elements named have witnesses among `elements`; only reads. Nothing changes until
+  /// commit().
+  bool try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial) const;
+  /// Carries out the last change tried, which must have succeeded on this state.
+  void commit(const Trial& trial);
 
  private:
   struct Piece {
@@ -72,7 +81,7 @@ class Coverage {
 
   void corners(const Piece& piece, glm::dvec3 (&out)[3]) const;
   static void split(const Piece& piece, std::vector<Piece>& out);
-  bool place(const Piece& whole, std::uint32_t first);
+  bool place(const Piece& whole, std::uint32_t first, Trial& trial) const;
   void push(List& list, const Piece& piece);
   void free(List& list);
 
@@ -81,19 +90,27 @@ class Coverage {
   std::vector<List> lists_;
   std::vector<Piece> pool_;
   std::uint32_t free_ = kNone;
+};
 
-  // The change under trial.
+/// What a try found, and its scratch; one a thread.
+class Coverage::Trial {
+ public:
+  /// Starts a series of tries around one place: what they find depends on nothing before.
+  void begin() { suspect_ = 0; }
+
+ private:
+  friend class Coverage;
   struct Candidate {
     std::uint32_t id;
     WitnessTriangle witness;
     double distance;
     bool replaced;  ///< its own pieces were looked at one by one
   };
-  std::vector<Candidate> candidates_;
   struct Heirloom {
     std::uint32_t id, heir;
     bool whole;  ///< passed on as it is
   };
+  std::vector<Candidate> candidates_;
   std::vector<Heirloom> heirlooms_;
   std::vector<Moved> moved_;
   std::vector<Piece> stack_;

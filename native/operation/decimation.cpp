@@ -4,6 +4,7 @@
 #include "operation/decimation.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <sstream>
 #include <unordered_map>
@@ -13,6 +14,7 @@
 #include "operation/collapse_loop.h"
 #include "operation/input.h"
 #include "operation/manifold_cut.h"
+#include "operation/refinement.h"
 #include "operation/wedges.h"
 #include "reference/errors.h"
 
@@ -21,10 +23,6 @@ namespace {
 
 constexpr std::uint32_t kNone = CutMesh::kNone;
 
-/// What the loop leaves of the tolerance unused, so that an independent measure, with rounding of its own, proves the
-/// result in finite time. Costs no triangles to speak of.
-constexpr double kHeadroom = 1e-4;
-
 class Decimation {
  public:
   Decimation(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const Placement& placement,
@@ -32,6 +30,7 @@ class Decimation {
       : vertices_(vertices), triangles_(triangles), volume_(volume), options_(options), placement_(placement) {
     validate(vertices, triangles);
     if (!volume && options.target_triangles == 0) throw InvalidInput("without a volume a target is needed");
+    if (!volume && options.rival) throw InvalidInput("without a volume there is no tolerance for a rival to keep");
     if (!options.locked.empty() && options.locked.size() != vertices.size()) {
       throw InvalidInput("locked must have one value for each vertex");
     }
@@ -52,20 +51,30 @@ class Decimation {
         })) {
       throw InvalidInput("all faces are degenerate (segments or points): there is no surface to decimate");
     }
-    CollapseBounds bounds;
+    Bounds bounds;
     if (volume_) bounds = set_bounds();
-    CollapseLoop loop(loop_input(), bounds);
+    BoundedMesh mesh(mesh_input(), bounds);
     const std::size_t apart = cut_.aside.size();
-    loop.run(options_.target_triangles > apart ? options_.target_triangles - apart : 0, options_.progress);
+    const std::size_t target = options_.target_triangles > apart ? options_.target_triangles - apart : 0;
+    CollapseLoop(mesh).run(target, options_.progress);
+    if (volume_ && !options_.rival && options_.effort == DecimationOptions::Effort::thorough) {
+      Refinement(mesh).run(
+          target, [&] { return result_.stopped_at_time = out_of_time(); }, options_.progress);
+    }
     result_.stopped_at_target =
-        options_.target_triangles > 0 && loop.triangle_count() + apart <= options_.target_triangles;
-    write(loop);
-    take_attributes(loop);
+        options_.target_triangles > 0 && mesh.triangle_count() + apart <= options_.target_triangles;
+    write(mesh);
+    take_attributes(mesh);
     report();
     return std::move(result_);
   }
 
  private:
+  bool out_of_time() const {
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start_;
+    return options_.max_seconds > 0 && spent.count() > options_.max_seconds;
+  }
+
   Frame own_frame() const {
     Box world;
     for (const glm::dvec3& p : vertices_) world.add(placement_.world(p));
@@ -96,7 +105,7 @@ class Decimation {
     return true;
   }
 
-  CollapseBounds set_bounds() {
+  Bounds set_bounds() {
     std::vector<glm::dvec3> used;
     for (const std::uint32_t i : cut_.vertex_input) used.push_back(vertices_[i]);
     if (const auto warning = storage_warning(*volume_, placement_, used)) result_.warnings.push_back(*warning);
@@ -108,12 +117,18 @@ class Decimation {
     }
     const double mapping_error = placement_.mapping_error(used);
     const double provable = volume_->provable(mapping_error), within = provable * (1 - kHeadroom);
+    Bounds bounds;
+    if (options_.rival) {
+      options_.rival->begin({positions_, cut_.triangles}, mapping_error);
+      result_.method = options_.rival->method(), result_.renderer = options_.rival->renderer();
+      bounds.rival = options_.rival;
+      return bounds;
+    }
     const Certificate certificate(*volume_);
     result_.method = certificate.method(), result_.renderer = certificate.renderer();
     identical_ = input_is_reference();
     if (!identical_) certify_input(certificate, mapping_error);
 
-    CollapseBounds bounds;
     forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within,
                      volume_->refutable(mapping_error));
     bounds.forward = &*forward_;
@@ -195,8 +210,8 @@ class Decimation {
     }
   }
 
-  CollapseInput loop_input() {
-    CollapseInput input;
+  BoundedMeshInput mesh_input() {
+    BoundedMeshInput input;
     input.triangles = cut_.triangles;
     for (std::size_t v = 0; v < positions_.size(); ++v)
       input.spots.push_back({vertices_[cut_.vertex_input[v]], positions_[v]});
@@ -228,26 +243,33 @@ class Decimation {
 
   /// The input corner, as 3 * triangle + corner, of a corner of the cut mesh.
   std::uint32_t input_corner(std::uint32_t triangle, int corner) const {
-    const int k = cut_.reversed[triangle] && corner != 0 ? 3 - corner : corner;
-    return 3 * cut_.triangle_input[triangle] + static_cast<std::uint32_t>(k);
+    return 3 * cut_.triangle_input[triangle] + static_cast<std::uint32_t>(own_corner(triangle, corner));
+  }
+  /// The other way around it is the same.
+  int own_corner(std::uint32_t triangle, int corner) const {
+    return cut_.reversed[triangle] && corner != 0 ? 3 - corner : corner;
   }
 
-  void write(const CollapseLoop& loop) {
+  void write(const BoundedMesh& mesh) {
     // Result vertices in the order of the input vertices that they continue.
     std::vector<std::uint32_t> order;
     std::vector<std::uint32_t> used(positions_.size(), kNone);
-    const auto slot = [&](std::uint32_t v) { return cut_.output_slot[loop.survivor(v)]; };
+    const auto slot = [&](std::uint32_t v) { return cut_.output_slot[mesh.survivor(v)]; };
+    // Corner k of a result triangle, in the order of the input triangle that it continues.
+    const auto corner = [&](std::uint32_t input, std::uint32_t t, int k) {
+      return slot(t == kNone ? cut_.input_vertex[triangles_[input][k]] : mesh.triangle(t)[own_corner(t, k)]);
+    };
     const auto use = [&](std::uint32_t s) {
       if (used[s] == kNone) used[s] = 0, order.push_back(s);
     };
     std::vector<std::pair<std::uint32_t, std::uint32_t>> kept;  // (input triangle, triangle of the cut mesh or kNone)
     for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
-      if (loop.alive(t)) kept.emplace_back(cut_.triangle_input[t], t);
+      if (mesh.alive(t)) kept.emplace_back(cut_.triangle_input[t], t);
     }
     for (const std::uint32_t i : cut_.aside) kept.emplace_back(i, kNone);
     std::sort(kept.begin(), kept.end());
     for (const auto& [input, t] : kept) {
-      for (int k = 0; k < 3; ++k) use(slot(cut_.input_vertex[triangles_[input][k]]));
+      for (int k = 0; k < 3; ++k) use(corner(input, t, k));
     }
     std::sort(order.begin(), order.end(),
               [&](std::uint32_t a, std::uint32_t b) { return cut_.vertex_input[a] < cut_.vertex_input[b]; });
@@ -256,11 +278,11 @@ class Decimation {
       used[v] = i;
       const std::uint32_t source = cut_.vertex_input[v];
       result_.vertex_source.push_back(source);
-      result_.vertices.push_back(loop.stored(v));
+      result_.vertices.push_back(mesh.stored(v));
     }
     for (const auto& [input, t] : kept) {
       glm::uvec3 triangle;
-      for (int k = 0; k < 3; ++k) triangle[k] = used[slot(cut_.input_vertex[triangles_[input][k]])];
+      for (int k = 0; k < 3; ++k) triangle[k] = used[corner(input, t, k)];
       result_.triangles.push_back(triangle);
       result_.triangle_source.push_back(input);
       kept_.push_back(t);
@@ -272,7 +294,7 @@ class Decimation {
     }
   }
 
-  void take_attributes(const CollapseLoop& loop) {
+  void take_attributes(const BoundedMesh& mesh) {
     const glm::dmat3 unit(1);
     std::vector<std::uint32_t> any_corner(positions_.size(), kNone);
     for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
@@ -289,10 +311,10 @@ class Decimation {
       glm::dmat3 weights = unit;
       for (int k = 0; k < 3 && kept_[i] != kNone; ++k) {
         const std::uint32_t t = kept_[i];
-        const int corner = cut_.reversed[t] && k != 0 ? 3 - k : k;
-        const std::uint32_t v = loop.survivor(cut_.triangles[t][corner]);
-        if (!loop.moved(v)) {
-          const std::uint32_t source = islands_.empty() ? any_corner[v] : loop.corner_source(t, corner);
+        const int corner = own_corner(t, k);
+        const std::uint32_t v = mesh.triangle(t)[corner];
+        if (!mesh.moved(v)) {
+          const std::uint32_t source = islands_.empty() ? any_corner[v] : mesh.corner_source(t, corner);
           const std::uint32_t original = input_corner(source / 3, static_cast<int>(source % 3));
           triangle[k] = original / 3;
           weights[k] = unit[static_cast<int>(original % 3)];
@@ -300,7 +322,7 @@ class Decimation {
         }
         if (!hierarchy) hierarchy = &own.emplace(input);
         const Hierarchy::Nearest nearest = hierarchy->nearest_if(
-            loop.position(v), [&](std::uint32_t other) { return islands_.empty() || islands_[other] == islands_[t]; });
+            mesh.position(v), [&](std::uint32_t other) { return islands_.empty() || islands_[other] == islands_[t]; });
         triangle[k] = cut_.triangle_input[nearest.triangle];
         weights[k] = nearest.weights;
         if (cut_.reversed[nearest.triangle]) std::swap(weights[k].y, weights[k].z);
@@ -333,6 +355,7 @@ class Decimation {
   std::span<const glm::uvec3> triangles_;
   const ToleranceVolume* volume_;
   const DecimationOptions& options_;
+  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   Placement placement_;
 
   CutMesh cut_;

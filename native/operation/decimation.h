@@ -11,21 +11,26 @@
 #include <vector>
 
 #include "check/tolerance_volume.h"
+#include "operation/ring_check.h"
 
 namespace tolvol {
 
 struct DecimationOptions {
   enum class Vertices { optimal, subset };
   enum class Outside { error, keep };
+  enum class Effort { fast, thorough };
 
   Vertices vertices =
       Vertices::optimal;              ///< optimal: fewest triangles; subset: every surviving vertex is an original one
   bool two_sided = true;              ///< also keep the whole reference within the tolerance of the result
+  Effort effort = Effort::fast;       ///< thorough: then moves vertices and flips edges to collapse more
+  double max_seconds = 0;             ///< thorough stops there with what it has; 0: no limit
   std::size_t target_triangles = 0;   ///< stop at this many; 0: as few as the tolerance allows
   std::span<const bool> locked = {};  ///< per input vertex, may be empty: neither moves nor vanishes
   Outside outside = Outside::error;   ///< what to do with input faces that are not within the tolerance
   std::span<const std::uint32_t> wedges = {};  ///< per input corner, may be empty: see wedge_labels()
-  unsigned threads = 0;                        ///< 0: one per core; never changes the result
+  RingCheck* rival = nullptr;  ///< for comparisons: decides in place of all that is certified; nothing is promised
+  unsigned threads = 0;        ///< 0: one per core; never changes the result
   Progress* progress = nullptr;
 };
 
@@ -44,6 +49,7 @@ struct DecimationResult {
   std::vector<glm::uvec3> source_triangle;     ///< per result corner: the input triangle whose attributes it takes, ...
   std::vector<glm::dmat3> source_weights;      ///< ... and the barycentric weights there, a column a corner
   bool stopped_at_target = false;
+  bool stopped_at_time = false;
   std::string method, renderer;  ///< of the check that bounded it; empty without a volume
   std::vector<Repair> repairs;
   std::map<std::string, std::size_t> locked;  ///< vertices that could not move, by cause

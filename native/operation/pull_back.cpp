@@ -25,9 +25,6 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
-/// What is left of the tolerance unused, so that an independent measure, with rounding of its own, proves the result in
-/// finite time.
-constexpr double kHeadroom = 1e-4;
 /// Shares of the provable distance. What is nearer than kEasy is proved by the certificate whatever its shape: its
 /// pieces become smaller than the rest. Vertices are first put at kComfort, where pieces of a quarter of the tolerance
 /// do.

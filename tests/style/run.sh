@@ -36,7 +36,7 @@ licence() {
 }
 
 clang_format() {
-  find native benchmark tests/native \( -name '*.h' -o -name '*.hh' -o -name '*.cpp' \) -print0 |
+  find native benchmark examples tests/native \( -name '*.h' -o -name '*.hh' -o -name '*.cpp' \) -print0 |
     xargs -0 clang-format --dry-run -Werror
 }
 

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The product's decimation with another method deciding about the collapses.
+#include <pybind11/stl.h>
+
+#include <chrono>
+#include <memory>
+#include <optional>
+
+#include "baselines/checked_ring.h"
+#include "baselines/module.h"
+#include "baselines/permission_ring.h"
+#include "baselines/vertex_samples.h"
+#include "check/certificate.h"
+#include "operation/decimation.h"
+#include "python/arrays.h"
+#include "reference/errors.h"
+
+namespace tolvol::baselines {
+namespace {
+
+namespace py = pybind11;
+using Seconds = std::chrono::duration<double>;
+
+constexpr double kPermissionPrecision = 4;           // what Zelinka and Garland recommend
+constexpr std::optional<double> kCoarse = 1.0 / 16;  // of a volume that nobody asks
+
+/// A rival and what it needs, built within a time of its own.
+struct Rival {
+  std::unique_ptr<PermissionGrid> grid;
+  std::unique_ptr<ToleranceCheck> check;
+  std::unique_ptr<RingCheck> ring;
+  std::size_t memory = 0;  ///< bytes of the grid it asks
+};
+
+Rival make_rival(const std::string& method, const ToleranceVolume& volume, std::optional<double> precision,
+                 unsigned threads) {
+  Rival rival;
+  if (method == "permission_grid") {
+    rival.grid = std::make_unique<PermissionGrid>(volume.reference(), volume.frame_tolerance(),
+                                                  precision.value_or(kPermissionPrecision), threads);
+    rival.ring = std::make_unique<PermissionRing>(*rival.grid);
+    rival.memory = rival.grid->memory();
+  } else if (method == "vertex_samples") {
+    rival.ring = std::make_unique<VertexSamples>(volume.frame_tolerance());
+  } else if (method == "certificate") {
+    rival.check = std::make_unique<Certificate>(volume);
+  } else {
+    throw InvalidInput("there is no method \"" + method + "\"");
+  }
+  if (rival.check) {
+    rival.ring = std::make_unique<CheckedRing>(*rival.check);
+    rival.memory = volume.grid().memory();
+  }
+  return rival;
+}
+
+py::tuple decimate_by(const py::object& vertices, const py::object& triangles, double tolerance,
+                      const std::string& method, std::optional<double> precision, const std::string& placement,
+                      int threads) {
+  const python::Vertices v = python::to_vertices(vertices, "vertices");
+  const std::vector<glm::uvec3> t = python::to_triangles(triangles, "triangles");
+  if (placement != "optimal" && placement != "subset")
+    throw InvalidInput("placement must be \"optimal\" or \"subset\"");
+  DecimationOptions options;
+  if (placement == "subset") options.vertices = DecimationOptions::Vertices::subset;
+  options.threads = python::to_threads(threads);
+  const Placement placed(glm::dmat4(1), v.storage);
+  DecimationResult result;
+  Seconds field, decimation;
+  std::size_t memory = 0;
+  {
+    const py::gil_scoped_release release;
+    // A rival that does not ask the volume does not wait for it: only its frame is used.
+    const bool asks_volume = method != "permission_grid" && method != "vertex_samples";
+    auto start = std::chrono::steady_clock::now();
+    const ToleranceVolume volume(v.values, t, placed, tolerance,
+                                 {asks_volume ? precision : kCoarse, options.threads, nullptr});
+    if (!asks_volume) start = std::chrono::steady_clock::now();
+    const Rival rival = make_rival(method, volume, precision, options.threads);
+    const auto built = std::chrono::steady_clock::now();
+    options.rival = rival.ring.get();
+    result = decimate(v.values, t, placed, &volume, options);
+    field = built - start, decimation = std::chrono::steady_clock::now() - built;
+    memory = rival.memory;
+  }
+  py::dict report;
+  report["method"] = result.method, report["renderer"] = result.renderer;
+  report["field_seconds"] = field.count(), report["seconds"] = decimation.count();
+  report["memory"] = memory;
+  return py::make_tuple(python::from_vertices(result.vertices, v.storage), python::from_triangles(result.triangles),
+                        report);
+}
+
+}  // namespace
+
+void bind_decimation(py::module_& module) {
+  module.def("decimate", &decimate_by, py::arg("vertices"), py::arg("triangles"), py::arg("tolerance"),
+             py::arg("method"), py::arg("precision") = py::none(), py::arg("placement") = "optimal",
+             py::arg("threads") = 0,
+             "(vertices, triangles, report) of tolvol.decimate with another method deciding about each collapse. "
+             "Nothing is promised.\n"
+             "method: \"permission_grid\", \"vertex_samples\", or one of ToleranceVolume.check. precision: grid nodes "
+             "or cells per\n"
+             "tolerance. report: method, renderer, field_seconds (to build what the method asks), seconds (of the "
+             "decimation), memory\n"
+             "(bytes of its grid). Raises RuntimeError.");
+}
+
+}  // namespace tolvol::baselines

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The one-sided distance from the original vertices to the decimated mesh: L. Kobbelt, S. Campagna, H.-P. Seidel, A
+/// general framework for mesh decimation, 1998. Every original vertex has a face that is within the tolerance of it; a
+/// collapse must find a new one for those of the faces it changes. The rest of the reference, and the result's own
+/// points, may be farther: the triangles between the vertices are never looked at.
+///
+/// As the paper has it, it runs with half-edge collapses (DecimationOptions::Vertices::subset) and keeps the removed
+/// vertices alone; here surviving ones have a face, too, which costs nothing (their distance is 0) and lets them move.
+#pragma once
+
+#include <optional>
+
+#include "operation/ring_check.h"
+
+namespace tolvol::baselines {
+
+class VertexSamples final : public RingCheck {
+ public:
+  /// `tolerance` in the frame.
+  explicit VertexSamples(double tolerance) : tolerance_(tolerance) {}
+
+  void begin(const TriangleMesh& mesh, double mapping_error) override;
+  bool accepts(std::span<const Coverage::Element> faces, std::span<const Coverage::Removed> removed) override {
+    return samples_->try_change(faces, removed);
+  }
+  void commit() override { samples_->commit(); }
+  std::string method() const override { return "vertex_samples"; }
+
+ private:
+  double tolerance_;
+  TriangleMesh points_;  // a triangle for each vertex, all of its corners there
+  std::optional<Coverage> samples_;
+};
+
+}  // namespace tolvol::baselines

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tables in Markdown files that scripts write and people read: each stands between two comment lines with its name."""
+
+from pathlib import Path
+
+
+def table(heads, rows, align):
+    """Markdown; `align`: a letter, l or r, for each column."""
+    lines = [heads, ["---:" if letter == "r" else "---" for letter in align], *rows]
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+
+
+def write(path, name, text):
+    """Puts `text` between the lines of `name`, at the end of the file where it has none yet."""
+    begin, end = f"<!-- {name}: written by a script, begin -->", f"<!-- {name}: end -->"
+    path = Path(path)
+    page = path.read_text() if path.exists() else ""
+    before, found, rest = page.partition(begin)
+    if found:
+        _, found, after = rest.partition(end)
+    if not found:
+        before, after = page + ("\n" if page else ""), "\n"
+    path.write_text(f"{before}{begin}\n{text}\n{end}{after}")

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Connectivity by OpenMesh; faces keep their input's indices, deleted ones are only marked.
+#include "operation/bounded_mesh.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "operation/change.h"
+
+namespace tolvol {
+
+BoundedMesh::BoundedMesh(BoundedMeshInput input, const Bounds& bounds)
+    : bounds_(bounds),
+      subset_(input.subset),
+      store_(std::move(input.store)),
+      triangles_(std::move(input.triangles)),
+      pinned_(std::move(input.pinned)),
+      slots_(std::move(input.slots)),
+      wedges_(std::move(input.wedges)) {
+  for (const Spot& s : input.spots) positions_.push_back(s.position), stored_.push_back(s.stored);
+  build(input.on_reference);
+}
+
+void BoundedMesh::build(bool on_reference) {
+  mesh_.request_vertex_status();
+  mesh_.request_edge_status();
+  mesh_.request_halfedge_status();
+  mesh_.request_face_status();
+  const std::size_t n = positions_.size(), m = triangles_.size();
+  mesh_.reserve(static_cast<unsigned>(n), static_cast<unsigned>(3 * m / 2 + n), static_cast<unsigned>(m));
+  for (std::size_t i = 0; i < n; ++i) mesh_.new_vertex();
+  for (const glm::uvec3& t : triangles_) {
+    const Vertex corners[3] = {handle(t.x), handle(t.y), handle(t.z)};
+    if (!mesh_.add_face(corners, 3).is_valid()) throw std::logic_error("the cut mesh is not a manifold");
+  }
+  triangle_count_ = m;
+  for (std::uint32_t v = 0; v < n; ++v) {
+    if (slots_[v] != v) copies_.try_emplace(slots_[v], 1, slots_[v]).first->second.push_back(v);
+  }
+  moved_.assign(n, false);
+  seam_.assign(n, false);
+  merged_into_.resize(n);
+  for (std::uint32_t i = 0; i < n; ++i) merged_into_[i] = i;
+  corner_source_.resize(m);
+  for (std::uint32_t i = 0; i < m; ++i) corner_source_[i] = {3 * i, 3 * i + 1, 3 * i + 2};
+  if (!wedges_.empty()) {
+    std::vector<std::uint32_t> first(n, Coverage::kNone);
+    for (std::size_t i = 0; i < m; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        std::uint32_t& wedge = first[triangles_[i][k]];
+        if (wedge == Coverage::kNone) wedge = wedges_[i][k];
+        if (wedge != wedges_[i][k]) seam_[triangles_[i][k]] = true;
+      }
+    }
+  }
+  distance_.assign(n, 0);
+  if (bounds_.forward) {
+    for (std::size_t i = 0; i < n && !on_reference; ++i) distance_[i] = bounds_.forward->distance_bound(positions_[i]);
+    face_distance_.assign(m, on_reference ? 0 : TriangleCertificate::kUnproved);
+  }
+}
+
+std::uint32_t BoundedMesh::survivor(std::uint32_t v) const {
+  while (merged_into_[v] != v) v = merged_into_[v] = merged_into_[merged_into_[v]];
+  return v;
+}
+
+/// Whether an edge joins the two in the result, be it between copies of them.
+bool BoundedMesh::joined_by_other(std::uint32_t a, std::uint32_t b) const {
+  const auto with_copies = [&](const std::uint32_t& v) {
+    const auto found = copies_.find(slots_[v]);
+    return found == copies_.end() ? std::span(&v, 1) : std::span<const std::uint32_t>(found->second);
+  };
+  for (const std::uint32_t x : with_copies(a)) {
+    for (const std::uint32_t y : with_copies(b)) {
+      if ((x != a || y != b) && mesh_.find_halfedge(handle(x), handle(y)).is_valid()) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+/// A vertex of higher rank can only be the one that stays.
+int BoundedMesh::rank(std::uint32_t vertex) const {
+  return pinned_[vertex] ? 4 : (seam_[vertex] ? 2 : 0) + (on_boundary(vertex) ? 1 : 0);
+}
+
+BoundedMesh::Merge BoundedMesh::merge(Edge e) const {
+  const Halfedge h = mesh_.halfedge_handle(e, 0);
+  const std::uint32_t v0 = from(h), v1 = to(h);
+  const int rank0 = rank(v0), rank1 = rank(v1);
+  if (pinned_[v0] && pinned_[v1]) return {Freedom::none, h};
+  // A boundary vertex never leaves the boundary, not even for a vertex that must stay.
+  if (rank0 > rank1 && on_boundary(v1) && !on_boundary(v0)) return {Freedom::none, h};
+  if (rank1 > rank0 && on_boundary(v0) && !on_boundary(v1)) return {Freedom::none, h};
+  if (rank0 == rank1) return {movable(v0) ? Freedom::anywhere : Freedom::either_way, h};
+  return {Freedom::one_way, rank0 > rank1 ? mesh_.opposite_halfedge_handle(h) : h};
+}
+
+void BoundedMesh::apply(Change& change) {
+  if (bounds_.rival) bounds_.rival->commit();
+  if (bounds_.backward) bounds_.backward->commit(change.backward_);
+  if (!change.boundary_elements_.empty()) bounds_.boundary_backward->commit(change.boundary_backward_);
+  for (const Change::NewWedge& n : change.new_wedges_) {
+    wedges_[n.triangle][n.corner] = n.gained.wedge;
+    corner_source_[n.triangle][n.corner] = n.gained.source;
+  }
+  for (std::size_t i = 0; i < change.faces_.size(); ++i) {
+    const Change::Face& face = change.faces_[i];
+    const std::uint32_t id = change.elements_[i].id;
+    triangles_[id] = {face.vertices[0], face.vertices[1], face.vertices[2]};
+    if (bounds_.forward) face_distance_[id] = face.distance;
+  }
+  if (change.kind_ == Change::Kind::flip) {
+    mesh_.flip(change.edge_);
+    return;
+  }
+  const std::uint32_t v = change.vertex_;
+  if (change.kind_ == Change::Kind::collapse) {
+    merged_into_[from(change.halfedge_)] = v;
+    triangle_count_ -= change.removed_.size();
+    mesh_.collapse(change.halfedge_);
+  }
+  moved_[v] = moved_[v] || change.spot_.position != positions_[v];
+  positions_[v] = change.spot_.position;
+  stored_[v] = change.spot_.stored;
+  if (bounds_.forward) distance_[v] = change.new_distance_;
+}
+
+}  // namespace tolvol

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// One change of a BoundedMesh under trial: the faces as they would be, and whether they keep the bounds. It only reads
+/// the mesh, and holds all that a trial needs, so that a thread each can try different changes of one mesh.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "operation/bounded_mesh.h"
+
+namespace tolvol {
+
+class Change {
+ public:
+  using Halfedge = BoundedMesh::Halfedge;
+  using Edge = BoundedMesh::Edge;
+
+  /// Ordered: what was refused at one position may succeed at another, what is impossible cannot.
+  enum class Outcome { impossible, refused, possible };
+
+  /// A face as the change would leave it; its corners are in Coverage::Element.
+  struct Face {
+    bool moves;  ///< whether a corner of it moves: `corner`,
+    int corner;
+    glm::dvec3 before;  ///< from here
+    std::uint32_t vertices[3];
+    double distance;  ///< upper bound on the distance of its points to the reference
+  };
+
+  /// Keeps a reference to `mesh`.
+  explicit Change(const BoundedMesh& mesh) : mesh_(&mesh) {}
+
+  /// The start of `h` merges into its end, which goes to `spot`.
+  Outcome try_collapse(Halfedge h, const Spot& spot);
+  /// A vertex moves.
+  Outcome try_relocate(std::uint32_t vertex, const Spot& spot);
+  /// The edge of two faces becomes the other diagonal.
+  Outcome try_flip(Edge e);
+
+  // The steps of the above, for a search that wants to see the faces before it pays for the bounds. Each prepares the
+  // faces and says whether the change is possible at all; check() then asks for the bounds.
+  bool prepare_collapse(Halfedge h, const Spot& spot);
+  bool prepare_relocate(std::uint32_t vertex, const Spot& spot);
+  bool prepare_flip(Edge e);
+  Outcome check();
+
+  const std::vector<Coverage::Element>& elements() const { return elements_; }
+  const std::vector<Face>& faces() const { return faces_; }  ///< parallel to elements()
+  const std::vector<Coverage::Removed>& removed() const { return removed_; }
+  /// Starts a series of tries around one place. What it finds depends on nothing before.
+  void begin() { suspect_ = 0, backward_.begin(), boundary_backward_.begin(); }
+
+ private:
+  friend class BoundedMesh;
+  enum class Kind { collapse, relocate, flip };
+  struct Corner {
+    std::uint32_t wedge, source;
+  };
+  struct NewWedge {
+    std::uint32_t triangle;
+    int corner;
+    Corner gained;
+  };
+
+  void clear(Kind kind, const Spot& spot);
+  void gather_side(std::uint32_t vertex, const glm::dvec3& position, double moved, int skip0, int skip1);
+  bool link_condition(Halfedge h);
+  bool gather(Halfedge h, const glm::dvec3& position);
+  bool wedges_fit(Halfedge h);
+  bool slots_fit(Halfedge h) const;
+  bool folds_over() const;
+  bool within_bounds();
+  bool boundary_within_bounds();
+  void boundary_of_collapse();
+  void boundary_of_relocation();
+
+  const BoundedMesh* mesh_;
+  Kind kind_ = Kind::collapse;
+  Halfedge halfedge_;
+  Edge edge_;
+  std::uint32_t vertex_ = 0;  ///< the one that moves
+  Spot spot_{};
+  std::vector<Coverage::Element> elements_;
+  std::vector<Face> faces_;
+  std::vector<Coverage::Removed> removed_;
+  std::vector<Coverage::Element> boundary_elements_;
+  std::vector<Coverage::Removed> boundary_removed_;
+  std::vector<NewWedge> new_wedges_;
+  std::vector<int> neighbours_;
+  Coverage::Trial backward_, boundary_backward_;
+  double new_distance_ = 0;
+  std::size_t suspect_ =
+      0;  ///< the face that failed last: of another try at the same place it is the likeliest to fail
+};
+
+}  // namespace tolvol

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Where the moving vertex of a change would be best: near the reference with all faces around it, and the reference
+/// near to them, the largest deviations counting most. It steers a search and proves nothing.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "operation/change.h"
+
+namespace tolvol {
+
+class PositionFit {
+ public:
+  /// Keeps a reference to `mesh`, which needs a forward bound.
+  explicit PositionFit(const BoundedMesh& mesh) : mesh_(&mesh) {}
+
+  /// Takes some of the pieces of the reference that the faces of a prepared change have to cover; good for any
+  /// position, and for the faces as they are now.
+  void gather(const Change& change);
+
+  struct Fit {
+    double energy;        ///< areas weighted by a high power of deviation over tolerance
+    glm::dvec3 position;  ///< lowers it, to first order
+  };
+  /// Of the faces as the change would leave them, its vertex at `position`. About 10 ns a face and piece.
+  Fit fit(const Change& change, const glm::dvec3& position);
+  /// Energy of the same faces as they are.
+  double energy_now(const Change& change);
+
+ private:
+  struct Sums;
+  void prepare(const Change& change, bool changed);
+  void add_pieces(const Change& change, Sums& sums) const;
+  void add_faces(const Change& change, Sums& sums) const;
+
+  const BoundedMesh* mesh_;
+  std::vector<Coverage::Sample> samples_;
+  std::vector<WitnessTriangle> faces_;
+};
+
+}  // namespace tolvol

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the README shows in Python runs as it stands there, and does what it says."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tolvol
+
+import meshes
+
+BLOCKS = re.findall(
+    r"^```python\n(.*?)^```", (Path(__file__).resolve().parents[2] / "README.md").read_text(), re.M | re.S
+)
+
+
+def run(block):
+    vertices, triangles = meshes.torus()
+    vertices += np.random.default_rng(1).normal(0, 0.003, vertices.shape).astype(np.float32)
+    names = {"vertices": vertices, "triangles": triangles}
+    exec(block, names)
+    return names
+
+
+def block_with(word):
+    found = [block for block in BLOCKS if word in block]
+    assert len(found) == 1
+    return found[0]
+
+
+def distance(names, bound):
+    triangles = names["triangles"]
+    return tolvol.hausdorff(names["positions"], triangles, names["vertices"], triangles, bound=bound)
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_runs(block):
+    run(block)
+
+
+def test_decimation_is_within_one_percent():
+    names = run(block_with("tolvol.decimate"))
+    assert len(names["result"].triangles) < len(names["triangles"]) / 4
+    assert names["forward"].upper <= 0.01 * tolvol.size(names["vertices"], names["triangles"])
+
+
+def test_five_lines_keep_a_smoothing_loop_within_the_tolerance():
+    block = block_with("# added")
+    without = "".join(line for line in block.splitlines(keepends=True) if "# added" not in line)
+    assert block.count("# added") == 5 and "tolvol" not in without
+    kept, free = run(block), run(without)
+    tolerance = kept["tolerance"]
+    assert distance(kept, tolerance).upper <= tolerance < distance(free, tolerance).lower
+    assert np.linalg.norm(kept["positions"] - kept["vertices"], axis=1).max() > 0.9 * tolerance
