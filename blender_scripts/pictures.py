@@ -24,14 +24,21 @@ def require(option, path):
     cli.require_folder(path, option)
     if Path(path).suffix.lower() != ".png":
         raise cli.Stop(f"{option} {path}: the extension must be .png")
+    if reason := unavailable():
+        raise cli.Stop(f"{option}: {reason}")
+
+
+def unavailable():
+    """Why no picture can be made here, or None."""
     try:
         import matplotlib  # noqa: F401
     except ImportError as error:
-        raise cli.Stop(f"{option}: {error}; install Debian's python3-matplotlib") from None
+        return f"{error}; install Debian's python3-matplotlib"
     try:
         tolvol.renderer()
     except tolvol.GlUnavailable as error:
-        raise cli.Stop(f"{option}: {error}") from None
+        return str(error)
+    return None
 
 
 def camera(vertices, triangles, size, path="", room=0.0):
@@ -124,7 +131,10 @@ def shares_within(surface, reference, tolerance, threads=0):
 
 
 def save_deviation(path, surface, reference, tolerance, like="", threads=0):
-    """A picture of a surface against the reference, both (vertices, triangles) in the world; like: the file it is from."""
+    """A picture of a surface against the reference, both (vertices, triangles) in the world; like: the file it is from.
+
+    path: where it goes, or a binary file.
+    """
     volume = tolvol.ToleranceVolume(*reference, tolerance, threads=threads)
     view = camera(*surface, (WIDTH, HEIGHT), like)
     edges = len(surface[1]) <= EDGES_UP_TO

@@ -5,12 +5,14 @@ blender --background --python blender_scripts/report.py -- A B [--tolerance 1%] 
 """
 
 import argparse
+import io
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 try:
     import command_line as cli
+    import pictures
     from addon import deviation, file_io, report, volume
 except ImportError as error:  # left alone, Blender would end with exit code 0
     print(f"report.py: Blender's Python lacks something: {error}; install Debian's python3-numpy", file=sys.stderr)
@@ -56,6 +58,7 @@ def arguments():
         metavar="FILE",
         help=f"write it there, as the extension says: {' '.join(deviation.EXTENSIONS)}; may be given more than once",
     )
+    parser.add_argument("--picture", metavar="FILE.png", help="draw A there, coloured by its distance from B")
     parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
     return parser.parse()
 
@@ -65,6 +68,8 @@ def main(options):
         file_io.extension_of(path)
     for path in options.report:
         cli.require_folder(path, "--report")
+    if options.picture:
+        pictures.require("--picture", options.picture)
     surfaces, files = [], []
     for path in (options.a, options.b):
         found = file_io.read_file(path)
@@ -77,12 +82,33 @@ def main(options):
     result |= {"a": files[0], "b": files[1]}
     for way, label in (("forward", "A from B"), ("backward", "B from A")):
         print(_line(result[way], label, size))
+    drawn = _draw(surfaces, result, options)
     for path in options.report:
         try:
-            deviation.save(result, path)
+            deviation.save(result, path, drawn)
         except OSError as error:
             raise cli.Stop(f"--report {path}: {error.strerror}") from None
     return 0
+
+
+def _draw(surfaces, result, options):
+    """Writes --picture; (caption, PNG) of both directions where a page asks for them."""
+    in_page = any(Path(path).suffix.lower() == ".html" for path in options.report)
+    if in_page and (reason := pictures.unavailable()):
+        print(f"note: no pictures in the report: {reason}")
+        in_page = False
+    a, b = ((surface.world(), surface.arrays.triangles) for surface in surfaces)
+    largest = max(result[way]["largest"][1] for way in ("forward", "backward"))
+    scale = result["tolerance"]["absolute"] if result["tolerance"] else max(largest, 1e-6 * result["size"])
+    drawn = []
+    for pair, path, other in (((a, b), options.a, options.b), ((b, a), options.b, options.a)):
+        if in_page or (options.picture and not drawn):
+            png = io.BytesIO()
+            pictures.save_deviation(png, *pair, scale, path, options.threads)
+            drawn.append((f"{Path(path).name}, coloured by its distance from {Path(other).name}", png.getvalue()))
+    if options.picture:
+        Path(options.picture).write_bytes(drawn[0][1])
+    return drawn
 
 
 def _line(way, label, size):

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """--picture of the commands, and the figures."""
 
+import base64
 import os
+import re
 
 import bpy
 import numpy as np
@@ -42,6 +44,24 @@ def test_decimate_draws_its_result(scan, tmp_path):
     drawn = pixels(picture)
     assert drawn.shape[1] > drawn.shape[0] > 400 and marked(drawn) == 0
     assert len(np.unique(drawn.reshape(-1, 4), axis=0)) > 1000
+
+
+def test_report_draws_both_directions_into_its_page(scan, tmp_path):
+    page, picture = tmp_path / "r.html", tmp_path / "picture.png"
+    arguments = scan, tmp_path / "out.ply", "--tolerance", "1%"
+    succeeded(decimate(*arguments))
+    for tolerance, outside in (("1%", False), ("0.3%", True)):
+        options = "--tolerance", tolerance, "--report", page, "--picture", picture
+        assert command("report.py", tmp_path / "out.ply", scan, *options)[::2] == (0, "")
+        images = re.findall(r'src="data:image/png;base64,([^"]+)"><figcaption>([^<]+)', page.read_text())
+        assert [caption for _, caption in images] == [
+            "out.ply, coloured by its distance from scan.ply",
+            "scan.ply, coloured by its distance from out.ply",
+        ]
+        assert base64.b64decode(images[0][0]) == picture.read_bytes() and images[0][0] != images[1][0]
+        assert (marked(pixels(picture)) > 100) == outside
+    code, _, error = command("report.py", scan, scan, "--picture", tmp_path / "a.jpg")
+    assert code == 2 and ".png" in error
 
 
 def test_a_picture_needs_a_folder_and_a_png(scan, tmp_path):
