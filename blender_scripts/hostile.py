@@ -144,7 +144,9 @@ def judge(name, vertices, triangles, tolerance, threads=0, method="certificate",
         makers = (_about_the_tolerance, _anyhow, _misleading)
         points = np.concatenate([make(rng, volume, vertices, triangles, n) for make, n in zip(makers, shares)])
         certified = volume.check(*_surface(points), threads=threads)
-        result = certified if method == "certificate" else volume.check(*_surface(points), threads=threads, method=method)
+        result = (
+            certified if method == "certificate" else volume.check(*_surface(points), threads=threads, method=method)
+        )
         verdict = result.verdict
         verdicts += np.bincount(verdict, minlength=3)
         proved += int((certified.verdict == INSIDE).sum())
@@ -188,7 +190,11 @@ def line(entry):
     return (
         f"{entry['reference']}: {entry['candidates']:,} candidates, {entry['within_band']:,} within 2 % of the tolerance, "
         f"by {entry['method']} {entry['inside']:,} inside, {entry['outside']:,} outside, {entry['unproved']:,} unproved "
-        + (f"({beyond:,} beyond the 2 %), " if beyond is not None else f"(the certificate: {entry['inside_by_certificate']:,} inside), ")
+        + (
+            f"({beyond:,} beyond the 2 %), "
+            if beyond is not None
+            else f"(the certificate: {entry['inside_by_certificate']:,} inside), "
+        )
         + f"wrong accepts {entry['wrong_accepts']:,}"
     )
 

@@ -5,7 +5,8 @@ blender --background --python blender_scripts/rates.py -- [MESH...] --tolerance 
 
 Without MESH: Blender's monkey in 251,904 triangles, with noise. One query: the whole mesh in one group. Groups: of six
 faces, as the ring of a collapse has. Faces: a verdict each for a million. Times are the best of several turns and include
-the way through Python. Beside each rate: what share of the candidates was proved inside.
+the way through Python. Beside each rate: what share of the candidates was proved inside. A picture: the mesh sent to
+the GPU and coloured by distance, one sample a pixel.
 """
 
 import json
@@ -24,6 +25,8 @@ REPEATS = 5
 MOVE = 0.1  # of the tolerance, along each axis
 RING = 6
 BATCH = 1_000_000
+PICTURE = (1024, 1024)
+TABLE_1 = 1.1  # the precision of [Botsch04, Table 1]
 METHODS = ("gl_certificate", "occlusion_query", "paper", "paper_half_h")
 
 
@@ -35,6 +38,9 @@ def measure(name, vertices, triangles, options):
     batch = np.resize(triangles, (BATCH, 3))
     whole = np.zeros(len(triangles), np.int32)
     rings = np.arange(len(triangles), dtype=np.int32) // RING
+
+    def build(field):
+        return tolvol.ToleranceVolume(vertices, triangles, tolerance, precision=TABLE_1, field=field, threads=1)
 
     runs = {("certificate", "one thread"): lambda: volume.check(points, triangles, threads=1)}
     runs["certificate", "faces, one thread"] = lambda: volume.check(points, batch, threads=1)
@@ -49,6 +55,15 @@ def measure(name, vertices, triangles, options):
         for key, call in runs.items():
             results[key] = timed(key, call)
     entries = []
+    # Once warm: every frame moves the mesh.
+    tolvol.render_distance(points, triangles, volume, size=PICTURE, samples=1)
+    for _ in range(REPEATS):
+        timed(("picture", "drawn"), lambda: tolvol.render_distance(points, triangles, volume, size=PICTURE, samples=1))
+        for field in ("scatter", "fast_marching"):
+            timed((field, "field"), lambda field=field: build(field))
+    drawn, fields = timed.seconds.pop(("picture", "drawn")), {}
+    for field in ("scatter", "fast_marching"):
+        fields[field] = timed.seconds.pop((field, "field"))
     for (method, what), seconds in timed.seconds.items():
         verdict = results[method, what].verdict
         entries.append(
@@ -61,7 +76,14 @@ def measure(name, vertices, triangles, options):
                 "inside_share": float((verdict == 2).mean()),
             }
         )
-    return {"file": name, "triangles": len(triangles), "precision": volume.precision, "rates": entries}
+    return {
+        "file": name,
+        "triangles": len(triangles),
+        "precision": volume.precision,
+        "rates": entries,
+        "picture_triangles_per_second": len(triangles) / drawn,
+        "field_seconds": fields,
+    }
 
 
 def line(entry):
@@ -84,7 +106,12 @@ def arguments():
 def main(options):
     if options.json:
         cli.require_folder(options.json, "--json")
-    figures = {"version": tolvol.__version__, "machine": benchmark.machine(), "renderer": tolvol.renderer(), "meshes": []}
+    figures = {
+        "version": tolvol.__version__,
+        "machine": benchmark.machine(),
+        "renderer": tolvol.renderer(),
+        "meshes": [],
+    }
     print(f"{figures['machine']}; {figures['renderer']}")
     meshes = [(path, *models.read(path)) for path in options.mesh]
     for mesh in meshes or [("suzanne-4", *models.arrays(models.build("suzanne-4")))]:
@@ -93,6 +120,11 @@ def main(options):
         print(f"{entry['file']}: {entry['triangles']:,} triangles, precision {entry['precision']:g}")
         for rate in entry["rates"]:
             print(line(rate), flush=True)
+        print(f"  picture of 1024 x 1024: {entry['picture_triangles_per_second'] / 1e6:.2f} M triangles/s")
+        scatter, marching = entry["field_seconds"].values()
+        print(
+            f"  field at precision 1.1, one thread: scatter {scatter:.3f} s, fast marching {marching:.3f} s", flush=True
+        )
     if options.json:
         Path(options.json).write_text(json.dumps(figures, indent=1) + "\n")
     return 0

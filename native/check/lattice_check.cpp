@@ -147,7 +147,8 @@ std::vector<std::uint64_t> LatticeCheck::draw(const Batch& batch, float bound, b
   float largest = 0;
   for (const Part& part : batch.parts) largest = std::max(largest, part.subdivisions);
   // A pixel more on both sides than the margin needs.
-  const int cell = static_cast<int>(std::bit_ceil(std::max<unsigned>(kSmallestCell, static_cast<unsigned>(largest) + 2)));
+  const int cell =
+      static_cast<int>(std::bit_ceil(std::max<unsigned>(kSmallestCell, static_cast<unsigned>(largest) + 2)));
   const int side = std::max(cell, kSmallestSide);
   gl::run([&] {
     const gl::Program& program = queries ? programs().query : programs().slots;

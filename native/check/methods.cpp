@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "check/methods.h"
 
-
 #include "check/certificate.h"
 #include "reference/errors.h"
 #ifdef TOLVOL_GL
@@ -42,9 +41,7 @@ constexpr Method kMethods[] = {
     {"paper", make_paper<Paper::Margin::half_diagonal>},
     {"paper_half_h", make_paper<Paper::Margin::half_spacing>},
 #else
-    {"gl_certificate", without_gl},
-    {"occlusion_query", without_gl},
-    {"paper", without_gl},
+    {"gl_certificate", without_gl},     {"occlusion_query", without_gl}, {"paper", without_gl},
     {"paper_half_h", without_gl},
 #endif
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Based on [Botsch04, §4] and deviates from it where that is not conservative. The paper's triangle of edge n leaves out
-// the candidate's corners, and a small one draws no pixel at all: here the pixels are a lattice that includes them. The
-// paper counts pixels outside, so that one that is missing is good: here the good ones are counted. The paper
+// Based on [Botsch04, §4] and deviates from it where that is not conservative. The paper's triangle of edge n leaves
+// out the candidate's corners, and a small one draws no pixel at all: here the pixels are a lattice that includes them.
+// The paper counts pixels outside, so that one that is missing is good: here the good ones are counted. The paper
 // interpolates in hardware, signed, in 8 bits: here in the shader, unsigned, in float32. Candidates larger than a cell
 // of the framebuffer are cut, because what a framebuffer cuts off nobody misses.
 //
@@ -26,7 +26,7 @@
 namespace tolvol {
 namespace {
 
-constexpr float kMargin = 1.5f;     // half way between the last lattice point and the next pixel
+constexpr float kMargin = 1.5f;      // half way between the last lattice point and the next pixel
 constexpr double kLargestPart = 62;  // subdivisions: with the margin it fits a cell of 64 pixels
 
 /// Upper bounds on the distances of the nodes, float32 rounded up. Never the grid's own distances: those are rounded
@@ -69,8 +69,8 @@ OcclusionQuery::OcclusionQuery(const ToleranceVolume& volume) : LatticeCheck(vol
 // What float32 hides, u = 2^-24, G the largest number of nodes along an axis. GLSL rounds sums and products correctly
 // but to either side: by 2u. In grid spacings, per coordinate: the corner is sent with an error of u G, the edges,
 // because i/n + j/n <= 1, together with u G; their multiplication rounds by 2u G together, the two sums by 2u G each.
-// 8 u G in three coordinates is below 14 u G h; doubles, which bring the corners into the grid, and n, which they round,
-// are far below the 16 counted here. In the interpolation t is exact and every term is a product of non-negative
+// 8 u G in three coordinates is below 14 u G h; doubles, which bring the corners into the grid, and n, which they
+// round, are far below the 16 counted here. In the interpolation t is exact and every term is a product of non-negative
 // factors: for each axis 1 - t, a product and a sum round by 2u of the result each, 18 u of at most epsilon; 20 leave
 // room for the bound's own rounding. What the witnesses behind the nodes hide is in provable() already.
 float OcclusionQuery::bound(double mapping_error) const {
@@ -84,8 +84,8 @@ float OcclusionQuery::bound(double mapping_error) const {
     // Half of the tolerance for the steps between samples.
     std::ostringstream text;
     text << "the method occlusion_query needs a finer grid: its samples stand for " << between << " spacings around, "
-         << "and that is more than the tolerance at a precision of " << volume().precision() << "; take precision="
-         << std::ceil(2 * between);
+         << "and that is more than the tolerance at a precision of " << volume().precision()
+         << "; take precision=" << std::ceil(2 * between);
     throw InvalidInput(text.str());
   }
   return std::nextafter(static_cast<float>(bound), 0.0f);
@@ -100,7 +100,8 @@ bool OcclusionQuery::add_parts(const Corners& corners, std::uint32_t slot, std::
   }
   const glm::dvec3 along = corners[1] - corners[0], across = corners[2] - corners[0];
   const glm::dvec3 third = across - along;
-  const double longest = std::sqrt(std::max({glm::dot(along, along), glm::dot(across, across), glm::dot(third, third)}));
+  const double longest =
+      std::sqrt(std::max({glm::dot(along, along), glm::dot(across, across), glm::dot(third, third)}));
   const double pieces = std::max(1.0, std::ceil(longest / kLargestPart));
   const auto n = static_cast<float>(std::max(1.0, std::ceil(longest / pieces)));
   const glm::dvec3 step1 = along / pieces, step2 = across / pieces;

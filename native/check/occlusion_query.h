@@ -3,9 +3,9 @@
 ///
 /// A candidate is drawn so that its pixels are the points of a lattice on it, n subdivisions an edge, spacing at most
 /// that of the grid; the points at which the interpolated distance is at most eps' are counted. Inside only if all of
-/// them were: whatever is not drawn is not proved. The rest is unproved; outside is never claimed. A node counts with the
-/// exact distance of the triangle that the grid names for it; of a grid filled by fast marching, which names few, little
-/// is proved.
+/// them were: whatever is not drawn is not proved. The rest is unproved; outside is never claimed. A node counts with
+/// the exact distance of the triangle that the grid names for it; of a grid filled by fast marching, which names few,
+/// little is proved.
 #pragma once
 
 #include <optional>
@@ -17,8 +17,8 @@ namespace tolvol {
 
 class OcclusionQuery final : public LatticeCheck {
  public:
-  /// Keeps a reference to `volume`, which must outlive this. Throws InvalidInput when the grid is too coarse, naming the
-  /// precision that will do: eps' is eps - 1.44 h less the rounding of float32, so 4 is good and 1.45 useless;
+  /// Keeps a reference to `volume`, which must outlive this. Throws InvalidInput when the grid is too coarse, naming
+  /// the precision that will do: eps' is eps - 1.44 h less the rounding of float32, so 4 is good and 1.45 useless;
   /// ResourceLimit when the grid is too large for a texture; GlUnavailable. O(nodes).
   explicit OcclusionQuery(const ToleranceVolume& volume);
   std::string method() const override { return "occlusion_query"; }

@@ -42,7 +42,8 @@ float Paper::bound(double) const {
 bool Paper::add_parts(const Corners& corners, std::uint32_t slot, std::vector<Part>& parts) const {
   const glm::dvec3 along = corners[1] - corners[0], across = corners[2] - corners[0];
   const glm::dvec3 third = across - along;
-  const double longest = std::sqrt(std::max({glm::dot(along, along), glm::dot(across, across), glm::dot(third, third)}));
+  const double longest =
+      std::sqrt(std::max({glm::dot(along, along), glm::dot(across, across), glm::dot(third, third)}));
   const double l = std::ceil(longest);
   // Written so that NaN fails as well.
   if (!(l + 2 <= largest_)) return false;

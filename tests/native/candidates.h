@@ -108,13 +108,15 @@ inline int farther(const Points& points, const TriangleMesh& reference, double t
   if (distance.upper <= tolerance) return 0;
   if (points.size() == 3) return distance.lower > tolerance;
   const auto middle = points.begin() + std::ptrdiff_t(points.size() / 6 * 3);
-  return farther({points.begin(), middle}, reference, tolerance) + farther({middle, points.end()}, reference, tolerance);
+  return farther({points.begin(), middle}, reference, tolerance) +
+         farther({middle, points.end()}, reference, tolerance);
 }
 
 inline Points accepted(const Points& points, const std::vector<Verdict>& verdicts) {
   Points result;
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
-    if (verdicts[i] == Verdict::inside) result.insert(result.end(), {points[3 * i], points[3 * i + 1], points[3 * i + 2]});
+    if (verdicts[i] == Verdict::inside)
+      result.insert(result.end(), {points[3 * i], points[3 * i + 1], points[3 * i + 2]});
   }
   return result;
 }

@@ -80,9 +80,7 @@ TEST_F(OcclusionQueries, TheBoundIsTheToleranceLessWhatSamplesStandFor) {
     const std::unique_ptr<ToleranceVolume> volume = make_volume(strip(1), precision);
     const OcclusionQuery check(*volume);
     const double bound = kTolerance - (1 / std::sqrt(3.0) + std::sqrt(3.0) / 2) * kTolerance / precision;
-    const auto at = [&](double z) {
-      return ask(check, *volume, {{0.1, 0.1, z}, {0.9, 0.1, z}, {0.5, 0.9, z}}).at(0);
-    };
+    const auto at = [&](double z) { return ask(check, *volume, {{0.1, 0.1, z}, {0.9, 0.1, z}, {0.5, 0.9, z}}).at(0); };
     EXPECT_EQ(at(bound - 1e-4 * kTolerance), Verdict::inside) << precision;
     EXPECT_EQ(at(bound + 1e-4 * kTolerance), Verdict::unproved) << precision;
   }

@@ -48,8 +48,8 @@ TEST_F(PaperChecks, SeesAParallelPlaneOnBothSidesOfItsBound) {
 }
 
 // The numbers are the point: this is what "not conservative" means. With h/2 about half of the spikes that are outside
-// pass at the paper's precision, because of a small triangle at most one pixel near its middle is drawn. The bands leave
-// room for hardware that fills and filters a little differently.
+// pass at the paper's precision, because of a small triangle at most one pixel near its middle is drawn. The bands
+// leave room for hardware that fills and filters a little differently.
 TEST_F(PaperChecks, AcceptsSpikesThatTheOthersDoNot) {
   constexpr int kSpikes = 10'000;
   struct Case {

@@ -77,7 +77,7 @@ def test_gl_methods_take_what_the_certificate_takes(method, dtype):
 
 
 def test_an_unknown_method_is_refused_with_the_names_of_the_others():
-    with pytest.raises(tolvol.InvalidInput, match="unknown method \"papers\".*" + ", ".join(LABELS)):
+    with pytest.raises(tolvol.InvalidInput, match='unknown method "papers".*' + ", ".join(LABELS)):
         torus_volume().check(*TORUS, method="papers")
 
 
