@@ -48,9 +48,9 @@ struct LatticeCheck::Batch {
 
 LatticeCheck::Programs::Programs(std::string_view counting)
     : query({{GL_VERTEX_SHADER, {"lattice.vert"}},
-             {GL_FRAGMENT_SHADER, {"lattice_part.glsl", "trilinear.glsl", counting, "query_samples.frag"}}}),
+             {GL_FRAGMENT_SHADER, {"lattice_part.glsl", counting, "query_samples.frag"}}}),
       slots({{GL_VERTEX_SHADER, {"lattice.vert"}},
-             {GL_FRAGMENT_SHADER, {"lattice_part.glsl", "trilinear.glsl", counting, "count_samples.frag"}}}) {}
+             {GL_FRAGMENT_SHADER, {"lattice_part.glsl", counting, "count_samples.frag"}}}) {}
 
 LatticeCheck::LatticeCheck(const ToleranceVolume& volume, float margin)
     : volume_(&volume), margin_(margin), renderer_(gl::renderer().name()) {}
@@ -82,10 +82,6 @@ std::vector<Verdict> LatticeCheck::decide(const Pieces& pieces, std::span<const 
                                           const Options& options) const {
   if (options.progress) options.progress->begin("checking");
   const float bound = this->bound(pieces.mapping_error);
-  struct Sum {
-    std::uint64_t counted = 0, points = 0;
-    bool drawn = true;
-  };
   std::vector<Sum> sums(order.empty() ? 0 : labels[order.back()] + 1);
   for (std::size_t next = 0; next < order.size();) {
     if (options.progress) options.progress->update(static_cast<double>(next) / static_cast<double>(order.size()));
@@ -101,15 +97,10 @@ std::vector<Verdict> LatticeCheck::decide(const Pieces& pieces, std::span<const 
       const std::size_t first = batch.parts.size();
       const auto slot = static_cast<std::uint32_t>(batch.labels.size() - 1);
       if (!add_piece(pieces, piece, slot, batch.parts)) sums[label].drawn = false;
-      for (std::size_t i = first; i < batch.parts.size(); ++i) {
-        const std::uint64_t of_part = lattice_points(batch.parts[i].subdivisions);
-        sums[label].points += of_part;
-        points += of_part;
-      }
+      for (std::size_t i = first; i < batch.parts.size(); ++i) points += lattice_points(batch.parts[i].subdivisions);
       batch.ends.back() = batch.parts.size();
     }
-    const std::vector<std::uint64_t> counts = draw(batch, bound, queries);
-    for (std::size_t slot = 0; slot < counts.size(); ++slot) sums[batch.labels[slot]].counted += counts[slot];
+    draw(batch, bound, queries, sums);
   }
   std::vector<Verdict> verdicts(pieces.size());
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
@@ -141,9 +132,8 @@ bool LatticeCheck::add_piece(const Pieces& pieces, std::size_t piece, std::uint3
   }
 }
 
-std::vector<std::uint64_t> LatticeCheck::draw(const Batch& batch, float bound, bool queries) const {
-  std::vector<std::uint64_t> counts(batch.ends.size(), 0);
-  if (batch.parts.empty()) return counts;
+void LatticeCheck::draw(const Batch& batch, float bound, bool queries, std::vector<Sum>& sums) const {
+  if (batch.parts.empty()) return;
   float largest = 0;
   for (const Part& part : batch.parts) largest = std::max(largest, part.subdivisions);
   // A pixel more on both sides than the margin needs.
@@ -151,42 +141,70 @@ std::vector<std::uint64_t> LatticeCheck::draw(const Batch& batch, float bound, b
       static_cast<int>(std::bit_ceil(std::max<unsigned>(kSmallestCell, static_cast<unsigned>(largest) + 2)));
   const int side = std::max(cell, kSmallestSide);
   gl::run([&] {
-    const gl::Program& program = queries ? programs().query : programs().slots;
-    program.set("margin", margin_);
-    program.set("bound", bound);
-    program.set("cell", cell);
-    program.set("cells_log2", std::countr_zero(static_cast<unsigned>(side / cell)));
-    use(program);
-    program.use();
+    for (const gl::Program* program : {&programs().query, &programs().slots}) {
+      program->set("margin", margin_);
+      program->set("cell", cell);
+      program->set("cells_log2", std::countr_zero(static_cast<unsigned>(side / cell)));
+      use(*program, bound);
+    }
     const gl::Framebuffer framebuffer = gl::Framebuffer::without_attachments(side, side);
     framebuffer.bind();
     const gl::VertexArray nothing = gl::VertexArray::make();
     nothing.bind();
     const gl::Buffer parts(batch.parts);
     parts.bind_storage(0);
-    if (!queries) {
-      gl::Buffer slots(counts.size() * sizeof(std::uint32_t), nullptr);
-      slots.clear();
-      slots.bind_storage(1);
-      draw_parts(0, batch.parts.size());
-      std::vector<std::uint32_t> read(counts.size());
-      slots.read(0, slots.bytes(), read.data());
-      counts.assign(read.begin(), read.end());
-      return;
-    }
-    std::vector<gl::Query> flight;
-    for (std::size_t slot = 0; slot < counts.size() + kInFlight; ++slot) {
-      const std::size_t place = slot % kInFlight;
-      if (slot >= kInFlight && slot - kInFlight < counts.size()) counts[slot - kInFlight] = flight[place].result();
-      if (slot >= counts.size()) continue;
-      if (flight.size() <= place) flight.emplace_back(GL_SAMPLES_PASSED);
-      const std::size_t first = slot ? batch.ends[slot - 1] : 0;
-      flight[place].begin();
-      draw_parts(first, batch.ends[slot]);
-      flight[place].end();
+    if (queries) {
+      count_by_query(batch, batch.ends, [&](std::size_t slot, const Sum& sum) { sums[batch.labels[slot]] += sum; });
+    } else {
+      count_by_slot(batch, sums);
     }
   });
-  return counts;
+}
+
+/// Calls found(i, sum) for the parts before each of `ends` and after the one before.
+template <class Found>
+void LatticeCheck::count_by_query(const Batch& batch, std::span<const std::size_t> ends, Found&& found) const {
+  programs().query.use();
+  std::vector<gl::Query> flight;
+  const auto begin = [&](std::size_t i) { return i ? ends[i - 1] : 0; };
+  for (std::size_t i = 0; i < ends.size() + kInFlight; ++i) {
+    const std::size_t place = i % kInFlight;
+    if (i >= kInFlight && i - kInFlight < ends.size()) {
+      const std::size_t done = i - kInFlight;
+      Sum sum{flight[place].result(), 0};
+      for (std::size_t k = begin(done); k < ends[done]; ++k) sum.points += lattice_points(batch.parts[k].subdivisions);
+      found(done, sum);
+    }
+    if (i >= ends.size()) continue;
+    if (flight.size() <= place) flight.emplace_back(GL_SAMPLES_PASSED);
+    flight[place].begin();
+    draw_parts(begin(i), ends[i]);
+    flight[place].end();
+  }
+}
+
+/// A query for each of several parts first: where all of these are inside nothing is left to tell apart.
+void LatticeCheck::count_by_slot(const Batch& batch, std::vector<Sum>& sums) const {
+  std::vector<std::size_t> ends;
+  for (std::size_t end = 0; end < batch.parts.size();) ends.push_back(end = std::min(end + kChunk, batch.parts.size()));
+  std::vector<std::size_t> again;
+  count_by_query(batch, ends, [&](std::size_t i, const Sum& sum) {
+    if (verdict(sum.counted, sum.points) != Verdict::inside) again.push_back(i);
+  });
+  if (again.empty()) return;
+  gl::Buffer slots(batch.labels.size() * sizeof(std::uint32_t), nullptr);
+  slots.clear();
+  slots.bind_storage(1);
+  programs().slots.use();
+  for (const std::size_t i : again) {
+    draw_parts(i * kChunk, ends[i]);
+    for (std::size_t k = i * kChunk; k < ends[i]; ++k) {
+      sums[batch.labels[batch.parts[k].slot]].points += lattice_points(batch.parts[k].subdivisions);
+    }
+  }
+  std::vector<std::uint32_t> counts(batch.labels.size());
+  slots.read(0, slots.bytes(), counts.data());
+  for (std::size_t slot = 0; slot < counts.size(); ++slot) sums[batch.labels[slot]].counted += counts[slot];
 }
 
 }  // namespace tolvol

@@ -17,7 +17,8 @@ namespace tolvol {
 
 class LatticeCheck : public ToleranceCheck {
  public:
-  /// Counts in shader storage, one counter a piece. O(points of the lattices).
+  /// Occlusion queries for many pieces at a time; where one finds that not all are inside, a counter a piece in shader
+  /// storage. O(points of the lattices).
   std::vector<Verdict> check(const Pieces& pieces, const Options& options) const override;
   /// One occlusion query a label, many of them in flight.
   std::vector<Verdict> check_groups(const Pieces& pieces, std::span<const std::int32_t> groups,
@@ -50,7 +51,7 @@ class LatticeCheck : public ToleranceCheck {
   /// Appends what to draw for a triangle; false when it cannot be drawn, and nothing is then known of it.
   virtual bool add_parts(const Corners& corners, std::uint32_t slot, std::vector<Part>& parts) const = 0;
   /// Binds texture and uniforms; on the GL thread.
-  virtual void use(const gl::Program& program) const = 0;
+  virtual void use(const gl::Program& program, float bound) const = 0;
   virtual const Programs& programs() const = 0;
   /// `counted` pixels, of lattices with `points` points together.
   virtual Verdict verdict(std::uint64_t counted, std::uint64_t points) const = 0;
@@ -59,10 +60,22 @@ class LatticeCheck : public ToleranceCheck {
 
  private:
   struct Batch;
+  /// Of one slot: pixels counted, of the points drawn. Both 0 where nothing was left to tell apart.
+  struct Sum {
+    std::uint64_t counted = 0, points = 0;
+    bool drawn = true;
+    Sum& operator+=(const Sum& other) {
+      counted += other.counted, points += other.points;
+      return *this;
+    }
+  };
   std::vector<Verdict> decide(const Pieces& pieces, std::span<const std::uint32_t> order,
                               std::span<const std::uint32_t> labels, bool queries, const Options& options) const;
   bool add_piece(const Pieces& pieces, std::size_t piece, std::uint32_t slot, std::vector<Part>& parts) const;
-  std::vector<std::uint64_t> draw(const Batch& batch, float bound, bool queries) const;
+  void draw(const Batch& batch, float bound, bool queries, std::vector<Sum>& sums) const;
+  template <class Found>
+  void count_by_query(const Batch& batch, std::span<const std::size_t> ends, Found&& found) const;
+  void count_by_slot(const Batch& batch, std::vector<Sum>& sums) const;
 
   const ToleranceVolume* volume_;
   float margin_;

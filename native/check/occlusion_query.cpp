@@ -10,7 +10,8 @@
 // triangles, no edge of which is longer than h, hence within h / sqrt(3) of a lattice point x. D(x) is a mean of values
 // of at least d(v_i) >= d(x) - |x - v_i| at the eight nodes v_i around x, with weights of which x is the mean of the
 // nodes; the mean of |x - v_i| is at most the root of the mean of its square, sum over the axes of h^2 t (1 - t) <=
-// (3/4) h^2. So d(p) <= D(x) + (sqrt(3)/2) h + h / sqrt(3).
+// (3/4) h^2. So d(p) <= D(x) + (sqrt(3)/2) h + h / sqrt(3). By way of the nearest node v alone it is d(p) <= d(v) +
+// |x - v| + h / sqrt(3); that is tried first.
 #include "check/occlusion_query.h"
 
 #include <algorithm>
@@ -28,6 +29,10 @@ namespace {
 
 constexpr float kMargin = 1.5f;      // half way between the last lattice point and the next pixel
 constexpr double kLargestPart = 62;  // subdivisions: with the margin it fits a cell of 64 pixels
+
+const double kInterpolation = std::sqrt(0.75);  // spacings that interpolation may lose
+
+float rounded_down(double x) { return std::nextafter(static_cast<float>(x), 0.0f); }
 
 /// Upper bounds on the distances of the nodes, float32 rounded up. Never the grid's own distances: those are rounded
 /// either way and, at needles, guesses. Nodes without an id are taken for farther than anything in the grid.
@@ -70,25 +75,25 @@ OcclusionQuery::OcclusionQuery(const ToleranceVolume& volume) : LatticeCheck(vol
 // but to either side: by 2u. In grid spacings, per coordinate: the corner is sent with an error of u G, the edges,
 // because i/n + j/n <= 1, together with u G; their multiplication rounds by 2u G together, the two sums by 2u G each.
 // 8 u G in three coordinates is below 14 u G h; doubles, which bring the corners into the grid, and n, which they
-// round, are far below the 16 counted here. In the interpolation t is exact and every term is a product of non-negative
-// factors: for each axis 1 - t, a product and a sum round by 2u of the result each, 18 u of at most epsilon; 20 leave
-// room for the bound's own rounding. What the witnesses behind the nodes hide is in provable() already.
+// round, are far below the 16 counted here. The way from a node is exact. In the interpolation every term is a product
+// of non-negative factors: three weights, three products and eight sums round by 2u of the result each, 28 u of at most
+// epsilon; 32 leave room for the bound's own rounding. By way of one node, the way's square rounds by 8u, and half of
+// that counts, room and its square by 4u: below 10 u. What the witnesses behind the nodes hide is in provable()
+// already.
 float OcclusionQuery::bound(double mapping_error) const {
   constexpr double kUnit = 0x1p-24;
   const DistanceGrid& grid = volume().grid();
-  const double h = grid.spacing, epsilon = volume().frame_tolerance(), between = 1 / std::sqrt(3.0) + std::sqrt(0.75),
-               provable = volume().provable(mapping_error),
-               rounding = kUnit * (16 * h * std::max({grid.nodes.x, grid.nodes.y, grid.nodes.z}) + 20 * epsilon);
-  const double bound = provable - between * h - rounding;
+  const double h = grid.spacing, largest = std::max({grid.nodes.x, grid.nodes.y, grid.nodes.z}),
+               rounding = kUnit * (16 * h * largest + 32 * volume().frame_tolerance());
+  const double bound = volume().provable(mapping_error) - h / std::sqrt(3.0) - kInterpolation * h - rounding;
   if (!(bound > 0)) {
-    // Half of the tolerance for the steps between samples.
+    constexpr int kGood = 4;  // more than a third of the tolerance goes to what samples stand for
     std::ostringstream text;
-    text << "the method occlusion_query needs a finer grid: its samples stand for " << between << " spacings around, "
-         << "and that is more than the tolerance at a precision of " << volume().precision()
-         << "; take precision=" << std::ceil(2 * between);
+    text << "the method occlusion_query needs a finer grid: at a precision of " << volume().precision()
+         << " what its samples stand for is larger than the tolerance; take precision=" << kGood;
     throw InvalidInput(text.str());
   }
-  return std::nextafter(static_cast<float>(bound), 0.0f);
+  return rounded_down(bound);
 }
 
 bool OcclusionQuery::add_parts(const Corners& corners, std::uint32_t slot, std::vector<Part>& parts) const {
@@ -118,9 +123,13 @@ bool OcclusionQuery::add_parts(const Corners& corners, std::uint32_t slot, std::
   return true;
 }
 
-void OcclusionQuery::use(const gl::Program& program) const {
+void OcclusionQuery::use(const gl::Program& program, float bound) const {
+  const double h = volume().grid().spacing;
   texture_->texture().bind(0);
   program.set("distances", 0);
+  program.set("bound", bound);
+  program.set("bound_near", rounded_down(bound + kInterpolation * h));
+  program.set("spacing2", std::nextafter(static_cast<float>(h * h), 1.0f));
 }
 
 const LatticeCheck::Programs& OcclusionQuery::programs() const {

@@ -26,7 +26,7 @@ class OcclusionQuery final : public LatticeCheck {
  private:
   float bound(double mapping_error) const override;
   bool add_parts(const Corners& corners, std::uint32_t slot, std::vector<Part>& parts) const override;
-  void use(const gl::Program& program) const override;
+  void use(const gl::Program& program, float bound) const override;
   const Programs& programs() const override;
   Verdict verdict(std::uint64_t counted, std::uint64_t points) const override;
 

@@ -53,9 +53,10 @@ bool Paper::add_parts(const Corners& corners, std::uint32_t slot, std::vector<Pa
   return true;
 }
 
-void Paper::use(const gl::Program& program) const {
+void Paper::use(const gl::Program& program, float bound) const {
   texture_->texture().bind(0);
   program.set("distances", 0);
+  program.set("bound", bound);
   program.set("nodes", glm::vec3(volume().grid().nodes));
   program.set("scale", texture_->scale());
   program.set("offset", texture_->offset());

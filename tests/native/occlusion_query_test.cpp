@@ -79,10 +79,12 @@ TEST_F(OcclusionQueries, TheBoundIsTheToleranceLessWhatSamplesStandFor) {
   for (const double precision : {2.0, 4.0, 9.0}) {
     const std::unique_ptr<ToleranceVolume> volume = make_volume(strip(1), precision);
     const OcclusionQuery check(*volume);
-    const double bound = kTolerance - (1 / std::sqrt(3.0) + std::sqrt(3.0) / 2) * kTolerance / precision;
+    const double h = kTolerance / precision, near = kTolerance - h / std::sqrt(3.0), bound = near - std::sqrt(0.75) * h;
     const auto at = [&](double z) { return ask(check, *volume, {{0.1, 0.1, z}, {0.9, 0.1, z}, {0.5, 0.9, z}}).at(0); };
     EXPECT_EQ(at(bound - 1e-4 * kTolerance), Verdict::inside) << precision;
-    EXPECT_EQ(at(bound + 1e-4 * kTolerance), Verdict::unproved) << precision;
+    // Between the two only samples near a node pass.
+    EXPECT_EQ(at(near - 0.05 * h), Verdict::unproved) << precision;
+    EXPECT_EQ(at(near + 1e-4 * kTolerance), Verdict::unproved) << precision;
   }
 }
 
@@ -92,9 +94,9 @@ TEST_F(OcclusionQueries, ATooCoarseGridIsRefusedWithThePrecisionThatWillDo) {
     const OcclusionQuery check(*coarse);
     FAIL();
   } catch (const InvalidInput& error) {
-    EXPECT_NE(std::string(error.what()).find("precision=3"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("precision=4"), std::string::npos) << error.what();
   }
-  const std::unique_ptr<ToleranceVolume> fine = make_volume(strip(1), 3);
+  const std::unique_ptr<ToleranceVolume> fine = make_volume(strip(1), 4);
   EXPECT_EQ(ask(OcclusionQuery(*fine), *fine, {{0.1, 0.1, 0}, {0.9, 0.1, 0}, {0.5, 0.9, 0}}).at(0), Verdict::inside);
 }
 

@@ -86,7 +86,9 @@ TEST_F(PaperChecks, AcceptsSpikesThatTheOthersDoNot) {
     EXPECT_GT(in.size(), 3u * kSpikes / 2) << c.method;
     EXPECT_GE(wrong, c.fewest) << c.method;
     EXPECT_LE(wrong, c.most) << c.method;
-    if (c.most == 0) EXPECT_EQ(candidates::farther(in, torus, kTolerance), 0) << c.method;
+    if (c.most == 0) {
+      EXPECT_EQ(candidates::farther(in, torus, kTolerance), 0) << c.method;
+    }
   }
 }
 
