@@ -48,7 +48,7 @@ def draw_volume(path, mesh, like):
     # What is cut open is beyond the mesh, so that the section begins at it.
     bar = VOLUME_SIZE[0], 90, VOLUME_SIZE[1] - 110
     page.legend(*bar, "signed", volume.tolerance, volume.size, lowest=0, outside=False)
-    path.write_bytes(page.png(step=3))
+    page.save(path, step=3)
 
 
 def draw_distances(path, mesh, tolerance, like):
@@ -77,7 +77,7 @@ def draw_distances(path, mesh, tolerance, like):
             page.image(x, HEADING + row * PANEL[1], pixels)
     for row, transfer in enumerate(("signed", "magnitude")):
         page.legend(2 * PANEL[0], HEADING + 20 + row * PANEL[1], PANEL[1] - 40, transfer, volume.tolerance, volume.size)
-    path.write_bytes(page.png(step=3))
+    page.save(path, step=3)
 
 
 def arguments():

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures of deviations with legends: what tolvol renders, put together on a white page by matplotlib."""
 
-import io
-import time
 from pathlib import Path
 
 import numpy as np
@@ -21,27 +19,26 @@ STRIPE = 12  # pixels from one stripe to the next, as rendered
 _VIEWS = {"Y": {"direction": (0.55, 0.4, 1), "up": (0, 1, 0)}, "Z": {"direction": (0.55, -1, 0.4), "up": (0, 0, 1)}}
 
 
-def missing():
-    """Why there can be no pictures here, or None."""
-    try:
-        import matplotlib  # noqa: F401
-
-        tolvol.renderer()
-    except ImportError as error:
-        return f"{error}; install Debian's python3-matplotlib"
-    except tolvol.GlUnavailable as error:
-        return str(error)
-    return None
-
-
 def require(option, path):
     """What a picture needs must be there before the work begins."""
     cli.require_folder(path, option)
     if Path(path).suffix.lower() != ".png":
         raise cli.Stop(f"{option} {path}: the extension must be .png")
-    reason = missing()
-    if reason:
+    if reason := unavailable():
         raise cli.Stop(f"{option}: {reason}")
+
+
+def unavailable():
+    """Why no picture can be made here, or None."""
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError as error:
+        return f"{error}; install Debian's python3-matplotlib"
+    try:
+        tolvol.renderer()
+    except tolvol.GlUnavailable as error:
+        return str(error)
+    return None
 
 
 def camera(vertices, triangles, size, path="", room=0.0):
@@ -109,16 +106,14 @@ class Page:
         length = f"{part * tolerance:.3g}".replace("-", "−")
         return f" {name} = {length}" if name and part else f" {name or length}"
 
-    def png(self, step=1):
-        """The bytes of a file. step: of the 256 levels of a channel that are kept; 3 cannot be seen and saves a fifth."""
+    def save(self, path, step=1):
+        """step: of the 256 levels of a channel that are kept; with 3 nobody sees it and the file is a fifth smaller."""
         from PIL import Image
 
         self.figure.canvas.draw()
         levels = np.asarray(self.figure.canvas.buffer_rgba())[..., :3].astype(int)
         levels = np.where(levels == 255, 255, np.minimum((levels + step // 2) // step * step, 255))
-        file = io.BytesIO()
-        Image.fromarray(levels.astype(np.uint8)).save(file, format="PNG", optimize=True)
-        return file.getvalue()
+        Image.fromarray(levels.astype(np.uint8)).save(path, format="PNG", optimize=True)
 
 
 def stripes(width, height):
@@ -135,13 +130,11 @@ def shares_within(surface, reference, tolerance, threads=0):
     return [1 - float(share) for share in spread.share_beyond]
 
 
-def deviation(surface, reference, tolerance, size, like="", threads=0):
-    """The PNG of a surface coloured by its distance to another, both (vertices, triangles) in the world.
+def save_deviation(path, surface, reference, tolerance, like="", threads=0):
+    """A picture of a surface against the reference, both (vertices, triangles) in the world; like: the file it is from.
 
-    size: what 100 % is; like: the file that the surface is from.
+    path: where it goes, or a binary file.
     """
-    # A volume is no larger than its reference; surfaces that far apart are striped.
-    tolerance = min(tolerance, tolvol.size(*reference))
     volume = tolvol.ToleranceVolume(*reference, tolerance, threads=threads)
     view = camera(*surface, (WIDTH, HEIGHT), like)
     edges = len(surface[1]) <= EDGES_UP_TO
@@ -150,19 +143,6 @@ def deviation(surface, reference, tolerance, size, like="", threads=0):
     page.image(0, 0, pixels)
     shares = shares_within(surface, reference, tolerance, threads)
     page.text(WIDTH + MARGIN, MARGIN, f"{len(surface[1]):,} triangles", 12)
-    page.text(WIDTH + MARGIN, MARGIN + 22, f"distance to the other surface,\n{len(reference[1]):,} triangles", 9, FAINT)
-    page.legend(WIDTH + MARGIN, MARGIN + 70, HEIGHT - 2 * MARGIN - 70, "signed", tolerance, size, shares)
-    return page.png()
-
-
-def triangles_per_second(vertices, triangles, tolerance, frames=10, size=(1024, 1024)):
-    """Of pictures, one sample a pixel, of a mesh that moves in every frame; of the fastest of `frames`."""
-    volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
-    view = camera(vertices, triangles, size)
-    seconds = []
-    for frame in range(frames + 1):
-        moved = vertices + np.float32(0.5 * tolerance * np.sin(frame))
-        started = time.perf_counter()
-        tolvol.render_distance(moved, triangles, volume, view, size, samples=1)
-        seconds.append(time.perf_counter() - started)
-    return len(triangles) / min(seconds[1:])  # the first one makes the field
+    page.text(WIDTH + MARGIN, MARGIN + 22, f"distance to the reference,\n{len(reference[1]):,} triangles", 9, FAINT)
+    page.legend(WIDTH + MARGIN, MARGIN + 70, HEIGHT - 2 * MARGIN - 70, "signed", tolerance, volume.size, shares)
+    page.save(path)

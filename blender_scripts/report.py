@@ -5,6 +5,7 @@ blender --background --python blender_scripts/report.py -- A B [--tolerance 1%] 
 """
 
 import argparse
+import io
 import sys
 from pathlib import Path
 
@@ -57,11 +58,7 @@ def arguments():
         metavar="FILE",
         help=f"write it there, as the extension says: {' '.join(deviation.EXTENSIONS)}; may be given more than once",
     )
-    parser.add_argument(
-        "--picture",
-        metavar="FILE.png",
-        help="draw A there, coloured by its distance to B up to the tolerance; needs OpenGL",
-    )
+    parser.add_argument("--picture", metavar="FILE.png", help="draw A there, coloured by its distance from B")
     parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
     return parser.parse()
 
@@ -85,43 +82,33 @@ def main(options):
     result |= {"a": files[0], "b": files[1]}
     for way, label in (("forward", "A from B"), ("backward", "B from A")):
         print(_line(result[way], label, size))
-    drawn = _pictures(options, surfaces, result)
+    drawn = _draw(surfaces, result, options)
     for path in options.report:
         try:
             deviation.save(result, path, drawn)
         except OSError as error:
             raise cli.Stop(f"--report {path}: {error.strerror}") from None
-    if options.picture:
-        try:
-            Path(options.picture).write_bytes(drawn[0][1])
-        except OSError as error:
-            raise cli.Stop(f"--picture {options.picture}: {error.strerror}") from None
     return 0
 
 
-def _pictures(options, surfaces, result):
-    """(caption, PNG) pairs of A from B and B from A, as far as something needs them and they can be drawn."""
-    pages = [path for path in options.report if Path(path).suffix.lower() == ".html"]
-    reason = pictures.missing() if pages else None
-    if reason:
-        print(f"note: no pictures in {pages[0]}: {reason}")
-        return ()
-    if not (pages or options.picture):
-        return ()
-    # Without a tolerance the colours end at the largest distance, short of which nothing can be told apart either.
-    largest = max(result[way]["largest"][1] for way in ("forward", "backward"))
-    tolerance = result["tolerance"]["absolute"] if result["tolerance"] else max(largest, 1e-6 * result["size"])
+def _draw(surfaces, result, options):
+    """Writes --picture; (caption, PNG) of both directions where a page asks for them."""
+    in_page = any(Path(path).suffix.lower() == ".html" for path in options.report)
+    if in_page and (reason := pictures.unavailable()):
+        print(f"note: no pictures in the report: {reason}")
+        in_page = False
     a, b = ((surface.world(), surface.arrays.triangles) for surface in surfaces)
-    wanted = [(options.a, options.b, a, b)]
-    if pages:
-        wanted.append((options.b, options.a, b, a))
-    return [
-        (
-            f"{Path(path).name} coloured by its distance to {Path(other_path).name}",
-            pictures.deviation(surface, other, tolerance, result["size"], path, options.threads),
-        )
-        for path, other_path, surface, other in wanted
-    ]
+    largest = max(result[way]["largest"][1] for way in ("forward", "backward"))
+    scale = result["tolerance"]["absolute"] if result["tolerance"] else max(largest, 1e-6 * result["size"])
+    drawn = []
+    for pair, path, other in (((a, b), options.a, options.b), ((b, a), options.b, options.a)):
+        if in_page or (options.picture and not drawn):
+            png = io.BytesIO()
+            pictures.save_deviation(png, *pair, scale, path, options.threads)
+            drawn.append((f"{Path(path).name}, coloured by its distance from {Path(other).name}", png.getvalue()))
+    if options.picture:
+        Path(options.picture).write_bytes(drawn[0][1])
+    return drawn
 
 
 def _line(way, label, size):

@@ -21,15 +21,16 @@ class VertexSamples final : public RingCheck {
 
   void begin(const TriangleMesh& mesh, double mapping_error) override;
   bool accepts(std::span<const Coverage::Element> faces, std::span<const Coverage::Removed> removed) override {
-    return samples_->try_change(faces, removed);
+    return samples_->try_change(faces, removed, trial_);
   }
-  void commit() override { samples_->commit(); }
+  void commit() override { samples_->commit(trial_); }
   std::string method() const override { return "vertex_samples"; }
 
  private:
   double tolerance_;
   TriangleMesh points_;  // a triangle for each vertex, all of its corners there
   std::optional<Coverage> samples_;
+  Coverage::Trial trial_;
 };
 
 }  // namespace tolvol::baselines

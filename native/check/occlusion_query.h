@@ -3,7 +3,9 @@
 ///
 /// A candidate is drawn so that its pixels are the points of a lattice on it, n subdivisions an edge, spacing at most
 /// that of the grid; the points at which the interpolated distance is at most eps' are counted. Inside only if all of
-/// them were: whatever is not drawn is not proved. The rest is unproved; outside is never claimed.
+/// them were: whatever is not drawn is not proved. The rest is unproved; outside is never claimed. A node counts with the
+/// exact distance of the triangle that the grid names for it; of a grid filled by fast marching, which names few, little
+/// is proved.
 #pragma once
 
 #include <optional>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // [Botsch04, §4] as printed, but for what is larger than a framebuffer: that stays unproved. Its distances are those of
-// the volume's grid, whichever way it was filled.
+// the volume's grid, whichever way it was filled, with signs.
 #include "check/paper.h"
 
 #include <algorithm>
@@ -14,8 +14,9 @@ namespace tolvol {
 
 Paper::Paper(const ToleranceVolume& volume, Margin margin) : LatticeCheck(volume, 0), margin_(margin) {
   bound(0);  // throws before any work when the grid is too coarse
+  const std::vector<float> distances = volume.signed_distance();
   gl::run([&] {
-    texture_.emplace(volume.grid(), volume.grid().distance, volume.frame_tolerance(), TextureFormat::normalised8);
+    texture_.emplace(volume.grid(), distances, volume.frame_tolerance(), TextureFormat::normalised8);
     texture_->filter_linearly();
     largest_ = gl::Framebuffer::largest();
     programs();

@@ -55,7 +55,7 @@ struct DeformationResult {
 /// `faces`: `corners` (1 to 4) a face; without a volume they may be empty. `volume` null: no tolerance. All faces of
 /// the result are inside, but for those kept. Throws InvalidInput for bad arrays, for a mesh that is outside to begin
 /// with (unless Outside::keep, or the deformation brings it inside), and where the stored type cannot hold the
-/// tolerance; Cancelled. About 0.3 us a vertex, and with a volume one check; when that fails some twelve, or
+/// tolerance; Cancelled. About 0.4 us a vertex, and with a volume one check; when that fails some twelve, or
 /// constrain().
 DeformationResult deform(std::span<const glm::dvec3> vertices, std::span<const std::uint32_t> faces, int corners,
                          const Placement& placement, const ToleranceVolume* volume, const LatticeDeformation& lattice,

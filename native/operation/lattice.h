@@ -68,7 +68,7 @@ class LatticeDeformation {
 
   /// How far the lattice carries a point of the world, exactly zero where none of the points that it depends on has
   /// left its rest (and the weights are equal); none for a point outside the box, which is not carried at all.
-  /// O(product of degree + 1), about 0.2 us for degree 3.
+  /// O(product of degree + 1), about 0.4 us for degree 3.
   std::optional<glm::dvec3> displacement(const glm::dvec3& world) const;
 
  private:

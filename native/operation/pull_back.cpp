@@ -29,8 +29,9 @@ constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 /// pieces become smaller than the rest. Vertices are first put at kComfort, where pieces of a quarter of the tolerance
 /// do.
 constexpr double kEasy = 0.98, kComfort = 0.97;
+constexpr double kGuess = 0.7;           // of the provable distance: up to here the grid's guess of a distance does
 constexpr double kRise = 1.0 / 64;       // what no factor can rise by in the end
-constexpr double kShrink = 0.75;         // of a factor, in each round in which a face of the vertex fails
+constexpr double kShrink = 0.5;          // of a factor, in each round in which a face of the vertex fails
 constexpr int kCrossings = 8;            // tries to find where a vertex leaves the volume; a plane takes one
 constexpr double kClose = 0.002;         // of the provable distance: near enough to that place
 constexpr double kInflate = 0x1p-50;     // rounding of a step's length and of adding it, relative
@@ -70,6 +71,14 @@ std::vector<std::uint32_t> select(std::size_t count, unsigned threads, Choose&& 
   });
   std::vector<std::uint32_t> result;
   for (const std::vector<std::uint32_t>& part : chosen) result.insert(result.end(), part.begin(), part.end());
+  return result;
+}
+
+std::vector<std::uint32_t> chosen(std::span<const std::uint32_t> from, std::span<const std::uint8_t> marked) {
+  std::vector<std::uint32_t> result;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    if (marked[i]) result.push_back(from[i]);
+  }
   return result;
 }
 
@@ -137,13 +146,8 @@ PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, Progress* pr
   state_.resize(stored.size());
   if (progress) progress->begin("checking");
   const std::size_t offender = first_of(stored.size(), threads_, [&](std::size_t v) {
-    if (progress && v % kBlock == 0) {
-      progress->update(0.5 * static_cast<double>(v) / static_cast<double>(stored.size()));
-    }
-    const glm::dvec3 at = placement_.frame(stored[v]);
-    const bool used = !ring(static_cast<std::uint32_t>(v)).empty();
-    state_[v] = {at, used ? distance_of(at) : kUnknown};
-    return used && !finite(at);
+    state_[v] = {placement_.frame(stored[v]), kUnknown};
+    return !finite(state_[v].at) && !ring(static_cast<std::uint32_t>(v)).empty();
   });
   if (offender < stored.size()) {
     refuse("vertex", offender, stored[offender], "is too far away for double precision");
@@ -153,26 +157,40 @@ PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, Progress* pr
   held_index_.assign(stored.size(), kNone);
   frozen_.assign(stored.size(), false);
   const std::size_t count = faces_.size() / corners_;
-  reach_.assign(count, within_);
-  trial_reach_.assign(count, within_);
-  result.outside = select(count, threads_, [&](std::size_t i) {
-    if (progress && i % kBlock == 0) progress->update(0.5 + 0.5 * static_cast<double>(i) / static_cast<double>(count));
-    const std::uint32_t f = static_cast<std::uint32_t>(i);
-    reach_[f] = provable_;  // nothing is known of it beyond the state as it is, unless:
-    const double reach = reach_by_certificate(f);
-    if (reach != kUnproved) {
-      reach_[f] = reach;
-      return false;
+  reach_.assign(count, 0);
+  trial_reach_.assign(count, 0);
+  std::vector<std::uint32_t> open =
+      select(count, threads_, [&](std::size_t f) { return !is_own(static_cast<std::uint32_t>(f)); });
+  measure(open, progress);
+  std::vector<std::uint8_t> outside(open.size());
+  parallel_for(open.size(), kSmallBlock, threads_, [&](std::size_t begin, std::size_t end) {
+    if (progress) progress->update(static_cast<double>(begin) / static_cast<double>(open.size()));
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t f = open[i];
+      reach_[f] = reach_by_certificate(f);
+      if (reach_[f] != kUnproved) continue;
+      reach_[f] = provable_;  // nothing is known of it beyond the state as it is
+      outside[i] = over_triangulations(f, [&](const glm::dvec3(&corners)[3], const glm::dvec3& distances) {
+                     return certificates_.front().verdict(corners, distances) == Verdict::inside ? 0 : kUnproved;
+                   }) == kUnproved;
     }
-    return over_triangulations(f, [&](const glm::dvec3(&corners)[3], const glm::dvec3& distances) {
-             return certificates_.front().verdict(corners, distances) == Verdict::inside ? 0 : kUnproved;
-           }) == kUnproved;
   });
+  result.outside = chosen(open, outside);
   for (const std::uint32_t f : result.outside) {
     for (const std::uint32_t v : corners_of(f)) frozen_[v] = true;
   }
   any_frozen_ = !result.outside.empty();
   return result;
+}
+
+/// Whether the face is the face of that number of the reference.
+bool PullBack::is_own(std::uint32_t face) const {
+  const TriangleMesh& reference = volume_->reference();
+  if (corners_ != 3 || face >= reference.triangles.size()) return false;
+  for (int k = 0; k < 3; ++k) {
+    if (state_[corners_of(face)[k]].at != reference.vertices[reference.triangles[face][k]]) return false;
+  }
+  return true;
 }
 
 PullBack::Moving PullBack::moving(std::vector<std::uint32_t> vertices) {
@@ -193,10 +211,13 @@ std::vector<std::uint32_t> PullBack::faces_around(std::span<const std::uint32_t>
   return faces;
 }
 
+/// An upper bound; the distance itself where the grid's guess leaves little room.
 double PullBack::distance_of(const glm::dvec3& at) const {
   const double box = 1 + 2 * volume_->frame_tolerance();
   // Written so that NaN is outside.
   if (!(std::abs(at.x) <= box && std::abs(at.y) <= box && std::abs(at.z) <= box)) return kFar;
+  const double guess = certificates_.front().distance_bound(at);
+  if (guess <= kGuess * within_) return guess;
   const Hierarchy::Nearest nearest = volume_->hierarchy().nearest(at, provable_, volume_->grid().triangle_near(at));
   return nearest.triangle == Hierarchy::kNone ? kFar : nearest.distance;
 }
@@ -250,15 +271,10 @@ double PullBack::reach_by_certificate(std::uint32_t face) const {
   return reach;
 }
 
-/// Which of these faces are not inside as their corners are now tried; writes trial_reach_ of all.
-std::vector<std::uint32_t> PullBack::failing(std::span<const std::uint32_t> faces, Progress* progress) {
-  if (progress) progress->update(progress->fraction());
-  std::vector<std::uint32_t> open = select(faces.size(), threads_, [&](std::size_t i) {
-    return (trial_reach_[faces[i]] = reach_by_motion(faces[i])) == kUnproved;
-  });
-  for (std::uint32_t& i : open) i = faces[i];
+/// Sees to it that the distances of all corners are known.
+void PullBack::measure(std::span<const std::uint32_t> faces, Progress* progress) {
   std::vector<std::uint32_t> unknown;
-  for (const std::uint32_t f : open) {
+  for (const std::uint32_t f : faces) {
     for (const std::uint32_t v : corners_of(f)) {
       if (trial_[v].distance != kUnknown) continue;
       trial_[v].distance = kFar;  // once each
@@ -266,19 +282,26 @@ std::vector<std::uint32_t> PullBack::failing(std::span<const std::uint32_t> face
     }
   }
   parallel_for(unknown.size(), kSmallBlock, threads_, [&](std::size_t begin, std::size_t end) {
+    if (progress) progress->update(progress->fraction());
     for (std::size_t i = begin; i < end; ++i) trial_[unknown[i]].distance = distance_of(trial_[unknown[i]].at);
   });
+}
+
+/// Which of these faces are not inside as their corners are now tried; writes trial_reach_ of all.
+std::vector<std::uint32_t> PullBack::failing(std::span<const std::uint32_t> faces, Progress* progress) {
+  if (progress) progress->update(progress->fraction());
+  std::vector<std::uint32_t> open = select(faces.size(), threads_, [&](std::size_t i) {
+    return (trial_reach_[faces[i]] = reach_by_motion(faces[i])) == kUnproved;
+  });
+  for (std::uint32_t& i : open) i = faces[i];
+  measure(open, progress);
   std::vector<std::uint8_t> failed(open.size());
   parallel_for(open.size(), kSmallBlock, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(progress->fraction());
     for (std::size_t i = begin; i < end; ++i)
       failed[i] = (trial_reach_[open[i]] = reach_by_certificate(open[i])) == kUnproved;
   });
-  std::vector<std::uint32_t> result;
-  for (std::size_t i = 0; i < open.size(); ++i) {
-    if (failed[i]) result.push_back(open[i]);
-  }
-  return result;
+  return chosen(open, failed);
 }
 
 PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3> before,
@@ -308,7 +331,7 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
     std::vector<Held> held = hold(moving, before, after, std::move(failed), progress);
     if (mode != Mode::reset) {
       pull(held, progress);
-      let_go(held, mode, progress);
+      if (mode != Mode::halve) let_go(held, mode, progress);
     }
     for (const Held& h : held) {
       const auto place = std::lower_bound(vertices.begin(), vertices.end(), h.vertex) - vertices.begin();
@@ -462,21 +485,13 @@ std::uint32_t PullBack::colour(std::vector<Held>& held) const {
 
 /// Step (3). Ends, because from its second turn on a vertex goes forward by kRise or not at all.
 void PullBack::let_go(std::vector<Held>& held, Mode mode, Progress* progress) {
-  std::vector<std::uint32_t> unknown;
+  std::vector<std::uint32_t> around;
   std::vector<std::vector<std::uint32_t>> due(colour(held));
   for (std::uint32_t i = 0; i < held.size(); ++i) {
     due[held[i].colour].push_back(i);
-    for (const std::uint32_t f : ring(held[i].vertex)) {
-      for (const std::uint32_t v : corners_of(f)) {
-        if (trial_[v].distance != kUnknown) continue;
-        trial_[v].distance = kFar;
-        unknown.push_back(v);
-      }
-    }
+    around.push_back(held[i].vertex);
   }
-  parallel_for(unknown.size(), kSmallBlock, threads_, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) trial_[unknown[i]].distance = distance_of(trial_[unknown[i]].at);
-  });
+  measure(faces_around(around), progress);
   std::vector<bool> is_due(held.size(), true), searched(held.size(), false);
   std::vector<std::uint8_t> raised;
   for (bool any = true; any;) {

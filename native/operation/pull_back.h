@@ -23,6 +23,7 @@ class PullBack {
   enum class Mode {
     pull_back,  ///< as far as the tolerance lets each vertex go: none can rise by 1/64 of its motion alone
     settle,     ///< the same but for the last 3 % of the tolerance, which take most of the time
+    halve,      ///< factors are halved until all faces are inside: quick, for steps that are repeated
     reset,      ///< all the way back or not at all, the one step back of [Botsch04, §5]
   };
 
@@ -95,11 +96,13 @@ class PullBack {
     return std::span(ring_).subspan(ring_start_[vertex], ring_start_[vertex + 1] - ring_start_[vertex]);
   }
   void make_rings(std::size_t vertex_count);
+  bool is_own(std::uint32_t face) const;
   double distance_of(const glm::dvec3& at) const;
   double reach_by_motion(std::uint32_t face) const;
   template <class Bound>
   double over_triangulations(std::uint32_t face, Bound&& bound) const;
   double reach_by_certificate(std::uint32_t face) const;
+  void measure(std::span<const std::uint32_t> faces, Progress* progress);
   std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Progress* progress);
   std::vector<std::uint32_t> faces_around(std::span<const std::uint32_t> vertices);
 

@@ -244,7 +244,7 @@ class Smoothing {
     std::size_t held_back = 0;
     if (pull_back_) {
       PullBack::Result ends = pull_back_->move(
-          moving_, before_, after_, options_.reset ? PullBack::Mode::reset : PullBack::Mode::settle, options_.progress);
+          moving_, before_, after_, options_.reset ? PullBack::Mode::reset : PullBack::Mode::halve, options_.progress);
       after_.swap(ends.reached);
       held_back = ends.held_back;
     }

@@ -221,7 +221,7 @@ void bind_deformation(py::module_& module) {
       "\"pull_back\"\n"
       "(each vertex goes as far as it may, see constrain). outside: \"error\", or \"keep\" the vertices of "
       "faces that are\n"
-      "outside to begin with where they are. Raises InvalidInput and Cancelled. Cost: about 0.3 us a vertex, "
+      "outside to begin with where they are. Raises InvalidInput and Cancelled. Cost: about 0.4 us a vertex, "
       "and with a\n"
       "volume one check; when that fails some twelve, or constrain.\n"
       "M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.");

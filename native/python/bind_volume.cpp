@@ -144,8 +144,19 @@ void bind_volume(py::module_& module) {
            "or float64.\n"
            "faces: (m, c) integers, c from 1 (points) to 4 (quads, in every triangulation). groups: (m,) integers; "
            "every face gets\n"
-           "the worst verdict of its group. method: \"certificate\". Returns a CheckResult. Cost: about 0.1 us a small "
-           "face.")
+           "the worst verdict of its group. Returns a CheckResult. method:\n"
+           "\"certificate\": exact witnesses, on the CPU, at any precision; the only one that proves outside. About 0.1 us "
+           "a small face.\n"
+           "\"gl_certificate\": the same in a compute shader, for batches of small faces; what it cannot prove is "
+           "unproved.\n"
+           "\"occlusion_query\": interpolated distances at a lattice on each face, drawn and counted; the grid must have "
+           "a precision\n"
+           "of 2 or more, 4 is good. With groups one query each: slow for small groups, fast for a single one.\n"
+           "\"paper\", \"paper_half_h\": the check as it was published, with a margin of (sqrt(3)/2) h or h/2 for the grid "
+           "spacing h;\n"
+           "NOT conservative: what it calls inside may be outside.\n"
+           "Raises GlUnavailable, with nothing accepted, where a GL method finds no OpenGL 4.5 or fails on the way.\n"
+           "After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 4.")
       .def("distance", &distance, py::arg("points"), py::arg("to_world") = py::none(), py::arg("threads") = 0,
            "(k,) float64: the exact unsigned distance of (k, 3) points to the reference, in world units. About 1 us a "
            "point.")

@@ -22,9 +22,9 @@ struct Volume {
   /// Made on first use and kept: those of GL hold textures and buffers. From any thread, without the GIL.
   std::shared_ptr<const ToleranceCheck> check(const std::string& method) const {
     const std::lock_guard lock(mutex);
-    std::shared_ptr<const ToleranceCheck>& kept = checks[method];
-    if (!kept) kept = make_check(method, native);
-    return kept;
+    const auto kept = checks.find(method);
+    if (kept != checks.end()) return kept->second;
+    return checks[method] = make_check(method, native);
   }
   /// One whose GL failed is made anew the next time.
   void forget(const std::string& method) const {

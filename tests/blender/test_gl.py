@@ -73,3 +73,10 @@ def test_without_egl_a_picture_is_refused_before_the_work(scan, tmp_path):
     code, said, error = command("decimate.py", scan, out, "--tolerance", "1%", "--picture", picture, before=hidden)
     assert code == 2 and "--picture: GL unavailable: " in error and "triangles" not in said
     assert not out.exists() and not picture.exists()
+
+
+def test_without_egl_a_page_has_no_pictures_and_says_so(scan, tmp_path):
+    hidden = "import os; os.environ['__EGL_VENDOR_LIBRARY_FILENAMES'] = '/dev/null'"
+    code, said, error = command("report.py", scan, scan, "--report", tmp_path / "r.html", before=hidden)
+    assert (code, error) == (0, "") and "note: no pictures in the report: GL unavailable: " in said
+    assert "<img" not in (tmp_path / "r.html").read_text()

@@ -47,31 +47,46 @@ TEST_F(PaperChecks, SeesAParallelPlaneOnBothSidesOfItsBound) {
   }
 }
 
-// The numbers are the point: this is what "not conservative" means. Measured at the paper's precision: 66 % of those
-// outside with h/2, and with (sqrt(3)/2) h still most of the small ones.
+// The numbers are the point: this is what "not conservative" means. With h/2 about half of the spikes that are outside
+// pass at the paper's precision, because of a small triangle at most one pixel near its middle is drawn. The bands leave
+// room for hardware that fills and filters a little differently.
 TEST_F(PaperChecks, AcceptsSpikesThatTheOthersDoNot) {
   constexpr int kSpikes = 10'000;
+  struct Case {
+    double precision;
+    const char* method;
+    int fewest, most;  // wrong accepts
+  };
+  const Case cases[] = {
+      {1.1, "paper_half_h", 500, 900}, {4.0, "paper_half_h", 200, 500}, {4.0, "paper", 30, 120},
+      {1.1, "certificate", 0, 0},      {1.1, "gl_certificate", 0, 0},   {4.0, "occlusion_query", 0, 0},
+  };
   const TriangleMesh torus = shapes::torus(128);
-  for (const double precision : {1.1, 4.0}) {
-    const std::unique_ptr<ToleranceVolume> volume = make_volume(torus, precision);
-    Maker maker(torus, kTolerance, 5);
-    Points points;
-    for (int i = 0; i < kSpikes; ++i) maker.spike(points);
-    const int outside = candidates::farther(points, torus, kTolerance);
-    for (const char* method : {"paper", "paper_half_h", "certificate", "gl_certificate", "occlusion_query"}) {
-      if (precision < 2 && std::string(method) == "occlusion_query") continue;
-      const std::vector<Verdict> verdicts = ask(*make_check(method, *volume), *volume, points);
-      const Points in = candidates::accepted(points, verdicts);
-      const int wrong = candidates::farther(in, torus, kTolerance);
-      std::printf("  precision %.1f, %s: %zu of %d spikes accepted, %d of %d outside ones wrongly\n", precision, method,
-                  in.size() / 3, kSpikes, wrong, outside);
-      if (std::string(method).starts_with("paper")) {
-        EXPECT_GT(wrong, outside / 20) << method;
-        EXPECT_LT(wrong, outside) << method;
-      } else {
-        EXPECT_EQ(wrong, 0) << method;
-      }
+  Maker maker(torus, kTolerance, 5);
+  Points points;
+  for (int i = 0; i < kSpikes; ++i) maker.spike(points);
+  const std::unique_ptr<ToleranceVolume> judge = make_volume(torus, 1);
+  const auto with_corner_outside = [&](const Points& triangles) {
+    int count = 0;
+    for (std::size_t i = 0; i < triangles.size(); i += 3) {
+      count += std::any_of(&triangles[i], &triangles[i] + 3, [&](const glm::dvec3& p) {
+        return judge->hierarchy().nearest(judge->frame().from_world(p)).distance > 1.0001 * judge->frame_tolerance();
+      });
     }
+    return count;
+  };
+  const int outside = with_corner_outside(points);
+  EXPECT_GT(outside, 1'000);
+  for (const Case& c : cases) {
+    const std::unique_ptr<ToleranceVolume> volume = make_volume(torus, c.precision);
+    const Points in = candidates::accepted(points, ask(*make_check(c.method, *volume), *volume, points));
+    const int wrong = with_corner_outside(in);
+    std::printf("  %s at precision %.1f: %zu of %d spikes accepted, %d of the %d outside\n", c.method, c.precision,
+                in.size() / 3, kSpikes, wrong, outside);
+    EXPECT_GT(in.size(), 3u * kSpikes / 2) << c.method;
+    EXPECT_GE(wrong, c.fewest) << c.method;
+    EXPECT_LE(wrong, c.most) << c.method;
+    if (c.most == 0) EXPECT_EQ(candidates::farther(in, torus, kTolerance), 0) << c.method;
   }
 }
 

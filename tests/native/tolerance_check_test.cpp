@@ -152,6 +152,20 @@ TEST_P(ProvingCheck, RandomAndHostileCandidates) {
   }
 }
 
+// Its distances are not exact, and most of its nodes have no triangle.
+TEST_P(ProvingCheck, AFieldByFastMarchingDoesNotMislead) {
+  const TriangleMesh torus = shapes::torus(32, 0.01);
+  const double tolerance = 2 * kTolerance;
+  ToleranceVolume::Options options;
+  options.precision = 3;
+  options.field = Field::fast_marching;
+  const ToleranceVolume volume(torus.vertices, torus.triangles, kIdentity, tolerance, options);
+  const Points points = Maker(torus, tolerance, 3).all_kinds(5'000);
+  const Points in = candidates::accepted(points, ask(*make_check(GetParam(), volume), volume, points));
+  EXPECT_GT(in.size(), 0u);
+  EXPECT_EQ(candidates::farther(in, torus, tolerance), 0);
+}
+
 TEST_P(ProvingCheck, OutsideTheGridAndNotFinite) {
   const TriangleMesh plane = shapes::grid(8);
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();

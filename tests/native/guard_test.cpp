@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Judged by measure/hausdorff.h on the float32 positions that the caller holds.
+#include "operation/guard.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "measure/hausdorff.h"
+#include "reference/errors.h"
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+constexpr double kTolerance = 0.03;
+
+struct Sculpture {
+  TriangleMesh mesh = shapes::torus(40);
+  glm::dmat4 to_world = glm::dmat4(1);
+  ToleranceVolume volume{mesh.vertices, mesh.triangles, {to_world, Storage::float32}, kTolerance};
+  std::vector<float> positions = flat(mesh.vertices);
+
+  static std::vector<float> flat(const std::vector<dvec3>& points) {
+    std::vector<float> result;
+    for (const dvec3& p : points) {
+      for (int k = 0; k < 3; ++k) result.push_back(float(p[k]));
+    }
+    return result;
+  }
+  std::vector<std::uint32_t> faces() const {
+    std::vector<std::uint32_t> result;
+    for (const glm::uvec3& t : mesh.triangles) result.insert(result.end(), {t.x, t.y, t.z});
+    return result;
+  }
+  Guard guard(const Guard::Options& options = {}) const { return {positions, faces(), 3, to_world, volume, options}; }
+  dvec3 at(std::size_t v) const { return {positions[3 * v], positions[3 * v + 1], positions[3 * v + 2]}; }
+  void push(std::size_t v, const dvec3& by) {
+    for (int k = 0; k < 3; ++k) positions[3 * v + k] += float(by[k]);
+  }
+  /// Pushes the vertices within `radius` of one away from the origin, by `amount` in the middle.
+  void dab(std::size_t centre, double radius, double amount) {
+    const dvec3 middle = at(centre);
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+      const double share = glm::length(at(v) - middle) / radius;
+      if (share < 1) push(v, amount * (1 - share) * glm::normalize(middle));
+    }
+  }
+  void correct(const Guard::Correction& correction) {
+    for (std::size_t i = 0; i < correction.vertices.size(); ++i) {
+      std::copy_n(&correction.positions[3 * i], 3, &positions[3 * correction.vertices[i]]);
+    }
+  }
+  double deviation() const {
+    TriangleMesh now = mesh;
+    for (std::size_t v = 0; v < now.vertices.size(); ++v) now.vertices[v] = at(v);
+    return hausdorff(now, mesh, {kTolerance, 1, nullptr}).upper;
+  }
+};
+
+TEST(Guard, KeepsEveryDabInside) {
+  Sculpture s;
+  Guard guard = s.guard();
+  std::size_t corrected = 0;
+  for (int i = 0; i < 30; ++i) {
+    s.dab(7 + 50 * std::size_t(i), 0.4, i % 3 == 0 ? 0.08 : -0.05);
+    const std::vector<float> wish = s.positions;
+    const Guard::Correction correction = guard.constrain(s.positions);
+    s.correct(correction);
+    for (std::size_t v = 0, c = 0; v < s.mesh.vertices.size(); ++v) {
+      if (c < correction.vertices.size() && correction.vertices[c] == v) {
+        ++c;
+      } else {
+        ASSERT_EQ(std::memcmp(&wish[3 * v], &s.positions[3 * v], 12), 0) << "not moved back";
+      }
+    }
+    corrected += correction.vertices.size();
+    ASSERT_LE(s.deviation(), kTolerance) << i;
+  }
+  EXPECT_GT(corrected, 100u);
+  EXPECT_GT(s.deviation(), 0.95 * kTolerance) << "it gets as far as it may";
+}
+
+TEST(Guard, AgreesWithConstrainButForTheLastThreePercent) {
+  Sculpture s;
+  Guard guard = s.guard();
+  const std::vector<dvec3> before = s.mesh.vertices;
+  s.dab(100, 0.5, 0.08);
+  std::vector<dvec3> wish;
+  for (std::size_t v = 0; v < before.size(); ++v) wish.push_back(s.at(v));
+  const ConstrainResult exact = constrain(before, wish, s.faces(), 3, {s.to_world, Storage::float32}, s.volume);
+  s.correct(guard.constrain(s.positions));
+  for (std::size_t v = 0; v < before.size(); ++v) {
+    EXPECT_LE(glm::length(s.at(v) - exact.vertices[v]), 0.1 * kTolerance) << v;
+  }
+}
+
+TEST(Guard, NothingMovedIsNothingToDoAndUndoIsAnEdit) {
+  Sculpture s;
+  Guard guard = s.guard();
+  EXPECT_TRUE(guard.constrain(s.positions).vertices.empty());
+  const std::vector<float> start = s.positions;
+  s.dab(100, 0.5, 0.02);
+  EXPECT_TRUE(guard.constrain(s.positions).vertices.empty()) << "inside";
+  EXPECT_TRUE(guard.constrain(start).vertices.empty()) << "undone";
+  EXPECT_TRUE(guard.constrain(s.positions).vertices.empty()) << "done again";
+}
+
+TEST(Guard, PullsBackTowardsTheLastGoodState) {
+  Sculpture s;
+  Guard guard = s.guard();
+  s.dab(100, 0.5, 0.02);
+  guard.constrain(s.positions);
+  const dvec3 good = s.at(100);
+  s.push(100, {0, 0, 5});
+  const Guard::Correction correction = guard.constrain(s.positions);
+  ASSERT_EQ(correction.vertices, std::vector<std::uint32_t>{100});
+  s.correct(correction);
+  EXPECT_LT(glm::length(s.at(100) - good), 0.3);
+  EXPECT_NEAR(s.at(100).x, good.x, 1e-6);
+  EXPECT_LE(s.deviation(), kTolerance);
+}
+
+TEST(Guard, TheResultDoesNotDependOnThreads) {
+  std::vector<float> ends[2];
+  for (const unsigned threads : {1u, 3u}) {
+    Sculpture s;
+    Guard guard = s.guard({.threads = threads});
+    for (const std::size_t v : {5, 500, 900}) {
+      s.dab(v, 1.0, 0.06);
+      s.correct(guard.constrain(s.positions));
+    }
+    ends[threads / 3] = s.positions;
+  }
+  EXPECT_EQ(ends[0], ends[1]);
+}
+
+TEST(Guard, FollowsTheMatrix) {
+  glm::dmat4 doubled(2);
+  doubled[3][3] = 1;
+  Sculpture s{.to_world = doubled};
+  s.mesh = shapes::grid(8);
+  const ToleranceVolume volume(s.mesh.vertices, s.mesh.triangles, {doubled, Storage::float32}, kTolerance);
+  std::vector<float> positions = Sculpture::flat(s.mesh.vertices);
+  Guard guard(positions, s.faces(), 3, doubled, volume, {});
+  for (std::size_t v = 0; v < s.mesh.vertices.size(); ++v) positions[3 * v + 2] = 1;
+  const Guard::Correction correction = guard.constrain(positions);
+  ASSERT_EQ(correction.vertices.size(), s.mesh.vertices.size());
+  for (std::size_t i = 0; i < correction.vertices.size(); ++i) {
+    EXPECT_NEAR(correction.positions[3 * i + 2], kTolerance / 2, 0.05 * kTolerance / 2);
+  }
+}
+
+TEST(Guard, BadInputKeepsTheState) {
+  Sculpture s;
+  Guard guard = s.guard();
+  const std::vector<float> good = s.positions;
+  s.positions[30] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(guard.constrain(s.positions), InvalidInput);
+  s.positions = good;
+  s.push(10, {0, 0, 1});
+  EXPECT_THROW(guard.reset(s.positions), InvalidInput) << "outside";
+  EXPECT_THROW(s.guard(), InvalidInput);
+  EXPECT_THROW(guard.constrain(std::vector<float>(9)), InvalidInput);
+  EXPECT_THROW(guard.reset(std::vector<float>(9)), InvalidInput);
+  s.correct(guard.constrain(s.positions));
+  EXPECT_LE(s.deviation(), kTolerance) << "works on from the last good state";
+}
+
+TEST(Guard, KeepsWhatIsOutsideWhenAsked) {
+  Sculpture s;
+  s.push(10, {0, 0, 1});
+  const std::vector<float> start = s.positions;
+  Guard guard = s.guard({.outside = ConstrainOptions::Outside::keep});
+  EXPECT_EQ(guard.outside().size(), 6u);
+  s.push(10, {0, 0, 0.01});
+  s.push(700, {0, 0, 0.01});
+  s.correct(guard.constrain(s.positions));
+  EXPECT_EQ(std::memcmp(&s.positions[30], &start[30], 12), 0) << "stays";
+  EXPECT_NE(std::memcmp(&s.positions[2100], &start[2100], 12), 0) << "moves";
+}
+
+TEST(Guard, ResetStartsAnew) {
+  Sculpture s;
+  Guard guard = s.guard();
+  const std::vector<float> start = s.positions;
+  s.dab(100, 0.5, 0.02);
+  guard.reset(s.positions);
+  const dvec3 good = s.at(100);
+  s.push(100, {0, 0, 5});
+  s.correct(guard.constrain(s.positions));
+  EXPECT_NEAR(s.at(100).x, good.x, 1e-6) << "from the new state";
+}
+
+}  // namespace

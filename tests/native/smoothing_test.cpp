@@ -1,0 +1,381 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Judged by measure/hausdorff.h on what is stored; the operators against direct formulas.
+#include "operation/smoothing.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <memory>
+
+#include "check/certificate.h"
+#include "measure/hausdorff.h"
+#include "reference/errors.h"
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+using Options = SmoothingOptions;
+using Operator = Options::Operator;
+using Weights = Options::Weights;
+using Boundary = Options::Boundary;
+
+const Placement kDouble(glm::dmat4(1), Storage::float64), kSingle(glm::dmat4(1), Storage::float32);
+
+SmoothingResult free_smooth(const TriangleMesh& mesh, const Options& options, const Placement& placement = kDouble) {
+  return smooth(mesh.vertices, mesh.triangles, placement, nullptr, options);
+}
+
+/// A flat square plate of n x n squares with noise in z, or with noise in the plane as well.
+TriangleMesh rough_plate(unsigned n, double noise, double sideways = 0) {
+  std::mt19937 engine(4);
+  std::normal_distribution<double> normal;
+  return shapes::squares(n, [&](const dvec3& p) {
+    const double x = normal(engine), y = normal(engine), z = normal(engine);
+    return p + dvec3(sideways * x, sideways * y, noise * z);
+  });
+}
+
+bool same_bits(const std::vector<dvec3>& a, const std::vector<dvec3>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(dvec3)) == 0;
+}
+
+TEST(Smoothing, UniformLaplacianIsHalfTheUmbrellaVector) {
+  const TriangleMesh mesh = rough_plate(4, 0.1, 0.02);
+  const SmoothingResult r =
+      free_smooth(mesh, {.iterations = 1, .kind = Operator::laplacian, .weights = Weights::uniform});
+  for (unsigned i = 1; i < 4; ++i) {
+    for (unsigned j = 1; j < 4; ++j) {
+      const unsigned v = i * 5 + j;
+      dvec3 mean(0);
+      for (const int step : {-1, 1, -5, 5, 6, -6}) mean += mesh.vertices[unsigned(int(v) + step)] / 6.0;
+      EXPECT_LT(glm::length(r.vertices[v] - 0.5 * (mean + mesh.vertices[v])), 1e-15);
+    }
+  }
+}
+
+/// The cotangent of the angle at `at` between the other two.
+double cotangent(const dvec3& at, const dvec3& a, const dvec3& b) {
+  return glm::dot(a - at, b - at) / glm::length(glm::cross(a - at, b - at));
+}
+
+TEST(Smoothing, CotangentBilaplacianFollowsItsFormula) {
+  for (const bool sheared : {false, true}) {
+    glm::dmat4 to_world(1);
+    if (sheared) to_world[1][0] = 0.3, to_world[2][2] = 2;  // weights are of the world
+    const TriangleMesh mesh = shapes::torus(12, 0.01);
+    const Placement placement(to_world, Storage::float64);
+    const unsigned n = 12;
+    const auto at = [n](int i, int j) { return unsigned((i + int(n)) % int(n)) * n + unsigned((j + int(n)) % int(n)); };
+    const auto umbrella = [&](int i, int j, const auto& value) {
+      // Neighbours in turn; the two corners opposite to an edge are the neighbours before and after.
+      const int around[6][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 0}, {-1, -1}, {0, -1}};
+      const auto world = [&](unsigned v) { return placement.world(mesh.vertices[v]); };
+      dvec3 sum(0);
+      double total = 0;
+      for (int k = 0; k < 6; ++k) {
+        const auto neighbour = [&](int m) { return at(i + around[m % 6][0], j + around[m % 6][1]); };
+        const unsigned v = at(i, j), to = neighbour(k);
+        const double w = cotangent(world(neighbour(k + 1)), world(v), world(to)) +
+                         cotangent(world(neighbour(k + 5)), world(v), world(to));
+        sum += std::max(w, 0.0) * (value(i + around[k][0], j + around[k][1]) - value(i, j));
+        total += std::max(w, 0.0);
+      }
+      return sum / total;
+    };
+    const auto position = [&](int i, int j) { return mesh.vertices[at(i, j)]; };
+    const auto first = [&](int i, int j) { return umbrella(i, j, position); };
+    const SmoothingResult r = free_smooth(mesh, {.iterations = 1}, placement);
+    for (int i = 0; i < int(n); ++i) {
+      for (int j = 0; j < int(n); ++j) {
+        const dvec3 expected = position(i, j) - 0.25 * umbrella(i, j, first);
+        EXPECT_LT(glm::length(r.vertices[at(i, j)] - expected), 1e-14);
+      }
+    }
+  }
+}
+
+TEST(Smoothing, APlaneStaysAPlaneAndCotangentsKeepItsTriangles) {
+  TriangleMesh flat = rough_plate(10, 0, 0.01);
+  for (dvec3& p : flat.vertices) p = {p.x - p.y / 2, std::sqrt(0.75) * p.y, 0};  // acute triangles
+  for (const Operator kind : {Operator::laplacian, Operator::bilaplacian}) {
+    const SmoothingResult kept = free_smooth(flat, {.kind = kind});
+    const SmoothingResult evened = free_smooth(flat, {.kind = kind, .weights = Weights::uniform});
+    EXPECT_LT(kept.largest_motion, 1e-14) << "no curvature, no motion";
+    EXPECT_GT(evened.largest_motion, 0.005);
+    for (const dvec3& p : evened.vertices) EXPECT_EQ(p.z, 0);
+  }
+}
+
+double roughness(const std::vector<dvec3>& points) {
+  double sum = 0;
+  for (const dvec3& p : points) sum += p.z * p.z;
+  return std::sqrt(sum / double(points.size()));
+}
+
+TEST(Smoothing, NoiseGoesDownWithEveryIterationAndOperator) {
+  const TriangleMesh mesh = rough_plate(20, 0.01);
+  for (const Operator kind : {Operator::laplacian, Operator::bilaplacian}) {
+    for (const Weights weights : {Weights::uniform, Weights::cotangent}) {
+      double last = roughness(mesh.vertices);
+      for (const unsigned iterations : {1u, 3u, 10u, 40u}) {
+        const double now =
+            roughness(free_smooth(mesh, {.iterations = iterations, .kind = kind, .weights = weights}).vertices);
+        EXPECT_LT(now, last);
+        last = now;
+      }
+    }
+  }
+}
+
+TEST(Smoothing, TheBilaplacianKeepsTheSizeBetter) {
+  const TriangleMesh mesh = shapes::torus(40);
+  const auto shrinkage = [&](Operator kind) {
+    return hausdorff(mesh, {free_smooth(mesh, {.kind = kind}).vertices, mesh.triangles}).lower;
+  };
+  EXPECT_LT(shrinkage(Operator::bilaplacian), 0.2 * shrinkage(Operator::laplacian));
+}
+
+TEST(Smoothing, TheBoundaryStaysOrIsSmoothedAlongItself) {
+  const unsigned n = 12;
+  TriangleMesh mesh = shapes::squares(n, [&](const dvec3& p) {
+    const bool zigzag = p.x == 0 && (std::lround(p.y * n) % 2 == 1);
+    return p + dvec3(zigzag ? -0.02 : 0, 0, 0.01 * std::sin(40 * p.x * p.y));
+  });
+  const auto on_boundary = [&](std::size_t v) { return v % (n + 1) % n == 0 || v / (n + 1) % n == 0; };
+  for (const Operator kind : {Operator::laplacian, Operator::bilaplacian}) {
+    for (const Weights weights : {Weights::uniform, Weights::cotangent}) {
+      const SmoothingResult fixed = free_smooth(mesh, {.kind = kind, .weights = weights});
+      const SmoothingResult along = free_smooth(mesh, {.kind = kind, .weights = weights, .boundary = Boundary::along});
+      EXPECT_EQ(fixed.fixed_boundary, 4 * n);
+      EXPECT_EQ(along.fixed_boundary, 0u);
+      double worst = 0;
+      for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+        if (!on_boundary(v)) continue;
+        EXPECT_EQ(fixed.vertices[v], mesh.vertices[v]);
+        if (v > 2 && v + 3 < n) worst = std::max(worst, std::abs(along.vertices[v].x - along.vertices[v + 1].x));
+      }
+      EXPECT_LT(worst, 0.01) << "the zigzag was 0.02";
+      // Inner vertices do not pull at the boundary: away from its corners, what is straight stays straight.
+      const SmoothingResult once =
+          free_smooth(mesh, {.iterations = 1, .kind = kind, .weights = weights, .boundary = Boundary::along});
+      for (std::size_t v = n * (n + 1) + 3; v + 3 < mesh.vertices.size(); ++v) {
+        EXPECT_EQ(once.vertices[v].x, 1);
+        EXPECT_NE(once.vertices[v].z, mesh.vertices[v].z);
+      }
+    }
+  }
+}
+
+TEST(Smoothing, LockedVerticesAndStrength) {
+  const TriangleMesh mesh = shapes::torus(20, 0.02);
+  const std::size_t count = mesh.vertices.size();
+  const auto locked = std::make_unique<bool[]>(count);
+  std::vector<double> strength(count);
+  for (std::size_t v = 0; v < count; ++v) locked[v] = v % 7 == 0, strength[v] = double(v % 5) / 4;
+  const Options once{.iterations = 1};
+  Options with_lock = once, with_strength = once;
+  with_lock.locked = {locked.get(), count};
+  with_strength.strength = strength;
+  const SmoothingResult plain = free_smooth(mesh, once), held = free_smooth(mesh, with_lock),
+                        partly = free_smooth(mesh, with_strength);
+  for (std::size_t v = 0; v < count; ++v) {
+    EXPECT_EQ(held.vertices[v], locked[v] ? mesh.vertices[v] : plain.vertices[v]);
+    const dvec3 expected = mesh.vertices[v] + strength[v] * (plain.vertices[v] - mesh.vertices[v]);
+    EXPECT_LT(glm::length(partly.vertices[v] - expected), 1e-15);
+  }
+}
+
+TEST(Smoothing, WhatIsHugeHoldsNothingBack) {
+  glm::dmat4 odd(1);
+  odd[1][0] = 0.3, odd[2][2] = -2, odd[3] = {10, 20, 30, 1};
+  for (const Storage storage : {Storage::float32, Storage::float64}) {
+    const TriangleMesh mesh = shapes::torus(30, 0.02);
+    const Placement placement(odd, storage);
+    const ToleranceVolume volume(mesh.vertices, mesh.triangles, placement, 3);
+    for (const bool reset : {false, true}) {
+      const Options options{.iterations = 20, .reset = reset};
+      const SmoothingResult bounded = smooth(mesh.vertices, mesh.triangles, placement, &volume, options);
+      EXPECT_TRUE(same_bits(bounded.vertices, free_smooth(mesh, options, placement).vertices));
+      EXPECT_EQ(bounded.held_back, std::vector<std::size_t>(20, 0));
+    }
+  }
+}
+
+struct Scene {
+  TriangleMesh mesh;
+  glm::dmat4 to_world = glm::dmat4(1);
+  double percent = 0.4;
+
+  Placement placement() const { return {to_world, Storage::float32}; }
+  double tolerance() const { return percent / 100 * reference_size(mesh.vertices, mesh.triangles, to_world); }
+};
+
+std::vector<Scene> scenes() {
+  glm::dmat4 mirrored(1), sheared(1), far_away(1), tiny(1e-6);
+  mirrored[0][0] = -1;
+  sheared[1][0] = 0.7, sheared[2][1] = -0.4, sheared[0][0] = 3;
+  far_away[3] = {5000, -3000, 100, 1};
+  tiny[3][3] = 1;
+  TriangleMesh needles = rough_plate(30, 0.02);
+  for (dvec3& p : needles.vertices) p.y *= 1e-3;
+  TriangleMesh odd = shapes::torus(30, 0.02);  // faces that are points and segments, and faces that are there twice
+  odd.triangles.insert(odd.triangles.end(), {{0, 0, 0}, {0, 1, 1}, {5, 9, 5}, odd.triangles[7], odd.triangles[8]});
+  return {{shapes::torus(40, 0.02)},
+          {shapes::torus(40, 0.02), glm::dmat4(1), 0.1},
+          {shapes::stored(rough_plate(30, 0.02))},
+          {shapes::box(10), glm::dmat4(1), 0.3},
+          {shapes::stored(needles), glm::dmat4(1), 0.1},
+          {odd},
+          {shapes::soup(shapes::torus(24, 0.02))},
+          {shapes::torus(30, 0.02), mirrored},
+          {shapes::torus(30, 0.02), sheared},
+          {shapes::torus(30, 0.02), far_away},
+          {shapes::torus(30, 0.02), tiny}};
+}
+
+TEST(Smoothing, EveryResultIsInsideOnEveryMesh) {
+  int number = 0;
+  for (const Scene& scene : scenes()) {
+    const ToleranceVolume volume(scene.mesh.vertices, scene.mesh.triangles, scene.placement(), scene.tolerance());
+    for (const bool reset : {false, true}) {
+      SCOPED_TRACE(testing::Message() << "scene " << number << (reset ? " reset" : " pulled back"));
+      const Options options{.iterations = 8,
+                            .weights = reset ? Weights::uniform : Weights::cotangent,
+                            .boundary = Boundary::along,
+                            .reset = reset};
+      const SmoothingResult r = smooth(scene.mesh.vertices, scene.mesh.triangles, scene.placement(), &volume, options);
+      const auto world = [&](std::vector<dvec3> points) {
+        for (dvec3& p : points) p = scene.placement().world(p);
+        return TriangleMesh{points, scene.mesh.triangles};
+      };
+      const double tolerance = scene.tolerance();
+      EXPECT_LE(hausdorff(world(r.vertices), world(scene.mesh.vertices), {tolerance, 1, nullptr}).upper, tolerance);
+      const Placement placed = scene.placement().in(volume.frame());
+      const std::vector<dvec3> in_frame = placed.frame(r.vertices);
+      std::vector<std::uint32_t> indices;
+      for (const glm::uvec3& t : scene.mesh.triangles) indices.insert(indices.end(), {t.x, t.y, t.z});
+      for (const Verdict v :
+           Certificate(volume).check({in_frame, indices, 3, placed.mapping_error(r.vertices)}, {1, nullptr}))
+        ASSERT_EQ(v, Verdict::inside);
+      for (const dvec3& p : r.vertices) ASSERT_EQ(p, rounded_to_float32(p));
+      EXPECT_TRUE(reset || r.largest_motion > 0.5 * tolerance);
+      EXPECT_GT(r.held_back.back(), 0u);
+      EXPECT_EQ(r.method, "certificate");
+    }
+    ++number;
+  }
+}
+
+TEST(Smoothing, PulledBackGoesFartherThanReset) {
+  const TriangleMesh mesh = shapes::torus(40, 0.02);
+  const ToleranceVolume volume(mesh.vertices, mesh.triangles, kSingle, 0.02);
+  const auto moved = [&](bool reset) {
+    const SmoothingResult r = smooth(mesh.vertices, mesh.triangles, kSingle, &volume, {.reset = reset});
+    double sum = 0;
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) sum += glm::length(r.vertices[v] - mesh.vertices[v]);
+    return sum;
+  };
+  EXPECT_GT(moved(false), 1.02 * moved(true));
+}
+
+TEST(Smoothing, TheResultDoesNotDependOnThreads) {
+  const TriangleMesh mesh = shapes::torus(60, 0.02);
+  const ToleranceVolume volume(mesh.vertices, mesh.triangles, kSingle, 0.02);
+  for (const ToleranceVolume* bound : {static_cast<const ToleranceVolume*>(nullptr), &volume}) {
+    const SmoothingResult one = smooth(mesh.vertices, mesh.triangles, kSingle, bound, {.threads = 1});
+    for (const unsigned threads : {2u, 5u}) {
+      EXPECT_TRUE(same_bits(one.vertices,
+                            smooth(mesh.vertices, mesh.triangles, kSingle, bound, {.threads = threads}).vertices));
+    }
+  }
+}
+
+TEST(Smoothing, VerticesAtOnePlaceMoveAsOne) {
+  const TriangleMesh mesh = shapes::torus(20, 0.02), soup = shapes::soup(mesh);
+  const SmoothingResult whole = free_smooth(mesh, {}), parts = free_smooth(soup, {});
+  EXPECT_EQ(parts.welded, soup.vertices.size() - mesh.vertices.size());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_LT(glm::length(parts.vertices[soup.triangles[t][k]] - whole.vertices[mesh.triangles[t][k]]), 1e-14);
+    }
+  }
+  for (std::size_t i = 1; i < parts.vertices.size(); ++i) {
+    for (std::size_t j = 0; j < std::min<std::size_t>(i, 40); ++j)
+      EXPECT_EQ(soup.vertices[i] == soup.vertices[j], parts.vertices[i] == parts.vertices[j]);
+  }
+}
+
+TEST(Smoothing, BranchesStay) {
+  TriangleMesh fins = shapes::stored(rough_plate(12, 0.01));
+  for (unsigned i = 0; i < 12; ++i) {
+    const unsigned a = i * 13 + 6, b = a + 13, n = unsigned(fins.vertices.size());
+    fins.vertices.push_back(fins.vertices[a] + dvec3(0, 0, 0.2));
+    fins.vertices.push_back(fins.vertices[b] + dvec3(0, 0, 0.2));
+    fins.triangles.emplace_back(a, b, n), fins.triangles.emplace_back(b, n + 1, n);
+  }
+  const SmoothingResult r = free_smooth(fins, {.boundary = Boundary::along});
+  EXPECT_EQ(r.fixed_non_manifold, 13u);
+  for (unsigned i = 0; i <= 12; ++i) EXPECT_EQ(r.vertices[i * 13 + 6], fins.vertices[i * 13 + 6]);
+  EXPECT_GT(r.largest_motion, 0);
+}
+
+TEST(Smoothing, OutsideIsAnErrorOrKept) {
+  TriangleMesh mesh = shapes::torus(30, 0.01);
+  const ToleranceVolume volume(mesh.vertices, mesh.triangles, kSingle, 0.05);
+  mesh.vertices[17] = rounded_to_float32(mesh.vertices[17] * 2.0);
+  try {
+    smooth(mesh.vertices, mesh.triangles, kSingle, &volume, {});
+    FAIL();
+  } catch (const InvalidInput& error) {
+    EXPECT_EQ(std::string(error.what()).find("6 faces are not within the tolerance"), 0u) << error.what();
+  }
+  const SmoothingResult r =
+      smooth(mesh.vertices, mesh.triangles, kSingle, &volume, {.outside = ConstrainOptions::Outside::keep});
+  EXPECT_EQ(r.outside_faces, 6u);
+  ASSERT_TRUE(r.first_outside.has_value());
+  for (const glm::uvec3& t : mesh.triangles) {
+    const bool touched = t.x == 17 || t.y == 17 || t.z == 17;
+    for (int k = 0; touched && k < 3; ++k) EXPECT_EQ(r.vertices[t[k]], mesh.vertices[t[k]]);
+  }
+  EXPECT_GT(r.largest_motion, 0.01);
+}
+
+TEST(Smoothing, BadInput) {
+  const TriangleMesh mesh = shapes::torus(10);
+  const auto refused = [](const auto& call) {
+    try {
+      call();
+    } catch (const InvalidInput& error) {
+      return std::string(error.what());
+    }
+    return std::string("not refused");
+  };
+  const auto with = [&](const Options& options) { return refused([&] { free_smooth(mesh, options); }); };
+  std::vector<double> strength(100, 1);
+  EXPECT_EQ(with({.strength = std::span(strength).first(99)}), "strength must have one value for each vertex");
+  for (const double bad : {-0.1, 1.1, std::numeric_limits<double>::quiet_NaN()}) {
+    strength[42] = bad;
+    EXPECT_EQ(with({.strength = strength}).find("the strength of vertex 42"), 0u);
+  }
+  const bool one[1] = {true};
+  EXPECT_EQ(with({.locked = one}), "locked must have one value for each vertex");
+  TriangleMesh broken = mesh;
+  broken.vertices[3].y = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(refused([&] { free_smooth(broken, {}); }).find("vertex 3 is not finite"), 0u);
+  broken = shapes::box(1);
+  for (dvec3& p : broken.vertices) p = std::numeric_limits<double>::max() * (2.0 * p - 1.0);
+  EXPECT_NE(refused([&] { free_smooth(broken, {.weights = Weights::uniform}); }).find("too large"), std::string::npos);
+  EXPECT_TRUE(same_bits(free_smooth(mesh, {.iterations = 0}).vertices, mesh.vertices));
+}
+
+TEST(Smoothing, CanBeCancelled) {
+  const TriangleMesh mesh = shapes::torus(20);
+  Progress progress;
+  progress.cancel();
+  EXPECT_THROW(free_smooth(mesh, {.progress = &progress}), Cancelled);
+}
+
+}  // namespace
