@@ -2,7 +2,7 @@
 """The same decimation with different methods deciding what is within the tolerance: triangles, time, memory, what was kept.
 
 blender --background --python blender_scripts/comparison.py -- [MESH...] [--tolerance 1%,0.3%,0.1%] [--write FILE.md]
-    [--json FILE] [--threads N]
+    [--methods NAME,...] [--json FILE] [--threads N]
 
 MESH: .obj, .ply, .stl, or a model of blender_scripts/models.py; suzanne by default. Every method runs in the product's own
 loop, so that the method alone differs. `time / QEM`: building what it asks and decimating, over the loop without any check
@@ -10,6 +10,7 @@ down to the same count; best of three turns, or one where it takes over 20 s. Di
 tolerances. --write puts the table between its two comment lines in a Markdown file.
 """
 
+import argparse
 import json
 import sys
 from pathlib import Path
@@ -66,6 +67,8 @@ METHODS = {
     "one": Method("certificate, one way", "forward", certified(False)),
     "coarse": Method("certificate, one way, coarse grid", "forward", certified(False, COARSE)),
     "grid": Method("permission grid [19]", "forward", rival("permission_grid", 4)),
+    "paper": Method("check as published", "none", rival("paper_half_h", 1.1)),
+    "query": Method("occlusion query, proved", "forward", rival("occlusion_query", 4)),
     "samples": Method("vertex samples [11]", "none", rival("vertex_samples", placement="subset")),
 }
 
@@ -112,14 +115,19 @@ def measure(method, vertices, triangles, tolerance, threads):
     }
 
 
-def compare(vertices, triangles, tolerance, threads):
-    methods = list(METHODS.values())
-    entries = [measure(method, vertices, triangles, tolerance, threads) for method in methods]
-    one_way = next(entry["triangles"] for method, entry in zip(methods, entries) if method is METHODS["one"])
-    finer = equal_grid(EQUAL * one_way, vertices, triangles, tolerance, threads)
-    if finer:
-        entries.insert(methods.index(METHODS["grid"]) + 1, finer)
-    return entries
+def compare(names, *case):
+    """An entry for each of the methods whose grid fits."""
+    entries = {}
+    for name in names:
+        try:
+            entries[name] = measure(METHODS[name], *case)
+        except RuntimeError as error:
+            print(f"{METHODS[name].name}: {error}", flush=True)
+        if name == "grid" and "one" in entries:
+            finer = equal_grid(EQUAL * entries["one"]["triangles"], *case)
+            if finer:
+                entries["finer"] = finer
+    return list(entries.values())
 
 
 def kept(entry):
@@ -160,11 +168,21 @@ def percentages(text):
     return [cli.length(part) for part in text.split(",")]
 
 
+def method_names(text):
+    for name in text.split(","):
+        if name not in METHODS:
+            raise argparse.ArgumentTypeError(f"{name!r} is no method; there are: {', '.join(METHODS)}")
+    return text.split(",")
+
+
 def arguments():
     parser = cli.Parser("comparison.py", description=__doc__.split("\n\n")[0], epilog=__doc__.split("\n\n")[2])
     parser.add_argument("mesh", nargs="*", metavar="MESH", default=["suzanne"], help="a file, or a model's name")
     parser.add_argument(
         "--tolerance", type=percentages, default="1%,0.3%,0.1%", metavar="T,...", help="default: %(default)s"
+    )
+    parser.add_argument(
+        "--methods", type=method_names, default=",".join(METHODS), metavar="NAME,...", help="default: all, %(default)s"
     )
     parser.add_argument("--write", metavar="FILE.md", help="put the table there")
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
@@ -182,7 +200,7 @@ def main(options):
         for wanted in options.tolerance:
             size = tolvol.size(vertices, triangles)
             tolerance = cli.in_units(wanted, size)
-            entries = compare(vertices, triangles, tolerance, options.threads)
+            entries = compare(options.methods, vertices, triangles, tolerance, options.threads)
             title = f"{Path(word).stem}, {len(triangles):,} triangles, ε = {100 * tolerance / size:g} %"
             figures["meshes"].append({"mesh": word, "tolerance": tolerance, "size": size, "methods": entries})
             rows.append([f"***{title}***"] + [""] * (len(HEADS) - 1))

@@ -10,7 +10,7 @@
 #include "baselines/module.h"
 #include "baselines/permission_ring.h"
 #include "baselines/vertex_samples.h"
-#include "check/certificate.h"
+#include "check/methods.h"
 #include "operation/decimation.h"
 #include "python/arrays.h"
 #include "reference/errors.h"
@@ -29,8 +29,15 @@ struct Rival {
   std::unique_ptr<PermissionGrid> grid;
   std::unique_ptr<ToleranceCheck> check;
   std::unique_ptr<RingCheck> ring;
-  std::size_t memory = 0;  ///< bytes of the grid it asks
+  std::size_t memory = 0;  ///< bytes of the grid or texture it asks
 };
+
+/// Of a texture its texels, else distances and ids.
+std::size_t asked_memory(const std::string& method, const DistanceGrid& grid) {
+  const std::size_t nodes = static_cast<std::size_t>(grid.nodes.x) * grid.nodes.y * grid.nodes.z;
+  if (method == "paper" || method == "paper_half_h") return nodes;
+  return method == "occlusion_query" ? nodes * sizeof(float) : grid.memory();
+}
 
 Rival make_rival(const std::string& method, const ToleranceVolume& volume, std::optional<double> precision,
                  unsigned threads) {
@@ -42,14 +49,10 @@ Rival make_rival(const std::string& method, const ToleranceVolume& volume, std::
     rival.memory = rival.grid->memory();
   } else if (method == "vertex_samples") {
     rival.ring = std::make_unique<VertexSamples>(volume.frame_tolerance());
-  } else if (method == "certificate") {
-    rival.check = std::make_unique<Certificate>(volume);
   } else {
-    throw InvalidInput("there is no method \"" + method + "\"");
-  }
-  if (rival.check) {
+    rival.check = make_check(method, volume);
     rival.ring = std::make_unique<CheckedRing>(*rival.check);
-    rival.memory = volume.grid().memory();
+    rival.memory = asked_memory(method, volume.grid());
   }
   return rival;
 }
@@ -103,7 +106,7 @@ void bind_decimation(py::module_& module) {
              "or cells per\n"
              "tolerance. report: method, renderer, field_seconds (to build what the method asks), seconds (of the "
              "decimation), memory\n"
-             "(bytes of its grid). Raises RuntimeError.");
+             "(bytes of its grid or texture). Raises RuntimeError.");
 }
 
 }  // namespace tolvol::baselines

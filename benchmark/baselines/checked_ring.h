@@ -13,7 +13,7 @@ class CheckedRing final : public RingCheck {
   explicit CheckedRing(const ToleranceCheck& check) : check_(&check) {}
 
   void begin(const TriangleMesh& mesh, double mapping_error) override;
-  /// One question of the check for each collapse, as [Botsch04, §5] has it.
+  /// One question of the check for each collapse, its new faces a group, as [Botsch04, §5] has it.
   bool accepts(std::span<const Coverage::Element> faces, std::span<const Coverage::Removed> removed) override;
   std::string method() const override { return check_->method(); }
   std::string renderer() const override { return check_->renderer(); }
@@ -23,6 +23,7 @@ class CheckedRing final : public RingCheck {
   double mapping_error_ = 0;
   std::vector<glm::dvec3> points_;
   std::vector<std::uint32_t> indices_;
+  std::vector<std::int32_t> groups_;
 };
 
 }  // namespace tolvol::baselines

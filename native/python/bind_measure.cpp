@@ -17,6 +17,7 @@ py::tuple to_pair(const Range& range) { return py::make_tuple(range.lower, range
 
 py::array_t<double> values_of(const std::vector<Estimate>& estimates) {
   std::vector<double> values;
+  values.reserve(estimates.size());
   for (const Estimate& estimate : estimates) values.push_back(estimate.value);
   return from_vector<double>(values);
 }

@@ -31,6 +31,8 @@ def test_methods_and_what_they_keep(written):
         assert grid["triangles"] > by_name["certificate, one way"]["triangles"], "what its cells lose costs triangles"
         assert by_name["certificate, one way, coarse grid"]["memory"] < by_name["certificate, one way"]["memory"]
         assert by_name["vertex samples [11]"]["memory"] == 0
+        assert by_name["occlusion query, proved"]["forward"] <= 1
+        assert by_name["check as published"]["memory"] < grid["memory"]
         assert all(entry["ratio"] > 0 and entry["method"] in out for entry in mesh["methods"])
 
 
@@ -40,17 +42,19 @@ def test_table_is_replaced_and_the_page_kept(written):
     assert first.startswith("# A page\n") and first.count("| permission grid [19] | 4 |") == 2
     folder = page.parent
     page.write_text(first + "After.\n")
-    done = command("comparison.py", folder / "ring.ply", "--tolerance", "8%", "--write", page)
+    done = command("comparison.py", folder / "ring.ply", "--tolerance", "8%", "--methods", "grid", "--write", page)
     assert done[0] == 0, done
     second = page.read_text()
     assert second.startswith("# A page\n") and second.endswith("After.\n")
     assert second.count("| permission grid [19] | 4 |") == 1 and second.count("begin -->") == 1
+    assert "certificate" in first and "certificate" not in second
 
 
 @pytest.mark.parametrize(
     "arguments, word",
     [
         (["nowhere.ply"], "nowhere.ply"),
+        (["suzanne", "--methods", "grid,rid"], "'rid'"),
         (["suzanne", "--tolerance", "1%,x"], "x"),
         (["suzanne", "--write", "no/where.md"], "no"),
     ],

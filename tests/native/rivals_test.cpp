@@ -7,11 +7,14 @@
 #include "baselines/checked_ring.h"
 #include "baselines/permission_ring.h"
 #include "baselines/vertex_samples.h"
-#include "check/certificate.h"
+#include "check/methods.h"
 #include "measure/hausdorff.h"
 #include "operation/decimation.h"
 #include "reference/errors.h"
 #include "shapes.h"
+#ifdef TOLVOL_GL
+#include "gl_fixture.h"
+#endif
 
 namespace {
 
@@ -74,16 +77,28 @@ TEST(Rivals, NeedAVolume) {
   EXPECT_THROW(decimate(mesh.vertices, mesh.triangles, kPlacement, nullptr, options), InvalidInput);
 }
 
-TEST(CheckedRing, KeepsWhatItsCheckProves) {
-  const TriangleMesh mesh = shapes::torus(60, 0.004);
-  const ToleranceVolume volume = volume_of(mesh);
-  const Certificate certificate(volume);
-  baselines::CheckedRing ring(certificate);
+void expect_kept(const std::string& method) {
+  const TriangleMesh mesh = shapes::torus(40, 0.004);
+  const ToleranceVolume volume(mesh.vertices, mesh.triangles, kPlacement, kTolerance, {.precision = 4.0});
+  const auto check = make_check(method, volume);
+  baselines::CheckedRing ring(*check);
   const Decimated result = by(ring, mesh, volume);
-  EXPECT_LT(result.mesh.triangles.size(), 400u);
-  EXPECT_LE(hausdorff(result.mesh, mesh, {kTolerance, 1, nullptr}).upper, kTolerance);
-  EXPECT_EQ(result.method, "certificate");
+  EXPECT_LT(result.mesh.triangles.size(), 600u) << method;
+  EXPECT_LE(hausdorff(result.mesh, mesh, {kTolerance, 1, nullptr}).upper, kTolerance) << method;
+  EXPECT_EQ(result.method, check->method());
+  EXPECT_EQ(result.renderer, check->renderer());
 }
+
+TEST(CheckedRing, KeepsWhatTheCertificateProves) { expect_kept("certificate"); }
+
+#ifdef TOLVOL_GL
+using CheckedRingGl = GlTest;
+
+TEST_F(CheckedRingGl, KeepsWhatTheGpuProves) {
+  expect_kept("gl_certificate");
+  expect_kept("occlusion_query");
+}
+#endif
 
 double farthest_vertex(const TriangleMesh& from, const TriangleMesh& to) {
   const Hierarchy hierarchy(to);
