@@ -51,7 +51,8 @@ class TriangleCertificate {
   /// none; infinity when p is not within().
   double distance_bound(const glm::dvec3& p) const;
 
-  /// A point of the reference near p: the nearest of the triangle that the grid proposes there.
+  /// A point of the reference near p, where that is far seldom not the nearest: of the triangles that the
+  /// nodes around p name.
   std::optional<glm::dvec3> near(const glm::dvec3& p) const;
 
   double within() const { return within_; }

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kBoundaryWeight = 10;  // of a boundary edge's plane, times its squared length
 constexpr double kReach = 2;            // a minimiser is trusted within this many edge lengths of the edge's middle
-constexpr int kFits = 5;                // steps of the fit before a collapse is refused
+constexpr int kFits = 3;                // steps of the fit before a collapse is refused
 /// Where many collapses cost nothing, on a plate, short edges go first: a weight of the fourth power of the length,
 /// which has the quadrics' unit. Without it one vertex would sweep along a row and leave needles behind.
 constexpr double kLengthWeight = 1e-6;
@@ -148,9 +148,9 @@ void CollapseLoop::collapse(Edge e) {
   }
 }
 
-/// Other positions for a collapse whose best one fails a bound.
+/// Other positions for a collapse whose best one fails: fitted ones or, where there is nothing to fit to, the ends and
+/// the middle.
 CollapseLoop::Outcome CollapseLoop::search(Halfedge h, const glm::dvec3& best) {
-  const Spot s0 = mesh_.spot(mesh_.from(h)), s1 = mesh_.spot(mesh_.to(h));
   if (mesh_.bounds().forward) {
     glm::dvec3 position = best;
     for (int i = 0; i < kFits; ++i) {
@@ -160,7 +160,9 @@ CollapseLoop::Outcome CollapseLoop::search(Halfedge h, const glm::dvec3& best) {
       const Outcome outcome = change_.try_collapse(h, mesh_.store(position));
       if (outcome != Outcome::refused) return outcome;
     }
+    return Outcome::refused;
   }
+  const Spot s0 = mesh_.spot(mesh_.from(h)), s1 = mesh_.spot(mesh_.to(h));
   for (const Spot& other : {s0, s1, mesh_.store((s0.position + s1.position) * 0.5)}) {
     const Outcome outcome = change_.try_collapse(h, other);
     if (outcome != Outcome::refused) return outcome;

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// What tests of decimation share: meshes with matrix, storage and tolerance, and the judge of what became of them.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "measure/hausdorff.h"
+#include "operation/decimation.h"
+#include "shapes.h"
+
+namespace tolvol::cases {
+
+using glm::dvec3;
+using Options = DecimationOptions;
+
+struct Case {
+  TriangleMesh mesh;
+  glm::dmat4 to_world = glm::dmat4(1);
+  Storage storage = Storage::float32;
+  double percent = 1;
+
+  Placement placement() const { return {to_world, storage}; }
+  double tolerance() const { return percent / 100 * reference_size(mesh.vertices, mesh.triangles, to_world); }
+  std::unique_ptr<ToleranceVolume> volume() const {
+    return std::make_unique<ToleranceVolume>(mesh.vertices, mesh.triangles, placement(), tolerance());
+  }
+  TriangleMesh world(std::vector<dvec3> vertices, std::vector<glm::uvec3> triangles) const {
+    for (dvec3& p : vertices) p = placement().world(p);
+    return {std::move(vertices), std::move(triangles)};
+  }
+};
+
+inline DecimationResult run(const Case& c, const Options& options = {}) {
+  const auto volume = c.volume();
+  return decimate(c.mesh.vertices, c.mesh.triangles, c.placement(), volume.get(), options);
+}
+
+inline void expect_within(const Case& c, const DecimationResult& r, bool two_sided = true) {
+  for (const dvec3& p : r.vertices) {
+    if (c.storage == Storage::float32) {
+      ASSERT_EQ(p, rounded_to_float32(p)) << "judged as stored";
+    }
+  }
+  const TriangleMesh result = c.world(r.vertices, r.triangles), reference = c.world(c.mesh.vertices, c.mesh.triangles);
+  const double tolerance = c.tolerance();
+  EXPECT_LE(hausdorff(result, reference, {tolerance, 1, nullptr}).upper, tolerance) << "forward";
+  if (two_sided) {
+    EXPECT_LE(hausdorff(reference, result, {tolerance, 1, nullptr}).upper, tolerance) << "backward";
+  }
+}
+
+inline std::vector<Case> all() {
+  glm::dmat4 mirrored(1), sheared(1), far_away(1), tiny(1e-6), huge(1e6);
+  mirrored[0][0] = -1;
+  sheared[1][0] = 0.7, sheared[2][1] = -0.4, sheared[0][0] = 3;
+  far_away[3] = {5000, -3000, 100, 1};
+  tiny[3][3] = huge[3][3] = 1;
+  TriangleMesh fins = shapes::grid(12);  // a second sheet through the middle of the first
+  for (unsigned i = 0; i < 12; ++i) {
+    const unsigned a = i * 13 + 6, b = a + 13, n = unsigned(fins.vertices.size());
+    fins.vertices.push_back(fins.vertices[a] + dvec3(0, 0, 0.2));
+    fins.vertices.push_back(fins.vertices[b] + dvec3(0, 0, 0.2));
+    fins.triangles.emplace_back(a, b, n), fins.triangles.emplace_back(b, n + 1, n);
+  }
+  TriangleMesh misoriented = shapes::torus(30);
+  for (std::size_t i = 0; i < misoriented.triangles.size(); i += 3)
+    std::swap(misoriented.triangles[i].y, misoriented.triangles[i].z);
+  TriangleMesh duplicates = shapes::box(8);
+  duplicates.triangles.insert(duplicates.triangles.end(), duplicates.triangles.begin(),
+                              duplicates.triangles.begin() + 100);
+  TriangleMesh slivers = shapes::grid(30);  // a plate squeezed to slivers, bent
+  for (dvec3& p : slivers.vertices) p = rounded_to_float32(dvec3(p.x, p.y * 1e-3, 0.05 * std::sin(9 * p.x)));
+  return {{shapes::torus(40, 0.002)},
+          {shapes::torus(40, 0.02), glm::dmat4(1), Storage::float64},
+          {shapes::box(10)},
+          {shapes::stored(shapes::grid(30))},
+          {shapes::soup(shapes::torus(24))},
+          {shapes::stored(fins)},
+          {misoriented},
+          {duplicates},
+          {slivers},
+          {shapes::torus(30), mirrored},
+          {shapes::torus(30), sheared},
+          {shapes::torus(30), far_away},
+          {shapes::torus(30), tiny},
+          {shapes::torus(30), huge},
+          {shapes::torus(40, 0.002), glm::dmat4(1), Storage::float32, 0.05},
+          {shapes::joined(shapes::box(6), shapes::grid(6)), glm::dmat4(1), Storage::float32, 10}};
+}
+
+}  // namespace tolvol::cases

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "operation/refinement.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "decimation_cases.h"
+#include "operation/wedges.h"
+#include "reference/errors.h"
+
+namespace {
+
+using namespace tolvol;
+using cases::Case;
+using cases::run;
+using glm::dvec3;
+using Options = DecimationOptions;
+
+Options thorough() {
+  Options options;
+  options.effort = Options::Effort::thorough;
+  return options;
+}
+
+Case torus() { return {shapes::torus(60, 0.002)}; }
+
+TEST(Refinement, KeepsBothDirectionsOnEveryMeshAndAddsNoTriangle) {
+  std::size_t fast = 0, fewer = 0;
+  for (const Case& c : cases::all()) {
+    if (c.percent < 0.1) continue;  // takes long and shows nothing new
+    const DecimationResult r = run(c, thorough());
+    cases::expect_within(c, r);
+    const std::size_t before = run(c).triangles.size();
+    EXPECT_LE(r.triangles.size(), before);
+    fast += before, fewer += r.triangles.size();
+  }
+  EXPECT_LT(static_cast<double>(fewer), 0.95 * static_cast<double>(fast));
+}
+
+TEST(Refinement, KeepsTheOneDirectionThatIsAskedFor) {
+  Options options = thorough();
+  options.two_sided = false;
+  for (const Case& c : {torus(), Case{shapes::stored(shapes::grid(20))}}) {
+    const DecimationResult r = run(c, options);
+    cases::expect_within(c, r, false);
+    EXPECT_GT(r.triangles.size(), 0u);
+  }
+}
+
+TEST(Refinement, SubsetKeepsPositionsBitForBit) {
+  const Case c = torus();
+  Options options = thorough();
+  options.vertices = Options::Vertices::subset;
+  const DecimationResult r = run(c, options);
+  cases::expect_within(c, r);
+  for (std::size_t v = 0; v < r.vertices.size(); ++v) EXPECT_EQ(r.vertices[v], c.mesh.vertices[r.vertex_source[v]]);
+  options.effort = Options::Effort::fast;
+  EXPECT_LT(r.triangles.size(), run(c, options).triangles.size());
+}
+
+TEST(Refinement, LockedVerticesStay) {
+  const Case c = torus();
+  const auto locked = std::make_unique<bool[]>(c.mesh.vertices.size());
+  for (std::size_t v = 0; v < c.mesh.vertices.size(); v += 50) locked[v] = true;
+  Options options = thorough();
+  options.locked = {locked.get(), c.mesh.vertices.size()};
+  const DecimationResult r = run(c, options);
+  for (std::size_t v = 0; v < c.mesh.vertices.size(); v += 50) {
+    ASSERT_GE(r.vertex_map[v], 0);
+    EXPECT_EQ(r.vertices[static_cast<std::size_t>(r.vertex_map[v])], c.mesh.vertices[v]);
+  }
+}
+
+TEST(Refinement, CornersOfAFaceKeepToOneSideOfASeam) {
+  const Case c = torus();
+  // A seam where x changes its sign: two values at each vertex on it.
+  std::vector<float> values;
+  for (const glm::uvec3& t : c.mesh.triangles) {
+    const dvec3 centre = (c.mesh.vertices[t.x] + c.mesh.vertices[t.y] + c.mesh.vertices[t.z]) / 3.0;
+    values.insert(values.end(), 3, centre.x > 0 ? 1.0f : 0.0f);
+  }
+  const std::vector<std::uint32_t> wedges = wedge_labels(c.mesh.triangles, values, 1);
+  Options options = thorough();
+  options.wedges = wedges;
+  const DecimationResult r = run(c, options);
+  cases::expect_within(c, r);
+  for (std::size_t i = 0; i < r.triangles.size(); ++i) {
+    float side[3];
+    for (int k = 0; k < 3; ++k) side[k] = values[3 * r.source_triangle[i][k]];
+    EXPECT_EQ(side[0], side[1]);
+    EXPECT_EQ(side[1], side[2]);
+  }
+}
+
+TEST(Refinement, ThreadsDoNotChangeABit) {
+  const Case c = torus();
+  Options options = thorough();
+  options.threads = 1;
+  const DecimationResult one = run(c, options);
+  options.threads = 3;
+  const DecimationResult three = run(c, options);
+  EXPECT_EQ(one.vertices, three.vertices);
+  EXPECT_EQ(one.triangles, three.triangles);
+}
+
+TEST(Refinement, TimeAndTargetEndIt) {
+  const Case c = torus();
+  const std::size_t fast = run(c).triangles.size();
+  Options options = thorough();
+  options.max_seconds = 1e-9;
+  const DecimationResult late = run(c, options);
+  EXPECT_TRUE(late.stopped_at_time);
+  EXPECT_EQ(late.triangles.size(), fast);
+  cases::expect_within(c, late);
+  options.max_seconds = 0;
+  options.target_triangles = fast - 4;
+  const DecimationResult at_target = run(c, options);
+  EXPECT_TRUE(at_target.stopped_at_target);
+  EXPECT_FALSE(at_target.stopped_at_time);
+  EXPECT_GE(at_target.triangles.size(), fast - 6);
+  EXPECT_LE(at_target.triangles.size(), fast - 4);
+}
+
+TEST(Refinement, StopsWhenCancelled) {
+  const Case c = torus();
+  Options options = thorough();
+  Progress progress;
+  progress.cancel();
+  options.progress = &progress;
+  EXPECT_THROW(run(c, options), Cancelled);
+}
+
+}  // namespace
