@@ -12,7 +12,8 @@ The paper says that the error falls like h^2. What is found: it does for exact v
 for the sphere, and for the mean over the others. At the medial axis, which reaches the surface along every convex edge,
 and, without signs, at the surface itself the distance has a kink: there the largest error falls like h. Fast marching is
 of first order at best, whatever the interpolation: at the corners of the box it is off by a whole spacing. A permission
-grid is of first order, too, and gives away about a spacing everywhere, ten to a thousand times as much.
+grid is of first order, too, and gives away about a spacing everywhere: in the mean 40 to 800 times as much as exact
+values interpolated.
 """
 
 import sys
