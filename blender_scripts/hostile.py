@@ -186,16 +186,14 @@ def judge(name, vertices, triangles, tolerance, threads=0, method="certificate",
 
 
 def line(entry):
-    beyond = entry.get("unproved_beyond_band")
+    if "unproved_beyond_band" in entry:
+        comparison = f"{entry['unproved_beyond_band']:,} beyond the 2 %"
+    else:
+        comparison = f"the certificate: {entry['inside_by_certificate']:,} inside"
     return (
         f"{entry['reference']}: {entry['candidates']:,} candidates, {entry['within_band']:,} within 2 % of the tolerance, "
         f"by {entry['method']} {entry['inside']:,} inside, {entry['outside']:,} outside, {entry['unproved']:,} unproved "
-        + (
-            f"({beyond:,} beyond the 2 %), "
-            if beyond is not None
-            else f"(the certificate: {entry['inside_by_certificate']:,} inside), "
-        )
-        + f"wrong accepts {entry['wrong_accepts']:,}"
+        f"({comparison}), wrong accepts {entry['wrong_accepts']:,}"
     )
 
 
