@@ -24,7 +24,7 @@ def references(method="certificate", seed=1):
     """(name, vertices, triangles, tolerance) of references that are hostile themselves."""
     rng = np.random.default_rng(seed)
     # A grid fine enough to interpolate does not fit a smaller tolerance.
-    tolerance = 2e-2 if method in INTERPOLATING else 1e-3
+    tolerance = 5e-2 if method in INTERPOLATING else 1e-3
     for exponent in range(2, 8):
         vertices, triangles = _needles(rng, 300, 10.0**-exponent)
         yield f"needles of height 1e-{exponent}", vertices, triangles, tolerance
@@ -186,16 +186,14 @@ def judge(name, vertices, triangles, tolerance, threads=0, method="certificate",
 
 
 def line(entry):
-    beyond = entry.get("unproved_beyond_band")
+    if "unproved_beyond_band" in entry:
+        comparison = f"{entry['unproved_beyond_band']:,} beyond the 2 %"
+    else:
+        comparison = f"the certificate: {entry['inside_by_certificate']:,} inside"
     return (
         f"{entry['reference']}: {entry['candidates']:,} candidates, {entry['within_band']:,} within 2 % of the tolerance, "
         f"by {entry['method']} {entry['inside']:,} inside, {entry['outside']:,} outside, {entry['unproved']:,} unproved "
-        + (
-            f"({beyond:,} beyond the 2 %), "
-            if beyond is not None
-            else f"(the certificate: {entry['inside_by_certificate']:,} inside), "
-        )
-        + f"wrong accepts {entry['wrong_accepts']:,}"
+        f"({comparison}), wrong accepts {entry['wrong_accepts']:,}"
     )
 
 

@@ -86,7 +86,7 @@ std::vector<Verdict> LatticeCheck::decide(const Pieces& pieces, std::span<const 
   for (std::size_t next = 0; next < order.size();) {
     if (options.progress) options.progress->update(static_cast<double>(next) / static_cast<double>(order.size()));
     Batch batch;
-    batch.parts.reserve(kBatchParts + 4);
+    batch.parts.reserve(std::min(kBatchParts, 4 * (order.size() - next)));
     for (std::uint64_t points = 0; next < order.size() && batch.parts.size() < kBatchParts && points < kBatchPoints;
          ++next) {
       const std::uint32_t piece = order[next], label = labels[piece];
