@@ -328,7 +328,7 @@ TEST_F(Picture, TheShellTakesAsMuchLightAsTheRayIsLongInIt) {
   const int size = 251;
   const Image image = draw_volume(sphere(0.2), {.resolution = resolution(size, size)});
   const double unit = size / 2.5;  // pixels
-  const auto alpha = [&](double radius) { return at(image, int(size / 2 + radius * unit), size / 2)[3] / 255.0; };
+  const auto alpha = [&](double radius) { return at(image, int(std::lround(size / 2 + radius * unit)), size / 2)[3] / 255.0; };
   EXPECT_EQ(alpha(0), 1) << "the mesh is opaque";
   EXPECT_GT(alpha(1 + 0.98 * kEpsilon), 0);
   EXPECT_EQ(alpha(1 + 1.03 * kEpsilon), 0);
