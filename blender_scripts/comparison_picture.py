@@ -113,26 +113,26 @@ def add_caption(camera, x, y, size, text, material):
     add("caption", curve, camera.matrix_world @ Matrix.Translation((x * width, y * width, -1)))
 
 
-def compose(reference, result, captions, up):
-    """The two (vertices, triangles) on a floor, lit and framed; captions: two (large, small) texts; up: "Y" or "Z"."""
+def compose(reference, result, looks, captions, up, gap=GAP, margin=MARGIN):
+    """The two (vertices, triangles) on a floor, lit and framed; looks: two materials; captions: two (large, small) texts;
+    up: "Y" or "Z"; gap: between the two; margin: beside them. Returns the two objects and the camera."""
     turn = Matrix.Rotation(TURN, 4, "Z") @ Matrix.Rotation(math.pi / 2 if up == "Y" else 0, 4, "X")
     turned = reference[0][np.unique(reference[1])] @ np.array(turn.to_3x3()).T
     lower, upper = turned.min(0), turned.max(0)
     scale = 1 / float(max(upper[0] - lower[0], upper[2] - lower[2]))
     width, depth, height = (scale * (upper - lower)).tolist()
     foot = Vector((*(lower + upper)[:2] / 2, lower[2]))
-    shift = (width + GAP) / 2
+    shift = (width + gap) / 2
     to_scene = Matrix.Scale(scale, 4) @ Matrix.Translation(-foot) @ turn
-    # The reference's edges are so many that at full strength they would be all there is to see.
-    looks = clay(REFERENCE_COLOUR, 0.55, 0.55), clay(RESULT_COLOUR, 1.1, 0.9)
+    objects = []
     for arrays, look, x in zip((reference, result), looks, (-shift, shift)):
         mesh = mesh_io.new_mesh("model", *arrays)
         mesh.materials.append(look)
-        add("model", mesh, Matrix.Translation((x, 0, 0)) @ to_scene)
+        objects.append(add("model", mesh, Matrix.Translation((x, 0, 0)) @ to_scene))
     add_floor()
 
     target = Vector((0, 0, 0.4 * height))
-    span = max(2 * width + GAP + MARGIN, (height + CAPTION) * WIDTH / HEIGHT)
+    span = max(2 * width + gap + margin, (height + CAPTION) * WIDTH / HEIGHT)
     distance = span * LENS / SENSOR + depth / 2
     view = Vector((0, -math.cos(ELEVATION), math.sin(ELEVATION)))
     data = bpy.data.cameras.new("camera")
@@ -144,6 +144,7 @@ def compose(reference, result, captions, up):
     for x, (large, small) in zip((-shift, shift), captions):
         add_caption(camera, x / span, bottom + 0.052, 0.026, large, material)
         add_caption(camera, x / span, bottom + 0.024, 0.015, small, material)
+    return objects, camera
 
 
 def render(picture):
@@ -215,7 +216,9 @@ def main(options):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     # By convention; nothing in the files says so.
     up = "Y" if Path(options.reference).suffix.lower() == ".obj" else "Z"
-    compose(reference, result, captions(reference, result, numbers), up)
+    # The reference's edges are so many that at full strength they would be all there is to see.
+    looks = clay(REFERENCE_COLOUR, 0.55, 0.55), clay(RESULT_COLOUR, 1.1, 0.9)
+    compose(reference, result, looks, captions(reference, result, numbers), up)
     with file_io.quiet():
         render(Path(options.picture))
     return 0

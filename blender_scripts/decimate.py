@@ -228,7 +228,7 @@ class Command:
                 )
             if self.options.picture:
                 start = time.perf_counter()
-                self._draw(volume.joined(found.values()), volume.joined(references), tolerance)
+                self._draw(volume.joined(found.values()), volume.joined(references), tolerance, size)
                 self._stage(f"drew {self.options.picture}", start)
             # OUT itself last: once it is there, all of it is.
             for path in sorted(folder.iterdir(), key=lambda path: path.name == self.output.name):
@@ -240,10 +240,13 @@ class Command:
     def _certify(self, surface, reference, tolerance, kept):
         return certify(surface, reference, tolerance, kept, self.options.threads)
 
-    def _draw(self, result, reference, tolerance):
+    def _draw(self, result, reference, tolerance, size):
         surfaces = [(surface.world(), surface.arrays.triangles) for surface in (result, reference)]
         like = self.options.reference or self.options.input
-        pictures.save_deviation(self.options.picture, *surfaces, tolerance, like, self.options.threads)
+        try:
+            pictures.save_deviation(self.options.picture, *surfaces, tolerance, size, like, self.options.threads)
+        except OSError as error:
+            raise cli.Stop(f"--picture {self.options.picture}: {error.strerror}") from None
 
     def _summary(self, names, runs, judged, tolerance, size):
         """The report of the whole file: the worst of its objects, as certified in the file."""

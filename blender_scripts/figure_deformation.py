@@ -13,7 +13,7 @@ from mathutils import Matrix
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import command_line as cli  # noqa: E402
-import figures  # noqa: E402
+import comparison_picture as comparison  # noqa: E402
 import models  # noqa: E402
 from addon import file_io, measure, native, report  # noqa: E402
 
@@ -55,7 +55,7 @@ def deviation_material(lit):
         tree.links.new(mix.outputs["Color"], surface.inputs["Base Color" if lit else "Color"])
         return surface.outputs[0]
 
-    return figures.new_material("deviation", build)
+    return comparison.new_material("deviation", build)
 
 
 def set_deviation(mesh, values):
@@ -91,25 +91,25 @@ def add_cage(points, model):
         node.inputs["Color"].default_value = (*CAGE_COLOUR, 1)
         return node.outputs["BSDF"]
 
-    curve.materials.append(figures.new_material("cage", build))
-    cage = figures.add("cage", curve, model.matrix_world)
+    curve.materials.append(comparison.new_material("cage", build))
+    cage = comparison.add("cage", curve, model.matrix_world)
     cage.visible_shadow = False
 
 
 def add_legend(camera, tolerance_text):
     """A bar of the colours at the top: from 0 to the tolerance, and beyond."""
-    width, (long, high) = figures.SENSOR / figures.LENS, BAR
-    top = figures.HEIGHT / figures.WIDTH / 2 - 0.015
+    width, (long, high) = comparison.SENSOR / comparison.LENS, BAR
+    top = comparison.HEIGHT / comparison.WIDTH / 2 - 0.015
     x = np.array([-0.5, 0.5, 0.5, 0.9]) * long
     vertices = np.array([(a, b * high + top, 0) for a in x for b in (0, -1)]) * width
     mesh = bpy.data.meshes.new("legend")
     mesh.from_pydata(vertices.tolist(), [], [(0, 1, 3, 2), (4, 5, 7, 6)])
     set_deviation(mesh, np.array([0, 0, 1, 1, 2, 2, 2, 2]))
     mesh.materials.append(deviation_material(lit=False))
-    figures.add("legend", mesh, camera.matrix_world @ Matrix.Translation((0, 0, -1)))
-    ink = figures.ink()
+    comparison.add("legend", mesh, camera.matrix_world @ Matrix.Translation((0, 0, -1)))
+    ink = comparison.ink()
     for place, text in ((-0.5, "0"), (0.5, tolerance_text), (0.75, "beyond")):
-        figures.add_caption(camera, place * long, top - high - 0.018, 0.013, text, ink)
+        comparison.add_caption(camera, place * long, top - high - 0.018, 0.013, text, ink)
 
 
 def arguments():
@@ -148,14 +148,14 @@ def main(options):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     look = deviation_material(lit=True)
     states = [(result.vertices, triangles) for result in (wish, bounded)]
-    objects, camera = figures.compose(*states, (look, look), captions, "Z", GAP, MARGIN)
+    objects, camera = comparison.compose(*states, (look, look), captions, "Z", GAP, MARGIN)
     for ob, result in zip(objects, (wish, bounded)):
         ob.data.polygons.foreach_set("use_smooth", np.ones(len(triangles), bool))
         set_deviation(ob.data, volume.distance(result.vertices) / tolerance)
         add_cage(points, ob)
     add_legend(camera, report.percent(tolerance, size))
     with file_io.quiet():
-        figures.render(Path(options.picture))
+        comparison.render(Path(options.picture))
     return 0
 
 

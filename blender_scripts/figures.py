@@ -4,9 +4,11 @@
 blender --background --python blender_scripts/figures.py -- [MESH] [--output FOLDER] [--tolerance 1%]
 
 volume.png: the tolerance volume around MESH, half of it cut away. distance.png: MESH decimated within the tolerance, and to
-as many triangles by Blender's own Decimate modifier, coloured by the distance to MESH. Without MESH: Blender's monkey.
+as many triangles by Blender's own Decimate modifier, coloured by the distance to MESH. Without MESH: Blender's monkey, and
+error.png as well, the error of distance fields against their spacing, which takes minutes and needs `sh setup.sh --tests`.
 """
 
+import importlib.util
 import sys
 from pathlib import Path
 
@@ -14,6 +16,7 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import command_line as cli  # noqa: E402
+import error_plot  # noqa: E402
 import models  # noqa: E402
 import pictures  # noqa: E402
 from addon import mesh_io  # noqa: E402
@@ -91,13 +94,16 @@ def arguments():
 
 
 def main(options):
-    volume, distance = (Path(options.output) / name for name in ("volume.png", "distance.png"))
-    for path in (volume, distance):
-        pictures.require("--output", path)
+    volume, distance, error = (Path(options.output) / name for name in ("volume.png", "distance.png", "error.png"))
+    pictures.require("--output", volume)
+    if not options.mesh and not importlib.util.find_spec("tolvol_baselines"):
+        raise cli.Stop("error.png needs tolvol_baselines: sh setup.sh --tests builds it; or name a MESH")
     mesh = models.read(options.mesh) if options.mesh else models.arrays(models.build("suzanne"))
     like = options.mesh or ""
     draw_volume(volume, mesh, like)
     draw_distances(distance, mesh, cli.in_units(options.tolerance, tolvol.size(*mesh)), like)
+    if not options.mesh:
+        error_plot.draw(error)
     return 0
 
 

@@ -130,11 +130,13 @@ def shares_within(surface, reference, tolerance, threads=0):
     return [1 - float(share) for share in spread.share_beyond]
 
 
-def save_deviation(path, surface, reference, tolerance, like="", threads=0):
-    """A picture of a surface against the reference, both (vertices, triangles) in the world; like: the file it is from.
+def save_deviation(path, surface, reference, tolerance, size, like="", threads=0):
+    """A picture of a surface coloured by its distance to another, both (vertices, triangles) in the world.
 
-    path: where it goes, or a binary file.
+    path: where it goes, or a binary file; size: what 100 % is; like: the file that the surface is from.
     """
+    # A volume is no larger than its reference; surfaces that far apart are striped.
+    tolerance = min(tolerance, tolvol.size(*reference))
     volume = tolvol.ToleranceVolume(*reference, tolerance, threads=threads)
     view = camera(*surface, (WIDTH, HEIGHT), like)
     edges = len(surface[1]) <= EDGES_UP_TO
@@ -143,6 +145,6 @@ def save_deviation(path, surface, reference, tolerance, like="", threads=0):
     page.image(0, 0, pixels)
     shares = shares_within(surface, reference, tolerance, threads)
     page.text(WIDTH + MARGIN, MARGIN, f"{len(surface[1]):,} triangles", 12)
-    page.text(WIDTH + MARGIN, MARGIN + 22, f"distance to the reference,\n{len(reference[1]):,} triangles", 9, FAINT)
-    page.legend(WIDTH + MARGIN, MARGIN + 70, HEIGHT - 2 * MARGIN - 70, "signed", tolerance, volume.size, shares)
+    page.text(WIDTH + MARGIN, MARGIN + 22, f"distance to the other surface,\n{len(reference[1]):,} triangles", 9, FAINT)
+    page.legend(WIDTH + MARGIN, MARGIN + 70, HEIGHT - 2 * MARGIN - 70, "signed", tolerance, size, shares)
     page.save(path)

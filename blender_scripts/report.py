@@ -104,10 +104,13 @@ def _draw(surfaces, result, options):
     for pair, path, other in (((a, b), options.a, options.b), ((b, a), options.b, options.a)):
         if in_page or (options.picture and not drawn):
             png = io.BytesIO()
-            pictures.save_deviation(png, *pair, scale, path, options.threads)
+            pictures.save_deviation(png, *pair, scale, result["size"], path, options.threads)
             drawn.append((f"{Path(path).name}, coloured by its distance from {Path(other).name}", png.getvalue()))
     if options.picture:
-        Path(options.picture).write_bytes(drawn[0][1])
+        try:
+            Path(options.picture).write_bytes(drawn[0][1])
+        except OSError as error:
+            raise cli.Stop(f"--picture {options.picture}: {error.strerror}") from None
     return drawn
 
 
