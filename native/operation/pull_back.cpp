@@ -156,6 +156,7 @@ void PullBack::pull(std::vector<Held>& held, Progress* progress) {
     for (std::size_t i = begin; i < end; ++i) release(held[i]);
   });
   std::vector<std::uint32_t> changed;
+  changed.reserve(held.size());
   for (const Held& h : held) changed.push_back(h.vertex);
   for (;;) {
     const std::vector<std::uint32_t> failed = mesh_.failing(mesh_.faces_around(changed), progress);

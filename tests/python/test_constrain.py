@@ -136,7 +136,7 @@ def test_guard_keeps_every_dab_inside():
         positions[indices] = back
         corrected += len(indices)
         assert deviation(positions) <= TOLERANCE
-    assert corrected > 50
+    assert corrected > 20
     assert deviation(positions) > 0.95 * TOLERANCE
 
 
