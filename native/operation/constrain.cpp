@@ -14,7 +14,7 @@ ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const gl
                        std::to_string(after.size()) + "; both must be the same ones");
   }
   PullBack pull_back(volume, placement, faces, corners, before.size(), options.threads);
-  const PullBack::Start start = pull_back.start(before, options.progress);
+  const MovingMesh::Start start = pull_back.start(before, options.progress);
   ConstrainResult result;
   result.outside_faces = start.outside.size();
   if (!start.outside.empty()) result.first_outside = start.outside.front();

@@ -38,7 +38,7 @@ void Guard::require_size(std::span<const float> positions) const {
 void Guard::begin(std::span<const float> positions, Progress* progress) {
   std::vector<glm::dvec3> stored(positions.size() / 3);
   for (std::size_t v = 0; v < stored.size(); ++v) stored[v] = at(positions, v);
-  PullBack::Start start = pull_back_.start(stored, progress);
+  MovingMesh::Start start = pull_back_.start(stored, progress);
   if (!start.outside.empty() && options_.outside == ConstrainOptions::Outside::error) {
     refuse_outside(start.outside.size(), start.outside.front());
   }

@@ -1,20 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// Keeps a moving mesh inside a tolerance volume: vertices of faces that would leave it are pulled back along their
-/// motion. What constrain(), Guard and smooth() share; it holds the state from one motion to the next.
+/// motion. What constrain(), Guard and smooth() share; the state is kept from one motion to the next.
 #pragma once
 
 #include <cstdint>
 #include <glm/glm.hpp>
-#include <limits>
-#include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
-#include "check/certificate.h"
-#include "check/tolerance_volume.h"
-#include "reference/frame.h"
-#include "reference/progress.h"
+#include "operation/moving_mesh.h"
 
 namespace tolvol {
 
@@ -25,11 +19,6 @@ class PullBack {
     settle,     ///< the same but for the last 3 % of the tolerance, which take most of the time
     halve,      ///< factors are halved until all faces are inside: quick, for steps that are repeated
     reset,      ///< all the way back or not at all, the one step back of [Botsch04, §5]
-  };
-
-  struct Start {
-    std::vector<std::uint32_t> outside;  ///< faces that are not proved inside, ascending: their vertices never move
-    std::optional<std::string> warning;  ///< of storage_warning()
   };
 
   /// A set of vertices that move together, ascending, and the faces that touch one of them.
@@ -43,14 +32,11 @@ class PullBack {
     std::size_t held_back = 0;        ///< factors below 1
   };
 
-  /// `faces`: `corners` (1 to 4) indices a face, as in Pieces. Keeps references to `volume` and `faces`. Throws
-  /// InvalidInput for an index that is not below `vertex_count`. O(n + m).
+  /// As MovingMesh.
   PullBack(const ToleranceVolume& volume, const Placement& placement, std::span<const std::uint32_t> faces, int corners,
            std::size_t vertex_count, unsigned threads);
-
-  /// Takes the stored positions as the state to start from and to come back to. Throws InvalidInput for a position that
-  /// is not finite, and where the stored type cannot hold the tolerance. About 1 us a vertex.
-  Start start(std::span<const glm::dvec3> stored, Progress* progress);
+  /// As MovingMesh::start().
+  MovingMesh::Start start(std::span<const glm::dvec3> stored, Progress* progress);
 
   Moving moving(std::vector<std::uint32_t> vertices);
 
@@ -62,11 +48,6 @@ class PullBack {
               Progress* progress);
 
  private:
-  /// A vertex in the frame; `distance` to the reference: kFar beyond the tolerance, kUnknown until asked for.
-  struct Spot {
-    glm::dvec3 at;
-    double distance;
-  };
   /// A vertex that cannot simply have its wish.
   struct Held {
     std::uint32_t vertex;
@@ -84,28 +65,6 @@ class PullBack {
     std::uint32_t triangle;  ///< the nearest
   };
 
-  // Both prove nothing when they are taken for upper bounds.
-  static constexpr double kUnknown = std::numeric_limits<double>::infinity();
-  static constexpr double kFar = std::numeric_limits<double>::max();
-  static constexpr double kUnproved = TriangleCertificate::kUnproved;
-
-  std::span<const std::uint32_t> corners_of(std::uint32_t face) const {
-    return faces_.subspan(std::size_t{face} * corners_, corners_);
-  }
-  std::span<const std::uint32_t> ring(std::uint32_t vertex) const {
-    return std::span(ring_).subspan(ring_start_[vertex], ring_start_[vertex + 1] - ring_start_[vertex]);
-  }
-  void make_rings(std::size_t vertex_count);
-  bool is_own(std::uint32_t face) const;
-  double distance_of(const glm::dvec3& at) const;
-  double reach_by_motion(std::uint32_t face) const;
-  template <class Bound>
-  double over_triangulations(std::uint32_t face, Bound&& bound) const;
-  double reach_by_certificate(std::uint32_t face) const;
-  void measure(std::span<const std::uint32_t> faces, Progress* progress);
-  std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Progress* progress);
-  std::vector<std::uint32_t> faces_around(std::span<const std::uint32_t> vertices);
-
   glm::dvec3 stored_at(const Held& held, double factor) const;
   void place(const Held& held, double factor);
   std::vector<Held> hold(const Moving& moving, std::span<const glm::dvec3> before, std::span<const glm::dvec3> after,
@@ -121,22 +80,8 @@ class PullBack {
   void raise(Held& held, Mode mode, bool search);
   bool attempt(Held& held, double factor);
 
-  const ToleranceVolume* volume_;
-  Placement placement_;
-  std::span<const std::uint32_t> faces_;
-  std::size_t corners_;
-  unsigned threads_;
-  std::vector<std::uint32_t> ring_start_, ring_;  // vertex -> its faces
-  std::vector<bool> frozen_;
-  bool any_frozen_ = false;
-  double provable_ = 0, within_ = 0;               // what the certificate decides by, and what of it is used
-  std::vector<TriangleCertificate> certificates_;  // for the two; none before start()
-  std::vector<Spot> state_, trial_;
-  std::vector<double> step_;                 // per vertex: from state_ to trial_
-  std::vector<double> reach_, trial_reach_;  // per face: no point of it is farther from the reference
-  std::vector<std::uint64_t> seen_;          // per face: when faces_around() last met it,
-  std::uint64_t now_ = 0;                    // ... in calls
-  std::vector<std::uint32_t> held_index_;    // per vertex: its place among the held ones, kNone
+  MovingMesh mesh_;
+  std::vector<std::uint32_t> held_index_;  // per vertex: its place among the held ones, kNone
 };
 
 }  // namespace tolvol

@@ -151,7 +151,7 @@ class Smoothing {
   void start_pull_back() {
     for (const glm::uvec3& t : triangles_) faces_.insert(faces_.end(), {t.x, t.y, t.z});
     pull_back_ = std::make_unique<PullBack>(*volume_, placement_, faces_, 3, positions_.size(), options_.threads);
-    const PullBack::Start start = pull_back_->start(positions_, options_.progress);
+    const MovingMesh::Start start = pull_back_->start(positions_, options_.progress);
     result_.outside_faces = start.outside.size();
     if (!start.outside.empty()) {
       if (options_.outside == ConstrainOptions::Outside::error) {

@@ -33,6 +33,9 @@ CALLS = {
     "ToleranceVolume": lambda progress: tolvol.ToleranceVolume(*LARGE, TOLERANCE, progress=progress),
     "check": lambda progress: VOLUME.check(LARGE[0], LARGE[1], progress=progress),
     "decimate": lambda progress: tolvol.decimate(*LARGE, VOLUME, progress=progress),
+    "constrain": lambda progress: tolvol.constrain(LARGE[0], LARGE[0] + TOLERANCE, LARGE[1], VOLUME, progress=progress),
+    "Guard": lambda progress: tolvol.Guard(LARGE[0].astype(np.float32), LARGE[1], VOLUME, progress=progress),
+    "smooth": lambda progress: tolvol.smooth(*LARGE, VOLUME, progress=progress),
     "hausdorff": lambda progress: tolvol.hausdorff(*LARGE, *meshes.torus(), progress=progress),
     "deviation": lambda progress: tolvol.deviation(*LARGE, *meshes.torus(), progress=progress),
 }
