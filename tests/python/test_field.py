@@ -79,4 +79,4 @@ def test_decimation_keeps_its_promise_on_a_marched_field(mesh):
         result = tolvol.decimate(*mesh, volume)
         judge.assert_promise(*mesh, result, tolerance)
         counts.append(len(result.triangles))
-    assert counts[1] == pytest.approx(counts[0], rel=0.05), "the search makes up for the missing triangles"
+    assert counts[1] == pytest.approx(counts[0], rel=0.1, abs=4), "the search makes up for the missing triangles"
