@@ -179,7 +179,8 @@ std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& opt
   const TriangleCertificate certificate(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within, beyond);
   if (options.progress) options.progress->begin("checking");
 
-  // Exact distances of the used points first: they settle most faces, inside (short edges) or outside, and are shared.
+  // Distances of the used points first: they settle most faces, inside (short edges) or outside, and are shared. Where
+  // the grid's guess does not show that a point is inside, the exact one says whether it is outside.
   std::vector<bool> used(pieces.points.size(), false);
   for (const std::uint32_t i : pieces.indices) used[i] = true;
   constexpr double kOutside = std::numeric_limits<double>::infinity();
@@ -189,6 +190,8 @@ std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& opt
     for (std::size_t i = begin; i < end; ++i) {
       if (!used[i]) continue;
       const glm::dvec3& p = pieces.points[i];
+      distance[i] = certificate.distance_bound(p);
+      if (distance[i] <= within) continue;
       const Hierarchy::Nearest nearest = volume_->hierarchy().nearest(p, beyond, volume_->grid().triangle_near(p));
       distance[i] = nearest.triangle == Hierarchy::kNone ? kOutside : nearest.distance;
     }
