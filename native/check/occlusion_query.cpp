@@ -30,7 +30,7 @@ namespace {
 constexpr float kMargin = 1.5f;      // half way between the last lattice point and the next pixel
 constexpr double kLargestPart = 62;  // subdivisions: with the margin it fits a cell of 64 pixels
 
-const double kInterpolation = std::sqrt(0.75);  // spacings that interpolation may lose
+constexpr double kInterpolationLoss = 0.8660254037844387;  // spacings that interpolation may lose
 
 float rounded_down(double x) { return std::nextafter(static_cast<float>(x), 0.0f); }
 
@@ -85,7 +85,7 @@ float OcclusionQuery::bound(double mapping_error) const {
   const DistanceGrid& grid = volume().grid();
   const double h = grid.spacing, largest = std::max({grid.nodes.x, grid.nodes.y, grid.nodes.z}),
                rounding = kUnit * (16 * h * largest + 32 * volume().frame_tolerance());
-  const double bound = volume().provable(mapping_error) - h / std::sqrt(3.0) - kInterpolation * h - rounding;
+  const double bound = volume().provable(mapping_error) - h / std::sqrt(3.0) - kInterpolationLoss * h - rounding;
   if (!(bound > 0)) {
     constexpr int kGood = 4;  // more than a third of the tolerance goes to what samples stand for
     std::ostringstream text;
@@ -128,7 +128,7 @@ void OcclusionQuery::use(const gl::Program& program, float bound) const {
   texture_->texture().bind(0);
   program.set("distances", 0);
   program.set("bound", bound);
-  program.set("bound_near", rounded_down(bound + kInterpolation * h));
+  program.set("bound_near", rounded_down(bound + kInterpolationLoss * h));
   program.set("spacing2", std::nextafter(static_cast<float>(h * h), 1.0f));
 }
 

@@ -100,7 +100,8 @@ std::string log_of(GLuint name, void (*size)(GLuint, GLenum, GLint*),
   size(name, GL_INFO_LOG_LENGTH, &length);
   std::string log(static_cast<std::size_t>(std::max(length, 1)), '\0');
   text(name, length, nullptr, log.data());
-  return log.c_str();
+  log.resize(log.find('\0'));
+  return log;
 }
 
 Object compile(const Program::Stage& stage) {
