@@ -20,9 +20,19 @@ done
 sh setup.sh --tests
 mkdir -p build/tests
 
-native() { build/release/tests/native/tolvol_tests --gtest_brief=1; }
+native() { in_shards build/release/tests/native/tolvol_tests; }
 asan() {
-  cmake --preset asan && cmake --build --preset asan && build/asan/tests/native/tolvol_tests --gtest_brief=1
+  cmake --preset asan && cmake --build --preset asan && in_shards build/asan/tests/native/tolvol_tests
+}
+# Most tests use one thread: a share of them on each core.
+in_shards() {
+  shards=$(nproc) index=0 running="" result=0
+  while [ $index -lt "$shards" ]; do
+    GTEST_TOTAL_SHARDS=$shards GTEST_SHARD_INDEX=$index "$1" --gtest_brief=1 &
+    running="$running $!" index=$((index + 1))
+  done
+  for one in $running; do wait "$one" || result=1; done
+  return $result
 }
 python() { /usr/bin/python3 -m pytest -q -p no:cacheprovider tests/python; }
 blender() { sh tests/blender/run.sh; }

@@ -123,6 +123,7 @@ ClosestPoint closest_point(const glm::dvec3& p, const glm::dvec3& a, const glm::
   // Half of each first: a difference of the whole may overflow.
   const double half = std::max({largest(0.5 * p - 0.5 * a), largest(0.5 * b - 0.5 * a), largest(0.5 * c - 0.5 * a)});
   if (half == 0) return at(p, a, {1, 0, 0});
+  if (!std::isfinite(half)) return {a, {1, 0, 0}, std::numeric_limits<double>::quiet_NaN()};
   const int exponent = std::ilogb(half);
   auto shifted = [](const glm::dvec3& x, int by) {
     return glm::dvec3(std::ldexp(x.x, by), std::ldexp(x.y, by), std::ldexp(x.z, by));

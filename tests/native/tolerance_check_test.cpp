@@ -209,7 +209,7 @@ TEST_P(ProvingCheck, GroupsTakeTheLeastVerdictInAnyOrder) {
   const Pieces pieces{in_frame, indices, 3, placed.mapping_error(points)};
   std::vector<std::int32_t> groups(pieces.size());
   std::mt19937 engine(1);
-  for (std::int32_t& g : groups) g = std::int32_t(engine() % 1'000) * 4'000'000 - 2'000'000'000;
+  for (std::int32_t& g : groups) g = std::int32_t(std::int64_t(engine() % 1'000) * 4'000'000 - 2'000'000'000);
   std::vector<Verdict> expected = check->check(pieces, {});
   combine_groups(expected, groups);
   EXPECT_EQ(check->check_groups(pieces, groups, {}), expected);

@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from .layout import SubPanel
+
+
+class TOLVOL_PT_deform(SubPanel, bpy.types.Panel):
+    bl_label = "Deform"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = context.active_object.tolvol
+        layout.prop(settings, "lattice")
+        layout.prop(settings, "deform_mode")
+        layout.operator("tolvol.deform", text="Deform")

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the panels share: where they stand, lengths in the scene's units, text that fits the sidebar, colours."""
+
+import blf
+import bpy
+
+from .. import native
+
+_FONT = 0  # Blender's own
+# Pixels of the sidebar that a label with an icon leaves to others: tabs, margins, the icon.
+_BESIDE_TEXT = 85
+
+NO_BREAK = "\u00a0"  # between a number and its unit
+
+GREY = "RADIOBUT_OFF"
+# Blender's coloured squares, which newer versions name anew.
+_ICONS = bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
+_COLOR = "SEQUENCE_COLOR" if "SEQUENCE_COLOR_01" in _ICONS else "STRIP_COLOR"
+RED, AMBER, GREEN = f"{_COLOR}_01", f"{_COLOR}_02", f"{_COLOR}_04"
+
+
+def length(context, value):
+    """A world length in the scene's units, with enough digits to mean something."""
+    units = context.scene.unit_settings
+    if units.system != "NONE":
+        text = bpy.utils.units.to_string(units.system, "LENGTH", value * units.scale_length, precision=3)
+        if value == 0 or any(digit in "123456789" for digit in text):
+            return text.replace(" ", NO_BREAK)
+    return f"{value:.3g}"
+
+
+class Panel:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Tolerance"
+
+
+class SubPanel(Panel):
+    bl_parent_id = "TOLVOL_PT_tolerance"
+
+    @classmethod
+    def poll(cls, context):
+        ob = context.active_object
+        return native.module is not None and ob is not None and ob.type == "MESH"
+
+
+def right(layout, text):
+    row = layout.row()
+    row.alignment = "RIGHT"
+    row.label(text=text)
+
+
+def text_lines(context, layout, text, icon):
+    """A label broken into lines that fit the sidebar."""
+    scale = context.preferences.system.ui_scale
+    blf.size(_FONT, context.preferences.ui_styles[0].widget.points * scale)
+    room = max(context.region.width, 100) - _BESIDE_TEXT * scale
+    lines, column = [""], layout.column(align=True)
+    for word in text.split(" "):
+        longer = f"{lines[-1]} {word}".strip()
+        if lines[-1] and blf.dimensions(_FONT, longer)[0] > room:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    for i, line in enumerate(lines):
+        column.label(text=line, icon="BLANK1" if i else icon)
