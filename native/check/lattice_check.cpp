@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <future>
 #include <numeric>
+#include <utility>
 
 #include "gl/context.h"
 #include "reference/errors.h"
@@ -21,7 +23,7 @@ constexpr std::size_t kChunk = 1024;   // triangles drawn before a flush: more l
 constexpr std::size_t kInFlight = 64;  // queries begun before the result of the first is waited for
 // A batch ends with the piece that reaches either of these. The first keeps a buffer below the 128 MB that every GL
 // allows, the second the wait for a cancelled call near a second.
-constexpr std::size_t kBatchParts = std::size_t{1} << 16;
+constexpr std::size_t kBatchParts = std::size_t{1} << 15;
 constexpr std::uint64_t kBatchPoints = std::uint64_t{1} << 25;
 
 std::uint64_t lattice_points(float subdivisions) {
@@ -42,8 +44,9 @@ void draw_parts(std::size_t begin, std::size_t end) {
 /// Consecutive slots, each with the parts of its pieces.
 struct LatticeCheck::Batch {
   std::vector<Part> parts;
-  std::vector<std::size_t> ends;      // of each slot's parts
-  std::vector<std::uint32_t> labels;  // what the slots stand for
+  std::vector<std::size_t> ends;         // of each slot's parts
+  std::vector<std::uint32_t> labels;     // what the slots stand for
+  std::vector<std::uint32_t> not_drawn;  // of pieces that cannot be
 };
 
 LatticeCheck::Programs::Programs(std::string_view counting)
@@ -83,31 +86,41 @@ std::vector<Verdict> LatticeCheck::decide(const Pieces& pieces, std::span<const 
   if (options.progress) options.progress->begin("checking");
   const float bound = this->bound(pieces.mapping_error);
   std::vector<Sum> sums(order.empty() ? 0 : labels[order.back()] + 1);
+  std::future<void> drawing;  // of one batch, while the next is made
   for (std::size_t next = 0; next < order.size();) {
     if (options.progress) options.progress->update(static_cast<double>(next) / static_cast<double>(order.size()));
-    Batch batch;
-    batch.parts.reserve(std::min(kBatchParts, 4 * (order.size() - next)));
-    for (std::uint64_t points = 0; next < order.size() && batch.parts.size() < kBatchParts && points < kBatchPoints;
-         ++next) {
-      const std::uint32_t piece = order[next], label = labels[piece];
-      if (batch.labels.empty() || batch.labels.back() != label) {
-        batch.labels.push_back(label);
-        batch.ends.push_back(batch.parts.size());
-      }
-      const std::size_t first = batch.parts.size();
-      const auto slot = static_cast<std::uint32_t>(batch.labels.size() - 1);
-      if (!add_piece(pieces, piece, slot, batch.parts)) sums[label].drawn = false;
-      for (std::size_t i = first; i < batch.parts.size(); ++i) points += lattice_points(batch.parts[i].subdivisions);
-      batch.ends.back() = batch.parts.size();
-    }
-    draw(batch, bound, queries, sums);
+    Batch batch = make_batch(pieces, order, labels, next);
+    if (drawing.valid()) drawing.get();
+    drawing = std::async(std::launch::async, [&, batch = std::move(batch)] { draw(batch, bound, queries, sums); });
   }
+  if (drawing.valid()) drawing.get();
   std::vector<Verdict> verdicts(pieces.size());
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     const Sum& sum = sums[labels[i]];
     verdicts[i] = sum.drawn ? verdict(sum.counted, sum.points) : Verdict::unproved;
   }
   return verdicts;
+}
+
+/// Of the pieces from `next` on, which is moved past them.
+LatticeCheck::Batch LatticeCheck::make_batch(const Pieces& pieces, std::span<const std::uint32_t> order,
+                                             std::span<const std::uint32_t> labels, std::size_t& next) const {
+  Batch batch;
+  batch.parts.reserve(std::min(kBatchParts, 4 * (order.size() - next)));
+  for (std::uint64_t points = 0; next < order.size() && batch.parts.size() < kBatchParts && points < kBatchPoints;
+       ++next) {
+    const std::uint32_t piece = order[next], label = labels[piece];
+    if (batch.labels.empty() || batch.labels.back() != label) {
+      batch.labels.push_back(label);
+      batch.ends.push_back(batch.parts.size());
+    }
+    const std::size_t first = batch.parts.size();
+    const auto slot = static_cast<std::uint32_t>(batch.labels.size() - 1);
+    if (!add_piece(pieces, piece, slot, batch.parts)) batch.not_drawn.push_back(label);
+    for (std::size_t i = first; i < batch.parts.size(); ++i) points += lattice_points(batch.parts[i].subdivisions);
+    batch.ends.back() = batch.parts.size();
+  }
+  return batch;
 }
 
 bool LatticeCheck::add_piece(const Pieces& pieces, std::size_t piece, std::uint32_t slot,
@@ -133,6 +146,7 @@ bool LatticeCheck::add_piece(const Pieces& pieces, std::size_t piece, std::uint3
 }
 
 void LatticeCheck::draw(const Batch& batch, float bound, bool queries, std::vector<Sum>& sums) const {
+  for (const std::uint32_t label : batch.not_drawn) sums[label].drawn = false;
   if (batch.parts.empty()) return;
   float largest = 0;
   for (const Part& part : batch.parts) largest = std::max(largest, part.subdivisions);

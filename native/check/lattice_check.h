@@ -71,6 +71,8 @@ class LatticeCheck : public ToleranceCheck {
   };
   std::vector<Verdict> decide(const Pieces& pieces, std::span<const std::uint32_t> order,
                               std::span<const std::uint32_t> labels, bool queries, const Options& options) const;
+  Batch make_batch(const Pieces& pieces, std::span<const std::uint32_t> order, std::span<const std::uint32_t> labels,
+                   std::size_t& next) const;
   bool add_piece(const Pieces& pieces, std::size_t piece, std::uint32_t slot, std::vector<Part>& parts) const;
   void draw(const Batch& batch, float bound, bool queries, std::vector<Sum>& sums) const;
   template <class Found>
