@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 
+#include "check/part.h"
 #include "reference/closest_point.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
@@ -25,10 +26,6 @@ constexpr double kExact = 0.7;  // of the tolerance: shorter pieces are worth an
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
 }  // namespace
-
-struct TriangleCertificate::Piece {
-  glm::dvec3 a, b, c;
-};
 
 TriangleCertificate::TriangleCertificate(const std::vector<WitnessTriangle>& reference, const DistanceGrid& grid,
                                          const Hierarchy& hierarchy, double within, double beyond)
@@ -83,18 +80,20 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       return Verdict::inside;
     }
   }
-  thread_local std::vector<Piece> queue;
-  queue.assign(1, {p0, p1, p2});
+  thread_local std::vector<Part> queue, covered;
+  queue.assign(1, {{p0, p1, p2}});
   Verdict result = Verdict::inside;
   double farthest2 = 0;  // over the parts proved so far
   std::uint32_t hint = Hierarchy::kNone;
   for (std::size_t next = 0; next < queue.size(); ++next) {
     if (next == (kProve ? kBudget : kQuickBudget)) return Verdict::unproved;
-    const Piece piece = queue[next];
-    const glm::dvec3 centre = (piece.a + piece.b + piece.c) * (1.0 / 3);
+    const Part part = queue[next];
+    const auto& [a, b, c] = part.corners;
+    const glm::dvec3 centre = (a + b + c) * (1.0 / 3);
     FourPoints points;
-    points.set(piece.a, piece.b, piece.c, centre);
+    points.set(a, b, c, centre);
     double centre2 = std::numeric_limits<double>::infinity();  // best known squared distance of the centre
+    Cover largest;
     std::array<std::uint32_t, 10> tried;
     int tries = 0;
     const auto covered_by = [&](std::uint32_t triangle) {
@@ -107,27 +106,28 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       witness_distances((*reference_)[triangle], points, d2);
       centre2 = std::min(centre2, d2[3]);
       // Written so that NaN is not covered.
-      if (!(d2[0] <= within2_ && d2[1] <= within2_ && d2[2] <= within2_)) return false;
-      farthest2 = std::max({farthest2, d2[0], d2[1], d2[2]});
-      return true;
+      if (d2[0] <= within2_ && d2[1] <= within2_ && d2[2] <= within2_) {
+        farthest2 = std::max({farthest2, d2[0], d2[1], d2[2]});
+        return true;
+      }
+      largest.improve(d2, within_);
+      return false;
     };
     const std::uint32_t guess = grid_->triangle_near(centre);
     if (covered_by(guess)) continue;
 
-    const double ab2 = squared_length(piece.b - piece.a), bc2 = squared_length(piece.c - piece.b),
-                 ca2 = squared_length(piece.a - piece.c);
-    const double longest2 = std::max({ab2, bc2, ca2});
+    const double longest2 = longest_squared(part);
     const bool seems_outside = !(centre2 <= within2_);
     if (guess != DistanceGrid::kNone && (seems_outside || longest2 < kSmall * kSmall * within2_)) {
       const glm::dvec3 cell = glm::floor((centre - grid_->origin) * (1 / grid_->spacing));
-      bool covered = false;
-      for (int i = 0; i < 8 && !covered; ++i) {
+      bool found = false;
+      for (int i = 0; i < 8 && !found; ++i) {
         const glm::ivec3 node = glm::ivec3(cell) + glm::ivec3(i & 1, (i >> 1) & 1, i >> 2);
         if (glm::any(glm::lessThan(node, glm::ivec3(0))) || glm::any(glm::greaterThanEqual(node, grid_->nodes)))
           continue;
-        covered = covered_by(grid_->triangle[grid_->index(node.x, node.y, node.z)]);
+        found = covered_by(grid_->triangle[grid_->index(node.x, node.y, node.z)]);
       }
-      if (covered) continue;
+      if (found) continue;
     }
     if (!(centre2 <= within2_) || longest2 < kExact * kExact * within2_) {
       if (hint == Hierarchy::kNone) hint = guess;
@@ -139,24 +139,17 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       if (!kProve && !(centre2 <= within2_)) return Verdict::unproved;
     }
     // Written so that NaN ends here.
-    if (!(longest2 > kFloor * kFloor * within2_)) {
+    if (!(longest2 > kFloor * kFloor * within2_) || part.cuts == kMostCuts) {
       if (!kProve) return Verdict::unproved;
       result = Verdict::unproved;
       continue;
     }
-    const glm::dvec3 mab = (piece.a + piece.b) * 0.5, mbc = (piece.b + piece.c) * 0.5, mca = (piece.c + piece.a) * 0.5;
-    if (longest2 > 4 * std::min({ab2, bc2, ca2})) {
-      // A needle is halved: splitting it in four would keep it a needle.
-      if (ab2 == longest2) {
-        queue.push_back({piece.a, mab, piece.c}), queue.push_back({mab, piece.b, piece.c});
-      } else if (bc2 == longest2) {
-        queue.push_back({piece.b, mbc, piece.a}), queue.push_back({mbc, piece.c, piece.a});
-      } else {
-        queue.push_back({piece.c, mca, piece.b}), queue.push_back({mca, piece.a, piece.b});
-      }
+    if (largest.share >= kWorthCutting) {
+      covered.clear();
+      cut(part, largest, covered, queue);
+      farthest2 = std::max(farthest2, largest.within * largest.within);
     } else {
-      queue.push_back({piece.a, mab, mca}), queue.push_back({mab, piece.b, mbc});
-      queue.push_back({mca, mbc, piece.c}), queue.push_back({mab, mbc, mca});
+      split(part, queue);
     }
   }
   farthest = std::sqrt(farthest2);

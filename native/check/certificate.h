@@ -58,7 +58,6 @@ class TriangleCertificate {
   double within() const { return within_; }
 
  private:
-  struct Piece;
   template <bool kProve>
   Verdict decide(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, double& farthest) const;
 

@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "check/part.h"
 #include "check/witness.h"
 #include "reference/hierarchy.h"
 #include "reference/triangle_mesh.h"
@@ -63,33 +64,21 @@ class Coverage {
   void commit(const Trial& trial);
 
  private:
-  struct Piece {
-    std::uint32_t triangle;
-    std::uint16_t i, j;  ///< barycentric place in units of 2^-level: exact, so that the parts cover the whole exactly
-    std::uint8_t level;
-    bool reversed;
-    std::uint32_t next;
-  };
   struct List {
-    std::uint32_t head = kNone, tail = kNone;
+    std::vector<Part> pieces;
     double distance = 0;  ///< every piece is within this of the element
   };
   struct Moved {
-    Piece piece;
+    Part piece;
     std::uint32_t element;
   };
 
-  void corners(const Piece& piece, glm::dvec3 (&out)[3]) const;
-  static void split(const Piece& piece, std::vector<Piece>& out);
-  bool place(const Piece& whole, std::uint32_t first, Trial& trial) const;
-  void push(List& list, const Piece& piece);
-  void free(List& list);
+  Part whole(std::uint32_t triangle) const;
+  bool place(const Part& whole, std::uint32_t first, Trial& trial) const;
 
   const TriangleMesh* reference_;
   double within_, within2_;
   std::vector<List> lists_;
-  std::vector<Piece> pool_;
-  std::uint32_t free_ = kNone;
 };
 
 /// What a try found, and its scratch; one a thread.
@@ -113,7 +102,7 @@ class Coverage::Trial {
   std::vector<Candidate> candidates_;
   std::vector<Heirloom> heirlooms_;
   std::vector<Moved> moved_;
-  std::vector<Piece> stack_;
+  std::vector<Part> stack_, cut_off_;
   std::size_t looked_ = 0;     ///< pieces looked at in this change
   std::uint32_t last_ = 0;     ///< the candidate that took the last piece
   std::uint32_t suspect_ = 0;  ///< the one whose pieces failed last: tried first, to be refused soon

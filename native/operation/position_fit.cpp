@@ -7,6 +7,7 @@
 #include "operation/position_fit.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "reference/closest_point.h"
@@ -14,7 +15,7 @@
 namespace tolvol {
 namespace {
 
-constexpr std::size_t kStride = 12;  // of the pieces one stands for so many: fewer triangles come of no more
+constexpr std::size_t kStride = 24;  // of the pieces one stands for so many: fewer triangles come of no more
 constexpr double kDamping = 1e-3;    // of the trace: along directions that nothing determines the vertex stays
 constexpr double kFaceShare = 0.1;   // of a face's area, that each of its own points stands for
 // Points of a face, as the weight of the moving corner and, of what is left, that of the corner before it.
@@ -25,13 +26,14 @@ constexpr double kFacePoints[][2] = {{1, 0},   {0.75, 0}, {0.75, 1}, {0.5, 0},  
 
 struct PositionFit::Sums {
   double unit2;  ///< 1 / tolerance^2
-  double energy = 0;
+  double energy = 0, largest2 = 0;
   glm::dmat3 m{0};
   glm::dvec3 g{0};
 
   void add(const glm::dvec3& residual, double area, double beta) {
     const double d2 = glm::dot(residual, residual), relative2 = d2 * unit2, weight = area * relative2 * relative2;
     energy += weight * relative2;
+    largest2 = std::max(largest2, relative2);
     if (!(d2 > 0) || !(beta > 0)) return;
     m += glm::outerProduct(residual, residual) * (weight * beta * beta / d2);
     g += residual * (weight * beta);
@@ -105,12 +107,13 @@ PositionFit::Fit PositionFit::fit(const Change& change, const glm::dvec3& positi
   add_pieces(change, sums);
   add_faces(change, sums);
   const double trace = sums.m[0][0] + sums.m[1][1] + sums.m[2][2];
-  if (!(trace > 0)) return {sums.energy, position};
+  const double deviation = std::sqrt(sums.largest2);
+  if (!(trace > 0)) return {sums.energy, deviation, position};
   for (int i = 0; i < 3; ++i) sums.m[i][i] += kDamping * trace;
   glm::dvec3 step = glm::inverse(sums.m) * sums.g;
   const double length = glm::length(step);
   if (length > within) step *= within / length;
-  return {sums.energy, position + step};
+  return {sums.energy, deviation, position + step};
 }
 
 double PositionFit::energy_now(const Change& change) {

@@ -22,6 +22,7 @@ class PositionFit {
 
   struct Fit {
     double energy;        ///< areas weighted by a high power of deviation over tolerance
+    double deviation;     ///< the largest of those looked at, over the tolerance; like the energy of where it was asked
     glm::dvec3 position;  ///< lowers it, to first order
   };
   /// Of the faces as the change would leave them, its vertex at `position`. About 10 ns a face and piece.
