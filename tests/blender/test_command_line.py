@@ -194,7 +194,7 @@ def test_a_bug_exits_with_1_and_its_traceback(scan, tmp_path):
 
 
 def test_a_bug_inside_the_operator_is_a_bug(scan, tmp_path):
-    spoil = PATCH.format("pass") + "from addon import transfer; transfer.write_decimated = None"
+    spoil = PATCH.format("pass") + "from addon import transfer; transfer.Writing = None"
     code, _, err = decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", before=spoil)
     assert code == 1 and "TypeError" in err
 
