@@ -152,11 +152,8 @@ class Carry:
         """
         values = values.reshape(len(values), -1)
         read = _blend(values[self._corner_at], self._corner_weights)
-        own = self._source.corners[self._result.triangle_source[layout.triangles]]
-        had = values[np.take_along_axis(own, layout.corners, 1)]
-        turned = self._result.turned[layout.triangles]
-        had[turned] = values[own[turned]].mean(1, keepdims=True)  # its corners are none of the source's
-        had = had.reshape(read.shape)
+        own = self._source.corners[self._result.triangle_source[layout.triangles][:, None], layout.corners].ravel()
+        had = values[own]
         if shared is not None:
             read, had = _mean(read, shared), _mean(had, shared)
         vertices = self._result.triangles[layout.triangles[:, None], layout.corners].ravel()

@@ -12,7 +12,8 @@ import numpy as np
 
 _COARSE = 1.2  # ratio of the values that are tried first,
 _FINE = 1.01  # and of those that are tried where the deviation is near the tolerance:
-NEAR = 2.0  # this many times, because neighbouring values may differ by half
+NEAR = 2.0  # this many times, because neighbouring values may differ by half.
+_BARELY = 1.03  # Beside what missed by so little there may be what does not.
 
 
 def search(first, last):
@@ -29,12 +30,18 @@ def search(first, last):
         missed.append(deviation)
     else:
         return None
-    if not missed:
-        return value
     near = next((i for i, deviation in enumerate(missed) if deviation <= NEAR), len(missed))
+    barely = []
     for finer in _steps(coarse[max(near - 1, 0)], value, _FINE)[1:-1]:
         deviation = yield finer
         if deviation <= 1:
+            value = finer
+            break
+        if deviation <= _BARELY:
+            barely.append(finer)
+    half = (_FINE if first < last else 1 / _FINE) ** 0.5
+    for finer in (missed * step for missed in barely for step in (1 / half, half)):
+        if (yield finer) <= 1:
             return finer
     return value
 

@@ -182,7 +182,7 @@ def _turn(built, faces, result):
         face = built.faces.new([built.verts[vertex] for vertex in vertices], copy)
         for loop, other in zip(face.loops, copy.loops):
             loop.copy_from(other)
-    bmesh.ops.delete(built, geom=[vertex for copy in copies for vertex in copy.verts], context="VERTS")
+    bmesh.ops.delete(built, geom=list({vertex for copy in copies for vertex in copy.verts}), context="VERTS")
 
 
 def _weld_targets(result):
