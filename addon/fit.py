@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_COARSE = 1.2  # ratio of the values that are tried first,
-_FINE = 1.01  # and of those that are tried where the deviation is near the tolerance:
-NEAR = 2.0  # this many times, because neighbouring values may differ by half.
-_BARELY = 1.03  # Beside what missed by so little there may be what does not.
+# Ratios of the values that are tried first: the farther from the tolerance, the larger.
+_COARSE, _COARSEST = 1.2, 2.0
+NEAR = 2.0  # tolerances: neighbouring values may differ by half. From there on the values tried next are
+_FINE = 1.015  # times each other.
+_BARELY = 1.06  # Beside what missed by so little there may be what does not.
 
 
 def search(first, last):
@@ -21,34 +22,30 @@ def search(first, last):
 
     The best value is always the last one that was within. first: where there are fewest triangles.
     """
-    coarse = _steps(first, last, _COARSE)
-    missed = []
-    for value in coarse:
-        deviation = yield value
-        if deviation <= 1:
-            break
-        missed.append(deviation)
-    else:
-        return None
-    near = next((i for i, deviation in enumerate(missed) if deviation <= NEAR), len(missed))
-    barely = []
-    for finer in _steps(coarse[max(near - 1, 0)], value, _FINE)[1:-1]:
+    onward = 1 if last > first else -1
+    value, missed = first, []
+    while (deviation := (yield value)) > 1:
+        if value == last:
+            return None
+        missed.append((value, deviation))
+        step = min(max((deviation / NEAR) ** 0.5, _COARSE), _COARSEST)
+        value = onward * min(onward * value * step**onward, onward * last)
+    if not missed:
+        return value
+    near = next((i for i, (_, deviation) in enumerate(missed) if deviation <= NEAR), len(missed))
+    start, barely = missed[max(near - 1, 0)][0], []
+    for i in range(1, int(np.log(value / start) / np.log(_FINE) * onward) + 1):
+        finer = start * _FINE ** (onward * i)
         deviation = yield finer
         if deviation <= 1:
             value = finer
             break
         if deviation <= _BARELY:
             barely.append(finer)
-    half = (_FINE if first < last else 1 / _FINE) ** 0.5
-    for finer in (missed * step for missed in barely for step in (1 / half, half)):
+    for finer in (beside * _FINE ** (onward * half) for beside in barely for half in (-0.5, 0.5)):
         if (yield finer) <= 1:
             return finer
     return value
-
-
-def _steps(first, last, ratio):
-    """Values from first to last, both included, at most `ratio` apart."""
-    return np.geomspace(first, last, 2 + int(abs(np.log(last / first)) / np.log(ratio))).tolist()
 
 
 @dataclass(frozen=True)

@@ -137,6 +137,8 @@ class JobOperator:
             return next(self._steps)
         try:
             outcome = self._job.outcome()
+            if self._progress.cancelled:  # after the last thing that would have noticed
+                raise native.module.Cancelled("cancelled")
         except BaseException as error:
             return self._steps.throw(error)
         return self._steps.send(outcome)

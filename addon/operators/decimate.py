@@ -23,7 +23,7 @@ from .blocked import allowed, decimate_blocked
 def draw_decimate_settings(layout, settings):
     """The same rows in the panel and in Adjust Last Operation."""
     layout.prop(settings, "keep")
-    layout.row().prop(settings, "effort", expand=True)
+    layout.prop(settings, "effort")
     column = layout.column(align=True)
     column.use_property_split = False  # the names need the width
     column.label(text="Placement")
@@ -37,17 +37,15 @@ def draw_decimate_settings(layout, settings):
 
 def draw_protect_settings(layout, settings, ob):
     """What a decimation leaves as it is; the same rows in the panel and in Adjust Last Operation."""
-    layout.prop(settings, "only_selected")
+    layout.row(heading="Faces").prop(settings, "only_selected", text="Unselected")
     column = layout.column(align=True)
-    column.label(text="Protect")
+    column.label(text="Edges")
     grid = column.grid_flow(columns=2, row_major=True, align=True)
     grid.use_property_split = False
     for kind, *_ in PROTECTED:
         grid.prop_enum(settings, "protect", kind)
     layout.row(align=True).prop(settings, "symmetry")
-    row = layout.row(align=True)
-    row.prop_search(settings, "vertex_group", ob, "vertex_groups")
-    row.prop(settings, "invert_vertex_group", text="", icon="ARROW_LEFTRIGHT")
+    shared.draw_vertex_group(layout, settings, ob)
 
 
 def targets(context):

@@ -3,7 +3,7 @@
 
 import bpy
 import numpy as np
-from bpy.props import IntProperty, StringProperty
+from bpy.props import FloatProperty, IntProperty, StringProperty
 
 from .. import fit, measure, mesh_io, preferences, report, volume
 from ..certify import certify
@@ -153,14 +153,25 @@ mesh becomes it"""
 
     bl_idname = "tolvol.fit_modifier"
     bl_label = "Fit Modifier to Tolerance"
-    # Without REGISTER: Adjust Last Operation would search again and hold up the window for as long.
-    bl_options = {"UNDO"}
+    bl_options = {"REGISTER", "UNDO"}
 
     __annotations__ = modifier_settings({"SKIP_SAVE"})
     modifier: StringProperty(
         name="Modifier", description="Its name; if none is given, the first that can be fitted", options={"SKIP_SAVE"}
     )
+    value: FloatProperty(
+        name="Value",
+        description="The modifier's ratio, voxel size or distance that was found; one that is given is not searched for",
+        min=0.0,
+        precision=5,
+        options={"SKIP_SAVE"},
+    )
     threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+
+    def draw(self, _context):
+        self.layout.use_property_split = True
+        self.layout.prop(self, "value")
+        self.layout.prop(self, "result")
 
     def steps(self, context):
         context.view_layer.update()
@@ -170,19 +181,9 @@ mesh becomes it"""
         name, trial = modifier.name, _Trial(ob, self.threads or preferences.threads(context))
         parameter = trial.parameter(modifier)
         with Evaluation(ob, name) as evaluation:
-            search, best, deviation = fit.search(parameter.first, parameter.last), None, None
-            while True:
-                try:
-                    value = search.send(deviation)
-                except StopIteration as end:
-                    best = end.value
-                    break
-                self.doing = f"Fitting {name}: {parameter.label} {value:.4g}"
-                setattr(evaluation.modifier, parameter.name, value)
-                deviation = yield trial.measured(mesh_io.read_mesh(evaluation.mesh()))
-            if best is None:
-                raise Refused(f"No {parameter.label} of {name} keeps {ob.name} within the tolerance both ways")
-            setattr(evaluation.modifier, parameter.name, best)
+            # Adjust Last Operation comes with the value that was found, or another one.
+            self.value = self.value or (yield from self._best(evaluation, parameter, trial))
+            setattr(evaluation.modifier, parameter.name, self.value)
             mesh = evaluation.new_mesh()
         try:
             certified = yield trial.certified(mesh_io.read_mesh(mesh))
@@ -192,7 +193,21 @@ mesh becomes it"""
             raise
         shared.give(self, settings, modifier_settings())
         self._write(context, trial, mesh, certified)
-        self.report({"INFO"}, f"{name}: {parameter.label} {best:.4g}, {trial.line(certified)}")
+        self.report({"INFO"}, f"{name}: {parameter.label} {self.value:.4g}, {trial.line(certified)}")
+
+    def _best(self, evaluation, parameter, trial):
+        name, search, deviation = evaluation.modifier.name, fit.search(parameter.first, parameter.last), None
+        while True:
+            try:
+                value = search.send(deviation)
+            except StopIteration as end:
+                if end.value is None:
+                    text = f"No {parameter.label} of {name} keeps {self.ob.name} within the tolerance both ways"
+                    raise Refused(text) from None
+                return end.value
+            self.doing = f"Fitting {name}: {parameter.label} {value:.4g}"
+            setattr(evaluation.modifier, parameter.name, value)
+            deviation = yield trial.measured(mesh_io.read_mesh(evaluation.mesh()))
 
     def _write(self, context, trial, mesh, certified):
         ob = self.target(context)

@@ -13,3 +13,9 @@ def give(operator, settings, names):
     """What the operator ran with is what the panel shows from now on."""
     for name in names:
         setattr(settings, name, getattr(operator, name))
+
+
+def draw_vertex_group(layout, settings, ob):
+    row = layout.row(align=True)
+    row.prop_search(settings, "vertex_group", ob, "vertex_groups", text="Group")
+    row.prop(settings, "invert_vertex_group", text="", icon="ARROW_LEFTRIGHT")

@@ -18,10 +18,8 @@ def draw_smooth_settings(layout, settings, ob):
     """The same rows in the panel and in Adjust Last Operation."""
     layout.prop(settings, "iterations")
     for name in ("method", "weights", "boundary"):
-        layout.row().prop(settings, name, expand=True)
-    row = layout.row(align=True)
-    row.prop_search(settings, "vertex_group", ob, "vertex_groups")
-    row.prop(settings, "invert_vertex_group", text="", icon="ARROW_LEFTRIGHT")
+        layout.prop(settings, name)
+    shared.draw_vertex_group(layout, settings, ob)
 
 
 class TOLVOL_OT_smooth(JobOperator, bpy.types.Operator):

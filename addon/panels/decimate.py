@@ -33,7 +33,7 @@ class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
 
 
 class TOLVOL_PT_protect(SubPanel, bpy.types.Panel):
-    bl_label = "Leave as It Is"
+    bl_label = "Protect"
     bl_parent_id = "TOLVOL_PT_decimate"
     bl_options = {"DEFAULT_CLOSED"}
 

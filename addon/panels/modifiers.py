@@ -22,12 +22,12 @@ class TOLVOL_PT_modifiers(SubPanel, bpy.types.Panel):
         icons = bpy.types.Modifier.bl_rna.properties["type"].enum_items
         for modifier in ob.modifiers:
             reason = modifier_blocked(ob, modifier)
-            row = layout.split(factor=0.42)
+            row = layout.split(factor=0.68)
             row.label(text=modifier.name, icon=icons[modifier.type].icon)
             button = row.row()
             button.enabled = not reason
             fits = modifier.type in FITTED
-            name, text = ("fit_modifier", "Fit to Tolerance") if fits else ("apply_modifier", "Apply in Tolerance")
+            name, text = ("fit_modifier", "Fit") if fits else ("apply_modifier", "Apply")
             button.operator(f"tolvol.{name}", text=text).modifier = modifier.name
             if reason:
                 text_lines(context, layout, reason, "BLANK1")
