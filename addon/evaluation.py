@@ -19,6 +19,7 @@ class Evaluation:
         self._ob = self._original.copy()
         self._ob.data = self._original.data.copy()
         self._ob.animation_data_clear()
+        self._ob.property_unset("tolvol")  # nothing is kept of it, and nothing watches it
         self._ob.shape_key_clear()
         for modifier in list(self._ob.modifiers):
             if modifier.name != self._name:

@@ -80,28 +80,25 @@ class JobOperator:
 
     def invoke(self, context, _event):
         self._begin(context)
-        deadline = time.monotonic() + _PATIENCE
-        while not (ended := self._advance()):
-            if not self._job.done(max(deadline - time.monotonic(), 0.0)):
-                manager = context.window_manager
-                self._timer = manager.event_timer_add(_TICK, window=context.window)
-                manager.modal_handler_add(self)
-                return {"RUNNING_MODAL"}
-        return ended
+        if ended := self._advance() or self._go_on(_PATIENCE):
+            return ended
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(_TICK, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
         if event.type == "ESC":
             self._progress.cancel()
         if event.type == "TIMER":
-            if self._job.done():
-                try:
-                    ended = self._advance()
-                except BaseException:
-                    self._leave(context)
-                    raise
-                if ended:
-                    self._leave(context)
-                    return ended
+            try:
+                ended = self._go_on(_TICK) if self._job.done() else None
+            except BaseException:
+                self._leave(context)
+                raise
+            if ended:
+                self._leave(context)
+                return ended
             context.workspace.status_text_set(_status(self._progress, self.doing))
         return {"RUNNING_MODAL"}
 
@@ -117,6 +114,14 @@ class JobOperator:
         self._steps = self.steps(context)
         self._progress = native.module.Progress()
         self._job = None
+
+    def _go_on(self, seconds):
+        """As many steps as there is time for; how the operator ended, if it did."""
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0 and self._job.done(left):
+            if ended := self._advance():
+                return ended
+        return None
 
     def _advance(self):
         """Starts the next work, and returns how the operator ended where there is none."""

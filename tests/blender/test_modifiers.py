@@ -162,8 +162,12 @@ def test_what_cannot_be_applied_is_refused():
         refused(match, modifier=kind)
         ob.modifiers.remove(modifier)
     group = bpy.data.node_groups.new("cut", "GeometryNodeTree")
-    group.inputs.new("NodeSocketGeometry", "Geometry")
-    group.outputs.new("NodeSocketGeometry", "Geometry")
+    if bpy.app.version < (4, 0):
+        group.inputs.new("NodeSocketGeometry", "Geometry")
+        group.outputs.new("NodeSocketGeometry", "Geometry")
+    else:
+        for way in ("INPUT", "OUTPUT"):
+            group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
     start, cut, end = (group.nodes.new(n) for n in ("NodeGroupInput", "GeometryNodeTriangulate", "NodeGroupOutput"))
     group.links.new(start.outputs[0], cut.inputs[0])
     group.links.new(cut.outputs[0], end.inputs[0])

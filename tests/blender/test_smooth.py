@@ -27,7 +27,6 @@ def smoothed(make=torus, **options):
 def roughness(ob):
     """Mean angle between the normals of neighbouring faces."""
     mesh = ob.data
-    mesh.calc_normals()
     normals = column(mesh.polygons, "normal", 3)
     edges = column(mesh.loops, "edge_index", 1, np.int32)
     order = np.argsort(edges, kind="stable")
