@@ -131,6 +131,7 @@ def test_shape_key_holds_the_result_and_the_base_stays():
     assert np.array_equal(coordinates(ob), before) and not ob.modifiers
     basis, key = ob.data.shape_keys.key_blocks
     assert np.array_equal(column(basis.data, "co", 3), before) and (key.name, key.value) == ("SMOOTH", 1.0)
+    assert ob.tolvol.modifiers.result == "SHAPE_KEY"
     stored = column(key.data, "co", 3).astype(np.float64)
     judged = native.module.hausdorff(stored, reference[1], *reference, bound=tolerance)
     assert 0.9 * tolerance < judged.upper <= tolerance
@@ -239,6 +240,8 @@ def test_a_value_that_is_given_is_certified_and_not_searched_for():
     ob = modified("DECIMATE")
     before = len(world_triangles(ob)[1])
     refused("Not proved", bpy.ops.tolvol.fit_modifier, value=0.05)
+    ob.modifiers[0].keyframe_insert("ratio", frame=1)
+    ob.modifiers[0].keyframe_insert("ratio", frame=20)
     bpy.ops.tolvol.fit_modifier(value=0.75)
     assert len(world_triangles(ob)[1]) == pytest.approx(0.75 * before, abs=2)
     assert volume.measurement_of(ob).forward_within
@@ -271,3 +274,4 @@ def test_new_object_of_a_fit_keeps_materials_and_uvs():
     assert new.data.materials[0].name == "steel" and new.data.uv_layers[0].name == "map"
     assert new.data.vertices[0].groups[0].weight == 1.0 and new.data["made by"] == "hand"
     assert len(new.data.polygons) < 500 and volume.measurement_of(new).backward_within
+    assert ob.tolvol.modifiers.result == "OBJECT"
