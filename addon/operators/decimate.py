@@ -55,8 +55,8 @@ def targets(context):
 
 
 class TOLVOL_OT_decimate(JobOperator, bpy.types.Operator):
-    """Reduce the selected meshes to the fewest triangles that stay within the tolerance, each of its own reference. \
-A mesh without a reference becomes it"""
+    """Reduce the selected meshes to the fewest triangles that stay within the tolerance, each of its own reference, with \
+the settings of the active one. A mesh without a reference becomes it"""
 
     bl_idname = "tolvol.decimate"
     bl_label = "Decimate in Tolerance"

@@ -268,7 +268,7 @@ def test_new_object_of_a_fit_keeps_materials_and_uvs():
     ob.vertex_groups.new(name="all").add(range(len(ob.data.vertices)), 1.0, "REPLACE")
     ob.data["made by"] = "hand"
     before = coordinates(ob)
-    bpy.ops.tolvol.fit_modifier(result="OBJECT")
+    bpy.ops.tolvol.fit_modifier(result="OBJECT", value=0.45)
     new = bpy.context.active_object
     assert np.array_equal(coordinates(ob), before) and len(ob.modifiers) == 1 and not new.modifiers
     assert new.data.materials[0].name == "steel" and new.data.uv_layers[0].name == "map"

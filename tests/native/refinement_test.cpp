@@ -98,7 +98,7 @@ TEST(Refinement, EdgesBetweenLockedVerticesStay) {
 }
 
 TEST(Refinement, SharesOfTheToleranceAreKeptAroundTheirVertices) {
-  const Case c = torus();
+  const Case c{shapes::torus(36, 0.002)};
   std::vector<double> shares(c.mesh.vertices.size(), 1);
   for (std::size_t v = 0; v < shares.size(); ++v) {
     if (c.mesh.vertices[v].x < 0) shares[v] = 0.25;
