@@ -2,11 +2,12 @@
 """One long call of an operator: in a thread with progress in the status bar and Esc, or at once.
 
 An operator gives prepare(), which reads Blender's data and returns the work to do; the work, which runs in the thread
-and touches nothing of Blender; and finish(), which writes the outcome in one go. A script, Adjust Last Operation and
-Blender without a window run the same three at once.
+and touches nothing of Blender; and finish(), which writes the outcome in one go. Work that needs Blender between its parts
+is a generator instead, steps(). A script, Adjust Last Operation and Blender without a window run the same at once.
 """
 
 import threading
+import time
 
 from . import native
 from .errors import Refused
@@ -41,9 +42,22 @@ class _Job:
         return self._outcome
 
 
+def alive(ob):
+    """The object, unless it was removed since."""
+    try:
+        ob.name  # noqa: B018
+    except ReferenceError:
+        raise Refused("The object was removed meanwhile") from None
+    return ob
+
+
 class JobOperator:
     """Mixed into an Operator that has prepare(context) -> work(progress) -> outcome, and finish(context, outcome)."""
 
+    doing = ""  # what the status bar says in place of the native stage
+
+    _steps = None
+    _progress = None
     _job = None
     _timer = None
     _ob = None
@@ -51,69 +65,98 @@ class JobOperator:
     @property
     def ob(self):
         """The object that was active when the operator began."""
-        try:
-            self._ob.name  # noqa: B018
-        except ReferenceError:
-            raise Refused("The object was removed meanwhile") from None
-        return self._ob
+        return alive(self._ob)
+
+    def steps(self, context):
+        """Yields work(progress) and is sent its outcome, in the main thread; only its end may change anything."""
+        outcome = yield self.prepare(context)
+        self.finish(context, outcome)
 
     def execute(self, context):
-        self._ob = context.active_object
-        return self._guarded(context, lambda: self.prepare(context)(native.module.Progress()))
+        self._begin(context)
+        while not (ended := self._advance()):
+            pass
+        return ended
 
     def invoke(self, context, _event):
-        self._ob = context.active_object
-        try:
-            work = self.prepare(context)
-        except (Refused, native.module.TolvolError) as error:
-            return self._refuse(error)
-        self._job = _Job(work, native.module.Progress())
-        if self._job.done(_PATIENCE):
-            return self._guarded(context, self._job.outcome)
+        self._begin(context)
+        if ended := self._advance() or self._go_on(_PATIENCE):
+            return ended
         manager = context.window_manager
         self._timer = manager.event_timer_add(_TICK, window=context.window)
         manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        progress = self._job.progress
         if event.type == "ESC":
-            progress.cancel()
+            self._progress.cancel()
         if event.type == "TIMER":
-            if self._job.done():
+            try:
+                ended = self._go_on(_TICK) if self._job.done() else None
+            except BaseException:
                 self._leave(context)
-                return self._guarded(context, self._job.outcome)
-            context.workspace.status_text_set(_status(progress))
+                raise
+            if ended:
+                self._leave(context)
+                return ended
+            context.workspace.status_text_set(_status(self._progress, self.doing))
         return {"RUNNING_MODAL"}
 
     def cancel(self, context):
         """Blender closes the window, or the file."""
-        self._job.progress.cancel()
+        self._progress.cancel()
         self._job.done(None)
+        self._steps.close()
         self._leave(context)
+
+    def _begin(self, context):
+        self._ob = context.active_object
+        self._steps = self.steps(context)
+        self._progress = native.module.Progress()
+        self._job = None
+
+    def _go_on(self, seconds):
+        """As many steps as there is time for; how the operator ended, if it did."""
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0 and self._job.done(left):
+            if ended := self._advance():
+                return ended
+        return None
+
+    def _advance(self):
+        """Starts the next work, and returns how the operator ended where there is none."""
+        try:
+            self._job = _Job(self._next_work(), self._progress)
+        except StopIteration:
+            return {"FINISHED"}
+        except native.module.Cancelled:
+            self.report({"INFO"}, f"{self.bl_label} was cancelled, nothing was changed")
+            return {"CANCELLED"}
+        except (Refused, native.module.TolvolError) as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return None
+
+    def _next_work(self):
+        if self._job is None:
+            return next(self._steps)
+        try:
+            outcome = self._job.outcome()
+            if self._progress.cancelled:  # after the last thing that would have noticed
+                raise native.module.Cancelled("cancelled")
+        except BaseException as error:
+            return self._steps.throw(error)
+        return self._steps.send(outcome)
 
     def _leave(self, context):
         context.window_manager.event_timer_remove(self._timer)
         context.workspace.status_text_set(None)
 
-    def _guarded(self, context, outcome):
-        try:
-            self.finish(context, outcome())
-        except native.module.Cancelled:
-            self.report({"INFO"}, f"{self.bl_label} was cancelled, nothing was changed")
-            return {"CANCELLED"}
-        except (Refused, native.module.TolvolError) as error:
-            return self._refuse(error)
-        return {"FINISHED"}
 
-    def _refuse(self, error):
-        self.report({"ERROR"}, str(error))
-        return {"CANCELLED"}
-
-
-def _status(progress):
+def _status(progress, doing):
     if progress.cancelled:
         return "Stopping"
-    # The count is of the stage that counts: triangles left.
-    left = f", {progress.count:,} triangles left" if progress.stage == "decimating" else ""
-    return f"{progress.stage.capitalize()} {progress.fraction:.0%}{left}    Esc: Cancel"
+    # The count is of the stages that count: triangles left.
+    left = f", {progress.count:,} triangles left" if progress.stage in {"decimating", "refining"} else ""
+    share = f" {progress.fraction:.0%}" if progress.fraction else ""
+    return f"{doing or progress.stage.capitalize() + share + left}    Esc: Cancel"

@@ -12,6 +12,8 @@ from bpy.props import (
     StringProperty,
 )
 
+from .operation_settings import decimate_settings, modifier_settings, smooth_settings
+
 
 def tolerance_settings(**options):
     """name -> property of the tolerance; `options` go to each."""
@@ -47,44 +49,6 @@ def tolerance_settings(**options):
             step=1,
             precision=5,
             subtype="DISTANCE",
-            **options,
-        ),
-    }
-
-
-def decimate_settings(**options):
-    """name -> property of a decimation but for its placement; `options` go to each."""
-    return {
-        "keep": EnumProperty(
-            name="Keep",
-            description="Which way the tolerance holds",
-            items=(
-                (
-                    "BOTH",
-                    "Both Ways",
-                    "The result stays within the tolerance of the reference, and the reference within the tolerance of "
-                    "the result, so nothing is lost",
-                ),
-                (
-                    "ONE",
-                    "One Way",
-                    "The result stays within the tolerance of the reference. Parts of the reference may vanish; its "
-                    "borders and separate pieces stay",
-                ),
-            ),
-            **options,
-        ),
-        "use_target": BoolProperty(
-            name="Stop At",
-            description="Stop at a number of triangles, if the tolerance lets it get that far",
-            **options,
-        ),
-        "target_triangles": IntProperty(
-            name="Triangles",
-            description="The number of triangles to stop at; the tolerance holds, whichever comes first",
-            default=5000,
-            min=1,
-            soft_max=1_000_000,
             **options,
         ),
     }
@@ -140,6 +104,14 @@ class TOLVOL_PG_measurement(bpy.types.PropertyGroup):
     share_outside: FloatProperty(description="Share of the mesh's area that is beyond the tolerance")
 
 
+class TOLVOL_PG_smooth(bpy.types.PropertyGroup):
+    __annotations__ = smooth_settings()
+
+
+class TOLVOL_PG_modifiers(bpy.types.PropertyGroup):
+    __annotations__ = modifier_settings()
+
+
 class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     __annotations__ = tolerance_settings() | decimate_settings()
 
@@ -188,18 +160,24 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     snapshot_size: FloatProperty()
     snapshot_seconds: FloatProperty(description="How long it took to build the tolerance volume")
 
+    smooth: PointerProperty(type=TOLVOL_PG_smooth)
+    modifiers: PointerProperty(type=TOLVOL_PG_modifiers)
+
     measurement: PointerProperty(type=TOLVOL_PG_measurement)
     last_run: StringProperty(description="The report of the last decimation, JSON")
     last_run_of: StringProperty(description="Fingerprint of the mesh it left")
 
 
+_CLASSES = (TOLVOL_PG_measurement, TOLVOL_PG_smooth, TOLVOL_PG_modifiers, TOLVOL_PG_settings)
+
+
 def register():
-    bpy.utils.register_class(TOLVOL_PG_measurement)
-    bpy.utils.register_class(TOLVOL_PG_settings)
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
     bpy.types.Object.tolvol = PointerProperty(type=TOLVOL_PG_settings)
 
 
 def unregister():
     del bpy.types.Object.tolvol
-    bpy.utils.unregister_class(TOLVOL_PG_settings)
-    bpy.utils.unregister_class(TOLVOL_PG_measurement)
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -13,7 +13,7 @@ def decimation_run(source, result, native_report, volume, certified, options, se
     """What one decimation says of itself.
 
     source: the MeshArrays that went in; result: the Decimated; native_report: decimate()'s own; certified: by certify(), of
-    what will be stored; options: two_sided, placement, target_triangles as given.
+    what will be stored; options: two_sided, placement, effort, target_triangles as given.
     """
     # Blender keeps vertices that no face uses, so they are no repair here.
     repairs = [repair for repair in native_report["repairs"] if repair["kind"] != "unused"]
@@ -27,6 +27,7 @@ def decimation_run(source, result, native_report, volume, certified, options, se
         "tolerance": {"absolute": volume.tolerance, "percent": 100 * volume.tolerance / volume.size},
         "two_sided": options["two_sided"],
         "placement": options["placement"],
+        "effort": options["effort"],
         "target_triangles": options["target_triangles"],
         "stopped_by": native_report["stopped_by"],
         "method": native_report["method"],

@@ -33,6 +33,7 @@ class Decimated:
     vertex_map: np.ndarray
     vertex_source: np.ndarray
     triangle_source: np.ndarray
+    turned: np.ndarray  # (l,) bool: an edge was flipped, so that the corners are not those of the source triangle
     source_triangle: np.ndarray
     source_weights: np.ndarray
     coincident: int  # triangles left out: Blender holds one face on any three vertices
@@ -40,6 +41,8 @@ class Decimated:
     @classmethod
     def of(cls, result, source):
         vertices, vertex_map, vertex_source = result.vertices, result.vertex_map, result.vertex_source
+        welded = vertex_map[source.triangles[result.triangle_source]]
+        turned = (welded != result.triangles).any(1)
         # A face that is only a segment or a point may have had vertices at one position joined: it keeps its own.
         a, b, c = result.triangles.T
         repeats = source.triangles[result.triangle_source[(a == b) | (b == c) | (c == a)]]
@@ -48,7 +51,7 @@ class Decimated:
         vertex_map[own] = len(vertices) + np.arange(len(own))
         vertices = np.concatenate([vertices, source.vertices[own]])
         vertex_source = np.concatenate([vertex_source, own.astype(vertex_source.dtype)])
-        triangles = vertex_map[source.triangles[result.triangle_source]]
+        triangles = np.where(turned[:, None], result.triangles, vertex_map[source.triangles[result.triangle_source]])
         # Two sheets that lay exactly on one another may end on the same vertices; as surfaces they are one.
         _, first = np.unique(np.sort(triangles, 1), axis=0, return_index=True)
         kept = np.sort(first)
@@ -58,35 +61,52 @@ class Decimated:
             vertex_map,
             vertex_source,
             result.triangle_source[kept],
+            turned[kept],
             result.source_triangle[kept],
             result.source_weights[kept],
             len(triangles) - len(kept),
         )
 
 
-def write_decimated(mesh, source, result):
-    """Turns `mesh`, whose arrays are `source`, into the Decimated `result`.
+class Writing:
+    """Turns `mesh`, whose arrays are `source`, into the Decimated `result`; a context manager.
 
-    First a scratch mesh is built and compared with the result, vertex by vertex and triangle by triangle: the mesh
-    is untouched when MeshMismatch is raised.
+    Entering builds a scratch mesh and compares it with the result, vertex by vertex and triangle by triangle, and raises
+    MeshMismatch when they differ; the mesh is touched by write() alone.
     """
-    carry = Carry(mesh, source, result)
-    built = bmesh.new()
-    try:
-        built.from_mesh(mesh)
-        loose = _loose(built)
-        _triangulate(built, source)
-        _keep_faces(built, source, result.triangle_source)
-        carry.blend_groups(built)
-        _weld(built, _weld_targets(result), loose)
-        layout = _compare(_scratch_arrays(built), source, result)
-        built.to_mesh(mesh)
-    finally:
-        built.free()
-    carry.write(mesh, layout)
-    stored = column(mesh.vertices, "co", 3)[layout.result_vertices]
-    if not np.array_equal(stored.view(np.uint32), result.vertices.view(np.uint32)):
-        raise RuntimeError("the mesh that was written is not the one that was certified")
+
+    def __init__(self, mesh, source, result):
+        self._mesh = mesh
+        self._source = source
+        self._result = result
+
+    def __enter__(self):
+        mesh, source, result = self._mesh, self._source, self._result
+        self._carry = Carry(mesh, source, result)
+        self._built = built = bmesh.new()
+        try:
+            built.from_mesh(mesh)
+            loose = _loose(built)
+            _triangulate(built, source)
+            faces = _keep_faces(built, source, result.triangle_source)
+            _turn(built, faces, result)
+            self._carry.blend_groups(built)
+            _weld(built, _weld_targets(result), loose)
+            self._layout = _compare(_scratch_arrays(built), source, result)
+        except BaseException:
+            built.free()
+            raise
+        return self
+
+    def __exit__(self, *_):
+        self._built.free()
+
+    def write(self):
+        self._built.to_mesh(self._mesh)
+        self._carry.write(self._mesh, self._layout)
+        stored = column(self._mesh.vertices, "co", 3)[self._layout.result_vertices]
+        if not np.array_equal(stored.view(np.uint32), self._result.vertices.view(np.uint32)):
+            raise RuntimeError("the mesh that was written is not the one that was certified")
 
 
 class Layout:
@@ -129,7 +149,7 @@ def _triangulate(built, source):
 
 
 def _keep_faces(built, source, kept):
-    """Deletes all faces but the triangles `kept` of the source; edges and vertices stay."""
+    """Deletes all faces but the triangles `kept` of the source, which it returns; edges and vertices stay."""
     faces = built.faces[:]
     if source.polygons[-1] + 1 == len(source.polygons):  # nothing was cut: face i is triangle i
         rows = np.arange(len(faces))
@@ -141,6 +161,28 @@ def _keep_faces(built, source, kept):
     stays = np.zeros(len(faces), bool)
     stays[rows[kept]] = True
     bmesh.ops.delete(built, geom=[faces[i] for i in np.flatnonzero(~stays)], context="FACES_ONLY")
+    return [faces[i] for i in rows[kept].tolist()]
+
+
+def _turn(built, faces, result):
+    """Makes the faces around which edges were flipped anew, on the vertices that survive; they keep what they are.
+
+    faces: those of the result's triangles.
+    """
+    turned = np.flatnonzero(result.turned).tolist()
+    if not turned:
+        return
+    # One of them may lie where another one was: what they are is kept by copies that lie nowhere.
+    copies = bmesh.ops.duplicate(built, geom=[faces[row] for row in turned])["face_map"]
+    copies = [copies[faces[row]] for row in turned]
+    bmesh.ops.delete(built, geom=[faces[row] for row in turned], context="FACES_ONLY")
+    built.verts.ensure_lookup_table()
+    corners = result.vertex_source[result.triangles[turned]].tolist()
+    for copy, vertices in zip(copies, corners):
+        face = built.faces.new([built.verts[vertex] for vertex in vertices], copy)
+        for loop, other in zip(face.loops, copy.loops):
+            loop.copy_from(other)
+    bmesh.ops.delete(built, geom=list({vertex for copy in copies for vertex in copy.verts}), context="VERTS")
 
 
 def _weld_targets(result):

@@ -54,6 +54,12 @@ def arguments():
         help="optimal: fewest triangles; subset: every vertex is an original one (default: subset with UVs, else optimal)",
     )
     parser.add_argument(
+        "--effort",
+        choices=("fast", "thorough"),
+        default="fast",
+        help="thorough: about a sixth fewer triangles in five to eight times the time (default: fast)",
+    )
+    parser.add_argument(
         "--target-triangles",
         type=cli.whole_number(1),
         metavar="N",
@@ -172,6 +178,8 @@ class Command:
         start = time.perf_counter()
         if ob.data.users > 1:  # instances in a glTF
             ob.data = ob.data.copy()
+        for other in bpy.context.view_layer.objects:
+            other.select_set(other == ob)
         bpy.context.view_layer.objects.active = ob
         if reference is not ob:
             ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", reference
@@ -183,6 +191,7 @@ class Command:
                 bpy.ops.tolvol.decimate(
                     tolerance_length=_not_above(tolerance),
                     keep="ONE" if self.options.one_sided else "BOTH",
+                    effort=self.options.effort.upper(),
                     outside=self.options.outside.upper(),
                     threads=self.options.threads,
                     **asked,
@@ -268,7 +277,7 @@ class Command:
         target = self.options.target_triangles or 0
         several = len(runs) > 1
         return {
-            **{key: runs[0][key] for key in ("version", "two_sided", "placement", "method", "renderer")},
+            **{key: runs[0][key] for key in ("version", "two_sided", "placement", "effort", "method", "renderer")},
             "tolerance": {"absolute": tolerance, "percent": 100 * tolerance / size},
             "target_triangles": target,
             "stopped_by": "target" if target and left <= target else "tolerance",

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Fewest triangles within the tolerance: computed and certified on arrays, then written to the mesh in one go."""
 
+import contextlib
+import functools
 import json
 import time
 
@@ -8,17 +10,20 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, IntProperty
 
-from .. import measure, mesh_io, native, preferences, report, transfer, volume
+from .. import measure, mesh_io, native, preferences, protect, report, transfer, volume
 from ..certify import certify
-from ..errors import NotProved
-from ..job import JobOperator
-from ..properties import PLACEMENTS, decimate_settings, tolerance_settings
+from ..errors import NotProved, Refused
+from ..job import JobOperator, alive
+from ..operation_settings import PROTECTED, decimate_settings
+from ..properties import PLACEMENTS, tolerance_settings
+from . import settings as shared
 from .blocked import allowed, decimate_blocked
 
 
 def draw_decimate_settings(layout, settings):
     """The same rows in the panel and in Adjust Last Operation."""
     layout.prop(settings, "keep")
+    layout.prop(settings, "effort")
     column = layout.column(align=True)
     column.use_property_split = False  # the names need the width
     column.label(text="Placement")
@@ -30,16 +35,35 @@ def draw_decimate_settings(layout, settings):
     sub.prop(settings, "target_triangles", text="")
 
 
+def draw_protect_settings(layout, settings, ob):
+    """What a decimation leaves as it is; the same rows in the panel and in Adjust Last Operation."""
+    layout.row(heading="Faces").prop(settings, "only_selected", text="Unselected")
+    column = layout.column(align=True)
+    column.label(text="Edges")
+    grid = column.grid_flow(columns=2, row_major=True, align=True)
+    grid.use_property_split = False
+    for kind, *_ in PROTECTED:
+        grid.prop_enum(settings, "protect", kind)
+    layout.row(align=True).prop(settings, "symmetry")
+    shared.draw_vertex_group(layout, settings, ob)
+
+
+def targets(context):
+    """The objects that a decimation is for: the active one first, then all other selected meshes."""
+    active = context.active_object
+    return [active, *(ob for ob in context.selected_objects if ob.type == "MESH" and ob != active)]
+
+
 class TOLVOL_OT_decimate(JobOperator, bpy.types.Operator):
-    """Reduce the mesh to the fewest triangles that stay within the tolerance of the reference. Without a reference \
-this mesh becomes it"""
+    """Reduce the selected meshes to the fewest triangles that stay within the tolerance, each of its own reference, with \
+the settings of the active one. A mesh without a reference becomes it"""
 
     bl_idname = "tolvol.decimate"
     bl_label = "Decimate in Tolerance"
     bl_options = {"REGISTER", "UNDO"}
 
     # Those not given are the object's own. SKIP_SAVE: never those of the last run, which may have been another object's.
-    __annotations__ = tolerance_settings(options={"SKIP_SAVE"}) | decimate_settings(options={"SKIP_SAVE"})
+    __annotations__ = tolerance_settings(options={"SKIP_SAVE"}) | decimate_settings({"SKIP_SAVE"})
     placement: EnumProperty(
         name="Placement", description="Where the remaining vertices go", items=PLACEMENTS, options={"SKIP_SAVE"}
     )
@@ -58,61 +82,84 @@ this mesh becomes it"""
     def poll(cls, context):
         return allowed(cls, decimate_blocked(context.active_object))
 
-    def draw(self, _context):
+    def draw(self, context):
         layout = self.layout
         layout.use_property_split = True
         column = layout.column(align=True)
         column.prop(self, "tolerance_percent" if self.tolerance_mode == "PERCENT" else "tolerance_length")
         column.prop(self, "tolerance_mode", text=" ")
         draw_decimate_settings(layout, self)
+        draw_protect_settings(layout, self, context.active_object)
         layout.prop(self, "outside")
 
     def prepare(self, context):
         context.view_layer.update()
-        ob = self.ob
-        self._take_settings(ob.tolvol)
-        surface, reference = volume.surface_of(ob), volume.reference_of(ob)
-        task = _Task(surface, reference, volume.tolerance_length(self, reference.size()), self._options(context))
-        task.locked = np.zeros(len(surface.arrays.vertices), bool)
-        task.locked[mesh_io.loose_edges(ob.data)] = True
-        task.uvs = mesh_io.corner_uvs(ob.data)
-        return task.run
+        self._objects = targets(context)
+        self._take_settings(self.ob.tolvol)
+        tasks = []
+        for ob in self._objects:
+            if reason := decimate_blocked(ob):
+                raise Refused(f"{ob.name}: {reason}")
+            tasks.append(self._task(context, ob))
+        return functools.partial(_run_all, tasks)
 
-    def finish(self, context, outcome):
-        surface, reference, result, run = outcome
-        ob = self.ob
-        transfer.write_decimated(ob.data, surface.arrays, result)
+    def _task(self, context, ob):
+        surface, reference = volume.surface_of(ob), volume.reference_of(ob)
+        task = _Task(
+            ob.name, surface, reference, volume.tolerance_length(self, reference.size()), self._options(context)
+        )
+        task.uvs = mesh_io.corner_uvs(ob.data)
+        task.locked[mesh_io.loose_edges(ob.data)] = True
+        task.locked |= protect.on_edges(ob.data, self.protect)
+        task.locked |= protect.on_planes(ob.data, self.symmetry)
+        if self.only_selected:
+            task.locked |= protect.unselected(ob)
+        task.shares = protect.group_weights(ob, self.vertex_group, self.invert_vertex_group)
+        if task.shares is not None:
+            task.locked |= task.shares == 0
+        return task
+
+    def finish(self, context, outcomes):
+        objects = [alive(ob) for ob in self._objects]
+        # All meshes are tried before the first is written.
+        with contextlib.ExitStack() as stack:
+            writes = [
+                stack.enter_context(transfer.Writing(ob.data, surface.arrays, result))
+                for ob, (surface, _, result, _) in zip(objects, outcomes)
+            ]
+            for write in writes:
+                write.write()
+        for ob, (_, reference, _, run) in zip(objects, outcomes):
+            self._keep(ob, reference, run, f"{ob.name}: " if len(objects) > 1 else "")
+
+    def _keep(self, ob, reference, run, prefix):
+        """What is remembered and said of one object."""
         if ob.tolvol.snapshot is None:
             volume.set_reference(ob, reference)
             ob.tolvol.snapshot_seconds = run["seconds"]["field"]
-        self._give_settings(ob.tolvol)
+        shared.give(self, ob.tolvol, _SHARED)
         volume.remember(ob, volume.surface_of(ob), run, run["tolerance"]["absolute"])
         ob.tolvol.last_run_of = ob.tolvol.measurement.fingerprint
         ob.tolvol.last_run = json.dumps(run)
         for warning in run["warnings"]:
-            self.report({"WARNING"}, warning)
-        self.report({"INFO"}, report.line(run))
+            self.report({"WARNING"}, prefix + warning)
+        self.report({"INFO"}, prefix + report.line(run))
 
     def _take_settings(self, settings):
-        given = {name for name in _SHARED if self.properties.is_property_set(name)}
+        """Those of the active object hold for all, so that Adjust Last Operation shows what was used."""
+        given = self.properties.is_property_set
         for mode, name in (("PERCENT", "tolerance_percent"), ("LENGTH", "tolerance_length")):
-            if name in given and "tolerance_mode" not in given:
+            if given(name) and not given("tolerance_mode"):
                 self.tolerance_mode = mode
-                given.add("tolerance_mode")
-        if "target_triangles" in given and "use_target" not in given:
+        if given("target_triangles") and not given("use_target"):
             self.use_target = True
-            given.add("use_target")
-        for name in _SHARED - given:
-            setattr(self, name, getattr(settings, name))
-
-    def _give_settings(self, settings):
-        for name in _SHARED:
-            setattr(settings, name, getattr(self, name))
+        shared.take(self, settings, _SHARED)
 
     def _options(self, context):
         return {
             "placement": self.placement.lower(),
             "two_sided": self.keep == "BOTH",
+            "effort": self.effort.lower(),
             "target_triangles": self.target_triangles if self.use_target else 0,
             "outside": self.outside.lower(),
             "threads": self.threads or preferences.threads(context),
@@ -122,15 +169,31 @@ this mesh becomes it"""
 _SHARED = {*tolerance_settings(), *decimate_settings(), "placement"}
 
 
+def _run_all(tasks, progress):
+    if len(tasks) == 1:
+        return [tasks[0].run(progress)]
+    outcomes = []
+    for task in tasks:
+        try:
+            outcomes.append(task.run(progress))
+        except native.module.Cancelled:
+            raise
+        except (Refused, native.module.TolvolError) as error:
+            raise Refused(f"{task.name}: {error}") from None
+    return outcomes
+
+
 class _Task:
     """What runs in the thread: arrays in, arrays and numbers out."""
 
-    def __init__(self, surface, reference, tolerance, options):
+    def __init__(self, name, surface, reference, tolerance, options):
+        self.name = name
         self.surface = surface
         self.reference = reference
         self.tolerance = tolerance
         self.options = options
-        self.locked = None
+        self.locked = np.zeros(len(surface.arrays.vertices), bool)
+        self.shares = None
         self.uvs = None
 
     def run(self, progress):
@@ -148,6 +211,7 @@ class _Task:
             built,
             to_world=matrix,
             locked=self.locked if self.locked.any() else None,
+            shares=self.shares,
             wedges=wedges,
             progress=progress,
             **self.options,

@@ -5,10 +5,10 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
-from .. import mesh_io, native, preferences, report, volume
-from ..certify import certify
-from ..errors import NotProved, Refused
+from .. import mesh_io, native, preferences
+from ..errors import Refused
 from ..job import JobOperator
+from ..motion import Motion
 from ..properties import DEFORM_MODES
 from .blocked import allowed, decimate_blocked
 
@@ -51,16 +51,29 @@ fewer than 4 along an axis, whatever its own interpolation. Vertices outside of 
         self.lattice = cage.name
         if not self.properties.is_property_set("mode"):
             self.mode = ob.tolvol.deform_mode
-        surface, reference = volume.surface_of(ob), volume.reference_of(ob)
-        tolerance = volume.tolerance_length(ob.tolvol, reference.size())
-        threads = self.threads or preferences.threads(context)
-        faces = mesh_io.whole_quads(ob.data, surface.arrays)
-        return _Task(surface, faces, reference, tolerance, native_lattice(cage), self.mode.lower(), threads).run
+        motion = Motion(ob, self.threads or preferences.threads(context))
+        lattice, mode = native_lattice(cage), self.mode.lower()
+
+        def work(progress):
+            result = native.module.deform(
+                motion.before,
+                lattice,
+                motion.faces,
+                motion.volume(progress),
+                to_world=motion.surface.matrix,
+                mode=mode,
+                threads=motion.threads,
+                progress=progress,
+            )
+            certified = motion.certify(result.vertices, progress) if result.report["moved"] else None
+            return motion, result, certified
+
+        return work
 
     def finish(self, context, outcome):
-        task, result, certified = outcome
+        motion, result, certified = outcome
         ob, run = self.ob, result.report
-        if task.mode == "blocked" and run["leaving"]["faces"]:
+        if self.mode == "BLOCKED" and run["leaving"]["faces"]:
             raise Refused(
                 f"Blocked: {run['leaving']['faces']:,} faces of {ob.name} would leave the tolerance. "
                 f"{100 * run['permitted_fraction']:.1f} % of the way is permitted: choose As Far as Permitted, "
@@ -69,18 +82,12 @@ fewer than 4 along an axis, whatever its own interpolation. Vertices outside of 
         if not run["moved"]:
             why = "the tolerance permits none of it" if run["leaving"]["faces"] else "it is at rest, or somewhere else"
             raise Refused(f"{self.lattice} does not move {ob.name}: {why}")
-        # Blender may cut the faces otherwise where they are now.
-        triangles = mesh_io.triangles_at(ob.data, result.vertices)
-        if not np.array_equal(triangles, task.surface.arrays.triangles):
-            certified = task.certify(result.vertices, triangles, native.module.Progress())
-        mesh_io.move_vertices(ob.data, task.surface.arrays.vertices, result.vertices)
-        if ob.tolvol.snapshot is None:
-            volume.set_reference(ob, task.reference)
+        certified = motion.settle(result.vertices, certified)
+        motion.write(ob, result.vertices, certified)
         ob.tolvol.lattice, ob.tolvol.deform_mode = bpy.data.objects[self.lattice], self.mode
-        volume.remember(ob, volume.surface_of(ob), certified, task.tolerance)
         for warning in (*run["warnings"], *_twice(ob)):
             self.report({"WARNING"}, warning)
-        self.report({"INFO"}, _line(task, result, certified))
+        self.report({"INFO"}, motion.line(_remarks(result), certified))
 
     def _chosen(self, context):
         selected = [ob for ob in context.selected_objects if ob.type == "LATTICE"]
@@ -113,50 +120,6 @@ def native_lattice(cage):
         raise Refused(f"{cage.name}: {error}") from None
 
 
-class _Task:
-    """What runs in the thread: arrays in, arrays and numbers out."""
-
-    def __init__(self, surface, faces, reference, tolerance, lattice, mode, threads):
-        self.surface = surface
-        self.faces = faces
-        self.reference = reference
-        self.tolerance = tolerance
-        self.lattice = lattice
-        self.mode = mode
-        self.threads = threads
-        self.size = None
-
-    def run(self, progress):
-        built = volume.native_volume(self.reference, self.tolerance, self.threads, progress)
-        self.size = built.size
-        result = native.module.deform(
-            self.surface.arrays.vertices,
-            self.lattice,
-            self.faces,
-            built,
-            to_world=self.surface.matrix,
-            mode=self.mode,
-            threads=self.threads,
-            progress=progress,
-        )
-        certified = None
-        if result.report["moved"]:
-            certified = self.certify(result.vertices, self.surface.arrays.triangles, progress)
-        return self, result, certified
-
-    def certify(self, vertices, triangles, progress):
-        deformed = volume.Surface(mesh_io.MeshArrays(vertices, triangles, None, None), self.surface.matrix)
-        certified = certify(deformed, self.reference, self.tolerance, 0, self.threads, progress)
-        lower, upper = certified["forward"]
-        if upper > self.tolerance:
-            size = self.size
-            raise NotProved(
-                f"the result is between {report.percent(lower, size)} and {report.percent(upper, size)} of the size "
-                "from the reference"
-            )
-        return certified
-
-
 def _twice(ob):
     """Warnings for modifiers that would deform the mesh by the same lattice once more."""
     for modifier in ob.modifiers:
@@ -164,8 +127,8 @@ def _twice(ob):
             yield f"{ob.name} also has the modifier {modifier.name} with {modifier.object.name}: remove it"
 
 
-def _line(task, result, certified):
-    run, size = result.report, task.size
+def _remarks(result):
+    run = result.report
     remarks = [f"{run['moved']:,} of {len(result.vertices):,} vertices moved"]
     if run["leaving"]["faces"]:
         if run["permitted_fraction"] is None:
@@ -174,8 +137,4 @@ def _line(task, result, certified):
             remarks.append(f"{100 * run['permitted_fraction']:.1f} % of the way")
     if run["outside_lattice"]:
         remarks.append(f"{run['outside_lattice']:,} are outside of the lattice")
-    forward, backward = (report.percent(certified[way][1], size) for way in ("forward", "backward"))
-    return (
-        f"{', '.join(remarks)}, tolerance {100 * task.tolerance / size:.4g} % = {task.tolerance:.3g}, "
-        f"result within {forward} (certified), reference within {backward}"
-    )
+    return remarks

@@ -3,11 +3,21 @@
 
 import bpy
 
-from .decimate import TOLVOL_PT_decimate
+from .decimate import TOLVOL_PT_decimate, TOLVOL_PT_protect
 from .deform import TOLVOL_PT_deform
 from .deviation import TOLVOL_PT_deviation
+from .modifiers import TOLVOL_PT_modifiers
+from .smooth import TOLVOL_PT_smooth
 from .tolerance import TOLVOL_PT_tolerance
 
-_CLASSES = (TOLVOL_PT_tolerance, TOLVOL_PT_deviation, TOLVOL_PT_decimate, TOLVOL_PT_deform)
+_CLASSES = (
+    TOLVOL_PT_tolerance,
+    TOLVOL_PT_deviation,
+    TOLVOL_PT_decimate,
+    TOLVOL_PT_protect,
+    TOLVOL_PT_smooth,
+    TOLVOL_PT_modifiers,
+    TOLVOL_PT_deform,
+)
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -5,7 +5,7 @@ import bpy
 
 from .. import report, volume
 from ..operators import blocked
-from ..operators.decimate import draw_decimate_settings
+from ..operators.decimate import draw_decimate_settings, draw_protect_settings, targets
 from .layout import SubPanel, text_lines
 
 
@@ -18,7 +18,8 @@ class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
         layout.use_property_decorate = False
         ob = context.active_object
         draw_decimate_settings(layout, ob.tolvol)
-        layout.operator("tolvol.decimate", text="Decimate")
+        count = len(targets(context))
+        layout.operator("tolvol.decimate", text=f"Decimate {count} Objects" if count > 1 else "Decimate")
         if ob.tolvol.last_run and ob.tolvol.last_run_of == volume.shown_fingerprint(ob):
             text_lines(context, layout, report.counts(json.loads(ob.tolvol.last_run)), "CHECKMARK")
         reason = blocked.decimate_blocked(ob)
@@ -29,3 +30,15 @@ class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
             blocked.check_blocked(ob),
         ):
             text_lines(context, layout, reason, "ERROR")
+
+
+class TOLVOL_PT_protect(SubPanel, bpy.types.Panel):
+    bl_label = "Protect"
+    bl_parent_id = "TOLVOL_PT_decimate"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        draw_protect_settings(layout, context.active_object.tolvol, context.active_object)

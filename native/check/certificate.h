@@ -56,6 +56,10 @@ class TriangleCertificate {
   std::optional<glm::dvec3> near(const glm::dvec3& p) const;
 
   double within() const { return within_; }
+  /// The same with `share`, 0 to 1, of the provable distance.
+  TriangleCertificate narrowed(double share) const {
+    return {*reference_, *grid_, *hierarchy_, share * within_, beyond_};
+  }
 
  private:
   template <bool kProve>

@@ -15,6 +15,7 @@ BoundedMesh::BoundedMesh(BoundedMeshInput input, const Bounds& bounds)
       store_(std::move(input.store)),
       triangles_(std::move(input.triangles)),
       pinned_(std::move(input.pinned)),
+      shares_(std::move(input.shares)),
       slots_(std::move(input.slots)),
       wedges_(std::move(input.wedges)) {
   for (const Spot& s : input.spots) positions_.push_back(s.position), stored_.push_back(s.stored);
@@ -119,6 +120,7 @@ void BoundedMesh::apply(Change& change) {
   const std::uint32_t v = change.vertex_;
   if (change.kind_ == Change::Kind::collapse) {
     merged_into_[from(change.halfedge_)] = v;
+    if (!shares_.empty()) shares_[v] = std::min(shares_[v], shares_[from(change.halfedge_)]);
     triangle_count_ -= change.removed_.size();
     mesh_.collapse(change.halfedge_);
   }

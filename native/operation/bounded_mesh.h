@@ -36,8 +36,9 @@ struct Spot {
 struct BoundedMeshInput {
   std::vector<glm::uvec3> triangles;  ///< an oriented manifold with boundary
   std::vector<Spot> spots;            ///< of the vertices
-  std::vector<bool> pinned;           ///< per vertex: neither moves nor vanishes
-  std::vector<std::uint32_t> slots;   ///< per vertex: equal for those that are one vertex of the result (all pinned)
+  std::vector<bool> pinned;           ///< per vertex: neither moves nor vanishes, and an edge between two such stays
+  std::vector<double> shares;  ///< per vertex: of the forward bound that new faces around it may use; may be empty
+  std::vector<std::uint32_t> slots;  ///< per vertex: equal for those that are one vertex of the result (all pinned)
   std::vector<glm::uvec3>
       wedges;                 ///< per triangle and corner: equal at a vertex where attributes are equal; may be empty
   bool on_reference = false;  ///< every triangle is one of the reference
@@ -98,6 +99,7 @@ class BoundedMesh {
 
   void build(bool on_reference);
   int rank(std::uint32_t vertex) const;
+  double share(std::uint32_t vertex) const { return shares_.empty() ? 1 : shares_[vertex]; }
   bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
 
   OpenMesh::TriConnectivity mesh_;
@@ -107,6 +109,7 @@ class BoundedMesh {
   std::vector<glm::uvec3> triangles_;
   std::vector<glm::dvec3> positions_, stored_;
   std::vector<bool> pinned_, seam_, moved_;
+  std::vector<double> shares_;
   std::vector<std::uint32_t> slots_;
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> copies_;  ///< by slot, where there are several
   std::vector<double> distance_;       ///< upper bound on each vertex's distance to the reference

@@ -39,7 +39,7 @@ Change::Outcome Change::check() {
 }
 
 void Change::clear(Kind kind, const Spot& spot) {
-  kind_ = kind, spot_ = spot;
+  kind_ = kind, spot_ = spot, share_ = 1;
   elements_.clear(), faces_.clear(), removed_.clear(), new_wedges_.clear();
   boundary_elements_.clear(), boundary_removed_.clear();
 }
@@ -47,6 +47,7 @@ void Change::clear(Kind kind, const Spot& spot) {
 bool Change::prepare_collapse(Halfedge h, const Spot& spot) {
   clear(Kind::collapse, spot);
   halfedge_ = h, vertex_ = mesh_->to(h);
+  share_ = std::min(mesh_->share(vertex_), mesh_->share(mesh_->from(h)));
   if (!link_condition(h) || !gather(h, spot.position)) return false;
   if (!mesh_->wedges_.empty() && !wedges_fit(h)) return false;
   if (!mesh_->copies_.empty() && !slots_fit(h)) return false;
@@ -60,7 +61,7 @@ bool Change::prepare_collapse(Halfedge h, const Spot& spot) {
 
 bool Change::prepare_relocate(std::uint32_t vertex, const Spot& spot) {
   clear(Kind::relocate, spot);
-  vertex_ = vertex;
+  vertex_ = vertex, share_ = mesh_->share(vertex);
   constexpr int kNoFace = -1;
   gather_side(vertex, spot.position, glm::length(mesh_->positions_[vertex] - spot.position), kNoFace, kNoFace);
   boundary_of_relocation();
@@ -76,6 +77,7 @@ bool Change::prepare_flip(Edge e) {
   // The faces (b, a, c) and (a, b, d) become (b, d, c) and (a, c, d); the kernel keeps their names that way around.
   const std::uint32_t a = mesh_->to(h), b = mesh_->to(o), c = mesh_->to(mesh.next_halfedge_handle(h)),
                       d = mesh_->to(mesh.next_halfedge_handle(o));
+  if (mesh_->pinned_[a] && mesh_->pinned_[b]) return false;
   if (!mesh_->copies_.empty() && mesh_->joined_by_other(c, d)) return false;
   const std::uint32_t first = static_cast<std::uint32_t>(mesh.face_handle(h).idx()),
                       second = static_cast<std::uint32_t>(mesh.face_handle(o).idx());
@@ -258,26 +260,33 @@ bool Change::folds_over() const {
   return false;
 }
 
+/// Of the forward bound that the points of a face may use.
+double Change::share(const Face& face) const {
+  double least = share_;
+  for (const std::uint32_t v : face.vertices) least = std::min(least, mesh_->share(v));
+  return least;
+}
+
 bool Change::within_bounds() {
   const Bounds& bounds = mesh_->bounds();
   if (bounds.rival) return bounds.rival->accepts(elements_, removed_);
   if (bounds.forward) {
-    const double within = bounds.forward->within();
     if (kind_ != Kind::flip) {
       new_distance_ = bounds.forward->distance_bound(spot_.position);
-      if (!(new_distance_ <= within)) return false;
+      if (!(new_distance_ <= share_ * bounds.forward->within())) return false;
     }
     const auto& distance = mesh_->distance_;
     for (std::size_t k = 0; k < elements_.size(); ++k) {
       const std::size_t i = (suspect_ + k) % elements_.size();
       const Coverage::Element& element = elements_[i];
       Face& face = faces_[i];
+      const TriangleCertificate forward = bounds.forward->narrowed(share(face));
       // No point of the face moves farther than its moving corner.
       face.distance = mesh_->face_distance_[element.id] + element.moved;
-      if (element.moved == 0 || face.distance <= within) continue;
+      if (element.moved == 0 || face.distance <= forward.within()) continue;
       glm::dvec3 corners(distance[face.vertices[0]], distance[face.vertices[1]], distance[face.vertices[2]]);
       if (kind_ != Kind::flip) corners[face.corner] = new_distance_;
-      face.distance = bounds.forward->bound(element.corners, corners);
+      face.distance = forward.bound(element.corners, corners);
       if (face.distance == TriangleCertificate::kUnproved) {
         suspect_ = i;
         return false;

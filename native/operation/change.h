@@ -65,6 +65,7 @@ class Change {
   };
 
   void clear(Kind kind, const Spot& spot);
+  double share(const Face& face) const;
   void gather_side(std::uint32_t vertex, const glm::dvec3& position, double moved, int skip0, int skip1);
   bool link_condition(Halfedge h);
   bool gather(Halfedge h, const glm::dvec3& position);
@@ -82,6 +83,7 @@ class Change {
   Edge edge_;
   std::uint32_t vertex_ = 0;  ///< the one that moves
   Spot spot_{};
+  double share_ = 1;  ///< of the forward bound, at the vertex that moves
   std::vector<Coverage::Element> elements_;
   std::vector<Face> faces_;
   std::vector<Coverage::Removed> removed_;

@@ -34,6 +34,14 @@ class Decimation {
     if (!options.locked.empty() && options.locked.size() != vertices.size()) {
       throw InvalidInput("locked must have one value for each vertex");
     }
+    if (!options.shares.empty() && options.shares.size() != vertices.size()) {
+      throw InvalidInput("shares must have one value for each vertex");
+    }
+    for (std::size_t i = 0; i < options.shares.size(); ++i) {
+      if (!(options.shares[i] >= 0 && options.shares[i] <= 1)) {
+        throw InvalidInput("shares must be from 0 to 1, that of vertex " + std::to_string(i) + " is not");
+      }
+    }
     if (!options.wedges.empty() && options.wedges.size() != 3 * triangles.size()) {
       throw InvalidInput("wedges must have one label for each corner of each triangle");
     }
@@ -216,6 +224,14 @@ class Decimation {
     for (std::size_t v = 0; v < positions_.size(); ++v)
       input.spots.push_back({vertices_[cut_.vertex_input[v]], positions_[v]});
     input.pinned = pinned_;
+    if (!options_.shares.empty()) {
+      input.shares.assign(positions_.size(), 1);
+      for (std::size_t i = 0; i < vertices_.size(); ++i) {
+        if (cut_.input_vertex[i] == kNone) continue;
+        double& share = input.shares[cut_.input_vertex[i]];
+        share = std::min(share, options_.shares[i]);
+      }
+    }
     input.slots = cut_.output_slot;
     if (!options_.wedges.empty()) {
       // Labels name wedges at one input vertex; vertices welded from several hold those of all of them.

@@ -21,13 +21,16 @@ struct DecimationOptions {
   enum class Effort { fast, thorough };
 
   Vertices vertices =
-      Vertices::optimal;              ///< optimal: fewest triangles; subset: every surviving vertex is an original one
-  bool two_sided = true;              ///< also keep the whole reference within the tolerance of the result
-  Effort effort = Effort::fast;       ///< thorough: then moves vertices and flips edges to collapse more
-  double max_seconds = 0;             ///< thorough stops there with what it has; 0: no limit
-  std::size_t target_triangles = 0;   ///< stop at this many; 0: as few as the tolerance allows
-  std::span<const bool> locked = {};  ///< per input vertex, may be empty: neither moves nor vanishes
-  Outside outside = Outside::error;   ///< what to do with input faces that are not within the tolerance
+      Vertices::optimal;             ///< optimal: fewest triangles; subset: every surviving vertex is an original one
+  bool two_sided = true;             ///< also keep the whole reference within the tolerance of the result
+  Effort effort = Effort::fast;      ///< thorough: then moves vertices and flips edges to collapse more
+  double max_seconds = 0;            ///< thorough stops there with what it has; 0: no limit
+  std::size_t target_triangles = 0;  ///< stop at this many; 0: as few as the tolerance allows
+  /// Per input vertex, may be empty: neither moves nor vanishes, and an edge between two such stays.
+  std::span<const bool> locked = {};
+  /// Per input vertex, 0 to 1, may be empty: how much of the tolerance the new faces around it may use.
+  std::span<const double> shares = {};
+  Outside outside = Outside::error;            ///< what to do with input faces that are not within the tolerance
   std::span<const std::uint32_t> wedges = {};  ///< per input corner, may be empty: see wedge_labels()
   RingCheck* rival = nullptr;  ///< for comparisons: decides in place of all that is certified; nothing is promised
   unsigned threads = 0;        ///< 0: one per core; never changes the result

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "reference/errors.h"
 #include "reference/frame.h"
 
 namespace tolvol::python {
@@ -32,6 +33,15 @@ std::vector<std::uint32_t> to_faces(const py::object& array, const std::string& 
 
 /// (n,) of any integer type.
 std::vector<std::int32_t> to_labels(const py::object& array, const std::string& name);
+
+/// (n,) of one type exactly, in one piece.
+template <class T>
+py::array_t<T, py::array::c_style> to_values(const py::object& array, const char* expected) {
+  if (!py::isinstance<py::array_t<T>>(array) || py::reinterpret_borrow<py::array>(array).ndim() != 1) {
+    throw InvalidInput(expected);
+  }
+  return py::array_t<T, py::array::c_style>(py::reinterpret_borrow<py::array>(array));
+}
 
 /// 0: one per core. Throws InvalidInput when negative.
 unsigned to_threads(int threads);

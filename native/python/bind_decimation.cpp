@@ -56,9 +56,9 @@ py::dict make_report(const DecimationResult& r, std::size_t triangles_in, double
 
 Result decimate_arrays(const py::object& vertices, const py::object& triangles, const Volume* volume,
                        const py::object& to_world, const std::string& placement, bool two_sided,
-                       std::int64_t target_triangles, const py::object& locked, const std::string& outside,
-                       const py::object& wedges, const std::string& effort, double max_seconds, int threads,
-                       Progress* progress) {
+                       std::int64_t target_triangles, const py::object& locked, const py::object& shares,
+                       const std::string& outside, const py::object& wedges, const std::string& effort,
+                       double max_seconds, int threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const Placement placed(to_matrix(to_world), v.storage);
@@ -74,14 +74,15 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
   options.two_sided = two_sided;
   if (target_triangles < 0) throw InvalidInput("target_triangles must not be negative");
   options.target_triangles = static_cast<std::size_t>(target_triangles);
-  std::unique_ptr<bool[]> locked_values;
+  py::array_t<bool, py::array::c_style> locked_values;
   if (!locked.is_none()) {
-    if (!py::isinstance<py::array_t<bool>>(locked))
-      throw InvalidInput("locked must be a bool array, one value for each vertex");
-    const auto view = py::reinterpret_borrow<py::array_t<bool>>(locked).unchecked<1>();
-    locked_values = std::make_unique<bool[]>(static_cast<std::size_t>(view.shape(0)));
-    for (py::ssize_t i = 0; i < view.shape(0); ++i) locked_values[static_cast<std::size_t>(i)] = view(i);
-    options.locked = {locked_values.get(), static_cast<std::size_t>(view.shape(0))};
+    locked_values = to_values<bool>(locked, "locked must be a bool array, one value for each vertex");
+    options.locked = {locked_values.data(), static_cast<std::size_t>(locked_values.size())};
+  }
+  py::array_t<double, py::array::c_style> share_values;
+  if (!shares.is_none()) {
+    share_values = to_values<double>(shares, "shares must be a float64 array, one value for each vertex");
+    options.shares = {share_values.data(), static_cast<std::size_t>(share_values.size())};
   }
   std::vector<std::uint32_t> labels;
   if (!wedges.is_none()) {
@@ -142,10 +143,10 @@ void bind_decimation(py::module_& module) {
                     "(n,) int32: the result vertex that each input vertex was merged into; -1: no triangle uses it.")
       .def_readonly("vertex_source", &Result::vertex_source,
                     "(k,) int32: the input vertex that each result vertex continues.")
-      .def_readonly(
-          "triangle_source", &Result::triangle_source,
-          "(l,) int32: the input triangle that each result triangle continues: its corners are vertex_map of that\n"
-          "triangle's corners, in order.")
+      .def_readonly("triangle_source", &Result::triangle_source,
+                    "(l,) int32: the input triangle that each result triangle continues: unless edges around it were "
+                    "flipped, its\n"
+                    "corners are vertex_map of that triangle's corners, in order.")
       .def_readonly("source_triangle", &Result::source_triangle,
                     "(l, 3) int32: for each result corner the input triangle that its attributes are read from.")
       .def_readonly("source_weights", &Result::source_weights, "(l, 3, 3) float64: the barycentric weights there.")
@@ -154,29 +155,33 @@ void bind_decimation(py::module_& module) {
                     "renderer, repairs (kind, count, message), locked (vertices by cause), outside (faces, first, "
                     "reference_faces), warnings.");
 
-  module.def("decimate", &decimate_arrays, py::arg("vertices"), py::arg("triangles"), py::arg("volume").none(true),
-             py::arg("to_world") = py::none(), py::arg("placement") = "optimal", py::arg("two_sided") = true,
-             py::arg("target_triangles") = 0, py::arg("locked") = py::none(), py::arg("outside") = "error",
-             py::arg("wedges") = py::none(), py::arg("effort") = "fast", py::arg("max_seconds") = 0.0,
-             py::arg("threads") = 0, py::arg("progress") = py::none(),
-             "Fewest triangles within the volume's tolerance: every point of the result within it of the reference "
-             "and, two_sided,\n"
-             "every point of the reference within it of the result.\n\n"
-             "placement: \"optimal\" (fewest triangles) or \"subset\" (every surviving vertex is an original one, bit "
-             "for bit).\n"
-             "target_triangles: stop there if the tolerance lets it get so far; 0: as few as possible. locked: (n,) "
-             "bool, vertices\n"
-             "that neither move nor vanish. outside: \"error\", or \"keep\" the input faces that are not within the "
-             "tolerance as\n"
-             "they are. wedges: (m, 3) labels from wedges(). effort: \"fast\", or \"thorough\": then vertices move and "
-             "edges flip to\n"
-             "make room for further collapses, for a sixth fewer triangles in about four times the time; max_seconds "
-             "ends that early\n"
-             "(0: never), with what there is; what it finds then depends on the machine's speed. volume None: no "
-             "tolerance at all, for comparison; a "
-             "target is needed.\n"
-             "Raises InvalidInput and Cancelled. Cost: about 5 us a triangle. Quadric error metric: M. Garland, P. "
-             "Heckbert, 1997.");
+  module.def(
+      "decimate", &decimate_arrays, py::arg("vertices"), py::arg("triangles"), py::arg("volume").none(true),
+      py::arg("to_world") = py::none(), py::arg("placement") = "optimal", py::arg("two_sided") = true,
+      py::arg("target_triangles") = 0, py::arg("locked") = py::none(), py::arg("shares") = py::none(),
+      py::arg("outside") = "error", py::arg("wedges") = py::none(), py::arg("effort") = "fast",
+      py::arg("max_seconds") = 0.0, py::arg("threads") = 0, py::arg("progress") = py::none(),
+      "Fewest triangles within the volume's tolerance: every point of the result within it of the reference "
+      "and, two_sided,\n"
+      "every point of the reference within it of the result.\n\n"
+      "placement: \"optimal\" (fewest triangles) or \"subset\" (every surviving vertex is an original one, bit "
+      "for bit).\n"
+      "target_triangles: stop there if the tolerance lets it get so far; 0: as few as possible. locked: (n,) "
+      "bool, vertices\n"
+      "that neither move nor vanish; an edge between two of them stays. shares: (n,) float64, 0 to 1, how much of "
+      "the tolerance\n"
+      "the new faces around a vertex may use: so near to the reference does the result stay there. outside: "
+      "\"error\", or\n"
+      "\"keep\" the input faces that are not within the tolerance as they are. wedges: (m, 3) labels from wedges(). "
+      "effort: \"fast\", or \"thorough\": then vertices move and "
+      "edges flip to\n"
+      "make room for further collapses, for a sixth fewer triangles in about four times the time; max_seconds "
+      "ends that early\n"
+      "(0: never), with what there is; what it finds then depends on the machine's speed. volume None: no "
+      "tolerance at all, for comparison; a "
+      "target is needed.\n"
+      "Raises InvalidInput and Cancelled. Cost: about 5 us a triangle. Quadric error metric: M. Garland, P. "
+      "Heckbert, 1997.");
   module.def("wedges", &wedges, py::arg("triangles"), py::arg("corners"),
              "(m, 3) int32 labels: two corners have the same label exactly when they are at the same vertex and all "
              "their values\n"

@@ -25,15 +25,6 @@ bool is_second(const std::string& value, const char* name, const char* first, co
   return value == second;
 }
 
-/// (n,) of one type exactly, in one piece.
-template <class T>
-py::array_t<T, py::array::c_style> to_values(const py::object& array, const char* expected) {
-  if (!py::isinstance<py::array_t<T>>(array) || py::reinterpret_borrow<py::array>(array).ndim() != 1) {
-    throw InvalidInput(expected);
-  }
-  return py::array_t<T, py::array::c_style>(py::reinterpret_borrow<py::array>(array));
-}
-
 Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, const Volume* volume,
                        const py::object& to_world, std::int64_t iterations, const std::string& kind,
                        const std::string& weights, const std::string& boundary, const py::object& locked,

@@ -53,7 +53,7 @@ def test_last_line_says_what_the_report_says(scan, tmp_path):
         assert 0 <= float(match[group]) / (100 * run[way][1] / size) - 1 < 0.01
 
 
-def test_one_sided_placement_target_and_threads(scan, tmp_path):
+def test_one_sided_placement_target_threads_and_effort(scan, tmp_path):
     reports = {}
     for name, extra in {
         "plain": [],
@@ -62,6 +62,7 @@ def test_one_sided_placement_target_and_threads(scan, tmp_path):
         "target": ["--target-triangles", "900"],
         "out of reach": ["--target-triangles", "4"],
         "threads": ["--threads", "1"],
+        "thorough": ["--effort", "thorough"],
     }.items():
         match = succeeded(
             decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", "--report", tmp_path / "r.json", *extra)
@@ -76,6 +77,8 @@ def test_one_sided_placement_target_and_threads(scan, tmp_path):
     assert 850 <= reports["target"][0]["output"]["triangles"] <= 900 and reports["target"][1] is None
     assert reports["out of reach"][1] == "target 4 not reached within the tolerance"
     assert np.array_equal(reports["threads"][2][0], reports["plain"][2][0])
+    assert reports["thorough"][0]["output"]["triangles"] < plain
+    assert [reports[name][0]["effort"] for name in ("plain", "thorough")] == ["fast", "thorough"]
 
 
 def test_another_file_as_reference(scan, tmp_path):
@@ -194,7 +197,7 @@ def test_a_bug_exits_with_1_and_its_traceback(scan, tmp_path):
 
 
 def test_a_bug_inside_the_operator_is_a_bug(scan, tmp_path):
-    spoil = PATCH.format("pass") + "from addon import transfer; transfer.write_decimated = None"
+    spoil = PATCH.format("pass") + "from addon import transfer; transfer.Writing = None"
     code, _, err = decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", before=spoil)
     assert code == 1 and "TypeError" in err
 

@@ -72,6 +72,59 @@ TEST(Refinement, LockedVerticesStay) {
   }
 }
 
+TEST(Refinement, EdgesBetweenLockedVerticesStay) {
+  const Case c = torus();
+  const auto locked = std::make_unique<bool[]>(c.mesh.vertices.size());
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> line;  // rings around the tube
+  for (const glm::uvec3& t : c.mesh.triangles) {
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+      if (a / 60 % 5 == 0 && b / 60 == a / 60 && a < b) line.emplace_back(a, b), locked[a] = locked[b] = true;
+    }
+  }
+  ASSERT_EQ(line.size(), 12u * 60);
+  Options options = thorough();
+  options.locked = {locked.get(), c.mesh.vertices.size()};
+  const DecimationResult r = run(c, options);
+  cases::expect_within(c, r);
+  for (const auto& [a, b] : line) {
+    const auto has = [&](const glm::uvec3& t, std::uint32_t v) {
+      const auto i = static_cast<std::uint32_t>(r.vertex_map[v]);
+      return t.x == i || t.y == i || t.z == i;
+    };
+    EXPECT_TRUE(std::any_of(r.triangles.begin(), r.triangles.end(),
+                            [&](const glm::uvec3& t) { return has(t, a) && has(t, b); }));
+  }
+}
+
+TEST(Refinement, SharesOfTheToleranceAreKeptAroundTheirVertices) {
+  const Case c{shapes::torus(36, 0.002)};
+  std::vector<double> shares(c.mesh.vertices.size(), 1);
+  for (std::size_t v = 0; v < shares.size(); ++v) {
+    if (c.mesh.vertices[v].x < 0) shares[v] = 0.25;
+  }
+  Options options;
+  for (const auto effort : {Options::Effort::fast, Options::Effort::thorough}) {
+    options.effort = effort, options.shares = {};
+    const auto near = [&](const DecimationResult& r) {
+      std::vector<glm::uvec3> there;
+      for (const glm::uvec3& t : r.triangles) {
+        if (std::max({r.vertices[t.x].x, r.vertices[t.y].x, r.vertices[t.z].x}) < -0.1) there.push_back(t);
+      }
+      return hausdorff(c.world(r.vertices, there), c.world(c.mesh.vertices, c.mesh.triangles),
+                       {0.25 * c.tolerance(), 1, nullptr});
+    };
+    const DecimationResult without = run(c, options);
+    EXPECT_GT(near(without).lower, 0.25 * c.tolerance());
+    options.shares = shares;
+    const DecimationResult r = run(c, options);
+    cases::expect_within(c, r);
+    EXPECT_LE(near(r).upper, 0.25 * c.tolerance());
+    EXPECT_GT(r.triangles.size(), without.triangles.size());
+    EXPECT_LT(r.triangles.size(), 4 * without.triangles.size());
+  }
+}
+
 TEST(Refinement, CornersOfAFaceKeepToOneSideOfASeam) {
   const Case c = torus();
   // A seam where x changes its sign: two values at each vertex on it.

@@ -90,6 +90,20 @@ def test_locked_vertices_stay():
     assert not free.report["locked"]
 
 
+@pytest.mark.parametrize("two_sided", [True, False])
+def test_shares_narrow_the_tolerance_around_their_vertices(two_sided):
+    vertices, triangles = TORUS
+    shares = np.where(vertices[:, 0] < 0, 0.3, 1.0)
+    result = decimate(vertices, triangles, TOLERANCE, shares=shares, two_sided=two_sided)
+    there = result.triangles[(result.vertices[result.triangles, 0] < -0.2).all(1)]
+    judged = tolvol.hausdorff(result.vertices, there, vertices, triangles, bound=0.3 * TOLERANCE)
+    assert 0.2 * TOLERANCE < judged.upper <= 0.3 * TOLERANCE
+    assert len(result.triangles) > 1.3 * len(decimate(vertices, triangles, TOLERANCE, two_sided=two_sided).triangles)
+    assert np.array_equal(
+        result.vertices, decimate(vertices, triangles, TOLERANCE, shares=shares, two_sided=two_sided).vertices
+    )
+
+
 def with_a_far_patch():
     """A sphere of which eight neighbouring vertices are pulled far out, and the sphere."""
     vertices, triangles = meshes.sphere(4)

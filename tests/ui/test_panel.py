@@ -104,7 +104,7 @@ def test_escape_leaves_everything_as_it_was():
         bpy.ops.object.modifier_apply(modifier="more")
     yield 0.5
     before, said, status = stored(), [], job._status
-    job._status = lambda progress: said.append(status(progress)) or said[-1]
+    job._status = lambda *shown: said.append(status(*shown)) or said[-1]
     yield from press("tolvol.decimate")
     yield from finished(lambda: any("triangles left" in text for text in said))
     screenshot("5 busy")

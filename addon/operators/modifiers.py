@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Modifiers within the tolerance: those that keep the faces are pulled back to it, those that change them are fitted."""
+
+import bpy
+import numpy as np
+from bpy.props import FloatProperty, IntProperty, StringProperty
+
+from .. import fit, measure, mesh_io, preferences, report, volume
+from ..certify import certify
+from ..errors import NotProved, Refused
+from ..evaluation import Evaluation, same_faces
+from ..job import JobOperator
+from ..mesh_io import column
+from ..motion import Motion
+from ..operation_settings import modifier_settings
+from . import settings as shared
+from .blocked import allowed, decimate_blocked
+
+FITTED = {"DECIMATE", "REMESH", "WELD"}
+_CHANGING = {
+    *("ARRAY", "BEVEL", "BOOLEAN", "BUILD", "EDGE_SPLIT", "MASK", "MIRROR", "MULTIRES", "PARTICLE_INSTANCE", "SCREW"),
+    *("SKIN", "SOLIDIFY", "SUBSURF", "TRIANGULATE", "VOLUME_TO_MESH", "WIREFRAME"),
+}
+_SIMULATIONS = {
+    *("CLOTH", "COLLISION", "DYNAMIC_PAINT", "EXPLODE", "FLUID", "OCEAN", "PARTICLE_SYSTEM", "SOFT_BODY", "SURFACE"),
+}
+
+
+def modifier_blocked(ob, modifier):
+    """Why this modifier can neither be applied nor fitted, or None."""
+    if modifier.type in FITTED:
+        if ob.data.shape_keys:
+            return f"{modifier.name} changes the faces: remove the shape keys first"
+        return fit.fit_blocked(modifier)
+    if modifier.type in _CHANGING:
+        return "It changes the faces and has nothing to fit"
+    if modifier.type in _SIMULATIONS:
+        return "A simulation cannot be applied in tolerance"
+    return None
+
+
+class _ModifierOperator(JobOperator):
+    """What both have in common: a modifier of the active object, and where the result goes."""
+
+    @classmethod
+    def poll(cls, context):
+        ob = context.active_object
+        reason = decimate_blocked(ob)
+        if not reason and not ob.modifiers:
+            reason = f"{ob.name} has no modifiers"
+        return allowed(cls, reason)
+
+    def chosen(self, fitted):
+        """The modifier; settings that were not given are taken."""
+        ob = self.ob
+        shared.take(self, ob.tolvol.modifiers, modifier_settings())
+        if not self.modifier:
+            suitable = [m for m in ob.modifiers if (m.type in FITTED) == fitted and not modifier_blocked(ob, m)]
+            self.modifier = suitable[0].name if suitable else ""
+        modifier = ob.modifiers.get(self.modifier)
+        if modifier is None:
+            raise Refused(f"{ob.name} has no modifier {self.modifier}".rstrip() + " to take")
+        if reason := modifier_blocked(ob, modifier):
+            raise Refused(f"{modifier.name} of {ob.name}: {reason}")
+        if (modifier.type in FITTED) != fitted:
+            other = "fit it instead" if modifier.type in FITTED else "apply it instead"
+            raise Refused(f"{modifier.name} of {ob.name}: {other}")
+        return modifier
+
+    def target(self, context):
+        """The object that the result goes to; the modifier goes."""
+        ob = self.ob
+        if self.result == "OBJECT":
+            copy = ob.copy()
+            copy.data = ob.data.copy()
+            for collection in ob.users_collection:
+                collection.objects.link(copy)
+            for other in context.selected_objects:
+                other.select_set(False)
+            copy.select_set(True)
+            context.view_layer.objects.active = ob = copy
+        ob.modifiers.remove(ob.modifiers[self.modifier])
+        return ob
+
+
+class TOLVOL_OT_apply_modifier(_ModifierOperator, bpy.types.Operator):
+    """Apply a modifier that keeps the faces, such as Smooth or Lattice: every vertex goes as far as the tolerance of the \
+reference permits. The modifier acts on the base mesh, without those above it. Without a reference the base mesh becomes it"""
+
+    bl_idname = "tolvol.apply_modifier"
+    bl_label = "Apply Modifier in Tolerance"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = modifier_settings({"SKIP_SAVE"})
+    modifier: StringProperty(
+        name="Modifier", description="Its name; if none is given, the first that can be applied", options={"SKIP_SAVE"}
+    )
+    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+
+    def draw(self, context):
+        self.layout.use_property_split = True
+        self.layout.prop(self, "result")
+
+    def prepare(self, context):
+        context.view_layer.update()
+        ob, name = self.ob, self.chosen(fitted=False).name
+        motion = Motion(ob, self.threads or preferences.threads(context))
+        with Evaluation(ob, name) as evaluation:
+            mesh = evaluation.mesh()
+            if not same_faces(mesh, ob.data):
+                raise Refused(
+                    f"{name} changes the faces of {ob.name}: only what moves vertices can be applied in tolerance"
+                )
+            wished = column(mesh.vertices, "co", 3)
+        if np.array_equal(wished, motion.before):
+            raise Refused(f"{name} does not move {ob.name}: check its settings")
+
+        def work(progress):
+            vertices = motion.hold(wished, progress)
+            return motion, wished, vertices, motion.certify(vertices, progress)
+
+        return work
+
+    def finish(self, context, outcome):
+        motion, wished, vertices, certified = outcome
+        name = self.modifier
+        if np.array_equal(vertices, motion.before):
+            raise Refused(f"The tolerance permits nothing of what {name} does to {self.ob.name}")
+        certified = motion.settle(vertices, certified)
+        shared.give(self, self.ob.tolvol.modifiers, modifier_settings())
+        ob = self.target(context)
+        if self.result == "SHAPE_KEY":
+            self._add_key(ob, name, vertices)
+            motion.keep_reference(ob)
+        else:
+            motion.write(ob, vertices, certified)
+        self.report({"INFO"}, f"{name}: {motion.line(motion.moved(vertices, wished), certified)}")
+
+    @staticmethod
+    def _add_key(ob, name, vertices):
+        if ob.data.shape_keys is None:
+            ob.shape_key_add(name="Basis")
+        key = ob.shape_key_add(name=name, from_mix=False)
+        key.data.foreach_set("co", vertices.ravel())
+        key.value = 1.0
+        ob.data.update()
+
+
+class TOLVOL_OT_fit_modifier(_ModifierOperator, bpy.types.Operator):
+    """Find the setting of a Decimate, Remesh or Weld modifier that leaves the fewest triangles within the tolerance, \
+proved both ways, and apply it. The modifier acts on the base mesh, without those above it. Without a reference the base \
+mesh becomes it"""
+
+    bl_idname = "tolvol.fit_modifier"
+    bl_label = "Fit Modifier to Tolerance"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = modifier_settings({"SKIP_SAVE"})
+    modifier: StringProperty(
+        name="Modifier", description="Its name; if none is given, the first that can be fitted", options={"SKIP_SAVE"}
+    )
+    value: FloatProperty(
+        name="Value",
+        description="The modifier's ratio, voxel size or distance that was found; one that is given is not searched for",
+        min=0.0,
+        precision=5,
+        options={"SKIP_SAVE"},
+    )
+    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+
+    def draw(self, _context):
+        self.layout.use_property_split = True
+        self.layout.prop(self, "value")
+        self.layout.prop(self, "result")
+
+    def steps(self, context):
+        context.view_layer.update()
+        ob, modifier = self.ob, self.chosen(fitted=True)
+        if self.result == "SHAPE_KEY":
+            raise Refused(f"{modifier.name} changes the faces of {ob.name}: choose Replace or New Object")
+        name, trial = modifier.name, _Trial(ob, self.threads or preferences.threads(context))
+        parameter = trial.parameter(modifier)
+        with Evaluation(ob, name) as evaluation:
+            # Adjust Last Operation comes with the value that was found, or another one.
+            self.value = self.value or (yield from self._best(evaluation, parameter, trial))
+            setattr(evaluation.modifier, parameter.name, self.value)
+            mesh = evaluation.new_mesh()
+        try:
+            certified = yield trial.certified(mesh_io.read_mesh(mesh))
+            settings = self.ob.tolvol.modifiers
+        except BaseException:
+            bpy.data.meshes.remove(mesh)
+            raise
+        shared.give(self, settings, modifier_settings())
+        self._write(context, trial, mesh, certified)
+        self.report({"INFO"}, f"{name}: {parameter.label} {self.value:.4g}, {trial.line(certified)}")
+
+    def _best(self, evaluation, parameter, trial):
+        name, search, deviation = evaluation.modifier.name, fit.search(parameter.first, parameter.last), None
+        while True:
+            try:
+                value = search.send(deviation)
+            except StopIteration as end:
+                if end.value is None:
+                    text = f"No {parameter.label} of {name} keeps {self.ob.name} within the tolerance both ways"
+                    raise Refused(text) from None
+                return end.value
+            self.doing = f"Fitting {name}: {parameter.label} {value:.4g}"
+            setattr(evaluation.modifier, parameter.name, value)
+            deviation = yield trial.measured(mesh_io.read_mesh(evaluation.mesh()))
+
+    def _write(self, context, trial, mesh, certified):
+        ob = self.target(context)
+        before = ob.data
+        name, mesh.use_fake_user = before.name, before.use_fake_user
+        for key, value in before.items():
+            mesh[key] = value
+        ob.data = mesh
+        bpy.data.meshes.remove(before)
+        mesh.name = name
+        if ob.tolvol.snapshot is None:
+            volume.set_reference(ob, trial.reference)
+        volume.remember(ob, volume.surface_of(ob), certified, trial.tolerance)
+
+
+class _Trial:
+    """One object against its reference; what it returns to be done runs in the thread."""
+
+    def __init__(self, ob, threads):
+        self.surface = volume.surface_of(ob)
+        self.reference = volume.reference_of(ob)
+        self.size = self.reference.size()
+        self.tolerance = volume.tolerance_length(ob.tolvol, self.size)
+        self._threads = threads
+        self._pair = self.reference.world(), self.reference.arrays.triangles
+        self._left = 0
+
+    def parameter(self, modifier):
+        arrays = self.surface.arrays
+        used = arrays.vertices[np.unique(arrays.triangles)]
+        size = float(np.linalg.norm(used.max(0) - used.min(0)))
+        return fit.parameter(modifier, len(arrays.triangles), size, self.tolerance * size / self.surface.size())
+
+    def measured(self, arrays):
+        """Work: the larger of the deviations both ways, in tolerances; at most 1 where it is certified to be within."""
+
+        def work(progress):
+            if not len(arrays.triangles):
+                return np.inf
+            pair = volume.Surface(arrays, self.surface.matrix).world(), arrays.triangles
+            deviation = 0.0
+            for one, other in ((self._pair, pair), (pair, self._pair)):
+                found = measure.largest_distance(one, other, self.tolerance, self._threads, progress)
+                share = (
+                    found.upper if found.within(self.tolerance) else max(found.lower, self.tolerance * 1.001)
+                ) / self.tolerance
+                deviation = max(deviation, share)
+                if deviation > fit.NEAR:
+                    break
+            return deviation
+
+        return work
+
+    def certified(self, arrays):
+        """Work: what certify() says of the mesh as it will be stored; NotProved unless it is within both ways."""
+
+        def work(progress):
+            surface = volume.Surface(arrays, self.surface.matrix)
+            found = certify(surface, self.reference, self.tolerance, 0, self._threads, progress)
+            if max(found["forward"][1], found["backward"][1]) > self.tolerance:
+                ways = (report.percent(found[way][1], self.size) for way in ("forward", "backward"))
+                raise NotProved("up to {} of the size from the reference, and the reference up to {}".format(*ways))
+            self._left = len(arrays.triangles)
+            return found
+
+        return work
+
+    def line(self, certified):
+        """What was reached, in one line."""
+        forward, backward = (report.percent(certified[way][1], self.size) for way in ("forward", "backward"))
+        return (
+            f"{len(self.surface.arrays.triangles):,} -> {self._left:,} triangles, tolerance "
+            f"{100 * self.tolerance / self.size:.4g} % = {self.tolerance:.3g}, result within {forward}, reference within "
+            f"{backward} (certified)"
+        )

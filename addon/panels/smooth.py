@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..operators.smooth import draw_smooth_settings
+from .layout import SubPanel
+
+
+class TOLVOL_PT_smooth(SubPanel, bpy.types.Panel):
+    bl_label = "Smooth"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        ob = context.active_object
+        draw_smooth_settings(layout, ob.tolvol.smooth, ob)
+        layout.operator("tolvol.smooth", text="Smooth")

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Smooth in Tolerance: the promise on what is stored, every option, what is refused."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from addon import mesh_io, native, volume
+from addon.mesh_io import column
+from scenes import add_object, sheet, torus, world_triangles
+
+PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, 2, 0.5, 1))
+
+
+def coordinates(ob):
+    return column(ob.data.vertices, "co", 3)
+
+
+def smoothed(make=torus, **options):
+    """Where the vertices of a new object end."""
+    ob = make()
+    assert bpy.ops.tolvol.smooth(**options) == {"FINISHED"}
+    return coordinates(ob)
+
+
+def roughness(ob):
+    """Mean angle between the normals of neighbouring faces."""
+    mesh = ob.data
+    normals = column(mesh.polygons, "normal", 3)
+    edges = column(mesh.loops, "edge_index", 1, np.int32)
+    order = np.argsort(edges, kind="stable")
+    one, two = (
+        np.repeat(np.arange(len(mesh.polygons)), column(mesh.polygons, "loop_total", 1, np.int32))[order]
+        .reshape(-1, 2)
+        .T
+    )
+    return np.arccos((normals[one] * normals[two]).sum(1).clip(-1, 1)).mean()
+
+
+@pytest.mark.parametrize("matrix", [Matrix(), PLACED], ids=["local", "placed"])
+def test_stays_within_the_tolerance_in_the_world(matrix):
+    ob = torus(matrix=matrix, noise=0.02)
+    reference, rough = world_triangles(ob), roughness(ob)
+    tolerance = 0.01 * native.module.size(coordinates(ob), reference[1], to_world=mesh_io.matrix_array(ob.matrix_world))
+    bpy.ops.tolvol.smooth(iterations=60, method="LAPLACIAN")
+    stored = world_triangles(ob)
+    judged = native.module.hausdorff(*stored, *reference, bound=tolerance)
+    assert 0.9 * tolerance < judged.upper <= tolerance
+    assert roughness(ob) < 0.8 * rough
+    measured = volume.measurement_of(ob)
+    assert measured.forward_within and judged.lower <= measured.forward
+    assert np.array_equal(mesh_io.read_mesh(ob.tolvol.snapshot).triangles, reference[1])
+    assert ob.tolvol.smooth.iterations == 60 and ob.tolvol.smooth.method == "LAPLACIAN"
+
+
+def test_every_setting_counts_and_those_not_given_are_the_objects_own():
+    plain = smoothed()
+    for options in ({"iterations": 3}, {"method": "LAPLACIAN"}, {"weights": "UNIFORM"}):
+        assert not np.array_equal(smoothed(**options), plain)
+    ob = torus()
+    ob.tolvol.smooth.iterations = 3
+    bpy.ops.tolvol.smooth()
+    assert np.array_equal(coordinates(ob), smoothed(iterations=3))
+
+
+def test_boundary_stays_or_is_smoothed_along_itself():
+    before = coordinates(sheet(bumps=0.2))
+    rim = (np.abs(before[:, :2]) == 1).any(1)
+    fixed = smoothed(lambda: sheet(bumps=0.2))
+    assert np.array_equal(fixed[rim], before[rim]) and not np.array_equal(fixed, before)
+    assert not np.array_equal(smoothed(lambda: sheet(bumps=0.2), boundary="ALONG")[rim], before[rim])
+
+
+def test_vertex_group_is_the_strength():
+    def half():
+        ob = torus(noise=0.02)
+        group = ob.vertex_groups.new(name="half")
+        group.add(np.flatnonzero(coordinates(ob)[:, 0] > 0).tolist(), 0.5, "REPLACE")
+        return ob
+
+    before = coordinates(half())
+    right = before[:, 0] > 0
+    whole, weak = smoothed(half, iterations=1), smoothed(half, iterations=1, vertex_group="half")
+    assert np.array_equal(weak[~right], before[~right])
+    far = before[:, 0] > 0.2
+    assert np.abs((weak - before)[far] - 0.5 * (whole - before)[far]).max() < 1e-5
+    inverted = smoothed(half, iterations=1, vertex_group="half", invert_vertex_group=True)
+    left = before[:, 0] < -0.2
+    assert np.abs(inverted - whole)[left].max() < 1e-6 and np.abs(inverted - weak)[far].max() < 1e-6
+
+
+def test_bent_quads_stay_within_however_they_are_cut():
+    ob = torus(noise=0.02)
+    reference, faces = world_triangles(ob), [list(face.vertices) for face in ob.data.polygons]
+    tolerance = 0.01 * native.module.size(*reference)
+    bpy.ops.tolvol.smooth(iterations=40, method="LAPLACIAN")
+    vertices = world_triangles(ob)[0]
+    inside = np.ones(len(faces), bool)
+    for corners in ([0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]):
+        cut = np.array(faces, np.int32)[:, corners]
+        before = [native.module.hausdorff(reference[0], face[None], *reference).upper <= tolerance for face in cut]
+        inside &= before
+    assert inside.sum() > 0.8 * len(faces)  # those that were outside across a diagonal stay as they are
+    for corners in ([0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]):
+        cut = np.array(faces, np.int32)[inside][:, corners]
+        assert native.module.hausdorff(vertices, cut, *reference, bound=tolerance).upper <= tolerance
+
+
+def test_loose_edges_stay_attached():
+    ob = add_object(
+        "spike",
+        [(0, 0, 0), (1, 0, 0), (1, 1, 0.3), (0, 1, 0), (0.5, 0.5, 0.2)],
+        [(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)],
+    )
+    ob.tolvol.tolerance_percent = 20
+    bpy.ops.tolvol.smooth()
+    assert coordinates(ob)[4, 2] != np.float32(0.2)
+    ob = add_object(
+        "spike",
+        [(0, 0, 0), (1, 0, 0), (1, 1, 0.3), (0, 1, 0), (0.5, 0.5, 0.2), (0.5, 0.5, 1)],
+        [(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)],
+    )
+    ob.data.edges.add(1)
+    ob.data.edges[-1].vertices = (4, 5)
+    ob.data.update()
+    ob.tolvol.tolerance_percent = 20
+    with pytest.raises(RuntimeError, match="Nothing of spike.* can be smoothed"):
+        bpy.ops.tolvol.smooth()
+
+
+def test_shape_keys_keep_their_motion_and_one_undo_step_restores_everything():
+    ob = torus()
+    ob.shape_key_add(name="Basis")
+    key = ob.shape_key_add(name="up")
+    for point in key.data:
+        point.co.z += 0.25
+    bpy.ops.ed.undo_push(message="start")
+    before = coordinates(ob)
+    bpy.ops.tolvol.smooth("EXEC_DEFAULT", True)
+    ob = bpy.data.objects["torus"]
+    after = coordinates(ob)
+    assert not np.array_equal(after, before)
+    basis, up = (column(block.data, "co", 3) for block in ob.data.shape_keys.key_blocks)
+    assert np.array_equal(basis, after) and np.abs(up - basis - [0, 0, 0.25]).max() < 1e-6
+    bpy.ops.ed.undo()
+    ob = bpy.data.objects["torus"]
+    assert np.array_equal(coordinates(ob), before) and ob.tolvol.snapshot is None
+
+
+def test_what_is_outside_is_refused():
+    ob = torus()
+    bpy.ops.tolvol.set_reference()
+    ob.data.vertices[5].co.z += 1
+    before = coordinates(ob)
+    with pytest.raises(RuntimeError, match="faces are not within the tolerance"):
+        bpy.ops.tolvol.smooth()
+    with pytest.raises(RuntimeError, match="torus has no vertex group none"):
+        bpy.ops.tolvol.smooth(vertex_group="none")
+    assert np.array_equal(coordinates(ob), before)

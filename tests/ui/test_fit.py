@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fitting a modifier in a window: Blender evaluates between the parts of the work, and Esc leaves everything as it was."""
+
+import bpy
+
+import scenes
+from addon import job
+from test_panel import assert_proved, finished, monkey, stored, suzanne
+from window import centre, key, reset, screenshot, view, xdotool
+
+
+def fit(ob):
+    ob.modifiers.new("Decimate", "DECIMATE")
+    bpy.ops.ed.undo_push(message="modifier")
+    with bpy.context.temp_override(window=view()[0], area=view()[1]):
+        assert bpy.ops.tolvol.fit_modifier("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+
+
+def test_escape_while_a_modifier_is_fitted_changes_nothing():
+    yield from reset(monkey)
+    before, said, status = stored(), [], job._status
+    job._status = lambda *shown: said.append(status(*shown)) or said[-1]
+    fit(suzanne())
+    yield from finished(lambda: len(said) > 2)
+    screenshot("10 fitting")
+    key("Escape")
+    yield from finished(lambda: len(bpy.data.scenes) == 1)
+    job._status = status
+    assert said[0].startswith("Fitting Decimate: Ratio") and said[0].endswith("Esc: Cancel")
+    assert stored() == before and suzanne().tolvol.snapshot is None
+    assert [modifier.name for modifier in suzanne().modifiers] == ["Decimate"]
+    assert len(bpy.data.objects) == 1
+
+
+def test_fitted_in_a_window_and_undone_by_one_ctrl_z():
+    yield from reset(scenes.torus)
+    ob = bpy.data.objects["torus"]
+    reference = scenes.world_triangles(ob)
+    fit(ob)
+    yield from finished(lambda: not bpy.data.objects["torus"].modifiers)
+    yield 0.5
+    ob = bpy.data.objects["torus"]
+    assert len(ob.data.polygons) < 500
+    assert_proved(ob, reference, 1)
+    screenshot("11 fitted")
+    xdotool("mousemove", *centre())
+    yield
+    key("ctrl+z")
+    yield 1.0
+    ob = bpy.data.objects["torus"]
+    assert len(ob.data.polygons) == 1152 and len(ob.modifiers) == 1 and ob.tolvol.snapshot is None
