@@ -4,8 +4,9 @@
 import bpy
 import numpy as np
 
-from .. import report, volume
-from .layout import AMBER, GREEN, GREY, NO_BREAK, RED, SubPanel, length, right, text_lines
+from .. import overlay, report, volume
+from ..units import NO_BREAK, length
+from .layout import AMBER, GREEN, GREY, RED, SubPanel, right, text_lines
 
 
 class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
@@ -19,6 +20,23 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         row.operator("tolvol.check")
         row.operator("tolvol.select_outside")
         layout.operator("tolvol.save_report", text="Save Report...")
+        self._draw_shown(context, ob)
+
+    def _draw_shown(self, context, ob):
+        """The overlay in the 3D view."""
+        settings = ob.tolvol
+        column = self.layout.column()
+        column.prop(settings, "show_deviation")
+        if not settings.show_deviation:
+            return
+        row = column.row()
+        row.active = not overlay.unsigned_reason(ob)
+        row.prop(settings, "deviation_kind", expand=True)
+        column.prop(settings, "deviation_opacity", slider=True)
+        if (why := overlay.reason(ob)) and settings.snapshot:
+            text_lines(context, column, why, "INFO")
+        elif why := overlay.unsigned_reason(ob):
+            text_lines(context, column, why, "INFO")
 
     def _draw_measured(self, context, ob):
         """The same rows whether there is a measurement or not: buttons below do not jump."""
