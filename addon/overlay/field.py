@@ -13,7 +13,7 @@ from . import work
 
 _LONGEST = 2048  # texels along an axis that every GPU of Blender's takes
 _NODES = 16_000_000  # 32 MB on the GPU
-_SETTLE = 0.3  # seconds without a further change of the tolerance before its grid is made
+_SETTLE = 0.3  # seconds after a change of the tolerance: often it goes on changing
 # A tolerance may grow this far towards the band of a grid that was made for a smaller one.
 _REACH = 0.98
 
@@ -63,7 +63,7 @@ def field_of(ob, tolerance, changed):
     return field, None
 
 
-def known(ob):
+def at_hand(ob):
     """The Field that is at hand, or None."""
     return _fields.get(key_of(ob))
 

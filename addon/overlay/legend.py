@@ -2,9 +2,7 @@
 """The corner of the 3D view that says what the colours mean."""
 
 import blf
-import bpy
 import gpu
-import numpy as np
 
 from ..units import NO_BREAK, length
 from . import shaders
@@ -42,6 +40,7 @@ class _Page:
 
     def __init__(self, context, signed):
         self.scale = context.preferences.system.ui_scale
+        self.region = context.region.width, context.region.height
         theme = context.preferences.themes[0].user_interface.wcol_tooltip
         self.ink, self.paper = tuple(theme.text), tuple(theme.inner)
         self.signed = signed
@@ -51,8 +50,8 @@ class _Page:
         shader = shaders.legend()
         shader.bind()
         shader.uniform_sampler("transfer", shaders.transfer(self.signed))
-        shader.uniform_float("to_clip", gpu.matrix.get_projection_matrix() @ gpu.matrix.get_model_view_matrix())
-        shader.uniform_float("corners", (x, y, x + width, y + height))
+        corners = [2 * at / size - 1 for at, size in zip((x, y, x + width, y + height), self.region * 2)]
+        shader.uniform_float("corners", corners)
         shader.uniform_float("flat_colour", colour)
         shader.uniform_float("fill", (kind, shaders.lowest(self.signed), _STRIPE * self.scale))
         gpu.state.blend_set("ALPHA")
@@ -148,11 +147,3 @@ def _corner(context, width, height, margin):
             bottom = max(bottom, other.y + other.height - region.y)
     left, bottom = right - width - margin, bottom + margin
     return (left, bottom) if left >= margin and bottom + height + margin <= region.height else None
-
-
-def fold(shares, signed):
-    """Of shares in eighths of the range from -tolerance to the tolerance, with what is beyond at both ends: what draw() takes."""
-    shares = np.asarray(shares)
-    within = shares[1:-1]
-    pairs = within.reshape(4, 2).sum(1) if signed else within[4:] + within[3::-1]
-    return [*pairs, shares[0] + shares[-1]]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The two programs of the overlay, for Blender's gpu module: the surface and its legend.
+"""The programs of the overlay, for Blender's gpu module: the surface, its edges and the legend.
 
 From distance to colour they use the same functions as the module's own pictures, whose text lies in shaders/.
 """
@@ -30,7 +30,7 @@ _SURFACE_VERTEX = """
 void main() {
   place = (told.to_nodes * vec4(position, 1.0)).xyz;
   gl_Position = told.view_projection * vec4((told.model * vec4(position, 1.0)).xyz, 1.0);
-  gl_Position.z -= 1e-6 * gl_Position.w;
+  gl_Position.z -= NEARER * gl_Position.w;
 }
 """
 
@@ -49,6 +49,10 @@ void main() {
 }
 """
 
+_LINES_FRAGMENT = """
+void main() { shown = displayed(flat_colour.rgb, flat_colour.a); }
+"""
+
 # As std140 lays it out: whole vectors first, and sixteen bytes filled up.
 _SURFACE_TOLD = """
 struct Told {
@@ -61,7 +65,7 @@ struct Told {
 _LEGEND_VERTEX = """
 void main() {
   part = position;
-  gl_Position = to_clip * vec4(mix(corners.xy, corners.zw, position), 0.0, 1.0);
+  gl_Position = vec4(mix(corners.xy, corners.zw, position), 0.0, 1.0);
 }
 """
 
@@ -82,7 +86,7 @@ void main() {
 FLAT, BAR, STRIPES = 0.0, 1.0, 2.0
 
 
-def _info(varying, position, vertex, fragment, shared):
+def _info(varying, position, vertex, fragment, shared=()):
     """varying, position: (type, name) of what goes between the two parts, and into the first."""
     interface = gpu.types.GPUStageInterfaceInfo(f"tolvol_{varying[1]}")
     interface.smooth(*varying)
@@ -90,7 +94,6 @@ def _info(varying, position, vertex, fragment, shared):
     info.vertex_in(0, *position)
     info.vertex_out(interface)
     info.fragment_out(0, "VEC4", "shown")
-    info.sampler(0, "FLOAT_1D", "transfer")
     info.push_constant("BOOL", "srgbTarget")
     for name, colour in zip(("OUTSIDE", "STRIPE"), native.module.OUTSIDE_COLOURS):
         info.define(name, f"vec3({', '.join(f'{level / 255:.4f}' for level in colour)})")
@@ -105,9 +108,22 @@ def surface():
     """Colours a mesh by its distance; told() is what its buffer `told` holds."""
     shared = "signed_distance.glsl", "distance_colour.glsl"
     info = _info(("VEC3", "place"), ("VEC3", "position"), _SURFACE_VERTEX, _SURFACE_FRAGMENT, shared)
+    info.sampler(0, "FLOAT_1D", "transfer")
     info.sampler(1, "FLOAT_3D", "field")
     info.typedef_source(_SURFACE_TOLD)
     info.uniform_buf(0, "Told", "told")
+    info.define("NEARER", "1e-6")
+    return gpu.shader.create_from_info(info)
+
+
+@functools.cache
+def lines():
+    """Edges of the same mesh, over its surface; flat_colour: theirs."""
+    info = _info(("VEC3", "place"), ("VEC3", "position"), _SURFACE_VERTEX, _LINES_FRAGMENT)
+    info.push_constant("VEC4", "flat_colour")
+    info.typedef_source(_SURFACE_TOLD)
+    info.uniform_buf(0, "Told", "told")
+    info.define("NEARER", "1e-5")
     return gpu.shader.create_from_info(info)
 
 
@@ -120,9 +136,10 @@ def told(view_projection, model, to_nodes, eye, tolerance, signed, period, opaci
 
 @functools.cache
 def legend():
-    """Fills rectangles in pixels of the region."""
+    """Fills rectangles, whose corners are in clip space."""
     info = _info(("VEC2", "part"), ("VEC2", "position"), _LEGEND_VERTEX, _LEGEND_FRAGMENT, ("distance_colour.glsl",))
-    for constant in (("MAT4", "to_clip"), ("VEC4", "corners"), ("VEC4", "flat_colour"), ("VEC3", "fill")):
+    info.sampler(0, "FLOAT_1D", "transfer")
+    for constant in (("VEC4", "corners"), ("VEC4", "flat_colour"), ("VEC3", "fill")):
         info.push_constant(*constant)
     info.define("BAR", str(BAR))
     info.define("STRIPES", str(STRIPES))
@@ -140,10 +157,12 @@ def transfer(signed):
     colours = native.module.transfer_colours("signed" if signed else "magnitude")
     texels = np.ones((len(colours), 4), np.float32)
     texels[:, :3] = colours / np.float32(255)
-    return gpu.types.GPUTexture(len(texels), format="RGBA16F", data=gpu.types.Buffer("FLOAT", texels.size, texels.ravel()))
+    return gpu.types.GPUTexture(
+        len(texels), format="RGBA16F", data=gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
+    )
 
 
 def free():
     """Forgets all that is on the GPU."""
-    for function in (surface, legend, transfer):
+    for function in (surface, lines, legend, transfer):
         function.cache_clear()

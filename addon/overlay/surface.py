@@ -16,8 +16,9 @@ class Surface:
         self.changes = 0  # how often it was read
         self._polygons = 0
         self._mode = None
-        self._indices = None
-        self._batch = None
+        self._edges = None  # (k, 2) int32 and (k,) whether selected, in Edit Mode
+        self._selected = None
+        self._buffers = {}
         self._stale = True  # positions may have changed
         self._recut = True  # and the triangles as well
 
@@ -38,45 +39,58 @@ class Surface:
         if ob.mode == "SCULPT":
             self._read(ob.data, sculpted_vertices(ob), True)
         elif ob.mode == "EDIT":
-            self._read(evaluated.to_mesh(), None, True)
+            mesh = evaluated.to_mesh()
+            self._read(mesh, None, True)
+            self._read_edges(mesh)
             evaluated.to_mesh_clear()
         else:
             self._read(evaluated.data, None, False)
         self._stale = False
 
     def _read(self, mesh, vertices, hides):
-        vertices = mesh.vertices if vertices is None else vertices
-        co = mesh_io.column(vertices, "co", 3)
-        same = self.vertices is not None and len(co) == len(self.vertices) and len(mesh.polygons) == self._polygons
-        if same and not self._recut and np.array_equal(co, self.vertices):
+        co = mesh_io.column(vertices or mesh.vertices, "co", 3)
+        recut = self._recut or len(co) != len(self.vertices) or len(mesh.polygons) != self._polygons
+        if not recut and np.array_equal(co, self.vertices):
             return
-        if self._recut or not same:
+        if recut:
             mesh.calc_loop_triangles()
             self.triangles = mesh_io.column(mesh.loop_triangles, "vertices", 3, np.int32)
             if hides:
                 hidden = mesh_io.column(mesh.polygons, "hide", 1, bool)
-                if hidden.any():
-                    owners = mesh_io.column(mesh.loop_triangles, "polygon_index", 1, np.int32)
-                    self.triangles = self.triangles[~hidden[owners]]
+                self.triangles = self.triangles[
+                    ~hidden[mesh_io.column(mesh.loop_triangles, "polygon_index", 1, np.int32)]
+                ]
             self._polygons = len(mesh.polygons)
-            self._indices = None
             self._recut = False
+            self._buffers.clear()
         self.vertices = co
         self.changes += 1
-        self._batch = None
+        self._buffers.pop("vertices", None)
+
+    def _read_edges(self, mesh):
+        shown = ~mesh_io.column(mesh.edges, "hide", 1, bool)
+        self._edges = mesh_io.column(mesh.edges, "vertices", 2, np.int32)[shown]
+        self._selected = mesh_io.column(mesh.edges, "select", 1, bool)[shown]
+        for selected in (False, True):
+            self._buffers.pop(("LINES", selected), None)
 
     def draw(self, shader):
-        if len(self.triangles) == 0:
-            return
-        if self._indices is None:
-            self._indices = gpu.types.GPUIndexBuf(type="TRIS", seq=np.ascontiguousarray(self.triangles, np.uint32))
-        if self._batch is None:
+        self._batch("TRIS", lambda: self.triangles).draw(shader)
+
+    def draw_edges(self, shader, selected):
+        """Those that are selected, or the others. In Edit Mode."""
+        self._batch("LINES", lambda: self._edges[self._selected == selected], selected).draw(shader)
+
+    def _batch(self, kind, corners, *which):
+        if "vertices" not in self._buffers:
             layout = gpu.types.GPUVertFormat()
             layout.attr_add(id="position", comp_type="F32", len=3, fetch_mode="FLOAT")
-            buffer = gpu.types.GPUVertBuf(layout, len(self.vertices))
-            buffer.attr_fill("position", self.vertices)
-            self._batch = gpu.types.GPUBatch(type="TRIS", buf=buffer, elem=self._indices)
-        self._batch.draw(shader)
+            self._buffers["vertices"] = gpu.types.GPUVertBuf(layout, len(self.vertices))
+            self._buffers["vertices"].attr_fill("position", self.vertices)
+        key = kind, *which
+        if key not in self._buffers:
+            self._buffers[key] = gpu.types.GPUIndexBuf(type=kind, seq=np.ascontiguousarray(corners(), np.uint32))
+        return gpu.types.GPUBatch(type=kind, buf=self._buffers["vertices"], elem=self._buffers[key])
 
 
 def sculpted_vertices(ob):

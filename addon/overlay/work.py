@@ -2,6 +2,7 @@
 """What takes too long to be done while drawing: one task at a time in a thread, and Blender's own loop between them."""
 
 import threading
+import time
 
 import bpy
 
@@ -9,7 +10,7 @@ from .. import native
 
 _TICK = 0.05  # seconds
 
-_waiting = {}  # what it is about -> (when it may begin, prepare, finish); a later wish replaces an earlier one
+_waiting = {}  # what it is about -> (when it may begin, prepare, finish)
 _running = None
 
 
@@ -31,18 +32,15 @@ class _Task:
 def later(about, seconds, prepare, finish):
     """Lets a thread do prepare() -> work(progress), then calls finish(outcome, error); one of these is None.
 
-    prepare and finish run in Blender's main thread, not while it draws. The delay starts anew with every call about the
-    same; while it is being worked on no further call counts.
+    prepare and finish run in Blender's main thread, not while it draws. Of several calls about the same thing the first
+    sets the time and the last what is done; while it is being worked on no further call counts.
     """
     if _running is not None and _running.about == about:
         return
-    _waiting[about] = (seconds, prepare, finish)
+    begin = _waiting[about][0] if about in _waiting else time.monotonic() + seconds
+    _waiting[about] = begin, prepare, finish
     if not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=0)
-
-
-def pending(about):
-    return about in _waiting or (_running is not None and _running.about == about)
 
 
 def _tick():
@@ -50,9 +48,8 @@ def _tick():
     if _running is not None and not _running.thread.is_alive():
         task, _running = _running, None
         task.finish(task.outcome, task.error)
-    for about, (seconds, prepare, finish) in list(_waiting.items()):
-        _waiting[about] = (seconds - _TICK, prepare, finish)
-        if seconds <= 0 and _running is None:
+    for about, (begin, prepare, finish) in list(_waiting.items()):
+        if _running is None and begin <= time.monotonic():
             del _waiting[about]
             work = prepare()
             if work is not None:

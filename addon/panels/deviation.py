@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 
 from .. import overlay, report, volume
+from ..overlay import reasons
 from ..units import NO_BREAK, length
 from .layout import AMBER, GREEN, GREY, RED, SubPanel, right, text_lines
 
@@ -29,14 +30,12 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         column.prop(settings, "show_deviation")
         if not settings.show_deviation:
             return
-        row = column.row()
-        row.active = not overlay.unsigned_reason(ob)
-        row.prop(settings, "deviation_kind", expand=True)
-        column.prop(settings, "deviation_opacity", slider=True)
-        if (why := overlay.reason(ob)) and settings.snapshot:
-            text_lines(context, column, why, "INFO")
-        elif why := overlay.unsigned_reason(ob):
-            text_lines(context, column, why, "INFO")
+        column.row().prop(settings, "deviation_kind", expand=True)
+        column.prop(settings, "deviation_opacity")
+        if reason := reasons.hidden(ob) or reasons.unsigned(ob):
+            text_lines(context, column, reason, "INFO")
+        elif not overlay.shows(ob):  # appended, for example
+            bpy.app.timers.register(overlay.refresh, first_interval=0)
 
     def _draw_measured(self, context, ob):
         """The same rows whether there is a measurement or not: buttons below do not jump."""
