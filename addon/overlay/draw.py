@@ -69,14 +69,15 @@ def _draw(context, ob, surface, found):
         to_nodes,
         _eye(context.region_data, to_nodes @ np.linalg.inv(mesh_io.matrix_array(ob.matrix_world))),
         _tolerance(ob) / found.grid.spacing,
+        found.grid.band / found.grid.spacing,
         _signed(ob, found.grid),
         _STRIPE * context.preferences.system.ui_scale,
         ob.tolvol.deviation_opacity * (shading.xray_alpha if x_ray else 1),
     )
-    shader = shaders.surface()
+    shader = shaders.surface(found.nearest)
     shader.bind()
     shader.uniform_sampler("transfer", shaders.transfer(_signed(ob, found.grid)))
-    shader.uniform_sampler("field", found.texture)
+    found.bind(shader)
     shader.uniform_block("told", told)
     if x_ray:
         # Blender has no depths here: without them it would be chance which layers are seen.

@@ -11,6 +11,7 @@ from .. import mesh_io, native, preferences, volume
 from ..errors import Refused
 from . import work
 
+_ROW = 2048  # texels in a row of triangle corners
 _LONGEST = 2048  # texels along an axis that every GPU of Blender's takes
 _NODES = 16_000_000  # 32 MB on the GPU
 _SETTLE = 0.3  # seconds after a change of the tolerance: often it goes on changing
@@ -22,21 +23,35 @@ _failed = {}  # key, tolerance -> why there is none
 
 
 class Field:
+    """A reference on the GPU; of its textures those that are bound to a program of shaders.surface(nearest)."""
+
     def __init__(self, grid, tolerance, placement):
         self.grid = grid
         self.tolerance = tolerance
         self.to_nodes = grid.to_nodes
         self.placement = placement  # of the reference when the grid was made
-        self._texture = None
+        self.nearest = grid.precision < grid.INTERPOLATED
+        self._textures = None
 
-    @property
-    def texture(self):
-        """To be asked for while drawing."""
-        if self._texture is None:
-            texels = np.ascontiguousarray(self.grid.distances)
-            data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
-            self._texture = gpu.types.GPUTexture(texels.shape[::-1], format="R16F", data=data)
-        return self._texture
+    def bind(self, shader):
+        """While drawing."""
+        if self._textures is None:
+            self._textures = self._nearest() if self.nearest else {"field": _texture(self.grid.distances, "R16F")}
+        for name, texture in self._textures.items():
+            shader.uniform_sampler(name, texture)
+
+    def _nearest(self):
+        ids = self.grid.nearest.astype(np.int32).astype(np.float32)  # the largest, which is none, becomes -1
+        corners = self.grid.corners.reshape(-1, 3)
+        texels = np.zeros((-(-len(corners) // _ROW), _ROW, 4), np.float32)
+        texels.reshape(-1, 4)[: len(corners), :3] = corners
+        return {"field": _texture(ids, "R32F"), "corners": _texture(texels, "RGBA32F", 2)}
+
+
+def _texture(texels, kind, axes=3):
+    texels = np.ascontiguousarray(texels)
+    data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
+    return gpu.types.GPUTexture(texels.shape[axes - 1 :: -1], format=kind, data=data)
 
 
 def key_of(ob):

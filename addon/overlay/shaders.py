@@ -36,7 +36,7 @@ void main() {
 
 _SURFACE_FRAGMENT = """
 void main() {
-  float d = signed_distance(field, place) / told.tolerance;
+  float d = DISTANCE / told.tolerance;
   vec3 colour;
   if (abs(d) > 1.0) {
     colour = outside_colour(gl_FragCoord.xy, told.period, OUTSIDE, STRIPE);
@@ -59,6 +59,7 @@ struct Told {
   mat4 view_projection, model, to_nodes;
   vec4 eye;
   float tolerance, lowest, period, opacity;
+  vec4 band;
 };
 """
 
@@ -104,16 +105,35 @@ def _info(varying, position, vertex, fragment, shared=()):
 
 
 @functools.cache
-def surface():
-    """Colours a mesh by its distance; told() is what its buffer `told` holds."""
-    shared = "signed_distance.glsl", "distance_colour.glsl"
+def surface(nearest):
+    """Colours a mesh by its distance; told() is what its buffer `told` holds.
+
+    nearest: `field` has the triangle of each node, and `corners` its corners; else distances to be interpolated.
+    """
+    shared = "nearest_distance.glsl" if nearest else "signed_distance.glsl", "distance_colour.glsl"
     info = _info(("VEC3", "place"), ("VEC3", "position"), _SURFACE_VERTEX, _SURFACE_FRAGMENT, shared)
     info.sampler(0, "FLOAT_1D", "transfer")
     info.sampler(1, "FLOAT_3D", "field")
+    if nearest:
+        info.sampler(2, "FLOAT_2D", "corners")
+        info.define("DISTANCE", "nearest_distance(field, corners, place, told.band.x)")
+    else:
+        info.define("DISTANCE", "signed_distance(field, place)")
     info.typedef_source(_SURFACE_TOLD)
     info.uniform_buf(0, "Told", "told")
     info.define("NEARER", "1e-6")
     return gpu.shader.create_from_info(info)
+
+
+def told(view_projection, model, to_nodes, eye, tolerance, band, signed, period, opacity):
+    """The buffer for surface().
+
+    to_nodes: from vertices; eye: (x, y, z, 1) or a direction with 0, in nodes, as are `tolerance` and `band`.
+    """
+    matrices = [np.array(matrix, np.float32).T.ravel() for matrix in (view_projection, model, to_nodes)]
+    numbers = tolerance, lowest(signed), period, opacity, band, 0, 0, 0
+    values = np.concatenate([*matrices, eye, numbers]).astype(np.float32)
+    return gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", values.size, values))
 
 
 @functools.cache
@@ -125,13 +145,6 @@ def lines():
     info.uniform_buf(0, "Told", "told")
     info.define("NEARER", "1e-5")
     return gpu.shader.create_from_info(info)
-
-
-def told(view_projection, model, to_nodes, eye, tolerance, signed, period, opacity):
-    """The buffer for surface(). to_nodes: from vertices; eye: (x, y, z, 1) or a direction with 0, in nodes, as is `tolerance`."""
-    matrices = [np.array(matrix, np.float32).T.ravel() for matrix in (view_projection, model, to_nodes)]
-    values = np.concatenate([*matrices, eye, (tolerance, lowest(signed), period, opacity)]).astype(np.float32)
-    return gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", values.size, values))
 
 
 @functools.cache

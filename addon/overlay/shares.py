@@ -24,7 +24,12 @@ def known(ob, surface, found, tolerance, changed):
     last = _known.get(name)
     if (last is None or last[0] != about) and surface.triangles is not None and len(surface.triangles):
         count = functools.partial(
-            found.grid.shares, surface.vertices, surface.triangles, tolerance * _EIGHTHS, placement
+            found.grid.shares,
+            surface.vertices,
+            surface.triangles,
+            tolerance * _EIGHTHS,
+            placement,
+            nearest=found.nearest,
         )
         work.later(
             ("shares", name),

@@ -30,7 +30,9 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         column.prop(settings, "show_deviation")
         if not settings.show_deviation:
             return
-        column.row().prop(settings, "deviation_kind", expand=True)
+        row = column.row()
+        row.enabled = not reasons.unsigned(ob)
+        row.prop(settings, "deviation_kind", expand=True)
         column.prop(settings, "deviation_opacity")
         if reason := reasons.hidden(ob) or reasons.unsigned(ob):
             text_lines(context, column, reason, "INFO")

@@ -6,12 +6,16 @@
 
 #include "field/scatter.h"
 #include "field/signs.h"
+#include "reference/closest_point.h"
 #include "reference/parallel.h"
 #include "reference/pseudonormals.h"
 
 namespace tolvol {
 namespace {
 
+constexpr double kCoarser = 0.8;  // a step towards a grid that fits
+constexpr double kTie = 1e-3;     // in spacings
+constexpr double kTiny = 1e-30;
 constexpr double kSamples = 1 << 16;
 // Samples of a triangle, or the first ones of neighbouring triangles, are spread evenly by these steps [M. Roberts, The
 // Unreasonable Effectiveness of Quasirandom Sequences, 2018].
@@ -33,26 +37,49 @@ DisplayGrid::DisplayGrid(const TriangleMesh& reference, bool mirrored, double to
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (used[i]) box.add(reference.vertices[i]);
   }
-  double precision = precision_that_fits(box, tolerance, options.precision);
+  double precision = options.precision;
   const auto fits = [&] {
+    if (precision_that_fits(box, tolerance, precision) < precision) return false;
     const glm::ivec3 n = layout_grid(box, tolerance, precision).nodes;
     return std::max({n.x, n.y, n.z}) <= options.longest &&
            static_cast<double>(n.x) * n.y * n.z <= static_cast<double>(options.nodes);
   };
-  while (!fits()) precision /= 2;
+  while (!fits()) precision *= kCoarser;
   grid = layout_grid(box, tolerance, precision);
   scatter(reference, grid, options.threads, options.progress);
   const Pseudonormals normals(reference);
   closed = normals.closed();
   grid.distance = signed_distance(reference, normals, grid, options.threads);
-  grid.triangle = {};
   grid.is_signed = true;
   const bool turned = closed ? enclosed_volume(reference) < 0 : mirrored;
   const float to_spacings = static_cast<float>((turned ? -1 : 1) / grid.spacing);
   for (float& d : grid.distance) d *= to_spacings;
+  corners.reserve(3 * reference.triangles.size());
+  for (const glm::uvec3& t : reference.triangles) {
+    for (const std::uint32_t v : {t.x, turned ? t.z : t.y, turned ? t.y : t.z}) {
+      corners.emplace_back((reference.vertices[v] - grid.origin) / grid.spacing);
+    }
+  }
 }
 
-float DisplayGrid::at(const glm::dvec3& node) const {
+float DisplayGrid::nearest(const glm::dvec3& node) const {
+  const glm::dvec3 last(grid.nodes - 1), place = glm::clamp(node, glm::dvec3(0), last);
+  const glm::ivec3 first(glm::min(glm::floor(place), last - 1.0));
+  double nearest = grid.band / grid.spacing, steepest = 0, side = 1;
+  for (int k = 0; k < 8; ++k) {
+    const std::uint32_t id = grid.triangle[grid.index(first.x + (k & 1), first.y + (k >> 1 & 1), first.z + (k >> 2))];
+    if (id == DistanceGrid::kNone) continue;
+    const glm::dvec3 a(corners[3 * id]), b(corners[3 * id + 1]), c(corners[3 * id + 2]);
+    const glm::dvec3 off = place - closest_point(place, a, b, c).point, normal = glm::cross(b - a, c - a);
+    const double distance = glm::length(off), across = glm::dot(off, normal) / std::max(glm::length(normal), kTiny);
+    // Of two faces at an edge that it is equally far from, the one that it is more above tells the side.
+    if (!(distance < nearest + kTie) || (distance > nearest - kTie && std::abs(across) < steepest)) continue;
+    nearest = std::min(distance, nearest), steepest = std::abs(across), side = across < 0 ? -1 : 1;
+  }
+  return static_cast<float>(side * nearest);
+}
+
+float DisplayGrid::interpolated(const glm::dvec3& node) const {
   const glm::dvec3 last(grid.nodes - 1), place = glm::clamp(node, glm::dvec3(0), last);
   const glm::dvec3 first = glm::min(glm::floor(place), last - 1.0);
   const glm::vec3 t(place - first);
@@ -78,7 +105,7 @@ float DisplayGrid::at(const glm::dvec3& node) const {
   return sign_of_nearest * glm::mix(near, far, t.z);
 }
 
-std::vector<double> area_shares(const DisplayGrid& display, std::span<const glm::dvec3> nodes,
+std::vector<double> area_shares(const DisplayGrid& display, bool nearest, std::span<const glm::dvec3> nodes,
                                 std::span<const glm::uvec3> triangles, std::span<const double> edges,
                                 unsigned threads) {
   std::vector<double> area(triangles.size());
@@ -103,7 +130,8 @@ std::vector<double> area_shares(const DisplayGrid& display, std::span<const glm:
         double u = glm::fract(kStepU * (k + static_cast<double>(i))),
                v = glm::fract(kStepV * (k + static_cast<double>(i)));
         if (u + v > 1) u = 1 - u, v = 1 - v;
-        const double d = display.at(a + u * ab + v * ac);
+        const glm::dvec3 p = a + u * ab + v * ac;
+        const double d = nearest ? display.nearest(p) : display.interpolated(p);
         sum[std::upper_bound(edges.begin(), edges.end(), d) - edges.begin()] += area[i] / (count * whole);
       }
     }

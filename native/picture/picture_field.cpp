@@ -18,6 +18,7 @@ PictureField::PictureField(const TriangleMesh& reference, bool mirrored, double 
   }
   gl::run([&] { texture_.emplace(grid_, grid_.distance, tolerance, TextureFormat::float32); });
   grid_.distance = {};
+  grid_.triangle = {};
 }
 
 }  // namespace tolvol

@@ -33,11 +33,20 @@ std::unique_ptr<Display> make_display(const Volume& volume, double precision, in
       new Display{{v.reference(), v.mirrored(), v.frame_tolerance(), options}, v.frame(), v.frame_tolerance()});
 }
 
-py::array_t<float> distances(const py::object& self) {
+template <class T>
+py::array_t<T> nodes_of(const py::object& self, std::vector<T> DistanceGrid::*values) {
   const DistanceGrid& g = py::cast<const Display&>(self).native.grid;
-  const py::ssize_t row = static_cast<py::ssize_t>(sizeof(float)) * g.pitch;
-  py::array_t<float> view({py::ssize_t{g.nodes.z}, py::ssize_t{g.nodes.y}, py::ssize_t{g.nodes.x}},
-                          {row * g.nodes.y, row, static_cast<py::ssize_t>(sizeof(float))}, g.distance.data(), self);
+  const auto size = static_cast<py::ssize_t>(sizeof(T)), row = size * g.pitch;
+  py::array_t<T> view({py::ssize_t{g.nodes.z}, py::ssize_t{g.nodes.y}, py::ssize_t{g.nodes.x}},
+                      {row * g.nodes.y, row, size}, (g.*values).data(), self);
+  view.attr("setflags")(py::arg("write") = false);
+  return view;
+}
+
+py::array_t<float> corners(const py::object& self) {
+  const std::vector<glm::vec3>& c = py::cast<const Display&>(self).native.corners;
+  py::array_t<float> view({static_cast<py::ssize_t>(c.size() / 3), py::ssize_t{3}, py::ssize_t{3}},
+                          c.empty() ? nullptr : &c[0].x, self);
   view.attr("setflags")(py::arg("write") = false);
   return view;
 }
@@ -54,7 +63,7 @@ py::array_t<double> to_nodes(const Display& display) {
 }
 
 std::vector<double> shares(const Display& display, const py::object& vertices, const py::object& triangles,
-                           std::vector<double> edges, const py::object& to_world, int threads) {
+                           std::vector<double> edges, const py::object& to_world, bool nearest, int threads) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const Placement placement = Placement(to_matrix(to_world), v.storage).in(display.frame);
@@ -69,7 +78,7 @@ std::vector<double> shares(const Display& display, const py::object& vertices, c
   }
   std::vector<glm::dvec3> nodes = placement.frame(v.values);
   for (glm::dvec3& p : nodes) p = display.node(p);
-  return area_shares(display.native, nodes, t, edges, count);
+  return area_shares(display.native, nearest, nodes, t, edges, count);
 }
 
 }  // namespace
@@ -84,12 +93,23 @@ void bind_display(py::module_& module) {
            "precision: nodes per tolerance, halved until no axis has more than `longest` nodes and all together no "
            "more than `nodes`.\n"
            "Raises InvalidInput, Cancelled. Cost: about 0.5 s for 270,000 triangles at 1 % of their size.")
-      .def_property_readonly("distances", &distances,
-                             "(nz, ny, nx) float32, a read-only view: in units of the spacing, negative inside, capped "
-                             "at the band. Across\n"
-                             "the continuation of an open reference's border they jump; shaders/signed_distance.glsl "
-                             "interpolates them with\n"
-                             "that in mind.")
+      .def_property_readonly(
+          "distances", [](const py::object& self) { return nodes_of(self, &DistanceGrid::distance); },
+          "(nz, ny, nx) float32, a read-only view: in units of the spacing, negative inside, capped at the band. "
+          "Across the "
+          "continuation of an open reference's border they jump; shaders/signed_distance.glsl interpolates them with "
+          "that in mind.")
+      .def_property_readonly(
+          "nearest", [](const py::object& self) { return nodes_of(self, &DistanceGrid::triangle); },
+          "(nz, ny, nx) uint32, a read-only view: the triangle that each node is nearest to, 4294967295 beyond the "
+          "band.")
+      .def_property_readonly("corners", &corners,
+                             "(m, 3, 3) float32, a read-only view: the corners of the reference's triangles, in nodes, "
+                             "turned so that their fronts are outside.")
+      .def_property_readonly_static(
+          "INTERPOLATED", [](const py::object&) { return DisplayGrid::kInterpolated; },
+          "The precision from which on distances may be interpolated. A coarser grid makes up too much at edges: there "
+          "take the nearest of the triangles of the eight nodes around, as shaders/nearest_distance.glsl does.")
       .def_property_readonly("to_nodes", &to_nodes, "(4, 4) float64: from the world to nodes, x first.")
       .def_property_readonly(
           "spacing", [](const Display& d) { return d.native.grid.spacing / d.frame.scale(); },
@@ -104,11 +124,12 @@ void bind_display(py::module_& module) {
           "Whether the reference has an inside: every edge has two faces that agree on it. Elsewhere signs are a "
           "guess.")
       .def("shares", &shares, py::arg("vertices"), py::arg("triangles"), py::arg("edges"),
-           py::arg("to_world") = py::none(), py::arg("threads") = 0,
+           py::arg("to_world") = py::none(), py::arg("nearest") = false, py::arg("threads") = 0,
            "The shares of a mesh's area, 0 to 1, whose signed distance lies between ascending `edges` (world units): "
            "len(edges) + 1\n"
-           "numbers, from beyond the first to beyond the last. As shown, by one sample a triangle and 65,536 more. "
-           "About 10 ms.");
+           "numbers, from beyond the first to beyond the last. By one sample a triangle and 65,536 more, "
+           "interpolated or,\n"
+           "with nearest=True, from triangles. About 10 ms.");
 }
 
 }  // namespace tolvol::python
