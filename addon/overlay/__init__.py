@@ -95,7 +95,7 @@ def _note_changes(_scene, depsgraph):
         ob = bpy.data.objects.get(name)
         if ob is None or not (ob in changed or ob.data in changed):
             continue
-        geometry = changed.get(ob) or changed.get(ob.data)
+        geometry = changed.get(ob, False) or changed.get(ob.data, False)
         # To Blender a stroke of sculpting is no change of the geometry, nor is one of what is selected.
         if geometry or ob.mode != "OBJECT":
             surface.touch(geometry and ob.mode != "SCULPT")

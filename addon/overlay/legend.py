@@ -75,7 +75,7 @@ def draw(context, heading, signed, tolerance, shares):
     scale = page.scale
     lowest = -tolerance if signed else 0.0
     labels = [(part, _label(context, lowest + part * (tolerance - lowest), signed)) for part in (0, 0.5, 1)]
-    bands = [_share(share) for share in shares] if shares is not None else [""] * 5
+    bands = [percent(share) for share in shares] if shares is not None else [""] * 5
     bar_width, bar_height = (size * scale for size in _BAR)
     row, gap = _ROW * scale, _GAP * scale
     label_width = max([width_of(text) for _, text in labels] + [width_of("Outside")])
@@ -125,7 +125,7 @@ def _label(context, value, signed):
     return sign + length(context, abs(value))
 
 
-def _share(share):
+def percent(share):
     """A little must not read as nothing, nor nearly all as all."""
     percent = 100 * share
     if 0 < percent < 0.1:

@@ -75,11 +75,14 @@ class Surface:
             self._buffers.pop(("LINES", selected), None)
 
     def draw(self, shader):
-        self._batch("TRIS", lambda: self.triangles).draw(shader)
+        if len(self.triangles):
+            self._batch("TRIS", lambda: self.triangles).draw(shader)
 
     def draw_edges(self, shader, selected):
         """Those that are selected, or the others. In Edit Mode."""
-        self._batch("LINES", lambda: self._edges[self._selected == selected], selected).draw(shader)
+        chosen = self._selected == selected
+        if chosen.any():
+            self._batch("LINES", lambda: self._edges[chosen], selected).draw(shader)
 
     def _batch(self, kind, corners, *which):
         if "vertices" not in self._buffers:
