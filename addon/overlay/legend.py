@@ -81,7 +81,7 @@ def draw(context, heading, signed, tolerance, shares):
     label_width = max([width_of(text) for _, text in labels] + [width_of("Outside")])
     share_width = max(width_of(text) for text in [*bands, "88.8 %"])
     width = max(bar_width + label_width + share_width + 2 * gap, width_of(heading), width_of(_NOTE)) + 2 * gap
-    height = 3 * row + bar_height + 3.5 * gap
+    height = 3 * row + bar_height + 4 * gap
     place = _corner(context, width, height, _MARGIN * scale)
     if place is None:
         return

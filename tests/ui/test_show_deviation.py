@@ -25,14 +25,26 @@ from window import (
 
 def ball():
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=6)
-    bpy.context.object.name = "ball"
     bpy.context.object.tolvol.deviation_kind = "MAGNITUDE"
     bpy.context.object.tolvol.deviation_opacity = 1
     view()[1].spaces[0].region_3d.view_distance = 5
 
 
-def the_ball():
-    return bpy.data.objects["ball"]
+def solid_monkey():
+    """Closed, which Blender's own is not."""
+    bpy.ops.mesh.primitive_monkey_add()
+    ob = bpy.context.object
+    ob.modifiers.new("subdivision", "SUBSURF").levels = 2
+    remesh = ob.modifiers.new("remesh", "REMESH")
+    remesh.voxel_size, remesh.use_smooth_shade = 0.025, True
+    ob.modifiers.new("smooth", "SMOOTH").iterations = 3
+    with bpy.context.temp_override(window=view()[0], area=view()[1], object=ob, active_object=ob):
+        bpy.ops.object.convert(target="MESH")
+    view()[1].spaces[0].region_3d.view_distance = 4.5
+
+
+def the_object():
+    return bpy.data.objects[0]
 
 
 def striped():
@@ -58,7 +70,7 @@ def _surface():
 
 
 def to_mode(mode):
-    with bpy.context.temp_override(window=view()[0], area=view()[1], object=the_ball()):
+    with bpy.context.temp_override(window=view()[0], area=view()[1], object=the_object()):
         bpy.ops.object.mode_set(mode=mode)
     bpy.ops.ed.undo_push(message=mode)  # as a key would
 
@@ -66,7 +78,7 @@ def to_mode(mode):
 def test_deviation_is_shown_while_the_mesh_changes():
     yield from reset(ball)
     yield from open_tab()
-    assert gone() and not overlay.shows(the_ball())
+    assert gone() and not overlay.shows(the_object())
     yield from press("tolvol.set_reference")
     xdotool("mousemove", *centre())
     yield from finished(lambda: near() > 30_000)
@@ -76,16 +88,12 @@ def test_deviation_is_shown_while_the_mesh_changes():
     to_mode("SCULPT")
     yield 0.5
     x, y = centre()
-    xdotool("mousemove", x, y, "sleep", "0.2", "mousedown", 1)
-    for step in range(1, 9):
-        xdotool("mousemove", x + 9 * step, y)
-        yield 0.1
-    yield 0.4
-    during = striped()
-    xdotool("mouseup", 1)
+    drawing, during = stroke((x, y), (x + 72, y)), 0
+    for pause in drawing:
+        yield pause
+        during = max(during, striped() if pause > 0.3 else 0)
     screenshot("overlay 2 sculpted")
     assert during > 100
-    yield 0.5
     key("ctrl+z")
     yield from finished(lambda: striped() == 0)
     assert near() > 30_000
@@ -101,13 +109,55 @@ def test_deviation_is_shown_while_the_mesh_changes():
     yield from finished(lambda: striped() == 0)
     to_mode("OBJECT")
 
-    the_ball().tolvol.tolerance_percent = 5
-    the_ball().data.vertices.foreach_set("co", (1.02 * np.array([v.co for v in the_ball().data.vertices])).ravel())
-    the_ball().data.update()
+    the_object().tolvol.tolerance_percent = 5
+    the_object().data.vertices.foreach_set("co", (1.02 * np.array([v.co for v in the_object().data.vertices])).ravel())
+    the_object().data.update()
     yield 1.0
-    assert gone() and striped() == 0, "neither near nor outside"
-    the_ball().tolvol.tolerance_percent = 0.2
+    yield from finished(lambda: striped() == 0 and not gone())
+    the_object().tolvol.tolerance_percent = 0.2
     yield from finished(lambda: striped() > 10_000)
+
+
+def test_sides_of_a_closed_reference():
+    yield from reset(solid_monkey)
+    yield from open_tab()
+    yield from press("tolvol.set_reference")
+    xdotool("mousemove", *centre())
+    assert (yield from find_property("deviation_kind")) is not None
+    the_object().tolvol.deviation_opacity = 0.8
+    to_mode("SCULPT")
+    view()[1].spaces[0].show_gizmo = False
+    yield 1.0
+    red, blue = sides()
+    assert red < 300 and blue < 300
+    x, y = on_screen(region("WINDOW"), *(size // 2 for size in (region("WINDOW").width, region("WINDOW").height)))
+    yield from stroke((x - 130, y - 90), (x - 20, y - 140))
+    assert sides()[0] > red + 300 and sides()[1] < 300
+    xdotool("keydown", "ctrl")
+    yield from stroke((x - 80, y + 40), (x + 10, y - 20))
+    xdotool("keyup", "ctrl")
+    yield 1.5
+    screenshot("overlay 6 both sides")
+    assert sides()[1] > blue + 300
+
+
+def stroke(start, end, steps=8):
+    """Draws with the brush."""
+    xdotool("mousemove", *start, "sleep", "0.2", "mousedown", 1)
+    for step in range(1, steps + 1):
+        xdotool("mousemove", *((a + (b - a) * step // steps) for a, b in zip(start, end)))
+        yield 0.1
+    yield 0.4
+    xdotool("mouseup", 1, "mousemove", *on_screen(region("WINDOW"), 75, region("WINDOW").height - 20))
+    yield 0.7
+
+
+def sides():
+    """Pixels of the view that are red, for outside, and blue."""
+    red, green, blue = np.moveaxis(_surface(), -1, 0)
+    return int(((red > 110) & (red - blue > 60) & (red - green > 50)).sum()), int(
+        ((blue - red > 60) & (blue > 110)).sum()
+    )
 
 
 def test_views_places_and_switches():
@@ -118,15 +168,15 @@ def test_views_places_and_switches():
     yield from finished(lambda: near() > 30_000)
     space = view()[1].spaces[0]
     space.region_3d.view_perspective = "ORTHO"
-    the_ball().scale.x = -1
-    the_ball().location.x += 0.3
+    the_object().scale.x = -1
+    the_object().location.x += 0.3
     yield 0.7
     assert near() > 30_000, "moved and mirrored"
-    the_ball().scale.x *= 2
+    the_object().scale.x *= 2
     yield 0.7
     screenshot("overlay 4 rescaled")
     assert gone()
-    the_ball().scale.x /= 2
+    the_object().scale.x /= 2
     yield 0.7
     assert near() > 30_000
     space.overlay.show_overlays = False
@@ -143,11 +193,11 @@ def test_views_places_and_switches():
     screenshot("overlay 5 off")
     xdotool("mousemove", *centre())
     yield 0.7
-    assert not the_ball().tolvol.show_deviation and gone()
-    assert not overlay.shows(the_ball()) and not overlay._drawing
+    assert not the_object().tolvol.show_deviation and gone()
+    assert not overlay.shows(the_object()) and not overlay._drawing
     assert not any(handler.__module__.startswith("addon.overlay") for handler in bpy.app.handlers.depsgraph_update_post)
-    the_ball().tolvol.show_deviation = True
+    the_object().tolvol.show_deviation = True
     yield from finished(lambda: near() > 30_000)
-    bpy.data.objects.remove(the_ball())
+    bpy.data.objects.remove(the_object())
     yield 0.7
     assert gone() and not overlay._drawing
