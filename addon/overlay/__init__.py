@@ -76,6 +76,8 @@ def _guarded(function):
 
     @functools.wraps(function)
     def call():
+        if not all(name in bpy.data.objects for name in _surfaces):  # renamed
+            bpy.app.timers.register(refresh, first_interval=0)
         try:
             function(bpy.context, _surfaces)
         except (RuntimeError, SystemError) as error:

@@ -23,11 +23,14 @@ def _in_view(context, names):
     space = context.space_data
     if not space.overlay.show_overlays or space.shading.type == "WIREFRAME":
         return []
+    depsgraph = context.evaluated_depsgraph_get()
     found = (context.view_layer.objects.get(name) for name in names)
     return [
         ob
         for ob in found
-        if ob is not None and ob.visible_in_viewport_get(space) and ob.display_type in {"SOLID", "TEXTURED"}
+        if ob is not None
+        and ob.display_type in {"SOLID", "TEXTURED"}
+        and ob.evaluated_get(depsgraph).visible_in_viewport_get(space)
     ]
 
 
@@ -105,8 +108,9 @@ def _eye(view, world_to_nodes):
 
 def legend_of_one(context, shown):
     """The active object's legend, or that of another one in view."""
+    quarters = context.space_data.region_quadviews
     objects = _in_view(context, shown)
-    if not objects:
+    if not objects or (quarters and context.region_data != quarters[-1]):
         return
     ob = context.active_object if context.active_object in objects else objects[0]
     found, reason = None, reasons.hidden(ob)

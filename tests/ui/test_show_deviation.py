@@ -177,8 +177,19 @@ def test_views_places_and_switches():
     screenshot("overlay 4 rescaled")
     assert gone()
     the_object().scale.x /= 2
+    the_object().name = "another"
+    yield 1.0
+    assert near() > 30_000
+    with bpy.context.temp_override(window=view()[0], area=view()[1], region=region("WINDOW")):
+        bpy.ops.view3d.localview(frame_selected=False)
     yield 0.7
     assert near() > 30_000
+    the_object().hide_set(True)
+    yield 0.7
+    assert gone()
+    the_object().hide_set(False)
+    with bpy.context.temp_override(window=view()[0], area=view()[1], region=region("WINDOW")):
+        bpy.ops.view3d.localview(frame_selected=False)
     space.overlay.show_overlays = False
     yield 0.5
     assert gone()
