@@ -21,23 +21,8 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         row.operator("tolvol.check")
         row.operator("tolvol.select_outside")
         layout.operator("tolvol.save_report", text="Save Report...")
-        self._draw_shown(context, ob)
-
-    def _draw_shown(self, context, ob):
-        """The overlay in the 3D view."""
-        settings = ob.tolvol
-        column = self.layout.column()
-        column.prop(settings, "show_deviation")
-        if not settings.show_deviation:
-            return
-        row = column.row()
-        row.enabled = not reasons.unsigned(ob)
-        row.prop(settings, "deviation_kind", expand=True)
-        column.prop(settings, "deviation_opacity")
-        if reason := reasons.hidden(ob) or reasons.unsigned(ob):
-            text_lines(context, column, reason, "INFO")
-        elif not overlay.shows(ob):  # appended, for example
-            bpy.app.timers.register(overlay.refresh, first_interval=0)
+        if ob.tolvol.show_deviation and (reason := reasons.off()):
+            text_lines(context, layout, f"Not shown: {reason}", "INFO")
 
     def _draw_measured(self, context, ob):
         """The same rows whether there is a measurement or not: buttons below do not jump."""
@@ -73,3 +58,29 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
                 else ""
             )
             text_lines(context, column, f"Beyond the tolerance{share}", RED)
+
+
+class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
+    """The overlay in the 3D view."""
+
+    bl_label = "Show Deviation"
+    bl_parent_id = "TOLVOL_PT_deviation"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        ob = context.active_object
+        self.layout.prop(ob.tolvol, "show_deviation", text="")
+        if ob.tolvol.show_deviation and not overlay.shows(ob) and not reasons.hidden(ob):  # appended, for example
+            bpy.app.timers.register(overlay.refresh, first_interval=0)
+
+    def draw(self, context):
+        ob = context.active_object
+        column = self.layout.column()
+        column.active = ob.tolvol.show_deviation
+        unsigned = reasons.unsigned(ob)
+        row = column.row()
+        row.enabled = not unsigned
+        row.prop(ob.tolvol, "deviation_kind", expand=True)
+        column.prop(ob.tolvol, "deviation_opacity")
+        if reason := reasons.hidden(ob) or unsigned:
+            text_lines(context, column, reason, "INFO")

@@ -79,7 +79,7 @@ def find(operator, across=0.33):
     return (yield from _find(f"bpy.ops.{operator}", "ctrl+c", across))
 
 
-def find_property(name, across=0.6):
+def find_property(name, across):
     """The same for a property of Object.tolvol."""
     return (yield from _find(f".tolvol.{name}", "ctrl+shift+alt+c", across))
 
