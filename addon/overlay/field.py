@@ -105,7 +105,7 @@ def _finish(key, tolerance, changed, field, error):
     if error is None:
         _fields[key] = field
     elif not isinstance(error, native.module.Cancelled):
-        _failed[key, tolerance] = str(error)
+        _failed[key, tolerance] = str(error) or "not enough memory"
     changed()
 
 

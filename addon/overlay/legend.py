@@ -15,6 +15,7 @@ _ROW = 17
 _GAP = 10  # between things, and around them
 _MARGIN = 14  # to the edges of the view
 _STRIPE = 12
+_NOTE = "Shown, not proved"
 
 _unit_square = None
 
@@ -103,9 +104,6 @@ def draw(context, heading, signed, tolerance, shares):
     for i, text in enumerate(bands[:4]):
         page.text(right - width_of(text), y + (i + 0.5) / 4 * bar_height, text, faint=True)
     page.text(x, bottom + height - gap - row / 2, heading)
-
-
-_NOTE = "Shown, not proved"
 
 
 def draw_note(context, text):

@@ -25,7 +25,7 @@ class _Task:
     def _run(self, work):
         try:
             self.outcome = work(self.progress)
-        except native.module.TolvolError as error:
+        except (native.module.TolvolError, MemoryError) as error:
             self.error = error
 
 

@@ -122,7 +122,8 @@ def test_sides_of_a_closed_reference():
     yield from reset(solid_monkey)
     yield from open_tab()
     yield from press("tolvol.set_reference")
-    xdotool("mousemove", *centre())
+    xdotool("mousemove", *beside())
+    yield from finished(lambda: overlay.field.at_hand(the_object()) is not None)
     the_object().tolvol.deviation_opacity = 0.8
     to_mode("SCULPT")
     view()[1].spaces[0].show_gizmo = False
@@ -147,8 +148,13 @@ def stroke(start, end, steps=8):
         xdotool("mousemove", *((a + (b - a) * step // steps) for a, b in zip(start, end)))
         yield 0.1
     yield 0.4
-    xdotool("mouseup", 1, "mousemove", *on_screen(region("WINDOW"), 75, region("WINDOW").height - 20))
+    xdotool("mouseup", 1, "mousemove", *beside())
     yield 0.7
+
+
+def beside():
+    """Where the brush's circle is not counted."""
+    return on_screen(region("WINDOW"), 75, region("WINDOW").height - 20)
 
 
 def sides():
