@@ -12,6 +12,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from . import volume
 from .operation_settings import decimate_settings, modifier_settings, smooth_settings
 
 
@@ -112,8 +113,41 @@ class TOLVOL_PG_modifiers(bpy.types.PropertyGroup):
     __annotations__ = modifier_settings()
 
 
+def _changed(_settings, _context):
+    volume.notify()
+
+
+DEVIATION_KINDS = (
+    ("SIGNED", "Signed", "With its side: blue inside the reference, red outside"),
+    ("MAGNITUDE", "Magnitude", "How far, on whichever side"),
+)
+
+
 class TOLVOL_PG_settings(bpy.types.PropertyGroup):
-    __annotations__ = tolerance_settings() | decimate_settings()
+    __annotations__ = tolerance_settings(update=_changed) | decimate_settings()
+
+    show_deviation: BoolProperty(
+        name="Show Deviation",
+        description="Colour the mesh in the 3D view by its distance to the reference, live; what is beyond the "
+        "tolerance is striped. The colours are interpolated and prove nothing, Check does",
+        default=True,
+        update=_changed,
+    )
+    deviation_kind: EnumProperty(
+        name="Deviation",
+        description="What the colours show",
+        items=DEVIATION_KINDS,
+        update=_changed,
+    )
+    deviation_opacity: FloatProperty(
+        name="Opacity",
+        description="How much the colours cover what is below them",
+        default=0.8,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        update=_changed,
+    )
 
     reference_kind: EnumProperty(
         name="Reference",
@@ -126,12 +160,14 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
                 "Another object's mesh as it is when the reference is set. It stays where it is in the world",
             ),
         ),
+        update=_changed,
     )
     reference_object: PointerProperty(
         name="Object",
         description="The object whose mesh is the reference",
         type=bpy.types.Object,
         poll=lambda settings, ob: ob.type == "MESH" and ob != settings.id_data,
+        update=_changed,
     )
     placement: EnumProperty(
         name="Placement",
@@ -158,6 +194,7 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     snapshot_object: PointerProperty(type=bpy.types.Object)
     snapshot_matrix: FloatVectorProperty(size=16)
     snapshot_size: FloatProperty()
+    snapshot_fingerprint: StringProperty()
     snapshot_seconds: FloatProperty(description="How long it took to build the tolerance volume")
 
     smooth: PointerProperty(type=TOLVOL_PG_smooth)

@@ -23,6 +23,9 @@ _volumes = OrderedDict()
 # What panels show of a mesh (its size, its fingerprint), by object; forgotten whenever any mesh changes.
 _shown = {}
 
+# Called whenever the reference of an object may have become another one: set, let go of, undone, loaded.
+listeners = []
+
 # How far the lengths of an object's axes and the angles between them may stray before it counts as rescaled: ten
 # times what float32 rotations add up to.
 _RIGID = 1e-5
@@ -92,6 +95,8 @@ def set_reference(ob, surface):
     settings.snapshot_object = settings.reference_object if settings.reference_kind == "OBJECT" else None
     settings.snapshot_matrix = surface.matrix.ravel()
     settings.snapshot_size = surface.size()
+    settings.snapshot_fingerprint = surface.arrays.fingerprint()
+    notify()
 
 
 def clear_reference(ob):
@@ -100,6 +105,12 @@ def clear_reference(ob):
     ob.tolvol.measurement.fingerprint = ""
     if snapshot is not None and snapshot.users == 0:
         bpy.data.meshes.remove(snapshot)
+    notify()
+
+
+def notify():
+    for listener in listeners:
+        listener()
 
 
 def stale_reason(ob):
@@ -208,6 +219,7 @@ def shown_fingerprint(ob):
 @persistent
 def _forget_shown(*_):
     _shown.clear()
+    notify()
 
 
 @persistent
@@ -220,6 +232,7 @@ def _forget_changed(_scene, depsgraph):
 def _forget_all(*_):
     _shown.clear()
     _volumes.clear()
+    notify()
 
 
 def register():

@@ -5,7 +5,7 @@ import bpy
 
 from .decimate import TOLVOL_PT_decimate, TOLVOL_PT_protect
 from .deform import TOLVOL_PT_deform
-from .deviation import TOLVOL_PT_deviation
+from .deviation import TOLVOL_PT_deviation, TOLVOL_PT_show_deviation
 from .modifiers import TOLVOL_PT_modifiers
 from .smooth import TOLVOL_PT_smooth
 from .tolerance import TOLVOL_PT_tolerance
@@ -13,6 +13,7 @@ from .tolerance import TOLVOL_PT_tolerance
 _CLASSES = (
     TOLVOL_PT_tolerance,
     TOLVOL_PT_deviation,
+    TOLVOL_PT_show_deviation,
     TOLVOL_PT_decimate,
     TOLVOL_PT_protect,
     TOLVOL_PT_smooth,

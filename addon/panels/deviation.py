@@ -4,8 +4,10 @@
 import bpy
 import numpy as np
 
-from .. import report, volume
-from .layout import AMBER, GREEN, GREY, NO_BREAK, RED, SubPanel, length, right, text_lines
+from .. import overlay, report, volume
+from ..overlay import reasons
+from ..units import NO_BREAK, length
+from .layout import AMBER, GREEN, GREY, RED, SubPanel, right, text_lines
 
 
 class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
@@ -19,6 +21,8 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         row.operator("tolvol.check")
         row.operator("tolvol.select_outside")
         layout.operator("tolvol.save_report", text="Save Report...")
+        if ob.tolvol.show_deviation and (reason := reasons.off()):
+            text_lines(context, layout, f"Not shown: {reason}", "INFO")
 
     def _draw_measured(self, context, ob):
         """The same rows whether there is a measurement or not: buttons below do not jump."""
@@ -54,3 +58,29 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
                 else ""
             )
             text_lines(context, column, f"Beyond the tolerance{share}", RED)
+
+
+class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
+    """The overlay in the 3D view."""
+
+    bl_label = "Show Deviation"
+    bl_parent_id = "TOLVOL_PT_deviation"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        ob = context.active_object
+        self.layout.prop(ob.tolvol, "show_deviation", text="")
+        if ob.tolvol.show_deviation and not overlay.shows(ob) and not reasons.hidden(ob):  # appended, for example
+            bpy.app.timers.register(overlay.refresh, first_interval=0)
+
+    def draw(self, context):
+        ob = context.active_object
+        column = self.layout.column()
+        column.active = ob.tolvol.show_deviation
+        unsigned = reasons.unsigned(ob)
+        row = column.row()
+        row.enabled = not unsigned
+        row.prop(ob.tolvol, "deviation_kind", expand=True)
+        column.prop(ob.tolvol, "deviation_opacity")
+        if reason := reasons.hidden(ob) or unsigned:
+            text_lines(context, column, reason, "INFO")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the panels share: where they stand, lengths in the scene's units, text that fits the sidebar, colours."""
+"""What the panels share: where they stand, text that fits the sidebar, colours."""
 
 import blf
 import bpy
@@ -10,23 +10,11 @@ _FONT = 0  # Blender's own
 # Pixels of the sidebar that a label with an icon leaves to others: tabs, margins, the icon.
 _BESIDE_TEXT = 85
 
-NO_BREAK = "\u00a0"  # between a number and its unit
-
 GREY = "RADIOBUT_OFF"
 # Blender's coloured squares, which newer versions name anew.
 _ICONS = bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
 _COLOR = "SEQUENCE_COLOR" if "SEQUENCE_COLOR_01" in _ICONS else "STRIP_COLOR"
 RED, AMBER, GREEN = f"{_COLOR}_01", f"{_COLOR}_02", f"{_COLOR}_04"
-
-
-def length(context, value):
-    """A world length in the scene's units, with enough digits to mean something."""
-    units = context.scene.unit_settings
-    if units.system != "NONE":
-        text = bpy.utils.units.to_string(units.system, "LENGTH", value * units.scale_length, precision=3)
-        if value == 0 or any(digit in "123456789" for digit in text):
-            return text.replace(" ", NO_BREAK)
-    return f"{value:.3g}"
 
 
 class Panel:

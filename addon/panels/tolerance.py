@@ -5,7 +5,8 @@ import bpy
 
 from .. import native, volume
 from ..operators import blocked
-from .layout import AMBER, GREEN, GREY, RED, Panel, length, right, text_lines
+from ..units import length
+from .layout import AMBER, GREEN, GREY, RED, Panel, right, text_lines
 
 
 class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):

@@ -52,9 +52,14 @@ void spread_signs(const DistanceGrid& grid, std::span<const std::uint8_t> known,
 }
 
 std::vector<float> signed_distance(const TriangleMesh& reference, const DistanceGrid& grid, unsigned threads) {
+  return grid.is_signed ? grid.distance : signed_distance(reference, Pseudonormals(reference), grid, threads);
+}
+
+std::vector<float> signed_distance(const TriangleMesh& reference, const Pseudonormals& normals,
+                                   const DistanceGrid& grid, unsigned threads) {
   std::vector<float> result = grid.distance;
   if (grid.is_signed) return result;
-  sign_by_triangle(reference, Pseudonormals(reference), grid, result, threads);
+  sign_by_triangle(reference, normals, grid, result, threads);
   std::vector<std::uint8_t> known(grid.triangle.size());
   std::transform(grid.triangle.begin(), grid.triangle.end(), known.begin(),
                  [](std::uint32_t id) { return id != DistanceGrid::kNone; });

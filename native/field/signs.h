@@ -17,6 +17,9 @@ namespace tolvol {
 /// beyond the band get the sign of those beside them. A grid that is signed already is returned as it is. O(m log
 /// valence + nodes), about a quarter of the time of scatter().
 std::vector<float> signed_distance(const TriangleMesh& reference, const DistanceGrid& grid, unsigned threads = 0);
+/// The same, with the reference's own pseudonormals at hand.
+std::vector<float> signed_distance(const TriangleMesh& reference, const Pseudonormals& normals,
+                                   const DistanceGrid& grid, unsigned threads = 0);
 
 /// Gives the nodes that have a triangle their sign; `distance` as grid.distance, not signed so far.
 void sign_by_triangle(const TriangleMesh& reference, const Pseudonormals& normals, const DistanceGrid& grid,

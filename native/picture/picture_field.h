@@ -17,12 +17,10 @@ class PictureField {
   /// Grid nodes per tolerance, where GL and the memory budget of grids allow that many.
   static constexpr double kPrecision = 4;
 
-  /// For a valid reference in its frame, whose triangles run the other way round if it is `mirrored`; `tolerance` in
-  /// the frame. A cell whose distances contradict their signs is
-  /// shown unsigned, so that open, misoriented and intersecting references have no places that only seem near. What a
-  /// picture shows differs from the distance by at most (sqrt(3)/2) / precision() of the tolerance, and by far less
-  /// where the reference is smooth. Not on the GL thread. Throws GlUnavailable. O(nodes in the band), about 0.5 s for
-  /// 270,000 triangles at 1 % of their size.
+  /// Arguments and cost as for DisplayGrid. A cell whose distances contradict their signs is shown unsigned, so that
+  /// open, misoriented and intersecting references have no places that only seem near. What a picture shows differs
+  /// from the distance by at most (sqrt(3)/2) / precision() of the tolerance, and by far less where the reference is
+  /// smooth. Not on the GL thread. Throws GlUnavailable.
   PictureField(const TriangleMesh& reference, bool mirrored, double tolerance, unsigned threads = 0,
                Progress* progress = nullptr);
 

@@ -14,6 +14,7 @@ PYBIND11_MODULE(tolvol, module) {
   tolvol::python::bind_progress(module);
   tolvol::python::bind_gl(module);
   tolvol::python::bind_volume(module);
+  tolvol::python::bind_display(module);
   tolvol::python::bind_constrain(module);
   tolvol::python::bind_smoothing(module);
   tolvol::python::bind_decimation(module);

@@ -10,6 +10,7 @@ void bind_errors(pybind11::module_& module);
 void bind_progress(pybind11::module_& module);
 void bind_gl(pybind11::module_& module);
 void bind_volume(pybind11::module_& module);
+void bind_display(pybind11::module_& module);
 void bind_constrain(pybind11::module_& module);
 void bind_smoothing(pybind11::module_& module);
 void bind_decimation(pybind11::module_& module);

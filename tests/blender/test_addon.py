@@ -121,8 +121,12 @@ def test_package_holds_what_is_here():
         others = {name for name in archive.namelist() if not name.endswith("/")} - {
             f"tolerance_volumes/{file}" for file in files
         }
+        shaders = {name for name in others if name.startswith("tolerance_volumes/shaders/")}
+        for name in shaders:
+            assert archive.read(name) == (ROOT / "shaders" / Path(name).name).read_bytes(), f"pack {name} anew"
     libraries = {name for name in others if re.fullmatch(r"tolerance_volumes/bin/(tolvol\.|lib).*", name)}
-    assert any("/tolvol." in name for name in libraries) and others - libraries == {"tolerance_volumes/LICENSE"}
+    assert any("/tolvol." in name for name in libraries) and len(shaders) == 3
+    assert others - libraries - shaders == {"tolerance_volumes/LICENSE"}
 
 
 DECIMATE = """

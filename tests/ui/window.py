@@ -5,6 +5,7 @@ import subprocess
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 PICTURES = Path(__file__).resolve().parents[2] / "build" / "ui"
 
@@ -23,6 +24,16 @@ def key(name):
 
 def screenshot(name):
     subprocess.run(["import", "-window", "root", str(PICTURES / f"{name}.png")], check=True)
+
+
+def pixels():
+    """What is on the screen, (height, width, 3) integers."""
+    picture = subprocess.run(
+        ["import", "-window", "root", "-depth", "8", "ppm:-"], check=True, capture_output=True
+    ).stdout
+    _, width, height, _ = picture.split(maxsplit=4)[:4]
+    count = 3 * int(width) * int(height)
+    return np.frombuffer(picture[-count:], np.uint8).reshape(int(height), int(width), 3).astype(int)
 
 
 def view():
@@ -65,13 +76,22 @@ def find(operator, across=0.33):
 
     across: how far from the left of the sidebar. Blender's Ctrl C over a button copies the Python command that it runs.
     """
+    return (yield from _find(f"bpy.ops.{operator}", "ctrl+c", across))
+
+
+def find_property(name, across):
+    """The same for a property of Object.tolvol."""
+    return (yield from _find(f".tolvol.{name}", "ctrl+shift+alt+c", across))
+
+
+def _find(copied, keys, across):
     sidebar = region("UI")
     for y in range(30, sidebar.height - 5, 12):
         place = on_screen(sidebar, int(sidebar.width * across), y)
         bpy.context.window_manager.clipboard = ""
-        xdotool("mousemove", *place, "sleep", "0.03", "key", "ctrl+c")
+        xdotool("mousemove", *place, "sleep", "0.03", "key", keys)
         yield 0.08
-        if f"bpy.ops.{operator}" in bpy.context.window_manager.clipboard:
+        if copied in bpy.context.window_manager.clipboard:
             return place
     return None
 

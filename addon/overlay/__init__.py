@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Show Deviation: the mesh in the 3D view coloured at every pixel by its distance to the reference, with a legend.
+
+While no object shows it there is neither a handler nor memory. Distances are read from a grid and interpolated: they
+are shown, not proved.
+"""
+
+import functools
+
+import bpy
+from bpy.app.handlers import persistent
+
+from .. import native, volume
+from . import draw, field, legend, reasons, shaders, shares, work
+from .surface import Surface
+
+_surfaces = {}  # name of an object that shows its deviation -> Surface
+_drawing = []  # handlers
+
+
+def shows(ob):
+    """Whether the deviation of `ob` is among what is shown."""
+    return ob.name in _surfaces
+
+
+def refresh():
+    """Begins or ends to show what is to be shown now. Called whenever a reference or a setting may have changed."""
+    names = _wanted()
+    if not names:
+        _end()
+        return
+    for name in _surfaces.keys() - names:
+        del _surfaces[name]
+        shares.forget(name)
+    for name in names:
+        _surfaces.setdefault(name, Surface()).touch(True)
+    field.keep_only({field.key_of(bpy.data.objects[name]) for name in names})
+    if not _drawing:
+        _begin()
+    draw.redraw()
+
+
+def _wanted():
+    """The names of the objects that show their deviation."""
+    if native.module is None or reasons.off():
+        return set()
+    meshes = (ob for ob in bpy.data.objects if ob.type == "MESH" and ob.library is None)
+    return {ob.name for ob in meshes if ob.tolvol.show_deviation and ob.tolvol.snapshot is not None}
+
+
+def _begin():
+    for function, when in ((draw.surfaces, "POST_VIEW"), (draw.legend_of_one, "POST_PIXEL")):
+        _drawing.append(bpy.types.SpaceView3D.draw_handler_add(_guarded(function), (), "WINDOW", when))
+    bpy.app.handlers.depsgraph_update_post.append(_note_changes)
+    bpy.app.handlers.frame_change_post.append(_note_frame)
+
+
+def _end():
+    if _drawing:
+        for handler in _drawing:
+            bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
+        _drawing.clear()
+        bpy.app.handlers.depsgraph_update_post.remove(_note_changes)
+        bpy.app.handlers.frame_change_post.remove(_note_frame)
+        work.stop()
+        draw.redraw()
+    _surfaces.clear()
+    shares.forget()
+    field.keep_only(set())
+    legend.free()
+    shaders.free()
+
+
+def _guarded(function):
+    """What the graphics driver refuses once it is not asked for again; the panel says why."""
+
+    @functools.wraps(function)
+    def call():
+        if not all(name in bpy.data.objects for name in _surfaces):  # renamed
+            bpy.app.timers.register(refresh, first_interval=0)
+        try:
+            function(bpy.context, _surfaces)
+        except (RuntimeError, SystemError) as error:
+            reasons.broken[:] = [str(error)]
+            bpy.app.timers.register(_end, first_interval=0)
+
+    return call
+
+
+@persistent
+def _note_changes(_scene, depsgraph):
+    if depsgraph.id_type_updated("SCENE") and _wanted() != _surfaces.keys():  # objects came or went or have new names
+        refresh()
+        return
+    changed = {update.id.original: update.is_updated_geometry for update in depsgraph.updates}
+    for name, surface in _surfaces.items():
+        ob = bpy.data.objects.get(name)
+        if ob is None or not (ob in changed or ob.data in changed):
+            continue
+        geometry = changed.get(ob, False) or changed.get(ob.data, False)
+        # To Blender a stroke of sculpting is no change of the geometry, nor is one of what is selected.
+        if geometry or ob.mode != "OBJECT":
+            surface.touch(geometry and ob.mode != "SCULPT")
+
+
+@persistent
+def _note_frame(*_):
+    for surface in _surfaces.values():
+        surface.touch(True)
+
+
+def register():
+    volume.listeners.append(refresh)
+
+
+def unregister():
+    volume.listeners.remove(refresh)
+    _end()
+    reasons.broken.clear()

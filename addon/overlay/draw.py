@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the 3D views draw: the surfaces of the objects that show their deviation, and the legend of one."""
+
+import bpy
+import gpu
+import numpy as np
+
+from .. import mesh_io, volume
+from . import field, legend, reasons, shaders, shares
+
+_STRIPE = 12  # pixels from one stripe to the next
+
+
+def redraw():
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+
+def _in_view(context, names):
+    """The objects among these that this view shows with faces."""
+    space = context.space_data
+    if not space.overlay.show_overlays or space.shading.type == "WIREFRAME":
+        return []
+    depsgraph = context.evaluated_depsgraph_get()
+    found = (context.view_layer.objects.get(name) for name in names)
+    return [
+        ob
+        for ob in found
+        if ob is not None
+        and ob.display_type in {"SOLID", "TEXTURED"}
+        and ob.evaluated_get(depsgraph).visible_in_viewport_get(space)
+    ]
+
+
+def _tolerance(ob):
+    return volume.tolerance_length(ob.tolvol, ob.tolvol.snapshot_size)
+
+
+def _signed(ob, grid):
+    return ob.tolvol.deviation_kind == "SIGNED" and grid.closed
+
+
+def surfaces(context, shown):
+    """Draws them; shown: name -> Surface."""
+    objects = [ob for ob in _in_view(context, shown) if not reasons.hidden(ob)]
+    if not objects:
+        return
+    depsgraph = context.evaluated_depsgraph_get()
+    gpu.state.depth_test_set("LESS_EQUAL")
+    gpu.state.depth_mask_set(True)  # so that of two layers that NEARER lets through the nearer one is seen
+    gpu.state.blend_set("ALPHA")
+    for ob in objects:
+        surface = shown[ob.name]
+        surface.update(ob, depsgraph)
+        found, _ = field.field_of(ob, _tolerance(ob), redraw)
+        if found is not None:
+            _draw(context, ob, surface, found)
+    gpu.state.blend_set("NONE")
+    gpu.state.depth_mask_set(False)
+    gpu.state.depth_test_set("NONE")
+
+
+def _draw(context, ob, surface, found):
+    shading = context.space_data.shading
+    x_ray = shading.type == "SOLID" and shading.show_xray
+    to_nodes = field.vertex_to_nodes(found, ob)
+    told = shaders.told(
+        context.region_data.perspective_matrix,
+        ob.matrix_world,
+        to_nodes,
+        _eye(context.region_data, to_nodes @ np.linalg.inv(mesh_io.matrix_array(ob.matrix_world))),
+        _tolerance(ob) / found.grid.spacing,
+        found.grid.band / found.grid.spacing,
+        _signed(ob, found.grid),
+        _STRIPE * context.preferences.system.ui_scale,
+        ob.tolvol.deviation_opacity * (shading.xray_alpha if x_ray else 1),
+    )
+    shader = shaders.surface(found.nearest)
+    shader.bind()
+    shader.uniform_sampler("transfer", shaders.transfer(_signed(ob, found.grid)))
+    found.bind(shader)
+    shader.uniform_block("told", told)
+    if x_ray:
+        # Blender has no depths here: without them it would be chance which layers are seen.
+        gpu.state.color_mask_set(False, False, False, False)
+        surface.draw(shader)
+        gpu.state.color_mask_set(True, True, True, True)
+    surface.draw(shader)
+    if ob.mode == "EDIT" and not x_ray:
+        # Blender's own edges are below the surface now, its vertices are not.
+        theme = context.preferences.themes[0].view_3d
+        shader = shaders.lines()
+        shader.bind()
+        shader.uniform_block("told", told)
+        for selected, colour in ((False, theme.wire_edit), (True, theme.edge_select)):
+            shader.uniform_float("flat_colour", (*colour, 1))
+            surface.draw_edges(shader, selected)
+
+
+def _eye(view, world_to_nodes):
+    """In nodes; of a view without perspective a direction, with 0 behind it."""
+    inverse = view.view_matrix.inverted()
+    eye = (*inverse.translation, 1) if view.is_perspective else inverse.col[2]
+    return world_to_nodes @ np.array(eye)
+
+
+def legend_of_one(context, shown):
+    """The active object's legend, or that of another one in view."""
+    quarters = context.space_data.region_quadviews
+    objects = _in_view(context, shown)
+    if not objects or (quarters and context.region_data != quarters[-1]):
+        return
+    ob = context.active_object if context.active_object in objects else objects[0]
+    found, reason = None, reasons.hidden(ob)
+    if not reason:
+        found, reason = field.field_of(ob, _tolerance(ob), redraw)
+    heading = f"Deviation of {ob.name}"
+    if found is None:
+        legend.draw_note(context, f"{heading}: {reason}")
+        return
+    signed, tolerance = _signed(ob, found.grid), _tolerance(ob)
+    bands = shares.known(ob, shown[ob.name], found, tolerance, redraw)
+    legend.draw(context, heading, signed, tolerance, bands and shares.fold(bands, signed))

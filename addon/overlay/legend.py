@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The corner of the 3D view that says what the colours mean."""
+
+import blf
+import gpu
+
+from ..units import NO_BREAK, length
+from . import shaders
+
+_FONT = 0  # Blender's own
+_POINTS = 11
+# In pixels at a scale of 1.
+_BAR = 14, 132
+_ROW = 17
+_GAP = 10  # between things, and around them
+_MARGIN = 14  # to the edges of the view
+_STRIPE = 12
+_NOTE = "Shown, not proved"
+
+_unit_square = None
+
+
+def _square():
+    global _unit_square
+    if _unit_square is None:
+        layout = gpu.types.GPUVertFormat()
+        layout.attr_add(id="position", comp_type="F32", len=2, fetch_mode="FLOAT")
+        buffer = gpu.types.GPUVertBuf(layout, 4)
+        buffer.attr_fill("position", [(0, 0), (1, 0), (0, 1), (1, 1)])
+        _unit_square = gpu.types.GPUBatch(type="TRI_STRIP", buf=buffer)
+    return _unit_square
+
+
+def free():
+    global _unit_square
+    _unit_square = None
+
+
+class _Page:
+    """Rectangles and text in pixels of the region, y upwards."""
+
+    def __init__(self, context, signed):
+        self.scale = context.preferences.system.ui_scale
+        self.region = context.region.width, context.region.height
+        theme = context.preferences.themes[0].user_interface.wcol_tooltip
+        self.ink, self.paper = tuple(theme.text), tuple(theme.inner)
+        self.signed = signed
+        blf.size(_FONT, _POINTS * self.scale)
+
+    def rectangle(self, x, y, width, height, kind, colour=(0, 0, 0, 0)):
+        shader = shaders.legend()
+        shader.bind()
+        shader.uniform_sampler("transfer", shaders.transfer(self.signed))
+        corners = [2 * at / size - 1 for at, size in zip((x, y, x + width, y + height), self.region * 2)]
+        shader.uniform_float("corners", corners)
+        shader.uniform_float("flat_colour", colour)
+        shader.uniform_float("fill", (kind, shaders.lowest(self.signed), _STRIPE * self.scale))
+        gpu.state.blend_set("ALPHA")
+        _square().draw(shader)
+        gpu.state.blend_set("NONE")
+
+    def text(self, x, y, text, faint=False):
+        """`y` is the middle of small letters."""
+        blf.color(_FONT, *self.ink, 0.6 if faint else 1.0)
+        blf.position(_FONT, x, y - blf.dimensions(_FONT, "x")[1] / 2, 0)
+        blf.draw(_FONT, text)
+
+
+def width_of(text):
+    return blf.dimensions(_FONT, text)[0]
+
+
+def draw(context, heading, signed, tolerance, shares):
+    """shares: of the surface in the four bands from the lowest colour on and outside, or None while unknown."""
+    page = _Page(context, signed)
+    scale = page.scale
+    lowest = -tolerance if signed else 0.0
+    labels = [(part, _label(context, lowest + part * (tolerance - lowest), signed)) for part in (0, 0.5, 1)]
+    bands = [percent(share) for share in shares] if shares is not None else [""] * 5
+    bar_width, bar_height = (size * scale for size in _BAR)
+    row, gap = _ROW * scale, _GAP * scale
+    label_width = max([width_of(text) for _, text in labels] + [width_of("Outside")])
+    share_width = max(width_of(text) for text in [*bands, "88.8 %"])
+    width = max(bar_width + label_width + share_width + 2 * gap, width_of(heading), width_of(_NOTE)) + 2 * gap
+    height = 3 * row + bar_height + 4 * gap
+    place = _corner(context, width, height, _MARGIN * scale)
+    if place is None:
+        return
+    left, bottom = place
+    page.rectangle(left, bottom, width, height, shaders.FLAT, page.paper)
+    x, y = left + gap, bottom + gap + row / 2
+    label_x, right = x + bar_width + gap, left + width - gap
+    page.text(x, y, _NOTE, faint=True)
+    y += row
+    page.rectangle(x, y - bar_width / 2, bar_width, bar_width, shaders.STRIPES)
+    page.text(label_x, y, "Outside")
+    page.text(right - width_of(bands[4]), y, bands[4])
+    y += row / 2 + gap
+    page.rectangle(x, y, bar_width, bar_height, shaders.BAR)
+    for part, text in labels:
+        at = y + part * bar_height
+        page.rectangle(x + bar_width, at - scale / 2, 4 * scale, scale, shaders.FLAT, (*page.ink, 1))
+        page.text(label_x, at, text)
+    for i, text in enumerate(bands[:4]):
+        page.text(right - width_of(text), y + (i + 0.5) / 4 * bar_height, text, faint=True)
+    page.text(x, bottom + height - gap - row / 2, heading)
+
+
+def draw_note(context, text):
+    """One line in the legend's place."""
+    page = _Page(context, True)
+    gap = _GAP * page.scale
+    width, height = width_of(text) + 2 * gap, _ROW * page.scale + gap
+    if place := _corner(context, width, height, _MARGIN * page.scale):
+        page.rectangle(*place, width, height, shaders.FLAT, page.paper)
+        page.text(place[0] + gap, place[1] + height / 2, text)
+
+
+def _label(context, value, signed):
+    if value == 0:
+        return "0"
+    sign = "" if not signed else "+" if value > 0 else "\u2212"
+    return sign + length(context, abs(value))
+
+
+def percent(share):
+    """A little must not read as nothing, nor nearly all as all."""
+    percent = 100 * share
+    if 0 < percent < 0.1:
+        return f"<{NO_BREAK}0.1{NO_BREAK}%"
+    if 99.9 < percent < 100:
+        return f">{NO_BREAK}99.9{NO_BREAK}%"
+    return f"{percent:.1f}{NO_BREAK}%"
+
+
+def _corner(context, width, height, margin):
+    """Left and bottom of a box in the lower right corner that other regions leave free; None where there is no room."""
+    region, right, bottom = context.region, context.region.width, 0
+    for other in context.area.regions:
+        if other == region or other.width <= 1 or other.height <= 1:
+            continue
+        if other.alignment == "RIGHT" and other.type == "UI":
+            right = min(right, other.x - region.x)
+        elif other.alignment == "BOTTOM" and other.y <= region.y + bottom:
+            bottom = max(bottom, other.y + other.height - region.y)
+    left, bottom = right - width - margin, bottom + margin
+    return (left, bottom) if left >= margin and bottom + height + margin <= region.height else None

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The programs of the overlay, for Blender's gpu module: the surface, its edges and the legend.
+
+From distance to colour they use the same functions as the module's own pictures, whose text lies in shaders/.
+"""
+
+import functools
+from pathlib import Path
+
+import gpu
+import numpy as np
+
+from .. import native
+
+_ADDON = Path(__file__).resolve().parents[1]
+# Beside the add-on's files in the package, at the top of a checkout.
+_SHARED = next(folder for folder in (_ADDON / "shaders", _ADDON.parent / "shaders") if folder.is_dir())
+
+# Blender tells whether what is drawn to expects linear colours.
+_DISPLAYED = """
+vec4 displayed(vec3 colour, float opacity) {
+  vec3 linear = mix(colour / 12.92, pow((colour + 0.055) / 1.055, vec3(2.4)), step(0.04045, colour));
+  return vec4(srgbTarget ? linear : colour, opacity);
+}
+"""
+
+# The same two products as in Blender's own shaders, so that depths agree but for the rounding that NEARER makes up for:
+# in clip space some steps of a depth buffer of 24 bits.
+_SURFACE_VERTEX = """
+void main() {
+  place = (told.to_nodes * vec4(position, 1.0)).xyz;
+  gl_Position = told.view_projection * vec4((told.model * vec4(position, 1.0)).xyz, 1.0);
+  gl_Position.z -= NEARER * gl_Position.w;
+}
+"""
+
+_SURFACE_FRAGMENT = """
+void main() {
+  float d = DISTANCE / told.tolerance;
+  vec3 colour;
+  if (abs(d) > 1.0) {
+    colour = outside_colour(gl_FragCoord.xy, told.period, OUTSIDE, STRIPE);
+  } else {
+    vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
+    vec3 to_eye = normalize(told.eye.xyz - told.eye.w * place);
+    colour = head_light(normal, to_eye) * distance_colour(transfer, d, told.lowest);
+  }
+  shown = displayed(colour, told.opacity);
+}
+"""
+
+_LINES_FRAGMENT = """
+void main() { shown = displayed(flat_colour.rgb, flat_colour.a); }
+"""
+
+# As std140 lays it out: whole vectors first, and sixteen bytes filled up.
+_SURFACE_TOLD = """
+struct Told {
+  mat4 view_projection, model, to_nodes;
+  vec4 eye;
+  float tolerance, lowest, period, opacity;
+  vec4 band;
+};
+"""
+
+_LEGEND_VERTEX = """
+void main() {
+  part = position;
+  gl_Position = vec4(mix(corners.xy, corners.zw, position), 0.0, 1.0);
+}
+"""
+
+# fill: its kind, where the colours begin, the period of stripes.
+_LEGEND_FRAGMENT = """
+void main() {
+  if (fill.x == BAR) {
+    shown = displayed(distance_colour(transfer, mix(fill.y, 1.0, part.y), fill.y), 1.0);
+  } else if (fill.x == STRIPES) {
+    shown = displayed(outside_colour(gl_FragCoord.xy, fill.z, OUTSIDE, STRIPE), 1.0);
+  } else {
+    shown = displayed(flat_colour.rgb, flat_colour.a);
+  }
+}
+"""
+
+# What a rectangle of the legend is filled with.
+FLAT, BAR, STRIPES = 0.0, 1.0, 2.0
+
+
+def _info(varying, position, vertex, fragment, shared=()):
+    """varying, position: (type, name) of what goes between the two parts, and into the first."""
+    interface = gpu.types.GPUStageInterfaceInfo(f"tolvol_{varying[1]}")
+    interface.smooth(*varying)
+    info = gpu.types.GPUShaderCreateInfo()
+    info.vertex_in(0, *position)
+    info.vertex_out(interface)
+    info.fragment_out(0, "VEC4", "shown")
+    info.push_constant("BOOL", "srgbTarget")
+    for name, colour in zip(("OUTSIDE", "STRIPE"), native.module.OUTSIDE_COLOURS):
+        info.define(name, f"vec3({', '.join(f'{level / 255:.4f}' for level in colour)})")
+    info.vertex_source(vertex)
+    text = "".join((_SHARED / name).read_text(encoding="utf-8") for name in shared)
+    info.fragment_source(text + _DISPLAYED + fragment)
+    return info
+
+
+@functools.cache
+def surface(nearest):
+    """Colours a mesh by its distance; told() is what its buffer `told` holds.
+
+    nearest: `field` has the triangle of each node, and `corners` its corners; else distances to be interpolated.
+    """
+    shared = "nearest_distance.glsl" if nearest else "signed_distance.glsl", "distance_colour.glsl"
+    info = _info(("VEC3", "place"), ("VEC3", "position"), _SURFACE_VERTEX, _SURFACE_FRAGMENT, shared)
+    info.sampler(0, "FLOAT_1D", "transfer")
+    info.sampler(1, "FLOAT_3D", "field")
+    if nearest:
+        info.sampler(2, "FLOAT_2D", "corners")
+        info.define("DISTANCE", "nearest_distance(field, corners, place, told.band.x)")
+    else:
+        info.define("DISTANCE", "signed_distance(field, place)")
+    info.typedef_source(_SURFACE_TOLD)
+    info.uniform_buf(0, "Told", "told")
+    info.define("NEARER", "1e-6")
+    return gpu.shader.create_from_info(info)
+
+
+def told(view_projection, model, to_nodes, eye, tolerance, band, signed, period, opacity):
+    """The buffer for surface().
+
+    to_nodes: from vertices; eye: (x, y, z, 1) or a direction with 0, in nodes, as are `tolerance` and `band`.
+    """
+    matrices = [np.array(matrix, np.float32).T.ravel() for matrix in (view_projection, model, to_nodes)]
+    numbers = tolerance, lowest(signed), period, opacity, band, 0, 0, 0
+    values = np.concatenate([*matrices, eye, numbers]).astype(np.float32)
+    return gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", values.size, values))
+
+
+@functools.cache
+def lines():
+    """Edges of the same mesh, over its surface; flat_colour: theirs."""
+    info = _info(("VEC3", "place"), ("VEC3", "position"), _SURFACE_VERTEX, _LINES_FRAGMENT)
+    info.push_constant("VEC4", "flat_colour")
+    info.typedef_source(_SURFACE_TOLD)
+    info.uniform_buf(0, "Told", "told")
+    info.define("NEARER", "1e-5")
+    return gpu.shader.create_from_info(info)
+
+
+@functools.cache
+def legend():
+    """Fills rectangles, whose corners are in clip space."""
+    info = _info(("VEC2", "part"), ("VEC2", "position"), _LEGEND_VERTEX, _LEGEND_FRAGMENT, ("distance_colour.glsl",))
+    info.sampler(0, "FLOAT_1D", "transfer")
+    for constant in (("VEC4", "corners"), ("VEC4", "flat_colour"), ("VEC3", "fill")):
+        info.push_constant(*constant)
+    info.define("BAR", str(BAR))
+    info.define("STRIPES", str(STRIPES))
+    return gpu.shader.create_from_info(info)
+
+
+def lowest(signed):
+    """Where the colours begin, in tolerances."""
+    return -1.0 if signed else 0.0
+
+
+@functools.cache
+def transfer(signed):
+    """The module's table of colours."""
+    colours = native.module.transfer_colours("signed" if signed else "magnitude")
+    texels = np.ones((len(colours), 4), np.float32)
+    texels[:, :3] = colours / np.float32(255)
+    return gpu.types.GPUTexture(
+        len(texels), format="RGBA16F", data=gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
+    )
+
+
+def free():
+    """Forgets all that is on the GPU."""
+    for function in (surface, lines, legend, transfer):
+        function.cache_clear()

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The mesh of an object as the 3D view shows it now, and its place on the GPU."""
+
+import gpu
+import numpy as np
+
+from .. import mesh_io
+
+
+class Surface:
+    """An object's triangles; written to the GPU anew only after they changed."""
+
+    def __init__(self):
+        self.vertices = None  # (n, 3) float32, local
+        self.triangles = None  # (m, 3) int32
+        self.changes = 0  # how often it was read
+        self._polygons = 0
+        self._mode = None
+        self._edges = None  # (k, 2) int32 and (k,) whether selected, in Edit Mode
+        self._selected = None
+        self._buffers = {}
+        self._stale = True  # positions may have changed
+        self._recut = True  # and the triangles as well
+
+    def touch(self, recut):
+        """Says that the mesh may have changed; recut: not only where its vertices are."""
+        self._stale = True
+        self._recut |= recut
+
+    def update(self, ob, depsgraph):
+        """Reads the mesh if it may have changed. In a draw handler."""
+        if ob.mode != self._mode:
+            self.touch(True)
+            self._mode = ob.mode
+        if not self._stale:
+            return
+        # Sculpting changes the stored mesh alone; elsewhere the evaluated one is what the view shows.
+        evaluated = ob.evaluated_get(depsgraph)
+        if ob.mode == "SCULPT":
+            self._read(ob.data, sculpted_vertices(ob), True)
+        elif ob.mode == "EDIT":
+            mesh = evaluated.to_mesh()
+            self._read(mesh, None, True)
+            self._read_edges(mesh)
+            evaluated.to_mesh_clear()
+        else:
+            self._read(evaluated.data, None, False)
+        self._stale = False
+
+    def _read(self, mesh, vertices, hides):
+        co = mesh_io.column(vertices or mesh.vertices, "co", 3)
+        recut = self._recut or len(co) != len(self.vertices) or len(mesh.polygons) != self._polygons
+        if not recut and np.array_equal(co, self.vertices):
+            return
+        if recut:
+            mesh.calc_loop_triangles()
+            self.triangles = mesh_io.column(mesh.loop_triangles, "vertices", 3, np.int32)
+            if hides:
+                hidden = mesh_io.column(mesh.polygons, "hide", 1, bool)
+                self.triangles = self.triangles[
+                    ~hidden[mesh_io.column(mesh.loop_triangles, "polygon_index", 1, np.int32)]
+                ]
+            self._polygons = len(mesh.polygons)
+            self._recut = False
+            self._buffers.clear()
+        self.vertices = co
+        self.changes += 1
+        self._buffers.pop("vertices", None)
+
+    def _read_edges(self, mesh):
+        shown = ~mesh_io.column(mesh.edges, "hide", 1, bool)
+        self._edges = mesh_io.column(mesh.edges, "vertices", 2, np.int32)[shown]
+        self._selected = mesh_io.column(mesh.edges, "select", 1, bool)[shown]
+        for selected in (False, True):
+            self._buffers.pop(("LINES", selected), None)
+
+    def draw(self, shader):
+        if len(self.triangles):
+            self._batch("TRIS", lambda: self.triangles).draw(shader)
+
+    def draw_edges(self, shader, selected):
+        """Those that are selected, or the others. In Edit Mode."""
+        chosen = self._selected == selected
+        if chosen.any():
+            self._batch("LINES", lambda: self._edges[chosen], selected).draw(shader)
+
+    def _batch(self, kind, corners, *which):
+        if "vertices" not in self._buffers:
+            layout = gpu.types.GPUVertFormat()
+            layout.attr_add(id="position", comp_type="F32", len=3, fetch_mode="FLOAT")
+            self._buffers["vertices"] = gpu.types.GPUVertBuf(layout, len(self.vertices))
+            self._buffers["vertices"].attr_fill("position", self.vertices)
+        key = kind, *which
+        if key not in self._buffers:
+            self._buffers[key] = gpu.types.GPUIndexBuf(type=kind, seq=np.ascontiguousarray(corners(), np.uint32))
+        return gpu.types.GPUBatch(type=kind, buf=self._buffers["vertices"], elem=self._buffers[key])
+
+
+def sculpted_vertices(ob):
+    """What sculpting moves: the active shape key, or the mesh itself."""
+    return ob.active_shape_key.data if ob.active_shape_key else ob.data.vertices

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Show Deviation where nothing can be drawn, and what it computes. What it draws is in tests/ui."""
+
+import bpy
+import numpy as np
+import pytest
+
+import addon
+from addon import overlay, preferences, volume
+from addon.overlay import legend, reasons, shares, surface
+from scenes import add_object, sheet, torus
+
+
+def with_reference(ob):
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    return ob
+
+
+def test_on_after_set_reference_and_without_a_window_neither_drawn_nor_a_crash():
+    ob = with_reference(torus())
+    assert ob.tolvol.show_deviation and ob.tolvol.deviation_kind == "SIGNED"
+    handlers = len(bpy.app.handlers.depsgraph_update_post)
+    for value in (False, True):
+        ob.tolvol.show_deviation = value
+        ob.tolvol.deviation_opacity = 0.3
+    assert not overlay.shows(ob) and len(bpy.app.handlers.depsgraph_update_post) == handlers
+    assert reasons.hidden(ob) == "Blender runs without a window"
+
+
+def test_every_change_of_a_reference_is_told_and_the_listener_leaves_with_the_addon():
+    told = []
+    volume.listeners.append(lambda: told.append(True))
+    try:
+
+        def tells(change):
+            told.clear()
+            change()
+            return bool(told)
+
+        ob = torus()
+        bpy.ops.ed.undo_push(message="start")
+        assert tells(bpy.ops.tolvol.set_reference)
+        bpy.ops.ed.undo_push(message="set")
+        assert tells(lambda: setattr(ob.tolvol, "tolerance_percent", 2))
+        assert tells(lambda: setattr(ob.tolvol, "show_deviation", False))
+        assert tells(bpy.ops.ed.undo) and tells(bpy.ops.ed.redo)
+        assert tells(bpy.ops.tolvol.clear_reference)
+        assert tells(lambda: bpy.ops.wm.read_factory_settings(use_empty=True))
+    finally:
+        volume.listeners.pop()
+    assert overlay.refresh in volume.listeners
+    addon.unregister()
+    try:
+        assert overlay.refresh not in volume.listeners
+    finally:
+        addon.register()
+
+
+def test_reasons_follow_preference_reference_and_mode(monkeypatch):
+    monkeypatch.setattr(reasons, "off", lambda: None)
+    ob = torus()
+    assert "Set the reference" in reasons.hidden(ob)
+    with_reference(ob)
+    assert reasons.hidden(ob) is None
+    ob.scale.x = 2
+    bpy.context.view_layer.update()
+    assert "out of date: the object was rescaled" in reasons.hidden(ob)
+    ob.scale.x = 1
+    bpy.context.view_layer.update()
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    assert "Sculpt Mode" in reasons.hidden(ob)
+    bpy.ops.object.mode_set(mode="SCULPT")
+    assert reasons.hidden(ob) is None
+    bpy.ops.sculpt.dynamic_topology_toggle()
+    assert "Dyntopo" in reasons.hidden(ob)
+
+
+def test_a_preference_turns_drawing_off(monkeypatch):
+    monkeypatch.setattr(reasons.bpy, "app", type("app", (), {"background": False}))
+    assert reasons.off() is None
+    monkeypatch.setattr(preferences, "use_gl", lambda _context: False)
+    assert "turned off in the add-on's preferences" in reasons.off()
+
+
+def test_the_surface_is_what_the_view_shows():
+    def read(ob):
+        found = surface.Surface()
+        found.update(ob, bpy.context.evaluated_depsgraph_get())
+        return found
+
+    ob = sheet(count=4)
+    assert (len(read(ob).vertices), len(read(ob).triangles)) == (25, 32)
+    ob.modifiers.new("subdivision", "SUBSURF").levels = 1
+    assert len(read(ob).triangles) == 128
+    ob.modifiers.clear()
+    ob.shape_key_add(name="Basis")
+    key = ob.shape_key_add(name="up")
+    key.data.foreach_set("co", (np.ones(75, np.float32)))
+    key.value = 1
+    assert np.allclose(read(ob).vertices, 1)
+    ob.active_shape_key_index = 1
+    bpy.ops.object.mode_set(mode="SCULPT")
+    assert np.allclose(read(ob).vertices, 1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    ob.shape_key_clear()
+    ob.data.polygons[3].hide = True
+    assert len(read(ob).triangles) == 32
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert len(read(ob).triangles) == 30
+
+
+def test_a_surface_is_read_again_only_after_a_change():
+    ob = sheet(count=4)
+    found, depsgraph = surface.Surface(), bpy.context.evaluated_depsgraph_get()
+    found.update(ob, depsgraph)
+    ob.data.vertices[7].co.z += 1
+    ob.data.update()
+    bpy.context.view_layer.update()
+    found.update(ob, depsgraph)
+    assert found.changes == 1
+    found.touch(False)
+    found.update(ob, depsgraph)
+    assert found.changes == 2 and found.vertices[7, 2] > 0.9
+    found.touch(False)
+    found.update(ob, depsgraph)
+    assert found.changes == 2, "it was the same"
+
+
+def test_bands_of_the_legend():
+    eighths = [0.01, 0.02, 0.03, 0.04, 0.05, 0.1, 0.2, 0.3, 0.2, 0.05]
+    assert shares.fold(eighths, True) == pytest.approx([0.05, 0.09, 0.3, 0.5, 0.06])
+    assert shares.fold(eighths, False) == pytest.approx([0.15, 0.24, 0.33, 0.22, 0.06])
+    said = [legend.percent(share).replace("\u00a0", " ") for share in (0, 1e-5, 0.0123, 0.99999, 1)]
+    assert said == ["0.0 %", "< 0.1 %", "1.2 %", "> 99.9 %", "100.0 %"]
+
+
+def test_an_object_of_edges_alone_has_no_surface():
+    ob = add_object("edge", [(0, 0, 0), (1, 0, 0)], [])
+    found = surface.Surface()
+    found.update(ob, bpy.context.evaluated_depsgraph_get())
+    assert len(found.triangles) == 0

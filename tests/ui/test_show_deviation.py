@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Show Deviation as it looks: what is counted are pixels of the screen."""
+
+import bpy
+import numpy as np
+
+from addon import native, overlay
+from test_panel import finished
+from window import (
+    centre,
+    click,
+    find_property,
+    key,
+    on_screen,
+    open_tab,
+    pixels,
+    press,
+    region,
+    reset,
+    screenshot,
+    view,
+    xdotool,
+)
+
+
+def ball():
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=6)
+    bpy.context.object.tolvol.deviation_kind = "MAGNITUDE"
+    bpy.context.object.tolvol.deviation_opacity = 1
+    view()[1].spaces[0].region_3d.view_distance = 5
+
+
+def solid_monkey():
+    """Closed, which Blender's own is not."""
+    bpy.ops.mesh.primitive_monkey_add()
+    ob = bpy.context.object
+    ob.modifiers.new("subdivision", "SUBSURF").levels = 2
+    remesh = ob.modifiers.new("remesh", "REMESH")
+    remesh.voxel_size, remesh.use_smooth_shade = 0.025, True
+    ob.modifiers.new("smooth", "SMOOTH").iterations = 3
+    with bpy.context.temp_override(window=view()[0], area=view()[1], object=ob, active_object=ob):
+        bpy.ops.object.convert(target="MESH")
+    view()[1].spaces[0].region_3d.view_distance = 4.5
+
+
+def the_object():
+    return bpy.data.objects[0]
+
+
+def striped():
+    """Pixels of the view that say: outside."""
+    return int((np.abs(_surface() - native.module.OUTSIDE_COLOURS[0]).max(-1) <= 2).sum())
+
+
+def near():
+    """Pixels of the view with the colour of no deviation, which nothing else there has: yellow, lit or not."""
+    red, green, blue = np.moveaxis(_surface(), -1, 0)
+    return int(((red > 100) & (green > 90) & (blue < 45) & (np.abs(red - green) < 40)).sum())
+
+
+def gone():
+    return near() < 300  # some are the edges of what is drawn around
+
+
+def _surface():
+    """Without the sidebar and the legend."""
+    place = region("WINDOW")
+    x, y = on_screen(place, 0, 0)
+    return pixels()[y + 40 : y + place.height - 40, x + 70 : x + place.width - 400]
+
+
+def to_mode(mode):
+    with bpy.context.temp_override(window=view()[0], area=view()[1], object=the_object()):
+        bpy.ops.object.mode_set(mode=mode)
+    bpy.ops.ed.undo_push(message=mode)  # as a key would
+
+
+def test_deviation_is_shown_while_the_mesh_changes():
+    yield from reset(ball)
+    yield from open_tab()
+    assert gone() and not overlay.shows(the_object())
+    yield from press("tolvol.set_reference")
+    xdotool("mousemove", *centre())
+    yield from finished(lambda: near() > 30_000)
+    assert striped() == 0
+    screenshot("overlay 1 set")
+
+    to_mode("SCULPT")
+    yield 0.5
+    x, y = centre()
+    drawing, during = stroke((x, y), (x + 72, y)), 0
+    for pause in drawing:
+        yield pause
+        during = max(during, striped() if pause > 0.3 else 0)
+    screenshot("overlay 2 sculpted")
+    assert during > 100
+    key("ctrl+z")
+    yield from finished(lambda: striped() == 0)
+    assert near() > 30_000
+
+    to_mode("EDIT")
+    xdotool("mousemove", x, y)
+    yield 0.5
+    assert near() > 3000
+    xdotool("key", "--delay", 100, "s", "1", "period", "0", "5")
+    yield from finished(lambda: striped() > 3000)  # while it is going on
+    screenshot("overlay 3 scaling in edit mode")
+    key("Escape")
+    yield from finished(lambda: striped() == 0)
+    to_mode("OBJECT")
+
+    the_object().tolvol.tolerance_percent = 5
+    the_object().data.vertices.foreach_set("co", (1.02 * np.array([v.co for v in the_object().data.vertices])).ravel())
+    the_object().data.update()
+    yield 1.0
+    yield from finished(lambda: striped() == 0 and not gone())
+    the_object().tolvol.tolerance_percent = 0.2
+    yield from finished(lambda: striped() > 10_000)
+
+
+def test_sides_of_a_closed_reference():
+    yield from reset(solid_monkey)
+    yield from open_tab()
+    yield from press("tolvol.set_reference")
+    xdotool("mousemove", *beside())
+    yield from finished(lambda: overlay.field.at_hand(the_object()) is not None)
+    the_object().tolvol.deviation_opacity = 0.8
+    to_mode("SCULPT")
+    view()[1].spaces[0].show_gizmo = False
+    yield 1.0
+    red, blue = sides()
+    assert red < 300 and blue < 300
+    x, y = on_screen(region("WINDOW"), *(size // 2 for size in (region("WINDOW").width, region("WINDOW").height)))
+    yield from stroke((x - 130, y - 90), (x - 20, y - 140))
+    assert sides()[0] > red + 300 and sides()[1] < 300
+    xdotool("keydown", "ctrl")
+    yield from stroke((x - 80, y + 40), (x + 10, y - 20))
+    xdotool("keyup", "ctrl")
+    yield 1.5
+    screenshot("overlay 6 both sides")
+    assert sides()[1] > blue + 300
+
+
+def stroke(start, end, steps=8):
+    """Draws with the brush."""
+    xdotool("mousemove", *start, "sleep", "0.2", "mousedown", 1)
+    for step in range(1, steps + 1):
+        xdotool("mousemove", *((a + (b - a) * step // steps) for a, b in zip(start, end)))
+        yield 0.1
+    yield 0.4
+    xdotool("mouseup", 1, "mousemove", *beside())
+    yield 0.7
+
+
+def beside():
+    """Where the brush's circle is not counted."""
+    return on_screen(region("WINDOW"), 75, region("WINDOW").height - 20)
+
+
+def sides():
+    """Pixels of the view that are red, for outside, and blue."""
+    red, green, blue = np.moveaxis(_surface(), -1, 0)
+    return int(((red > 110) & (red - blue > 60) & (red - green > 50)).sum()), int(
+        ((blue - red > 60) & (blue > 110)).sum()
+    )
+
+
+def test_views_places_and_switches():
+    yield from reset(ball)
+    yield from open_tab()
+    yield from press("tolvol.set_reference")
+    xdotool("mousemove", *centre())
+    yield from finished(lambda: near() > 30_000)
+    space = view()[1].spaces[0]
+    space.region_3d.view_perspective = "ORTHO"
+    the_object().scale.x = -1
+    the_object().location.x += 0.3
+    yield 0.7
+    assert near() > 30_000, "moved and mirrored"
+    the_object().scale.x *= 2
+    yield 0.7
+    screenshot("overlay 4 rescaled")
+    assert gone()
+    the_object().scale.x /= 2
+    the_object().name = "another"
+    yield 1.0
+    assert near() > 30_000
+    with bpy.context.temp_override(window=view()[0], area=view()[1], region=region("WINDOW")):
+        bpy.ops.view3d.localview(frame_selected=False)
+    yield 0.7
+    assert near() > 30_000
+    the_object().hide_set(True)
+    yield 0.7
+    assert gone()
+    the_object().hide_set(False)
+    with bpy.context.temp_override(window=view()[0], area=view()[1], region=region("WINDOW")):
+        bpy.ops.view3d.localview(frame_selected=False)
+    space.overlay.show_overlays = False
+    yield 0.5
+    assert gone()
+    space.overlay.show_overlays = True
+    space.region_3d.view_perspective = "PERSP"
+
+    place = yield from find_property("show_deviation", across=0.2)
+    assert place is not None
+    yield 0.6  # until no tooltip is in the way
+    click(*place)
+    yield 0.5
+    screenshot("overlay 5 off")
+    xdotool("mousemove", *centre())
+    yield 0.7
+    assert not the_object().tolvol.show_deviation and gone()
+    assert not overlay.shows(the_object()) and not overlay._drawing
+    assert not any(handler.__module__.startswith("addon.overlay") for handler in bpy.app.handlers.depsgraph_update_post)
+    the_object().tolvol.show_deviation = True
+    yield from finished(lambda: near() > 30_000)
+    bpy.data.objects.remove(the_object())
+    yield 0.7
+    assert gone() and not overlay._drawing
