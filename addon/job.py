@@ -16,7 +16,7 @@ _PATIENCE = 0.4
 _TICK = 0.1
 
 
-class _Job:
+class Job:
     def __init__(self, work, progress):
         self.progress = progress
         self._outcome = None
@@ -67,7 +67,7 @@ class JobOperator:
             work = self.prepare(context)
         except (Refused, native.module.TolvolError) as error:
             return self._refuse(error)
-        self._job = _Job(work, native.module.Progress())
+        self._job = Job(work, native.module.Progress())
         if self._job.done(_PATIENCE):
             return self._guarded(context, self._job.outcome)
         manager = context.window_manager

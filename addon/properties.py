@@ -140,6 +140,23 @@ class TOLVOL_PG_measurement(bpy.types.PropertyGroup):
     share_outside: FloatProperty(description="Share of the mesh's area that is beyond the tolerance")
 
 
+class TOLVOL_PG_guard(bpy.types.PropertyGroup):
+    """Which of Blender's own tools are kept within the tolerance."""
+
+    sculpting: BoolProperty(
+        name="Sculpting",
+        description="Hold vertices back at the tolerance while a stroke goes on in Sculpt Mode",
+    )
+    editing: BoolProperty(
+        name="Editing",
+        description="Hold vertices back at the tolerance in Edit Mode, and undo edits of the faces that would leave it",
+    )
+    lattice: BoolProperty(
+        name="Lattice",
+        description="Stop the points of a lattice where the mesh that its modifier deforms would leave the tolerance",
+    )
+
+
 class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     __annotations__ = tolerance_settings() | decimate_settings()
 
@@ -188,6 +205,7 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     snapshot_size: FloatProperty()
     snapshot_seconds: FloatProperty(description="How long it took to build the tolerance volume")
 
+    guard: PointerProperty(type=TOLVOL_PG_guard)
     measurement: PointerProperty(type=TOLVOL_PG_measurement)
     last_run: StringProperty(description="The report of the last decimation, JSON")
     last_run_of: StringProperty(description="Fingerprint of the mesh it left")
@@ -195,6 +213,7 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
 
 def register():
     bpy.utils.register_class(TOLVOL_PG_measurement)
+    bpy.utils.register_class(TOLVOL_PG_guard)
     bpy.utils.register_class(TOLVOL_PG_settings)
     bpy.types.Object.tolvol = PointerProperty(type=TOLVOL_PG_settings)
 
@@ -202,4 +221,5 @@ def register():
 def unregister():
     del bpy.types.Object.tolvol
     bpy.utils.unregister_class(TOLVOL_PG_settings)
+    bpy.utils.unregister_class(TOLVOL_PG_guard)
     bpy.utils.unregister_class(TOLVOL_PG_measurement)

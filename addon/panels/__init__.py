@@ -6,8 +6,9 @@ import bpy
 from .decimate import TOLVOL_PT_decimate
 from .deform import TOLVOL_PT_deform
 from .deviation import TOLVOL_PT_deviation
+from .guard import TOLVOL_PT_guard
 from .tolerance import TOLVOL_PT_tolerance
 
-_CLASSES = (TOLVOL_PT_tolerance, TOLVOL_PT_deviation, TOLVOL_PT_decimate, TOLVOL_PT_deform)
+_CLASSES = (TOLVOL_PT_tolerance, TOLVOL_PT_deviation, TOLVOL_PT_decimate, TOLVOL_PT_deform, TOLVOL_PT_guard)
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guards: a mesh that Blender's own tools sculpt, edit or deform stays within the tolerance while they do it.
+
+There is no call from a brush: Blender evaluates the scene after each dab and each step of a transform, and then calls
+depsgraph_update_post, before it draws.
+"""
+
+import time
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import edit, lattice, sculpt
+
+# Setting of Object.tolvol.guard -> module. Each has wanted(ob), blocked(ob), follow(ob, restored, depsgraph), watches.
+ROOMS = {"sculpting": sculpt, "editing": edit, "lattice": lattice}
+
+_TICK = 0.1
+# Seconds after something was held back last until the stroke counts as over, and how long the status bar says so.
+_REST = 0.3
+_SAID = 4.0
+
+_restored = None  # "undo" or "redo" until what it brought back was looked at
+_quiet_at = None  # when the status bar is Blender's again
+
+
+def states(ob):
+    """(setting, text, whether it guards: None while there is nothing to guard) of each guard of `ob` that is switched on."""
+    for setting, room in ROOMS.items():
+        if getattr(ob.tolvol.guard, setting):
+            yield setting, *_state(ob, room)
+
+
+def _state(ob, room):
+    watch = room.watches.shown(ob)
+    if reason := room.blocked(ob):
+        return reason, False
+    if watch is None:
+        return None, None
+    if watch.on:
+        return watch.said() if watch.held_at else "Within the tolerance", True
+    return (watch.reason, False) if watch.reason else ("Being prepared", None)
+
+
+@persistent
+def _after_update(_scene, depsgraph):
+    global _restored
+    _sweep()
+    objects = [update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Object)]
+    followed = False
+    for ob in objects:
+        if ob.type == "MESH":
+            for room in ROOMS.values():
+                followed |= _follow(room, ob, depsgraph)
+    if followed:
+        _restored = None
+
+
+def _follow(room, ob, depsgraph):
+    if not room.wanted(ob):
+        return False
+    if room.blocked(ob):
+        room.watches.drop(ob.name)
+        return False
+    room.follow(ob, _restored, depsgraph)
+    _redraw("UI")
+    if not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=_TICK)
+    return True
+
+
+def _sweep():
+    """Lets go of what is no longer wanted: another mode, a switch, an object that was removed or renamed."""
+    for room in ROOMS.values():
+        for name, _ in room.watches:
+            ob = bpy.data.objects.get(name)
+            if ob is None or ob.type != "MESH" or not room.wanted(ob):
+                room.watches.drop(name)
+
+
+def _tick():
+    """What has to wait until Blender has time; seconds to the next call, None when there is nothing to wait for."""
+    _sweep()
+    busy = False
+    for room in ROOMS.values():
+        for name, watch in room.watches:
+            busy |= _look_after(room, bpy.data.objects[name], watch)
+    if _quiet_at is not None and time.monotonic() > _quiet_at:
+        _say(None)
+    return _TICK if busy or _quiet_at is not None else None
+
+
+def _look_after(room, ob, watch):
+    """Whether there is more to wait for."""
+    if watch.preparing:
+        if watch.settled():
+            _follow(room, ob, bpy.context.evaluated_depsgraph_get())
+        return True
+    if room is edit and edit.has_to_go(ob):
+        _undo(ob, watch)
+        return True
+    if watch.rested:
+        return False
+    if time.monotonic() - watch.held_at > _REST:
+        watch.rested = True
+        room.rest(ob)
+        _say(f"{ob.name}: {watch.said()}")
+    return True
+
+
+def _undo(ob, watch):
+    name, reason = ob.name, watch.reason
+    label = bpy.context.window_manager.operators[-1].name
+    with _window():
+        bpy.ops.ed.undo()
+    _say(f"{label} was undone: {reason} of {name}")
+
+
+def _window():
+    """A context with a window, which timers have none of."""
+    window = bpy.context.window_manager.windows[0]
+    area = next((area for area in window.screen.areas if area.type == "VIEW_3D"), window.screen.areas[0])
+    return bpy.context.temp_override(window=window, area=area, region=area.regions[-1])
+
+
+def _say(text):
+    """Shows a text in the status bar for a while; None gives the bar back."""
+    global _quiet_at
+    with _window():
+        bpy.context.workspace.status_text_set(text)
+    _quiet_at = text and time.monotonic() + _SAID
+
+
+def _redraw(kind):
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                for region in area.regions:
+                    if region.type == kind:
+                        region.tag_redraw()
+
+
+@persistent
+def _before_undo(*_):
+    global _restored
+    _restored = "undo"
+
+
+@persistent
+def _before_redo(*_):
+    global _restored
+    _restored = "redo"
+
+
+@persistent
+def _forget(*_):
+    global _restored
+    _restored = None
+    for room in ROOMS.values():
+        for name, _ in room.watches:
+            room.watches.drop(name)
+
+
+_HANDLERS = (
+    ("depsgraph_update_post", _after_update),
+    ("undo_pre", _before_undo),
+    ("redo_pre", _before_redo),
+    ("load_pre", _forget),
+)
+
+
+def register():
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister():
+    for name, handler in reversed(_HANDLERS):
+        getattr(bpy.app.handlers, name).remove(handler)
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    if _quiet_at is not None:
+        _say(None)
+    _forget()
