@@ -16,8 +16,7 @@ from . import edit, lattice, sculpt
 ROOMS = {"sculpting": sculpt, "editing": edit, "lattice": lattice}
 
 _TICK = 0.1
-# Seconds after something was held back last until the stroke counts as over, and how long the status bar says so.
-_REST = 0.3
+# Seconds for which the status bar says what was held back.
 _SAID = 4.0
 
 _restored = None  # "undo" or "redo" until what it brought back was looked at
@@ -38,7 +37,7 @@ def _state(ob, room):
     if watch is None:
         return None, None
     if watch.on:
-        return watch.said() if watch.held_at else "Within the tolerance", True
+        return watch.said() or "Within the tolerance", True
     return (watch.reason, False) if watch.reason else ("Being prepared", None)
 
 
@@ -99,12 +98,14 @@ def _look_after(room, ob, watch):
     if room is edit and edit.has_to_go(ob):
         _undo(ob, watch)
         return True
-    if watch.rested:
+    if watch.rest_at is None:
         return False
-    if time.monotonic() - watch.held_at > _REST:
-        watch.rested = True
+    if time.monotonic() > watch.rest_at:
+        watch.rest_at = None
+        said = watch.said()
         room.rest(ob)
-        _say(f"{ob.name}: {watch.said()}")
+        if said:
+            _say(f"{ob.name}: {said}")
     return True
 
 

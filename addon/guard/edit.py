@@ -39,9 +39,9 @@ def follow(ob, restored, _depsgraph):
     if not current.settled() or not current.on:
         return
     changed = known[0] if known else np.empty(0, np.int32)
-    held, places = current.hold(positions)
-    if len(held) and not (restored and watches.restart(ob, positions)):
-        positions[held] = places
+    wished = positions.copy() if restored else None
+    held = current.hold(positions)
+    if len(held) and not (restored and watches.restart(ob, wished)):
         changed = np.union1d(changed, held)
         _corrections[wish] = changed, positions[changed]
     if len(changed):

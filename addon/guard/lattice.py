@@ -5,6 +5,8 @@ What is checked is the mesh as the viewport shows it, with all modifiers. It mov
 line when nothing but lattices deforms it: that line proposes how far they may go, and what comes of it is checked again.
 """
 
+import time
+
 import bpy
 import numpy as np
 
@@ -44,6 +46,7 @@ class LatticeWatch(watch.Preparing):
     def __init__(self, ob):
         super().__init__()
         self._tries = 0
+        self._stopped = False
         self._built = None
         self._positions = self._points = self._proposed = None
         try:
@@ -69,20 +72,26 @@ class LatticeWatch(watch.Preparing):
         if not len(failing):
             self._positions, self._points = positions, points
             self.on, self.reason = True, None
+            self._stopped = _equal(points, self._proposed)
             return None
         outside = len(np.unique(arrays.polygons[failing]))
         if not self.on or _equal(points, self._points):
             self.on, self.reason = False, f"{outside:,} faces of the deformed mesh are outside"
             return None
-        self.held()
+        self.stopped()
         # What did not come out as proposed is proposed nearer, but not for ever.
         self._tries = self._tries + 1 if _equal(points, self._proposed) else 0
         share = 0.0 if self._tries > _MOST_TRIES else self._share(positions, arrays.triangles[failing])
         self._proposed = [last + np.float32(share) * (now - last) for now, last in zip(points, self._points)]
         return self._proposed
 
+    def stopped(self):
+        self.rest_at = time.monotonic() + watch.REST
+        self._stopped = True
+
     def said(self):
-        return "The lattice was stopped at the tolerance"
+        """What happened last, or None."""
+        return "The lattice was stopped at the tolerance" if self._stopped else None
 
     def _failing(self, positions, triangles):
         return np.flatnonzero(self._built.check(positions, triangles, **self._options).verdict < INSIDE)
@@ -108,7 +117,7 @@ def follow(ob, restored, depsgraph):
     current = watches.shown(ob)
     if known and current:
         _write(cages, known)
-        current.held()
+        current.stopped()
         return
     evaluated = ob.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()

@@ -29,11 +29,11 @@ def follow(ob, restored, _depsgraph):
     current = watches.of(ob, _topology(ob.data), lambda followed: watch.Watch(ob, positions.copy(), followed))
     if not current.settled() or not current.on:
         return
-    indices, places = current.hold(positions)
+    wished = positions.copy() if restored or ob.active_shape_key else None
+    held = current.hold(positions)
     # What undo brings back was certified in its time: it is proved anew rather than changed.
-    if not len(indices) or (restored and watches.restart(ob, positions)):
-        return
-    _write(ob, positions, indices, places)
+    if len(held) and not (restored and watches.restart(ob, wished)):
+        _write(ob, wished, positions)
 
 
 def rest(ob):
@@ -46,15 +46,12 @@ def _topology(mesh):
     return (len(mesh.vertices), len(mesh.loops), mesh.loops[0].as_pointer(), mesh.polygons[0].as_pointer())
 
 
-def _write(ob, positions, indices, places):
-    wished = positions.copy()
-    positions[indices] = places
-    mesh = ob.data
-    keys = mesh.shape_keys
-    if keys and ob.active_shape_key == keys.reference_key:
+def _write(ob, wished, positions):
+    mesh, key = ob.data, ob.active_shape_key
+    if key and key == mesh.shape_keys.reference_key:
         mesh_io.move_vertices(mesh, wished, positions)
         return
     watch.points_of(ob).foreach_set("co", positions.ravel())
-    # A bare mesh is drawn as it is sculpted; a changed one that is evaluated has to be told.
-    if keys or ob.modifiers:
+    # A bare mesh is drawn as it is sculpted; one that is evaluated has to be told.
+    if key or ob.modifiers:
         mesh.update()

@@ -19,8 +19,14 @@ from ..job import Job
 _PATIENCE = 0.4
 # Of a face with so many corners all triangles between any three of them are kept inside: 41,664.
 _MOST_CORNERS = 64
-# Seconds in which nothing is held back after which it is another stroke that does.
+# Seconds without an edit after which the next one is another stroke.
 _STROKE_GAP = 0.5
+# Seconds after something was held back in which the stroke counts as going on.
+REST = 0.3
+# Tolerances of a way of which 1/64 is too much to give away.
+_FAR = 3
+
+_NONE = np.empty(0, np.int32)
 
 
 def blocked(ob):
@@ -98,8 +104,7 @@ class Preparing:
         self.followed = followed
         self.reason = None
         self.on = False
-        self.held_at = None  # when something was held back last
-        self.rested = True
+        self.rest_at = None  # when the stroke that something was held back in counts as over, if there is one
         self._job = None
 
     def begin(self, work):
@@ -119,13 +124,6 @@ class Preparing:
     @property
     def preparing(self):
         return self._job is not None
-
-    def held(self):
-        """Notes that something was held back now; whether that begins another stroke."""
-        now = time.monotonic()
-        another = self.held_at is None or now - self.held_at > _STROKE_GAP
-        self.held_at, self.rested = now, False
-        return another
 
     def end(self):
         """Lets go of a thread that is still at work."""
@@ -147,7 +145,9 @@ class Watch(Preparing):
         super().__init__(followed)
         self.kept_polygons = 0
         self._guard = None
+        self._last = positions
         self._held = np.zeros(len(positions), bool)
+        self._edited_at = 0.0
         try:
             faces = Faces.of(ob.data)
             reference, tolerance, matrix, threads = needed(ob)
@@ -180,30 +180,42 @@ class Watch(Preparing):
         return int(np.count_nonzero(self._held))
 
     def hold(self, positions):
-        """Takes the mesh as it was edited; (k,) the vertices that have to go back, and (k, 3) where to."""
-        indices, places = self._guard.constrain(positions)
+        """Takes the mesh as it was edited, and keeps the array; moves what has to go back in it: (k,) these vertices."""
+        if np.array_equal(positions.view(np.int32), self._last.view(np.int32)):
+            return _NONE
+        now = time.monotonic()
+        if now - self._edited_at > _STROKE_GAP:
+            self._held[:] = False
+        self._edited_at = now
+        try:
+            indices, places = self._guard.constrain(positions)
+        except native.module.TolvolError as error:  # a coordinate that is not finite
+            self.on, self.reason = False, str(error)
+            return _NONE
         if len(indices):
-            places = self._nearer(positions, indices, places)
-            if self.held():
-                self._held[:] = False
+            positions[indices] = self._nearer(positions, indices, places)
             self._held[indices] = True
-        return indices, places
+            self.rest_at = now + REST
+        self._last = positions
+        return indices
 
     def _nearer(self, positions, indices, places):
         """The guard finds how far a vertex may go to 1/64 of its way: one that was sent far away is sent on from where it
         stopped, a tolerance at most."""
         way = positions[indices] - places
-        length = np.maximum(np.linalg.norm(way, axis=1), np.finfo(np.float32).tiny)
-        if (length <= self._step).all():
+        length = np.linalg.norm(way, axis=1)
+        if length.max() <= _FAR * self._step:
             return places
+        length = np.maximum(length, self._step)
         positions = positions.copy()
-        positions[indices] = places + way * np.minimum(1, self._step / length)[:, None]
+        positions[indices] = places + way * (self._step / length)[:, None]
         stopped, places = self._guard.constrain(positions)
         positions[stopped] = places
         return positions[indices]
 
     def said(self):
-        return f"Held back {self.held_back:,} vertices"
+        """What happened in the last stroke, or None."""
+        return f"Held back {self.held_back:,} vertices" if self._held.any() else None
 
 
 def outside_reason(count):
