@@ -63,9 +63,14 @@ def _follow(room, ob, depsgraph):
         return False
     room.follow(ob, _restored, depsgraph)
     _redraw("UI")
-    if not bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.register(_tick, first_interval=_TICK)
+    _call_tick(0 if room is edit and edit.outside(ob) else _TICK)
     return True
+
+
+def _call_tick(seconds):
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    bpy.app.timers.register(_tick, first_interval=seconds)
 
 
 def _sweep():
@@ -80,41 +85,45 @@ def _sweep():
 def _tick():
     """What has to wait until Blender has time; seconds to the next call, None when there is nothing to wait for."""
     _sweep()
-    busy = False
+    waits = []
     for room in ROOMS.values():
         for name, watch in room.watches:
-            busy |= _look_after(room, bpy.data.objects[name], watch)
-    if _quiet_at is not None and time.monotonic() > _quiet_at:
-        _say(None)
-    return _TICK if busy or _quiet_at is not None else None
+            waits.append(_look_after(room, bpy.data.objects[name], watch))
+    if _quiet_at is not None:
+        waits.append(_TICK)
+        if time.monotonic() > _quiet_at:
+            _say(None)
+    return min((wait for wait in waits if wait is not None), default=None)
 
 
 def _look_after(room, ob, watch):
-    """Whether there is more to wait for."""
+    """Seconds to the next call, None for never."""
     if watch.preparing:
         if watch.settled():
             _follow(room, ob, bpy.context.evaluated_depsgraph_get())
-        return True
-    if room is edit and edit.has_to_go(ob):
-        _undo(ob, watch)
-        return True
+        return _TICK
+    if room is edit and edit.outside(ob):
+        if edit.has_ended(ob):
+            _undo(ob)
+        # Timers come before events: nothing can begin between the end of an operator and the next call.
+        return 0
     if watch.rest_at is None:
-        return False
+        return None
     if time.monotonic() > watch.rest_at:
         watch.rest_at = None
         said = watch.said()
         room.rest(ob)
         if said:
             _say(f"{ob.name}: {said}")
-    return True
+    return _TICK
 
 
-def _undo(ob, watch):
-    name, reason = ob.name, watch.reason
-    label = bpy.context.window_manager.operators[-1].name
+def _undo(ob):
+    operators = bpy.context.window_manager.operators
+    label, name = operators[-1].name if operators else "Redo", ob.name
     with _window():
         bpy.ops.ed.undo()
-    _say(f"{label} was undone: {reason} of {name}")
+    _say(f"{label} was undone: {name} would leave the tolerance")
 
 
 def _window():

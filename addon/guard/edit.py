@@ -54,10 +54,17 @@ def rest(ob):
     bmesh.update_edit_mesh(ob.data)
 
 
-def has_to_go(ob):
-    """Whether the last operator has ended and left faces that are outside, of a mesh that was inside before it."""
+def outside(ob):
+    """Whether an operator, which may go on, made faces that are outside of a mesh that was inside before it."""
     current = watches.shown(ob)
-    return current.settled() and not current.on and current.followed and _last_operator() != _last_inside.get(ob.name)
+    return current is not None and not current.preparing and not current.on and current.followed
+
+
+def has_ended(ob):
+    """Whether that operator has ended: one that goes on has its hands in the mesh, and to undo would crash Blender."""
+    if any(getattr(window, "modal_operators", ()) for window in bpy.context.window_manager.windows):
+        return False
+    return _last_operator() != _last_inside[ob.name]
 
 
 def _accept_restored(ob, current, restored):
@@ -66,7 +73,7 @@ def _accept_restored(ob, current, restored):
     if restored == "undo" and _last_operator() is None:
         current.followed = False
     else:
-        _last_inside.pop(ob.name, None)
+        _last_inside[ob.name] = "another"
 
 
 def _last_operator():
