@@ -7,9 +7,9 @@ from .. import guard
 from .layout import AMBER, GREEN, GREY, SubPanel, text_lines
 
 _WHERE = {
-    "sculpting": "Guards in Sculpt Mode",
-    "editing": "Guards in Edit Mode",
-    "lattice": "Guards in Object Mode, while the lattice is edited",
+    "sculpting": "Takes effect in Sculpt Mode",
+    "editing": "Takes effect in Edit Mode",
+    "lattice": "Takes effect while the mesh is in Object Mode",
 }
 
 

@@ -5,11 +5,13 @@ import subprocess
 
 import bpy
 import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Euler
 
 import scenes
-from addon import guard, mesh_io, native
-from window import centre, key, region, reset, screenshot, view, xdotool
+from addon import guard, mesh_io, native, panels
+from addon.panels.guard import TOLVOL_PT_guard
+from window import centre, click, key, on_screen, open_tab, region, reset, screenshot, view, xdotool
 
 TOLERANCE = 0.02
 
@@ -67,40 +69,124 @@ def across(length=200, steps=12):
     return [(x - length // 2 + i * length // steps, y + 3 * (i % 2)) for i in range(steps + 1)]
 
 
+def only_guard_panel():
+    """Shows no other sub-panel, and this one open."""
+    for cls in panels._CLASSES[1:]:
+        bpy.utils.unregister_class(cls)
+    TOLVOL_PT_guard.bl_options = set()
+    bpy.utils.register_class(TOLVOL_PT_guard)
+
+
+def all_panels():
+    bpy.utils.unregister_class(TOLVOL_PT_guard)
+    TOLVOL_PT_guard.bl_options = {"DEFAULT_CLOSED"}
+    for cls in panels._CLASSES[1:]:
+        bpy.utils.register_class(cls)
+
+
+def switch(setting):
+    """Clicks a switch in the sidebar: Blender's Shift Ctrl C over it copies where it is stored."""
+    sidebar = region("UI")
+    for y in range(150, sidebar.height - 5, 10):
+        place = on_screen(sidebar, sidebar.width // 3, y)
+        bpy.context.window_manager.clipboard = ""
+        xdotool("mousemove", *place, "sleep", "0.03", "key", "ctrl+shift+c")
+        yield 0.1
+        if bpy.context.window_manager.clipboard == f"tolvol.guard.{setting}":
+            click(*place)
+            yield 0.3
+            return
+    raise AssertionError(f"no switch {setting}")
+
+
+def undone_and_redone(read, *steps):
+    """Presses keys and compares bit for bit: (keys, coordinates) each."""
+    for keys, expected in steps:
+        key(keys)
+        yield 0.8
+        assert np.array_equal(read(), expected), keys
+
+
 def test_guard_sculpting_by_mouse():
     yield from reset(sheet)
     look()
     reference, before = scenes.world_triangles(ob()), coordinates()
-    ob().tolvol.guard.sculpting = True
-    yield 0.3
-    mode("SCULPT")
-    yield 0.5
-    assert guard.sculpt.watches.shown(ob()).on
-    sculpting = bpy.context.tool_settings.sculpt
-    sculpting.brush.strength = 1.0
-    start = coordinates()
-    yield from stroke(*across())
-    yield 0.5
-    screenshot("guard 1 stroke")
+    only_guard_panel()
+    try:
+        yield from open_tab()
+        yield from switch("sculpting")
+        mode("SCULPT")
+        yield 0.5
+        assert np.array_equal(coordinates(), before)
+        bpy.context.tool_settings.sculpt.brush.strength = 1.0
+        yield from stroke(*across())
+        screenshot("guard 1 stroke")
+    finally:
+        all_panels()
     after = coordinates()
-    print("forward", forward(reference), [*guard.states(ob())])
     assert 0.95 < forward(reference) <= 1
-    assert np.array_equal(start, before)
     touched = (after != before).any(1)
-    assert 0 < touched.sum() < len(before) / 2
     held = guard.sculpt.watches.shown(ob()).held_back
-    assert 0 < held <= touched.sum()
+    assert 0 < held <= touched.sum() < len(before) / 2
     assert [*guard.states(ob())] == [("sculpting", f"Held back {held:,} vertices", True)]
     yield from stroke(*across())
     again = coordinates()
     assert forward(reference) <= 1
-    for keys, expected in (("ctrl+z", after), ("ctrl+z", before), ("ctrl+shift+z", after), ("ctrl+shift+z", again)):
-        key(keys)
-        yield 0.8
-        assert np.array_equal(coordinates(), expected), keys
+    undo, redo = "ctrl+z", "ctrl+shift+z"
+    yield from undone_and_redone(coordinates, (undo, after), (undo, before), (redo, after), (redo, again))
     mode("OBJECT")
     yield 0.3
     assert guard.sculpt.watches.shown(ob()) is None
+
+
+def test_guard_other_brushes():
+    yield from reset(lambda: sheet(60, 0.1))
+    look(1.0)
+    reference = scenes.world_triangles(ob())
+    ob().tolvol.guard.sculpting = True
+    mode("SCULPT")
+    yield 0.5
+    bpy.context.tool_settings.unified_paint_settings.size = 60
+    for name in ("Grab", "Snake Hook", "Pose", "Cloth", "Inflate/Deflate", "Smooth"):
+        bpy.context.tool_settings.sculpt.brush = bpy.data.brushes[name]
+        before = coordinates()
+        # A brush begins where a ray meets the surface.
+        way = [ob().data.vertices[60 * 31 + 10 + 4 * i].co[:] for i in range(10)]
+        with window_context():
+            bpy.ops.sculpt.brush_stroke("EXEC_DEFAULT", True, stroke=[_sample(i, at) for i, at in enumerate(way)])
+        yield 0.4
+        assert not np.array_equal(coordinates(), before), name
+        assert forward(reference) <= 1, name
+    assert forward(reference) > 0.95
+    mode("OBJECT")
+
+
+def _sample(i, at):
+    place = location_3d_to_region_2d(region("WINDOW"), view()[1].spaces[0].region_3d, at)
+    sample = {
+        "name": "",
+        "location": at,
+        "mouse": place,
+        "mouse_event": place,
+        "pressure": 1,
+        "size": 60,
+        "time": i / 50,
+    }
+    return sample | {"is_start": i == 0, "pen_flip": False, "x_tilt": 0, "y_tilt": 0}
+
+
+def grab(far, slowly=False):
+    """G, the mouse up the screen by so many pixels, and a click."""
+    x, y = centre()
+    xdotool("mousemove", x, y)
+    yield 0.3
+    key("g")
+    yield 0.3
+    for share in (0.2, 0.5, 0.8, 1) if slowly else (1,):
+        xdotool("mousemove", x + int(share * far / 8), y - int(share * far))
+        yield 0.1 if slowly else 0.0
+    click(x + far // 8, y - far)
+    yield 0.8
 
 
 def test_guard_editing_by_keys():
@@ -113,31 +199,31 @@ def test_guard_editing_by_keys():
         bpy.ops.mesh.select_all("EXEC_DEFAULT", True, action="SELECT")
     yield 0.5
     states = [coordinates()]
-    x, y = centre()
-
-    def grab(far, slowly):
-        xdotool("mousemove", x, y)
-        yield 0.3
-        key("g")
-        yield 0.3
-        for share in (0.2, 0.5, 0.8, 1) if slowly else (1,):
-            xdotool("mousemove", x + int(share * far / 8), y - int(share * far))
-            yield 0.1 if slowly else 0.0
-        xdotool("click", 1)
-        yield 0.6
+    for far, slowly in ((60, True), (-60, False)):
+        yield from grab(far, slowly)
         states.append(coordinates())
-        print(forward(reference), [*guard.states(ob())])
         assert not np.array_equal(states[-1], states[-2])
         assert 0.95 < forward(reference) <= 1
-
-    yield from grab(60, True)
-    yield from grab(-60, False)
     screenshot("guard 2 grabbed")
-    for keys, state in (("ctrl+z", 1), ("ctrl+z", 0), ("ctrl+shift+z", 1), ("ctrl+shift+z", 2)):
-        key(keys)
-        yield 0.8
-        print(keys, coordinates()[:,2].max(), coordinates()[:,2].min(), np.abs(coordinates()-states[state]).max())
-        assert np.array_equal(coordinates(), states[state]), keys
+    undo, redo = "ctrl+z", "ctrl+shift+z"
+    steps = (undo, states[1]), (undo, states[0]), (redo, states[1]), (redo, states[2])
+    yield from undone_and_redone(coordinates, *steps)
+    # Faces that would leave go again, also when they are made again.
+    with window_context():
+        bpy.ops.mesh.solidify("EXEC_DEFAULT", True, thickness=0.5)
+    yield 1.0
+    screenshot("guard 3 solidify undone")
+    assert np.array_equal(coordinates(), states[2])
+    yield from undone_and_redone(coordinates, (redo, states[2]))
+    # What an extrusion makes is inside, and then moves as far as it may.
+    key("e")
+    yield 0.3
+    xdotool("mousemove_relative", 0, 100)
+    yield 0.3
+    xdotool("click", 1)
+    yield 0.8
+    assert len(coordinates()) == 2 * len(states[0])
+    assert forward(reference) <= 1
     mode("OBJECT")
 
 
@@ -149,14 +235,18 @@ def cage():
     bpy.context.collection.objects.link(lattice)
     lattice.scale = 0.8, 0.8, 1
     ob().modifiers.new("lattice", "LATTICE").object = lattice
-    return lattice
+    scenes.activate(lattice)
 
 
-def evaluated():
-    """The deformed mesh in the world."""
-    surface = ob().evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
-    arrays = mesh_io.read_mesh(surface)
-    return mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob().matrix_world)), arrays.triangles
+def points():
+    return mesh_io.column(bpy.data.lattices["cage"].points, "co_deform", 3)
+
+
+def deformed(reference):
+    """As forward(), of the mesh that the viewport shows."""
+    arrays = mesh_io.read_mesh(ob().evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh())
+    vertices = mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob().matrix_world))
+    return native.module.hausdorff(vertices, arrays.triangles, *reference, bound=TOLERANCE).upper / TOLERANCE
 
 
 def test_guard_lattice_by_keys():
@@ -164,33 +254,18 @@ def test_guard_lattice_by_keys():
     look(np.pi / 2)
     reference = scenes.world_triangles(ob())
     ob().tolvol.guard.lattice = True
-    lattice = bpy.data.objects["cage"]
-    scenes.activate(lattice)
     mode("EDIT")
-    yield 0.5
-    x, y = centre()
-    print([*guard.states(ob())])
     with window_context():
         bpy.ops.lattice.select_all("EXEC_DEFAULT", True, action="SELECT")
     yield 0.5
-    states = [mesh_io.column(lattice.data.points, "co_deform", 3)]
+    states = [points()]
     for far, slowly in ((60, True), (-80, False)):
-        xdotool("mousemove", x, y)
-        yield 0.3
-        key("g")
-        yield 0.3
-        for share in (0.2, 0.5, 0.8, 1) if slowly else (1,):
-            xdotool("mousemove", x + int(share * far / 8), y - int(share * far))
-            yield 0.1 if slowly else 0.0
-        xdotool("click", 1)
-        yield 0.6
-        far = native.module.hausdorff(*evaluated(), *reference, bound=TOLERANCE)
-        states.append(mesh_io.column(lattice.data.points, "co_deform", 3))
-        print(far.upper / TOLERANCE, [*guard.states(ob())], states[-1][:, 2].max())
-        screenshot("guard 3 lattice")
-    for keys, state in (("ctrl+z", 1), ("ctrl+z", 0), ("ctrl+shift+z", 1), ("ctrl+shift+z", 2)):
-        key(keys)
-        yield 0.8
-        now = mesh_io.column(bpy.data.lattices["cage"].points, "co_deform", 3)
-        far = native.module.hausdorff(*evaluated(), *reference, bound=TOLERANCE)
-        print(keys, np.abs(now - states[state]).max(), far.upper / TOLERANCE)
+        yield from grab(far, slowly)
+        states.append(points())
+        assert not np.array_equal(states[-1], states[-2])
+        assert 0.9 < deformed(reference) <= 1
+    screenshot("guard 4 lattice")
+    undo, redo = "ctrl+z", "ctrl+shift+z"
+    yield from undone_and_redone(points, (undo, states[1]), (undo, states[0]), (redo, states[1]), (redo, states[2]))
+    assert deformed(reference) <= 1
+    mode("OBJECT")
