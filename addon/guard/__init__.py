@@ -10,7 +10,7 @@ import time
 import bpy
 from bpy.app.handlers import persistent
 
-from . import edit, lattice, sculpt
+from . import edit, lattice, sculpt, undo
 
 # Setting of Object.tolvol.guard -> module. Each has wanted(ob), blocked(ob), follow(ob, restored, depsgraph), watches.
 ROOMS = {"sculpting": sculpt, "editing": edit, "lattice": lattice}
@@ -63,14 +63,9 @@ def _follow(room, ob, depsgraph):
         return False
     room.follow(ob, _restored, depsgraph)
     _redraw("UI")
-    _call_tick(0 if room is edit and edit.outside(ob) else _TICK)
+    if not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=_TICK)
     return True
-
-
-def _call_tick(seconds):
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
-    bpy.app.timers.register(_tick, first_interval=seconds)
 
 
 def _sweep():
@@ -83,47 +78,32 @@ def _sweep():
 
 
 def _tick():
-    """What has to wait until Blender has time; seconds to the next call, None when there is nothing to wait for."""
+    """What has to wait until Blender has time; seconds to the next call, None when there is nothing."""
     _sweep()
-    waits = []
+    busy = undo.expect()
     for room in ROOMS.values():
         for name, watch in room.watches:
-            waits.append(_look_after(room, bpy.data.objects[name], watch))
-    if _quiet_at is not None:
-        waits.append(_TICK)
-        if time.monotonic() > _quiet_at:
-            _say(None)
-    return min((wait for wait in waits if wait is not None), default=None)
+            busy |= _look_after(room, bpy.data.objects[name], watch)
+    if _quiet_at is not None and time.monotonic() > _quiet_at:
+        _say(None)
+    return _TICK if busy or _quiet_at is not None else None
 
 
 def _look_after(room, ob, watch):
-    """Seconds to the next call, None for never."""
+    """Whether there is more to wait for."""
     if watch.preparing:
         if watch.settled():
             _follow(room, ob, bpy.context.evaluated_depsgraph_get())
-        return _TICK
-    if room is edit and edit.outside(ob):
-        if edit.has_ended(ob):
-            _undo(ob)
-        # Timers come before events: nothing can begin between the end of an operator and the next call.
-        return 0
+        return True
     if watch.rest_at is None:
-        return None
+        return False
     if time.monotonic() > watch.rest_at:
         watch.rest_at = None
         said = watch.said()
         room.rest(ob)
         if said:
             _say(f"{ob.name}: {said}")
-    return _TICK
-
-
-def _undo(ob):
-    operators = bpy.context.window_manager.operators
-    label, name = operators[-1].name if operators else "Redo", ob.name
-    with _window():
-        bpy.ops.ed.undo()
-    _say(f"{label} was undone: {name} would leave the tolerance")
+    return True
 
 
 def _window():
@@ -180,6 +160,7 @@ _HANDLERS = (
 
 
 def register():
+    undo.register()
     for name, handler in _HANDLERS:
         getattr(bpy.app.handlers, name).append(handler)
 
@@ -192,3 +173,4 @@ def unregister():
     if _quiet_at is not None:
         _say(None)
     _forget()
+    undo.unregister()

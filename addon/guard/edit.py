@@ -10,7 +10,7 @@ from . import watch
 
 watches = watch.Watches()
 _corrections = watch.Corrections()  # fingerprint of coordinates and faces -> (indices, places)
-_last_inside = {}  # object name -> the operator that was the last when its mesh was last inside
+_undoing = False
 
 
 def wanted(ob):
@@ -34,8 +34,9 @@ def follow(ob, restored, _depsgraph):
     if known:
         positions[known[0]] = known[1]
     current = watches.of(ob, topology, lambda followed: watch.Watch(ob, positions.copy(), followed))
-    if restored:
-        _accept_restored(ob, current, restored)
+    # What a person goes back to was there before the guard; Adjust Last Operation, which keeps the operator, is an edit.
+    if restored == "undo" and not _undoing and not bpy.context.window_manager.operators:
+        current.followed = False
     if not current.settled() or not current.on:
         return
     changed = known[0] if known else np.empty(0, np.int32)
@@ -46,7 +47,6 @@ def follow(ob, restored, _depsgraph):
         _corrections[wish] = changed, positions[changed]
     if len(changed):
         _write(mesh, changed, positions[changed])
-    _last_inside[ob.name] = _last_operator()
 
 
 def rest(ob):
@@ -54,31 +54,22 @@ def rest(ob):
     bmesh.update_edit_mesh(ob.data)
 
 
-def outside(ob):
-    """Whether an operator, which may go on, made faces that are outside of a mesh that was inside before it."""
-    current = watches.shown(ob)
-    return current is not None and not current.preparing and not current.on and current.followed
+def outside():
+    """An object with faces that an operator, which may go on, made outside of a mesh that was inside before, or None."""
+    for name, current in watches:
+        if current.followed and not current.on and not current.preparing:
+            return bpy.data.objects.get(name)
+    return None
 
 
-def has_ended(ob):
-    """Whether that operator has ended: one that goes on has its hands in the mesh, and to undo would crash Blender."""
-    if any(getattr(window, "modal_operators", ()) for window in bpy.context.window_manager.windows):
-        return False
-    return _last_operator() != _last_inside[ob.name]
-
-
-def _accept_restored(ob, current, restored):
-    """A step that was undone for leaving the tolerance is undone when it is done again. What lies before the guard was
-    switched on is no step to undo; Adjust Last Operation, which keeps the operator, is."""
-    if restored == "undo" and _last_operator() is None:
-        current.followed = False
-    else:
-        _last_inside[ob.name] = "another"
-
-
-def _last_operator():
-    operators = bpy.context.window_manager.operators
-    return operators[-1].as_pointer() if operators else None
+def undo():
+    """Goes one step back for good: until it is inside again, whatever was done meanwhile."""
+    global _undoing
+    _undoing = True
+    try:
+        bpy.ops.ed.undo()
+    finally:
+        _undoing = False
 
 
 def _write(mesh, indices, places):
