@@ -10,17 +10,14 @@ import time
 import bpy
 from bpy.app.handlers import persistent
 
-from . import edit, lattice, sculpt, undo
+from . import edit, lattice, sculpt, status_bar, undo
 
 # Setting of Object.tolvol.guard -> module. Each has wanted(ob), blocked(ob), follow(ob, restored, depsgraph), watches.
 ROOMS = {"sculpting": sculpt, "editing": edit, "lattice": lattice}
 
 _TICK = 0.1
-# Seconds for which the status bar says what was held back.
-_SAID = 4.0
 
 _restored = None  # "undo" or "redo" until what it brought back was looked at
-_quiet_at = None  # when the status bar is Blender's again
 
 
 def states(ob):
@@ -62,7 +59,7 @@ def _follow(room, ob, depsgraph):
         room.watches.drop(ob.name)
         return False
     room.follow(ob, _restored, depsgraph)
-    _redraw("UI")
+    _redraw_panels()
     if not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=_TICK)
     return True
@@ -80,13 +77,11 @@ def _sweep():
 def _tick():
     """What has to wait until Blender has time; seconds to the next call, None when there is nothing."""
     _sweep()
-    busy = undo.expect()
+    busy = undo.expect() | status_bar.look()
     for room in ROOMS.values():
         for name, watch in room.watches:
             busy |= _look_after(room, bpy.data.objects[name], watch)
-    if _quiet_at is not None and time.monotonic() > _quiet_at:
-        _say(None)
-    return _TICK if busy or _quiet_at is not None else None
+    return _TICK if busy else None
 
 
 def _look_after(room, ob, watch):
@@ -99,35 +94,18 @@ def _look_after(room, ob, watch):
         return False
     if time.monotonic() > watch.rest_at:
         watch.rest_at = None
-        said = watch.said()
+        if said := watch.said():
+            status_bar.say(f"{ob.name}: {said}")
         room.rest(ob)
-        if said:
-            _say(f"{ob.name}: {said}")
     return True
 
 
-def _window():
-    """A context with a window, which timers have none of."""
-    window = bpy.context.window_manager.windows[0]
-    area = next((area for area in window.screen.areas if area.type == "VIEW_3D"), window.screen.areas[0])
-    return bpy.context.temp_override(window=window, area=area, region=area.regions[-1])
-
-
-def _say(text):
-    """Shows a text in the status bar for a while; None gives the bar back."""
-    global _quiet_at
-    with _window():
-        bpy.context.workspace.status_text_set(text)
-    _quiet_at = text and time.monotonic() + _SAID
-
-
-def _redraw(kind):
+def _redraw_panels():
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                for region in area.regions:
-                    if region.type == kind:
-                        region.tag_redraw()
+            for region in area.regions:
+                if area.type == "VIEW_3D" and region.type == "UI":
+                    region.tag_redraw()
 
 
 @persistent
@@ -170,7 +148,6 @@ def unregister():
         getattr(bpy.app.handlers, name).remove(handler)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
-    if _quiet_at is not None:
-        _say(None)
+    status_bar.clear()
     _forget()
     undo.unregister()

@@ -7,7 +7,7 @@ move of the mouse then: one that arrives at the keymap of the window says that t
 
 import bpy
 
-from . import edit
+from . import edit, status_bar
 
 _item = None  # (keymap, its item) while there is something to undo
 
@@ -27,7 +27,7 @@ class TOLVOL_OT_guard_undo(bpy.types.Operator):
         name, operators = edit.outside().name, context.window_manager.operators
         label = operators[-1].name if operators else "The last step"
         edit.undo()
-        self.report({"WARNING"}, f"{label} was undone: {name} would leave the tolerance")
+        status_bar.say(f"{label} was undone: {name} would leave the tolerance")
         return {"FINISHED", "PASS_THROUGH"}
 
 

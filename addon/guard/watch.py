@@ -215,7 +215,9 @@ class Watch(Preparing):
 
     def said(self):
         """What happened in the last stroke, or None."""
-        return f"Held back {self.held_back:,} vertices" if self._held.any() else None
+        if self._held.any():
+            return f"Held back {self.held_back:,} vertices"
+        return f"{self.kept_polygons:,} concave faces stay where they are" if self.kept_polygons else None
 
 
 def outside_reason(count):
