@@ -17,7 +17,7 @@ _PATIENCE = 0.4
 _TICK = 0.1
 
 
-class _Job:
+class Job:
     def __init__(self, work, progress):
         self.progress = progress
         self._outcome = None
@@ -126,7 +126,7 @@ class JobOperator:
     def _advance(self):
         """Starts the next work, and returns how the operator ended where there is none."""
         try:
-            self._job = _Job(self._next_work(), self._progress)
+            self._job = Job(self._next_work(), self._progress)
         except StopIteration:
             return {"FINISHED"}
         except native.module.Cancelled:

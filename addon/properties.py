@@ -123,6 +123,23 @@ DEVIATION_KINDS = (
 )
 
 
+class TOLVOL_PG_guard(bpy.types.PropertyGroup):
+    """Which of Blender's own tools are kept within the tolerance."""
+
+    sculpting: BoolProperty(
+        name="Sculpting",
+        description="Hold vertices back at the tolerance while a stroke goes on in Sculpt Mode",
+    )
+    editing: BoolProperty(
+        name="Editing",
+        description="Hold vertices back at the tolerance in Edit Mode, and undo edits of the faces that would leave it",
+    )
+    lattice: BoolProperty(
+        name="Lattice",
+        description="Stop the points of a lattice where the mesh that its modifier deforms would leave the tolerance",
+    )
+
+
 class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     __annotations__ = tolerance_settings(update=_changed) | decimate_settings()
 
@@ -199,13 +216,14 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
 
     smooth: PointerProperty(type=TOLVOL_PG_smooth)
     modifiers: PointerProperty(type=TOLVOL_PG_modifiers)
+    guard: PointerProperty(type=TOLVOL_PG_guard)
 
     measurement: PointerProperty(type=TOLVOL_PG_measurement)
     last_run: StringProperty(description="The report of the last decimation, JSON")
     last_run_of: StringProperty(description="Fingerprint of the mesh it left")
 
 
-_CLASSES = (TOLVOL_PG_measurement, TOLVOL_PG_smooth, TOLVOL_PG_modifiers, TOLVOL_PG_settings)
+_CLASSES = (TOLVOL_PG_measurement, TOLVOL_PG_smooth, TOLVOL_PG_modifiers, TOLVOL_PG_guard, TOLVOL_PG_settings)
 
 
 def register():

@@ -6,6 +6,7 @@ import bpy
 from .decimate import TOLVOL_PT_decimate, TOLVOL_PT_protect
 from .deform import TOLVOL_PT_deform
 from .deviation import TOLVOL_PT_deviation, TOLVOL_PT_show_deviation
+from .guard import TOLVOL_PT_guard
 from .modifiers import TOLVOL_PT_modifiers
 from .smooth import TOLVOL_PT_smooth
 from .tolerance import TOLVOL_PT_tolerance
@@ -19,6 +20,7 @@ _CLASSES = (
     TOLVOL_PT_smooth,
     TOLVOL_PT_modifiers,
     TOLVOL_PT_deform,
+    TOLVOL_PT_guard,
 )
 
 register, unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -54,7 +54,9 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
 def _status(context, layout, ob):
     """How the reference stands, with a colour for it."""
     settings = ob.tolvol
-    if reason := blocked.object_blocked(ob):
+    reason = blocked.object_blocked(ob)
+    # A reference that is set holds in every mode; buttons that need Object Mode say so.
+    if reason and (ob.mode == "OBJECT" or settings.snapshot is None):
         text_lines(context, layout, reason, RED)
     elif settings.snapshot is None:
         text_lines(context, layout, blocked.reference_blocked(ob) or "No reference set", GREY)

@@ -15,7 +15,7 @@ import bpy
 
 FOLDER = Path(__file__).resolve().parent
 sys.dont_write_bytecode = True
-sys.path[:0] = [str(FOLDER.parents[1]), str(FOLDER.parent / "blender"), str(FOLDER)]
+sys.path[:0] = [str(FOLDER), str(FOLDER.parents[1]), str(FOLDER.parent / "blender")]
 # Only before the first window is drawn.
 bpy.context.preferences.view.show_splash = False
 

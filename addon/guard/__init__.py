@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guards: a mesh that Blender's own tools sculpt, edit or deform stays within the tolerance while they do it.
+
+There is no call from a brush: Blender evaluates the scene after each dab and each step of a transform, and then calls
+depsgraph_update_post, before it draws.
+"""
+
+import time
+
+import bpy
+from bpy.app.handlers import persistent
+
+from . import edit, lattice, sculpt, status_bar, undo
+
+# Setting of Object.tolvol.guard -> module. Each has wanted(ob), blocked(ob), follow(ob, restored, depsgraph), watches.
+ROOMS = {"sculpting": sculpt, "editing": edit, "lattice": lattice}
+
+_TICK = 0.1
+
+_restored = None  # "undo" or "redo" until what it brought back was looked at
+
+
+def states(ob):
+    """(setting, text, whether it guards: None while there is nothing to guard) of each guard of `ob` that is switched on."""
+    for setting, room in ROOMS.items():
+        if getattr(ob.tolvol.guard, setting):
+            yield setting, *_state(ob, room)
+
+
+def _state(ob, room):
+    watch = room.watches.shown(ob)
+    if reason := room.blocked(ob):
+        return reason, False
+    if watch is None:
+        return None, None
+    if watch.on:
+        return watch.said() or "Within the tolerance", True
+    return (watch.reason, False) if watch.reason else ("Being prepared", None)
+
+
+@persistent
+def _after_update(_scene, depsgraph):
+    global _restored
+    _sweep()
+    objects = [update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Object)]
+    followed = False
+    for ob in objects:
+        if ob.type == "MESH":
+            for room in ROOMS.values():
+                followed |= _follow(room, ob, depsgraph)
+    if followed:
+        _restored = None
+
+
+def _follow(room, ob, depsgraph):
+    if not room.wanted(ob):
+        return False
+    if room.blocked(ob):
+        room.watches.drop(ob.name)
+        return False
+    room.follow(ob, _restored, depsgraph)
+    _redraw_panels()
+    if not bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.register(_tick, first_interval=_TICK)
+    return True
+
+
+def _sweep():
+    """Lets go of what is no longer wanted: another mode, a switch, an object that was removed or renamed."""
+    for room in ROOMS.values():
+        for name, _ in room.watches:
+            ob = bpy.data.objects.get(name)
+            if ob is None or ob.type != "MESH" or not room.wanted(ob):
+                room.watches.drop(name)
+
+
+def _tick():
+    """What has to wait until Blender has time; seconds to the next call, None when there is nothing."""
+    _sweep()
+    busy = undo.expect() | status_bar.look()
+    for room in ROOMS.values():
+        for name, watch in room.watches:
+            busy |= _look_after(room, bpy.data.objects[name], watch)
+    return _TICK if busy else None
+
+
+def _look_after(room, ob, watch):
+    """Whether there is more to wait for."""
+    if watch.preparing:
+        if watch.settled():
+            _follow(room, ob, bpy.context.evaluated_depsgraph_get())
+        return True
+    if watch.rest_at is None:
+        return False
+    if time.monotonic() > watch.rest_at:
+        watch.rest_at = None
+        if said := watch.said():
+            status_bar.say(f"{ob.name}: {said}")
+        room.rest(ob)
+    return True
+
+
+def _redraw_panels():
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            for region in area.regions:
+                if area.type == "VIEW_3D" and region.type == "UI":
+                    region.tag_redraw()
+
+
+@persistent
+def _before_undo(*_):
+    global _restored
+    _restored = "undo"
+
+
+@persistent
+def _before_redo(*_):
+    global _restored
+    _restored = "redo"
+
+
+@persistent
+def _forget(*_):
+    global _restored
+    _restored = None
+    for room in ROOMS.values():
+        for name, _ in room.watches:
+            room.watches.drop(name)
+
+
+_HANDLERS = (
+    ("depsgraph_update_post", _after_update),
+    ("undo_pre", _before_undo),
+    ("redo_pre", _before_redo),
+    ("load_pre", _forget),
+)
+
+
+def register():
+    undo.register()
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister():
+    for name, handler in reversed(_HANDLERS):
+        getattr(bpy.app.handlers, name).remove(handler)
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
+    status_bar.clear()
+    _forget()
+    undo.unregister()

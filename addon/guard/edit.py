@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guard Editing: vertices stop at the tolerance; an edit of the faces that would leave it is undone."""
+
+import bmesh
+import bpy
+import numpy as np
+
+from .. import mesh_io
+from . import watch
+
+watches = watch.Watches()
+_corrections = watch.Corrections()  # fingerprint of coordinates and faces -> (indices, places)
+_undoing = False
+
+
+def wanted(ob):
+    return ob.mode == "EDIT" and ob.tolvol.guard.editing
+
+
+blocked = watch.blocked
+
+
+def follow(ob, restored, _depsgraph):
+    """Called after whatever happened to `ob`; restored: by "undo" or "redo", None for anything else."""
+    ob.update_from_editmode()
+    mesh = ob.data
+    if not mesh.polygons:
+        watches.drop(ob.name)
+        return
+    positions = mesh_io.column(watch.points_of(ob), "co", 3)
+    topology = watch.topology(mesh)
+    wish = topology + watch.fingerprint(positions)
+    known = _corrections.get(wish) if restored else None
+    if known:
+        positions[known[0]] = known[1]
+    current = watches.of(ob, topology, lambda followed: watch.Watch(ob, positions.copy(), followed))
+    # What a person goes back to was there before the guard; Adjust Last Operation, which keeps the operator, is an edit.
+    if restored == "undo" and not _undoing and not bpy.context.window_manager.operators:
+        current.followed = False
+    if not current.settled() or not current.on:
+        return
+    changed = known[0] if known else np.empty(0, np.int32)
+    wished = positions.copy() if restored else None
+    held = current.hold(positions)
+    if len(held) and not (restored and watches.restart(ob, wished)):
+        changed = np.union1d(changed, held)
+        _corrections[wish] = changed, positions[changed]
+    if len(changed):
+        _write(mesh, changed, positions[changed])
+
+
+def rest(ob):
+    """When the edit is over: Blender cuts the faces anew where the vertices are."""
+    bmesh.update_edit_mesh(ob.data)
+
+
+def outside():
+    """An object with faces that an operator, which may go on, made outside of a mesh that was inside before, or None."""
+    for name, current in watches:
+        if current.followed and not current.on and not current.preparing:
+            return bpy.data.objects.get(name)
+    return None
+
+
+def undo():
+    """Goes one step back for good: until it is inside again, whatever was done meanwhile."""
+    global _undoing
+    _undoing = True
+    try:
+        bpy.ops.ed.undo()
+    finally:
+        _undoing = False
+
+
+def _write(mesh, indices, places):
+    edited = bmesh.from_edit_mesh(mesh)
+    edited.verts.ensure_lookup_table()
+    for index, place in zip(indices.tolist(), places.tolist()):
+        edited.verts[index].co = place
+    bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)

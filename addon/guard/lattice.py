@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guard Lattice: the points of a lattice stop where the mesh that its modifier deforms would leave the tolerance.
+
+What is checked is the mesh as the viewport shows it, with all modifiers. It moves along with the points, in a straight
+line when nothing but lattices deforms it: that line proposes how far they may go, and what comes of it is checked again.
+"""
+
+import time
+
+import bpy
+import numpy as np
+
+from .. import mesh_io, native, volume
+from ..certify import INSIDE
+from ..errors import Refused
+from . import watch
+
+watches = watch.Watches()
+_corrections = watch.Corrections()  # fingerprint of the points of all lattices -> the arrays that they became
+
+# Shares of the way that are tried: the farthest permitted is found to 1/256.
+_HALVINGS = 8
+# Corrections in a row after which the points go all the way back.
+_MOST_TRIES = 3
+
+
+def wanted(ob):
+    return ob.mode == "OBJECT" and ob.tolvol.guard.lattice
+
+
+def blocked(ob):
+    """Why no lattice of `ob` can be guarded, or None."""
+    if reason := watch.blocked(ob):
+        return reason
+    return None if cages_of(ob) else f"{ob.name} has no Lattice modifier with a lattice"
+
+
+def cages_of(ob):
+    """The lattice objects that deform `ob` in the viewport."""
+    return [m.object for m in ob.modifiers if m.type == "LATTICE" and m.object and m.show_viewport]
+
+
+class LatticeWatch(watch.Preparing):
+    """Keeps the last points whose mesh was inside, and that mesh."""
+
+    def __init__(self, ob):
+        super().__init__()
+        self._tries = 0
+        self._stopped = False
+        self._built = None
+        self._positions = self._points = self._proposed = None
+        try:
+            reference, tolerance, matrix, threads = watch.needed(ob)
+        except (Refused, native.module.TolvolError) as error:
+            self.reason = str(error)
+            return
+        self._options = {"to_world": matrix, "threads": threads}
+        self.begin(lambda progress: volume.native_volume(reference, tolerance, threads, progress))
+
+    def prepared(self, outcome):
+        self._built = outcome
+
+    @property
+    def ready(self):
+        return self._built is not None
+
+    def judge(self, arrays, points):
+        """None when the mesh is inside, which is kept; else where the points have to go, on their way from the last ones
+        that were kept, or None again when it is not they that moved it."""
+        positions = arrays.vertices
+        failing = self._failing(positions, arrays.triangles)
+        if not len(failing):
+            self._positions, self._points = positions, points
+            self.on, self.reason = True, None
+            self._stopped = _equal(points, self._proposed)
+            return None
+        outside = len(np.unique(arrays.polygons[failing]))
+        if not self.on or _equal(points, self._points):
+            self.on, self.reason = False, f"{outside:,} faces of the deformed mesh are outside"
+            return None
+        self.stopped()
+        # What did not come out as proposed is proposed nearer, but not for ever.
+        self._tries = self._tries + 1 if _equal(points, self._proposed) else 0
+        share = 0.0 if self._tries > _MOST_TRIES else self._share(positions, arrays.triangles[failing])
+        self._proposed = [last + np.float32(share) * (now - last) for now, last in zip(points, self._points)]
+        return self._proposed
+
+    def stopped(self):
+        self.rest_at = time.monotonic() + watch.REST
+        self._stopped = True
+
+    def said(self):
+        """What happened last, or None."""
+        return "The lattice was stopped at the tolerance" if self._stopped else None
+
+    def _failing(self, positions, triangles):
+        return np.flatnonzero(self._built.check(positions, triangles, **self._options).verdict < INSIDE)
+
+    def _share(self, positions, triangles):
+        inside, outside = 0.0, 1.0
+        for _ in range(_HALVINGS):
+            middle = (inside + outside) / 2
+            tried = self._positions + np.float32(middle) * (positions - self._positions)
+            if len(self._failing(tried, triangles)):
+                outside = middle
+            else:
+                inside = middle
+        return inside
+
+
+def follow(ob, restored, depsgraph):
+    """Called after whatever happened to `ob`; restored: by "undo" or "redo", None for anything else."""
+    cages = cages_of(ob)
+    points = [mesh_io.column(cage.data.points, "co_deform", 3) for cage in cages]
+    wish = watch.fingerprint(*points)
+    known = _corrections.get(wish) if restored else None
+    current = watches.shown(ob)
+    if known and current:
+        _write(cages, known)
+        current.stopped()
+        return
+    evaluated = ob.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        arrays = mesh_io.read_mesh(mesh)
+    finally:
+        evaluated.to_mesh_clear()
+    made_for = len(arrays.vertices), [(cage.name, len(places)) for cage, places in zip(cages, points)]
+    current = watches.of(ob, made_for, lambda _followed: LatticeWatch(ob))
+    if not current.settled() or not current.ready:
+        return
+    corrected = current.judge(arrays, points)
+    if corrected is not None:
+        _corrections[wish] = corrected
+        _write(cages, corrected)
+
+
+def _write(cages, points):
+    for cage, places in zip(cages, points):
+        cage.data.points.foreach_set("co_deform", places.ravel())
+        cage.data.update_tag()
+
+
+def rest(ob):
+    """Blender evaluates what was written without telling anybody: it is checked now."""
+    follow(ob, None, bpy.context.evaluated_depsgraph_get())
+
+
+def _equal(points, others):
+    return others is not None and all(np.array_equal(now, then) for now, then in zip(points, others))

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which tools are guarded, and how that goes."""
+
+import bpy
+
+from .. import guard
+from .layout import AMBER, GREEN, GREY, SubPanel, text_lines
+
+_WHERE = {
+    "sculpting": "Takes effect in Sculpt Mode",
+    "editing": "Takes effect in Edit Mode",
+    "lattice": "Takes effect while the mesh is in Object Mode",
+}
+
+
+class TOLVOL_PT_guard(SubPanel, bpy.types.Panel):
+    bl_label = "Guard"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        ob = context.active_object
+        settings = ob.tolvol.guard
+        states = {setting: state for setting, *state in guard.states(ob)}
+        for setting in guard.ROOMS:
+            layout.prop(settings, setting)
+            if setting in states:
+                text, on = states[setting]
+                icon = GREEN if on else GREY if on is None else AMBER
+                text_lines(context, layout, text or _WHERE[setting], icon)

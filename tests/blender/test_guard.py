@@ -1,0 +1,414 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The guards without a window: a script moves what a brush, a transform or a lattice would. tests/ui has the brushes."""
+
+import bmesh
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from addon import guard, mesh_io, native
+from scenes import activate, add_object, sheet, sheet_arrays, world_triangles
+
+TOLERANCE = 0.02
+PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, -2, 0.5, 1))
+
+
+def guarded(ob, *kinds, tolerance=TOLERANCE, mode="SCULPT"):
+    """Makes the mesh its own reference, in this mode; (vertices, triangles) of it in the world."""
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", tolerance
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    reference = world_triangles(ob)
+    for kind in kinds:
+        setattr(ob.tolvol.guard, kind, True)
+    bpy.ops.object.mode_set(mode=mode)
+    updated(ob)
+    return reference
+
+
+def updated(ob):
+    """As Blender does after each dab."""
+    ob.update_tag()
+    bpy.context.view_layer.update()
+
+
+def coordinates(ob):
+    return mesh_io.column(guard.watch.points_of(ob), "co", 3)
+
+
+def dab(ob, positions):
+    guard.watch.points_of(ob).foreach_set("co", positions.astype(np.float32).ravel())
+    updated(ob)
+    return coordinates(ob)
+
+
+def judged(ob, reference, tolerance=TOLERANCE):
+    """(lower, upper) of the largest distance from the reference, in tolerances, as Blender cuts the faces now."""
+    scratch = ob.data.copy()
+    scratch.vertices.foreach_set("co", coordinates(ob).ravel())
+    arrays = mesh_io.read_mesh(scratch)
+    bpy.data.meshes.remove(scratch)
+    vertices = mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world))
+    found = native.module.hausdorff(vertices, arrays.triangles, *reference, bound=tolerance)
+    return found.lower / tolerance, found.upper / tolerance
+
+
+def state(ob):
+    return {kind: (text, on) for kind, text, on in guard.states(ob)}
+
+
+def bump(ob, height, radius=0.3):
+    """The coordinates with a hill in the middle."""
+    wish = coordinates(ob)
+    wish[:, 2] += height * np.clip(1 - np.hypot(wish[:, 0], wish[:, 1]) / radius, 0, None)
+    return wish
+
+
+# Sculpting ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("height", [0.05, 3.0])
+def test_a_stroke_far_outwards_stops_at_the_tolerance_and_touches_nothing_else(height):
+    ob = sheet(count=60, bumps=0.0)
+    reference = guarded(ob, "sculpting")
+    before = coordinates(ob)
+    wish = bump(ob, height)
+    after = dab(ob, wish)
+    lower, upper = judged(ob, reference)
+    assert 0.95 < lower and upper <= 1
+    untouched = (wish == before).all(1)
+    assert untouched.any() and np.array_equal(after[untouched], before[untouched])
+    inside = wish[:, 2] < 0.3 * TOLERANCE
+    assert np.array_equal(after[inside], wish[inside])
+    held = int((after != wish).any(1).sum())
+    assert state(ob) == {"sculpting": (f"Held back {held:,} vertices", True)}
+
+
+def test_switched_off_it_holds_nothing_back():
+    ob = sheet(count=20, bumps=0.0)
+    guarded(ob, "sculpting")
+    ob.tolvol.guard.sculpting = False
+    wish = bump(ob, 1)
+    assert np.array_equal(dab(ob, wish), wish) and not state(ob)
+
+
+@pytest.mark.parametrize("kind", ["editing", "lattice"])
+def test_each_switch_is_for_its_own_mode(kind):
+    ob = sheet(count=20, bumps=0.0)
+    guarded(ob, kind)
+    wish = bump(ob, 1)
+    assert np.array_equal(dab(ob, wish), wish)
+
+
+def test_stroke_upon_stroke_in_the_world():
+    ob = sheet(count=40, matrix=PLACED)
+    reference = guarded(ob, "sculpting")
+    rng = np.random.default_rng(3)
+    for _ in range(8):
+        dab(ob, bump(ob, rng.uniform(-0.2, 0.2), rng.uniform(0.2, 0.9)))
+        assert judged(ob, reference)[1] <= 1
+    assert judged(ob, reference)[0] > 0.95
+
+
+def test_undo_and_redo_bring_back_every_bit():
+    ob = sheet(count=30)
+    guarded(ob, "sculpting")
+    states = [coordinates(ob)]
+    bpy.ops.ed.undo_push(message="start")
+    for height in (0.1, -0.3):
+        states.append(dab(ob, bump(ob, height)))
+        bpy.ops.ed.undo_push(message="stroke")
+    for step, expected in ((bpy.ops.ed.undo, 1), (bpy.ops.ed.undo, 0), (bpy.ops.ed.redo, 1), (bpy.ops.ed.redo, 2)):
+        step()
+        ob = bpy.data.objects["sheet"]
+        updated(ob)
+        assert np.array_equal(coordinates(ob), states[expected])
+    assert state(ob)["sculpting"][1]
+
+
+def test_the_active_shape_key_is_guarded():
+    ob = sheet(count=30)
+    ob.shape_key_add(name="Basis")
+    up = ob.shape_key_add(name="up")
+    reference = guarded(ob, "sculpting")
+    ob.active_shape_key_index = 1
+    updated(ob)
+    basis = mesh_io.column(ob.data.vertices, "co", 3)
+    dab(ob, bump(ob, 1))
+    lower, upper = judged(ob, reference)
+    assert 0.95 < lower and upper <= 1
+    assert np.array_equal(mesh_io.column(ob.data.vertices, "co", 3), basis)
+    ob.active_shape_key_index = 0
+    updated(ob)
+    other, wish = mesh_io.column(up.data, "co", 3), bump(ob, -1)
+    after = dab(ob, wish)
+    assert judged(ob, reference)[1] <= 1
+    assert np.array_equal(mesh_io.column(ob.data.vertices, "co", 3), after)
+    # A brush moves the keys along with the Basis: they go back along with it.
+    assert np.abs(mesh_io.column(up.data, "co", 3) - (other + after - wish)).max() < 1e-6
+
+
+def test_faces_of_many_corners_stay_however_blender_cuts_them():
+    around = np.arange(12) * np.pi / 6
+    vertices = [(np.cos(a), np.sin(a), 0) for a in around]
+    ob = add_object("disc", vertices, [range(12)])
+    reference = guarded(ob, "sculpting")
+    rng = np.random.default_rng(5)
+    for _ in range(10):
+        dab(ob, coordinates(ob) + rng.normal(0, 0.03, (12, 3)))
+        assert judged(ob, reference)[1] <= 1
+
+
+def test_corners_of_a_concave_face_stay_where_they_are():
+    quads = [(0, 1, 2, 3), (1, 4, 5, 2)]
+    ob = add_object("arrow", [(0, 0, 0), (1, 0, 0), (0.3, 0.3, 0), (0, 1, 0), (3, 0, 0), (3, 2, 0)], quads)
+    reference = guarded(ob, "sculpting")
+    assert state(ob)["sculpting"] == ("1 concave faces stay where they are", True)
+    before = coordinates(ob)
+    after = dab(ob, before + [0, 0, 0.01])
+    moved = (after != before).any(1)
+    assert list(moved) == [False, False, False, False, True, True]
+    assert state(ob)["sculpting"] == ("Held back 4 vertices", True)
+    assert judged(ob, reference)[1] <= 1
+
+
+# What cannot be guarded ---------------------------------------------------------------------------------------------
+
+
+def test_a_mesh_that_is_outside_is_left_alone_with_the_reason():
+    ob = sheet(count=20)
+    reference = guarded(ob, "sculpting", mode="OBJECT")
+    co = coordinates(ob)
+    co[100, 2] += 1
+    ob.data.vertices.foreach_set("co", co.ravel())
+    bpy.ops.object.mode_set(mode="SCULPT")
+    updated(ob)
+    assert state(ob)["sculpting"] == ("4 faces are outside: Select Outside in Object Mode shows them", False)
+    wish = bump(ob, 0.5)
+    assert np.array_equal(dab(ob, wish), wish)
+    # Back inside and switched on anew.
+    dab(ob, np.asarray(sheet_arrays(20)[0]))
+    ob.tolvol.guard.sculpting = False
+    updated(ob)
+    ob.tolvol.guard.sculpting = True
+    updated(ob)
+    dab(ob, bump(ob, 0.5))
+    assert judged(ob, reference)[1] <= 1
+
+
+def test_reasons():
+    ob = sheet(count=10)
+    ob.tolvol.guard.sculpting = True
+    assert state(ob)["sculpting"] == ("Set the reference first", False)
+    guarded(ob, "sculpting")
+    bpy.ops.sculpt.dynamic_topology_toggle()
+    assert "Switch off Dyntopo" in state(ob)["sculpting"][0]
+    bpy.ops.sculpt.dynamic_topology_toggle()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    multires = ob.modifiers.new("multires", "MULTIRES")
+    assert "Apply the Multiresolution modifier first" in state(ob)["sculpting"][0]
+    ob.modifiers.remove(multires)
+    ob.scale.x = 2
+    bpy.context.view_layer.update()
+    assert "the object was rescaled" in state(ob)["sculpting"][0]
+    ob.scale.x = 1
+    bpy.context.view_layer.update()
+    ob.tolvol.guard.lattice = True
+    assert state(ob)["lattice"] == ("sheet has no Lattice modifier with a lattice", False)
+
+
+def test_a_face_of_very_many_corners_is_refused():
+    around = np.arange(65) * 2 * np.pi / 65
+    ob = add_object("disc", [(np.cos(a), np.sin(a), 0) for a in around], [range(65)])
+    guarded(ob, "sculpting")
+    assert "65 corners: Face > Triangulate" in state(ob)["sculpting"][0]
+
+
+def test_a_tolerance_that_is_changed_counts_at_once():
+    ob = sheet(count=30, bumps=0.0)
+    reference = guarded(ob, "sculpting")
+    dab(ob, bump(ob, 0.015))
+    ob.tolvol.tolerance_length = 0.05
+    updated(ob)
+    dab(ob, bump(ob, 1))
+    lower, upper = judged(ob, reference, 0.05)
+    assert 0.95 < lower and upper <= 1
+    ob.tolvol.tolerance_length = 0.01
+    updated(ob)
+    assert "faces are outside" in state(ob)["sculpting"][0]
+
+
+def test_nothing_is_left_of_objects_that_change_or_go():
+    ob = sheet(count=20)
+    reference = guarded(ob, "sculpting")
+    ob.name = "renamed"
+    updated(ob)
+    assert [name for name, _ in guard.sculpt.watches] == ["renamed"]
+    dab(ob, bump(ob, 1))
+    assert judged(ob, reference)[1] <= 1
+    twin = ob.copy()
+    twin.data = ob.data.copy()
+    bpy.context.collection.objects.link(twin)
+    updated(twin)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    updated(ob)
+    assert not list(guard.sculpt.watches)
+    activate(twin)
+    bpy.ops.object.mode_set(mode="SCULPT")
+    updated(twin)
+    bpy.data.objects.remove(ob)
+    dab(twin, bump(twin, -1))
+    assert judged(twin, reference)[1] <= 1
+    bpy.data.objects.remove(twin)
+    bpy.context.view_layer.update()
+    guard._sweep()
+    assert not list(guard.sculpt.watches)
+    guarded(sheet(count=5), "sculpting")
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    assert not list(guard.sculpt.watches)
+
+
+# Editing ------------------------------------------------------------------------------------------------------------
+
+
+def edit(ob, move):
+    edited = bmesh.from_edit_mesh(ob.data)
+    for vertex in edited.verts:
+        vertex.co = move(vertex.co)
+    bmesh.update_edit_mesh(ob.data)
+    bpy.context.view_layer.update()
+    ob.update_from_editmode()
+    return coordinates(ob)
+
+
+def test_what_is_moved_in_edit_mode_stops_at_the_tolerance():
+    ob = sheet(count=20, matrix=PLACED)
+    reference = guarded(ob, "editing", mode="EDIT")
+    edit(ob, lambda co: (co.x, co.y, co.z + 3 * (co.x > 0.5)))
+    lower, upper = judged(ob, reference)
+    assert 0.95 < lower and upper <= 1
+    assert state(ob)["editing"][1]
+    ob.tolvol.guard.editing = False
+    edit(ob, lambda co: (co.x, co.y, co.z + 3 * (co.x > 0.5)))
+    assert judged(ob, reference)[0] > 1
+
+
+def test_a_wish_that_redo_brings_back_ends_where_it_did():
+    """The step is pushed with the wish in it, as an operator's is."""
+    ob = sheet(count=20)
+    reference = guarded(ob, "editing", mode="EDIT")
+    start = coordinates(ob)
+    bpy.ops.ed.undo_push(message="start")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.transform.translate(value=(0, 0.001, 0.3))
+    bpy.ops.ed.undo_push(message="move")
+    bpy.context.view_layer.update()
+    ob.update_from_editmode()
+    held = coordinates(ob)
+    assert judged(ob, reference)[1] <= 1 and not np.array_equal(held, start)
+    for step, expected in ((bpy.ops.ed.undo, start), (bpy.ops.ed.redo, held)):
+        step()
+        ob = bpy.data.objects["sheet"]
+        updated(ob)
+        ob.update_from_editmode()
+        assert np.array_equal(coordinates(ob), expected)
+
+
+def test_new_faces_that_are_inside_are_guarded_on():
+    ob = sheet(count=10, bumps=0.0)
+    reference = guarded(ob, "editing", mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.subdivide(number_cuts=1)
+    bpy.context.view_layer.update()
+    assert state(ob)["editing"] == ("Within the tolerance", True)
+    assert len(edit(ob, lambda co: (co.x, co.y, 1))) == 441
+    lower, upper = judged(ob, reference)
+    assert 0.95 < lower and upper <= 1
+
+
+# Lattices -----------------------------------------------------------------------------------------------------------
+
+
+def caged(ob, name="cage"):
+    data = bpy.data.lattices.new(name)
+    data.points_u = data.points_v = 3
+    lattice = bpy.data.objects.new(name, data)
+    lattice.matrix_world = ob.matrix_world @ Matrix.Diagonal((1, 1, 0.5, 1))
+    bpy.context.collection.objects.link(lattice)
+    ob.modifiers.new(name, "LATTICE").object = lattice
+    bpy.context.view_layer.update()
+    return lattice
+
+
+def lift(lattice, height):
+    points = mesh_io.column(lattice.data.points, "co_deform", 3)
+    points[4, 2] += height
+    points[13, 2] += height
+    lattice.data.points.foreach_set("co_deform", points.ravel())
+    lattice.data.update_tag()
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.update()  # of what the guard wrote, which Blender evaluates without a call
+
+
+def evaluated(ob, reference):
+    surface = ob.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    arrays = mesh_io.read_mesh(surface)
+    vertices = mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world))
+    found = native.module.hausdorff(vertices, arrays.triangles, *reference, bound=TOLERANCE)
+    return found.lower / TOLERANCE, found.upper / TOLERANCE
+
+
+@pytest.mark.parametrize("matrix", [Matrix(), PLACED], ids=["local", "placed"])
+def test_the_points_of_a_lattice_stop_at_the_tolerance(matrix):
+    ob = sheet(count=20, matrix=matrix)
+    lattice = caged(ob)
+    reference = guarded(ob, "lattice", mode="OBJECT")
+    before = coordinates(ob)
+    lift(lattice, 0.02)
+    assert mesh_io.column(lattice.data.points, "co_deform", 3)[4, 2] == np.float32(-0.5) + np.float32(0.02)
+    for _ in range(3):
+        lift(lattice, 0.7)
+        assert evaluated(ob, reference)[1] <= 1
+    assert evaluated(ob, reference)[0] > 0.9
+    assert state(ob)["lattice"] == ("The lattice was stopped at the tolerance", True)
+    assert np.array_equal(coordinates(ob), before)
+    ob.tolvol.guard.lattice = False
+    lift(lattice, 0.7)
+    assert evaluated(ob, reference)[0] > 1
+
+
+def test_what_is_not_the_points_doing_is_said_and_left():
+    ob = sheet(count=10)
+    lattice = caged(ob)
+    reference = guarded(ob, "lattice", mode="OBJECT")
+    points = mesh_io.column(lattice.data.points, "co_deform", 3)
+    ob.modifiers.new("displace", "DISPLACE").strength = 0.5
+    bpy.context.view_layer.update()
+    assert state(ob)["lattice"] == ("100 faces of the deformed mesh are outside", False)
+    assert np.array_equal(mesh_io.column(lattice.data.points, "co_deform", 3), points)
+    ob.modifiers.remove(ob.modifiers["displace"])
+    bpy.context.view_layer.update()
+    lift(lattice, 1)
+    assert evaluated(ob, reference)[1] <= 1 and state(ob)["lattice"][1]
+
+
+def test_a_wished_lattice_that_redo_brings_back_ends_where_it_did():
+    ob = sheet(count=10)
+    lattice = caged(ob)
+    guarded(ob, "lattice", mode="OBJECT")
+    start = mesh_io.column(lattice.data.points, "co_deform", 3)
+    wish = start.copy()
+    wish[:, 2] += 0.3
+    bpy.ops.ed.undo_push(message="start")
+    lattice.data.points.foreach_set("co_deform", wish.ravel())
+    bpy.ops.ed.undo_push(message="move")
+    lattice.data.update_tag()
+    bpy.context.view_layer.update()
+    held = mesh_io.column(lattice.data.points, "co_deform", 3)
+    assert not np.array_equal(held, wish) and not np.array_equal(held, start)
+    for step, expected in ((bpy.ops.ed.undo, start), (bpy.ops.ed.redo, held)):
+        step()
+        lattice = bpy.data.objects["cage"]
+        lattice.data.update_tag()
+        bpy.context.view_layer.update()
+        assert np.array_equal(mesh_io.column(lattice.data.points, "co_deform", 3), expected)
