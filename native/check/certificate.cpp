@@ -144,9 +144,8 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       result = Verdict::unproved;
       continue;
     }
-    if (largest.share >= kWorthCutting) {
-      covered.clear();
-      cut(part, largest, covered, queue);
+    covered.clear();
+    if (cut(part, largest, covered, queue)) {
       farthest2 = std::max(farthest2, largest.within * largest.within);
     } else {
       split(part, queue);

@@ -10,7 +10,10 @@
 namespace tolvol {
 namespace {
 
-constexpr double kCutAt = 0.9;  // of what is permitted; the rest is room for later changes
+constexpr double kCutAt = 0.9;         // of what is permitted; the rest is room for later changes
+constexpr double kWorthCutting = 0.5;  // of a part's area
+// The squared longest edge of what a cut leaves, over the part's. Cuts that leave it would go round in circles.
+constexpr double kProgress2 = 0.6;
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
@@ -82,7 +85,8 @@ bool Cover::improve(const double (&d2)[4], double permitted) {
   return true;
 }
 
-void cut(const Part& part, const Cover& cover, std::vector<Part>& inside, std::vector<Part>& rest) {
+bool cut(const Part& part, const Cover& cover, std::vector<Part>& inside, std::vector<Part>& rest) {
+  if (!(cover.share >= kWorthCutting)) return false;
   const double(&distance)[3] = cover.distance;
   const double within = cover.within;
   const int count = count_within(distance, within), alone = odd_one(distance, within, count == 1);
@@ -94,13 +98,17 @@ void cut(const Part& part, const Cover& cover, std::vector<Part>& inside, std::v
   };
   const glm::dvec3 on_q = at(j), on_r = at(k);
   const std::uint32_t cuts = part.cuts + 1;
-  std::vector<Part>&single = count == 1 ? inside : rest, &pair = count == 1 ? rest : inside;
-  single.push_back({{p, on_q, on_r}, cuts});
-  if (squared_length(on_q - r) < squared_length(on_r - q)) {
-    pair.push_back({{on_q, q, r}, cuts}), pair.push_back({{on_q, r, on_r}, cuts});
-  } else {
-    pair.push_back({{on_q, q, on_r}, cuts}), pair.push_back({{on_r, q, r}, cuts});
-  }
+  const Part single{{p, on_q, on_r}, cuts};
+  const bool from_q = squared_length(on_q - r) < squared_length(on_r - q);
+  const Part pair[2] = {{{on_q, q, from_q ? r : on_r}, cuts},
+                        {{from_q ? on_q : on_r, from_q ? r : q, from_q ? on_r : r}, cuts}};
+  const double left2 =
+      count == 1 ? std::max(longest_squared(pair[0]), longest_squared(pair[1])) : longest_squared(single);
+  if (!(left2 <= kProgress2 * longest_squared(part))) return false;
+  (count == 1 ? inside : rest).push_back(single);
+  std::vector<Part>& others = count == 1 ? rest : inside;
+  others.insert(others.end(), {pair[0], pair[1]});
+  return true;
 }
 
 }  // namespace tolvol

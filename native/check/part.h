@@ -18,9 +18,6 @@ struct Part {
 /// d), for which witness_error() has room.
 inline constexpr std::uint32_t kMostCuts = 32;
 
-/// Of the area: a share that is worth being cut off.
-inline constexpr double kWorthCutting = 0.5;
-
 double longest_squared(const Part& part);
 
 /// Appends the halves of a needle, or four quarters.
@@ -37,7 +34,8 @@ struct Cover {
   bool improve(const double (&d2)[4], double permitted);
 };
 
-/// Appends what `cover` covers to `inside`, the rest to `rest`.
-void cut(const Part& part, const Cover& cover, std::vector<Part>& inside, std::vector<Part>& rest);
+/// Appends what `cover` covers to `inside`, the rest to `rest`. False, and nothing done, where that is too little or
+/// leaves a part as long as before: then split().
+bool cut(const Part& part, const Cover& cover, std::vector<Part>& inside, std::vector<Part>& rest);
 
 }  // namespace tolvol

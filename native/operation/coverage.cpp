@@ -114,9 +114,8 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
     if (!(centre2 <= within2_) || longest_squared(piece) <= kFloor * kFloor * within2_ || piece.cuts == kMostCuts) {
       return false;
     }
-    if (cover.share >= kWorthCutting) {
-      trial.cut_off_.clear();
-      cut(piece, cover, trial.cut_off_, trial.stack_);
+    trial.cut_off_.clear();
+    if (cut(piece, cover, trial.cut_off_, trial.stack_)) {
       for (const Part& part : trial.cut_off_) trial.moved_.push_back({part, cover_by});
       trial.candidates_[cover_by].distance = std::max(trial.candidates_[cover_by].distance, cover.within);
       trial.last_ = cover_by;

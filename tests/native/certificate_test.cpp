@@ -162,6 +162,28 @@ TEST(Certificate, LargeAndBentPieces) {
   EXPECT_EQ(check(ring, {{{1.4, 0, 0}, {-0.7, 1.2, 0}, {-0.7, -1.2, 0}}, {0, 1, 2}})[0], Verdict::outside);
 }
 
+TEST(Certificate, ProvesLargeFacesOverTrianglesOfAnySize) {
+  // Cutting along one reference triangle after the other must not go round in circles.
+  const TriangleMesh plane = shapes::grid(30);  // of side 1
+  std::mt19937 engine(3);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (const double tolerance : {0.1, 0.02, 0.005, 0.001}) {
+    const ToleranceVolume volume(plane.vertices, plane.triangles, kIdentity, tolerance, {});
+    Candidates faces;
+    for (std::uint32_t i = 0; i < 3'000; ++i) {
+      const dvec3 middle(u(engine), u(engine), 0);
+      const double size = 0.5 * u(engine);
+      for (int k = 0; k < 3; ++k) {
+        const dvec3 p = middle + size * dvec3(u(engine) - 0.5, u(engine) - 0.5, 0);
+        faces.points.push_back({std::clamp(p.x, 0.0, 1.0), std::clamp(p.y, 0.0, 1.0), 0.9 * tolerance * u(engine)});
+        faces.indices.push_back(3 * i + static_cast<std::uint32_t>(k));
+      }
+    }
+    const std::vector<Verdict> verdicts = check(volume, faces);
+    EXPECT_EQ(std::count(verdicts.begin(), verdicts.end(), Verdict::inside), 3'000) << "at " << tolerance;
+  }
+}
+
 TEST(Certificate, PointsSegmentsAndQuads) {
   const TriangleMesh plane = shapes::grid(4);
   const ToleranceVolume volume(plane.vertices, plane.triangles, kIdentity, 0.1);

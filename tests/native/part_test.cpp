@@ -80,7 +80,11 @@ TEST(Part, CutsOffWhatOneTriangleCovers) {
     Cover cover;
     if (!cover.improve(d2, kPermitted) || cover.share == 1) continue;
     std::vector<Part> inside, rest, all;
-    cut(whole, cover, inside, rest);
+    if (!cut(whole, cover, inside, rest)) {
+      EXPECT_TRUE(inside.empty() && rest.empty());
+      continue;
+    }
+    for (const Part& p : rest) EXPECT_LT(longest_squared(p), 0.7 * longest_squared(whole));
     ASSERT_EQ(inside.size() + rest.size(), 3u);
     EXPECT_NEAR(area(inside), cover.share * area(whole), 1e-12);
     all = inside;
@@ -92,7 +96,7 @@ TEST(Part, CutsOffWhatOneTriangleCovers) {
     }
     (inside.size() == 1 ? cut_by_one : cut_by_two) += near > 0;
   }
-  EXPECT_GT(cut_by_one, 100);
+  EXPECT_GT(cut_by_one, 20);
   EXPECT_GT(cut_by_two, 100);
 }
 
