@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How many triangles a second each method of check decides, on candidates made from a mesh by small moves.
 
-blender --background --python blender_scripts/rates.py -- [MESH...] --tolerance 1% --json FILE [--precision 4]
+blender --background --python blender_scripts/rates.py -- [MESH...] --tolerance 1% --json FILE [--precision 2] [--write FILE.md]
 
 Without MESH: Blender's monkey in 251,904 triangles, with noise. One query: the whole mesh in one group. Groups: of six
 faces, as the ring of a collapse has. Faces: a verdict each for a million. Times are the best of several turns and include
@@ -19,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import benchmark  # noqa: E402
 import command_line as cli  # noqa: E402
 import models  # noqa: E402
+import tables  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
 
 REPEATS = 5
@@ -94,18 +95,38 @@ def line(entry):
     )
 
 
+def table(meshes):
+    rows = []
+    for mesh in meshes:
+        rows.append(
+            [f"***{Path(mesh['file']).name}, {mesh['triangles']:,} triangles, ρ = {mesh['precision']:g}***", *4 * [""]]
+        )
+        for e in mesh["rates"]:
+            groups = f"{e['groups_per_second']:,.0f}" if e["groups_per_second"] else ""
+            speed, inside = f"{e['triangles_per_second'] / 1e6:.2f}", f"{100 * e['inside_share']:.1f} %"
+            rows.append([e["method"], e["what"], speed, groups, inside])
+        rows.append(["picture, 1024 x 1024", "", f"{mesh['picture_triangles_per_second'] / 1e6:.2f}", "", ""])
+        for field, seconds in mesh["field_seconds"].items():
+            rows.append(
+                [f"field, {field.replace('_', ' ')}", f"ρ = {TABLE_1}, one thread: {seconds:.3f} s", "", "", ""]
+            )
+    return tables.table(["Method", "What", "M triangles/s", "Groups/s", "Inside"], rows, "llrrr")
+
+
 def arguments():
     parser = cli.Parser("rates.py", description=__doc__.split("\n\n")[0], epilog=__doc__.split("\n\n")[2])
     parser.add_argument("mesh", nargs="*", metavar="MESH", help=".obj, .ply or .stl")
     parser.add_argument("--tolerance", required=True, type=cli.length, metavar="T", help="N%% of size, or a length")
-    parser.add_argument("--precision", type=float, default=4, metavar="P", help="grid nodes per tolerance (default 4)")
+    parser.add_argument("--precision", type=float, default=2, metavar="P", help="grid nodes per tolerance (default 2)")
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    parser.add_argument("--write", metavar="FILE.md", help="put them there as a table")
     return parser.parse()
 
 
 def main(options):
-    if options.json:
-        cli.require_folder(options.json, "--json")
+    for option in ("json", "write"):
+        if getattr(options, option):
+            cli.require_folder(getattr(options, option), f"--{option}")
     figures = {
         "version": tolvol.__version__,
         "machine": benchmark.machine(),
@@ -125,6 +146,9 @@ def main(options):
         print(
             f"  field at precision 1.1, one thread: scatter {scatter:.3f} s, fast marching {marching:.3f} s", flush=True
         )
+    if options.write:
+        where = f"{figures['machine']}; {figures['renderer']}; version {figures['version']}."
+        tables.write(options.write, "rates", f"{where}\n\n{table(figures['meshes'])}")
     if options.json:
         Path(options.json).write_text(json.dumps(figures, indent=1) + "\n")
     return 0

@@ -33,7 +33,7 @@ Part Coverage::whole(std::uint32_t triangle) const {
   return {{reference_->vertices[t.x], reference_->vertices[t.y], reference_->vertices[t.z]}};
 }
 
-void Coverage::own(std::uint32_t element, std::uint32_t triangle) { lists_[element].pieces = {whole(triangle)}; }
+void Coverage::own(std::uint32_t element, std::uint32_t triangle) { lists_[element].pieces.push_back(whole(triangle)); }
 
 bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids,
                       double provable, std::vector<std::uint32_t>& nearest) {
