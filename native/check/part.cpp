@@ -38,7 +38,7 @@ int count_within(const double (&distance)[3], double within) {
 /// ends gives.
 double share_within(const double (&distance)[3], double within) {
   const int count = count_within(distance, within);
-  if (count == 0 || count == 3) return count / 3;
+  if (count == 0 || count == 3) return count == 3;
   const int alone = odd_one(distance, within, count == 1);
   const double p = distance[alone], q = distance[(alone + 1) % 3], r = distance[(alone + 2) % 3];
   return count == 1 ? reach(p, q, within) * reach(p, r, within)

@@ -51,8 +51,8 @@ void witness_distances(const WitnessTriangle& triangle, const FourPoints& points
 /// together u 6R; the two subtractions round results of at most M + 2R each. For the edge bc, whose witness is b + w
 /// bc, one subtraction more. Altogether below u (4 M + 14 R). An accepted |p| is at most sqrt(3) R + d, so M <= 2.74 R
 /// + d and the sum is below 25 u (R + d); three coordinates: times sqrt(3). The sum of three squares has a relative
-/// error of at most 4u and the squared threshold of 2u, which moves d by 3u d. 25 sqrt(3) + 3 < 47. Cutting pieces up (part.h) adds 32 *
-/// 5.2 < 167; 256 is a power of two.
+/// error of at most 4u and the squared threshold of 2u, which moves d by 3u d. 25 sqrt(3) + 3 < 47. Cutting pieces up
+/// (part.h) adds 32 * 5.2 < 167; 256 is a power of two.
 inline double witness_error(double magnitude) { return 256 * kUnitRoundoff * magnitude; }
 
 }  // namespace tolvol

@@ -125,14 +125,14 @@ std::vector<double> area_shares(const DisplayGrid& display, bool nearest, std::s
     double* sum = &sums[begin / kBlock * bins];
     for (std::size_t i = begin; i < end; ++i) {
       const glm::dvec3 a = nodes[triangles[i].x], ab = nodes[triangles[i].y] - a, ac = nodes[triangles[i].z] - a;
-      const double count = 1 + std::floor(area[i] / whole * kSamples);
-      for (double k = 0; k < count; ++k) {
-        double u = glm::fract(kStepU * (k + static_cast<double>(i))),
-               v = glm::fract(kStepV * (k + static_cast<double>(i)));
+      const auto count = 1 + static_cast<std::size_t>(area[i] / whole * kSamples);
+      for (std::size_t k = i; k < i + count; ++k) {
+        double u = glm::fract(kStepU * static_cast<double>(k)), v = glm::fract(kStepV * static_cast<double>(k));
         if (u + v > 1) u = 1 - u, v = 1 - v;
         const glm::dvec3 p = a + u * ab + v * ac;
         const double d = nearest ? display.nearest(p) : display.interpolated(p);
-        sum[std::upper_bound(edges.begin(), edges.end(), d) - edges.begin()] += area[i] / (count * whole);
+        sum[std::upper_bound(edges.begin(), edges.end(), d) - edges.begin()] +=
+            area[i] / (static_cast<double>(count) * whole);
       }
     }
   });

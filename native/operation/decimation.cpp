@@ -196,7 +196,10 @@ class Decimation {
     std::vector<std::uint32_t> nearest;
     std::size_t first = 0;
     std::size_t& uncovered = result_.uncovered_faces;
-    for (std::uint32_t i = 0; i < volume_->reference().triangles.size(); ++i) {
+    const std::size_t count = volume_->reference().triangles.size();
+    if (options_.progress) options_.progress->begin("comparing");
+    for (std::uint32_t i = 0; i < count; ++i) {
+      if (options_.progress) options_.progress->update(static_cast<double>(i) / static_cast<double>(count));
       if (!backward_->assign(i, hierarchy, ids, provable, nearest) && uncovered++ == 0) first = i;
     }
     if (uncovered && options_.outside == DecimationOptions::Outside::error) {

@@ -86,6 +86,20 @@ def test_stored_coordinates_far_from_the_origin():
     assert not decimate(near, triangles, tolerance).report["warnings"]
 
 
+def test_a_degenerate_face_does_not_stand_for_the_face_beside_it():
+    vertices, triangles = meshes.plate(19)
+    spikes = triangles[::13]
+    tips = vertices[spikes].mean(1) + [0, 0, 0.15]
+    tip = len(vertices) + np.arange(len(spikes))
+    sides = [np.stack([tip, spikes[:, k], spikes[:, (k + 1) % 3]], 1) for k in range(3)]
+    flat = [spikes[:, [k, (k + 1) % 3, (k + 1) % 3]] for k in range(3)]
+    triangles = np.concatenate([*sides, np.delete(triangles, np.s_[::13], 0), *flat]).astype(np.int32)
+    vertices = np.concatenate([vertices, tips])
+    for share in (0.01, 0.03):
+        tolerance = share * tolvol.size(vertices, triangles)
+        assert_promise(vertices, triangles, decimate(vertices, triangles, tolerance), tolerance)
+
+
 def test_fewer_triangles_at_a_larger_tolerance():
     vertices, triangles = meshes.torus(noise=0.001)
     size = tolvol.size(vertices, triangles)

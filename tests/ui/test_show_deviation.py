@@ -18,6 +18,7 @@ from window import (
     region,
     reset,
     screenshot,
+    sculpt_by_drawing,
     view,
     xdotool,
 )
@@ -86,6 +87,7 @@ def test_deviation_is_shown_while_the_mesh_changes():
     screenshot("overlay 1 set")
 
     to_mode("SCULPT")
+    sculpt_by_drawing()
     yield 0.5
     x, y = centre()
     drawing, during = stroke((x, y), (x + 72, y)), 0
@@ -126,6 +128,7 @@ def test_sides_of_a_closed_reference():
     yield from finished(lambda: overlay.field.at_hand(the_object()) is not None)
     the_object().tolvol.deviation_opacity = 0.8
     to_mode("SCULPT")
+    sculpt_by_drawing()
     view()[1].spaces[0].show_gizmo = False
     yield 1.0
     red, blue = sides()

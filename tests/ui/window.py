@@ -105,8 +105,21 @@ def press(operator, across=0.33):
     yield 0.3
 
 
+_first_view = {}
+
+
+def sculpt_by_drawing():
+    """In Sculpt Mode: the brush that is chosen at first."""
+    with bpy.context.temp_override(window=view()[0], area=view()[1], region=region("WINDOW")):
+        bpy.ops.wm.tool_set_by_id(name="builtin_brush.Draw")
+
+
 def reset(*make):
-    """A scene with only the object that make() makes, active."""
+    """A scene with only the object that make() makes, active, seen as at first."""
+    camera = view()[1].spaces[0].region_3d
+    for name in ("view_perspective", "view_distance", "view_location", "view_rotation"):
+        value = getattr(camera, name)
+        setattr(camera, name, _first_view.setdefault(name, value if isinstance(value, (str, float)) else value.copy()))
     for ob in list(bpy.data.objects):
         bpy.data.objects.remove(ob)
     for function in make:
