@@ -122,4 +122,10 @@ def legend_of_one(context, shown):
         return
     signed, tolerance = _signed(ob, found.grid), _tolerance(ob)
     bands = shares.known(ob, shown[ob.name], found, tolerance, redraw)
-    legend.draw(context, heading, signed, tolerance, bands and shares.fold(bands, signed))
+    legend.draw(context, heading, note(ob), signed, tolerance, bands and shares.fold(bands, signed))
+
+
+def note(ob):
+    """What the colours are not. A stroke of sculpting is shown without what Blender puts on top of it."""
+    on_top = volume.on_top(ob) if ob.mode != "SCULPT" else []
+    return f"Shown with its {' and '.join(on_top)}, not proved" if on_top else "Shown, not proved"
