@@ -39,8 +39,8 @@ class TOLVOL_OT_set_tolerance(bpy.types.Operator):
 
 
 class TOLVOL_MT_tolerances(bpy.types.Menu):
-    bl_label = "Tolerances"
-    bl_description = "Tolerances to choose from"
+    bl_label = "Tolerance Presets"
+    bl_description = "Common tolerances, each as a length and as a share of the size"
 
     def draw(self, context):
         size = volume.shown_size(context.active_object)

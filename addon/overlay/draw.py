@@ -126,6 +126,8 @@ def legend_of_one(context, shown):
 
 
 def note(ob):
-    """What the colours are not. A stroke of sculpting is shown without what Blender puts on top of it."""
-    on_top = volume.on_top(ob) if ob.mode != "SCULPT" else []
-    return f"Shown with its {' and '.join(on_top)}, not proved" if on_top else "Shown, not proved"
+    """What the colours are not. Sculpting is shown as it is stored, whatever deforms it afterwards."""
+    on_top, how = volume.on_top(ob), "with"
+    if ob.mode == "SCULPT":
+        on_top, how = [name for name in on_top if name == "modifiers"], "without"
+    return f"Shown {how} its {' and '.join(on_top)}, not proved" if on_top else "Shown, not proved"

@@ -62,8 +62,8 @@ def _status(context, layout, ob):
     if settings.snapshot is None:
         why = None if reason else blocked.reference_blocked(ob)
         text_lines(context, layout, why or "No reference set", GREY)
-    elif reason := volume.stale_reason(ob):
-        text_lines(context, layout, f"Out of date: {reason}", AMBER)
+    elif stale := volume.stale_reason(ob):
+        text_lines(context, layout, f"Out of date: {stale}", AMBER)
     else:
         triangles = len(settings.snapshot.polygons)
         tolerance = length(context, volume.tolerance_length(settings, settings.snapshot_size))

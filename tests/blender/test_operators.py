@@ -360,14 +360,15 @@ def test_legend_says_what_no_proof_covers():
     ob.modifiers.new("wave", "WAVE")
     ob.shape_key_add()
     assert draw.note(ob) == "Shown with its modifiers and shape keys, not proved"
+    bpy.ops.object.mode_set(mode="SCULPT")
+    assert draw.note(ob) == "Shown without its modifiers, not proved"
 
 
-def test_drawing_that_was_refused_is_asked_for_again_once_it_is_turned_on_anew(monkeypatch):
+def test_drawing_that_was_refused_is_asked_for_again_once_it_is_turned_on_anew(chosen_preferences):
     reasons.broken[:] = ["no such texture"]
     overlay.refresh()
     assert reasons.broken
-    monkeypatch.setattr(preferences, "use_gl", lambda context: False)
-    overlay.refresh()
+    chosen_preferences.use_gl = False
     assert not reasons.broken
 
 
@@ -445,13 +446,22 @@ def test_settings_not_given_are_the_objects_own_and_those_given_are_kept():
     assert '"percent": 1.0' in other.tolvol.last_run and '"two_sided": true' in other.tolvol.last_run
 
 
-def test_tolerance_begins_as_the_preferences_say_and_stays_once_a_reference_is_set(monkeypatch):
+@pytest.fixture
+def chosen_preferences():
+    """What a person chose where the add-on is installed."""
+    installed = bpy.context.preferences.addons.new()
+    installed.module = addon.__name__
+    yield installed.preferences
+    bpy.context.preferences.addons.remove(installed)
+
+
+def test_tolerance_begins_as_the_preferences_say_and_stays_once_a_reference_is_set(chosen_preferences):
     ob = link(bpy.data.objects.new("new", torus().data.copy()))
     assert ob.tolvol.tolerance_percent == 0.5 and ob.tolvol.tolerance_mode == "PERCENT" and ob.tolvol.keep == "BOTH"
-    monkeypatch.setattr(preferences, "tolerance", lambda context: 0.25)
+    chosen_preferences.tolerance = 0.25
     assert ob.tolvol.tolerance_percent == 0.25
     bpy.ops.tolvol.set_reference()
-    monkeypatch.undo()
+    chosen_preferences.tolerance = 2
     assert ob.tolvol.tolerance_percent == 0.25
 
 
