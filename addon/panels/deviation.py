@@ -38,7 +38,7 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         if not measured:
             text = "Not measured yet" if ob.tolvol.snapshot else "Set the reference first"
             if ob.mode != "OBJECT":
-                text = "Measured in Object Mode only"
+                text = "Measure in Object Mode"
             text_lines(context, column, text, GREY)
             return
         # A tolerance that was changed since is compared with what was measured.

@@ -72,7 +72,7 @@ def _status(context, layout, ob):
         text_lines(context, layout, f"{triangles:,} triangles, ±{tolerance}, {ready}", GREEN)
     # A reference that is set holds in every mode.
     if reason:
-        text_lines(context, layout, f"{reason} to use the buttons here", "INFO")
+        text_lines(context, layout, "Buttons need Object Mode", "INFO")
 
 
 def _bytes(count):
