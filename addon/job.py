@@ -133,7 +133,7 @@ class JobOperator:
             self.report({"INFO"}, f"{self.bl_label} was cancelled, nothing was changed")
             return {"CANCELLED"}
         except (Refused, native.module.TolvolError) as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, native.said(error))
             return {"CANCELLED"}
         return None
 

@@ -79,6 +79,24 @@ def _load_copy(path, name):
 module, path, reason = _load()
 
 
+# How the module speaks of options that have other names in Blender, or none.
+_WORDS = (
+    (', or keep them (outside="keep")', "; Select Outside shows them"),
+    (
+        'keep one direction only (two_sided=False), or go on from what there is (outside="keep")',
+        "or set Keep to One Way",
+    ),
+)
+
+
+def said(error):
+    """What an error of the module says, in the panel's words."""
+    text = str(error)
+    for words, instead in _WORDS:
+        text = text.replace(words, instead)
+    return text
+
+
 def shutdown():
     """Ends the module's GL thread, if there is one; what needs it starts it again."""
     if module is not None:

@@ -12,26 +12,28 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import volume
+from . import preferences, volume
 from .operation_settings import decimate_settings, modifier_settings, smooth_settings
 
+TOLERANCE_UNITS = (
+    ("PERCENT", "% of Size", "Percent of the longest diagonal of the reference's bounding box"),
+    ("LENGTH", "Length", "A length in the world, whatever the size of the reference"),
+)
 
-def tolerance_settings(**options):
-    """name -> property of the tolerance; `options` go to each."""
+
+def tolerance_settings(percent=None, **options):
+    """name -> property of the tolerance; `options` go to each, those in `percent` to the percentage alone."""
     return {
         "tolerance_mode": EnumProperty(
             name="Tolerance Unit",
             description="What the tolerance is given in",
-            items=(
-                ("PERCENT", "% of Size", "Percent of the longest diagonal of the reference's bounding box"),
-                ("LENGTH", "Length", "A length in the world, whatever the size of the reference"),
-            ),
+            items=TOLERANCE_UNITS,
             **options,
         ),
         "tolerance_percent": FloatProperty(
             name="Tolerance",
             description="How far the mesh may lie from the reference, in percent of the reference's size",
-            default=1.0,
+            default=preferences.TOLERANCE,
             min=1e-6,
             max=100.0,
             soft_min=0.01,
@@ -39,6 +41,7 @@ def tolerance_settings(**options):
             step=10,
             precision=3,
             subtype="PERCENTAGE",
+            **(percent or {}),
             **options,
         ),
         "tolerance_length": FloatProperty(
@@ -92,12 +95,21 @@ def _set_placement(settings, value):
     settings.placement_choice = value
 
 
+def _get_percent(settings):
+    """What was chosen; until something is, the default of the preferences."""
+    return settings.percent_choice or preferences.tolerance(bpy.context)
+
+
+def _set_percent(settings, value):
+    settings.percent_choice = value
+
+
 class TOLVOL_PG_measurement(bpy.types.PropertyGroup):
     """The certified distances of one state of a mesh, in world units."""
 
     fingerprint: StringProperty(description="Of the mesh that was measured; empty: none was")
     matrix: FloatVectorProperty(size=16, description="Of the object then")
-    tolerance: FloatProperty()
+    tolerance: FloatProperty(description="That it was compared with")
     forward: FloatProperty(description="The mesh is nowhere farther from the reference than this")
     backward: FloatProperty(description="The reference is nowhere farther from the mesh than this")
     forward_within: BoolProperty(description="Proved to be within the tolerance")
@@ -141,7 +153,10 @@ class TOLVOL_PG_guard(bpy.types.PropertyGroup):
 
 
 class TOLVOL_PG_settings(bpy.types.PropertyGroup):
-    __annotations__ = tolerance_settings(update=_changed) | decimate_settings()
+    __annotations__ = (
+        tolerance_settings({"get": _get_percent, "set": _set_percent}, update=_changed) | decimate_settings()
+    )
+    percent_choice: FloatProperty(description="The percentage that was chosen; 0: none was")
 
     show_deviation: BoolProperty(
         name="Show Deviation",
@@ -193,7 +208,7 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
         get=_get_placement,
         set=_set_placement,
     )
-    placement_choice: IntProperty(default=-1)
+    placement_choice: IntProperty(default=-1, description="The placement that was chosen; -1: none was")
     lattice: PointerProperty(
         name="Lattice",
         description="The lattice that carries the mesh along",
@@ -207,12 +222,11 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     )
 
     snapshot: PointerProperty(type=bpy.types.Mesh, description="The reference as it was set; never changed")
-    snapshot_kind: StringProperty()
-    snapshot_object: PointerProperty(type=bpy.types.Object)
-    snapshot_matrix: FloatVectorProperty(size=16)
-    snapshot_size: FloatProperty()
-    snapshot_fingerprint: StringProperty()
-    snapshot_seconds: FloatProperty(description="How long it took to build the tolerance volume")
+    snapshot_kind: StringProperty(description="The kind of reference that was chosen then")
+    snapshot_object: PointerProperty(type=bpy.types.Object, description="The object that was chosen then")
+    snapshot_matrix: FloatVectorProperty(size=16, description="The place of the snapshot in the world then")
+    snapshot_size: FloatProperty(description="The length that is 100 %")
+    snapshot_fingerprint: StringProperty(description="Tells the snapshot from others")
 
     smooth: PointerProperty(type=TOLVOL_PG_smooth)
     modifiers: PointerProperty(type=TOLVOL_PG_modifiers)

@@ -96,6 +96,7 @@ def set_reference(ob, surface):
     settings.snapshot_matrix = surface.matrix.ravel()
     settings.snapshot_size = surface.size()
     settings.snapshot_fingerprint = surface.arrays.fingerprint()
+    settings.tolerance_percent = settings.tolerance_percent  # no longer what the preferences say
     notify()
 
 
@@ -141,9 +142,12 @@ def remember(ob, surface, certified, tolerance, share_outside=0.0):
 
 
 def measurement_of(ob):
-    """What was measured last, or None when the mesh, its place or the reference has changed since."""
+    """What was measured last, or None when the mesh, its place or the reference has changed since.
+
+    In other modes than Object Mode the mesh is being changed by Blender, out of sight: nothing is known of it there.
+    """
     measurement = ob.tolvol.measurement
-    if not measurement.fingerprint or measurement.fingerprint != shown_fingerprint(ob):
+    if ob.mode != "OBJECT" or not measurement.fingerprint or measurement.fingerprint != shown_fingerprint(ob):
         return None
     before, now = _stored_matrix(measurement.matrix), mesh_io.matrix_array(ob.matrix_world)
     moves_along = ob.tolvol.snapshot_kind == "SELF" and same_shape(before, now)
@@ -158,6 +162,23 @@ def same_shape(matrix, other):
 
 def _stored_matrix(values):
     return np.array(values, np.float64).reshape(4, 4)
+
+
+def built_of(ob):
+    """The tolerance volume of the reference that is set, if it is in memory; cheap enough to draw."""
+    settings = ob.tolvol
+    own = settings.snapshot_kind == "SELF"
+    matrix = mesh_io.matrix_array(ob.matrix_world) if own else _stored_matrix(settings.snapshot_matrix)
+    tolerance = tolerance_length(settings, settings.snapshot_size)  # of a size that is stored as float32
+    for (fingerprint, place, of), volume in _volumes.items():
+        if (fingerprint, place) == (settings.snapshot_fingerprint, matrix.tobytes()) and abs(of / tolerance - 1) < 1e-6:
+            return volume
+    return None
+
+
+def on_top(ob):
+    """What Blender shows the mesh of `ob` with that no proof covers."""
+    return ["modifiers"] * bool(ob.modifiers) + ["shape keys"] * bool(ob.data.shape_keys)
 
 
 def native_volume(surface, tolerance, threads=0, progress=None):
@@ -197,7 +218,7 @@ def shown_size(ob):
     if ob.tolvol.snapshot is not None:
         return ob.tolvol.snapshot_size
     source = source_object(ob)
-    if source is None or not source.data.polygons or native.module is None:
+    if source is None or source.type != "MESH" or not source.data.polygons or native.module is None:
         return None
     key = (source.as_pointer(), "size", mesh_io.matrix_array(source.matrix_world).tobytes())
     if key not in _shown:

@@ -51,7 +51,7 @@ def situation(ob):
         key.name if key else None,
         mesh_io.matrix_array(ob.matrix_world).tobytes(),
         (settings.tolerance_mode, settings.tolerance_percent, settings.tolerance_length),
-        (settings.snapshot.as_pointer(), settings.snapshot_size, settings.snapshot_seconds),
+        (settings.snapshot.as_pointer(), settings.snapshot_size, settings.snapshot_fingerprint),
     )
 
 

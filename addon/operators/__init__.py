@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""bpy.ops.tolvol: set_reference, clear_reference, check, select_outside, save_report, decimate, smooth,
+"""bpy.ops.tolvol: set_tolerance, set_reference, clear_reference, check, select_outside, save_report, decimate, smooth,
 apply_modifier, fit_modifier, deform."""
 
 import bpy
@@ -8,11 +8,14 @@ from .check import TOLVOL_OT_check, TOLVOL_OT_select_outside
 from .decimate import TOLVOL_OT_decimate
 from .deform import TOLVOL_OT_deform
 from .modifiers import TOLVOL_OT_apply_modifier, TOLVOL_OT_fit_modifier
+from .presets import TOLVOL_MT_tolerances, TOLVOL_OT_set_tolerance
 from .reference import TOLVOL_OT_clear_reference, TOLVOL_OT_set_reference
 from .report import TOLVOL_OT_save_report
 from .smooth import TOLVOL_OT_smooth
 
 _CLASSES = (
+    TOLVOL_OT_set_tolerance,
+    TOLVOL_MT_tolerances,
     TOLVOL_OT_set_reference,
     TOLVOL_OT_clear_reference,
     TOLVOL_OT_check,

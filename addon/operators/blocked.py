@@ -24,6 +24,8 @@ def reference_blocked(ob):
     source = volume.source_object(ob)
     if source is None:
         return "Choose the reference object"
+    if source.type != "MESH":
+        return f"{source.name} is no mesh: Object > Convert > Mesh"
     if not source.data.polygons:
         return f"{source.name} has no faces"
     return None

@@ -136,7 +136,6 @@ the settings of the active one. A mesh without a reference becomes it"""
         """What is remembered and said of one object."""
         if ob.tolvol.snapshot is None:
             volume.set_reference(ob, reference)
-            ob.tolvol.snapshot_seconds = run["seconds"]["field"]
         shared.give(self, ob.tolvol, _SHARED)
         volume.remember(ob, volume.surface_of(ob), run, run["tolerance"]["absolute"])
         ob.tolvol.last_run_of = ob.tolvol.measurement.fingerprint

@@ -36,9 +36,7 @@ class TOLVOL_OT_set_reference(JobOperator, bpy.types.Operator):
 
     def finish(self, context, outcome):
         surface, built = outcome
-        ob = self.ob
-        volume.set_reference(ob, surface)
-        ob.tolvol.snapshot_seconds = built.seconds
+        volume.set_reference(self.ob, surface)
         self.report({"INFO"}, f"Reference set: {built.triangle_count:,} triangles, ready in {built.seconds:.2f} s")
 
 

@@ -10,7 +10,7 @@ import functools
 import bpy
 from bpy.app.handlers import persistent
 
-from .. import native, volume
+from .. import native, preferences, volume
 from . import draw, field, legend, reasons, shaders, shares, work
 from .surface import Surface
 
@@ -25,6 +25,8 @@ def shows(ob):
 
 def refresh():
     """Begins or ends to show what is to be shown now. Called whenever a reference or a setting may have changed."""
+    if not preferences.use_gl(bpy.context):
+        reasons.broken.clear()  # asked anew once it is turned on again
     names = _wanted()
     if not names:
         _end()

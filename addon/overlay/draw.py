@@ -122,4 +122,12 @@ def legend_of_one(context, shown):
         return
     signed, tolerance = _signed(ob, found.grid), _tolerance(ob)
     bands = shares.known(ob, shown[ob.name], found, tolerance, redraw)
-    legend.draw(context, heading, signed, tolerance, bands and shares.fold(bands, signed))
+    legend.draw(context, heading, note(ob), signed, tolerance, bands and shares.fold(bands, signed))
+
+
+def note(ob):
+    """What the colours are not. Sculpting is shown as it is stored, whatever deforms it afterwards."""
+    on_top, how = volume.on_top(ob), "with"
+    if ob.mode == "SCULPT":
+        on_top, how = [name for name in on_top if name == "modifiers"], "without"
+    return f"Shown {how} its {' and '.join(on_top)}, not proved" if on_top else "Shown, not proved"

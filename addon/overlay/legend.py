@@ -15,7 +15,6 @@ _ROW = 17
 _GAP = 10  # between things, and around them
 _MARGIN = 14  # to the edges of the view
 _STRIPE = 12
-_NOTE = "Shown, not proved"
 
 _unit_square = None
 
@@ -70,8 +69,9 @@ def width_of(text):
     return blf.dimensions(_FONT, text)[0]
 
 
-def draw(context, heading, signed, tolerance, shares):
-    """shares: of the surface in the four bands from the lowest colour on and outside, or None while unknown."""
+def draw(context, heading, note, signed, tolerance, shares):
+    """note: the lowest line; shares: of the surface in the four bands from the lowest colour on and outside, or None
+    while unknown."""
     page = _Page(context, signed)
     scale = page.scale
     lowest = -tolerance if signed else 0.0
@@ -81,7 +81,7 @@ def draw(context, heading, signed, tolerance, shares):
     row, gap = _ROW * scale, _GAP * scale
     label_width = max([width_of(text) for _, text in labels] + [width_of("Outside")])
     share_width = max(width_of(text) for text in [*bands, "88.8 %"])
-    width = max(bar_width + label_width + share_width + 2 * gap, width_of(heading), width_of(_NOTE)) + 2 * gap
+    width = max(bar_width + label_width + share_width + 2 * gap, width_of(heading), width_of(note)) + 2 * gap
     height = 3 * row + bar_height + 4 * gap
     place = _corner(context, width, height, _MARGIN * scale)
     if place is None:
@@ -90,7 +90,7 @@ def draw(context, heading, signed, tolerance, shares):
     page.rectangle(left, bottom, width, height, shaders.FLAT, page.paper)
     x, y = left + gap, bottom + gap + row / 2
     label_x, right = x + bar_width + gap, left + width - gap
-    page.text(x, y, _NOTE, faint=True)
+    page.text(x, y, note, faint=True)
     y += row
     page.rectangle(x, y - bar_width / 2, bar_width, bar_width, shaders.STRIPES)
     page.text(label_x, y, "Outside")

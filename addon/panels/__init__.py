@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""3D View > Sidebar > Tolerance, from top to bottom."""
+"""3D View > Sidebar > Tolerance, from top to bottom, and entries in Blender's own menus."""
 
 import bpy
 
+from . import menus
 from .decimate import TOLVOL_PT_decimate, TOLVOL_PT_protect
 from .deform import TOLVOL_PT_deform
 from .deviation import TOLVOL_PT_deviation, TOLVOL_PT_show_deviation
@@ -23,4 +24,14 @@ _CLASSES = (
     TOLVOL_PT_guard,
 )
 
-register, unregister = bpy.utils.register_classes_factory(_CLASSES)
+_register, _unregister = bpy.utils.register_classes_factory(_CLASSES)
+
+
+def register():
+    _register()
+    menus.register()
+
+
+def unregister():
+    menus.unregister()
+    _unregister()

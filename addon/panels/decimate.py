@@ -4,9 +4,8 @@ import json
 import bpy
 
 from .. import report, volume
-from ..operators import blocked
 from ..operators.decimate import draw_decimate_settings, draw_protect_settings, targets
-from .layout import SubPanel, text_lines
+from .layout import SubPanel, say_blocked, text_lines
 
 
 class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
@@ -22,14 +21,7 @@ class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
         layout.operator("tolvol.decimate", text=f"Decimate {count} Objects" if count > 1 else "Decimate")
         if ob.tolvol.last_run and ob.tolvol.last_run_of == volume.shown_fingerprint(ob):
             text_lines(context, layout, report.counts(json.loads(ob.tolvol.last_run)), "CHECKMARK")
-        reason = blocked.decimate_blocked(ob)
-        # The panel above says what is wrong with the reference.
-        if reason and reason not in (
-            blocked.object_blocked(ob),
-            blocked.reference_blocked(ob),
-            blocked.check_blocked(ob),
-        ):
-            text_lines(context, layout, reason, "ERROR")
+        say_blocked(context, layout, ob)
 
 
 class TOLVOL_PT_protect(SubPanel, bpy.types.Panel):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from .layout import SubPanel
+from .layout import SubPanel, say_blocked
 
 
 class TOLVOL_PT_deform(SubPanel, bpy.types.Panel):
@@ -16,3 +16,4 @@ class TOLVOL_PT_deform(SubPanel, bpy.types.Panel):
         layout.prop(settings, "lattice")
         layout.prop(settings, "deform_mode")
         layout.operator("tolvol.deform", text="Deform")
+        say_blocked(context, layout, context.active_object)

@@ -37,6 +37,8 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
             right(row, f"{length(context, value)}  {report.percent(value, tolerance)}" if measured else "\u2013")
         if not measured:
             text = "Not measured yet" if ob.tolvol.snapshot else "Set the reference first"
+            if ob.mode != "OBJECT":
+                text = "Measure in Object Mode"
             text_lines(context, column, text, GREY)
             return
         # A tolerance that was changed since is compared with what was measured.

@@ -5,6 +5,7 @@ import blf
 import bpy
 
 from .. import native
+from ..operators import blocked
 
 _FONT = 0  # Blender's own
 # Pixels of the sidebar that a label with an icon leaves to others: tabs, margins, the icon.
@@ -52,3 +53,10 @@ def text_lines(context, layout, text, icon):
             lines[-1] = longer
     for i, line in enumerate(lines):
         column.label(text=line, icon="BLANK1" if i else icon)
+
+
+def say_blocked(context, layout, ob):
+    """Why the mesh cannot be changed; what is wrong with the reference or the mode the panel above says."""
+    reason = blocked.decimate_blocked(ob)
+    if reason and reason not in (blocked.object_blocked(ob), blocked.reference_blocked(ob), blocked.check_blocked(ob)):
+        text_lines(context, layout, reason, "ERROR")

@@ -2,7 +2,7 @@
 import bpy
 
 from ..operators.modifiers import FITTED, modifier_blocked
-from .layout import SubPanel, text_lines
+from .layout import SubPanel, say_blocked, text_lines
 
 
 class TOLVOL_PT_modifiers(SubPanel, bpy.types.Panel):
@@ -31,3 +31,4 @@ class TOLVOL_PT_modifiers(SubPanel, bpy.types.Panel):
             button.operator(f"tolvol.{name}", text=text).modifier = modifier.name
             if reason:
                 text_lines(context, layout, reason, "BLANK1")
+        say_blocked(context, layout, ob)

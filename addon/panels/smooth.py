@@ -2,7 +2,7 @@
 import bpy
 
 from ..operators.smooth import draw_smooth_settings
-from .layout import SubPanel
+from .layout import SubPanel, say_blocked
 
 
 class TOLVOL_PT_smooth(SubPanel, bpy.types.Panel):
@@ -16,3 +16,4 @@ class TOLVOL_PT_smooth(SubPanel, bpy.types.Panel):
         ob = context.active_object
         draw_smooth_settings(layout, ob.tolvol.smooth, ob)
         layout.operator("tolvol.smooth", text="Smooth")
+        say_blocked(context, layout, ob)

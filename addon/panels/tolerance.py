@@ -5,7 +5,7 @@ import bpy
 
 from .. import native, volume
 from ..operators import blocked
-from ..units import length
+from ..units import NO_BREAK, length
 from .layout import AMBER, GREEN, GREY, RED, Panel, right, text_lines
 
 
@@ -29,15 +29,16 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
             layout.prop(settings, "reference_object")
         column = layout.column(align=True)
         column.prop(settings, "tolerance_percent" if settings.tolerance_mode == "PERCENT" else "tolerance_length")
-        column.prop(settings, "tolerance_mode", text=" ")
+        row = column.row(align=True)
+        row.prop(settings, "tolerance_mode", text=" ")
+        row.menu("TOLVOL_MT_tolerances", text="", icon="PRESET")
         right(layout, self._other_form(context, ob))
         row = layout.row(align=True)
         row.operator("tolvol.set_reference", text="Update" if settings.snapshot else "Set Reference")
         if settings.snapshot:
             row.operator("tolvol.clear_reference", text="", icon="X")
         _status(context, layout, ob)
-        on_top = ["modifiers"] * bool(ob.modifiers) + ["shape keys"] * bool(ob.data.shape_keys)
-        if on_top:
+        if on_top := volume.on_top(ob):
             text_lines(context, layout, f"Holds for the base mesh, without its {' and '.join(on_top)}", "INFO")
 
     @staticmethod
@@ -55,15 +56,24 @@ def _status(context, layout, ob):
     """How the reference stands, with a colour for it."""
     settings = ob.tolvol
     reason = blocked.object_blocked(ob)
-    # A reference that is set holds in every mode; buttons that need Object Mode say so.
-    if reason and (ob.mode == "OBJECT" or settings.snapshot is None):
+    if reason and ob.mode == "OBJECT":
         text_lines(context, layout, reason, RED)
-    elif settings.snapshot is None:
-        text_lines(context, layout, blocked.reference_blocked(ob) or "No reference set", GREY)
-    elif reason := volume.stale_reason(ob):
-        text_lines(context, layout, f"Out of date: {reason}", AMBER)
+        return
+    if settings.snapshot is None:
+        why = None if reason else blocked.reference_blocked(ob)
+        text_lines(context, layout, why or "No reference set", GREY)
+    elif stale := volume.stale_reason(ob):
+        text_lines(context, layout, f"Out of date: {stale}", AMBER)
     else:
         triangles = len(settings.snapshot.polygons)
         tolerance = length(context, volume.tolerance_length(settings, settings.snapshot_size))
-        ready = f", ready in {settings.snapshot_seconds:.2f} s" if settings.snapshot_seconds else ""
-        text_lines(context, layout, f"{triangles:,} triangles, ±{tolerance}{ready}", GREEN)
+        built = volume.built_of(ob)
+        ready = f"ready in {built.seconds:.2f}{NO_BREAK}s, {_bytes(built.memory)}" if built else "computed when needed"
+        text_lines(context, layout, f"{triangles:,} triangles, ±{tolerance}, {ready}", GREEN)
+    # A reference that is set holds in every mode.
+    if reason:
+        text_lines(context, layout, "Buttons need Object Mode", "INFO")
+
+
+def _bytes(count):
+    return f"{count / 1e6:.3g}{NO_BREAK}MB"

@@ -10,10 +10,12 @@ from addon import mesh_io
 
 
 def add_object(name, vertices, faces, matrix=None):
-    """A new object, selected and active."""
+    """A new object with a tolerance of 1 %, selected and active."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(np.asarray(vertices).tolist(), [], [[int(vertex) for vertex in face] for face in faces])
-    return link(bpy.data.objects.new(name, mesh), matrix)
+    ob = bpy.data.objects.new(name, mesh)
+    ob.tolvol.tolerance_percent = 1
+    return link(ob, matrix)
 
 
 def link(ob, matrix=None):

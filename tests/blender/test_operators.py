@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import mesh_io, native, volume
-from addon.operators import blocked
+import addon
+from addon import mesh_io, native, overlay, preferences, volume
+from addon.operators import blocked, presets
+from addon.overlay import draw, reasons
 from scenes import activate, add_object, link, sheet, torus, world_triangles
 
 OPERATORS = (bpy.ops.tolvol.set_reference, bpy.ops.tolvol.check, bpy.ops.tolvol.select_outside, bpy.ops.tolvol.decimate)
@@ -140,6 +142,17 @@ def test_measurement_is_dropped_when_mesh_place_or_reference_change():
     assert volume.measurement_of(ob) is None
 
 
+def test_nothing_is_known_of_a_mesh_that_is_being_edited():
+    ob = torus()
+    bpy.ops.tolvol.set_reference()
+    bpy.ops.tolvol.check()
+    for mode in ("EDIT", "SCULPT"):
+        bpy.ops.object.mode_set(mode=mode)
+        assert volume.measurement_of(ob) is None
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert volume.measurement_of(ob) is not None
+
+
 def test_own_measurement_moves_along():
     ob = torus()
     bpy.ops.tolvol.decimate(tolerance_percent=1)
@@ -246,6 +259,132 @@ def test_check_without_reference_is_refused():
         bpy.ops.tolvol.check()
 
 
+def test_a_reference_that_is_no_mesh_is_refused():
+    curve = bpy.data.objects.new("wire", bpy.data.curves.new("wire", "CURVE"))
+    ob = torus()
+    ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", curve
+    with pytest.raises(RuntimeError, match="wire is no mesh: Object > Convert > Mesh"):
+        bpy.ops.tolvol.set_reference()
+    assert volume.shown_size(ob) is None
+
+
+# What becomes of objects ---------------------------------------------------------------------------------------------
+
+
+def referenced(name="torus"):
+    """An object whose reference is set, decimated and measured."""
+    ob = torus(name)
+    bpy.ops.tolvol.set_reference()
+    bpy.ops.tolvol.decimate()
+    return ob
+
+
+def test_volume_in_memory_is_that_of_the_tolerance():
+    ob = referenced()
+    built = volume.built_of(ob)
+    assert built.tolerance == pytest.approx(0.01 * ob.tolvol.snapshot_size, rel=1e-6) and built.memory > 0
+    ob.tolvol.tolerance_percent = 2
+    assert volume.built_of(ob) is None
+    bpy.ops.tolvol.check()
+    bpy.ops.tolvol.decimate()
+    assert volume.built_of(ob).tolerance == pytest.approx(2 * built.tolerance)
+
+
+def test_renaming_changes_nothing():
+    ob = referenced()
+    ob.name, ob.data.name, ob.tolvol.snapshot.name = "other", "mesh", "moved"
+    bpy.context.view_layer.update()
+    assert volume.measurement_of(ob) is not None and volume.stale_reason(ob) is None
+    assert bpy.ops.tolvol.check() == {"FINISHED"}
+
+
+def test_duplicates_share_a_reference_until_one_gets_another():
+    ob = referenced()
+    bpy.ops.object.duplicate()
+    twin = bpy.context.object
+    assert twin is not ob and twin.tolvol.snapshot is ob.tolvol.snapshot and volume.measurement_of(twin) is not None
+    before = mesh_io.read_mesh(ob.tolvol.snapshot).fingerprint()
+    bpy.ops.tolvol.set_reference()
+    assert twin.tolvol.snapshot is not ob.tolvol.snapshot and volume.measurement_of(twin) is None
+    assert mesh_io.read_mesh(ob.tolvol.snapshot).fingerprint() == before
+    bpy.data.objects.remove(twin)
+    activate(ob)
+    assert volume.measurement_of(ob) is not None and bpy.ops.tolvol.check() == {"FINISHED"}
+
+
+def test_reference_outlives_the_object_it_was_taken_of():
+    other = torus("other")
+    ob = torus()
+    ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", other
+    bpy.ops.tolvol.set_reference()
+    bpy.data.objects.remove(other)
+    assert volume.shown_size(ob) == ob.tolvol.snapshot_size
+    assert bpy.ops.tolvol.check() == {"FINISHED"}
+    bpy.ops.tolvol.clear_reference()
+    assert blocked.reference_blocked(ob) == "Choose the reference object" and volume.shown_size(ob) is None
+
+
+def test_another_mesh_on_the_object_is_noticed():
+    ob = referenced()
+    ob.data = torus("other", seed=2).data
+    bpy.context.view_layer.update()
+    assert volume.measurement_of(ob) is None
+
+
+def assert_whole(ob):
+    assert volume.stale_reason(ob) is None and volume.measurement_of(ob).forward_within
+    assert len(ob.tolvol.snapshot.vertices) == 48 * 24 and ob.tolvol.tolerance_percent == 1
+    assert bpy.ops.tolvol.check() == {"FINISHED"} and bpy.ops.tolvol.decimate.poll()
+
+
+def test_saved_loaded_and_appended(tmp_path):
+    ob = referenced()
+    path = str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    ob = bpy.data.objects["torus"]
+    assert volume.built_of(ob) is None
+    assert_whole(ob)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(path) as (_, there):
+        there.objects = ["torus"]
+    assert_whole(link(there.objects[0]))
+
+
+# Beside the panel ----------------------------------------------------------------------------------------------------
+
+
+def test_legend_says_what_no_proof_covers():
+    ob = torus()
+    assert draw.note(ob) == "Shown, not proved"
+    ob.modifiers.new("wave", "WAVE")
+    ob.shape_key_add()
+    assert draw.note(ob) == "Shown with its modifiers and shape keys, not proved"
+    bpy.ops.object.mode_set(mode="SCULPT")
+    assert draw.note(ob) == "Shown without its modifiers, not proved"
+
+
+def test_drawing_that_was_refused_is_asked_for_again_once_it_is_turned_on_anew(chosen_preferences):
+    reasons.broken[:] = ["no such texture"]
+    overlay.refresh()
+    assert reasons.broken
+    chosen_preferences.use_gl = False
+    assert not reasons.broken
+
+
+def test_menus_have_entries_while_the_addon_is_on():
+    def ours():
+        kinds = bpy.types.VIEW3D_MT_object, bpy.types.VIEW3D_MT_edit_mesh_vertices
+        return [sum(f.__module__.startswith("addon.") for f in kind.draw._draw_funcs) for kind in kinds]
+
+    assert ours() == [1, 1]
+    addon.unregister()
+    try:
+        assert ours() == [0, 0]
+    finally:
+        addon.register()
+
+
 # Undo ---------------------------------------------------------------------------------------------------------------
 
 
@@ -305,6 +444,70 @@ def test_settings_not_given_are_the_objects_own_and_those_given_are_kept():
     other = torus("other")
     bpy.ops.tolvol.decimate()
     assert '"percent": 1.0' in other.tolvol.last_run and '"two_sided": true' in other.tolvol.last_run
+
+
+@pytest.fixture
+def chosen_preferences():
+    """What a person chose where the add-on is installed."""
+    installed = bpy.context.preferences.addons.new()
+    installed.module = addon.__name__
+    yield installed.preferences
+    bpy.context.preferences.addons.remove(installed)
+
+
+def test_tolerance_begins_as_the_preferences_say_and_stays_once_a_reference_is_set(chosen_preferences):
+    ob = link(bpy.data.objects.new("new", torus().data.copy()))
+    assert ob.tolvol.tolerance_percent == 0.5 and ob.tolvol.tolerance_mode == "PERCENT" and ob.tolvol.keep == "BOTH"
+    chosen_preferences.tolerance = 0.25
+    assert ob.tolvol.tolerance_percent == 0.25
+    bpy.ops.tolvol.set_reference()
+    chosen_preferences.tolerance = 2
+    assert ob.tolvol.tolerance_percent == 0.25
+
+
+def test_presets_are_shown_as_length_and_share():
+    ob = torus()
+    size = volume.shown_size(ob)
+    assert bpy.ops.tolvol.set_tolerance(mode="LENGTH", value=0.05) == {"FINISHED"}
+    assert volume.tolerance_length(ob.tolvol, size) == 0.05
+    said = presets.label(bpy.context, "LENGTH", 0.05, size).replace("\u00a0", " ")
+    assert said == f"0.05 in file units:  5 cm,  {5 / size:.3g} % of size"
+    bpy.ops.tolvol.set_tolerance(mode="PERCENT", value=0.1)
+    assert volume.tolerance_length(ob.tolvol, size) == 0.001 * size
+    assert presets.label(bpy.context, "PERCENT", 0.1, None) == "0.1 % of size"
+
+
+def test_every_setting_has_a_tooltip():
+    groups = [cls for cls in bpy.types.PropertyGroup.__subclasses__() if cls.__name__.startswith("TOLVOL_PG")]
+    assert len(groups) >= 5
+    for group in (*groups, preferences.TOLVOL_AP_preferences):
+        for name in group.__annotations__:
+            rna = group.bl_rna.properties[name]
+            if rna.type != "POINTER" or rna.fixed_type.bl_rna.identifier[:9] != "TOLVOL_PG":
+                assert rna.description and not rna.description.endswith("."), (group, name)
+
+
+def test_what_the_module_refuses_is_said_in_the_panels_words():
+    ob = moved_up()
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.05
+    for operator in (bpy.ops.tolvol.decimate, bpy.ops.tolvol.smooth):
+        with pytest.raises(
+            RuntimeError, match="take a larger tolerance, set the reference anew; Select Outside"
+        ) as said:
+            operator()
+        assert "=" not in str(said.value)
+    # Every face of what is left is inside, but half of the reference has nothing near it.
+    ob = sheet(bumps=0.0)
+    bpy.ops.tolvol.set_reference()
+    half = sheet("half", bumps=0.0)
+    half.data.transform(Matrix.Diagonal((0.5, 1, 1, 1)))
+    ob.data = half.data
+    bpy.data.objects.remove(half)
+    activate(ob)
+    with pytest.raises(RuntimeError, match="or set Keep to One Way") as said:
+        bpy.ops.tolvol.decimate()
+    assert "=" not in str(said.value)
+    assert bpy.ops.tolvol.decimate(keep="ONE") == {"FINISHED"}
 
 
 def test_percent_that_was_typed_is_the_percent_that_is_used():

@@ -6,7 +6,21 @@ import numpy as np
 
 import scenes
 from addon import job, mesh_io, native, volume
-from window import centre, click, find, key, on_screen, open_tab, press, region, reset, screenshot, view, xdotool
+from window import (
+    centre,
+    click,
+    find,
+    find_property,
+    key,
+    on_screen,
+    open_tab,
+    press,
+    region,
+    reset,
+    screenshot,
+    view,
+    xdotool,
+)
 
 
 def monkey():
@@ -53,7 +67,8 @@ def test_decimate_by_mouse_and_undo_by_one_ctrl_z():
     yield 1.0
     screenshot("2 decimated")
     assert len(reference[1]) == 62976 and suzanne().tolvol.snapshot is not None
-    assert_proved(suzanne(), reference, 1)
+    assert suzanne().tolvol.tolerance_percent == 0.5
+    assert_proved(suzanne(), reference, 0.5)
     after = stored()
     xdotool("mousemove", *centre())
     yield
@@ -64,6 +79,31 @@ def test_decimate_by_mouse_and_undo_by_one_ctrl_z():
     key("ctrl+shift+z")
     yield 1.0
     assert stored() == after and suzanne().tolvol.snapshot is not None
+
+
+def test_tolerance_from_the_presets_and_decimation_by_menu_search():
+    yield from reset(scenes.torus)
+    yield from open_tab()
+    ob, reference = bpy.data.objects["torus"], scenes.world_triangles(bpy.data.objects["torus"])
+    _, y = yield from find_property("tolerance_mode", 0.6)
+    sidebar = region("UI")
+    x, _ = on_screen(sidebar, sidebar.width - 47, 0)  # beside the unit
+    click(x, y)
+    yield 1.0
+    screenshot("presets")
+    xdotool("key", "Down", "sleep", "0.1", "key", "Return")
+    yield from finished(lambda: ob.tolvol.tolerance_mode == "LENGTH")
+    assert volume.tolerance_length(ob.tolvol, 1) == 0.05
+    xdotool("mousemove", *centre())
+    yield
+    key("F3")
+    yield 0.5
+    xdotool("type", "decimate in tol")
+    yield 0.5
+    screenshot("menu search")
+    key("Return")
+    yield from finished(lambda: len(ob.data.polygons) < 500)
+    assert_proved(ob, reference, 5 / native.module.size(*reference))
 
 
 def test_adjust_last_operation():
@@ -141,7 +181,7 @@ def test_reference_check_and_select_outside():
     yield from finished(lambda: suzanne().mode == "EDIT")
     yield 0.5
     screenshot("9 outside selected")
-    assert (yield from find("tolvol.decimate")) is not None
+    assert (yield from find("tolvol.check")) is not None  # greyed
     screenshot("10 edit mode")
     with bpy.context.temp_override(window=view()[0], area=view()[1]):
         bpy.ops.object.mode_set(mode="OBJECT")

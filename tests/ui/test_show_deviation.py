@@ -26,6 +26,7 @@ from window import (
 
 def ball():
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=6)
+    bpy.context.object.tolvol.tolerance_percent = 1
     bpy.context.object.tolvol.deviation_kind = "MAGNITUDE"
     bpy.context.object.tolvol.deviation_opacity = 1
     view()[1].spaces[0].region_3d.view_distance = 5
@@ -41,6 +42,7 @@ def solid_monkey():
     ob.modifiers.new("smooth", "SMOOTH").iterations = 3
     with bpy.context.temp_override(window=view()[0], area=view()[1], object=ob, active_object=ob):
         bpy.ops.object.convert(target="MESH")
+    ob.tolvol.tolerance_percent = 1
     view()[1].spaces[0].region_3d.view_distance = 4.5
 
 

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Entries in the menus of the 3D view: Object in Object Mode, Vertex in Edit Mode."""
+
+import bpy
+
+# Blender's menu search (F3) finds what is in a menu.
+_IN_OBJECT_MENU = (
+    *("set_reference", "clear_reference", "check", "select_outside", "save_report"),
+    *("decimate", "smooth", "apply_modifier", "fit_modifier", "deform"),
+)
+
+
+def _object_menu(self, _context):
+    self.layout.separator()
+    self.layout.menu("TOLVOL_MT_object")
+
+
+def _vertex_menu(self, _context):
+    self.layout.separator()
+    self.layout.operator("tolvol.smooth")
+
+
+class TOLVOL_MT_object(bpy.types.Menu):
+    bl_label = "Tolerance"
+
+    def draw(self, _context):
+        for name in _IN_OBJECT_MENU:
+            self.layout.operator(f"tolvol.{name}")
+
+
+def register():
+    bpy.utils.register_class(TOLVOL_MT_object)
+    bpy.types.VIEW3D_MT_object.append(_object_menu)
+    bpy.types.VIEW3D_MT_edit_mesh_vertices.append(_vertex_menu)
+
+
+def unregister():
+    bpy.types.VIEW3D_MT_edit_mesh_vertices.remove(_vertex_menu)
+    bpy.types.VIEW3D_MT_object.remove(_object_menu)
+    bpy.utils.unregister_class(TOLVOL_MT_object)
