@@ -42,6 +42,7 @@ def main():
     import bpy
 
     bpy.app.binary_path = sys.argv[0]
+    print(f"Blender {bpy.app.version_string}")
     for code, file in found:
         try:
             run(code, file)
