@@ -42,7 +42,6 @@ def main():
     import bpy
 
     bpy.app.binary_path = sys.argv[0]
-    print(f"Blender {bpy.app.version_string}")
     for code, file in found:
         try:
             run(code, file)

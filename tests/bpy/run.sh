@@ -33,7 +33,7 @@ venv=$PWD/build/bpy/$version
 if [ ! -e "$venv/bin/blender" ]; then
   rm -rf "$venv"
   "$found" -m venv "$venv"
-  "$venv/bin/pip" install --quiet --disable-pip-version-check "bpy==$version.*" pytest==8.3.4
+  "$venv/bin/pip" install --quiet --disable-pip-version-check "bpy==$version.*" pytest==8.3.4 matplotlib==3.10.0
   cat >"$venv/bin/blender" <<EOF
 #!/bin/sh
 TOLVOL_BPY_BLENDER=\$0 exec "$venv/bin/python" "$PWD/tests/bpy/blender.py" "\$@"
