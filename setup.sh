@@ -4,18 +4,19 @@
 # Blender installs. Nothing is done twice.
 #   sh setup.sh           what the add-on and the demo need
 #   sh setup.sh --tests   also what the tests need
+# TOLVOL_PYTHONS="3.11;3.13" adds a module for each of these Pythons, by version or path.
 set -eu
 cd "$(dirname "$0")"
 
 packages="cmake ninja-build pkg-config g++ python3-dev pybind11-dev python3-numpy python3-matplotlib libopenmesh-dev libglm-dev libepoxy-dev libgtest-dev
   libegl1 libgl1 libgl1-mesa-dri blender"
-targets=addon_zip
+targets=extension
 case "${1-}" in
 "") ;;
 --tests)
   packages="$packages python3-pytest python3-venv python3-matplotlib libcgal-dev clang-format clang-tidy
     xvfb xdotool imagemagick"
-  targets="all addon_zip"
+  targets="all extension"
   ;;
 *)
   echo "setup: unknown option $1 (the only one is --tests)" >&2
@@ -63,5 +64,5 @@ if [ -n "$missing" ]; then
   stage "packages" $as_root DEBIAN_FRONTEND=noninteractive apt-get -q -y install --no-install-recommends $missing
 fi
 
-stage "configured" cmake --preset release
+stage "configured" cmake --preset release ${TOLVOL_PYTHONS:+"-DTOLVOL_PYTHONS=$TOLVOL_PYTHONS"}
 stage "built in build/release" cmake --build --preset release --target $targets

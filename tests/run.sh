@@ -1,10 +1,15 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Sets up and runs every test, or only the runners that are named: sh tests/run.sh [native|asan|python|blender|ui|style]...
+#   sh tests/run.sh --bpy VERSION    instead: the tests of the add-on in PyPI's bpy of that version, 4.2 or later
 # One closing line a runner; what a runner printed is in build/tests/, and is shown when it fails.
 set -eu
 cd "$(dirname "$0")/.."
 
+if [ "${1-}" = --bpy ]; then
+  shift
+  exec sh tests/bpy/run.sh "$@"
+fi
 runners="native asan python blender ui style"
 for name in "$@"; do
   case " $runners " in

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Guard Sculpting: what a dab moved beyond the tolerance goes back before it is drawn."""
 
+import bpy
+
 from .. import mesh_io
 from . import watch
 
@@ -42,6 +44,8 @@ def rest(ob):
 
 
 def _topology(mesh):
+    if bpy.app.version >= (3, 6):  # arrays that are shared with the evaluated mesh move when they are read
+        return watch.topology(mesh)
     # Sculpting changes the faces only by tools that make them anew, elsewhere in memory.
     return (len(mesh.vertices), len(mesh.loops), mesh.loops[0].as_pointer(), mesh.polygons[0].as_pointer())
 

@@ -18,13 +18,13 @@ void bind_errors(pybind11::module_& module) {
     try {
       if (pointer) std::rethrow_exception(pointer);
     } catch (const InvalidInput& error) {
-      invalid_input(error.what());
+      PyErr_SetString(invalid_input.ptr(), error.what());
     } catch (const ResourceLimit& error) {
-      resource_limit(error.what());
+      PyErr_SetString(resource_limit.ptr(), error.what());
     } catch (const GlUnavailable& error) {
-      gl_unavailable(error.what());
+      PyErr_SetString(gl_unavailable.ptr(), error.what());
     } catch (const Cancelled& error) {
-      cancelled(error.what());
+      PyErr_SetString(cancelled.ptr(), error.what());
     }
   });
 }

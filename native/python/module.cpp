@@ -1,7 +1,25 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "python/module.h"
 
+#include <string>
+
+namespace {
+
+// NumPy 2 moved fields that an older pybind11 reads: it would take wrong sizes without an error.
+void refuse_newer_numpy() {
+#if PYBIND11_VERSION_HEX < 0x020C0000
+  const auto version = pybind11::module_::import("numpy").attr("__version__").cast<std::string>();
+  if (std::stoi(version) >= 2) {
+    throw pybind11::import_error("made for NumPy 1, and this is NumPy " + version +
+                                 ": build it with pybind11 2.12 or later, as -DTOLVOL_PYTHONS does");
+  }
+#endif
+}
+
+}  // namespace
+
 PYBIND11_MODULE(tolvol, module) {
+  refuse_newer_numpy();
   module.doc() =
       "Tolerance volumes: keep a triangle mesh within a tolerance of a reference surface, proved.\n\n"
       "Vertices are (n, 3) float32 or float64 arrays in local coordinates; to_world is a (4, 4) matrix that maps them "

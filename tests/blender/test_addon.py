@@ -89,7 +89,7 @@ def run_blender(script, tmp_path, **environment):
 def package():
     """The zip that the build makes."""
     path = ROOT / f"build/release/tolerance_volumes-{native.module.__version__}.zip"
-    assert path.is_file(), "cmake --build build/release --target addon_zip makes it"
+    assert path.is_file(), "cmake --build build/release --target extension makes it"
     return path
 
 
@@ -123,7 +123,9 @@ def test_package_holds_what_is_here():
         for name in shaders:
             assert archive.read(name) == (ROOT / "shaders" / Path(name).name).read_bytes(), f"pack {name} anew"
     libraries = {name for name in others if re.fullmatch(r"tolerance_volumes/bin/(tolvol\.|lib).*", name)}
-    assert any("/tolvol." in name for name in libraries) and len(shaders) == 3
+    modules = {name for name in libraries if "/tolvol." in name}
+    assert {Path(name).name for name in modules} == {path.name for path in native.path.parent.glob("tolvol.*.so")}
+    assert native.path.name in {Path(name).name for name in modules} and len(shaders) == 3
     assert others - libraries - shaders == {"tolerance_volumes/LICENSE"}
 
 
@@ -158,6 +160,34 @@ assert installed.bl_info['version'] == (0, 2, 0)
 assert sys.modules['tolerance_volumes.volume'] is not old
 {DECIMATE}
 bpy.ops.preferences.addon_disable(module='tolerance_volumes')
+assert not hasattr(bpy.types.Object, 'tolvol')
+ok()""",
+        tmp_path,
+        TOLVOL_PYTHON_PATH="",
+    )
+    assert "Error" not in out
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 2), reason="extensions came with 4.2")
+def test_zip_installs_as_an_extension_and_over_itself(tmp_path):
+    manifest = "tolerance_volumes/blender_manifest.toml"
+    second = repack(
+        tmp_path / "second.zip",
+        text=lambda name, content: content.replace(b'"0.1.0"', b'"0.2.0"') if name == manifest else content,
+    )
+    out = run_blender(
+        f"""
+import bpy
+def install(path):
+    bpy.ops.extensions.package_install_files(filepath=path, repo='user_default', enable_on_install=True)
+    return sys.modules['bl_ext.user_default.tolerance_volumes']
+for path in {str(package())!r}, {str(second)!r}:
+    installed = install(path)
+    assert installed.native.module is not None, installed.native.reason
+    assert installed.native.path.is_relative_to({str(tmp_path / "user")!r}), installed.native.path
+    assert bpy.context.preferences.addons[installed.__name__].preferences.threads == 0
+    {DECIMATE.replace(chr(10), chr(10) + "    ")}
+bpy.ops.preferences.addon_disable(module=installed.__name__)
 assert not hasattr(bpy.types.Object, 'tolvol')
 ok()""",
         tmp_path,
