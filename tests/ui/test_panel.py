@@ -88,7 +88,9 @@ def test_tolerance_from_the_presets_and_decimation_by_menu_search():
     _, y = yield from find_property("tolerance_mode", 0.6)
     sidebar = region("UI")
     x, _ = on_screen(sidebar, sidebar.width - 47, 0)  # beside the unit
-    click(x, y)
+    xdotool("mousemove", *centre())
+    yield 0.6  # until no tooltip is in the way
+    xdotool("mousemove", x, y, "sleep", "0.1", "mousedown", 1, "sleep", "0.1", "mouseup", 1)
     yield 1.0
     screenshot("presets")
     xdotool("key", "Down", "sleep", "0.1", "key", "Return")
