@@ -16,6 +16,15 @@ PROTECTED = (
 )
 
 
+def _vertex_group(description, options):
+    return {
+        "vertex_group": StringProperty(name="Vertex Group", description=description, options=set(options)),
+        "invert_vertex_group": BoolProperty(
+            name="Invert", description="Take the weights the other way around", options=set(options)
+        ),
+    }
+
+
 def decimate_settings(options=frozenset()):
     """All but the placement, whose default depends on the mesh."""
     return {
@@ -82,16 +91,11 @@ def decimate_settings(options=frozenset()):
             items=tuple((axis, axis, f"The plane where {axis} is 0, in the object's own axes") for axis in "XYZ"),
             options={"ENUM_FLAG", *options},
         ),
-        "vertex_group": StringProperty(
-            name="Vertex Group",
-            description="How much of the tolerance may be used: vertices of weight 0 stay where they are, around those of "
-            "weight 0.5 the result stays within half the tolerance of the reference",
-            options=set(options),
-        ),
-        "invert_vertex_group": BoolProperty(
-            name="Invert", description="Take the weights the other way around", options=set(options)
-        ),
-    }
+    } | _vertex_group(
+        "How much of the tolerance may be used: vertices of weight 0 stay where they are, around those of "
+        "weight 0.5 the result stays within half the tolerance of the reference",
+        options,
+    )
 
 
 def smooth_settings(options=frozenset()):
@@ -132,15 +136,10 @@ def smooth_settings(options=frozenset()):
             ),
             options=set(options),
         ),
-        "vertex_group": StringProperty(
-            name="Vertex Group",
-            description="Strength for each vertex: those of weight 0 stay where they are",
-            options=set(options),
-        ),
-        "invert_vertex_group": BoolProperty(
-            name="Invert", description="Take the weights the other way around", options=set(options)
-        ),
-    }
+    } | _vertex_group(
+        "Strength for each vertex: those of weight 0 stay where they are",
+        options,
+    )
 
 
 def modifier_settings(options=frozenset()):

@@ -9,6 +9,16 @@ from . import native, volume
 
 # Percent of the size, where nobody chose anything else.
 TOLERANCE = 0.5
+# What a tolerance in percent of the size may be and how it is typed.
+PERCENT = {
+    "min": 1e-6,
+    "max": 100.0,
+    "soft_min": 0.01,
+    "soft_max": 10.0,
+    "step": 10,
+    "precision": 3,
+    "subtype": "PERCENTAGE",
+}
 
 
 class TOLVOL_AP_preferences(bpy.types.AddonPreferences):
@@ -18,13 +28,7 @@ class TOLVOL_AP_preferences(bpy.types.AddonPreferences):
         name="Default Tolerance",
         description="The tolerance of objects for which none was chosen yet, in percent of the reference's size",
         default=TOLERANCE,
-        min=1e-6,
-        max=100.0,
-        soft_min=0.01,
-        soft_max=10.0,
-        step=10,
-        precision=3,
-        subtype="PERCENTAGE",
+        **PERCENT,
         update=lambda _preferences, _context: volume.notify(),
     )
     threads: IntProperty(

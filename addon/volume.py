@@ -129,6 +129,15 @@ def stale_reason(ob):
     return None
 
 
+def reference_missing(ob):
+    """Why there is no reference to compare `ob` with, or None. Cheap enough to draw."""
+    if ob.tolvol.snapshot is None:
+        return "Set the reference first"
+    if reason := stale_reason(ob):
+        return f"The reference is out of date: {reason}; press Update"
+    return None
+
+
 def remember(ob, surface, certified, tolerance, share_outside=0.0):
     """Keeps what was certified of `surface`, the object's mesh as it is now, for the panel."""
     measurement = ob.tolvol.measurement

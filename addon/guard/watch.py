@@ -33,10 +33,8 @@ def blocked(ob):
     """Why the mesh of `ob` cannot be guarded now, whatever the mode, or None. Cheap enough to draw."""
     if native.module is None:
         return native.reason
-    if ob.tolvol.snapshot is None:
-        return "Set the reference first"
-    if reason := volume.stale_reason(ob):
-        return f"The reference is out of date ({reason}): press Update"
+    if reason := volume.reference_missing(ob):
+        return reason
     if not ob.data.polygons:
         return f"{ob.name} has no faces"
     return None

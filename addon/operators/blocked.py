@@ -33,12 +33,8 @@ def reference_blocked(ob):
 
 def check_blocked(ob):
     """Why `ob` cannot be compared with its reference now, or None."""
-    if reason := object_blocked(ob):
+    if reason := object_blocked(ob) or volume.reference_missing(ob):
         return reason
-    if ob.tolvol.snapshot is None:
-        return "Set the reference first"
-    if reason := volume.stale_reason(ob):
-        return f"The reference is out of date ({reason}): press Update"
     if not ob.data.polygons:
         return f"{ob.name} has no faces"
     return None

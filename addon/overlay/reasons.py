@@ -25,10 +25,8 @@ def hidden(ob):
     """Why the deviation of `ob` is not shown where it should be, or None."""
     if reason := off():
         return reason
-    if ob.tolvol.snapshot is None:
-        return "Set the reference first"
-    if reason := volume.stale_reason(ob):
-        return f"The reference is out of date: {reason}. Press Update"
+    if reason := volume.reference_missing(ob):
+        return reason
     if ob.mode not in _MODES:
         return "Shown in Object, Edit and Sculpt Mode"
     if ob.mode == "SCULPT" and ob.use_dynamic_topology_sculpting:

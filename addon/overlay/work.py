@@ -1,32 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What takes too long to be done while drawing: one task at a time in a thread, and Blender's own loop between them."""
 
-import threading
 import time
 
 import bpy
 
 from .. import native
+from ..job import Job
 
 _TICK = 0.05  # seconds
 
 _waiting = {}  # what it is about -> (when it may begin, prepare, finish)
-_running = None
-
-
-class _Task:
-    def __init__(self, about, work, finish):
-        self.about, self.finish = about, finish
-        self.progress = native.module.Progress()
-        self.outcome = self.error = None
-        self.thread = threading.Thread(target=self._run, args=(work,), daemon=True)
-        self.thread.start()
-
-    def _run(self, work):
-        try:
-            self.outcome = work(self.progress)
-        except (native.module.TolvolError, MemoryError) as error:
-            self.error = error
+_running = None  # (about, finish, job)
 
 
 def later(about, seconds, prepare, finish):
@@ -35,7 +20,7 @@ def later(about, seconds, prepare, finish):
     prepare and finish run in Blender's main thread, not while it draws. Of several calls about the same thing the first
     sets the time and the last what is done; while it is being worked on no further call counts.
     """
-    if _running is not None and _running.about == about:
+    if _running is not None and _running[0] == about:
         return
     begin = _waiting[about][0] if about in _waiting else time.monotonic() + seconds
     _waiting[about] = begin, prepare, finish
@@ -45,15 +30,19 @@ def later(about, seconds, prepare, finish):
 
 def _tick():
     global _running
-    if _running is not None and not _running.thread.is_alive():
-        task, _running = _running, None
-        task.finish(task.outcome, task.error)
+    if _running is not None and _running[2].done():
+        (_, finish, job), _running = _running, None
+        try:
+            outcome, error = job.outcome(), None
+        except (native.module.TolvolError, MemoryError) as failure:
+            outcome, error = None, failure
+        finish(outcome, error)
     for about, (begin, prepare, finish) in list(_waiting.items()):
         if _running is None and begin <= time.monotonic():
             del _waiting[about]
             work = prepare()
             if work is not None:
-                _running = _Task(about, work, finish)
+                _running = about, finish, Job(work, native.module.Progress())
     return _TICK if _waiting or _running is not None else None
 
 
@@ -64,6 +53,7 @@ def stop():
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     if _running is not None:
-        _running.progress.cancel()
-        _running.thread.join()
+        job = _running[2]
+        job.progress.cancel()
+        job.done(None)
         _running = None

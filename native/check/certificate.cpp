@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Cheapest reason first: short edges between corners known to be near; the triangle of the grid node nearest to the
 // piece's centre; those of the nodes around; the exact closest triangle by the hierarchy, which also proves "outside";
-// then the piece is split. Parts are looked at breadth first, because the centres of the large ones show soonest that a
-// piece is outside.
+// then what one triangle covers is cut off, or the piece is split. Parts are looked at breadth first, because the
+// centres of the large ones show soonest that a piece is outside.
 #include "check/certificate.h"
 
 #include <algorithm>

@@ -12,10 +12,8 @@ namespace tolvol {
 namespace {
 
 constexpr double kFloor = 0.1;  // of the tolerance: a shorter piece is not split further
-// What an earlier decimation left has a witness for each of its pieces, and hardly any were cut finer than this.
-constexpr double kFinest = 0.1;
-constexpr std::size_t kBudget = 1 << 14;       // pieces that splitting may add in one change before it is refused
-constexpr std::size_t kFirstBudget = 1 << 14;  // pieces of one triangle in assign() that are split
+// Pieces that splitting may add before a change is refused, and in assign() of one triangle of the reference.
+constexpr std::size_t kBudget = 1 << 14;
 
 FourPoints with_centre(const Part& part) {
   const auto& [a, b, c] = part.corners;
@@ -62,7 +60,7 @@ bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::s
         std::sqrt(std::max({glm::dot(c[0] - centre, c[0] - centre), glm::dot(c[1] - centre, c[1] - centre),
                             glm::dot(c[2] - centre, c[2] - centre)}));
     const bool finest =
-        longest_squared(piece) <= kFinest * kFinest * within2_ || piece.cuts == kMostCuts || ++looked > kFirstBudget;
+        longest_squared(piece) <= kFloor * kFloor * within2_ || piece.cuts == kMostCuts || ++looked > kBudget;
     if (closest.distance > provable + radius || finest) {
       nearest.push_back(closest.triangle);
       all = false;

@@ -13,7 +13,8 @@ struct ClosestPoint {
                             ///< degenerate triangles it is still the distance to a point of the triangle
 };
 
-/// Degenerate triangles are the segments or points they are. Not finite input: the distance is NaN. O(1).
+/// Degenerate triangles are the segments or points they are. The corners are finite; of a p that is
+/// not, the distance is not finite either. O(1).
 /// After C. Ericson, Real-Time Collision Detection, 2005, §5.1.5, made safe for degenerate input.
 ClosestPoint closest_point(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);
 

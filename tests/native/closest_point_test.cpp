@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <random>
 
 namespace {
@@ -116,6 +117,19 @@ TEST(ClosestPoint, AnyScale) {
   // A small triangle far from the point: the distance keeps all its bits.
   EXPECT_EQ(closest_point({0, 0, 1}, a * 1e-200, b * 1e-200, c * 1e-200).distance_squared, 1);
   EXPECT_TRUE(std::isfinite(closest_point({1e308, 0, 0}, dvec3(-1e308, 0, 0), dvec3(-1e308, 1, 0), dvec3(0)).point.x));
+}
+
+TEST(ClosestPoint, APointThatIsNotFiniteHasNoDistance) {
+  const dvec3 a(0, 0, 0), b(4, 0, 0);
+  for (const double x : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    for (const double height : {4.0, 1e-9}) {
+      for (int i = 0; i < 3; ++i) {
+        dvec3 p(1, 1, 3);
+        p[i] = x;
+        EXPECT_FALSE(std::isfinite(closest_point(p, a, b, {0, height, 0}).distance_squared)) << x << " at " << i;
+      }
+    }
+  }
 }
 
 }  // namespace

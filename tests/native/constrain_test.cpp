@@ -10,6 +10,7 @@
 
 #include "check/certificate.h"
 #include "measure/hausdorff.h"
+#include "placed_mesh.h"
 #include "reference/errors.h"
 #include "shapes.h"
 
@@ -20,17 +21,7 @@ using glm::dvec3;
 using Mode = PullBack::Mode;
 using Points = std::vector<dvec3>;
 
-struct Scene {
-  TriangleMesh mesh;
-  glm::dmat4 to_world = glm::dmat4(1);
-  Storage storage = Storage::float32;
-  double percent = 1;
-
-  Placement placement() const { return {to_world, storage}; }
-  double tolerance() const { return percent / 100 * reference_size(mesh.vertices, mesh.triangles, to_world); }
-  std::unique_ptr<ToleranceVolume> volume(double share = 1) const {
-    return std::make_unique<ToleranceVolume>(mesh.vertices, mesh.triangles, placement(), share * tolerance());
-  }
+struct Scene : PlacedMesh {
   dvec3 stored(const dvec3& p) const { return storage == Storage::float32 ? rounded_to_float32(p) : p; }
   /// Every vertex moved by `motion(v)`, a world vector in tolerances.
   template <class Motion>

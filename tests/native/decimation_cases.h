@@ -5,12 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <memory>
-#include <utility>
 #include <vector>
 
 #include "measure/hausdorff.h"
 #include "operation/decimation.h"
+#include "placed_mesh.h"
 #include "shapes.h"
 
 namespace tolvol::cases {
@@ -18,22 +17,7 @@ namespace tolvol::cases {
 using glm::dvec3;
 using Options = DecimationOptions;
 
-struct Case {
-  TriangleMesh mesh;
-  glm::dmat4 to_world = glm::dmat4(1);
-  Storage storage = Storage::float32;
-  double percent = 1;
-
-  Placement placement() const { return {to_world, storage}; }
-  double tolerance() const { return percent / 100 * reference_size(mesh.vertices, mesh.triangles, to_world); }
-  std::unique_ptr<ToleranceVolume> volume() const {
-    return std::make_unique<ToleranceVolume>(mesh.vertices, mesh.triangles, placement(), tolerance());
-  }
-  TriangleMesh world(std::vector<dvec3> vertices, std::vector<glm::uvec3> triangles) const {
-    for (dvec3& p : vertices) p = placement().world(p);
-    return {std::move(vertices), std::move(triangles)};
-  }
-};
+using Case = PlacedMesh;
 
 inline DecimationResult run(const Case& c, const Options& options = {}) {
   const auto volume = c.volume();

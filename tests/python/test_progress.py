@@ -66,6 +66,20 @@ def test_cancel_from_another_thread():
     assert progress.cancelled
 
 
+def test_cancel_while_the_input_is_compared_with_the_reference():
+    vertices, triangles = LARGE
+    volume = tolvol.ToleranceVolume(vertices, triangles, TOLERANCE)
+    moved = vertices + 0.4 * TOLERANCE * np.array([1, 0, 0])
+    progress, thread, outcome = watch(lambda progress: tolvol.decimate(moved, triangles, volume, progress=progress))
+    while thread.is_alive() and not (progress.stage == "comparing" and progress.fraction > 0):
+        time.sleep(0.0005)
+    progress.cancel()
+    while thread.is_alive():
+        assert progress.stage == "comparing", "it went on"
+        time.sleep(0.0005)
+    assert isinstance(outcome[0], tolvol.Cancelled)
+
+
 @pytest.mark.parametrize("call", CALLS)
 def test_a_call_that_is_cancelled_before_it_starts(call):
     progress = tolvol.Progress()
