@@ -70,6 +70,8 @@ class BoundedMesh {
   /// Whether the vertex left its original position.
   bool moved(std::uint32_t vertex) const { return moved_[vertex]; }
   bool on_boundary(std::uint32_t vertex) const { return mesh_.is_boundary(handle(vertex)); }
+  /// Whether vertices of the kernel are one vertex of the result: what one may do then depends on where the others are.
+  bool has_copies() const { return !copies_.empty(); }
   /// Where corner `corner` of a triangle takes its attributes: an input corner as 3 * triangle + corner.
   std::uint32_t corner_source(std::uint32_t triangle, int corner) const { return corner_source_[triangle][corner]; }
 

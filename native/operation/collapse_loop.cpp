@@ -5,6 +5,7 @@
 #include "operation/collapse_loop.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace tolvol {
@@ -18,12 +19,28 @@ constexpr double kHopeless[] = {1.4, 1.2, 1.12};
 /// Where many collapses cost nothing, on a plate, short edges go first: a weight of the fourth power of the length,
 /// which has the quadrics' unit. Without it one vertex would sweep along a row and leave needles behind.
 constexpr double kLengthWeight = 1e-6;
+// Edges tried at once: one for so many triangles, because collapses come in each other's way, and at most so many.
+constexpr std::size_t kTrianglesPerAttempt = 48, kMostAttempts = 64;
+constexpr unsigned kMostThreads = 16;  // more would wait for each other
+constexpr double kNever = std::numeric_limits<double>::infinity();
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
 }  // namespace
 
-CollapseLoop::CollapseLoop(BoundedMesh& mesh) : mesh_(mesh), change_(mesh), fit_(mesh) { sum_quadrics(); }
+CollapseLoop::CollapseLoop(BoundedMesh& mesh, unsigned threads)
+    : mesh_(mesh),
+      // A rival answers one question after another, and copies are looked up beyond the faces around an edge.
+      team_(mesh.bounds().rival || mesh.has_copies() ? 1 : std::min(thread_count(threads), kMostThreads)),
+      queue_(mesh.connectivity().n_edges()),
+      attempt_of_(mesh.connectivity().n_edges(), 0),
+      touched_(mesh.connectivity().n_vertices(), 0),
+      refused_(mesh.connectivity().n_edges(), false) {
+  // Those of the last time, too, may still be waiting for their turn.
+  const std::size_t attempts = team_.alone() ? 1 : 2 * kMostAttempts;
+  for (std::size_t i = 0; i < attempts; ++i) attempts_.emplace_back(mesh);
+  sum_quadrics();
+}
 
 void CollapseLoop::sum_quadrics() {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
@@ -82,109 +99,156 @@ std::optional<CollapseLoop::Plan> CollapseLoop::plan(Edge e) const {
   return Plan{h, mesh_.position(mesh_.to(h)), keep0 ? cost0 : cost1, freedom};
 }
 
-void CollapseLoop::push(Edge e) {
-  const std::uint32_t i = static_cast<std::uint32_t>(e.idx());
-  ++stamps_[i];
-  if (refused_[i]) refused_[i] = false, --refused_count_;
-  if (const auto p = plan(e)) {
-    const double length2 =
-        squared_length(mesh_.position(mesh_.from(p->halfedge)) - mesh_.position(mesh_.to(p->halfedge)));
-    heap_.push_back({p->cost + kLengthWeight * length2 * length2, i, stamps_[i]});
+double CollapseLoop::cost(Edge e) const {
+  const auto p = plan(e);
+  if (!p) return kNever;
+  const double length2 =
+      squared_length(mesh_.position(mesh_.from(p->halfedge)) - mesh_.position(mesh_.to(p->halfedge)));
+  return p->cost + kLengthWeight * length2 * length2;
+}
+
+void CollapseLoop::push(std::uint32_t edge, double cost) {
+  if (cost < kNever) {
+    queue_.push(edge, cost);
+  } else {
+    queue_.drop(edge);
   }
 }
 
 void CollapseLoop::run(std::size_t target, Progress* progress) {
-  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
-  // Ties go to the lower edge, so that the order is the same everywhere.
-  const auto later = [](const Entry& a, const Entry& b) {
-    return a.cost > b.cost || (a.cost == b.cost && a.edge > b.edge);
-  };
-  const std::size_t edges = connectivity.n_edges(), before = mesh_.triangle_count();
-  stamps_.assign(edges, 0);
-  refused_.assign(edges, false);
-  heap_.clear();
-  heap_.reserve(2 * edges);
-  for (std::size_t i = 0; i < edges; ++i) push(Edge(static_cast<int>(i)));
-  std::make_heap(heap_.begin(), heap_.end(), later);
+  constexpr std::size_t kBlock = 1024;
+  const std::size_t before = mesh_.triangle_count();
+  std::vector<double> costs(mesh_.connectivity().n_edges());
+  team_.run(costs.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) costs[i] = cost(Edge(static_cast<int>(i)));
+  });
+  for (std::uint32_t i = 0; i < costs.size(); ++i) push(i, costs[i]);
   if (progress) progress->begin("decimating");
-  while (!heap_.empty() && mesh_.triangle_count() > target) {
+  while (mesh_.triangle_count() > target) {
     if (progress) {
       progress->set_count(mesh_.triangle_count());
       progress->update(static_cast<double>(before - mesh_.triangle_count()) / static_cast<double>(before));
     }
-    std::pop_heap(heap_.begin(), heap_.end(), later);
-    const Entry entry = heap_.back();
-    heap_.pop_back();
-    const Edge e(static_cast<int>(entry.edge));
-    if (entry.stamp != stamps_[entry.edge] || connectivity.status(e).deleted()) continue;
-    const std::size_t sorted = heap_.size();
-    collapse(e);
-    for (std::size_t i = sorted; i < heap_.size(); ++i) {
-      std::push_heap(heap_.begin(), heap_.begin() + static_cast<std::ptrdiff_t>(i) + 1, later);
-    }
+    const auto entry = queue_.pop();
+    if (!entry) break;
+    if (mesh_.connectivity().status(BoundedMesh::edge(entry->edge)).deleted()) continue;
+    Attempt* const tried = found(entry->edge);
+    carry_out(tried ? *tried : try_ahead(entry->edge));
   }
 }
 
-void CollapseLoop::collapse(Edge e) {
-  const std::optional<Plan> p = plan(e);
-  if (!p) return;
-  change_.begin();
-  Halfedge h = p->halfedge;
-  Outcome outcome =
-      change_.try_collapse(h, p->freedom == Freedom::anywhere ? mesh_.store(p->position) : mesh_.spot(mesh_.to(h)));
-  if (outcome != Outcome::possible && p->freedom == Freedom::either_way) {
-    const Halfedge other = mesh_.connectivity().opposite_halfedge_handle(h);
-    const Outcome second = change_.try_collapse(other, mesh_.spot(mesh_.from(h)));
-    if (second == Outcome::possible) h = other;
-    outcome = std::max(outcome, second);
-  } else if (outcome == Outcome::refused && p->freedom == Freedom::anywhere) {
-    outcome = search(h, p->position);
+/// What was found for the edge, if that still holds.
+CollapseLoop::Attempt* CollapseLoop::found(std::uint32_t edge) {
+  Attempt& a = attempts_[attempt_of_[edge]];
+  if (a.edge != edge) return nullptr;
+  const Halfedge h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
+  return std::max(touched_[mesh_.from(h)], touched_[mesh_.to(h)]) <= a.at ? &a : nullptr;
+}
+
+/// Tries the edge and, with several threads, those that would come next.
+CollapseLoop::Attempt& CollapseLoop::try_ahead(std::uint32_t edge) {
+  const auto take = [&](std::uint32_t e) -> Attempt& {
+    attempt_of_[e] = static_cast<std::uint32_t>(next_);
+    Attempt& a = attempts_[next_];
+    next_ = (next_ + 1) % attempts_.size();
+    a.edge = e, a.at = clock_;
+    return a;
+  };
+  Attempt& first = take(edge);
+  if (team_.alone()) {
+    attempt(first);
+    return first;
   }
-  if (outcome == Outcome::possible) {
-    const std::uint32_t v0 = mesh_.from(h), v1 = mesh_.to(h);
-    mesh_.apply(change_);
+  const std::size_t most = std::clamp<std::size_t>(mesh_.triangle_count() / kTrianglesPerAttempt, 1, kMostAttempts);
+  std::vector<Attempt*> batch{&first};
+  std::vector<CollapseQueue::Entry> ahead;
+  while (ahead.size() + 1 < most) {
+    const auto entry = queue_.pop();
+    if (!entry) break;
+    if (mesh_.connectivity().status(BoundedMesh::edge(entry->edge)).deleted()) continue;
+    ahead.push_back(*entry);
+    if (!found(entry->edge)) batch.push_back(&take(entry->edge));
+  }
+  for (const CollapseQueue::Entry& entry : ahead) queue_.push(entry.edge, entry.cost);
+  team_.run(batch.size(), 1, [&](std::size_t i, std::size_t) { attempt(*batch[i]); });
+  return first;
+}
+
+void CollapseLoop::carry_out(Attempt& a) {
+  const std::uint32_t edge = std::exchange(a.edge, kNoEdge);
+  if (a.outcome == Outcome::possible) {
+    const std::uint32_t v0 = mesh_.from(a.halfedge), v1 = mesh_.to(a.halfedge);
+    mesh_.apply(a.change);
     quadrics_[v1] += quadrics_[v0];
-    renew(v1);
-  } else if (outcome == Outcome::refused) {
-    refused_[static_cast<std::size_t>(e.idx())] = true;
+    renew_around(v1);
+  } else if (a.outcome == Outcome::refused) {
+    refused_[edge] = true;
     ++refused_count_;
+  }
+}
+
+/// Reads faces around the edge's two ends, and nothing else of the mesh that changes.
+void CollapseLoop::attempt(Attempt& a) const {
+  a.outcome = Outcome::impossible;
+  const std::optional<Plan> p = plan(BoundedMesh::edge(a.edge));
+  if (!p) return;
+  a.change.begin();
+  a.halfedge = p->halfedge;
+  const Halfedge h = a.halfedge;
+  a.outcome =
+      a.change.try_collapse(h, p->freedom == Freedom::anywhere ? mesh_.store(p->position) : mesh_.spot(mesh_.to(h)));
+  if (a.outcome != Outcome::possible && p->freedom == Freedom::either_way) {
+    const Halfedge other = mesh_.connectivity().opposite_halfedge_handle(h);
+    const Outcome second = a.change.try_collapse(other, mesh_.spot(mesh_.from(h)));
+    if (second == Outcome::possible) a.halfedge = other;
+    a.outcome = std::max(a.outcome, second);
+  } else if (a.outcome == Outcome::refused && p->freedom == Freedom::anywhere) {
+    a.outcome = search(a, p->position);
   }
 }
 
 /// Other positions for a collapse whose best one fails: fitted ones or, where there is nothing to fit to, the ends and
 /// the middle.
-CollapseLoop::Outcome CollapseLoop::search(Halfedge h, const glm::dvec3& best) {
+CollapseLoop::Outcome CollapseLoop::search(Attempt& a, const glm::dvec3& best) const {
+  const Halfedge h = a.halfedge;
   if (mesh_.bounds().forward) {
     glm::dvec3 position = best;
     bool first = true;
     for (const double hopeless : kHopeless) {
-      if (!change_.prepare_collapse(h, mesh_.store(position))) return Outcome::impossible;
-      if (std::exchange(first, false)) fit_.gather(change_);
-      const PositionFit::Fit fit = fit_.fit(change_, position);
+      if (!a.change.prepare_collapse(h, mesh_.store(position))) return Outcome::impossible;
+      if (std::exchange(first, false)) a.fit.gather(a.change);
+      const PositionFit::Fit fit = a.fit.fit(a.change, position);
       if (fit.deviation > hopeless) return Outcome::refused;
       position = fit.position;
-      const Outcome outcome = change_.try_collapse(h, mesh_.store(position));
+      const Outcome outcome = a.change.try_collapse(h, mesh_.store(position));
       if (outcome != Outcome::refused) return outcome;
     }
     return Outcome::refused;
   }
   const Spot s0 = mesh_.spot(mesh_.from(h)), s1 = mesh_.spot(mesh_.to(h));
   for (const Spot& other : {s0, s1, mesh_.store((s0.position + s1.position) * 0.5)}) {
-    const Outcome outcome = change_.try_collapse(h, other);
+    const Outcome outcome = a.change.try_collapse(h, other);
     if (outcome != Outcome::refused) return outcome;
   }
   return Outcome::refused;
 }
 
-void CollapseLoop::renew(std::uint32_t vertex) {
+/// After a collapse: the costs that it changes, and the edges that may now be possible.
+void CollapseLoop::renew_around(std::uint32_t vertex) {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
   const auto v = BoundedMesh::handle(vertex);
-  for (const auto e : connectivity.ve_range(v)) push(e);
-  if (refused_count_ == 0) return;
+  const auto renew = [&](Edge e) {
+    const std::uint32_t i = static_cast<std::uint32_t>(e.idx());
+    if (refused_[i]) refused_[i] = false, --refused_count_;
+    push(i, cost(e));
+  };
+  touched_[vertex] = ++clock_;
+  for (const auto e : connectivity.ve_range(v)) renew(e);
   for (const auto near : connectivity.vv_range(v)) {
+    touched_[static_cast<std::size_t>(near.idx())] = clock_;
+    if (refused_count_ == 0) continue;
     for (const auto e : connectivity.ve_range(near)) {
-      const std::size_t i = static_cast<std::size_t>(e.idx());
-      if (refused_[i]) push(e);
+      if (refused_[static_cast<std::size_t>(e.idx())]) renew(e);
     }
   }
 }

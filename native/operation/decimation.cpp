@@ -64,7 +64,7 @@ class Decimation {
     BoundedMesh mesh(mesh_input(), bounds);
     const std::size_t apart = cut_.aside.size();
     const std::size_t target = options_.target_triangles > apart ? options_.target_triangles - apart : 0;
-    CollapseLoop(mesh).run(target, options_.progress);
+    CollapseLoop(mesh, options_.threads).run(target, options_.progress);
     if (volume_ && !options_.rival && options_.effort == DecimationOptions::Effort::thorough) {
       Refinement(mesh).run(
           target, [&] { return result_.stopped_at_time = out_of_time(); }, options_.progress);
@@ -135,6 +135,10 @@ class Decimation {
     const Certificate certificate(*volume_);
     result_.method = certificate.method(), result_.renderer = certificate.renderer();
     identical_ = input_is_reference();
+    if (identical_) {
+      element_of_.assign(triangles_.size(), kNone);
+      for (std::uint32_t t = 0; t < cut_.triangle_input.size(); ++t) element_of_[cut_.triangle_input[t]] = t;
+    }
     if (!identical_) certify_input(certificate, mapping_error);
 
     forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within,
@@ -176,10 +180,8 @@ class Decimation {
   /// First witnesses for every triangle of the reference.
   void cover(double provable) {
     if (identical_) {
-      std::vector<std::uint32_t> element_of(triangles_.size(), kNone);
-      for (std::uint32_t t = 0; t < cut_.triangle_input.size(); ++t) element_of[cut_.triangle_input[t]] = t;
       for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
-        const std::uint32_t element = element_of[cut_.stand_in[i]];
+        const std::uint32_t element = element_of_[cut_.stand_in[i]];
         if (element != kNone) backward_->own(element, i);  // what is set aside never changes and covers itself
       }
       return;
@@ -323,7 +325,6 @@ class Decimation {
       }
     }
     std::optional<Hierarchy> own;
-    const Hierarchy* hierarchy = nullptr;
     const TriangleMesh input{positions_, cut_.triangles};
     for (std::size_t i = 0; i < kept_.size(); ++i) {
       glm::uvec3 triangle(result_.triangle_source[i]);
@@ -339,9 +340,19 @@ class Decimation {
           weights[k] = unit[static_cast<int>(original % 3)];
           continue;
         }
-        if (!hierarchy) hierarchy = &own.emplace(input);
-        const Hierarchy::Nearest nearest = hierarchy->nearest_if(
-            mesh.position(v), [&](std::uint32_t other) { return islands_.empty() || islands_[other] == islands_[t]; });
+        const auto same_island = [&](std::uint32_t other) {
+          return islands_.empty() || islands_[other] == islands_[t];
+        };
+        const glm::dvec3& p = mesh.position(v);
+        if (identical_) {
+          const Hierarchy::Nearest nearest = volume_->hierarchy().nearest_if(
+              p, [&](std::uint32_t i) { return element_of_[i] != kNone && same_island(element_of_[i]); });
+          triangle[k] = nearest.triangle;
+          weights[k] = nearest.weights;
+          continue;
+        }
+        if (!own) own.emplace(input);
+        const Hierarchy::Nearest nearest = own->nearest_if(p, same_island);
         triangle[k] = cut_.triangle_input[nearest.triangle];
         weights[k] = nearest.weights;
         if (cut_.reversed[nearest.triangle]) std::swap(weights[k].y, weights[k].z);
@@ -380,8 +391,9 @@ class Decimation {
   CutMesh cut_;
   std::vector<glm::dvec3> positions_;  // of the cut mesh, in the frame
   std::vector<bool> pinned_;
-  std::vector<std::uint32_t> islands_;  // per triangle of the cut mesh; empty without wedges
-  bool identical_ = false;              // the input is the reference itself
+  std::vector<std::uint32_t> islands_;     // per triangle of the cut mesh; empty without wedges
+  bool identical_ = false;                 // the input is the reference itself
+  std::vector<std::uint32_t> element_of_;  // per input triangle, if so: its triangle in the cut mesh or kNone
   std::optional<TriangleCertificate> forward_;
   std::optional<Coverage> backward_;
   std::optional<BoundaryBounds> boundary_;

@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <numeric>
+#include <tuple>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -27,6 +29,24 @@ std::uint64_t pair_key(std::uint32_t a, std::uint32_t b) {
   return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
 }
 
+/// Puts things in the order of what `before` compares, which must begin with first(thing): one pass by that, and short
+/// sorts of those that share it, because a mesh has few sides or triangles that do.
+template <class T, class First, class Before>
+void sort_by(std::vector<T>& things, First&& first, Before&& before) {
+  std::uint32_t groups = 0;
+  for (const T& t : things) groups = std::max(groups, first(t) + 1);
+  std::vector<std::size_t> end(groups + 1, 0);
+  for (const T& t : things) ++end[first(t) + 1];
+  std::partial_sum(end.begin(), end.end(), end.begin());
+  std::vector<T> sorted(things.size());
+  for (const T& t : things) sorted[end[first(t)]++] = t;
+  for (std::size_t group = 0, begin = 0; group < groups; begin = end[group++]) {
+    std::sort(sorted.begin() + static_cast<std::ptrdiff_t>(begin),
+              sorted.begin() + static_cast<std::ptrdiff_t>(end[group]), before);
+  }
+  things.swap(sorted);
+}
+
 class Cutter {
  public:
   Cutter(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles)
@@ -34,7 +54,11 @@ class Cutter {
     cut_.stand_in.resize(triangles.size());
     std::iota(cut_.stand_in.begin(), cut_.stand_in.end(), 0u);
     const std::vector<bool> used = used_vertices(vertices.size(), triangles);
-    for (std::size_t i = 0; i < vertices.size(); ++i) cut_.welded += used[i] && weld_[i] != i && used[weld_[i]];
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+      if (!used[i] || weld_[i] == i) continue;
+      renamed_ = true;
+      cut_.welded += used[weld_[i]];
+    }
   }
 
   CutMesh run(std::size_t vertex_count) {
@@ -54,19 +78,25 @@ class Cutter {
   std::uint32_t welded(Side corner) const { return weld_[vertex(corner)]; }
   std::uint32_t vertex(Side corner) const { return input_[triangles_[corner / 3]][corner % 3]; }
 
+  struct Keyed {
+    std::array<std::uint32_t, 3> key;
+    std::uint32_t triangle;
+  };
+  /// Lowers first[t] to the first triangle that has the same key as t.
+  static void find_first(std::vector<Keyed>& triangles, std::vector<std::uint32_t>& first) {
+    sort_by(
+        triangles, [](const Keyed& t) { return t.key[0]; },
+        [](const Keyed& a, const Keyed& b) { return std::tie(a.key, a.triangle) < std::tie(b.key, b.triangle); });
+    std::uint32_t of_key = 0;
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+      if (i == 0 || triangles[i].key != triangles[i - 1].key) of_key = triangles[i].triangle;
+      std::uint32_t& lowest = first[triangles[i].triangle];
+      lowest = std::min(lowest, of_key);
+    }
+  }
+
   void sort_out_triangles() {
-    struct Hash {
-      std::size_t operator()(const std::array<std::uint32_t, 3>& t) const {
-        std::uint64_t h = t[0];
-        h = h * 0x9E3779B97F4A7C15u + t[1];
-        h = h * 0x9E3779B97F4A7C15u + t[2];
-        return h ^ (h >> 29);
-      }
-    };
-    // Positions that turn the same way, or the same three vertices either way: Blender, too, holds only one such face.
-    // The two sides of a sheet that has vertices of its own for each stay two.
-    std::unordered_map<std::array<std::uint32_t, 3>, std::uint32_t, Hash> turned(input_.size() * 2),
-        same(input_.size() * 2);
+    std::vector<Keyed> turned, same;
     std::vector<std::uint32_t> degenerate;
     for (std::uint32_t i = 0; i < input_.size(); ++i) {
       std::array<std::uint32_t, 3> t{weld_[input_[i].x], weld_[input_[i].y], weld_[input_[i].z]};
@@ -74,15 +104,24 @@ class Cutter {
         degenerate.push_back(i);
         continue;
       }
-      std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
-      std::array<std::uint32_t, 3> vertices{input_[i].x, input_[i].y, input_[i].z};
-      std::sort(vertices.begin(), vertices.end());
-      const std::uint32_t first =
-          std::min(turned.try_emplace(t, i).first->second, same.try_emplace(vertices, i).first->second);
-      if (first == i) {
+      if (renamed_) {  // else all that this would find is the same three vertices
+        std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+        turned.push_back({t, i});
+      }
+      t = {input_[i].x, input_[i].y, input_[i].z};
+      std::sort(t.begin(), t.end());
+      same.push_back({t, i});
+    }
+    // Positions that turn the same way, or the same three vertices either way: Blender, too, holds only one such face.
+    // The two sides of a sheet that has vertices of its own for each stay two.
+    std::vector<std::uint32_t> first(input_.size(), kNone);
+    find_first(turned, first);
+    find_first(same, first);
+    for (std::uint32_t i = 0; i < input_.size(); ++i) {
+      if (first[i] == i) {
         triangles_.push_back(i);
-      } else {
-        cut_.stand_in[i] = cut_.stand_in[first];
+      } else if (first[i] != kNone) {
+        cut_.stand_in[i] = cut_.stand_in[first[i]];
         ++cut_.duplicates;
       }
     }
@@ -110,20 +149,26 @@ class Cutter {
     }
   }
 
+  using KeyedSide = std::pair<std::uint64_t, Side>;
+  static void sort_sides(std::vector<KeyedSide>& sides) {
+    sort_by(
+        sides, [](const KeyedSide& s) { return static_cast<std::uint32_t>(s.first >> 32); }, std::less<KeyedSide>());
+  }
+
   /// Sides by their key, those with the same key in a row, in ascending order of side.
   template <class Key>
-  std::vector<std::pair<std::uint64_t, Side>> sorted_sides(Key&& key) const {
-    std::vector<std::pair<std::uint64_t, Side>> sides;
+  std::vector<KeyedSide> sorted_sides(Key&& key) const {
+    std::vector<KeyedSide> sides;
     sides.reserve(mate_.size());
     for (Side s = 0; s < mate_.size(); ++s) {
       if (mate_[s] == kNone && !is_cut_[s]) sides.emplace_back(key(s), s);
     }
-    std::sort(sides.begin(), sides.end());
+    sort_sides(sides);
     return sides;
   }
 
   template <class Visit>
-  static void for_each_run(const std::vector<std::pair<std::uint64_t, Side>>& sides, Visit&& visit) {
+  static void for_each_run(const std::vector<KeyedSide>& sides, Visit&& visit) {
     for (std::size_t begin = 0, end; begin < sides.size(); begin = end) {
       for (end = begin + 1; end < sides.size() && sides[end].first == sides[begin].first;) ++end;
       visit(std::span(sides).subspan(begin, end - begin));
@@ -199,12 +244,12 @@ class Cutter {
     corner_vertex_.resize(mate_.size());
     for (Side s = 0; s < mate_.size(); ++s) corner_vertex_[s] = corners.find(s);
 
-    std::vector<std::pair<std::uint64_t, Side>> sides;
+    std::vector<KeyedSide> sides;
     sides.reserve(mate_.size());
     for (Side s = 0; s < mate_.size(); ++s) {
       sides.emplace_back(pair_key(corner_vertex_[s], corner_vertex_[next_corner(s)]), s);
     }
-    std::sort(sides.begin(), sides.end());
+    sort_sides(sides);
     std::vector<std::uint32_t> offenders;
     for_each_run(sides, [&](auto run) {
       if (run.size() > 2 || (run.size() == 2 && mate_[run[0].second] != run[1].second)) {
@@ -310,6 +355,7 @@ class Cutter {
 
   std::span<const glm::uvec3> input_;
   std::vector<std::uint32_t> weld_;
+  bool renamed_ = false;                  // a vertex that is used is not its own representative
   std::vector<std::uint32_t> triangles_;  // input triangles that go into the manifold
   std::vector<Side> mate_;                // per side: the side joined to it
   std::vector<bool> is_cut_;              // per side: cut, so that its vertices are tied

@@ -222,6 +222,25 @@ TEST(Decimation, ThreadsAndInstructionsDoNotChangeABit) {
   EXPECT_EQ(one.triangles, baseline.triangles);
 }
 
+TEST(Decimation, TryingAheadChangesNothing) {
+  for (const Case& c : cases::all()) {
+    const auto volume = c.volume();
+    for (const bool two_sided : {true, false}) {
+      for (const auto vertices : {Options::Vertices::optimal, Options::Vertices::subset}) {
+        const auto with = [&](unsigned threads) {
+          Options options;
+          options.threads = threads, options.two_sided = two_sided, options.vertices = vertices;
+          return decimate(c.mesh.vertices, c.mesh.triangles, c.placement(), volume.get(), options);
+        };
+        const DecimationResult one = with(1), four = with(4);
+        EXPECT_EQ(one.vertices, four.vertices);
+        EXPECT_EQ(one.triangles, four.triangles);
+        EXPECT_EQ(one.triangle_source, four.triangle_source);
+      }
+    }
+  }
+}
+
 TEST(Decimation, SeamsKeepTheirSides) {
   // A seam ring around the torus: corners on either side of vertex column 0 differ.
   const unsigned n = 30;

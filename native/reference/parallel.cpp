@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reference/parallel.h"
+
+#include <system_error>
+
+namespace tolvol {
+namespace {
+
+/// Turns given to other threads before one goes to sleep: the next loop, or the end of this one, is often near.
+constexpr int kPatience = 2000;
+
+template <class Condition>
+void wait_a_little(Condition&& condition) {
+  for (int i = 0; i < kPatience && !condition(); ++i) std::this_thread::yield();
+}
+
+}  // namespace
+
+Team::Team(unsigned threads) {
+  try {
+    for (unsigned i = 1; i < threads; ++i) helpers_.emplace_back([this] { help(); });
+  } catch (const std::system_error&) {
+    // Those that did start, and the caller, do the work.
+  }
+}
+
+Team::~Team() {
+  {
+    std::lock_guard lock(mutex_);
+    ends_ = true;
+  }
+  wake_.notify_all();
+  for (std::thread& helper : helpers_) helper.join();
+}
+
+void Team::run(Loop& loop) {
+  const bool shared = !alone() && loop.count > loop.block;
+  if (shared) {
+    {
+      std::lock_guard lock(mutex_);
+      open_ = &loop;
+      ++loops_;
+    }
+    wake_.notify_all();
+  }
+  work(loop);
+  if (shared) {
+    std::unique_lock lock(mutex_);
+    open_ = nullptr;
+    lock.unlock();
+    wait_a_little([&] { return inside_ == 0; });
+    lock.lock();
+    left_.wait(lock, [&] { return inside_ == 0; });
+  }
+  if (loop.error) std::rethrow_exception(loop.error);
+}
+
+void Team::work(Loop& loop) {
+  try {
+    for (std::size_t begin; (begin = loop.next.fetch_add(loop.block)) < loop.count;) {
+      loop.call(loop.body, begin, std::min(begin + loop.block, loop.count));
+    }
+  } catch (...) {
+    std::lock_guard lock(mutex_);
+    if (!loop.error) loop.error = std::current_exception();
+    loop.next = loop.count;
+  }
+}
+
+void Team::help() {
+  for (std::size_t seen = 0;;) {
+    wait_a_little([&] { return loops_ != seen; });
+    std::unique_lock lock(mutex_);
+    wake_.wait(lock, [&] { return ends_ || loops_ != seen; });
+    if (ends_) return;
+    seen = loops_;
+    if (!open_) continue;
+    Loop& loop = *open_;
+    ++inside_;
+    lock.unlock();
+    work(loop);
+    lock.lock();
+    --inside_;
+    left_.notify_one();
+  }
+}
+
+}  // namespace tolvol
