@@ -189,8 +189,7 @@ def test_views_places_and_switches():
     assert gone()
     the_object().scale.x /= 2
     the_object().name = "another"
-    yield 1.0
-    assert near() > 30_000
+    yield from finished(lambda: near() > 30_000)
     with window_context():
         bpy.ops.view3d.localview(frame_selected=False)
     yield 0.7
