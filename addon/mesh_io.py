@@ -4,6 +4,7 @@
 import hashlib
 from dataclasses import dataclass
 
+import bmesh
 import bpy
 import numpy as np
 
@@ -78,6 +79,15 @@ def move_vertices(mesh, before, after):
     # Blender keeps the triangles it has through foreach_set and update(); one vertex set by itself makes it cut anew.
     mesh.vertices[0].co = mesh.vertices[0].co
     mesh.update()
+
+
+def move_edited(mesh, indices, places):
+    """Writes coordinates of some vertices bit for bit while the mesh is in Edit Mode; the BMesh, to be updated."""
+    edited = bmesh.from_edit_mesh(mesh)
+    edited.verts.ensure_lookup_table()
+    for index, place in zip(indices.tolist(), places.tolist()):
+        edited.verts[index].co = place
+    return edited
 
 
 def new_mesh(name, vertices, triangles):

@@ -3,6 +3,7 @@
 
 from dataclasses import replace
 
+import bmesh
 import numpy as np
 
 from . import mesh_io, native, report, volume
@@ -14,6 +15,7 @@ class Motion:
     """Read and written in the main thread; volume(), hold() and certify() are for the job's."""
 
     def __init__(self, ob, threads):
+        ob.update_from_editmode()
         self.surface = volume.surface_of(ob)
         self.reference = volume.reference_of(ob)
         self.size = self.reference.size()
@@ -71,9 +73,19 @@ class Motion:
 
     def write(self, ob, vertices, certified):
         """Moves the vertices of `ob`, which has the mesh that was read or a copy of it."""
-        mesh_io.move_vertices(ob.data, self.before, vertices)
+        if ob.mode == "EDIT":
+            self._write_edited(ob, vertices)
+        else:
+            mesh_io.move_vertices(ob.data, self.before, vertices)
         self.keep_reference(ob)
         volume.remember(ob, volume.surface_of(ob), certified, self.tolerance)
+
+    def _write_edited(self, ob, vertices):
+        """The mesh is the one that Edit Mode works on; Blender moves other shape keys along when it is left."""
+        moved = np.flatnonzero((vertices != self.before).any(1))
+        mesh_io.move_edited(ob.data, moved, vertices[moved]).normal_update()
+        bmesh.update_edit_mesh(ob.data, destructive=False)
+        ob.update_from_editmode()
 
     def keep_reference(self, ob):
         """A mesh that had no reference was its own."""

@@ -24,6 +24,14 @@ def unselected(ob):
     return vertices
 
 
+def unselected_vertices(ob):
+    """(n,) bool: vertices that are not selected."""
+    selected = column(ob.data.vertices, "select", 1, bool)
+    if not selected.any():
+        raise Refused(f"No vertex of {ob.name} is selected")
+    return ~selected
+
+
 def on_edges(mesh, kinds):
     """(n,) bool: vertices of the edges of these kinds, named as in operation_settings.PROTECTED."""
     chosen = np.zeros(len(mesh.edges), bool)

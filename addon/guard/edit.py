@@ -73,8 +73,5 @@ def undo():
 
 
 def _write(mesh, indices, places):
-    edited = bmesh.from_edit_mesh(mesh)
-    edited.verts.ensure_lookup_table()
-    for index, place in zip(indices.tolist(), places.tolist()):
-        edited.verts[index].co = place
+    mesh_io.move_edited(mesh, indices, places)
     bmesh.update_edit_mesh(mesh, loop_triangles=False, destructive=False)

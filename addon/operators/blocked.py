@@ -3,23 +3,25 @@
 
 from .. import native, volume
 
+_OBJECT_MODE = {"OBJECT"}
 
-def object_blocked(ob):
-    """Why nothing can be done with `ob` now, or None."""
+
+def object_blocked(ob, modes=_OBJECT_MODE):
+    """Why nothing can be done with `ob` now, or None; modes: those of Blender in which it can."""
     if native.module is None:
         return native.reason
     if ob is None or ob.type != "MESH":
         return "Select a mesh object"
     if ob.library is not None or ob.override_library is not None:
         return f"{ob.name} is linked from another file: Object > Relations > Make Local > All"
-    if ob.mode != "OBJECT":
+    if ob.mode not in modes:
         return "Switch to Object Mode"
     return None
 
 
-def reference_blocked(ob):
+def reference_blocked(ob, modes=_OBJECT_MODE):
     """Why no reference can be set for `ob` now, or None."""
-    if reason := object_blocked(ob):
+    if reason := object_blocked(ob, modes):
         return reason
     source = volume.source_object(ob)
     if source is None:
@@ -31,18 +33,18 @@ def reference_blocked(ob):
     return None
 
 
-def check_blocked(ob):
+def check_blocked(ob, modes=_OBJECT_MODE):
     """Why `ob` cannot be compared with its reference now, or None."""
-    if reason := object_blocked(ob) or volume.reference_missing(ob):
+    if reason := object_blocked(ob, modes) or volume.reference_missing(ob):
         return reason
     if not ob.data.polygons:
         return f"{ob.name} has no faces"
     return None
 
 
-def decimate_blocked(ob):
-    """Why the mesh of `ob` cannot be decimated now, or None."""
-    if reason := object_blocked(ob):
+def decimate_blocked(ob, modes=_OBJECT_MODE):
+    """Why the mesh of `ob` cannot be changed now, or None."""
+    if reason := object_blocked(ob, modes):
         return reason
     mesh = ob.data
     if mesh.library is not None or mesh.override_library is not None:
@@ -54,7 +56,7 @@ def decimate_blocked(ob):
         return f"{ob.name} has no faces"
     if any(modifier.type == "MULTIRES" for modifier in ob.modifiers):
         return "Apply the Multiresolution modifier first"
-    return check_blocked(ob) if ob.tolvol.snapshot else reference_blocked(ob)
+    return (check_blocked if ob.tolvol.snapshot else reference_blocked)(ob, modes)
 
 
 def allowed(cls, reason):

@@ -13,6 +13,8 @@ from ..operation_settings import smooth_settings
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
 
+_MODES = {"OBJECT", "EDIT"}
+
 
 def draw_smooth_settings(layout, settings, ob):
     """The same rows in the panel and in Adjust Last Operation."""
@@ -24,7 +26,7 @@ def draw_smooth_settings(layout, settings, ob):
 
 class TOLVOL_OT_smooth(JobOperator, bpy.types.Operator):
     """Smooth the mesh as far as it stays within the tolerance of the reference. Without a reference this mesh as it is \
-becomes it"""
+becomes it. In Edit Mode: the selected vertices"""
 
     bl_idname = "tolvol.smooth"
     bl_label = "Smooth in Tolerance"
@@ -35,7 +37,7 @@ becomes it"""
 
     @classmethod
     def poll(cls, context):
-        return allowed(cls, decimate_blocked(context.active_object))
+        return allowed(cls, decimate_blocked(context.active_object, _MODES))
 
     def draw(self, context):
         self.layout.use_property_split = True
@@ -45,9 +47,14 @@ becomes it"""
         context.view_layer.update()
         ob = self.ob
         shared.take(self, ob.tolvol.smooth, smooth_settings())
+        if ob.mode == "EDIT" and ob.active_shape_key_index > 0:
+            basis = ob.data.shape_keys.reference_key.name
+            raise Refused(f"What is smoothed is the mesh of {ob.name}: choose its shape key {basis} first")
         motion = Motion(ob, self.threads or preferences.threads(context))
         locked = np.zeros(len(motion.before), bool)
         locked[mesh_io.loose_edges(ob.data)] = True
+        if ob.mode == "EDIT":
+            locked |= protect.unselected_vertices(ob)
         options = {
             "iterations": self.iterations,
             "operator": self.method.lower(),

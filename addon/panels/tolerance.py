@@ -72,7 +72,8 @@ def _status(context, layout, ob):
         text_lines(context, layout, f"{triangles:,} triangles, ±{tolerance}, {ready}", GREEN)
     # A reference that is set holds in every mode.
     if reason:
-        text_lines(context, layout, "Buttons need Object Mode", "INFO")
+        text = "Buttons other than Smooth need Object Mode" if ob.mode == "EDIT" else "Buttons need Object Mode"
+        text_lines(context, layout, text, "INFO")
 
 
 def _bytes(count):

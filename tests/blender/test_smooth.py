@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Smooth in Tolerance: the promise on what is stored, every option, what is refused."""
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -146,6 +147,89 @@ def test_shape_keys_keep_their_motion_and_one_undo_step_restores_everything():
     bpy.ops.ed.undo()
     ob = bpy.data.objects["torus"]
     assert np.array_equal(coordinates(ob), before) and ob.tolvol.snapshot is None
+
+
+def in_edit_mode(make, select):
+    """A new object in Edit Mode, vertices selected where select(coordinates) says."""
+    ob = make()
+    bpy.ops.object.mode_set(mode="EDIT")
+    chosen = select(coordinates(ob))
+    edited = bmesh.from_edit_mesh(ob.data)
+    for vertex, choose in zip(edited.verts, chosen):
+        vertex.select_set(bool(choose))
+    bmesh.update_edit_mesh(ob.data)
+    return ob, chosen
+
+
+def stored(ob):
+    """The coordinates in Edit Mode."""
+    ob.update_from_editmode()
+    return coordinates(ob)
+
+
+def test_in_edit_mode_the_selected_vertices_are_smoothed_in_one_undo_step():
+    ob, chosen = in_edit_mode(lambda: torus(noise=0.02), lambda co: co[:, 0] > 0)
+    bpy.ops.ed.undo_push(message="selected")
+    reference, before = world_triangles(ob), coordinates(ob)
+    tolerance = 0.01 * native.module.size(*reference)
+    assert bpy.ops.tolvol.smooth("EXEC_DEFAULT", True, iterations=60, method="LAPLACIAN") == {"FINISHED"}
+    assert ob.mode == "EDIT"
+    after = stored(ob)
+    assert np.array_equal(after[~chosen], before[~chosen])
+    assert (after != before).any(1)[chosen].mean() > 0.9
+    judged = native.module.hausdorff(*world_triangles(ob), *reference, bound=tolerance)
+    assert 0.9 * tolerance < judged.upper <= tolerance
+    assert [vertex.select for vertex in bmesh.from_edit_mesh(ob.data).verts] == chosen.tolist()
+    bpy.ops.ed.undo()
+    ob = bpy.data.objects["torus"]
+    assert ob.mode == "EDIT" and np.array_equal(stored(ob), before)
+    bpy.ops.ed.redo()
+    ob = bpy.data.objects["torus"]
+    assert np.array_equal(stored(ob), after)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert np.array_equal(coordinates(ob), after)
+    assert volume.measurement_of(ob).forward_within
+
+
+def test_in_edit_mode_what_is_not_yet_in_the_mesh_counts():
+    ob, _ = in_edit_mode(lambda: torus(noise=0.02), lambda co: co[:, 0] > 0)
+    for vertex in bmesh.from_edit_mesh(ob.data).verts:
+        vertex.co.z += 5
+    bpy.ops.tolvol.smooth()
+    assert stored(ob)[:, 2].min() > 4
+    assert column(ob.tolvol.snapshot.vertices, "co", 3)[:, 2].min() > 4
+
+
+def test_shape_keys_follow_what_edit_mode_smooths():
+    def keyed():
+        ob = torus(noise=0.02)
+        ob.shape_key_add(name="Basis")
+        for point in ob.shape_key_add(name="up").data:
+            point.co.z += 0.25
+        ob.active_shape_key_index = 0
+        return ob
+
+    ob, _ = in_edit_mode(keyed, lambda co: co[:, 0] > 0)
+    before = coordinates(ob)
+    bpy.ops.tolvol.smooth()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    basis, up = (column(block.data, "co", 3) for block in ob.data.shape_keys.key_blocks)
+    assert not np.array_equal(basis, before) and np.array_equal(basis, coordinates(ob))
+    assert np.abs(up - basis - [0, 0, 0.25]).max() < 1e-6
+    ob.active_shape_key_index = 1
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(RuntimeError, match="the mesh of torus: choose its shape key Basis first"):
+        bpy.ops.tolvol.smooth()
+
+
+def test_in_edit_mode_nothing_selected_is_refused():
+    ob, _ = in_edit_mode(torus, lambda co: co[:, 0] > 9)
+    before = coordinates(ob)
+    with pytest.raises(RuntimeError, match="No vertex of torus is selected"):
+        bpy.ops.tolvol.smooth()
+    assert np.array_equal(stored(ob), before)
+    bpy.ops.object.mode_set(mode="SCULPT")
+    assert not bpy.ops.tolvol.smooth.poll()
 
 
 def test_what_is_outside_is_refused():

@@ -20,6 +20,7 @@ from window import (
     screenshot,
     sculpt_by_drawing,
     view,
+    window_context,
     xdotool,
 )
 
@@ -52,12 +53,12 @@ def the_object():
 
 def striped():
     """Pixels of the view that say: outside."""
-    return int((np.abs(_surface() - native.module.OUTSIDE_COLOURS[0]).max(-1) <= 2).sum())
+    return int((np.abs(surface() - native.module.OUTSIDE_COLOURS[0]).max(-1) <= 2).sum())
 
 
 def near():
     """Pixels of the view with the colour of no deviation, which nothing else there has: yellow, lit or not."""
-    red, green, blue = np.moveaxis(_surface(), -1, 0)
+    red, green, blue = np.moveaxis(surface(), -1, 0)
     return int(((red > 100) & (green > 90) & (blue < 45) & (np.abs(red - green) < 40)).sum())
 
 
@@ -65,7 +66,7 @@ def gone():
     return near() < 300  # some are the edges of what is drawn around
 
 
-def _surface():
+def surface():
     """Without the sidebar and the legend."""
     place = region("WINDOW")
     x, y = on_screen(place, 0, 0)
@@ -164,7 +165,7 @@ def beside():
 
 def sides():
     """Pixels of the view that are red, for outside, and blue."""
-    red, green, blue = np.moveaxis(_surface(), -1, 0)
+    red, green, blue = np.moveaxis(surface(), -1, 0)
     return int(((red > 110) & (red - blue > 60) & (red - green > 50)).sum()), int(
         ((blue - red > 60) & (blue > 110)).sum()
     )
@@ -188,9 +189,8 @@ def test_views_places_and_switches():
     assert gone()
     the_object().scale.x /= 2
     the_object().name = "another"
-    yield 1.0
-    assert near() > 30_000
-    with bpy.context.temp_override(window=view()[0], area=view()[1], region=region("WINDOW")):
+    yield from finished(lambda: near() > 30_000)
+    with window_context():
         bpy.ops.view3d.localview(frame_selected=False)
     yield 0.7
     assert near() > 30_000
@@ -198,7 +198,7 @@ def test_views_places_and_switches():
     yield 0.7
     assert gone()
     the_object().hide_set(False)
-    with bpy.context.temp_override(window=view()[0], area=view()[1], region=region("WINDOW")):
+    with window_context():
         bpy.ops.view3d.localview(frame_selected=False)
     space.overlay.show_overlays = False
     yield 0.5

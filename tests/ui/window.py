@@ -26,6 +26,15 @@ def screenshot(name):
     subprocess.run(["import", "-window", "root", str(PICTURES / f"{name}.png")], check=True)
 
 
+def picture(name):
+    """The 3D view and the status bar as a picture for the documentation, of few colours so that it stays small."""
+    area = view()[1]
+    height = area.y + area.height
+    place = f"{area.width}x{height}+{area.x}+{view()[0].height - height}"
+    reduce = ["-crop", place, "+repage", "-dither", "FloydSteinberg", "-colors", "256"]
+    subprocess.run(["import", "-window", "root", *reduce, f"PNG8:{PICTURES / name}.png"], check=True)
+
+
 def pixels():
     """What is on the screen, (height, width, 3) integers."""
     picture = subprocess.run(
@@ -44,6 +53,11 @@ def view():
 
 def region(kind):
     return next(region for region in view()[1].regions if region.type == kind)
+
+
+def window_context():
+    """For operators that act on the 3D view."""
+    return bpy.context.temp_override(window=view()[0], area=view()[1], region=region("WINDOW"))
 
 
 def on_screen(area_region, x, y):
@@ -108,9 +122,16 @@ def press(operator, across=0.33):
 _first_view = {}
 
 
+def maximize():
+    """Gives the 3D view the whole window, or its place back."""
+    with window_context():
+        bpy.ops.screen.screen_full_area()
+    yield 0.5
+
+
 def sculpt_by_drawing():
     """In Sculpt Mode: the brush that is chosen at first."""
-    with bpy.context.temp_override(window=view()[0], area=view()[1], region=region("WINDOW")):
+    with window_context():
         bpy.ops.wm.tool_set_by_id(name="builtin_brush.Draw")
 
 

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The add-on as the README and the manual show it: build/ui/guard.png, overlay.png and panel.png."""
+
+import bpy
+import numpy as np
+from mathutils import Euler, Vector
+
+from addon import guard, volume
+from test_guard import all_panels, only_guard_panel
+from test_panel import finished
+from test_show_deviation import sides, solid_monkey, stroke, surface, the_object, to_mode
+from window import (
+    maximize,
+    on_screen,
+    open_tab,
+    picture,
+    pixels,
+    region,
+    reset,
+    sculpt_by_drawing,
+    view,
+    window_context,
+    xdotool,
+)
+
+_FOREHEAD = (0.43, 0.255), (0.54, 0.235)  # in shares of the view
+_MIDDLE = (0.46, 0.25), (0.50, 0.243)
+_SNOUT = (0.36, 0.72), (0.38, 0.75)
+
+
+def test_pictures_for_the_documentation():
+    yield from reset(solid_monkey)
+    yield from maximize()
+    space = view()[1].spaces[0]
+    space.show_gizmo = space.show_region_toolbar = space.overlay.show_cursor = False
+    from_the_front()
+    only_guard_panel()
+    try:
+        yield from open_tab()
+        begin("set_reference")
+        the_object().tolvol.guard.sculpting = True
+        to_mode("SCULPT")
+        sculpt_by_drawing()
+        bpy.context.tool_settings.sculpt.show_brush = False
+        bpy.context.tool_settings.sculpt.brush.strength = 1
+        yield from draw(*_FOREHEAD)
+        yield from finished(lambda: sides()[0] > 300)
+        yield 1.0  # the shares in the legend; the status bar is given back after four
+        picture("guard")
+    finally:
+        all_panels()
+    assert magenta() == 0
+    assert [text.startswith("Held back") for _, text, _ in guard.states(the_object())] == [True]
+
+    the_object().tolvol.guard.sculpting = False
+    bpy.context.tool_settings.sculpt.brush.strength = 0.6
+    yield from draw(*_MIDDLE)
+    xdotool("keydown", "ctrl")
+    yield from draw(*_SNOUT)
+    xdotool("keyup", "ctrl")
+    yield from settled()
+    picture("overlay")
+    assert min(sides()) > 300 and magenta() > 300
+    bpy.context.tool_settings.sculpt.show_brush = True
+    to_mode("OBJECT")
+
+    yield from reset(solid_monkey)
+    from_the_front()
+    space.overlay.show_wireframes = True
+    begin("decimate")
+    yield from finished(lambda: volume.measurement_of(the_object()) is not None)
+    yield from settled()
+    picture("panel")
+    measured = volume.measurement_of(the_object())
+    assert measured.forward_within and measured.backward_within and min(sides()) > 300 and magenta() == 0
+    space.overlay.show_wireframes = False
+    space.show_gizmo = space.show_region_toolbar = space.overlay.show_cursor = True
+    yield from maximize()
+
+
+def from_the_front():
+    """And from one side, so near that the monkey fills the view."""
+    camera = view()[1].spaces[0].region_3d
+    camera.view_perspective, camera.view_distance = "PERSP", 3.4
+    camera.view_rotation = Euler((1.4, 0, 0.5)).to_quaternion()
+    camera.view_location = camera.view_rotation @ Vector((0.3, 0, 0))
+
+
+def begin(operator):
+    with window_context():
+        getattr(bpy.ops.tolvol, operator)("INVOKE_DEFAULT")
+
+
+def draw(*ends):
+    place = region("WINDOW")
+    yield from stroke(*(on_screen(place, int(x * place.width), int(y * place.height)) for x, y in ends))
+    aside()
+
+
+def aside():
+    """Above the 3D view there is no tooltip in the picture."""
+    xdotool("mousemove", 600, 10)
+
+
+def magenta():
+    """Pixels of the stripes, which are shaded here."""
+    red, green, blue = np.moveaxis(surface(), -1, 0)
+    return int(((red > 150) & (green < 80) & (blue > 90)).sum())
+
+
+def settled():
+    """Waits until the colours are there and nothing changes any more."""
+    aside()
+    yield from finished(lambda: min(sides()) > 300)
+    last = None
+    while last is None or not np.array_equal(last, pixels()):
+        last = pixels()
+        yield 1.0
