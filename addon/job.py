@@ -88,8 +88,11 @@ class JobOperator:
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        if event.type == "ESC":
-            self._progress.cancel()
+        if event.type == "ESC" and event.value == "PRESS":
+            if _improving(self._progress):
+                self._progress.finish()
+            else:
+                self._progress.cancel()
         if event.type == "TIMER":
             try:
                 ended = self._go_on(_TICK) if self._job.done() else None
@@ -153,10 +156,16 @@ class JobOperator:
         context.workspace.status_text_set(None)
 
 
+def _improving(progress):
+    """Whether there is a result that Esc keeps; a second one cancels."""
+    return progress.stage == "refining" and not progress.finishing
+
+
 def _status(progress, doing):
     if progress.cancelled:
         return "Stopping"
     # The count is of the stages that count: triangles left.
     left = f", {progress.count:,} triangles left" if progress.stage in {"decimating", "refining"} else ""
     share = f" {progress.fraction:.0%}" if progress.fraction else ""
-    return f"{doing or progress.stage.capitalize() + share + left}    Esc: Cancel"
+    escape = "Keep What There Is" if _improving(progress) else "Cancel"
+    return f"{doing or progress.stage.capitalize() + share + left}    Esc: {escape}"

@@ -70,6 +70,8 @@ def counts(run):
     remarks = []
     if run["target_triangles"] and run["stopped_by"] != "target":
         remarks.append(f"target {run['target_triangles']:,} not reached within the tolerance")
+    if run["stopped_by"] == "request":
+        remarks.append("stopped early")
     if run["outside"]["faces"]:
         remarks.append(f"{run['outside']['faces']:,} faces outside kept")
     remark = f" ({', '.join(remarks)})" if remarks else ""

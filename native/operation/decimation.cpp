@@ -67,7 +67,7 @@ class Decimation {
     CollapseLoop(mesh, options_.threads).run(target, options_.progress);
     if (volume_ && !options_.rival && options_.effort == DecimationOptions::Effort::thorough) {
       Refinement(mesh).run(
-          target, [&] { return result_.stopped_at_time = out_of_time(); }, options_.progress);
+          target, [&] { return ended_early(); }, options_.progress);
     }
     result_.stopped_at_target =
         options_.target_triangles > 0 && mesh.triangle_count() + apart <= options_.target_triangles;
@@ -78,9 +78,11 @@ class Decimation {
   }
 
  private:
-  bool out_of_time() const {
+  bool ended_early() {
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start_;
-    return options_.max_seconds > 0 && spent.count() > options_.max_seconds;
+    result_.stopped_at_time = options_.max_seconds > 0 && spent.count() > options_.max_seconds;
+    result_.stopped_on_request = options_.progress && options_.progress->finishing();
+    return result_.stopped_at_time || result_.stopped_on_request;
   }
 
   Frame own_frame() const {

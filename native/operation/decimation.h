@@ -53,7 +53,8 @@ struct DecimationResult {
   std::vector<glm::dmat3> source_weights;      ///< ... and the barycentric weights there, a column a corner
   bool stopped_at_target = false;
   bool stopped_at_time = false;
-  std::string method, renderer;  ///< of the check that bounded it; empty without a volume
+  bool stopped_on_request = false;  ///< of Progress::finish()
+  std::string method, renderer;     ///< of the check that bounded it; empty without a volume
   std::vector<Repair> repairs;
   std::map<std::string, std::size_t> locked;  ///< vertices that could not move, by cause
   std::size_t outside_faces = 0;              ///< input faces not within the tolerance, kept as they are

@@ -40,7 +40,10 @@ py::dict make_report(const DecimationResult& r, std::size_t triangles_in, double
   report["triangles_in"] = triangles_in;
   report["triangles_out"] = r.triangles.size();
   report["seconds"] = seconds;
-  report["stopped_by"] = r.stopped_at_target ? "target" : r.stopped_at_time ? "time" : "tolerance";
+  report["stopped_by"] = r.stopped_at_target    ? "target"
+                         : r.stopped_at_time    ? "time"
+                         : r.stopped_on_request ? "request"
+                                                : "tolerance";
   report["method"] = r.method;
   report["renderer"] = r.renderer;
   report["repairs"] = repairs;
@@ -151,7 +154,8 @@ void bind_decimation(py::module_& module) {
                     "(l, 3) int32: for each result corner the input triangle that its attributes are read from.")
       .def_readonly("source_weights", &Result::source_weights, "(l, 3, 3) float64: the barycentric weights there.")
       .def_readonly("report", &Result::report,
-                    "dict: triangles_in, triangles_out, seconds, stopped_by (\"tolerance\" or \"target\"), method,\n"
+                    "dict: triangles_in, triangles_out, seconds, stopped_by (\"tolerance\", \"target\", \"time\" or "
+                    "\"request\"), method,\n"
                     "renderer, repairs (kind, count, message), locked (vertices by cause), outside (faces, first, "
                     "reference_faces), warnings.");
 

@@ -20,6 +20,9 @@ class Progress {
   void set_count(std::size_t count) { count_.store(count, std::memory_order_relaxed); }
   bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
   void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
+  /// Asks a call that improves its result step by step for the one it has.
+  void finish() { finishing_.store(true, std::memory_order_relaxed); }
+  bool finishing() const { return finishing_.load(std::memory_order_relaxed); }
 
   void begin(const char* stage) {
     fraction_.store(0, std::memory_order_relaxed);
@@ -35,7 +38,7 @@ class Progress {
   std::atomic<double> fraction_{0};
   std::atomic<const char*> stage_{""};
   std::atomic<std::size_t> count_{0};
-  std::atomic<bool> cancelled_{false};
+  std::atomic<bool> cancelled_{false}, finishing_{false};
 };
 
 }  // namespace tolvol

@@ -175,6 +175,19 @@ TEST(Refinement, TimeAndTargetEndIt) {
   EXPECT_LE(at_target.triangles.size(), fast - 4);
 }
 
+TEST(Refinement, KeepsWhatThereIsOnRequest) {
+  const Case c = torus();
+  const DecimationResult fast = run(c);
+  Options options = thorough();
+  Progress progress;
+  progress.finish();
+  options.progress = &progress;
+  const DecimationResult kept = run(c, options);
+  EXPECT_TRUE(kept.stopped_on_request);
+  EXPECT_EQ(kept.triangles, fast.triangles);
+  EXPECT_FALSE(fast.stopped_on_request);
+}
+
 TEST(Refinement, StopsWhenCancelled) {
   const Case c = torus();
   Options options = thorough();

@@ -80,6 +80,20 @@ def test_cancel_while_the_input_is_compared_with_the_reference():
     assert isinstance(outcome[0], tolvol.Cancelled)
 
 
+def test_finish_keeps_the_last_state_of_a_thorough_decimation():
+    fast = tolvol.decimate(*LARGE, VOLUME)
+    progress, thread, outcome = watch(lambda progress: tolvol.decimate(*LARGE, VOLUME, effort="thorough", progress=progress))
+    while thread.is_alive() and not (progress.stage == "refining" and progress.count < len(fast.triangles) - 4):
+        time.sleep(0.001)
+    assert thread.is_alive() and not progress.finishing
+    progress.finish()
+    thread.join()
+    assert progress.finishing and outcome[0].report["stopped_by"] == "request"
+    assert len(outcome[0].triangles) < len(fast.triangles)
+    assert tolvol.hausdorff(outcome[0].vertices, outcome[0].triangles, *LARGE).upper <= TOLERANCE
+    assert tolvol.hausdorff(*LARGE, outcome[0].vertices, outcome[0].triangles).upper <= TOLERANCE
+
+
 @pytest.mark.parametrize("call", CALLS)
 def test_a_call_that_is_cancelled_before_it_starts(call):
     progress = tolvol.Progress()

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel as a person uses it."""
 
+import json
+
 import bpy
 import numpy as np
 
@@ -159,6 +161,25 @@ def test_escape_leaves_everything_as_it_was():
     assert len(said) == count  # nothing goes on
     assert stored() == before and suzanne().tolvol.snapshot is None and not suzanne().tolvol.last_run
     screenshot("6 stopped")
+
+
+def test_escape_keeps_what_refining_has_reached():
+    yield from reset(monkey)
+    yield from open_tab()
+    suzanne().tolvol.tolerance_percent, suzanne().tolvol.effort = 0.3, "THOROUGH"
+    suzanne().tolvol.placement = "OPTIMAL"  # has more to refine
+    reference, said, status = scenes.world_triangles(suzanne()), [], job._status
+    job._status = lambda *shown: said.append(status(*shown)) or said[-1]
+    yield from press("tolvol.decimate")
+    yield from finished(lambda: any(text.startswith("Refining") for text in said), 120)
+    screenshot("refining")
+    key("Escape")
+    yield from finished(lambda: suzanne().tolvol.last_run)
+    job._status = status
+    assert any(text.startswith("Refining") and text.endswith("Esc: Keep What There Is") for text in said)
+    run = json.loads(suzanne().tolvol.last_run)
+    assert run["stopped_by"] == "request" and run["output"]["triangles"] == len(suzanne().data.polygons) < 1500
+    assert_proved(suzanne(), reference, 0.3)
 
 
 def test_reference_check_and_select_outside():
