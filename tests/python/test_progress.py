@@ -82,7 +82,9 @@ def test_cancel_while_the_input_is_compared_with_the_reference():
 
 def test_finish_keeps_the_last_state_of_a_thorough_decimation():
     fast = tolvol.decimate(*LARGE, VOLUME)
-    progress, thread, outcome = watch(lambda progress: tolvol.decimate(*LARGE, VOLUME, effort="thorough", progress=progress))
+    progress, thread, outcome = watch(
+        lambda progress: tolvol.decimate(*LARGE, VOLUME, effort="thorough", progress=progress)
+    )
     while thread.is_alive() and not (progress.stage == "refining" and progress.count < len(fast.triangles) - 4):
         time.sleep(0.001)
     assert thread.is_alive() and not progress.finishing
