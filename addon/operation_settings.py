@@ -68,7 +68,7 @@ def decimate_settings(options=frozenset()):
                 (
                     "THOROUGH",
                     "Thorough",
-                    "Then moves vertices and flips edges to remove more, until that brings nothing: about a sixth fewer "
+                    "Then moves vertices and flips edges to remove more, until that brings nothing: about a fifth fewer "
                     "triangles in five to eight times the time",
                 ),
             ),
