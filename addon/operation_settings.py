@@ -69,7 +69,7 @@ def decimate_settings(options=frozenset()):
                     "THOROUGH",
                     "Thorough",
                     "Then moves vertices and flips edges to remove more, until that brings nothing: about a fifth fewer "
-                    "triangles in five to eight times the time",
+                    "triangles in six to eight times the time",
                 ),
             ),
             options=set(options),

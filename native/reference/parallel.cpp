@@ -45,12 +45,14 @@ void Team::run(Loop& loop) {
   }
   work(loop);
   if (shared) {
+    {
+      std::lock_guard lock(mutex_);
+      open_ = nullptr;
+    }
+    const auto left = [&] { return inside_ == 0; };
+    wait_a_little(left);
     std::unique_lock lock(mutex_);
-    open_ = nullptr;
-    lock.unlock();
-    wait_a_little([&] { return inside_ == 0; });
-    lock.lock();
-    left_.wait(lock, [&] { return inside_ == 0; });
+    left_.wait(lock, left);
   }
   if (loop.error) std::rethrow_exception(loop.error);
 }
@@ -69,9 +71,10 @@ void Team::work(Loop& loop) {
 
 void Team::help() {
   for (std::size_t seen = 0;;) {
-    wait_a_little([&] { return loops_ != seen; });
+    const auto called = [&] { return ends_ || loops_ != seen; };
+    wait_a_little(called);
     std::unique_lock lock(mutex_);
-    wake_.wait(lock, [&] { return ends_ || loops_ != seen; });
+    wake_.wait(lock, called);
     if (ends_) return;
     seen = loops_;
     if (!open_) continue;

@@ -60,7 +60,7 @@ class Team {
   Loop* open_ = nullptr;                ///< a helper that wakes too late finds none
   std::atomic<std::size_t> loops_{0};   ///< begun so far
   std::atomic<std::size_t> inside_{0};  ///< helpers in the open loop
-  bool ends_ = false;
+  std::atomic<bool> ends_{false};
   std::vector<std::thread> helpers_;
 };
 
