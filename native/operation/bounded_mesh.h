@@ -4,6 +4,7 @@
 #pragma once
 
 #include <OpenMesh/Core/Mesh/TriConnectivity.hh>
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
@@ -68,10 +69,11 @@ class BoundedMesh {
   Spot spot(std::uint32_t vertex) const { return {stored_[vertex], positions_[vertex]}; }
   Spot store(const glm::dvec3& position) const { return store_(position); }
   /// Whether the vertex left its original position.
-  bool moved(std::uint32_t vertex) const { return moved_[vertex]; }
+  bool moved(std::uint32_t vertex) const { return moved_[vertex] != 0; }
   bool on_boundary(std::uint32_t vertex) const { return mesh_.is_boundary(handle(vertex)); }
   /// Whether vertices of the kernel are one vertex of the result: what one may do then depends on where the others are.
   bool has_copies() const { return !copies_.empty(); }
+  bool has_copies(std::uint32_t vertex) const { return copies_.contains(slots_[vertex]); }
   /// Where corner `corner` of a triangle takes its attributes: an input corner as 3 * triangle + corner.
   std::uint32_t corner_source(std::uint32_t triangle, int corner) const { return corner_source_[triangle][corner]; }
 
@@ -110,7 +112,8 @@ class BoundedMesh {
   std::function<Spot(const glm::dvec3&)> store_;
   std::vector<glm::uvec3> triangles_;
   std::vector<glm::dvec3> positions_, stored_;
-  std::vector<bool> pinned_, seam_, moved_;
+  std::vector<bool> pinned_, seam_;
+  std::vector<std::uint8_t> moved_;  ///< not bits, which threads would share
   std::vector<double> shares_;
   std::vector<std::uint32_t> slots_;
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> copies_;  ///< by slot, where there are several
@@ -118,7 +121,7 @@ class BoundedMesh {
   std::vector<double> face_distance_;  ///< the same for every point of a face
   std::vector<glm::uvec3> wedges_, corner_source_;
   mutable std::vector<std::uint32_t> merged_into_;
-  std::size_t triangle_count_ = 0;
+  std::atomic<std::size_t> triangle_count_ = 0;
 };
 
 }  // namespace tolvol

@@ -17,7 +17,8 @@ std::size_t bucket_of(double cost) {
 
 }  // namespace
 
-CollapseQueue::CollapseQueue(std::size_t edges) : buckets_(std::size_t{1} << kBucketBits), stamps_(edges, 0) {}
+CollapseQueue::CollapseQueue(std::span<std::uint32_t> stamps)
+    : buckets_(std::size_t{1} << kBucketBits), stamps_(stamps) {}
 
 void CollapseQueue::push(std::uint32_t edge, double cost) {
   cost += 0.0;  // of the two zeros the positive one: they are equal, and so must their buckets be

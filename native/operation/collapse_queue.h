@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace tolvol {
@@ -19,7 +20,8 @@ class CollapseQueue {
     std::uint32_t edge;
   };
 
-  explicit CollapseQueue(std::size_t edges);
+  /// `stamps`: per edge, of all queues that its entries were ever in.
+  explicit CollapseQueue(std::span<std::uint32_t> stamps);
 
   /// Instead of the edge's former entry. Costs are finite.
   void push(std::uint32_t edge, double cost);
@@ -39,7 +41,7 @@ class CollapseQueue {
   std::vector<std::vector<Stamped>> buckets_;
   std::size_t open_ = 0;  ///< buckets before this one are in the heap
   std::vector<Stamped> heap_;
-  std::vector<std::uint32_t> stamps_;  ///< per edge: an entry with another one is out of date
+  std::span<std::uint32_t> stamps_;  ///< per edge: an entry with another one is out of date
 };
 
 }  // namespace tolvol

@@ -11,7 +11,7 @@
 
 #include "check/certificate.h"
 #include "operation/boundary.h"
-#include "operation/collapse_loop.h"
+#include "operation/collapse_rounds.h"
 #include "operation/input.h"
 #include "operation/manifold_cut.h"
 #include "operation/refinement.h"
@@ -64,7 +64,7 @@ class Decimation {
     BoundedMesh mesh(mesh_input(), bounds);
     const std::size_t apart = cut_.aside.size();
     const std::size_t target = options_.target_triangles > apart ? options_.target_triangles - apart : 0;
-    CollapseLoop(mesh, options_.threads).run(target, options_.progress);
+    collapse_edges(mesh, target, options_.threads, options_.progress);
     if (volume_ && !options_.rival && options_.effort == DecimationOptions::Effort::thorough) {
       Refinement(mesh).run(
           target, [&] { return ended_early(); }, options_.progress);

@@ -16,7 +16,7 @@ namespace {
 /// Held against a sorted set, step by step.
 class Mirror {
  public:
-  explicit Mirror(std::size_t edges) : queue_(edges), cost_(edges, kNone) {}
+  explicit Mirror(std::size_t edges) : stamps_(edges, 0), queue_(stamps_), cost_(edges, kNone) {}
 
   void push(std::uint32_t edge, double cost) {
     drop(edge);
@@ -41,6 +41,7 @@ class Mirror {
 
  private:
   static constexpr double kNone = std::numeric_limits<double>::infinity();
+  std::vector<std::uint32_t> stamps_;
   CollapseQueue queue_;
   std::vector<double> cost_;
   std::set<std::pair<double, std::uint32_t>> order_;

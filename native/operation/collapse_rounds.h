@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Decimation of a mesh by edge collapses: rounds in which regions are worked on side by side, each as cheap edges as
+/// in the others, then one loop over all that is left.
+///
+/// A region fits the cache, and the threads share them out. How the mesh is cut into regions depends on the mesh alone:
+/// the result is the same for any number of threads.
+#pragma once
+
+#include <cstddef>
+
+#include "operation/bounded_mesh.h"
+#include "reference/progress.h"
+
+namespace tolvol {
+
+/// Until no edge can collapse or `target` triangles are left; with a target there are no rounds, because its order is
+/// that of the whole. `threads`: 0 means one per core. O(n log n) without bounds. Throws Cancelled.
+void collapse_edges(BoundedMesh& mesh, std::size_t target, unsigned threads, Progress* progress);
+
+}  // namespace tolvol

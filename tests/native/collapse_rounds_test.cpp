@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Meshes large enough to be cut into regions.
+#include "operation/collapse_rounds.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "decimation_cases.h"
+#include "operation/wedges.h"
+#include "reference/errors.h"
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using cases::Case;
+using cases::Options;
+using glm::dvec3;
+
+constexpr unsigned kSquares = 100;
+
+TriangleMesh waves() {
+  TriangleMesh mesh = shapes::grid(kSquares);
+  for (dvec3& p : mesh.vertices) p.z = 0.03 * std::sin(9 * p.x) * std::cos(7 * p.y);
+  return shapes::stored(mesh);
+}
+
+/// A second sheet through the middle of the first: an edge of four faces along the whole of it.
+TriangleMesh crossing() {
+  TriangleMesh mesh = waves();
+  for (unsigned i = 0; i < kSquares; ++i) {
+    const unsigned a = i * (kSquares + 1) + kSquares / 2, b = a + kSquares + 1, n = unsigned(mesh.vertices.size());
+    mesh.vertices.push_back(mesh.vertices[a] + dvec3(0, 0, 0.2));
+    mesh.vertices.push_back(mesh.vertices[b] + dvec3(0, 0, 0.2));
+    mesh.triangles.emplace_back(a, b, n), mesh.triangles.emplace_back(b, n + 1, n);
+  }
+  return shapes::stored(mesh);
+}
+
+std::vector<Case> large() {
+  return {{shapes::torus(kSquares, 0.001)}, {waves()}, {crossing()}, {shapes::soup(shapes::torus(kSquares))}};
+}
+
+DecimationResult decimated(const Case& c, Options options, unsigned threads) {
+  options.threads = threads;
+  return cases::run(c, options);
+}
+
+TEST(CollapseRounds, KeepTheTolerance) {
+  for (const Case& c : large()) {
+    for (const bool two_sided : {true, false}) {
+      Options options;
+      options.two_sided = two_sided;
+      const DecimationResult r = decimated(c, options, 4);
+      cases::expect_within(c, r, two_sided);
+      // As many, about, as in the order of one loop over the whole, which a target asks for; but not the same.
+      options.target_triangles = 1;
+      const DecimationResult whole = decimated(c, options, 4);
+      EXPECT_NE(r.vertices, whole.vertices) << "there were rounds";
+      EXPECT_NEAR(double(r.triangles.size()), double(whole.triangles.size()), 0.15 * double(whole.triangles.size()));
+    }
+  }
+}
+
+TEST(CollapseRounds, ThreadsDoNotChangeABit) {
+  for (const Case& c : large()) {
+    // Seams across the mesh, in two directions.
+    std::vector<float> values;
+    for (const glm::uvec3& t : c.mesh.triangles) {
+      const dvec3 centre = (c.mesh.vertices[t.x] + c.mesh.vertices[t.y] + c.mesh.vertices[t.z]) / 3.0;
+      for (int k = 0; k < 3; ++k) values.push_back(float((centre.x > 0.3) + 2 * (centre.y > 0.4)));
+    }
+    const std::vector<std::uint32_t> wedges = wedge_labels(c.mesh.triangles, values, 1);
+    for (const bool seams : {false, true}) {
+      Options options;
+      options.two_sided = seams;  // one-sided, boundaries have bounds of their own
+      if (seams) options.wedges = wedges;
+      const DecimationResult one = decimated(c, options, 1), four = decimated(c, options, 4);
+      EXPECT_EQ(one.vertices, four.vertices);
+      EXPECT_EQ(one.triangles, four.triangles);
+      EXPECT_EQ(one.triangle_source, four.triangle_source);
+      EXPECT_EQ(one.source_weights, four.source_weights);
+    }
+  }
+}
+
+TEST(CollapseRounds, StopWhenCancelled) {
+  const Case c{waves()};
+  for (const unsigned threads : {1u, 4u}) {
+    Progress progress;
+    progress.cancel();
+    Options options;
+    options.progress = &progress;
+    EXPECT_THROW(decimated(c, options, threads), Cancelled);
+  }
+}
+
+}  // namespace
