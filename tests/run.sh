@@ -39,8 +39,17 @@ in_shards() {
   for one in $running; do wait "$one" || result=1; done
   return $result
 }
-python() { /usr/bin/python3 -m pytest -q -p no:cacheprovider tests/python; }
-blender() { sh tests/blender/run.sh; }
+python() { /usr/bin/python3 -m pytest -q -p no:cacheprovider -n "$(nproc)" tests/python; }
+# A Blender on each core, with every so many files.
+blender() {
+  at_once=$(nproc) index=0 running="" result=0
+  while [ $index -lt "$at_once" ]; do
+    sh tests/blender/run.sh $(ls tests/blender/test_*.py | awk -v n="$at_once" -v i=$index 'NR % n == i') &
+    running="$running $!" index=$((index + 1))
+  done
+  for one in $running; do wait "$one" || result=1; done
+  return $result
+}
 ui() { sh tests/ui/run.sh; }
 style() { sh tests/style/run.sh; }
 

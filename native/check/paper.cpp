@@ -11,6 +11,13 @@
 #include "reference/errors.h"
 
 namespace tolvol {
+namespace {
+
+/// Pixels along an edge of what is drawn of a large candidate with a corner beyond the grid: all of them there, hence
+/// outside, as the candidate is whatever its other pixels are.
+constexpr float kCorner = 16;
+
+}  // namespace
 
 Paper::Paper(const ToleranceVolume& volume, Margin margin) : LatticeCheck(volume, 0), margin_(margin) {
   bound(0);  // throws before any work when the grid is too coarse
@@ -49,6 +56,16 @@ bool Paper::add_parts(const Corners& corners, std::uint32_t slot, std::vector<Pa
   if (!(l + 2 <= largest_)) return false;
   // Of a candidate that is one point nothing is drawn; the division must not be by zero.
   const double steps = std::max(l, 1.0);
+  if (l > kCorner) {
+    const glm::dvec3 last = glm::dvec3(volume().grid().nodes) - 1.0;
+    for (int k = 0; k < 3; ++k) {
+      const glm::dvec3& p = corners[k];
+      const glm::dvec3 beyond = glm::max(-p, p - last);
+      if (std::max({beyond.x, beyond.y, beyond.z}) <= kCorner + 1) continue;
+      parts.push_back({p, kCorner, (corners[(k + 1) % 3] - p) / steps, slot, (corners[(k + 2) % 3] - p) / steps, 0});
+      return true;
+    }
+  }
   parts.push_back({corners[0], static_cast<float>(l), along / steps, slot, across / steps, 0});
   return true;
 }

@@ -47,6 +47,16 @@ TEST_F(PaperChecks, SeesAParallelPlaneOnBothSidesOfItsBound) {
   }
 }
 
+TEST_F(PaperChecks, ALargeCandidateThatLeavesTheGridIsOutside) {
+  const std::unique_ptr<ToleranceVolume> volume = make_volume(shapes::grid(4), 4);
+  const Paper check(*volume, Paper::Margin::half_diagonal);
+  const glm::dvec3 corners[] = {{0.1, 0.1, 0}, {0.9, 0.1, 0}, {0.5, 5, 0}};
+  for (int k = 0; k < 3; ++k) {
+    const Points points{corners[k], corners[(k + 1) % 3], corners[(k + 2) % 3]};
+    EXPECT_EQ(ask(check, *volume, points).at(0), Verdict::outside);
+  }
+}
+
 // The numbers are the point: this is what "not conservative" means. With h/2 about half of the spikes that are outside
 // pass at the paper's precision, because of a small triangle at most one pixel near its middle is drawn. The bands
 // leave room for hardware that fills and filters a little differently.
