@@ -18,6 +18,7 @@ namespace tolvol {
 namespace {
 
 constexpr double kFloor = 0.02;                // of the tolerance: a piece this short is not split further
+constexpr double kWorthCutting = 0.25;         // of the tolerance
 constexpr std::size_t kBudget = 1 << 20;       // parts looked at before a piece is left unproved,
 constexpr std::size_t kQuickBudget = 1 << 13;  // and where the answer is only one of many tries
 constexpr double kSmall = 2.0;  // of the tolerance: shorter pieces are worth trying against all eight nodes
@@ -80,7 +81,7 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       return Verdict::inside;
     }
   }
-  thread_local std::vector<Part> queue, covered;
+  thread_local std::vector<Part> queue;
   queue.assign(1, {{p0, p1, p2}});
   Verdict result = Verdict::inside;
   double farthest2 = 0;  // over the parts proved so far
@@ -93,7 +94,7 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
     FourPoints points;
     points.set(a, b, c, centre);
     double centre2 = std::numeric_limits<double>::infinity();  // best known squared distance of the centre
-    Cover largest;
+    std::uint32_t below = DistanceGrid::kNone;                 // the triangle it is of
     std::array<std::uint32_t, 10> tried;
     int tries = 0;
     const auto covered_by = [&](std::uint32_t triangle) {
@@ -104,13 +105,12 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       tried[tries++] = triangle;
       double d2[4];
       witness_distances((*reference_)[triangle], points, d2);
-      centre2 = std::min(centre2, d2[3]);
+      if (d2[3] < centre2) centre2 = d2[3], below = triangle;
       // Written so that NaN is not covered.
       if (d2[0] <= within2_ && d2[1] <= within2_ && d2[2] <= within2_) {
         farthest2 = std::max({farthest2, d2[0], d2[1], d2[2]});
         return true;
       }
-      largest.improve(d2, within_);
       return false;
     };
     const std::uint32_t guess = grid_->triangle_near(centre);
@@ -144,12 +144,7 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       result = Verdict::unproved;
       continue;
     }
-    covered.clear();
-    if (cut(part, largest, covered, queue)) {
-      farthest2 = std::max(farthest2, largest.within * largest.within);
-    } else {
-      split(part, queue);
-    }
+    if (!cut(part, (*reference_)[below], kWorthCutting * within_, queue)) split(part, queue);
   }
   farthest = std::sqrt(farthest2);
   return result;

@@ -6,11 +6,14 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "check/witness.h"
+
 namespace tolvol {
 
 struct Part {
   glm::dvec3 corners[3];
   std::uint32_t cuts = 0;  ///< made since it was whole; past kMostCuts rounding would no longer be within the bounds
+  std::uint32_t of = 0;    ///< what it is a part of, for whoever wants to know
 };
 
 /// A cut puts a corner up to 3u |x| from where it should be, u = 2^-53, and a part of a part inherits that: every point
@@ -20,22 +23,11 @@ inline constexpr std::uint32_t kMostCuts = 32;
 
 double longest_squared(const Part& part);
 
-/// Appends the halves of a needle, or four quarters.
+/// Appends the halves of a needle, or four quarters. A segment is (a, b, b), and so are its parts.
 void split(const Part& part, std::vector<Part>& out);
 
-/// The convex set (a triangle) that covers most of a part, and how to cut off what it covers.
-struct Cover {
-  double share = 0;      ///< of the part's area, that is sure to be `within`
-  double distance[3]{};  ///< of the corners
-  double within = 0;     ///< up to where the cut goes
-
-  /// Takes another set when its share is larger. `d2`: squared distances of the corners, and of any other point;
-  /// `permitted`: what they may be.
-  bool improve(const double (&d2)[4], double permitted);
-};
-
-/// Appends what `cover` covers to `inside`, the rest to `rest`. False, and nothing done, where that is too little or
-/// leaves a part as long as before: then split().
-bool cut(const Part& part, const Cover& cover, std::vector<Part>& inside, std::vector<Part>& rest);
+/// Cuts a part where an edge of a triangle runs below it, and appends both sides: of the three edges the one that
+/// leaves most on both. False, and nothing done, where none leaves a strip of width `least` on both.
+bool cut(const Part& part, const WitnessTriangle& triangle, double least, std::vector<Part>& out);
 
 }  // namespace tolvol

@@ -267,6 +267,24 @@ double Change::share(const Face& face) const {
   return least;
 }
 
+void Change::gather_predecessors() {
+  const auto add = [&](std::uint32_t id) {
+    const glm::uvec3& t = mesh_->triangles_[id];
+    const auto& p = mesh_->positions_;
+    predecessors_.add(p[t.x], p[t.y], p[t.z], mesh_->face_distance_[id]);
+  };
+  for (const Coverage::Element& e : elements_) add(e.id);
+  for (const Coverage::Removed& r : removed_) add(r.id);
+}
+
+/// Whether a face is likely to lie near many triangles of the reference.
+bool Change::is_large(const Coverage::Element& e) const {
+  constexpr double kLarge = 8;  // times the tolerance
+  const double limit = kLarge * mesh_->bounds().forward->within();
+  const glm::dvec3 &a = e.corners[0], &b = e.corners[1], &c = e.corners[2];
+  return std::max({squared_length(b - a), squared_length(c - b), squared_length(a - c)}) > limit * limit;
+}
+
 bool Change::within_bounds() {
   const Bounds& bounds = mesh_->bounds();
   if (bounds.rival) return bounds.rival->accepts(elements_, removed_);
@@ -276,6 +294,7 @@ bool Change::within_bounds() {
       if (!(new_distance_ <= share_ * bounds.forward->within())) return false;
     }
     const auto& distance = mesh_->distance_;
+    predecessors_.clear();
     for (std::size_t k = 0; k < elements_.size(); ++k) {
       const std::size_t i = (suspect_ + k) % elements_.size();
       const Coverage::Element& element = elements_[i];
@@ -284,6 +303,11 @@ bool Change::within_bounds() {
       // No point of the face moves farther than its moving corner.
       face.distance = mesh_->face_distance_[element.id] + element.moved;
       if (element.moved == 0 || face.distance <= forward.within()) continue;
+      if (is_large(element)) {
+        if (predecessors_.empty()) gather_predecessors();
+        face.distance = predecessors_.bound(element.corners, forward.within());
+        if (face.distance <= forward.within()) continue;
+      }
       glm::dvec3 corners(distance[face.vertices[0]], distance[face.vertices[1]], distance[face.vertices[2]]);
       if (kind_ != Kind::flip) corners[face.corner] = new_distance_;
       face.distance = forward.bound(element.corners, corners);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "operation/bounded_mesh.h"
+#include "operation/predecessors.h"
 
 namespace tolvol {
 
@@ -72,6 +73,8 @@ class Change {
   bool wedges_fit(Halfedge h);
   bool slots_fit(Halfedge h) const;
   bool folds_over() const;
+  void gather_predecessors();
+  bool is_large(const Coverage::Element& e) const;
   bool within_bounds();
   bool boundary_within_bounds();
   void boundary_of_collapse();
@@ -91,6 +94,7 @@ class Change {
   std::vector<Coverage::Removed> boundary_removed_;
   std::vector<NewWedge> new_wedges_;
   std::vector<int> neighbours_;
+  Predecessors predecessors_;
   Coverage::Trial backward_, boundary_backward_;
   double new_distance_ = 0;
   std::size_t suspect_ =

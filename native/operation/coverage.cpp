@@ -11,9 +11,12 @@
 namespace tolvol {
 namespace {
 
-constexpr double kFloor = 0.1;  // of the tolerance: a shorter piece is not split further
+constexpr double kWorthCutting = 0.25;  // of the tolerance
+constexpr double kFloor = 0.1;          // of the tolerance: a shorter piece is not split further
 // Pieces that splitting may add before a change is refused, and in assign() of one triangle of the reference.
 constexpr std::size_t kBudget = 1 << 14;
+
+constexpr std::uint32_t kNeverWhole = 1u << 31;  // in split_into_: some of the triangle is out of reach
 
 FourPoints with_centre(const Part& part) {
   const auto& [a, b, c] = part.corners;
@@ -25,11 +28,15 @@ FourPoints with_centre(const Part& part) {
 }  // namespace
 
 Coverage::Coverage(const TriangleMesh& reference, double within, std::size_t element_count)
-    : reference_(&reference), within_(within), within2_(within * within), lists_(element_count) {}
+    : reference_(&reference),
+      within_(within),
+      within2_(within * within),
+      lists_(element_count),
+      split_into_(reference.triangles.size()) {}
 
 Part Coverage::whole(std::uint32_t triangle) const {
   const glm::uvec3 t = reference_->triangles[triangle];
-  return {{reference_->vertices[t.x], reference_->vertices[t.y], reference_->vertices[t.z]}};
+  return {{reference_->vertices[t.x], reference_->vertices[t.y], reference_->vertices[t.z]}, 0, triangle};
 }
 
 void Coverage::own(std::uint32_t element, std::uint32_t triangle) { lists_[element].pieces.push_back(whole(triangle)); }
@@ -52,6 +59,7 @@ bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::s
       List& list = lists_[element];
       list.distance = std::max(list.distance, common.distance);
       list.pieces.push_back(piece);
+      if (piece.cuts > 0) ++split_into_[triangle];
       continue;
     }
     const glm::dvec3 centre = (c[0] + c[1] + c[2]) * (1.0 / 3);
@@ -64,6 +72,7 @@ bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::s
     if (closest.distance > provable + radius || finest) {
       nearest.push_back(closest.triangle);
       all = false;
+      split_into_[triangle] |= kNeverWhole;
     } else {
       split(piece, stack);
     }
@@ -87,12 +96,11 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
     trial.stack_.pop_back();
     const FourPoints points = with_centre(piece);
     double centre2 = std::numeric_limits<double>::infinity();
-    Cover cover;
-    std::uint32_t cover_by = 0;
+    const WitnessTriangle* below = nullptr;
     const auto covered_by = [&](std::uint32_t i) {
       double d2[4];
       witness_distances(trial.candidates_[i].witness, points, d2);
-      centre2 = std::min(centre2, d2[3]);
+      if (d2[3] < centre2) centre2 = d2[3], below = &trial.candidates_[i].witness;
       // Written so that NaN is not covered.
       if (d2[0] <= within2_ && d2[1] <= within2_ && d2[2] <= within2_) {
         trial.candidates_[i].distance =
@@ -101,7 +109,6 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
         trial.last_ = i;
         return true;
       }
-      if (cover.improve(d2, within_)) cover_by = i;
       return false;
     };
     // The element that took the last piece is as likely as the one that follows from the change.
@@ -115,14 +122,7 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
     if (!(centre2 <= within2_) || longest_squared(piece) <= kFloor * kFloor * within2_ || piece.cuts == kMostCuts) {
       return false;
     }
-    trial.cut_off_.clear();
-    if (cut(piece, cover, trial.cut_off_, trial.stack_)) {
-      for (const Part& part : trial.cut_off_) trial.moved_.push_back({part, cover_by});
-      trial.candidates_[cover_by].distance = std::max(trial.candidates_[cover_by].distance, cover.within);
-      trial.last_ = cover_by;
-    } else {
-      split(piece, trial.stack_);
-    }
+    if (!cut(piece, *below, kWorthCutting * within_, trial.stack_)) split(piece, trial.stack_);
   }
   return true;
 }
@@ -154,27 +154,56 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   for (std::size_t i = 0; i < elements.size(); ++i) {
     trial.candidates_[i].witness = {elements[i].corners[0], elements[i].corners[1], elements[i].corners[2]};
   }
+  thread_local std::vector<std::uint32_t> gathered;  // per triangle of the reference, all 0 between calls
+  if (gathered.size() < split_into_.size()) gathered.resize(split_into_.size(), 0);
+  const auto for_each_split = [&](auto&& call) {
+    trial.for_each_replaced(lists_, [&](const Part& piece) {
+      if (piece.cuts > 0) call(gathered[piece.of]);
+    });
+  };
+  for_each_split([](std::uint32_t& count) { ++count; });
+  const bool placed = place_all(trial, gathered);
+  for_each_split([](std::uint32_t& count) { count = 0; });
+  return placed;
+}
+
+/// Places the pieces of what is replaced. `gathered`: how many there are of each triangle that was split.
+bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) const {
+  constexpr std::uint32_t kPlaced = 0xFFFFFFFFu;
+  const auto place_list = [&](const std::vector<Part>& pieces, std::uint32_t first) {
+    return std::all_of(pieces.begin(), pieces.end(), [&](const Part& piece) {
+      if (piece.cuts == 0) return place(piece, first, trial);
+      std::uint32_t& count = gathered[piece.of];
+      if (count == kPlaced) return true;
+      if (count != split_into_[piece.of].load(std::memory_order_relaxed)) return place(piece, first, trial);
+      count = kPlaced;
+      return place(whole(piece.of), first, trial);
+    });
+  };
   // What loses its element is the likeliest to fail.
   for (const Trial::Heirloom& h : trial.heirlooms_) {
-    if (h.whole) continue;
-    for (const Part& piece : lists_[h.id].pieces) {
-      if (!place(piece, h.heir, trial)) return false;
-    }
+    if (!h.whole && !place_list(lists_[h.id].pieces, h.heir)) return false;
   }
-  for (std::uint32_t k = 0; k < trial.candidates_.size(); ++k) {
-    const std::uint32_t i = (trial.suspect_ + k) % static_cast<std::uint32_t>(trial.candidates_.size());
+  const auto count = static_cast<std::uint32_t>(trial.candidates_.size());
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const std::uint32_t i = (trial.suspect_ + k) % count;
     if (!trial.candidates_[i].replaced) continue;
-    for (const Part& piece : lists_[trial.candidates_[i].id].pieces) {
-      if (!place(piece, i, trial)) {
-        trial.suspect_ = i;
-        return false;
-      }
+    if (!place_list(lists_[trial.candidates_[i].id].pieces, i)) {
+      trial.suspect_ = i;
+      return false;
     }
   }
   return true;
 }
 
 void Coverage::commit(const Trial& trial) {
+  // Up before down: no count is ever less than the pieces that there are.
+  for (const Moved& m : trial.moved_) {
+    if (m.piece.cuts > 0) split_into_[m.piece.of].fetch_add(1, std::memory_order_relaxed);
+  }
+  trial.for_each_replaced(lists_, [&](const Part& piece) {
+    if (piece.cuts > 0) split_into_[piece.of].fetch_sub(1, std::memory_order_relaxed);
+  });
   for (const Trial::Candidate& c : trial.candidates_) {
     if (c.replaced) lists_[c.id].pieces.clear();
     lists_[c.id].distance = c.distance;

@@ -4,9 +4,12 @@
 ///
 /// The certificate with the roles exchanged: a piece whose three corners are within epsilon of one element is within
 /// epsilon of it as a whole. A change of the mesh must find a new witness for each piece of the elements it replaces,
-/// splitting pieces where one element does not do; one piece without a witness refuses the change.
+/// splitting pieces where one element does not do; one piece without a witness refuses the change. Where all pieces of
+/// a triangle of the reference are to find new witnesses, it is taken as a whole again.
 #pragma once
 
+#include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
@@ -74,11 +77,15 @@ class Coverage {
   };
 
   Part whole(std::uint32_t triangle) const;
+  bool place_all(Trial& trial, std::vector<std::uint32_t>& gathered) const;
   bool place(const Part& whole, std::uint32_t first, Trial& trial) const;
 
   const TriangleMesh* reference_;
   double within_, within2_;
   std::vector<List> lists_;
+  /// Per triangle of the reference: the pieces that it was split into, none while it is whole. A count changes while
+  /// others read it, yet never looks as if a piece that is elsewhere did not exist.
+  std::vector<std::atomic<std::uint32_t>> split_into_;
 };
 
 /// What a try found, and its scratch; one a thread.
@@ -99,10 +106,21 @@ class Coverage::Trial {
     std::uint32_t id, heir;
     bool whole;  ///< passed on as it is
   };
+  /// Calls call(piece) for all pieces that the change places anew.
+  template <class Call>
+  void for_each_replaced(const std::vector<List>& lists, Call&& call) const {
+    for (const Heirloom& h : heirlooms_) {
+      if (!h.whole) std::for_each(lists[h.id].pieces.begin(), lists[h.id].pieces.end(), call);
+    }
+    for (const Candidate& c : candidates_) {
+      if (c.replaced) std::for_each(lists[c.id].pieces.begin(), lists[c.id].pieces.end(), call);
+    }
+  }
+
   std::vector<Candidate> candidates_;
   std::vector<Heirloom> heirlooms_;
   std::vector<Moved> moved_;
-  std::vector<Part> stack_, cut_off_;
+  std::vector<Part> stack_;
   std::size_t looked_ = 0;     ///< pieces looked at in this change
   std::uint32_t last_ = 0;     ///< the candidate that took the last piece
   std::uint32_t suspect_ = 0;  ///< the one whose pieces failed last: tried first, to be refused soon

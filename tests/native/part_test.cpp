@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -65,55 +66,76 @@ TEST(Part, SplitsIntoQuartersAndNeedlesIntoHalves) {
   EXPECT_LT(halved, 450);
 }
 
-TEST(Part, CutsOffWhatOneTriangleCovers) {
+TEST(Part, CutsAlongTheEdgeThatRunsBelow) {
   std::mt19937 engine(2);
-  constexpr double kPermitted = 0.7;
-  int cut_by_one = 0, cut_by_two = 0;
-  for (int i = 0; i < 5'000; ++i) {
-    const Part whole{{random_point(engine), random_point(engine), random_point(engine)}};
-    const WitnessTriangle t(random_point(engine), random_point(engine), random_point(engine));
-    FourPoints points;
-    points.set(whole.corners[0], whole.corners[1], whole.corners[2], dvec3(0));
-    double d2[4];
-    witness_distances(t, points, d2);
-    const int near = (d2[0] <= 0.3) + (d2[1] <= 0.3) + (d2[2] <= 0.3);
-    Cover cover;
-    if (!cover.improve(d2, kPermitted) || cover.share == 1) continue;
-    std::vector<Part> inside, rest, all;
-    if (!cut(whole, cover, inside, rest)) {
-      EXPECT_TRUE(inside.empty() && rest.empty());
+  constexpr double kLeast = 0.1;
+  int cuts = 0;
+  for (int i = 0; i < 2'000; ++i) {
+    const Part whole{{random_point(engine), random_point(engine), random_point(engine)}, 2, 7};
+    const dvec3 corners[3] = {random_point(engine), random_point(engine), random_point(engine)};
+    std::vector<Part> parts;
+    if (!cut(whole, {corners[0], corners[1], corners[2]}, kLeast, parts)) {
+      EXPECT_TRUE(parts.empty());
       continue;
     }
-    for (const Part& p : rest) EXPECT_LT(longest_squared(p), 0.7 * longest_squared(whole));
-    ASSERT_EQ(inside.size() + rest.size(), 3u);
-    EXPECT_NEAR(area(inside), cover.share * area(whole), 1e-12);
-    all = inside;
-    all.insert(all.end(), rest.begin(), rest.end());
-    expect_tiles(whole, all, engine);
-    for (const Part& p : inside) {
-      for (const dvec3& x : p.corners)
-        EXPECT_LT(closest_point(x, t.a, t.a + t.ab, t.a + t.ac).distance_squared, kPermitted * kPermitted);
+    ++cuts;
+    ASSERT_EQ(parts.size(), 3u);
+    expect_tiles(whole, parts, engine);
+    // One of the three planes, through an edge and along the normal, has all of each part on one side.
+    const dvec3 normal = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
+    int planes = 0;
+    for (int edge = 0; edge < 3; ++edge) {
+      const dvec3 &a = corners[edge], &b = corners[(edge + 1) % 3];
+      const dvec3 inwards = glm::normalize(glm::cross(normal, b - a));
+      const auto crosses = [&](const Part& p) {
+        double high = 0, low = 0;
+        for (const dvec3& x : p.corners)
+          high = std::max(high, glm::dot(inwards, x - a)), low = std::max(low, -glm::dot(inwards, x - a));
+        return std::min(high, low);
+      };
+      planes += crosses(whole) > kLeast &&
+                std::none_of(parts.begin(), parts.end(), [&](const Part& p) { return crosses(p) > 1e-12; });
     }
-    (inside.size() == 1 ? cut_by_one : cut_by_two) += near > 0;
+    EXPECT_EQ(planes, 1);
+    for (const Part& p : parts) EXPECT_EQ(p.of, 7u);
   }
-  EXPECT_GT(cut_by_one, 20);
-  EXPECT_GT(cut_by_two, 100);
+  EXPECT_GT(cuts, 200);
 }
 
-TEST(Part, CoverTakesTheLargestShareAndNeverWhatIsNotANumber) {
+TEST(Part, CutsASegmentAtTheEndOfAnother) {
+  const Part whole{{{0, 0.1, 0}, {1, 0.1, 0}, {1, 0.1, 0}}};
+  std::vector<Part> parts;
+  ASSERT_TRUE(cut(whole, {dvec3(-1, 0, 0), dvec3(0.3, 0, 0), dvec3(0.3, 0, 0)}, 0.01, parts));
+  ASSERT_EQ(parts.size(), 2u);
+  double length = 0;
+  for (const Part& p : parts) {
+    EXPECT_EQ(p.corners[1], p.corners[2]);
+    EXPECT_NEAR(std::min(std::abs(p.corners[0].x - 0.3), std::abs(p.corners[1].x - 0.3)), 0, 1e-15);
+    length += glm::length(p.corners[1] - p.corners[0]);
+  }
+  EXPECT_NEAR(length, 1, 1e-15);
+  parts.clear();
+  split(whole, parts);
+  ASSERT_EQ(parts.size(), 2u);
+  for (const Part& p : parts) EXPECT_NEAR(glm::length(p.corners[1] - p.corners[0]), 0.5, 1e-15);
+}
+
+TEST(Part, IsNotCutWhereThatBringsNothing) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kFar = std::numeric_limits<double>::infinity();
-  Cover cover;
-  EXPECT_FALSE(cover.improve({kNan, kNan, kNan, 0}, 1));
-  EXPECT_FALSE(cover.improve({4, 4, 4, 0}, 1));
-  EXPECT_FALSE(cover.improve({0, kNan, 4, 0}, 1));
-  EXPECT_FALSE(cover.improve({0, kFar, kFar, 0}, 1));
-  EXPECT_EQ(cover.share, 0);
-  EXPECT_TRUE(cover.improve({0, 4, 4, 0}, 1));
-  const double small = cover.share;
-  EXPECT_TRUE(cover.improve({0, 0, 4, 0}, 1));
-  EXPECT_GT(cover.share, small);
-  EXPECT_FALSE(cover.improve({0, 4, 4, 0}, 1));
-  EXPECT_EQ(cover.distance[1], 0);
+  const WitnessTriangle triangle(dvec3(0, 0, 0), dvec3(1, 0, 0), dvec3(0, 1, 0));
+  const WitnessTriangle point(dvec3(0, 0, 0), dvec3(0, 0, 0), dvec3(0, 0, 0));
+  const Part inside{{{0.1, 0.1, 5}, {0.5, 0.1, 5}, {0.1, 0.5, 5}}},
+      beyond{{{-0.05, 0.1, 0}, {0.5, 0.1, 0}, {0.1, 0.5, 0}}}, no_number{{{kNan, 0, 0}, {-1, 0, 0}, {1, 0, 0}}},
+      endless{{{kFar, 0, 0}, {-1, 0, 0}, {1, 0, 0}}};
+  std::vector<Part> parts;
+  EXPECT_FALSE(cut(inside, triangle, 0.1, parts)) << "it is too high, not too wide";
+  EXPECT_FALSE(cut(beyond, triangle, 0.1, parts)) << "a strip narrower than what is asked for";
+  EXPECT_TRUE(cut(beyond, triangle, 0.01, parts));
+  parts.clear();
+  EXPECT_FALSE(cut(beyond, point, 0.01, parts));
+  EXPECT_FALSE(cut(no_number, triangle, 0.1, parts));
+  EXPECT_FALSE(cut(endless, triangle, 0.1, parts));
+  EXPECT_TRUE(parts.empty());
 }
 
 }  // namespace

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Every step may add to the bound. It takes a fixed share of the room that is left, so that after many steps there is
+// some left to take: a hundred of them use 96 % of it.
+#include "operation/predecessors.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace tolvol {
+namespace {
+
+constexpr double kStep = 1.0 / 32;       // of the room that is left
+constexpr double kRounding = 0.5;        // of a step: looked for is less, and the rest is far more than rounding hides
+constexpr double kLeast = 1e-6;          // of the tolerance: a smaller step is not taken
+constexpr double kWorthCutting = 0.25;   // of what is looked for
+constexpr double kFloor = 0.1;           // of what is looked for: a shorter part is not split further
+constexpr std::size_t kMostParts = 512;  // looked at
+
+}  // namespace
+
+void Predecessors::add(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double distance) {
+  faces_.emplace_back(a, b, c);
+  farthest_ = std::max(farthest_, distance);
+}
+
+double Predecessors::bound(const glm::dvec3 (&corners)[3], double within) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  const double step = kStep * (within - farthest_);
+  if (!(step >= kLeast * within)) return kNone;
+  const double near = kRounding * step, near2 = near * near;
+  parts_.assign(1, {{corners[0], corners[1], corners[2]}});
+  for (std::size_t looked = 0; !parts_.empty(); ++looked) {
+    if (looked == kMostParts) return kNone;
+    const Part part = parts_.back();
+    parts_.pop_back();
+    const auto& [a, b, c] = part.corners;
+    FourPoints points;
+    points.set(a, b, c, (a + b + c) * (1.0 / 3));
+    double centre2 = kNone;
+    const WitnessTriangle* below = nullptr;  // the nearest to the centre
+    const bool covered = std::any_of(faces_.begin(), faces_.end(), [&](const WitnessTriangle& face) {
+      double d2[4];
+      witness_distances(face, points, d2);
+      if (d2[3] < centre2) centre2 = d2[3], below = &face;
+      if (d2[0] <= near2 && d2[1] <= near2 && d2[2] <= near2) return true;
+      return false;
+    });
+    if (covered) continue;
+    // Written so that NaN ends here.
+    if (!(centre2 <= near2) || longest_squared(part) <= kFloor * kFloor * near2 || part.cuts == kMostCuts) return kNone;
+    if (!cut(part, *below, kWorthCutting * near, parts_)) split(part, parts_);
+  }
+  return farthest_ + step;
+}
+
+}  // namespace tolvol

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "operation/predecessors.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "measure/hausdorff.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+constexpr double kWithin = 0.01;
+
+/// A fan of triangles around a point, as high as `height` there.
+TriangleMesh fan(unsigned count, double height) {
+  TriangleMesh mesh{{{0, 0, height}}, {}};
+  for (unsigned i = 0; i < count; ++i) {
+    const double angle = 2 * M_PI * i / count;
+    mesh.vertices.emplace_back(std::cos(angle), std::sin(angle), 0);
+    mesh.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % count);
+  }
+  return mesh;
+}
+
+Predecessors faces_of(const TriangleMesh& mesh, double distance) {
+  Predecessors faces;
+  for (const glm::uvec3& t : mesh.triangles)
+    faces.add(mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z], distance);
+  return faces;
+}
+
+TEST(Predecessors, BoundWhatLiesInTheirPlane) {
+  const TriangleMesh mesh = fan(7, 0);
+  Predecessors faces = faces_of(mesh, 0);
+  const dvec3 across[3] = {mesh.vertices[1], mesh.vertices[3], mesh.vertices[6]};
+  const double bound = faces.bound(across, kWithin);
+  EXPECT_LE(bound, 0.05 * kWithin);
+  EXPECT_GT(bound, 0);
+  // Again and again, and there is still room.
+  double distance = 0;
+  for (int i = 0; i < 100; ++i) {
+    Predecessors next = faces_of(mesh, distance);
+    distance = next.bound(across, kWithin);
+    ASSERT_LE(distance, kWithin) << i;
+  }
+}
+
+TEST(Predecessors, NeverBoundByLessThanTheDistance) {
+  std::mt19937 engine(1);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int bounded = 0;
+  for (int i = 0; i < 3'000; ++i) {
+    const double distance = 0.3 * (1 + unit(engine)) * kWithin, scale = std::pow(10, 2 * unit(engine) - 3);
+    const TriangleMesh mesh = fan(5, scale * kWithin * unit(engine));
+    dvec3 corners[3];
+    for (dvec3& p : corners) p = {0.6 * unit(engine), 0.6 * unit(engine), scale * kWithin * unit(engine)};
+    const double bound = faces_of(mesh, distance).bound(corners, kWithin);
+    if (!(bound <= kWithin)) continue;
+    ++bounded;
+    const TriangleMesh face{{corners[0], corners[1], corners[2]}, {{0, 1, 2}}};
+    EXPECT_LE(distance + hausdorff(face, mesh, {bound - distance, 1, nullptr}).upper, bound * (1 + 1e-12));
+  }
+  EXPECT_GT(bounded, 300);
+  EXPECT_LT(bounded, 2'900);
+}
+
+TEST(Predecessors, LeaveOpenWhatTheyCannotBound) {
+  const dvec3 inside[3] = {{0.1, 0.1, 0}, {0.4, 0.1, 0}, {0.1, 0.4, 0}},
+              beyond[3] = {{0, 0, 0}, {1.2, 0, 0}, {0, 1, 0}};
+  EXPECT_LE(faces_of(fan(6, 0), 0).bound(inside, kWithin), kWithin);
+  EXPECT_GT(faces_of(fan(6, 0), 0).bound(beyond, kWithin), kWithin);
+  EXPECT_GT(faces_of(fan(6, 0), kWithin).bound(inside, kWithin), kWithin) << "no room is left";
+  EXPECT_GT(faces_of(fan(6, 0), std::numeric_limits<double>::infinity()).bound(inside, kWithin), kWithin);
+  EXPECT_GT(Predecessors().bound(inside, kWithin), kWithin);
+}
+
+}  // namespace
