@@ -9,8 +9,6 @@ Without MESH: Blender's monkey in 62,976 and in 251,904 triangles, with noise. T
 """
 
 import json
-import os
-import platform
 import re
 import sys
 import time
@@ -25,6 +23,7 @@ import models  # noqa: E402
 import table1  # noqa: E402
 import tables  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
+from common import machine  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "build" / "release" / "python"))
 
@@ -118,11 +117,6 @@ def line(entry):
         f"unbounded {seconds['unbounded']:.2f} s (ratio {entry['ratio']:.2f}), OpenMesh {seconds['openmesh']:.2f} s, "
         f"peak memory {entry['peak_memory'] / 1e6:.0f} MB"
     )
-
-
-def machine():
-    model = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
-    return f"{model[1] if model else platform.processor()}, {os.cpu_count()} cores"
 
 
 def meshes(paths):

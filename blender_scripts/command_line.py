@@ -5,8 +5,6 @@ Exit codes: 0 done and proved, 1 a bug, 2 bad usage or input (one line on stderr
 """
 
 import argparse
-import math
-import re
 import sys
 import traceback
 from pathlib import Path
@@ -18,18 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import addon
 from addon import native
 from addon.errors import Refused
-
-USAGE, NOT_PROVED = 2, 3
-
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
-
-
-class Stop(Exception):
-    """Ends the command with a line on stderr and an exit code."""
-
-    def __init__(self, message, code=USAGE):
-        super().__init__(message)
-        self.code = code
+from common import NOT_PROVED, USAGE, Stop, in_units, length, require_folder, whole_number  # noqa: F401
 
 
 class Parser(argparse.ArgumentParser):
@@ -60,44 +47,6 @@ class Parser(argparse.ArgumentParser):
             else:
                 joined.append(word)
         return self.parse_args(joined)
-
-
-def whole_number(least):
-    def parse(text):
-        try:
-            value = int(text)
-        except ValueError:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
-        if value < least:
-            raise argparse.ArgumentTypeError(f"{value} is less than {least}")
-        return value
-
-    return parse
-
-
-def length(text):
-    """'1%' or '0.5' -> (number, whether it is in percent of size)."""
-    match = re.fullmatch(rf"\s*({_NUMBER})\s*(%?)\s*", text, re.IGNORECASE)
-    if not match:
-        raise argparse.ArgumentTypeError(f"{text!r} is neither a length nor a percentage such as 1%")
-    value = float(match[1])
-    if not math.isfinite(value) or value <= 0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number above 0")
-    return value, bool(match[2])
-
-
-def in_units(value_and_percent, size):
-    value, is_percent = value_and_percent
-    return value / 100 * size if is_percent else value
-
-
-def require_folder(path, what):
-    """The folder that a file is to be written to must be there before the work begins."""
-    folder = Path(path).resolve().parent
-    if not folder.is_dir():
-        raise Stop(f"{what} {path}: the folder {folder} does not exist")
-    if Path(path).is_dir():
-        raise Stop(f"{what} {path}: this is a folder")
 
 
 def run(script, arguments, main):

@@ -21,6 +21,7 @@ import command_line as cli  # noqa: E402
 import models  # noqa: E402
 import tables  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
+from common import machine  # noqa: E402
 
 REPEATS = 5
 MOVE = 0.1  # of the tolerance, along each axis
@@ -129,7 +130,7 @@ def main(options):
             cli.require_folder(getattr(options, option), f"--{option}")
     figures = {
         "version": tolvol.__version__,
-        "machine": benchmark.machine(),
+        "machine": machine(),
         "renderer": tolvol.renderer(),
         "meshes": [],
     }

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the commands have in common that needs no Blender: words of the command line, and the machine's name."""
+
+import argparse
+import math
+import os
+import platform
+import re
+from pathlib import Path
+
+USAGE, NOT_PROVED = 2, 3
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
+
+
+class Stop(Exception):
+    """Ends the command with a line on stderr and an exit code."""
+
+    def __init__(self, message, code=USAGE):
+        super().__init__(message)
+        self.code = code
+
+
+def whole_number(least):
+    def parse(text):
+        try:
+            value = int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+        if value < least:
+            raise argparse.ArgumentTypeError(f"{value} is less than {least}")
+        return value
+
+    return parse
+
+
+def length(text):
+    """'1%' or '0.5' -> (number, whether it is in percent of size)."""
+    match = re.fullmatch(rf"\s*({_NUMBER})\s*(%?)\s*", text, re.IGNORECASE)
+    if not match:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither a length nor a percentage such as 1%")
+    value = float(match[1])
+    if not math.isfinite(value) or value <= 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number above 0")
+    return value, bool(match[2])
+
+
+def in_units(value_and_percent, size):
+    value, is_percent = value_and_percent
+    return value / 100 * size if is_percent else value
+
+
+def require_folder(path, what):
+    """The folder that a file is to be written to must be there before the work begins."""
+    folder = Path(path).resolve().parent
+    if not folder.is_dir():
+        raise Stop(f"{what} {path}: the folder {folder} does not exist")
+    if Path(path).is_dir():
+        raise Stop(f"{what} {path}: this is a folder")
+
+
+def machine():
+    model = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
+    return f"{model[1] if model else platform.processor()}, {os.cpu_count()} cores"
