@@ -10,7 +10,7 @@ namespace tolvol {
 namespace {
 
 constexpr double kStep = 1.0 / 32;       // of the room that is left
-constexpr double kRounding = 0.5;        // of a step: looked for is less, and the rest is far more than rounding hides
+constexpr double kLookedFor = 0.5;       // of a step: the rest is room for rounding
 constexpr double kLeast = 1e-6;          // of the tolerance: a smaller step is not taken
 constexpr double kWorthCutting = 0.25;   // of what is looked for
 constexpr double kFloor = 0.1;           // of what is looked for: a shorter part is not split further
@@ -26,8 +26,8 @@ void Predecessors::add(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec
 double Predecessors::bound(const glm::dvec3 (&corners)[3], double within) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const double step = kStep * (within - farthest_);
-  if (!(step >= kLeast * within)) return kNone;
-  const double near = kRounding * step, near2 = near * near;
+  const double near = kLookedFor * step, near2 = near * near;
+  if (!(step >= kLeast * within && step - near >= witness_error(2 * (1 + within)))) return kNone;
   parts_.assign(1, {{corners[0], corners[1], corners[2]}});
   for (std::size_t looked = 0; !parts_.empty(); ++looked) {
     if (looked == kMostParts) return kNone;

@@ -76,6 +76,8 @@ TEST(Predecessors, LeaveOpenWhatTheyCannotBound) {
   EXPECT_GT(faces_of(fan(6, 0), kWithin).bound(inside, kWithin), kWithin) << "no room is left";
   EXPECT_GT(faces_of(fan(6, 0), std::numeric_limits<double>::infinity()).bound(inside, kWithin), kWithin);
   EXPECT_GT(Predecessors().bound(inside, kWithin), kWithin);
+  constexpr double kTiny = 1e-12;
+  EXPECT_GT(faces_of(fan(6, 0), 0).bound(inside, kTiny), kTiny) << "a step of it is no more than rounding hides";
 }
 
 }  // namespace
