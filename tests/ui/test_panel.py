@@ -123,10 +123,15 @@ def test_adjust_last_operation():
     yield 1.0
     hud = region("HUD")
     place = on_screen(hud, hud.width * 2 // 3, 50)
-    xdotool("mousemove", *place, "sleep", "0.2", "click", "--repeat", 2, "--delay", 60, 1)
-    yield 0.4
-    xdotool("key", "ctrl+a", "type", "3")
-    key("Return")
+    for _ in range(3):  # a busy machine may take a double click for two
+        xdotool("mousemove", *place, "sleep", "0.2", "click", "--repeat", 2, "--delay", 60, 1)
+        yield 0.4
+        xdotool("key", "ctrl+a", "type", "3")
+        key("Return")
+        yield 5.0
+        if suzanne().tolvol.tolerance_percent == 3:
+            break
+        key("Escape")
     yield from finished(lambda: len(suzanne().data.polygons) < first)
     yield 1.0
     screenshot("4 adjusted")
