@@ -198,23 +198,21 @@ def interval(a, b, tolerance):
     return [found.lower / tolerance, found.upper / tolerance]
 
 
-def judge(mesh, tolerance, answer):
-    """The certified distances of what a tool returned: {"forward", "backward"}."""
+def directions(mesh, answer):
+    """(a, b) of both ways between what a tool returned and the mesh: the distance is of a's points to b."""
     reference = mesh.vertices.astype(np.float64), mesh.triangles
     result = answer["vertices"], answer["triangles"]
-    return {
-        "forward": interval(result, reference, tolerance),
-        "backward": interval(reference, result, tolerance),
-    }
+    return {"forward": (result, reference), "backward": (reference, result)}
+
+
+def judge(mesh, tolerance, answer):
+    """The certified distances of what a tool returned: {"forward", "backward"}."""
+    return {way: interval(*pair, tolerance) for way, pair in directions(mesh, answer).items()}
 
 
 def keeps_both(mesh, tolerance, answer):
-    reference = mesh.vertices.astype(np.float64), mesh.triangles
-    result = answer["vertices"], answer["triangles"]
-    return all(
-        tolvol.hausdorff(*a, *b, bound=tolerance).upper <= tolerance
-        for a, b in ((result, reference), (reference, result))
-    )
+    pairs = directions(mesh, answer).values()
+    return all(tolvol.hausdorff(*a, *b, bound=tolerance).upper <= tolerance for a, b in pairs)
 
 
 def kept(entry):

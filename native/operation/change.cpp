@@ -281,8 +281,7 @@ void Change::gather_predecessors() {
 bool Change::is_large(const Coverage::Element& e) const {
   constexpr double kLarge = 8;  // times the tolerance
   const double limit = kLarge * mesh_->bounds().forward->within();
-  const glm::dvec3 &a = e.corners[0], &b = e.corners[1], &c = e.corners[2];
-  return std::max({squared_length(b - a), squared_length(c - b), squared_length(a - c)}) > limit * limit;
+  return longest_squared({{e.corners[0], e.corners[1], e.corners[2]}}) > limit * limit;
 }
 
 bool Change::within_bounds() {

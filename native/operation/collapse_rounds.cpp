@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // In a round each region goes up to the same cost, so that the order is nearly that of one loop over all; the counts
-// that it leads to are as often lower as higher, by a few per cent.
+// that it leads to are higher or lower by up to four per cent, in the mean one or two higher.
 #include "operation/collapse_rounds.h"
 
 #include <algorithm>
@@ -57,9 +57,7 @@ class Rounds {
   void whole(std::size_t target) {
     price();
     CollapseLoop loop(shared_, team_);
-    for (std::uint32_t e = 0; e < costs_.size(); ++e) {
-      if (costs_[e] < EdgeCollapse::kNever) loop.add(e, costs_[e]);
-    }
+    for (std::uint32_t e = 0; e < costs_.size(); ++e) loop.add(e, costs_[e]);
     loop.run({EdgeCollapse::kNever, target}, progress_);
   }
 

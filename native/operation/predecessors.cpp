@@ -42,8 +42,7 @@ double Predecessors::bound(const glm::dvec3 (&corners)[3], double within) {
       double d2[4];
       witness_distances(face, points, d2);
       if (d2[3] < centre2) centre2 = d2[3], below = &face;
-      if (d2[0] <= near2 && d2[1] <= near2 && d2[2] <= near2) return true;
-      return false;
+      return d2[0] <= near2 && d2[1] <= near2 && d2[2] <= near2;
     });
     if (covered) continue;
     // Written so that NaN ends here.
