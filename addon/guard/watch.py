@@ -23,8 +23,6 @@ _MOST_CORNERS = 64
 _STROKE_GAP = 0.5
 # Seconds after something was held back in which the stroke counts as going on.
 REST = 0.3
-# Tolerances of a way of which 1/64 is too much to give away.
-_FAR = 3
 
 _NONE = np.empty(0, np.int32)
 
@@ -152,7 +150,6 @@ class Watch(Preparing):
         except (Refused, native.module.TolvolError) as error:
             self.reason = str(error)
             return
-        self._step = np.float32(tolerance / max(np.linalg.norm(matrix[:3, :3], 2), 1e-30))
 
         def work(progress):
             built = volume.native_volume(reference, tolerance, threads, progress)
@@ -191,25 +188,11 @@ class Watch(Preparing):
             self.on, self.reason = False, str(error)
             return _NONE
         if len(indices):
-            positions[indices] = self._nearer(positions, indices, places)
+            positions[indices] = places
             self._held[indices] = True
             self.rest_at = now + REST
         self._last = positions
         return indices
-
-    def _nearer(self, positions, indices, places):
-        """The guard finds how far a vertex may go to 1/64 of its way: one that was sent far away is sent on from where it
-        stopped, a tolerance at most."""
-        way = positions[indices] - places
-        length = np.linalg.norm(way, axis=1)
-        if length.max() <= _FAR * self._step:
-            return places
-        length = np.maximum(length, self._step)
-        positions = positions.copy()
-        positions[indices] = places + way * (self._step / length)[:, None]
-        stopped, places = self._guard.constrain(positions)
-        positions[stopped] = places
-        return positions[indices]
 
     def said(self):
         """What happened in the last stroke, or None."""

@@ -132,7 +132,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress
   state_.resize(stored.size());
   if (progress) progress->begin("checking");
   const std::size_t offender = first_of(stored.size(), threads_, [&](std::size_t v) {
-    state_[v] = {placement_.frame(stored[v]), kUnknown};
+    state_[v] = {placement_.frame(stored[v]), {}};
     return !finite(state_[v].at) && !ring(static_cast<std::uint32_t>(v)).empty();
   });
   if (offender < stored.size()) {
@@ -189,15 +189,16 @@ std::vector<std::uint32_t> MovingMesh::faces_around(std::span<const std::uint32_
   return faces;
 }
 
-/// An upper bound; the distance itself where the grid's guess leaves little room.
-double MovingMesh::distance_of(const glm::dvec3& at) const {
+/// The distance itself where the grid's guess leaves little room.
+MovingMesh::Near MovingMesh::near(const glm::dvec3& at) const {
   const double box = 1 + 2 * volume_->frame_tolerance();
   // Written so that NaN is outside.
-  if (!(std::abs(at.x) <= box && std::abs(at.y) <= box && std::abs(at.z) <= box)) return kFar;
+  if (!(std::abs(at.x) <= box && std::abs(at.y) <= box && std::abs(at.z) <= box)) return {kFar};
+  const std::uint32_t triangle = volume_->grid().triangle_near(at);
   const double guess = certificates_.front().distance_bound(at);
-  if (guess <= kGuess * within_) return guess;
-  const Hierarchy::Nearest nearest = volume_->hierarchy().nearest(at, provable_, volume_->grid().triangle_near(at));
-  return nearest.triangle == Hierarchy::kNone ? kFar : nearest.distance;
+  if (guess <= kGuess * within_) return {guess, triangle};
+  const Hierarchy::Nearest nearest = volume_->hierarchy().nearest(at, provable_, triangle);
+  return nearest.triangle == Hierarchy::kNone ? Near{kFar} : Near{nearest.distance, nearest.triangle};
 }
 
 double MovingMesh::reach_by_motion(std::uint32_t face) const {
@@ -215,7 +216,7 @@ double MovingMesh::over_triangulations(std::uint32_t face, Bound&& bound) const 
   const std::vector<Spot>& spots = trial_;
   const auto triangle = [&](int a, int b, int c) {
     const Spot &p = spots[corner[a]], &q = spots[corner[b]], &r = spots[corner[c]];
-    return bound({p.at, q.at, r.at}, glm::dvec3(p.distance, q.distance, r.distance));
+    return bound({p.at, q.at, r.at}, glm::dvec3(p.near.distance, q.near.distance, r.near.distance));
   };
   switch (corners_) {
     case 1:
@@ -236,7 +237,7 @@ double MovingMesh::over_triangulations(std::uint32_t face, Bound&& bound) const 
 
 double MovingMesh::reach_by_certificate(std::uint32_t face) const {
   for (const std::uint32_t v : corners_of(face)) {
-    if (trial_[v].distance > within_) return kUnproved;
+    if (trial_[v].near.distance > within_) return kUnproved;
   }
   // First as Certificate decides, so that it proves the face again; then the headroom.
   double reach = kUnproved;
@@ -253,14 +254,14 @@ void MovingMesh::measure(std::span<const std::uint32_t> faces, Progress* progres
   std::vector<std::uint32_t> unknown;
   for (const std::uint32_t f : faces) {
     for (const std::uint32_t v : corners_of(f)) {
-      if (trial_[v].distance != kUnknown) continue;
-      trial_[v].distance = kFar;  // once each
+      if (trial_[v].near.distance != kUnknown) continue;
+      trial_[v].near.distance = kFar;  // once each
       unknown.push_back(v);
     }
   }
   parallel_for(unknown.size(), kSmallBlock, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(progress->fraction());
-    for (std::size_t i = begin; i < end; ++i) trial_[unknown[i]].distance = distance_of(trial_[unknown[i]].at);
+    for (std::size_t i = begin; i < end; ++i) trial_[unknown[i]].near = near(trial_[unknown[i]].at);
   });
 }
 
@@ -286,7 +287,7 @@ void MovingMesh::try_all(std::span<const std::uint32_t> vertices, std::span<cons
   const std::size_t offender = first_of(vertices.size(), threads_, [&](std::size_t i) {
     const std::uint32_t v = vertices[i];
     if (frozen_[v]) return !finite(after[i]);
-    try_at(v, placement_.frame(after[i]));
+    try_at(v, placement_.frame(after[i]), {});
     return !finite(after[i] - before[i]) || !finite(trial_[v].at);
   });
   if (offender == vertices.size()) return;
@@ -295,18 +296,18 @@ void MovingMesh::try_all(std::span<const std::uint32_t> vertices, std::span<cons
          finite(after[offender]) ? "is too far away for double precision" : "is not finite");
 }
 
-void MovingMesh::try_at(std::uint32_t vertex, const glm::dvec3& at) {
-  trial_[vertex] = {at, kUnknown};
+void MovingMesh::try_at(std::uint32_t vertex, const glm::dvec3& at, const Near& near) {
+  trial_[vertex] = {at, near};
   step_[vertex] = glm::length(at - state_[vertex].at);
 }
 
 bool MovingMesh::try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint32_t& blame) {
   const Spot from = trial_[vertex];
   if (at == from.at) return true;
-  const double distance = distance_of(at), step = step_[vertex];
-  if (distance > within_) return false;
-  try_at(vertex, at);
-  trial_[vertex].distance = distance;
+  const Near there = near(at);
+  const double step = step_[vertex];
+  if (there.distance > within_) return false;
+  try_at(vertex, at, there);
   const auto faces = ring(vertex);
   thread_local std::vector<double> reach;
   reach.resize(faces.size());

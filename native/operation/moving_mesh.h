@@ -20,6 +20,14 @@ namespace tolvol {
 /// Holds a state, all of it inside, and a trial beside it, at first equal. Positions are in the frame.
 class MovingMesh {
  public:
+  static constexpr double kUnknown = std::numeric_limits<double>::infinity();
+
+  /// What is known of the way from a place to the reference.
+  struct Near {
+    double distance = kUnknown;                 ///< an upper bound; kUnknown until asked for
+    std::uint32_t triangle = Hierarchy::kNone;  ///< one that is about as near, if any is known
+  };
+
   struct Start {
     std::vector<std::uint32_t> outside;  ///< faces that are not proved inside, ascending: their vertices never move
     std::optional<std::string> warning;  ///< of storage_warning()
@@ -38,7 +46,7 @@ class MovingMesh {
   /// for the first position that is not finite.
   void try_all(std::span<const std::uint32_t> vertices, std::span<const glm::dvec3> before,
                std::span<const glm::dvec3> after);
-  void try_at(std::uint32_t vertex, const glm::dvec3& at);
+  void try_at(std::uint32_t vertex, const glm::dvec3& at, const Near& near);
   void take_back(std::uint32_t vertex) { trial_[vertex] = state_[vertex], step_[vertex] = 0; }
   /// Which of these faces are not inside on trial. Every face must be asked about after the last change to a corner.
   /// Settled ones cost about 10 ns each, those near the tolerance 0.1 us to many.
@@ -52,6 +60,8 @@ class MovingMesh {
   void accept(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces);
 
   const glm::dvec3& state(std::uint32_t vertex) const { return state_[vertex].at; }
+  const Near& near_state(std::uint32_t vertex) const { return state_[vertex].near; }
+  const Near& near_trial(std::uint32_t vertex) const { return trial_[vertex].near; }
   double step(std::uint32_t vertex) const { return step_[vertex]; }  ///< length from state to trial
   bool frozen(std::uint32_t vertex) const { return frozen_[vertex]; }
   bool any_frozen() const { return any_frozen_; }
@@ -71,20 +81,18 @@ class MovingMesh {
   std::vector<std::uint32_t> faces_around(std::span<const std::uint32_t> vertices);
 
  private:
-  /// `distance` to the reference, an upper bound: kFar beyond the tolerance, kUnknown until asked for.
   struct Spot {
     glm::dvec3 at;
-    double distance;
+    Near near;  ///< kFar beyond the tolerance
   };
 
-  // Both prove nothing when they are taken for upper bounds.
-  static constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  // This and kUnknown prove nothing when they are taken for upper bounds.
   static constexpr double kFar = std::numeric_limits<double>::max();
   static constexpr double kUnproved = TriangleCertificate::kUnproved;
 
   void make_rings(std::size_t vertex_count);
   bool is_own(std::uint32_t face) const;
-  double distance_of(const glm::dvec3& at) const;
+  Near near(const glm::dvec3& at) const;
   double reach_by_motion(std::uint32_t face) const;
   template <class Bound>
   double over_triangulations(std::uint32_t face, Bound&& bound) const;

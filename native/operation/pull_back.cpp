@@ -23,6 +23,8 @@ constexpr double kRise = 1.0 / 64;  // what no factor can rise by in the end
 constexpr double kShrink = 0.5;     // of a factor, in each round in which a face of the vertex fails
 /// Of the provable distance: where vertices are put first, as pieces of a quarter of the tolerance prove a face there.
 constexpr double kComfort = 0.97;
+/// Of the same, in Mode::settle: who got there stays, unless kLast of the tolerance more does not lead outside.
+constexpr double kSettled = 0.965, kLast = 0.04;
 constexpr int kCrossings = 8;       // tries to find where a vertex leaves the volume; a plane takes one
 constexpr double kClose = 0.002;    // of the provable distance: near enough to that place
 constexpr std::size_t kBlock = 32;  // vertices, for work of some us each
@@ -53,7 +55,7 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
   if (!failed.empty()) {
     std::vector<Held> held = hold(moving, before, after, std::move(failed), progress);
     if (mode != Mode::reset) {
-      pull(held, progress);
+      pull(held, mode, progress);
       if (mode != Mode::halve) let_go(held, mode, progress);
     }
     for (const Held& h : held) {
@@ -86,7 +88,7 @@ std::vector<PullBack::Held> PullBack::hold(const Moving& moving, std::span<const
         if (mesh_.step(v) == 0) continue;
         const auto place =
             std::lower_bound(moving.vertices.begin(), moving.vertices.end(), v) - moving.vertices.begin();
-        held.push_back({v, before[place], after[place], mesh_.step(v)});
+        held.push_back({v, before[place], after[place], mesh_.near_trial(v), mesh_.step(v)});
         mesh_.take_back(v);
         back.push_back(v);
       }
@@ -104,36 +106,52 @@ glm::dvec3 PullBack::stored_at(const Held& held, double factor) const {
   return mesh_.placement().storage() == Storage::float32 ? rounded_to_float32(p) : p;
 }
 
-void PullBack::place(const Held& held, double factor) {
-  mesh_.try_at(held.vertex, mesh_.placement().frame(stored_at(held, factor)));
+void PullBack::place(Held& held, const Along& along) {
+  held.factor = along.factor;
+  mesh_.try_at(held.vertex, mesh_.placement().frame(stored_at(held, along.factor)), along.near);
 }
 
-/// A factor at which the vertex itself is about `target` from the reference, at the most, between one where it is
+/// Where the vertex itself is about `target` from the reference, at the most, between one where it is
 /// nearer and one where it is farther: false position, in which an end that stays twice counts half (Illinois).
-double PullBack::crossing(const Held& held, double target, Along near, Along far) const {
-  double near_excess = near.distance - target, far_excess = far.distance - target;
-  for (int i = 0; i < kCrossings && near_excess < -kClose * mesh_.within(); ++i) {
-    const double factor = near.factor + (far.factor - near.factor) * near_excess / (near_excess - far_excess);
-    const Along next = along(held, factor, far.triangle);
-    if (next.distance <= target) {
-      near = next, near_excess = next.distance - target, far_excess /= 2;
+PullBack::Along PullBack::crossing(const Held& held, double target, Along inner, Along outer) const {
+  double inner_excess = inner.near.distance - target, outer_excess = outer.near.distance - target;
+  for (int i = 0; i < kCrossings && inner_excess < -kClose * mesh_.within(); ++i) {
+    const double factor = inner.factor + (outer.factor - inner.factor) * inner_excess / (inner_excess - outer_excess);
+    const Along next = along(held, factor, outer.near.triangle);
+    if (next.near.distance <= target) {
+      inner = next, inner_excess = next.near.distance - target, outer_excess /= 2;
     } else {
-      far = next, far_excess = next.distance - target, near_excess /= 2;
+      outer = next, outer_excess = next.near.distance - target, inner_excess /= 2;
     }
   }
-  return near.factor;
+  return inner;
+}
+
+/// How far the reference is there; no triangle where that is more than `within`, which is sooner known.
+MovingMesh::Near PullBack::near(const Held& held, double factor, double within, std::uint32_t hint) const {
+  const glm::dvec3 at = mesh_.placement().frame(stored_at(held, factor));
+  if (hint == Hierarchy::kNone) hint = mesh_.volume().grid().triangle_near(at);
+  const Hierarchy::Nearest nearest = mesh_.volume().hierarchy().nearest(at, within, hint);
+  return {nearest.distance, nearest.triangle};
 }
 
 PullBack::Along PullBack::along(const Held& held, double factor, std::uint32_t hint) const {
-  const glm::dvec3 at = mesh_.placement().frame(stored_at(held, factor));
-  const std::uint32_t guess = mesh_.volume().grid().triangle_near(at);
-  const Hierarchy::Nearest nearest = mesh_.volume().hierarchy().nearest(at, std::numeric_limits<double>::infinity(),
-                                                                        guess == DistanceGrid::kNone ? hint : guess);
-  return {factor, nearest.distance, nearest.triangle};
+  return {factor, near(held, factor, std::numeric_limits<double>::infinity(), hint)};
 }
 
 /// Finds where the vertex leaves the volume if nothing else held it, and puts it a little before that.
-void PullBack::release(Held& held) {
+void PullBack::release(Held& held, Mode mode) {
+  const double within = mesh_.within();
+  if (held.wish.distance <= within) {
+    held.limit = 1;
+    return place(held, {1, held.wish});
+  }
+  Along inner{0, mesh_.near_state(held.vertex)};
+  if (inner.near.distance == MovingMesh::kUnknown) inner = along(held, 0, kNone);
+  const std::uint32_t hint = inner.near.triangle;
+  const bool settled = mode == Mode::settle && !(inner.near.distance < kSettled * within);
+  held.limit = 0;
+  if (settled && near(held, rise(held, mode), within, hint).triangle == Hierarchy::kNone) return place(held, inner);
   // A wish at the end of the world tells nothing: all of the volume is in this box.
   const double box = 1 + 2 * mesh_.volume().frame_tolerance();
   const glm::dvec3 from = mesh_.state(held.vertex), way = mesh_.placement().frame(held.after) - from;
@@ -141,19 +159,21 @@ void PullBack::release(Held& held) {
   for (int k = 0; k < 3; ++k) {
     if (way[k] != 0) exit = std::min(exit, std::max(0.0, (std::copysign(box, way[k]) - from[k]) / way[k]));
   }
-  const Along far = along(held, exit, kNone), near = along(held, 0, far.triangle);
-  held.factor = held.limit = 1;
-  if (far.distance > mesh_.within()) {
-    held.limit = near.distance < mesh_.within() ? crossing(held, mesh_.within(), near, far) : 0;
-    held.factor = near.distance < kComfort * mesh_.within() ? crossing(held, kComfort * mesh_.within(), near, far) : 0;
+  const Along outer = along(held, exit, hint);
+  const bool room = inner.near.distance < kComfort * within;
+  const Along end = room ? crossing(held, kComfort * within, inner, outer) : inner;
+  if (mode == Mode::settle && room) {
+    held.limit = end.factor;
+  } else if (inner.near.distance < within) {
+    held.limit = crossing(held, within, inner, outer).factor;
   }
-  place(held, held.factor);
+  place(held, end);
 }
 
 /// Step (2).
-void PullBack::pull(std::vector<Held>& held, Progress* progress) {
+void PullBack::pull(std::vector<Held>& held, Mode mode, Progress* progress) {
   parallel_for(held.size(), kBlock, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) release(held[i]);
+    for (std::size_t i = begin; i < end; ++i) release(held[i], mode);
   });
   std::vector<std::uint32_t> changed;
   changed.reserve(held.size());
@@ -172,9 +192,8 @@ void PullBack::pull(std::vector<Held>& held, Progress* progress) {
     changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
     for (const std::uint32_t v : changed) {
       Held& h = held[held_index_[v]];
-      h.factor *= kShrink;
-      if (h.factor * h.length < (1 - kComfort) * mesh_.within()) h.factor = 0;
-      place(h, h.factor);
+      const double factor = h.factor * kShrink;
+      place(h, {factor < little(h) ? 0 : factor, {}});
     }
   }
 }
@@ -205,9 +224,11 @@ std::uint32_t PullBack::colour(std::vector<Held>& held) const {
 
 /// Step (3). Ends, because from its second turn on a vertex goes forward by kRise or not at all.
 void PullBack::let_go(std::vector<Held>& held, Mode mode, Progress* progress) {
+  const auto settled = [&](const Held& h) { return h.factor >= (mode == Mode::settle ? h.limit : 1); };
   std::vector<std::uint32_t> around;
   std::vector<std::vector<std::uint32_t>> due(colour(held));
   for (std::uint32_t i = 0; i < held.size(); ++i) {
+    if (settled(held[i])) continue;
     due[held[i].colour].push_back(i);
     around.push_back(held[i].vertex);
   }
@@ -233,7 +254,7 @@ void PullBack::let_go(std::vector<Held>& held, Mode mode, Progress* progress) {
       for (std::size_t i = 0; i < turn.size(); ++i) {
         if (!raised[i]) continue;
         held_around(held[turn[i]].vertex, [&](std::uint32_t other) {
-          if (is_due[other] || held[other].factor >= 1) return;
+          if (is_due[other] || settled(held[other])) return;
           is_due[other] = true;
           due[held[other].colour].push_back(other);
         });
@@ -248,9 +269,16 @@ bool PullBack::attempt(Held& held, double factor) {
   return true;
 }
 
+/// The share of the motion that is as long as the last of the tolerance.
+double PullBack::little(const Held& held) const { return (1 - kComfort) * mesh_.within() / held.length; }
+
+/// What the factor cannot rise by in the end.
+double PullBack::rise(const Held& held, Mode mode) const {
+  return mode == Mode::settle ? std::max(kRise, kLast * mesh_.within() / held.length) : kRise;
+}
+
 void PullBack::raise(Held& held, Mode mode, bool search) {
-  const double little = (1 - kComfort) * mesh_.within() / held.length;
-  const double rise = mode == Mode::settle ? std::max(kRise, little) : kRise, grain = std::min(rise, little);
+  const double step = rise(held, mode), grain = std::min(step, little(held));
   while (held.factor < 1) {
     if (held.limit >= 1 && attempt(held, 1)) return;
     if (search) {
@@ -261,7 +289,7 @@ void PullBack::raise(Held& held, Mode mode, bool search) {
         next = (lower + upper) / 2;
       }
     }
-    if (!attempt(held, std::min(1.0, held.factor + rise))) return;
+    if (!attempt(held, std::min(1.0, held.factor + step))) return;
     search = true;
   }
 }

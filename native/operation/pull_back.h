@@ -16,7 +16,7 @@ class PullBack {
  public:
   enum class Mode {
     pull_back,  ///< as far as the tolerance lets each vertex go: none can rise by 1/64 of its motion alone
-    settle,     ///< the same but for the last 3 % of the tolerance, which take most of the time
+    settle,     ///< the same but for the last 4 % of the tolerance, which take most of the time
     halve,      ///< factors are halved until all faces are inside: quick, for steps that are repeated
     reset,      ///< all the way back or not at all, the one step back of [Botsch04, §5]
   };
@@ -52,6 +52,7 @@ class PullBack {
   struct Held {
     std::uint32_t vertex;
     glm::dvec3 before, after;  ///< stored
+    MovingMesh::Near wish;     ///< at `after`
     double length;             ///< of the motion, in the frame
     double factor = 0;
     double limit = 1;         ///< about where the vertex itself leaves the volume; 1 only if it does not
@@ -59,24 +60,27 @@ class PullBack {
     std::uint32_t colour = 0;
   };
 
-  /// A place on the way of a vertex, and the distance there.
+  /// A place on the way of a vertex.
   struct Along {
-    double factor, distance;
-    std::uint32_t triangle;  ///< the nearest
+    double factor;
+    MovingMesh::Near near;
   };
 
   glm::dvec3 stored_at(const Held& held, double factor) const;
-  void place(const Held& held, double factor);
+  void place(Held& held, const Along& along);
   std::vector<Held> hold(const Moving& moving, std::span<const glm::dvec3> before, std::span<const glm::dvec3> after,
                          std::vector<std::uint32_t> failed, Progress* progress);
+  MovingMesh::Near near(const Held& held, double factor, double within, std::uint32_t hint) const;
   Along along(const Held& held, double factor, std::uint32_t hint) const;
-  double crossing(const Held& held, double target, Along near, Along far) const;
-  void release(Held& held);
-  void pull(std::vector<Held>& held, Progress* progress);
+  Along crossing(const Held& held, double target, Along inner, Along outer) const;
+  void release(Held& held, Mode mode);
+  void pull(std::vector<Held>& held, Mode mode, Progress* progress);
   void let_go(std::vector<Held>& held, Mode mode, Progress* progress);
   std::uint32_t colour(std::vector<Held>& held) const;
   template <class Visit>
   void held_around(std::uint32_t vertex, Visit&& visit) const;
+  double little(const Held& held) const;
+  double rise(const Held& held, Mode mode) const;
   void raise(Held& held, Mode mode, bool search);
   bool attempt(Held& held, double factor);
 
