@@ -146,12 +146,6 @@ void PullBack::release(Held& held, Mode mode) {
     held.limit = 1;
     return place(held, {1, held.wish});
   }
-  Along inner{0, mesh_.near_state(held.vertex)};
-  if (inner.near.distance == MovingMesh::kUnknown) inner = along(held, 0, kNone);
-  const std::uint32_t hint = inner.near.triangle;
-  const bool settled = mode == Mode::settle && !(inner.near.distance < kSettled * within);
-  held.limit = 0;
-  if (settled && near(held, rise(held, mode), within, hint).triangle == Hierarchy::kNone) return place(held, inner);
   // A wish at the end of the world tells nothing: all of the volume is in this box.
   const double box = 1 + 2 * mesh_.volume().frame_tolerance();
   const glm::dvec3 from = mesh_.state(held.vertex), way = mesh_.placement().frame(held.after) - from;
@@ -159,10 +153,20 @@ void PullBack::release(Held& held, Mode mode) {
   for (int k = 0; k < 3; ++k) {
     if (way[k] != 0) exit = std::min(exit, std::max(0.0, (std::copysign(box, way[k]) - from[k]) / way[k]));
   }
-  const Along outer = along(held, exit, hint);
-  const bool room = inner.near.distance < kComfort * within;
-  const Along end = room ? crossing(held, kComfort * within, inner, outer) : inner;
-  if (mode == Mode::settle && room) {
+  Along start{0, mesh_.near_state(held.vertex)};
+  if (start.near.distance == MovingMesh::kUnknown) start = along(held, 0, kNone);
+  Along inner = start;
+  held.limit = 0;
+  const double comfort = mode == Mode::settle ? kSettled : kComfort;
+  if (mode == Mode::settle && !(start.near.distance < kSettled * within)) {
+    const double factor = std::min(rise(held, mode), exit);
+    inner = {factor, near(held, factor, within, start.near.triangle)};
+    if (inner.near.triangle == Hierarchy::kNone) return place(held, start);
+  }
+  const Along outer = along(held, exit, inner.near.triangle);
+  Along end = start;
+  if (inner.near.distance < comfort * within) end = crossing(held, kComfort * within, inner, outer);
+  if (mode == Mode::settle && end.factor > 0) {
     held.limit = end.factor;
   } else if (inner.near.distance < within) {
     held.limit = crossing(held, within, inner, outer).factor;

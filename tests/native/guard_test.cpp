@@ -83,7 +83,7 @@ TEST(Guard, KeepsEveryDabInside) {
   EXPECT_GT(s.deviation(), 0.95 * kTolerance) << "it gets as far as it may";
 }
 
-TEST(Guard, AgreesWithConstrainButForTheLastThreePercentAlmostEverywhere) {
+TEST(Guard, AgreesWithConstrainButForTheLastFourPercentAlmostEverywhere) {
   // Where a face finds no proof just there, a guard that must be quick settles for half of the way.
   std::size_t held = 0, apart = 0;
   for (std::size_t centre = 50; centre < 1'600; centre += 50) {
@@ -103,6 +103,20 @@ TEST(Guard, AgreesWithConstrainButForTheLastThreePercentAlmostEverywhere) {
   }
   EXPECT_GT(held, 500u);
   EXPECT_LE(apart, held / 100);
+}
+
+TEST(Guard, WhoIsAtTheLimitStaysThereOrGoesTheOtherWay) {
+  Sculpture s;
+  Guard guard = s.guard();
+  const auto pushed = [&](double amount) {
+    s.dab(100, 0.4, amount);
+    s.correct(guard.constrain(s.positions));
+    return s.at(100);
+  };
+  const dvec3 outwards = pushed(0.2);
+  EXPECT_EQ(pushed(0.02), outwards);
+  EXPECT_GT(glm::length(pushed(-0.5) - outwards), 1.9 * kTolerance);
+  EXPECT_LE(s.deviation(), kTolerance);
 }
 
 TEST(Guard, NothingMovedIsNothingToDoAndUndoIsAnEdit) {
