@@ -4,7 +4,7 @@
 Each function returns name -> property; `options` are Blender's property options for all of them.
 """
 
-from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 PROTECTED = (
     ("BOUNDARY", "Boundary", "Edges of one face", 1),
@@ -72,6 +72,15 @@ def decimate_settings(options=frozenset()):
                     "triangles in six to eight times the time",
                 ),
             ),
+            options=set(options),
+        ),
+        "max_seconds": FloatProperty(
+            name="Time Limit",
+            description="Seconds after which Thorough stops with what it has reached; 0 for no limit",
+            min=0,
+            soft_max=600,
+            step=100,
+            precision=0,
             options=set(options),
         ),
         "only_selected": BoolProperty(

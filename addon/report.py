@@ -72,6 +72,8 @@ def counts(run):
         remarks.append(f"target {run['target_triangles']:,} not reached within the tolerance")
     if run["stopped_by"] == "request":
         remarks.append("stopped early")
+    if run["stopped_by"] == "time":
+        remarks.append("stopped at the time limit")
     if run["outside"]["faces"]:
         remarks.append(f"{run['outside']['faces']:,} faces outside kept")
     remark = f" ({', '.join(remarks)})" if remarks else ""

@@ -60,6 +60,12 @@ def arguments():
         help="thorough: about a sixth fewer triangles in five to eight times the time (default: fast)",
     )
     parser.add_argument(
+        "--max-seconds",
+        type=cli.whole_number(1),
+        metavar="S",
+        help="thorough stops after S seconds an object with what it has reached (default: no limit)",
+    )
+    parser.add_argument(
         "--target-triangles",
         type=cli.whole_number(1),
         metavar="N",
@@ -88,6 +94,8 @@ class Command:
         self.options = options
         self.output = Path(options.output)
         self.started = time.perf_counter()
+        if options.max_seconds and options.effort != "thorough":
+            raise cli.Stop("--max-seconds is for --effort thorough: fast is one pass")
         file_io.extension_of(options.input)
         file_io.extension_of(options.output)
         cli.require_folder(options.output, "OUT")
@@ -192,6 +200,7 @@ class Command:
                     tolerance_length=_not_above(tolerance),
                     keep="ONE" if self.options.one_sided else "BOTH",
                     effort=self.options.effort.upper(),
+                    max_seconds=self.options.max_seconds or 0,
                     outside=self.options.outside.upper(),
                     threads=self.options.threads,
                     **asked,
@@ -275,12 +284,13 @@ class Command:
                 locked[cause] = locked.get(cause, 0) + count
         left = sum(run["output"]["triangles"] for run in runs)
         target = self.options.target_triangles or 0
+        out_of_time = any(run["stopped_by"] == "time" for run in runs)
         several = len(runs) > 1
         return {
             **{key: runs[0][key] for key in ("version", "two_sided", "placement", "effort", "method", "renderer")},
             "tolerance": {"absolute": tolerance, "percent": 100 * tolerance / size},
             "target_triangles": target,
-            "stopped_by": "target" if target and left <= target else "tolerance",
+            "stopped_by": "target" if target and left <= target else "time" if out_of_time else "tolerance",
             "precision": min(run["precision"] for run in runs),
             "forward": forward,
             "backward": backward,

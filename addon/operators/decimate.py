@@ -24,6 +24,8 @@ def draw_decimate_settings(layout, settings):
     """The same rows in the panel and in Adjust Last Operation."""
     layout.prop(settings, "keep")
     layout.prop(settings, "effort")
+    if settings.effort == "THOROUGH":
+        layout.prop(settings, "max_seconds")
     column = layout.column(align=True)
     column.use_property_split = False  # the names need the width
     column.label(text="Placement")
@@ -159,6 +161,7 @@ the settings of the active one. A mesh without a reference becomes it"""
             "placement": self.placement.lower(),
             "two_sided": self.keep == "BOTH",
             "effort": self.effort.lower(),
+            "max_seconds": self.max_seconds,
             "target_triangles": self.target_triangles if self.use_target else 0,
             "outside": self.outside.lower(),
             "threads": self.threads or preferences.threads(context),

@@ -82,6 +82,13 @@ def test_one_sided_placement_target_threads_and_effort(scan, tmp_path):
     assert [reports[name][0]["effort"] for name in ("plain", "thorough")] == ["fast", "thorough"]
 
 
+def test_a_time_limit_is_for_thorough(scan, tmp_path):
+    arguments = scan, tmp_path / "out.ply", "--tolerance", "1%", "--max-seconds", "60"
+    code, _, err = decimate(*arguments)
+    assert code == 2 and "--max-seconds is for --effort thorough" in err
+    succeeded(decimate(*arguments, "--effort", "thorough"))
+
+
 def test_another_file_as_reference(scan, tmp_path):
     fine = save(tmp_path / "fine.ply", ("fine", *torus_arrays(seed=2, around=64, across=32)))
     succeeded(decimate(fine, tmp_path / "out.ply", "--tolerance", "0.04", "--reference", scan))

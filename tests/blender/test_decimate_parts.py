@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import mesh_io, native, transfer
+from addon import mesh_io, native, report, transfer
 from addon.mesh_io import column
 from scenes import activate, sheet, torus, world_triangles
 
@@ -56,6 +56,14 @@ def test_thorough_leaves_fewer_and_says_so():
     assert decimate(ob, effort="THOROUGH") < fast
     assert json.loads(ob.tolvol.last_run)["effort"] == "thorough" and ob.tolvol.effort == "THOROUGH"
     assert ob.tolvol.last_run_of
+
+
+def test_thorough_stops_at_its_time_limit():
+    whole = decimate(torus("one"), effort="THOROUGH")
+    ob = torus("two")
+    assert decimate(ob, effort="THOROUGH", max_seconds=1e-6) > whole
+    run = json.loads(ob.tolvol.last_run)
+    assert run["stopped_by"] == "time" and "(stopped at the time limit)" in report.counts(run)
 
 
 def test_faces_whose_edges_were_flipped_keep_what_they_are(monkeypatch):
