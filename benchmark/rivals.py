@@ -13,15 +13,12 @@ Results are kept in build/rivals/results and taken from there the next time; --a
 """
 
 import argparse
-import contextlib
 import hashlib
 import json
 import math
 import os
 import re
-import select
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -35,7 +32,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blender_scripts"))
 import rival_tools  # noqa: E402
 import tables  # noqa: E402
 from common import USAGE, Stop, in_units, length, machine, require_folder, whole_number  # noqa: E402
+from rival_page import draw, row, text, title  # noqa: E402
 from rival_tools import CGAL_PROGRAM, ROOT, TOOLS  # noqa: E402
+from rival_worker import Worker  # noqa: E402
 
 sys.path.insert(0, os.environ.get("TOLVOL_PYTHON_PATH", str(ROOT / "build" / "release" / "python")))
 try:
@@ -126,67 +125,6 @@ def read_mesh(path, folder):
     return Mesh(Path(path).stem, vertices, triangles, tolvol.size(vertices, triangles))
 
 
-class Worker:
-    """A process with one tool and one mesh. It is started when it is asked, and again after it was ended."""
-
-    def __init__(self, name, mesh, threads, folder):
-        self.folder = Path(folder)
-        np.save(self.folder / "vertices.npy", mesh.vertices)
-        np.save(self.folder / "triangles.npy", mesh.triangles)
-        self.command = [PYTHON, rival_tools.__file__, "serve", name, "vertices.npy", "triangles.npy", str(threads)]
-        self.threads = threads
-        self.process = None
-
-    def start(self):
-        cores = sorted(os.sched_getaffinity(0))[: self.threads]
-        self.process = subprocess.Popen(
-            self.command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=(self.folder / "log.txt").open("w"),
-            text=True,
-            cwd=self.folder,
-            env={**os.environ, "OMP_NUM_THREADS": str(self.threads)},
-            start_new_session=True,  # so that its own processes end with it
-            preexec_fn=lambda: os.sched_setaffinity(0, cores),
-        )
-
-    def ask(self, what, parameter, limit):
-        """{"seconds", "vertices", "triangles"}, or {"failure"}."""
-        if not self.process:
-            self.start()
-        try:
-            self.process.stdin.write(json.dumps({"what": what, "parameter": parameter}) + "\n")
-            self.process.stdin.flush()
-            ready = select.select([self.process.stdout], [], [], limit)[0]
-            answer = json.loads(self.process.stdout.readline()) if ready else None
-        except (BrokenPipeError, json.JSONDecodeError):
-            code = self.end()
-            return {"failure": f"crashed ({signal.Signals(-code).name if code < 0 else f'exit code {code}'})"}
-        if answer is None:
-            self.end()
-            return {"failure": f"did not end in {limit} s"}
-        if "failure" not in answer:
-            answer["vertices"] = np.load(self.folder / "result_vertices.npy")
-            answer["triangles"] = np.load(self.folder / "result_triangles.npy")
-        return answer
-
-    def end(self):
-        """The exit code: its own where it has ended by itself."""
-        if not self.process:
-            return 0
-        with contextlib.suppress(BrokenPipeError):
-            self.process.stdin.close()  # which ends one that waits
-        try:
-            code = self.process.wait(1)
-        except subprocess.TimeoutExpired:
-            os.killpg(self.process.pid, signal.SIGKILL)
-            code = self.process.wait()
-        self.process.stdout.close()
-        self.process = None
-        return code
-
-
 # ---- judging and searching
 
 
@@ -213,12 +151,6 @@ def judge(mesh, tolerance, answer):
 def keeps_both(mesh, tolerance, answer):
     pairs = directions(mesh, answer).values()
     return all(tolvol.hausdorff(*a, *b, bound=tolerance).upper <= tolerance for a, b in pairs)
-
-
-def kept(entry):
-    """What is proved: "both", "forward" (the result within the tolerance of the reference), "backward", or "no"."""
-    forward, backward = (entry.get(way) is not None and entry[way][1] <= 1 for way in ("forward", "backward"))
-    return {(True, True): "both", (True, False): "forward", (False, True): "backward"}.get((forward, backward), "no")
 
 
 def search(start, count, calls=SEARCH_CALLS):
@@ -258,7 +190,7 @@ def measure(name, mesh, tolerance, threads, limit):
     tool = TOOLS[name]
     entry = {}
     with tempfile.TemporaryDirectory() as folder:
-        worker = Worker(name, mesh, threads, folder)
+        worker = Worker(PYTHON, name, mesh, threads, folder)
         try:
             answer = worker.ask("run", tolerance, limit)
             if "failure" in answer:
@@ -334,135 +266,6 @@ def compare(mesh, tolerance, options, numbers):
             )
         print(" | ".join(row(name, entries[name])), flush=True)
     return entries
-
-
-# ---- what people read
-
-HEADS = ["Tool", "Triangles", "Seconds", "Result → reference", "Reference → result", "Kept"]
-HEADS += ["Fewest kept", "Search, s"]
-
-
-def seconds(value):
-    return f"{value:.2f}" if value < 10 else f"{value:.0f}"
-
-
-def distance(interval):
-    if interval is None:
-        return ""
-    text = f"{interval[1]:.3f}" if interval[1] < 100 else "over 100"
-    return f"**{text}**" if interval[1] <= 1 else text
-
-
-def row(name, entry):
-    if "failure" in entry:
-        return [TOOLS[name].title, entry["failure"].replace("|", "/"), *[""] * (len(HEADS) - 2)]
-    found = entry.get("search")
-    return [
-        TOOLS[name].title,
-        f"{entry['triangles']:,}",
-        seconds(entry["seconds"]),
-        distance(entry.get("forward")),
-        distance(entry.get("backward")),
-        kept(entry),
-        "" if found is None else f"{found['triangles']:,}" if "triangles" in found else "none",
-        "" if found is None else seconds(found["seconds"]),
-    ]
-
-
-def title(case):
-    return f"{case['mesh']}, {case['triangles']:,} triangles, ε = {case['percent']:g} %"
-
-
-def text(figures):
-    rows = []
-    for case in figures["cases"]:
-        rows.append([f"***{title(case)}***"] + [""] * (len(HEADS) - 1))
-        rows += [row(name, entry) for name, entry in case["tools"].items()]
-    used = {TOOLS[name].package for case in figures["cases"] for name in case["tools"]}
-    numbers = [f"{package} {number}" for package, number in sorted(figures["versions"].items()) if package in used]
-    threads = "1 thread" if figures["threads"] == 1 else f"{figures['threads']} threads"
-    where = f"{figures['machine']}, {threads}; {', '.join(numbers)}."
-    return f"{where}\n\n{tables.table(HEADS, rows, 'lrrrrlrr')}"
-
-
-BLUE, ORANGE, GREEN, PURPLE, SKY, GREY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#56B4E9", "#777777"
-LOOKS = {  # name: (colour, marker); told apart without colours as well
-    "ours": ("#000000", "D"),
-    "thorough": ("#000000", "*"),
-    "cgal": (ORANGE, "s"),
-    "manifold3d": (GREY, "v"),
-    "meshlib": (BLUE, "o"),
-    "meshlib-weighted": (BLUE, "p"),
-    "meshoptimizer": (GREEN, "^"),
-    "open3d": (PURPLE, "<"),
-    "openmesh": (GREEN, "h"),
-    "pyfqmr": (SKY, ">"),
-    "pymeshlab": (PURPLE, "d"),
-    "pytetwild": (ORANGE, "X"),
-    "pytetwild-long": (ORANGE, "P"),
-    "vtk-pro": (SKY, "s"),
-    "vtk-quadric": (GREY, "8"),
-}
-
-
-def draw(cases, picture):
-    """Triangles against seconds, a row for each tolerance and a column for each mesh."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-    from matplotlib.lines import Line2D
-
-    meshes = list(dict.fromkeys(case["mesh"] for case in cases))
-    percents = list(dict.fromkeys(case["percent"] for case in cases))
-    height = 3.1 * len(percents)
-    figure, axes = pyplot.subplots(
-        len(percents), len(meshes), figsize=(12, height + 1.7), sharey=True, sharex="row", squeeze=False
-    )
-    figure.subplots_adjust(left=0.06, right=0.99, top=1 - 0.3 / (height + 1.7), hspace=0.32, wspace=0.05)
-    figure.subplots_adjust(bottom=1.9 / (height + 1.7))
-    for case in cases:
-        axis = axes[percents.index(case["percent"]), meshes.index(case["mesh"])]
-        axis.set_title(title(case), fontsize=10)
-        for name, entry in case["tools"].items():
-            if name in LOOKS and "failure" not in entry:
-                mark(axis, *LOOKS[name], entry)
-        axis.set_xscale("log")
-        axis.set_yscale("log")
-        axis.grid(True, color="#E4E4E4", linewidth=0.6)
-        axis.set_axisbelow(True)
-    for axis in axes[-1]:
-        axis.set_xlabel("triangles")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("seconds")
-
-    def sample(colour, marker, filled, label):
-        face = colour if filled else "white"
-        return Line2D([], [], linestyle="", marker=marker, color=colour, markerfacecolor=face, label=label)
-
-    shown = [name for name in LOOKS if any(name in case["tools"] for case in cases)]
-    handles = [sample(*LOOKS[name], True, TOOLS[name].title.replace("**", "")) for name in shown]
-    handles += [
-        sample("#444444", "o", True, "filled: both directions kept, proved"),
-        sample("#444444", "o", False, "hollow: not kept"),
-        Line2D([], [], color="#444444", linewidth=0.8, marker=".", label="to the fewest found by search"),
-    ]
-    figure.legend(handles=handles, loc="lower center", ncol=4, fontsize=9, frameon=False)
-    figure.savefig(picture, dpi=110)
-    pyplot.close(figure)
-
-
-def mark(axis, colour, marker, entry):
-    """What was left when it was asked, large, and a line to the fewest found; of what left nothing, those alone."""
-    x, y = entry["triangles"], entry["seconds"]
-    found = entry.get("search", {})
-    if "triangles" in found:
-        axis.plot(found["triangles"], found["call"], marker, color=colour, markersize=4)
-        if x:
-            axis.plot([x, found["triangles"]], [y, found["call"]], color=colour, linewidth=0.8, alpha=0.6)
-    if x:
-        face = colour if kept(entry) == "both" else "white"
-        axis.plot(x, y, marker, color=colour, markerfacecolor=face, markersize=12 if marker == "*" else 8, zorder=3)
 
 
 # ---- the command

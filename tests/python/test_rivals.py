@@ -11,8 +11,10 @@ import pytest
 import meshes
 
 BENCHMARK = Path(__file__).resolve().parents[2] / "benchmark"
-sys.path.insert(0, str(BENCHMARK))
+sys.path[:0] = [str(BENCHMARK), str(BENCHMARK.parent / "blender_scripts")]
+import rival_page  # noqa: E402
 import rival_tools  # noqa: E402
+import rival_worker  # noqa: E402
 import rivals  # noqa: E402
 
 
@@ -66,29 +68,29 @@ def test_row_says_what_was_kept(forward, backward, expected):
     intervals = {"forward": forward, "backward": backward}
     entry = {"triangles": 1234, "seconds": 0.5}
     entry |= {way: [0.99 * upper, upper] for way, upper in intervals.items() if upper is not None}
-    cells = rivals.row("meshlib", entry)
-    assert len(cells) == len(rivals.HEADS)
+    cells = rival_page.row("meshlib", entry)
+    assert len(cells) == len(rival_page.HEADS)
     assert cells[1] == "1,234" and cells[5] == expected
     assert cells[3].startswith("**") == (forward is not None and forward <= 1)
 
 
 def test_row_of_a_search_and_of_a_failure():
     entry = {"triangles": 0, "seconds": 30.0, "search": {"seconds": 81.2, "triangles": 5006}}
-    assert rivals.row("openmesh", entry)[-2:] == ["5,006", "81"]
-    assert rivals.row("openmesh", {**entry, "search": {"seconds": 81.2}})[-2:] == ["none", "81"]
-    cells = rivals.row("cgal", {"failure": "did not end in 300 s"})
-    assert len(cells) == len(rivals.HEADS) and cells[1] == "did not end in 300 s"
+    assert rival_page.row("openmesh", entry)[-2:] == ["5,006", "81"]
+    assert rival_page.row("openmesh", {**entry, "search": {"seconds": 81.2}})[-2:] == ["none", "81"]
+    cells = rival_page.row("cgal", {"failure": "did not end in 300 s"})
+    assert len(cells) == len(rival_page.HEADS) and cells[1] == "did not end in 300 s"
 
 
 def test_judge_sees_both_directions():
     mesh, tolerance = torus(), 0.05
     half = {"vertices": mesh.vertices.astype(np.float64), "triangles": mesh.triangles[: len(mesh.triangles) // 4]}
     entry = rivals.judge(mesh, tolerance, half)
-    assert rivals.kept(entry) == "forward" and entry["backward"][0] > 1
+    assert rival_page.kept(entry) == "forward" and entry["backward"][0] > 1
     assert entry["backward"][1] <= 1.02 * entry["backward"][0]
     assert not rivals.keeps_both(mesh, tolerance, half)
     whole = {**half, "triangles": mesh.triangles}
-    assert rivals.kept(rivals.judge(mesh, tolerance, whole)) == "both" and rivals.keeps_both(mesh, tolerance, whole)
+    assert rival_page.kept(rivals.judge(mesh, tolerance, whole)) == "both" and rivals.keeps_both(mesh, tolerance, whole)
 
 
 def test_merged_makes_a_surface_of_a_soup():
@@ -100,17 +102,12 @@ def test_merged_makes_a_surface_of_a_soup():
     assert points.dtype == np.float32 and faces.dtype == np.int32
 
 
-@pytest.fixture
-def plain_python(monkeypatch):
-    """Workers by this Python, which has the module under test alone."""
-    monkeypatch.setattr(rivals, "PYTHON", sys.executable)
-
-
 def worker(tmp_path, name="ours"):
-    return rivals.Worker(name, torus(), 1, tmp_path)
+    """By this Python, which has the module under test alone."""
+    return rival_worker.Worker(sys.executable, name, torus(), 1, tmp_path)
 
 
-def test_worker_answers_again_and_again(plain_python, tmp_path):
+def test_worker_answers_again_and_again(tmp_path):
     one, tolerance = worker(tmp_path), 0.04
     for _ in range(2):
         answer = one.ask("run", tolerance, 60)
@@ -118,7 +115,7 @@ def test_worker_answers_again_and_again(plain_python, tmp_path):
     assert one.end() == 0
 
 
-def test_worker_says_why_there_is_no_result(plain_python, tmp_path):
+def test_worker_says_why_there_is_no_result(tmp_path):
     one = worker(tmp_path)
     assert "tolerance" in one.ask("run", -1, 60)["failure"]
     assert "triangles" in one.ask("run", 0.04, 60), "it goes on after that"
