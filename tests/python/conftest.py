@@ -16,3 +16,16 @@ def pytest_sessionstart(session):
         import tolvol  # noqa: F401
     except ImportError as error:
         pytest.exit(f"the module tolvol does not load ({error}): run sh setup.sh", returncode=3)
+
+
+@pytest.fixture(scope="session")
+def gl():
+    """For tests that draw: where nothing can be drawn they are skipped, or fail if TOLVOL_REQUIRE_GL is set."""
+    import tolvol
+
+    try:
+        tolvol.renderer()
+    except tolvol.GlUnavailable as error:
+        if os.environ.get("TOLVOL_REQUIRE_GL"):
+            raise
+        pytest.skip(str(error))

@@ -27,15 +27,7 @@ PLATE = meshes.plate(9)
 TORUS = meshes.torus(96, 48)
 TOLERANCE = 0.05
 
-
-@pytest.fixture(scope="module", autouse=True)
-def gl():
-    try:
-        tolvol.renderer()
-    except tolvol.GlUnavailable as error:
-        if os.environ.get("TOLVOL_REQUIRE_GL"):
-            raise
-        pytest.skip(str(error))
+pytestmark = pytest.mark.usefixtures("gl")
 
 
 def torus_volume():

@@ -22,13 +22,7 @@ def torus():
 
 
 @pytest.fixture(scope="module")
-def volume(torus):
-    try:
-        tolvol.renderer()
-    except tolvol.GlUnavailable as error:
-        if os.environ.get("TOLVOL_REQUIRE_GL"):
-            raise
-        pytest.skip(str(error))
+def volume(torus, gl):
     return tolvol.ToleranceVolume(*torus, TOLERANCE)
 
 
@@ -171,7 +165,7 @@ def test_a_camera_says_what_it_is():
     assert (camera.eye, camera.target, camera.up, camera.angle) == ([1, 2, 3], [4, 5, 6], [0, 1, 0], 20)
 
 
-def test_progress_and_stop(torus):
+def test_progress_and_stop(torus, gl):
     volume = tolvol.ToleranceVolume(*torus, TOLERANCE)
     progress = tolvol.Progress()
     tolvol.render_distance(*torus, volume, size=(50, 50), progress=progress)
@@ -213,7 +207,7 @@ def test_threads_draw_side_by_side(torus, volume):
     assert not wrong
 
 
-def test_dropped_volumes_leave_no_memory():
+def test_dropped_volumes_leave_no_memory(gl):
     def resident():
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 

@@ -34,7 +34,7 @@ def distance(names, bound):
     return tolvol.hausdorff(names["positions"], triangles, names["vertices"], triangles, bound=bound)
 
 
-def test_they_run_one_after_the_other():
+def test_they_run_one_after_the_other(gl):
     run(*BLOCKS)
 
 
