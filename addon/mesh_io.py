@@ -69,6 +69,17 @@ def triangles_at(mesh, vertices):
         bpy.data.meshes.remove(scratch)
 
 
+def select_faces(mesh, chosen):
+    """chosen: (polygons,) bool; no vertex or edge by itself. In Object Mode."""
+    for elements, name in ((mesh.vertices, ".select_vert"), (mesh.edges, ".select_edge")):
+        # Nothing is selected where there is no attribute. Blender 5.0 crashes when all edges are set in one that is there.
+        if attribute := mesh.attributes.get(name):
+            mesh.attributes.remove(attribute)
+        else:
+            elements.foreach_set("select", np.zeros(len(elements), bool))
+    mesh.polygons.foreach_set("select", chosen)
+
+
 def move_vertices(mesh, before, after):
     """Writes coordinates bit for bit; shape keys keep their motion from the basis. before: the present ones."""
     mesh.vertices.foreach_set("co", after.ravel())

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from bpy.props import IntProperty
 
-from .. import native, preferences, report, volume
+from .. import mesh_io, native, preferences, report, volume
 from ..certify import INSIDE, certify, verdicts
 from ..job import JobOperator
 from .blocked import allowed, check_blocked
@@ -83,9 +83,7 @@ class TOLVOL_OT_select_outside(Comparison, bpy.types.Operator):
         if not outside.any():
             self.report({"INFO"}, "No face is outside")
             return
-        mesh.vertices.foreach_set("select", np.zeros(len(mesh.vertices), bool))
-        mesh.edges.foreach_set("select", np.zeros(len(mesh.edges), bool))
-        mesh.polygons.foreach_set("select", outside)
+        mesh_io.select_faces(mesh, outside)
         context.tool_settings.mesh_select_mode = (False, False, True)
         bpy.ops.object.mode_set(mode="EDIT")
         self.report({"WARNING"}, f"{outside.sum():,} of {len(outside):,} faces are outside")

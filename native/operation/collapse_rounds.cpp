@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::size_t kMostVertices = 4096;   // of a region
 constexpr std::size_t kLeastRegions = 12;     // for as many threads
-constexpr std::size_t kLeastVertices = 8192;  // a mesh of fewer is not cut: rims would be much of it
+constexpr std::size_t kLeastVertices = 1024;  // a mesh of fewer is not cut: rims would be much of it
 constexpr double kRoundShare = 0.8;           // of the edges that the first of a round may collapse
 constexpr double kLeastGain = 0.1;            // of the triangles: after a round that removes fewer there is no other
 constexpr unsigned kMostThreads = 16;         // more would wait for each other

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "operation/guard.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "operation/input.h"

@@ -3,6 +3,8 @@
 // drawn first, then the rays to what is visible of it, then those that pass it by.
 #include "picture/render_volume.h"
 
+#include <algorithm>
+
 #include "gl/context.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/stl.h>
 
+#include <algorithm>
+
 #include "picture/camera.h"
 #include "picture/transfer.h"
 #include "python/arrays.h"

@@ -21,6 +21,7 @@
 // rounding of the distance, R or more.
 #include "reference/hierarchy.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "reference/parallel.h"
 
+#include <algorithm>
 #include <system_error>
 
 namespace tolvol {

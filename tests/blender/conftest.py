@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+import os
+
 import bpy
 import pytest
 
@@ -19,6 +21,17 @@ def _registered():
 @pytest.fixture(autouse=True)
 def _empty_scene(_registered):
     bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+@pytest.fixture(scope="session")
+def gl():
+    """For tests that draw: where nothing can be drawn they are skipped, or fail if TOLVOL_REQUIRE_GL is set."""
+    try:
+        native.module.renderer()
+    except native.module.GlUnavailable as error:
+        if os.environ.get("TOLVOL_REQUIRE_GL"):
+            raise
+        pytest.skip(str(error))
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ def written(tmp_path_factory):
     return done[1], page, json.loads(figures.read_text())
 
 
-def test_methods_and_what_they_keep(written):
+def test_methods_and_what_they_keep(written, gl):
     out, _, figures = written
     assert [round(mesh["tolerance"] / mesh["size"], 6) for mesh in figures["meshes"]] == [0.08, 0.05]
     for mesh in figures["meshes"]:

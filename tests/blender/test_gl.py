@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Smoke tests of GL inside Blender, whose main thread may have a context of its own."""
 
-import os
-
 import numpy as np
 import pytest
 
@@ -22,14 +20,7 @@ def torus():
     return np.asarray(vertices, float), triangles
 
 
-@pytest.fixture(autouse=True)
-def _needs_gl():
-    try:
-        native.module.renderer()
-    except native.module.GlUnavailable as error:
-        if os.environ.get("TOLVOL_REQUIRE_GL"):
-            raise
-        pytest.skip(str(error))
+pytestmark = pytest.mark.usefixtures("gl")
 
 
 def test_the_renderer_has_a_name():

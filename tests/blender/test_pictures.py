@@ -2,7 +2,6 @@
 """--picture of the commands, and the figures."""
 
 import base64
-import os
 import re
 
 import bpy
@@ -12,15 +11,7 @@ import pytest
 from addon import native
 from commands import command, decimate, succeeded
 
-
-@pytest.fixture(autouse=True)
-def _needs_gl():
-    try:
-        native.module.renderer()
-    except native.module.GlUnavailable as error:
-        if os.environ.get("TOLVOL_REQUIRE_GL"):
-            raise
-        pytest.skip(str(error))
+pytestmark = pytest.mark.usefixtures("gl")
 
 
 def pixels(path):

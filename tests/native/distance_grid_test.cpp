@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "field/scatter.h"
 #include "reference/closest_point.h"
 #include "reference/errors.h"

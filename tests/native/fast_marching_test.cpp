@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "field/scatter.h"
 #include "field/signs.h"
 #include "reference/errors.h"

@@ -5,6 +5,7 @@
 #include <epoxy/egl.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <thread>
 
 #include "candidates.h"

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "candidates.h"
 #include "check/methods.h"
 #include "gl_fixture.h"

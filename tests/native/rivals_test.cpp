@@ -2,6 +2,7 @@
 // The decimation with other methods in charge: each must decide, and keep exactly what it is about.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "baselines/checked_ring.h"
