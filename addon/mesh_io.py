@@ -71,12 +71,10 @@ def triangles_at(mesh, vertices):
 
 def select_faces(mesh, chosen):
     """chosen: (polygons,) bool; no vertex or edge by itself. In Object Mode."""
-    for elements, name in ((mesh.vertices, ".select_vert"), (mesh.edges, ".select_edge")):
-        # Nothing is selected where there is no attribute. Blender 5.0 crashes when all edges are set in one that is there.
-        if attribute := mesh.attributes.get(name):
-            mesh.attributes.remove(attribute)
-        else:
-            elements.foreach_set("select", np.zeros(len(elements), bool))
+    if bpy.app.version >= (5, 0) and (attribute := mesh.attributes.get(".select_edge")):
+        mesh.attributes.remove(attribute)  # which selects none; 5.0 crashes when they are set in one that is there
+    for elements in (mesh.vertices, mesh.edges):
+        elements.foreach_set("select", np.zeros(len(elements), bool))
     mesh.polygons.foreach_set("select", chosen)
 
 

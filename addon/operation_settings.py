@@ -68,7 +68,7 @@ def decimate_settings(options=frozenset()):
                 (
                     "THOROUGH",
                     "Thorough",
-                    "Then moves vertices and flips edges to remove more, until that brings nothing: about a fifth fewer "
+                    "Then moves vertices and flips edges to remove more, until that brings nothing: about a sixth fewer "
                     "triangles in six to eight times the time",
                 ),
             ),
@@ -76,7 +76,7 @@ def decimate_settings(options=frozenset()):
         ),
         "max_seconds": FloatProperty(
             name="Time Limit",
-            description="Seconds after which Thorough stops with what it has reached; 0 for no limit",
+            description="Seconds after which Thorough stops with what it has reached of an object; 0 for no limit",
             min=0,
             soft_max=600,
             step=100,

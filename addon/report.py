@@ -69,7 +69,8 @@ def counts(run):
     """How many triangles a run left, and what kept it from leaving fewer or all of it from being within."""
     remarks = []
     if run["target_triangles"] and run["stopped_by"] != "target":
-        remarks.append(f"target {run['target_triangles']:,} not reached within the tolerance")
+        within = " within the tolerance" if run["stopped_by"] == "tolerance" else ""
+        remarks.append(f"target {run['target_triangles']:,} not reached{within}")
     if run["stopped_by"] == "request":
         remarks.append("stopped early")
     if run["stopped_by"] == "time":

@@ -189,7 +189,6 @@ std::vector<std::uint32_t> MovingMesh::faces_around(std::span<const std::uint32_
   return faces;
 }
 
-/// The distance itself where the grid's guess leaves little room.
 MovingMesh::Near MovingMesh::near(const glm::dvec3& at) const {
   const double box = 1 + 2 * volume_->frame_tolerance();
   // Written so that NaN is outside.
@@ -288,7 +287,7 @@ void MovingMesh::try_all(std::span<const std::uint32_t> vertices, std::span<cons
     const std::uint32_t v = vertices[i];
     if (frozen_[v]) return !finite(after[i]);
     try_at(v, placement_.frame(after[i]), {});
-    return !finite(after[i] - before[i]) || !finite(trial_[v].at);
+    return !finite(after[i] - before[i]) || !finite(trial_[v].at) || !std::isfinite(step_[v]);
   });
   if (offender == vertices.size()) return;
   for (const std::uint32_t v : vertices) take_back(v);
@@ -297,7 +296,8 @@ void MovingMesh::try_all(std::span<const std::uint32_t> vertices, std::span<cons
 }
 
 void MovingMesh::try_at(std::uint32_t vertex, const glm::dvec3& at, const Near& near) {
-  trial_[vertex] = {at, near};
+  // What is known of a place must not depend on how one got there: a guess would do for a shorter distance.
+  trial_[vertex] = {at, near.distance > kGuess * within_ ? near : Near{}};
   step_[vertex] = glm::length(at - state_[vertex].at);
 }
 
@@ -308,6 +308,7 @@ bool MovingMesh::try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint
   const double step = step_[vertex];
   if (there.distance > within_) return false;
   try_at(vertex, at, there);
+  trial_[vertex].near = there;  // as measure() would
   const auto faces = ring(vertex);
   thread_local std::vector<double> reach;
   reach.resize(faces.size());

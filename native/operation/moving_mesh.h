@@ -24,7 +24,7 @@ class MovingMesh {
 
   /// What is known of the way from a place to the reference.
   struct Near {
-    double distance = kUnknown;                 ///< an upper bound; kUnknown until asked for
+    double distance = kUnknown;                 ///< an upper bound; huge beyond the tolerance, kUnknown until asked for
     std::uint32_t triangle = Hierarchy::kNone;  ///< one that is about as near, if any is known
   };
 
@@ -46,6 +46,7 @@ class MovingMesh {
   /// for the first position that is not finite.
   void try_all(std::span<const std::uint32_t> vertices, std::span<const glm::dvec3> before,
                std::span<const glm::dvec3> after);
+  /// `near`: what is known there.
   void try_at(std::uint32_t vertex, const glm::dvec3& at, const Near& near);
   void take_back(std::uint32_t vertex) { trial_[vertex] = state_[vertex], step_[vertex] = 0; }
   /// Which of these faces are not inside on trial. Every face must be asked about after the last change to a corner.
@@ -60,12 +61,13 @@ class MovingMesh {
   void accept(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces);
 
   const glm::dvec3& state(std::uint32_t vertex) const { return state_[vertex].at; }
+  /// The distance itself where the grid's guess leaves little room.
+  Near near(const glm::dvec3& at) const;
   const Near& near_state(std::uint32_t vertex) const { return state_[vertex].near; }
   const Near& near_trial(std::uint32_t vertex) const { return trial_[vertex].near; }
   double step(std::uint32_t vertex) const { return step_[vertex]; }  ///< length from state to trial
   bool frozen(std::uint32_t vertex) const { return frozen_[vertex]; }
   bool any_frozen() const { return any_frozen_; }
-  std::size_t vertex_count() const { return ring_start_.size() - 1; }
   double within() const { return within_; }  ///< the provable distance less a headroom
   const ToleranceVolume& volume() const { return *volume_; }
   const Placement& placement() const { return placement_; }
@@ -92,7 +94,6 @@ class MovingMesh {
 
   void make_rings(std::size_t vertex_count);
   bool is_own(std::uint32_t face) const;
-  Near near(const glm::dvec3& at) const;
   double reach_by_motion(std::uint32_t face) const;
   template <class Bound>
   double over_triangulations(std::uint32_t face, Bound&& bound) const;

@@ -154,12 +154,12 @@ void PullBack::release(Held& held, Mode mode) {
     if (way[k] != 0) exit = std::min(exit, std::max(0.0, (std::copysign(box, way[k]) - from[k]) / way[k]));
   }
   Along start{0, mesh_.near_state(held.vertex)};
-  if (start.near.distance == MovingMesh::kUnknown) start = along(held, 0, kNone);
+  if (start.near.distance == MovingMesh::kUnknown) start.near = mesh_.near(from);
   Along inner = start;
   held.limit = 0;
   const double comfort = mode == Mode::settle ? kSettled : kComfort;
   if (mode == Mode::settle && !(start.near.distance < kSettled * within)) {
-    const double factor = std::min(rise(held, mode), exit);
+    const double factor = std::min(kLast * within / held.length, exit);
     inner = {factor, near(held, factor, within, start.near.triangle)};
     if (inner.near.triangle == Hierarchy::kNone) return place(held, start);
   }
@@ -168,8 +168,8 @@ void PullBack::release(Held& held, Mode mode) {
   if (inner.near.distance < comfort * within) end = crossing(held, kComfort * within, inner, outer);
   if (mode == Mode::settle && end.factor > 0) {
     held.limit = end.factor;
-  } else if (inner.near.distance < within) {
-    held.limit = crossing(held, within, inner, outer).factor;
+  } else if (mode != Mode::halve && inner.near.distance < within) {
+    held.limit = crossing(held, within, end.factor > 0 ? end : inner, outer).factor;
   }
   place(held, end);
 }
@@ -196,8 +196,9 @@ void PullBack::pull(std::vector<Held>& held, Mode mode, Progress* progress) {
     changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
     for (const std::uint32_t v : changed) {
       Held& h = held[held_index_[v]];
-      const double factor = h.factor * kShrink;
-      place(h, {factor < little(h) ? 0 : factor, {}});
+      h.factor *= kShrink;
+      if (h.factor < little(h)) h.factor = 0;
+      h.factor > 0 ? place(h, {h.factor, {}}) : mesh_.take_back(v);
     }
   }
 }
@@ -273,20 +274,16 @@ bool PullBack::attempt(Held& held, double factor) {
   return true;
 }
 
-/// The share of the motion that is as long as the last of the tolerance.
+/// The share of the motion that is as long as what is beyond kComfort.
 double PullBack::little(const Held& held) const { return (1 - kComfort) * mesh_.within() / held.length; }
 
-/// What the factor cannot rise by in the end.
-double PullBack::rise(const Held& held, Mode mode) const {
-  return mode == Mode::settle ? std::max(kRise, kLast * mesh_.within() / held.length) : kRise;
-}
-
 void PullBack::raise(Held& held, Mode mode, bool search) {
-  const double step = rise(held, mode), grain = std::min(step, little(held));
+  const double step = mode == Mode::settle ? std::max(kRise, little(held)) : kRise;
+  const double grain = std::min(step, little(held));
   while (held.factor < 1) {
     if (held.limit >= 1 && attempt(held, 1)) return;
     if (search) {
-      // Most are held back by nothing but their own limit: just below it first.
+      // A vertex that nothing holds back but its own limit ends just below it.
       double lower = held.factor, upper = std::min(1.0, held.limit), next = upper - grain / 2;
       while (upper - lower > grain) {
         (attempt(held, next) ? lower : upper) = next;

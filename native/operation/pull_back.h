@@ -55,7 +55,8 @@ class PullBack {
     MovingMesh::Near wish;     ///< at `after`
     double length;             ///< of the motion, in the frame
     double factor = 0;
-    double limit = 1;         ///< about where the vertex itself leaves the volume; 1 only if it does not
+    /// About where the vertex itself leaves the volume, 1 only if it does not; in Mode::settle as far as it is to go.
+    double limit = 1;
     std::uint32_t blame = 0;  ///< place in the vertex's ring of the face that refused last
     std::uint32_t colour = 0;
   };
@@ -80,7 +81,6 @@ class PullBack {
   template <class Visit>
   void held_around(std::uint32_t vertex, Visit&& visit) const;
   double little(const Held& held) const;
-  double rise(const Held& held, Mode mode) const;
   void raise(Held& held, Mode mode, bool search);
   bool attempt(Held& held, double factor);
 
