@@ -106,7 +106,8 @@ def newer(name, content):
     if name != "tolerance_volumes/__init__.py":
         return content
     assert b'"version": (0, 1, 0)' in content
-    return content.replace(b'"version": (0, 1, 0)', b'"version": (0, 2, 0)')
+    # Longer, too: Python takes what it compiled for the same if length and second are the same.
+    return content.replace(b'"version": (0, 1, 0)', b'"version": (0, 2, 0)') + b"# newer\n"
 
 
 def test_package_holds_what_is_here():
