@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // In a round each region goes up to the same cost, so that the order is nearly that of one loop over all; the counts
-// that it leads to are higher or lower by up to four per cent, in the mean one or two higher.
+// that it leads to are higher or lower by up to four per cent, in the mean about the same.
 #include "operation/collapse_rounds.h"
 
 #include <algorithm>

@@ -146,7 +146,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress
   trial_reach_.assign(count, 0);
   std::vector<std::uint32_t> open =
       select(count, threads_, [&](std::size_t f) { return !is_own(static_cast<std::uint32_t>(f)); });
-  measure(open, progress);
+  measure(open, Ask::surely, progress);
   std::vector<std::uint8_t> outside(open.size());
   parallel_for(open.size(), kSmallBlock, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(static_cast<double>(begin) / static_cast<double>(open.size()));
@@ -189,13 +189,14 @@ std::vector<std::uint32_t> MovingMesh::faces_around(std::span<const std::uint32_
   return faces;
 }
 
-MovingMesh::Near MovingMesh::near(const glm::dvec3& at) const {
+MovingMesh::Near MovingMesh::near(const glm::dvec3& at, Ask ask) const {
   const double box = 1 + 2 * volume_->frame_tolerance();
   // Written so that NaN is outside.
   if (!(std::abs(at.x) <= box && std::abs(at.y) <= box && std::abs(at.z) <= box)) return {kFar};
   const std::uint32_t triangle = volume_->grid().triangle_near(at);
-  const double guess = certificates_.front().distance_bound(at);
+  const double guess = triangle == DistanceGrid::kNone ? kFar : certificates_.front().distance_bound(at);
   if (guess <= kGuess * within_) return {guess, triangle};
+  if (ask == Ask::roughly && guess > within_) return {kFar, triangle};
   const Hierarchy::Nearest nearest = volume_->hierarchy().nearest(at, provable_, triangle);
   return nearest.triangle == Hierarchy::kNone ? Near{kFar} : Near{nearest.distance, nearest.triangle};
 }
@@ -249,7 +250,7 @@ double MovingMesh::reach_by_certificate(std::uint32_t face) const {
   return reach;
 }
 
-void MovingMesh::measure(std::span<const std::uint32_t> faces, Progress* progress) {
+void MovingMesh::measure(std::span<const std::uint32_t> faces, Ask ask, Progress* progress) {
   std::vector<std::uint32_t> unknown;
   for (const std::uint32_t f : faces) {
     for (const std::uint32_t v : corners_of(f)) {
@@ -260,18 +261,21 @@ void MovingMesh::measure(std::span<const std::uint32_t> faces, Progress* progres
   }
   parallel_for(unknown.size(), kSmallBlock, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(progress->fraction());
-    for (std::size_t i = begin; i < end; ++i) trial_[unknown[i]].near = near(trial_[unknown[i]].at);
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t v = unknown[i];
+      trial_[v].near = near(trial_[v].at, step_[v] > 0 ? ask : Ask::surely);
+    }
   });
 }
 
 /// Writes trial_reach_ of all of them.
-std::vector<std::uint32_t> MovingMesh::failing(std::span<const std::uint32_t> faces, Progress* progress) {
+std::vector<std::uint32_t> MovingMesh::failing(std::span<const std::uint32_t> faces, Ask ask, Progress* progress) {
   if (progress) progress->update(progress->fraction());
   std::vector<std::uint32_t> open = select(faces.size(), threads_, [&](std::size_t i) {
     return (trial_reach_[faces[i]] = reach_by_motion(faces[i])) == kUnproved;
   });
   for (std::uint32_t& i : open) i = faces[i];
-  measure(open, progress);
+  measure(open, ask, progress);
   std::vector<std::uint8_t> failed(open.size());
   parallel_for(open.size(), kSmallBlock, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(progress->fraction());
@@ -297,8 +301,12 @@ void MovingMesh::try_all(std::span<const std::uint32_t> vertices, std::span<cons
 
 void MovingMesh::try_at(std::uint32_t vertex, const glm::dvec3& at, const Near& near) {
   // What is known of a place must not depend on how one got there: a guess would do for a shorter distance.
-  trial_[vertex] = {at, near.distance > kGuess * within_ ? near : Near{}};
-  step_[vertex] = glm::length(at - state_[vertex].at);
+  set_trial(vertex, {at, near.distance > kGuess * within_ ? near : Near{}});
+}
+
+void MovingMesh::set_trial(std::uint32_t vertex, const Spot& spot) {
+  trial_[vertex] = spot;
+  step_[vertex] = glm::length(spot.at - state_[vertex].at);
 }
 
 bool MovingMesh::try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint32_t& blame) {
@@ -307,8 +315,7 @@ bool MovingMesh::try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint
   const Near there = near(at);
   const double step = step_[vertex];
   if (there.distance > within_) return false;
-  try_at(vertex, at, there);
-  trial_[vertex].near = there;  // as measure() would
+  set_trial(vertex, {at, there});
   const auto faces = ring(vertex);
   thread_local std::vector<double> reach;
   reach.resize(faces.size());

@@ -49,20 +49,23 @@ class MovingMesh {
   /// `near`: what is known there.
   void try_at(std::uint32_t vertex, const glm::dvec3& at, const Near& near);
   void take_back(std::uint32_t vertex) { trial_[vertex] = state_[vertex], step_[vertex] = 0; }
+  /// Surely: as the reference says. Roughly: who moved to where the grid guesses the reference beyond the tolerance
+  /// counts as outside, right or wrong.
+  enum class Ask { surely, roughly };
   /// Which of these faces are not inside on trial. Every face must be asked about after the last change to a corner.
   /// Settled ones cost about 10 ns each, those near the tolerance 0.1 us to many.
-  std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Progress* progress);
+  std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Ask ask, Progress* progress);
   /// Tries the vertex there if all faces around it are inside then; returns whether. Different threads may ask for
   /// vertices that share no face. The distances of all corners must be known: measure(). `blame`: the place in the
   /// ring of the face that is asked first, set to that of the face that refused.
   bool try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint32_t& blame);
-  void measure(std::span<const std::uint32_t> faces, Progress* progress);
+  void measure(std::span<const std::uint32_t> faces, Ask ask, Progress* progress);
   /// Makes the trial of these the state. `faces`: all around them.
   void accept(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces);
 
   const glm::dvec3& state(std::uint32_t vertex) const { return state_[vertex].at; }
   /// The distance itself where the grid's guess leaves little room.
-  Near near(const glm::dvec3& at) const;
+  Near near(const glm::dvec3& at, Ask ask = Ask::surely) const;
   const Near& near_state(std::uint32_t vertex) const { return state_[vertex].near; }
   const Near& near_trial(std::uint32_t vertex) const { return trial_[vertex].near; }
   double step(std::uint32_t vertex) const { return step_[vertex]; }  ///< length from state to trial
@@ -93,6 +96,7 @@ class MovingMesh {
   static constexpr double kUnproved = TriangleCertificate::kUnproved;
 
   void make_rings(std::size_t vertex_count);
+  void set_trial(std::uint32_t vertex, const Spot& spot);
   bool is_own(std::uint32_t face) const;
   double reach_by_motion(std::uint32_t face) const;
   template <class Bound>

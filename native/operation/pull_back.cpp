@@ -51,9 +51,12 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
   const std::vector<std::uint32_t>& vertices = moving.vertices;
   mesh_.try_all(vertices, before, after);
   Result result{std::vector<double>(vertices.size(), 1), {after.begin(), after.end()}, 0};
-  std::vector<std::uint32_t> failed = mesh_.failing(moving.faces, progress);
+  if (mode == Mode::settle) beyond_.resize(held_index_.size());
+  // In a hurry, release() asks about a wish that the grid guesses outside, and knows where the way leaves as well.
+  const MovingMesh::Ask ask = mode == Mode::settle ? MovingMesh::Ask::roughly : MovingMesh::Ask::surely;
+  std::vector<std::uint32_t> failed = mesh_.failing(moving.faces, ask, progress);
   if (!failed.empty()) {
-    std::vector<Held> held = hold(moving, before, after, std::move(failed), progress);
+    std::vector<Held> held = hold(moving, before, after, std::move(failed), ask, progress);
     if (mode != Mode::reset) {
       pull(held, mode, progress);
       if (mode != Mode::halve) let_go(held, mode, progress);
@@ -78,10 +81,10 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
 /// Step (1). Ends, because a face that fails has a corner away from the state, in which it did not fail.
 std::vector<PullBack::Held> PullBack::hold(const Moving& moving, std::span<const glm::dvec3> before,
                                            std::span<const glm::dvec3> after, std::vector<std::uint32_t> failed,
-                                           Progress* progress) {
+                                           MovingMesh::Ask ask, Progress* progress) {
   std::vector<Held> held;
   std::vector<std::uint32_t> back;
-  for (; !failed.empty(); failed = mesh_.failing(mesh_.faces_around(back), progress)) {
+  for (; !failed.empty(); failed = mesh_.failing(mesh_.faces_around(back), ask, progress)) {
     back.clear();
     for (const std::uint32_t f : failed) {
       for (const std::uint32_t v : mesh_.corners_of(f)) {
@@ -111,8 +114,8 @@ void PullBack::place(Held& held, const Along& along) {
   mesh_.try_at(held.vertex, mesh_.placement().frame(stored_at(held, along.factor)), along.near);
 }
 
-/// Where the vertex itself is about `target` from the reference, at the most, between one where it is
-/// nearer and one where it is farther: false position, in which an end that stays twice counts half (Illinois).
+/// Where the vertex itself is about `target` from the reference, at the most, between a place where it is nearer and
+/// one where it is farther: false position, in which an end that stays twice counts half (Illinois).
 PullBack::Along PullBack::crossing(const Held& held, double target, Along inner, Along outer) const {
   double inner_excess = inner.near.distance - target, outer_excess = outer.near.distance - target;
   for (int i = 0; i < kCrossings && inner_excess < -kClose * mesh_.within(); ++i) {
@@ -128,15 +131,27 @@ PullBack::Along PullBack::crossing(const Held& held, double target, Along inner,
 }
 
 /// How far the reference is there; no triangle where that is more than `within`, which is sooner known.
-MovingMesh::Near PullBack::near(const Held& held, double factor, double within, std::uint32_t hint) const {
-  const glm::dvec3 at = mesh_.placement().frame(stored_at(held, factor));
+MovingMesh::Near PullBack::near(const glm::dvec3& at, double within, std::uint32_t hint) const {
   if (hint == Hierarchy::kNone) hint = mesh_.volume().grid().triangle_near(at);
   const Hierarchy::Nearest nearest = mesh_.volume().hierarchy().nearest(at, within, hint);
   return {nearest.distance, nearest.triangle};
 }
 
 PullBack::Along PullBack::along(const Held& held, double factor, std::uint32_t hint) const {
-  return {factor, near(held, factor, std::numeric_limits<double>::infinity(), hint)};
+  const glm::dvec3 at = mesh_.placement().frame(stored_at(held, factor));
+  return {factor, near(at, std::numeric_limits<double>::infinity(), hint)};
+}
+
+/// What is near a place, if it is inside: who is at the limit is pushed on by every dab of a stroke, the same way.
+MovingMesh::Near PullBack::probe(const Held& held, double factor, std::uint32_t hint) {
+  const glm::dvec3 at = mesh_.placement().frame(stored_at(held, factor));
+  Beyond& known = beyond_[held.vertex];
+  if (glm::length(at - known.at) < known.margin) return {};
+  const double within = mesh_.within(), margin = kLast * within;
+  const MovingMesh::Near found = near(at, within + margin, hint);
+  if (found.distance <= within) return found;
+  known = {at, found.triangle == Hierarchy::kNone ? margin : found.distance - within};
+  return {};
 }
 
 /// Finds where the vertex leaves the volume if nothing else held it, and puts it a little before that.
@@ -160,10 +175,14 @@ void PullBack::release(Held& held, Mode mode) {
   const double comfort = mode == Mode::settle ? kSettled : kComfort;
   if (mode == Mode::settle && !(start.near.distance < kSettled * within)) {
     const double factor = std::min(kLast * within / held.length, exit);
-    inner = {factor, near(held, factor, within, start.near.triangle)};
-    if (inner.near.triangle == Hierarchy::kNone) return place(held, start);
+    inner = {factor, probe(held, factor, start.near.triangle)};
+    if (inner.near.distance == MovingMesh::kUnknown) return place(held, start);
   }
   const Along outer = along(held, exit, inner.near.triangle);
+  if (exit == 1 && outer.near.distance <= within) {
+    held.limit = 1;
+    return place(held, outer);
+  }
   Along end = start;
   if (inner.near.distance < comfort * within) end = crossing(held, kComfort * within, inner, outer);
   if (mode == Mode::settle && end.factor > 0) {
@@ -180,10 +199,12 @@ void PullBack::pull(std::vector<Held>& held, Mode mode, Progress* progress) {
     for (std::size_t i = begin; i < end; ++i) release(held[i], mode);
   });
   std::vector<std::uint32_t> changed;
-  changed.reserve(held.size());
-  for (const Held& h : held) changed.push_back(h.vertex);
+  for (const Held& h : held) {
+    if (h.factor > 0) changed.push_back(h.vertex);
+  }
   for (;;) {
-    const std::vector<std::uint32_t> failed = mesh_.failing(mesh_.faces_around(changed), progress);
+    const std::vector<std::uint32_t> failed =
+        mesh_.failing(mesh_.faces_around(changed), MovingMesh::Ask::surely, progress);
     if (failed.empty()) return;
     changed.clear();
     for (const std::uint32_t f : failed) {
@@ -237,7 +258,7 @@ void PullBack::let_go(std::vector<Held>& held, Mode mode, Progress* progress) {
     due[held[i].colour].push_back(i);
     around.push_back(held[i].vertex);
   }
-  mesh_.measure(mesh_.faces_around(around), progress);
+  mesh_.measure(mesh_.faces_around(around), MovingMesh::Ask::surely, progress);
   std::vector<bool> is_due(held.size(), true), searched(held.size(), false);
   std::vector<std::uint8_t> raised;
   for (bool any = true; any;) {

@@ -9,6 +9,8 @@ from addon import native
 from commands import command
 from scenes import torus_arrays
 
+pytestmark = pytest.mark.usefixtures("gl")
+
 TOLERANCE = 0.03
 
 
@@ -18,9 +20,6 @@ def torus():
     faces = np.asarray(faces)
     triangles = faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
     return np.asarray(vertices, float), triangles
-
-
-pytestmark = pytest.mark.usefixtures("gl")
 
 
 def test_the_renderer_has_a_name():
