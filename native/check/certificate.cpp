@@ -23,6 +23,7 @@ constexpr std::size_t kBudget = 1 << 20;       // parts looked at before a piece
 constexpr std::size_t kQuickBudget = 1 << 13;  // and where the answer is only one of many tries
 constexpr double kSmall = 2.0;  // of the tolerance: shorter pieces are worth trying against all eight nodes
 constexpr double kExact = 0.7;  // of the tolerance: shorter pieces are worth an exact search
+constexpr double kRoom = 0.7;   // of the tolerance: up to here the grid's guess of a distance does
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
@@ -49,6 +50,20 @@ double TriangleCertificate::distance_bound(const glm::dvec3& p) const {
   return std::sqrt(d2[0]);
 }
 
+TriangleCertificate::Nearby TriangleCertificate::guess(const glm::dvec3& p) const {
+  const std::uint32_t triangle = grid_->triangle_near(p);
+  return triangle == DistanceGrid::kNone ? Nearby{} : Nearby{distance_bound(p), triangle};
+}
+
+bool TriangleCertificate::leaves_room(double distance) const { return distance <= kRoom * within_; }
+
+TriangleCertificate::Nearby TriangleCertificate::nearby(const glm::dvec3& p, double radius) const {
+  const Nearby first = guess(p);
+  if (leaves_room(first.distance)) return first;
+  const Hierarchy::Nearest nearest = hierarchy_->nearest(p, radius, first.triangle);
+  return nearest.triangle == Hierarchy::kNone ? Nearby{} : Nearby{nearest.distance, nearest.triangle};
+}
+
 std::optional<glm::dvec3> TriangleCertificate::near(const glm::dvec3& p) const {
   constexpr double kNear = 0.3;  // of the tolerance: a point this near is near enough
   std::optional<glm::dvec3> nearest;
@@ -70,7 +85,8 @@ std::optional<glm::dvec3> TriangleCertificate::near(const glm::dvec3& p) const {
 }
 
 template <bool kProve>
-Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, double& farthest) const {
+Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& near,
+                                    double& farthest) const {
   const glm::dvec3 &p0 = corners[0], &p1 = corners[1], &p2 = corners[2];
   {
     // Every point of a triangle is within L / sqrt(3) of a corner, L its longest edge.
@@ -85,7 +101,7 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
   queue.assign(1, {{p0, p1, p2}});
   Verdict result = Verdict::inside;
   double farthest2 = 0;  // over the parts proved so far
-  std::uint32_t hint = Hierarchy::kNone;
+  std::uint32_t hint = near.x;
   for (std::size_t next = 0; next < queue.size(); ++next) {
     if (next == (kProve ? kBudget : kQuickBudget)) return Verdict::unproved;
     const Part part = queue[next];
@@ -95,7 +111,7 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
     points.set(a, b, c, centre);
     double centre2 = std::numeric_limits<double>::infinity();  // best known squared distance of the centre
     std::uint32_t below = DistanceGrid::kNone;                 // the triangle it is of
-    std::array<std::uint32_t, 10> tried;
+    std::array<std::uint32_t, 13> tried;
     int tries = 0;
     const auto covered_by = [&](std::uint32_t triangle) {
       if (triangle == DistanceGrid::kNone) return false;
@@ -114,7 +130,7 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       return false;
     };
     const std::uint32_t guess = grid_->triangle_near(centre);
-    if (covered_by(guess)) continue;
+    if (covered_by(near.x) || covered_by(near.y) || covered_by(near.z) || covered_by(guess)) continue;
 
     const double longest2 = longest_squared(part);
     const bool seems_outside = !(centre2 <= within2_);
@@ -150,14 +166,16 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
   return result;
 }
 
-double TriangleCertificate::bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
+double TriangleCertificate::bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
+                                  const glm::uvec3& near) const {
   double farthest = 0;
-  return decide<false>(corners, bounds, farthest) == Verdict::inside ? farthest : kUnproved;
+  return decide<false>(corners, bounds, near, farthest) == Verdict::inside ? farthest : kUnproved;
 }
 
-Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
+Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
+                                     const glm::uvec3& near) const {
   double farthest = 0;
-  return decide<true>(corners, bounds, farthest);
+  return decide<true>(corners, bounds, near, farthest);
 }
 
 std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& options) const {
@@ -166,21 +184,14 @@ std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& opt
   const TriangleCertificate certificate(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within, beyond);
   if (options.progress) options.progress->begin("checking");
 
-  // Distances of the used points first: they settle most faces, inside (short edges) or outside, and are shared. Where
-  // the grid's guess does not show that a point is inside, the exact one says whether it is outside.
+  // The used points first: their distances settle most faces, inside (short edges) or outside, and are shared.
   std::vector<bool> used(pieces.points.size(), false);
   for (const std::uint32_t i : pieces.indices) used[i] = true;
-  constexpr double kOutside = std::numeric_limits<double>::infinity();
-  std::vector<double> distance(pieces.points.size(), 0);
+  std::vector<TriangleCertificate::Nearby> nearby(pieces.points.size());
   constexpr std::size_t kBlock = 512;
-  parallel_for(distance.size(), kBlock, options.threads, [&](std::size_t begin, std::size_t end) {
+  parallel_for(nearby.size(), kBlock, options.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      if (!used[i]) continue;
-      const glm::dvec3& p = pieces.points[i];
-      distance[i] = certificate.distance_bound(p);
-      if (distance[i] <= within) continue;
-      const Hierarchy::Nearest nearest = volume_->hierarchy().nearest(p, beyond, volume_->grid().triangle_near(p));
-      distance[i] = nearest.triangle == Hierarchy::kNone ? kOutside : nearest.distance;
+      if (used[i]) nearby[i] = certificate.nearby(pieces.points[i], beyond);
     }
   });
 
@@ -191,9 +202,10 @@ std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& opt
       const std::span<const std::uint32_t> corner = pieces.indices.subspan(i * pieces.corners, pieces.corners);
       const auto triangle = [&](int a, int b, int c) {
         const std::uint32_t ia = corner[a], ib = corner[b], ic = corner[c];
-        const glm::dvec3 bounds(distance[ia], distance[ib], distance[ic]);
-        if (std::max({bounds.x, bounds.y, bounds.z}) == kOutside) return Verdict::outside;
-        return certificate.verdict({pieces.points[ia], pieces.points[ib], pieces.points[ic]}, bounds);
+        const glm::uvec3 near(nearby[ia].triangle, nearby[ib].triangle, nearby[ic].triangle);
+        if (glm::any(glm::equal(near, glm::uvec3(Hierarchy::kNone)))) return Verdict::outside;
+        const glm::dvec3 bounds(nearby[ia].distance, nearby[ib].distance, nearby[ic].distance);
+        return certificate.verdict({pieces.points[ia], pieces.points[ib], pieces.points[ic]}, bounds, near);
       };
       switch (pieces.corners) {
         case 1:

@@ -41,11 +41,25 @@ class TriangleCertificate {
 
   /// An upper bound, at most within(), on the distance of any point of the triangle to the reference; kUnproved where
   /// no proof was found. `bounds`: upper bounds on the corners' distances (from witnesses, never field values);
-  /// infinity where none is known.
-  double bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
+  /// infinity where none is known. `near`: triangles of the reference that may be near all of it, tried first.
+  double bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
+               const glm::uvec3& near = glm::uvec3(Hierarchy::kNone)) const;
 
   /// Whether bound() finds one, and if not, whether a point outside proves that there is none.
-  Verdict verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
+  Verdict verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
+                  const glm::uvec3& near = glm::uvec3(Hierarchy::kNone)) const;
+
+  struct Nearby {
+    double distance = kUnproved;                ///< upper bound
+    std::uint32_t triangle = Hierarchy::kNone;  ///< that it is to
+  };
+  /// The grid's guess, if it has one.
+  Nearby guess(const glm::dvec3& p) const;
+  /// The guess where that leaves some of within(), or else the nearest triangle within the radius, if any: no more than
+  /// that is needed to prove faces around p, which then does not depend on how p came to be there.
+  Nearby nearby(const glm::dvec3& p, double radius) const;
+  /// Whether nearby() takes a guess of this distance.
+  bool leaves_room(double distance) const;
 
   /// An upper bound on the distance of p to the reference, from the grid's guess, or from a search where the grid has
   /// none; infinity when p is not within().
@@ -63,7 +77,8 @@ class TriangleCertificate {
 
  private:
   template <bool kProve>
-  Verdict decide(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, double& farthest) const;
+  Verdict decide(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& near,
+                 double& farthest) const;
 
   const std::vector<WitnessTriangle>* reference_;
   const DistanceGrid* grid_;

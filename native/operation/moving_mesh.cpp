@@ -19,7 +19,6 @@ namespace {
 /// Of the provable distance: what is nearer is proved by the certificate whatever its shape, as the pieces that it
 /// splits into become smaller than the rest. So what is settled without it is nothing that it could not prove.
 constexpr double kEasy = 0.98;
-constexpr double kGuess = 0.7;           // of the provable distance: up to here the grid's guess of a distance does
 constexpr double kInflate = 0x1p-50;     // rounding of a step's length and of adding it, relative
 constexpr std::size_t kBlock = 1024;     // faces or vertices, for work of about 10 ns each, and
 constexpr std::size_t kSmallBlock = 32;  // for work of about 1 us each
@@ -155,9 +154,11 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress
       reach_[f] = reach_by_certificate(f);
       if (reach_[f] != kUnproved) continue;
       reach_[f] = provable_;  // nothing is known of it beyond the state as it is
-      outside[i] = over_triangulations(f, [&](const glm::dvec3(&corners)[3], const glm::dvec3& distances) {
-                     return certificates_.front().verdict(corners, distances) == Verdict::inside ? 0 : kUnproved;
-                   }) == kUnproved;
+      outside[i] =
+          over_triangulations(
+              f, [&](const glm::dvec3(&corners)[3], const glm::dvec3& distances, const glm::uvec3& triangles) {
+                return certificates_.front().verdict(corners, distances, triangles) == Verdict::inside ? 0 : kUnproved;
+              }) == kUnproved;
     }
   });
   result.outside = chosen(open, outside);
@@ -193,12 +194,13 @@ MovingMesh::Near MovingMesh::near(const glm::dvec3& at, Ask ask) const {
   const double box = 1 + 2 * volume_->frame_tolerance();
   // Written so that NaN is outside.
   if (!(std::abs(at.x) <= box && std::abs(at.y) <= box && std::abs(at.z) <= box)) return {kFar};
-  const std::uint32_t triangle = volume_->grid().triangle_near(at);
-  const double guess = triangle == DistanceGrid::kNone ? kFar : certificates_.front().distance_bound(at);
-  if (guess <= kGuess * within_) return {guess, triangle};
-  if (ask == Ask::roughly && guess > within_) return {kFar, triangle};
-  const Hierarchy::Nearest nearest = volume_->hierarchy().nearest(at, provable_, triangle);
-  return nearest.triangle == Hierarchy::kNone ? Near{kFar} : Near{nearest.distance, nearest.triangle};
+  const TriangleCertificate& certificate = certificates_.front();
+  if (ask == Ask::roughly) {
+    const TriangleCertificate::Nearby guess = certificate.guess(at);
+    if (guess.distance > within_) return {kFar, guess.triangle};
+  }
+  const TriangleCertificate::Nearby found = certificate.nearby(at, provable_);
+  return found.triangle == Hierarchy::kNone ? Near{kFar} : Near{found.distance, found.triangle};
 }
 
 double MovingMesh::reach_by_motion(std::uint32_t face) const {
@@ -209,14 +211,15 @@ double MovingMesh::reach_by_motion(std::uint32_t face) const {
   return reach <= kEasy * within_ ? reach : kUnproved;
 }
 
-/// The largest of bound(corners, distances) over the triangles that the face may consist of.
+/// The largest of bound(corners, distances, triangles near them) over the triangles that the face may consist of.
 template <class Bound>
 double MovingMesh::over_triangulations(std::uint32_t face, Bound&& bound) const {
   const auto corner = corners_of(face);
   const std::vector<Spot>& spots = trial_;
   const auto triangle = [&](int a, int b, int c) {
     const Spot &p = spots[corner[a]], &q = spots[corner[b]], &r = spots[corner[c]];
-    return bound({p.at, q.at, r.at}, glm::dvec3(p.near.distance, q.near.distance, r.near.distance));
+    return bound({p.at, q.at, r.at}, glm::dvec3(p.near.distance, q.near.distance, r.near.distance),
+                 glm::uvec3(p.near.triangle, q.near.triangle, r.near.triangle));
   };
   switch (corners_) {
     case 1:
@@ -242,9 +245,10 @@ double MovingMesh::reach_by_certificate(std::uint32_t face) const {
   // First as Certificate decides, so that it proves the face again; then the headroom.
   double reach = kUnproved;
   for (const TriangleCertificate& certificate : certificates_) {
-    reach = over_triangulations(face, [&](const glm::dvec3(&corners)[3], const glm::dvec3& distances) {
-      return certificate.bound(corners, distances);
-    });
+    reach = over_triangulations(
+        face, [&](const glm::dvec3(&corners)[3], const glm::dvec3& distances, const glm::uvec3& triangles) {
+          return certificate.bound(corners, distances, triangles);
+        });
     if (reach <= within_ || reach == kUnproved) break;
   }
   return reach;
@@ -301,7 +305,7 @@ void MovingMesh::try_all(std::span<const std::uint32_t> vertices, std::span<cons
 
 void MovingMesh::try_at(std::uint32_t vertex, const glm::dvec3& at, const Near& near) {
   // What is known of a place must not depend on how one got there: a guess would do for a shorter distance.
-  set_trial(vertex, {at, near.distance > kGuess * within_ ? near : Near{}});
+  set_trial(vertex, {at, certificates_.front().leaves_room(near.distance) ? Near{} : near});
 }
 
 void MovingMesh::set_trial(std::uint32_t vertex, const Spot& spot) {

@@ -25,7 +25,7 @@ class MovingMesh {
   /// What is known of the way from a place to the reference.
   struct Near {
     double distance = kUnknown;                 ///< an upper bound; huge beyond the tolerance, kUnknown until asked for
-    std::uint32_t triangle = Hierarchy::kNone;  ///< one that is about as near, if any is known
+    std::uint32_t triangle = Hierarchy::kNone;  ///< of the reference, that is so near; kNone beyond the tolerance
   };
 
   struct Start {

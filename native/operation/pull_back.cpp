@@ -25,9 +25,10 @@ constexpr double kShrink = 0.5;     // of a factor, in each round in which a fac
 constexpr double kComfort = 0.97;
 /// Of the same, in Mode::settle: who got there stays, unless kLast of the tolerance more does not lead outside.
 constexpr double kSettled = 0.965, kLast = 0.04;
-constexpr int kCrossings = 8;       // tries to find where a vertex leaves the volume; a plane takes one
-constexpr double kClose = 0.002;    // of the provable distance: near enough to that place
-constexpr std::size_t kBlock = 32;  // vertices, for work of some us each
+constexpr int kCrossings = 8;            // tries to find where a vertex leaves the volume; a plane takes one
+constexpr double kClose = 0.002;         // of the provable distance: near enough to that place
+constexpr double kLeastRate = 1.0 / 16;  // of the length of the way: how slowly a distance is taken to grow
+constexpr std::size_t kBlock = 32;       // vertices, for work of some us each
 
 }  // namespace
 
@@ -109,25 +110,51 @@ glm::dvec3 PullBack::stored_at(const Held& held, double factor) const {
   return mesh_.placement().storage() == Storage::float32 ? rounded_to_float32(p) : p;
 }
 
+glm::dvec3 PullBack::way_of(const Held& held) const {
+  return mesh_.placement().frame(held.after) - mesh_.state(held.vertex);
+}
+
 void PullBack::place(Held& held, const Along& along) {
   held.factor = along.factor;
   mesh_.try_at(held.vertex, mesh_.placement().frame(stored_at(held, along.factor)), along.near);
 }
 
 /// Where the vertex itself is about `target` from the reference, at the most, between a place where it is nearer and
-/// one where it is farther: false position, in which an end that stays twice counts half (Illinois).
-PullBack::Along PullBack::crossing(const Held& held, double target, Along inner, Along outer) const {
-  double inner_excess = inner.near.distance - target, outer_excess = outer.near.distance - target;
-  for (int i = 0; i < kCrossings && inner_excess < -kClose * mesh_.within(); ++i) {
-    const double factor = inner.factor + (outer.factor - inner.factor) * inner_excess / (inner_excess - outer_excess);
-    const Along next = along(held, factor, outer.near.triangle);
-    if (next.near.distance <= target) {
-      inner = next, inner_excess = next.near.distance - target, outer_excess /= 2;
+/// the factor `last`. At first by what is missing to the target over the rate at which the distance seems to grow;
+/// once too far, by false position, in which an end that stays twice counts half (Illinois).
+PullBack::Along PullBack::crossing(const Held& held, double target, Along inner, double last) const {
+  constexpr double kUnknown = MovingMesh::kUnknown;
+  const double close = kClose * mesh_.within(), aim = target - close / 2;
+  double inner_excess = inner.near.distance - aim, outer_excess = kUnknown,
+         rate = first_rate(held, inner.near.triangle);
+  bool was_outside = false;
+  for (int i = 0; i < kCrossings && inner.near.distance < target - close && inner.factor < last; ++i) {
+    const double step = outer_excess == kUnknown ? -inner_excess / rate
+                                                 : (last - inner.factor) * inner_excess / (inner_excess - outer_excess);
+    const Along next = along(held, std::min(inner.factor + step, last), inner.near.triangle);
+    const double excess = next.near.distance - aim;
+    const bool outside = !(next.near.distance <= target), stays_twice = i > 0 && was_outside == outside;
+    if (outside) {
+      last = next.factor, outer_excess = excess;
+      if (stays_twice) inner_excess /= 2;
     } else {
-      outer = next, outer_excess = next.near.distance - target, inner_excess /= 2;
+      rate = std::max(kLeastRate * held.length, (excess - inner_excess) / (next.factor - inner.factor));
+      inner = next, inner_excess = excess;
+      if (stays_twice) outer_excess /= 2;
     }
+    was_outside = outside;
   }
   return inner;
+}
+
+/// How fast the vertex leaves the plane of a triangle, over the factor.
+double PullBack::first_rate(const Held& held, std::uint32_t triangle) const {
+  if (triangle == Hierarchy::kNone) return held.length;
+  const TriangleMesh& reference = mesh_.volume().reference();
+  const glm::uvec3& t = reference.triangles[triangle];
+  const glm::dvec3 &a = reference.vertices[t.x], &b = reference.vertices[t.y], &c = reference.vertices[t.z];
+  const glm::dvec3 normal = glm::cross(b - a, c - a), way = way_of(held);
+  return std::max(kLeastRate * held.length, std::abs(glm::dot(normal, way)) / glm::length(normal));
 }
 
 /// How far the reference is there; no triangle where that is more than `within`, which is sooner known.
@@ -163,13 +190,13 @@ void PullBack::release(Held& held, Mode mode) {
   }
   // A wish at the end of the world tells nothing: all of the volume is in this box.
   const double box = 1 + 2 * mesh_.volume().frame_tolerance();
-  const glm::dvec3 from = mesh_.state(held.vertex), way = mesh_.placement().frame(held.after) - from;
+  const glm::dvec3 from = mesh_.state(held.vertex), way = way_of(held);
   double exit = 1;
   for (int k = 0; k < 3; ++k) {
     if (way[k] != 0) exit = std::min(exit, std::max(0.0, (std::copysign(box, way[k]) - from[k]) / way[k]));
   }
   Along start{0, mesh_.near_state(held.vertex)};
-  if (start.near.distance == MovingMesh::kUnknown) start.near = mesh_.near(from);
+  if (start.near.distance == MovingMesh::kUnknown) start = along(held, 0, start.near.triangle);
   Along inner = start;
   held.limit = 0;
   const double comfort = mode == Mode::settle ? kSettled : kComfort;
@@ -178,17 +205,12 @@ void PullBack::release(Held& held, Mode mode) {
     inner = {factor, probe(held, factor, start.near.triangle)};
     if (inner.near.distance == MovingMesh::kUnknown) return place(held, start);
   }
-  const Along outer = along(held, exit, inner.near.triangle);
-  if (exit == 1 && outer.near.distance <= within) {
-    held.limit = 1;
-    return place(held, outer);
-  }
   Along end = start;
-  if (inner.near.distance < comfort * within) end = crossing(held, kComfort * within, inner, outer);
+  if (inner.near.distance < comfort * within) end = crossing(held, kComfort * within, inner, exit);
   if (mode == Mode::settle && end.factor > 0) {
     held.limit = end.factor;
   } else if (mode != Mode::halve && inner.near.distance < within) {
-    held.limit = crossing(held, within, end.factor > 0 ? end : inner, outer).factor;
+    held.limit = crossing(held, within, end.factor > 0 ? end : inner, exit).factor;
   }
   place(held, end);
 }

@@ -93,7 +93,6 @@ void Refinement::relocate(std::uint32_t vertex) {
   if (!change_.prepare_relocate(vertex, mesh_.spot(vertex))) return;
   // Faces around a vertex that stays count as moving: the fit is for where it could go.
   fit_.gather(change_);
-  const glm::dvec3 start = mesh_.position(vertex);
   for (int move = 0; move < kMoves; ++move) {
     const glm::dvec3 from = mesh_.position(vertex);
     change_.prepare_relocate(vertex, mesh_.spot(vertex));
