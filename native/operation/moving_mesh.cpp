@@ -19,6 +19,8 @@ namespace {
 /// Of the provable distance: what is nearer is proved by the certificate whatever its shape, as the pieces that it
 /// splits into become smaller than the rest. So what is settled without it is nothing that it could not prove.
 constexpr double kEasy = 0.98;
+constexpr double kKnown = 2;             // of the provable distance: up to here distances are known
+constexpr double kRounding = 0x1p-44;    // of distances in the frame
 constexpr double kInflate = 0x1p-50;     // rounding of a step's length and of adding it, relative
 constexpr std::size_t kBlock = 1024;     // faces or vertices, for work of about 10 ns each, and
 constexpr std::size_t kSmallBlock = 32;  // for work of about 1 us each
@@ -138,6 +140,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress
     refuse("vertex", offender, stored[offender], "is too far away for double precision");
   }
   trial_ = state_;
+  if (!refusals_.empty()) refusals_.assign(stored.size(), {});
   step_.assign(stored.size(), 0);
   frozen_.assign(stored.size(), false);
   const std::size_t count = faces_.size() / corners_;
@@ -145,7 +148,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress
   trial_reach_.assign(count, 0);
   std::vector<std::uint32_t> open =
       select(count, threads_, [&](std::size_t f) { return !is_own(static_cast<std::uint32_t>(f)); });
-  measure(open, Ask::surely, progress);
+  measure(open, progress);
   std::vector<std::uint8_t> outside(open.size());
   parallel_for(open.size(), kSmallBlock, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(static_cast<double>(begin) / static_cast<double>(open.size()));
@@ -190,17 +193,24 @@ std::vector<std::uint32_t> MovingMesh::faces_around(std::span<const std::uint32_
   return faces;
 }
 
-MovingMesh::Near MovingMesh::near(const glm::dvec3& at, Ask ask) const {
+MovingMesh::Near MovingMesh::near(const glm::dvec3& at) const {
   const double box = 1 + 2 * volume_->frame_tolerance();
   // Written so that NaN is outside.
   if (!(std::abs(at.x) <= box && std::abs(at.y) <= box && std::abs(at.z) <= box)) return {kFar};
-  const TriangleCertificate& certificate = certificates_.front();
-  if (ask == Ask::roughly) {
-    const TriangleCertificate::Nearby guess = certificate.guess(at);
-    if (guess.distance > within_) return {kFar, guess.triangle};
-  }
-  const TriangleCertificate::Nearby found = certificate.nearby(at, provable_);
+  const TriangleCertificate::Nearby found = certificates_.front().nearby(at, kKnown * provable_);
   return found.triangle == Hierarchy::kNone ? Near{kFar} : Near{found.distance, found.triangle};
+}
+
+MovingMesh::Near MovingMesh::near(std::uint32_t vertex, const glm::dvec3& at, Trial trial) {
+  if (refusals_.empty()) return near(at);
+  std::array<Refusal, 2>& known = refusals_[vertex];
+  for (const Refusal& r : known) {
+    if (glm::length(at - r.at) < r.margin) return {kFar};
+  }
+  const Near found = near(at);
+  const double room = std::min(found.distance, kKnown * provable_) - provable_;
+  if (room > 0) known[static_cast<std::size_t>(trial)] = {at, room - kRounding};
+  return found;
 }
 
 double MovingMesh::reach_by_motion(std::uint32_t face) const {
@@ -254,7 +264,7 @@ double MovingMesh::reach_by_certificate(std::uint32_t face) const {
   return reach;
 }
 
-void MovingMesh::measure(std::span<const std::uint32_t> faces, Ask ask, Progress* progress) {
+void MovingMesh::measure(std::span<const std::uint32_t> faces, Progress* progress) {
   std::vector<std::uint32_t> unknown;
   for (const std::uint32_t f : faces) {
     for (const std::uint32_t v : corners_of(f)) {
@@ -266,20 +276,20 @@ void MovingMesh::measure(std::span<const std::uint32_t> faces, Ask ask, Progress
   parallel_for(unknown.size(), kSmallBlock, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(progress->fraction());
     for (std::size_t i = begin; i < end; ++i) {
-      const std::uint32_t v = unknown[i];
-      trial_[v].near = near(trial_[v].at, step_[v] > 0 ? ask : Ask::surely);
+      Spot& spot = trial_[unknown[i]];
+      spot.near = near(unknown[i], spot.at, Trial::wish);
     }
   });
 }
 
 /// Writes trial_reach_ of all of them.
-std::vector<std::uint32_t> MovingMesh::failing(std::span<const std::uint32_t> faces, Ask ask, Progress* progress) {
+std::vector<std::uint32_t> MovingMesh::failing(std::span<const std::uint32_t> faces, Progress* progress) {
   if (progress) progress->update(progress->fraction());
   std::vector<std::uint32_t> open = select(faces.size(), threads_, [&](std::size_t i) {
     return (trial_reach_[faces[i]] = reach_by_motion(faces[i])) == kUnproved;
   });
   for (std::uint32_t& i : open) i = faces[i];
-  measure(open, ask, progress);
+  measure(open, progress);
   std::vector<std::uint8_t> failed(open.size());
   parallel_for(open.size(), kSmallBlock, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(progress->fraction());
@@ -316,7 +326,7 @@ void MovingMesh::set_trial(std::uint32_t vertex, const Spot& spot) {
 bool MovingMesh::try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint32_t& blame) {
   const Spot from = trial_[vertex];
   if (at == from.at) return true;
-  const Near there = near(at);
+  const Near there = near(vertex, at, Trial::ahead);
   const double step = step_[vertex];
   if (there.distance > within_) return false;
   set_trial(vertex, {at, there});

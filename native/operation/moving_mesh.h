@@ -2,6 +2,7 @@
 /// A mesh inside a tolerance volume whose vertices are tried at other places: which faces would be inside there?
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <limits>
@@ -49,23 +50,30 @@ class MovingMesh {
   /// `near`: what is known there.
   void try_at(std::uint32_t vertex, const glm::dvec3& at, const Near& near);
   void take_back(std::uint32_t vertex) { trial_[vertex] = state_[vertex], step_[vertex] = 0; }
-  /// Surely: as the reference says. Roughly: who moved to where the grid guesses the reference beyond the tolerance
-  /// counts as outside, right or wrong.
-  enum class Ask { surely, roughly };
   /// Which of these faces are not inside on trial. Every face must be asked about after the last change to a corner.
   /// Settled ones cost about 10 ns each, those near the tolerance 0.1 us to many.
-  std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Ask ask, Progress* progress);
+  std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Progress* progress);
   /// Tries the vertex there if all faces around it are inside then; returns whether. Different threads may ask for
   /// vertices that share no face. The distances of all corners must be known: measure(). `blame`: the place in the
   /// ring of the face that is asked first, set to that of the face that refused.
   bool try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint32_t& blame);
-  void measure(std::span<const std::uint32_t> faces, Ask ask, Progress* progress);
+  void measure(std::span<const std::uint32_t> faces, Progress* progress);
   /// Makes the trial of these the state. `faces`: all around them.
   void accept(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces);
 
   const glm::dvec3& state(std::uint32_t vertex) const { return state_[vertex].at; }
+  /// From now on, keeps in mind where vertices were refused: 64 bytes a vertex, for those who push the same ones
+  /// against the limit again and again. It saves searches and changes no answer.
+  void remember_refusals() { refusals_.resize(state_.size()); }
   /// The distance itself where the grid's guess leaves little room.
-  Near near(const glm::dvec3& at, Ask ask = Ask::surely) const;
+  Near near(const glm::dvec3& at) const;
+  /// The same of a place where a vertex is tried, on its wish or a little ahead of where it is.
+  enum class Trial { wish, ahead };
+  Near near(std::uint32_t vertex, const glm::dvec3& at, Trial trial);
+  /// Whether that is the distance itself, and not a guess or nothing.
+  bool is_exact(const Near& near) const {
+    return near.distance != kUnknown && !certificates_.front().leaves_room(near.distance);
+  }
   const Near& near_state(std::uint32_t vertex) const { return state_[vertex].near; }
   const Near& near_trial(std::uint32_t vertex) const { return trial_[vertex].near; }
   double step(std::uint32_t vertex) const { return step_[vertex]; }  ///< length from state to trial
@@ -89,6 +97,12 @@ class MovingMesh {
   struct Spot {
     glm::dvec3 at;
     Near near;  ///< kFar beyond the tolerance
+  };
+
+  /// No point of the reference is within the tolerance of any place nearer to `at` than `margin`.
+  struct Refusal {
+    glm::dvec3 at{0};
+    double margin = 0;
   };
 
   // This and kUnknown prove nothing when they are taken for upper bounds.
@@ -115,9 +129,10 @@ class MovingMesh {
   std::vector<TriangleCertificate> certificates_;  // for the two; none before start()
   std::vector<Spot> state_, trial_;
   std::vector<double> step_;
-  std::vector<double> reach_, trial_reach_;  // per face: no point of it is farther from the reference
-  std::vector<std::uint64_t> seen_;          // per face: when faces_around() last met it,
-  std::uint64_t now_ = 0;                    // ... in calls
+  std::vector<std::array<Refusal, 2>> refusals_;  // per vertex and Trial, the last; none unless remembered
+  std::vector<double> reach_, trial_reach_;       // per face: no point of it is farther from the reference
+  std::vector<std::uint64_t> seen_;               // per face: when faces_around() last met it,
+  std::uint64_t now_ = 0;                         // ... in calls
 };
 
 }  // namespace tolvol

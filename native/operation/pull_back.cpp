@@ -25,10 +25,9 @@ constexpr double kShrink = 0.5;     // of a factor, in each round in which a fac
 constexpr double kComfort = 0.97;
 /// Of the same, in Mode::settle: who got there stays, unless kLast of the tolerance more does not lead outside.
 constexpr double kSettled = 0.965, kLast = 0.04;
-constexpr int kCrossings = 8;            // tries to find where a vertex leaves the volume; a plane takes one
-constexpr double kClose = 0.002;         // of the provable distance: near enough to that place
-constexpr double kLeastRate = 1.0 / 16;  // of the length of the way: how slowly a distance is taken to grow
-constexpr std::size_t kBlock = 32;       // vertices, for work of some us each
+constexpr int kCrossings = 8;       // tries to find where a vertex leaves the volume; a plane takes one
+constexpr double kClose = 0.002;    // of the provable distance: near enough to that place
+constexpr std::size_t kBlock = 32;  // vertices, for work of some us each
 
 }  // namespace
 
@@ -52,12 +51,10 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
   const std::vector<std::uint32_t>& vertices = moving.vertices;
   mesh_.try_all(vertices, before, after);
   Result result{std::vector<double>(vertices.size(), 1), {after.begin(), after.end()}, 0};
-  if (mode == Mode::settle) beyond_.resize(held_index_.size());
-  // In a hurry, release() asks about a wish that the grid guesses outside, and knows where the way leaves as well.
-  const MovingMesh::Ask ask = mode == Mode::settle ? MovingMesh::Ask::roughly : MovingMesh::Ask::surely;
-  std::vector<std::uint32_t> failed = mesh_.failing(moving.faces, ask, progress);
+  if (mode == Mode::settle) mesh_.remember_refusals();
+  std::vector<std::uint32_t> failed = mesh_.failing(moving.faces, progress);
   if (!failed.empty()) {
-    std::vector<Held> held = hold(moving, before, after, std::move(failed), ask, progress);
+    std::vector<Held> held = hold(moving, before, after, std::move(failed), progress);
     if (mode != Mode::reset) {
       pull(held, mode, progress);
       if (mode != Mode::halve) let_go(held, mode, progress);
@@ -82,10 +79,10 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
 /// Step (1). Ends, because a face that fails has a corner away from the state, in which it did not fail.
 std::vector<PullBack::Held> PullBack::hold(const Moving& moving, std::span<const glm::dvec3> before,
                                            std::span<const glm::dvec3> after, std::vector<std::uint32_t> failed,
-                                           MovingMesh::Ask ask, Progress* progress) {
+                                           Progress* progress) {
   std::vector<Held> held;
   std::vector<std::uint32_t> back;
-  for (; !failed.empty(); failed = mesh_.failing(mesh_.faces_around(back), ask, progress)) {
+  for (; !failed.empty(); failed = mesh_.failing(mesh_.faces_around(back), progress)) {
     back.clear();
     for (const std::uint32_t f : failed) {
       for (const std::uint32_t v : mesh_.corners_of(f)) {
@@ -110,75 +107,36 @@ glm::dvec3 PullBack::stored_at(const Held& held, double factor) const {
   return mesh_.placement().storage() == Storage::float32 ? rounded_to_float32(p) : p;
 }
 
-glm::dvec3 PullBack::way_of(const Held& held) const {
-  return mesh_.placement().frame(held.after) - mesh_.state(held.vertex);
-}
-
 void PullBack::place(Held& held, const Along& along) {
   held.factor = along.factor;
   mesh_.try_at(held.vertex, mesh_.placement().frame(stored_at(held, along.factor)), along.near);
 }
 
 /// Where the vertex itself is about `target` from the reference, at the most, between a place where it is nearer and
-/// the factor `last`. At first by what is missing to the target over the rate at which the distance seems to grow;
-/// once too far, by false position, in which an end that stays twice counts half (Illinois).
-PullBack::Along PullBack::crossing(const Held& held, double target, Along inner, double last) const {
-  constexpr double kUnknown = MovingMesh::kUnknown;
+/// one where it is farther: false position, in which an end that stays twice counts half (Illinois).
+PullBack::Along PullBack::crossing(const Held& held, double target, Along inner, Along outer) const {
   const double close = kClose * mesh_.within(), aim = target - close / 2;
-  double inner_excess = inner.near.distance - aim, outer_excess = kUnknown,
-         rate = first_rate(held, inner.near.triangle);
+  double inner_excess = inner.near.distance - aim, outer_excess = outer.near.distance - aim;
   bool was_outside = false;
-  for (int i = 0; i < kCrossings && inner.near.distance < target - close && inner.factor < last; ++i) {
-    const double step = outer_excess == kUnknown ? -inner_excess / rate
-                                                 : (last - inner.factor) * inner_excess / (inner_excess - outer_excess);
-    const Along next = along(held, std::min(inner.factor + step, last), inner.near.triangle);
-    const double excess = next.near.distance - aim;
+  for (int i = 0; i < kCrossings && inner.near.distance < target - close; ++i) {
+    const double factor = inner.factor + (outer.factor - inner.factor) * inner_excess / (inner_excess - outer_excess);
+    const Along next = along(held, factor, inner.near.triangle);
     const bool outside = !(next.near.distance <= target), stays_twice = i > 0 && was_outside == outside;
-    if (outside) {
-      last = next.factor, outer_excess = excess;
-      if (stays_twice) inner_excess /= 2;
-    } else {
-      rate = std::max(kLeastRate * held.length, (excess - inner_excess) / (next.factor - inner.factor));
-      inner = next, inner_excess = excess;
-      if (stays_twice) outer_excess /= 2;
-    }
+    (outside ? outer : inner) = next;
+    (outside ? outer_excess : inner_excess) = next.near.distance - aim;
+    if (stays_twice) (outside ? inner_excess : outer_excess) /= 2;
     was_outside = outside;
   }
   return inner;
 }
 
-/// How fast the vertex leaves the plane of a triangle, over the factor.
-double PullBack::first_rate(const Held& held, std::uint32_t triangle) const {
-  if (triangle == Hierarchy::kNone) return held.length;
-  const TriangleMesh& reference = mesh_.volume().reference();
-  const glm::uvec3& t = reference.triangles[triangle];
-  const glm::dvec3 &a = reference.vertices[t.x], &b = reference.vertices[t.y], &c = reference.vertices[t.z];
-  const glm::dvec3 normal = glm::cross(b - a, c - a), way = way_of(held);
-  return std::max(kLeastRate * held.length, std::abs(glm::dot(normal, way)) / glm::length(normal));
-}
-
-/// How far the reference is there; no triangle where that is more than `within`, which is sooner known.
-MovingMesh::Near PullBack::near(const glm::dvec3& at, double within, std::uint32_t hint) const {
-  if (hint == Hierarchy::kNone) hint = mesh_.volume().grid().triangle_near(at);
-  const Hierarchy::Nearest nearest = mesh_.volume().hierarchy().nearest(at, within, hint);
-  return {nearest.distance, nearest.triangle};
-}
-
+/// A place on the way, and the distance there however far it is.
 PullBack::Along PullBack::along(const Held& held, double factor, std::uint32_t hint) const {
   const glm::dvec3 at = mesh_.placement().frame(stored_at(held, factor));
-  return {factor, near(at, std::numeric_limits<double>::infinity(), hint)};
-}
-
-/// What is near a place, if it is inside: who is at the limit is pushed on by every dab of a stroke, the same way.
-MovingMesh::Near PullBack::probe(const Held& held, double factor, std::uint32_t hint) {
-  const glm::dvec3 at = mesh_.placement().frame(stored_at(held, factor));
-  Beyond& known = beyond_[held.vertex];
-  if (glm::length(at - known.at) < known.margin) return {};
-  const double within = mesh_.within(), margin = kLast * within;
-  const MovingMesh::Near found = near(at, within + margin, hint);
-  if (found.distance <= within) return found;
-  known = {at, found.triangle == Hierarchy::kNone ? margin : found.distance - within};
-  return {};
+  if (hint == Hierarchy::kNone) hint = mesh_.volume().grid().triangle_near(at);
+  const Hierarchy::Nearest nearest =
+      mesh_.volume().hierarchy().nearest(at, std::numeric_limits<double>::infinity(), hint);
+  return {factor, {nearest.distance, nearest.triangle}};
 }
 
 /// Finds where the vertex leaves the volume if nothing else held it, and puts it a little before that.
@@ -190,27 +148,30 @@ void PullBack::release(Held& held, Mode mode) {
   }
   // A wish at the end of the world tells nothing: all of the volume is in this box.
   const double box = 1 + 2 * mesh_.volume().frame_tolerance();
-  const glm::dvec3 from = mesh_.state(held.vertex), way = way_of(held);
+  const glm::dvec3 from = mesh_.state(held.vertex), way = mesh_.placement().frame(held.after) - from;
   double exit = 1;
   for (int k = 0; k < 3; ++k) {
     if (way[k] != 0) exit = std::min(exit, std::max(0.0, (std::copysign(box, way[k]) - from[k]) / way[k]));
   }
   Along start{0, mesh_.near_state(held.vertex)};
-  if (start.near.distance == MovingMesh::kUnknown) start = along(held, 0, start.near.triangle);
+  if (!mesh_.is_exact(start.near)) start = along(held, 0, start.near.triangle);
   Along inner = start;
   held.limit = 0;
   const double comfort = mode == Mode::settle ? kSettled : kComfort;
   if (mode == Mode::settle && !(start.near.distance < kSettled * within)) {
     const double factor = std::min(kLast * within / held.length, exit);
-    inner = {factor, probe(held, factor, start.near.triangle)};
-    if (inner.near.distance == MovingMesh::kUnknown) return place(held, start);
+    const glm::dvec3 ahead = mesh_.placement().frame(stored_at(held, factor));
+    inner = {factor, mesh_.near(held.vertex, ahead, MovingMesh::Trial::ahead)};
+    if (inner.near.distance > within) return place(held, start);
   }
+  const bool known = exit == 1 && held.wish.triangle != Hierarchy::kNone;
+  const Along outer = known ? Along{1, held.wish} : along(held, exit, inner.near.triangle);
   Along end = start;
-  if (inner.near.distance < comfort * within) end = crossing(held, kComfort * within, inner, exit);
+  if (inner.near.distance < comfort * within) end = crossing(held, kComfort * within, inner, outer);
   if (mode == Mode::settle && end.factor > 0) {
     held.limit = end.factor;
   } else if (mode != Mode::halve && inner.near.distance < within) {
-    held.limit = crossing(held, within, end.factor > 0 ? end : inner, exit).factor;
+    held.limit = crossing(held, within, end.factor > 0 ? end : inner, outer).factor;
   }
   place(held, end);
 }
@@ -225,8 +186,7 @@ void PullBack::pull(std::vector<Held>& held, Mode mode, Progress* progress) {
     if (h.factor > 0) changed.push_back(h.vertex);
   }
   for (;;) {
-    const std::vector<std::uint32_t> failed =
-        mesh_.failing(mesh_.faces_around(changed), MovingMesh::Ask::surely, progress);
+    const std::vector<std::uint32_t> failed = mesh_.failing(mesh_.faces_around(changed), progress);
     if (failed.empty()) return;
     changed.clear();
     for (const std::uint32_t f : failed) {
@@ -280,7 +240,7 @@ void PullBack::let_go(std::vector<Held>& held, Mode mode, Progress* progress) {
     due[held[i].colour].push_back(i);
     around.push_back(held[i].vertex);
   }
-  mesh_.measure(mesh_.faces_around(around), MovingMesh::Ask::surely, progress);
+  mesh_.measure(mesh_.faces_around(around), progress);
   std::vector<bool> is_due(held.size(), true), searched(held.size(), false);
   std::vector<std::uint8_t> raised;
   for (bool any = true; any;) {

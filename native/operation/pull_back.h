@@ -67,22 +67,12 @@ class PullBack {
     MovingMesh::Near near;
   };
 
-  /// No point of the reference is within the tolerance of any place nearer to `at` than `margin`.
-  struct Beyond {
-    glm::dvec3 at{0};
-    double margin = 0;
-  };
-
   glm::dvec3 stored_at(const Held& held, double factor) const;
-  glm::dvec3 way_of(const Held& held) const;  ///< in the frame
-  double first_rate(const Held& held, std::uint32_t triangle) const;
   void place(Held& held, const Along& along);
   std::vector<Held> hold(const Moving& moving, std::span<const glm::dvec3> before, std::span<const glm::dvec3> after,
-                         std::vector<std::uint32_t> failed, MovingMesh::Ask ask, Progress* progress);
-  MovingMesh::Near near(const glm::dvec3& at, double within, std::uint32_t hint) const;
-  MovingMesh::Near probe(const Held& held, double factor, std::uint32_t hint);
+                         std::vector<std::uint32_t> failed, Progress* progress);
   Along along(const Held& held, double factor, std::uint32_t hint) const;
-  Along crossing(const Held& held, double target, Along inner, double last) const;
+  Along crossing(const Held& held, double target, Along inner, Along outer) const;
   void release(Held& held, Mode mode);
   void pull(std::vector<Held>& held, Mode mode, Progress* progress);
   void let_go(std::vector<Held>& held, Mode mode, Progress* progress);
@@ -95,7 +85,6 @@ class PullBack {
 
   MovingMesh mesh_;
   std::vector<std::uint32_t> held_index_;  // per vertex: its place among the held ones, kNone
-  std::vector<Beyond> beyond_;             // per vertex: where it was refused last in Mode::settle
 };
 
 }  // namespace tolvol
