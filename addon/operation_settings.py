@@ -69,7 +69,7 @@ def decimate_settings(options=frozenset()):
                     "THOROUGH",
                     "Thorough",
                     "Then moves vertices and flips edges to remove more, until that brings nothing: about a sixth fewer "
-                    "triangles in four to eight times the time",
+                    "triangles in two to four times the time",
                 ),
             ),
             options=set(options),

@@ -57,7 +57,7 @@ def arguments():
         "--effort",
         choices=("fast", "thorough"),
         default="fast",
-        help="thorough: about a sixth fewer triangles in four to eight times the time (default: fast)",
+        help="thorough: about a sixth fewer triangles in two to four times the time (default: fast)",
     )
     parser.add_argument(
         "--max-seconds",

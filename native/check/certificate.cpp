@@ -50,18 +50,16 @@ double TriangleCertificate::distance_bound(const glm::dvec3& p) const {
   return std::sqrt(d2[0]);
 }
 
-TriangleCertificate::Nearby TriangleCertificate::guess(const glm::dvec3& p) const {
-  const std::uint32_t triangle = grid_->triangle_near(p);
-  return triangle == DistanceGrid::kNone ? Nearby{} : Nearby{distance_bound(p), triangle};
-}
-
 bool TriangleCertificate::leaves_room(double distance) const { return distance <= kRoom * within_; }
 
-TriangleCertificate::Nearby TriangleCertificate::nearby(const glm::dvec3& p, double radius) const {
-  const Nearby first = guess(p);
-  if (leaves_room(first.distance)) return first;
-  const Hierarchy::Nearest nearest = hierarchy_->nearest(p, radius, first.triangle);
-  return nearest.triangle == Hierarchy::kNone ? Nearby{} : Nearby{nearest.distance, nearest.triangle};
+TriangleCertificate::Near TriangleCertificate::nearest(const glm::dvec3& p, double radius) const {
+  const std::uint32_t guess = grid_->triangle_near(p);
+  if (guess != DistanceGrid::kNone) {
+    const double distance = distance_bound(p);
+    if (leaves_room(distance)) return {distance, guess};
+  }
+  const Hierarchy::Nearest found = hierarchy_->nearest(p, radius, guess);
+  return found.triangle == Hierarchy::kNone ? Near{} : Near{found.distance, found.triangle};
 }
 
 std::optional<glm::dvec3> TriangleCertificate::near(const glm::dvec3& p) const {
@@ -187,11 +185,11 @@ std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& opt
   // The used points first: their distances settle most faces, inside (short edges) or outside, and are shared.
   std::vector<bool> used(pieces.points.size(), false);
   for (const std::uint32_t i : pieces.indices) used[i] = true;
-  std::vector<TriangleCertificate::Nearby> nearby(pieces.points.size());
+  std::vector<TriangleCertificate::Near> nearest(pieces.points.size());
   constexpr std::size_t kBlock = 512;
-  parallel_for(nearby.size(), kBlock, options.threads, [&](std::size_t begin, std::size_t end) {
+  parallel_for(nearest.size(), kBlock, options.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      if (used[i]) nearby[i] = certificate.nearby(pieces.points[i], beyond);
+      if (used[i]) nearest[i] = certificate.nearest(pieces.points[i], beyond);
     }
   });
 
@@ -202,9 +200,9 @@ std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& opt
       const std::span<const std::uint32_t> corner = pieces.indices.subspan(i * pieces.corners, pieces.corners);
       const auto triangle = [&](int a, int b, int c) {
         const std::uint32_t ia = corner[a], ib = corner[b], ic = corner[c];
-        const glm::uvec3 near(nearby[ia].triangle, nearby[ib].triangle, nearby[ic].triangle);
+        const glm::uvec3 near(nearest[ia].triangle, nearest[ib].triangle, nearest[ic].triangle);
         if (glm::any(glm::equal(near, glm::uvec3(Hierarchy::kNone)))) return Verdict::outside;
-        const glm::dvec3 bounds(nearby[ia].distance, nearby[ib].distance, nearby[ic].distance);
+        const glm::dvec3 bounds(nearest[ia].distance, nearest[ib].distance, nearest[ic].distance);
         return certificate.verdict({pieces.points[ia], pieces.points[ib], pieces.points[ic]}, bounds, near);
       };
       switch (pieces.corners) {

@@ -49,16 +49,14 @@ class TriangleCertificate {
   Verdict verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
                   const glm::uvec3& near = glm::uvec3(Hierarchy::kNone)) const;
 
-  struct Nearby {
+  struct Near {
     double distance = kUnproved;                ///< upper bound
-    std::uint32_t triangle = Hierarchy::kNone;  ///< that it is to
+    std::uint32_t triangle = Hierarchy::kNone;  ///< of the reference, that it is to
   };
-  /// The grid's guess, if it has one.
-  Nearby guess(const glm::dvec3& p) const;
-  /// The guess where that leaves some of within(), or else the nearest triangle within the radius, if any: no more than
-  /// that is needed to prove faces around p, which then does not depend on how p came to be there.
-  Nearby nearby(const glm::dvec3& p, double radius) const;
-  /// Whether nearby() takes a guess of this distance.
+  /// The grid's guess where that leaves some of within(), or else the nearest triangle within the radius, if any. A
+  /// proof of faces around p needs no more, and what starts from this does not depend on how p came to be there.
+  Near nearest(const glm::dvec3& p, double radius) const;
+  /// Whether nearest() takes a guess of this distance.
   bool leaves_room(double distance) const;
 
   /// An upper bound on the distance of p to the reference, from the grid's guess, or from a search where the grid has

@@ -157,11 +157,9 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress
       reach_[f] = reach_by_certificate(f);
       if (reach_[f] != kUnproved) continue;
       reach_[f] = provable_;  // nothing is known of it beyond the state as it is
-      outside[i] =
-          over_triangulations(
-              f, [&](const glm::dvec3(&corners)[3], const glm::dvec3& distances, const glm::uvec3& triangles) {
-                return certificates_.front().verdict(corners, distances, triangles) == Verdict::inside ? 0 : kUnproved;
-              }) == kUnproved;
+      outside[i] = over_triangulations(f, [&](const auto&... triangle) {
+                     return certificates_.front().verdict(triangle...) == Verdict::inside ? 0 : kUnproved;
+                   }) == kUnproved;
     }
   });
   result.outside = chosen(open, outside);
@@ -197,8 +195,8 @@ MovingMesh::Near MovingMesh::near(const glm::dvec3& at) const {
   const double box = 1 + 2 * volume_->frame_tolerance();
   // Written so that NaN is outside.
   if (!(std::abs(at.x) <= box && std::abs(at.y) <= box && std::abs(at.z) <= box)) return {kFar};
-  const TriangleCertificate::Nearby found = certificates_.front().nearby(at, kKnown * provable_);
-  return found.triangle == Hierarchy::kNone ? Near{kFar} : Near{found.distance, found.triangle};
+  const Near found = certificates_.front().nearest(at, kKnown * provable_);
+  return found.triangle == Hierarchy::kNone ? Near{kFar} : found;
 }
 
 MovingMesh::Near MovingMesh::near(std::uint32_t vertex, const glm::dvec3& at, Trial trial) {
@@ -228,7 +226,8 @@ double MovingMesh::over_triangulations(std::uint32_t face, Bound&& bound) const 
   const std::vector<Spot>& spots = trial_;
   const auto triangle = [&](int a, int b, int c) {
     const Spot &p = spots[corner[a]], &q = spots[corner[b]], &r = spots[corner[c]];
-    return bound({p.at, q.at, r.at}, glm::dvec3(p.near.distance, q.near.distance, r.near.distance),
+    const glm::dvec3 corners[3] = {p.at, q.at, r.at};
+    return bound(corners, glm::dvec3(p.near.distance, q.near.distance, r.near.distance),
                  glm::uvec3(p.near.triangle, q.near.triangle, r.near.triangle));
   };
   switch (corners_) {
@@ -255,10 +254,7 @@ double MovingMesh::reach_by_certificate(std::uint32_t face) const {
   // First as Certificate decides, so that it proves the face again; then the headroom.
   double reach = kUnproved;
   for (const TriangleCertificate& certificate : certificates_) {
-    reach = over_triangulations(
-        face, [&](const glm::dvec3(&corners)[3], const glm::dvec3& distances, const glm::uvec3& triangles) {
-          return certificate.bound(corners, distances, triangles);
-        });
+    reach = over_triangulations(face, [&](const auto&... triangle) { return certificate.bound(triangle...); });
     if (reach <= within_ || reach == kUnproved) break;
   }
   return reach;

@@ -23,11 +23,9 @@ class MovingMesh {
  public:
   static constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
-  /// What is known of the way from a place to the reference.
-  struct Near {
-    double distance = kUnknown;                 ///< an upper bound; huge beyond the tolerance, kUnknown until asked for
-    std::uint32_t triangle = Hierarchy::kNone;  ///< of the reference, that is so near; kNone beyond the tolerance
-  };
+  /// What is known of the way from a place to the reference: the distance is kUnknown until it is asked for, and huge,
+  /// with no triangle, far beyond the tolerance.
+  using Near = TriangleCertificate::Near;
 
   struct Start {
     std::vector<std::uint32_t> outside;  ///< faces that are not proved inside, ascending: their vertices never move

@@ -179,7 +179,7 @@ void bind_decimation(py::module_& module) {
       "\"keep\" the input faces that are not within the tolerance as they are. wedges: (m, 3) labels from wedges(). "
       "effort: \"fast\", or \"thorough\": then vertices move and "
       "edges flip to\n"
-      "make room for further collapses, for a sixth fewer triangles in four to eight times the time; max_seconds "
+      "make room for further collapses, for a sixth fewer triangles in two to four times the time; max_seconds "
       "ends that early\n"
       "(0: never), with what there is; what it finds then depends on the machine's speed. volume None: no "
       "tolerance at all, for comparison; a "
