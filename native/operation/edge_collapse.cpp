@@ -5,7 +5,6 @@
 #include "operation/edge_collapse.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace tolvol {
 namespace {
@@ -113,20 +112,7 @@ void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
 /// the middle.
 EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) const {
   const Halfedge h = a.halfedge;
-  if (mesh_.bounds().forward) {
-    glm::dvec3 position = best;
-    bool first = true;
-    for (const double hopeless : kHopeless) {
-      if (!a.change.prepare_collapse(h, mesh_.store(position))) return Outcome::impossible;
-      if (std::exchange(first, false)) a.fit.gather(a.change);
-      const PositionFit::Fit fit = a.fit.fit(a.change, position);
-      if (fit.deviation > hopeless) return Outcome::refused;
-      position = fit.position;
-      const Outcome outcome = a.change.try_collapse(h, mesh_.store(position));
-      if (outcome != Outcome::refused) return outcome;
-    }
-    return Outcome::refused;
-  }
+  if (mesh_.bounds().forward) return a.fit.collapse(a.change, h, best, kHopeless);
   const Spot s0 = mesh_.spot(mesh_.from(h)), s1 = mesh_.spot(mesh_.to(h));
   for (const Spot& other : {s0, s1, mesh_.store((s0.position + s1.position) * 0.5)}) {
     const Outcome outcome = a.change.try_collapse(h, other);

@@ -94,7 +94,7 @@ class MovingMesh {
  private:
   struct Spot {
     glm::dvec3 at;
-    Near near;  ///< kFar beyond the tolerance
+    Near near;  ///< the distance is kFar far beyond the tolerance
   };
 
   /// No point of the reference is within the tolerance of any place nearer to `at` than `margin`.

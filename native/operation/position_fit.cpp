@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "reference/closest_point.h"
 
@@ -114,6 +115,22 @@ PositionFit::Fit PositionFit::fit(const Change& change, const glm::dvec3& positi
   const double length = glm::length(step);
   if (length > within) step *= within / length;
   return {sums.energy, deviation, position + step};
+}
+
+Change::Outcome PositionFit::collapse(Change& change, Change::Halfedge h, const glm::dvec3& start,
+                                      std::span<const double> limits) {
+  glm::dvec3 position = start;
+  bool first = true;
+  for (const double limit : limits) {
+    if (!change.prepare_collapse(h, mesh_->store(position))) return Change::Outcome::impossible;
+    if (std::exchange(first, false)) gather(change);
+    const Fit found = fit(change, position);
+    if (found.deviation > limit) break;
+    position = found.position;
+    const Change::Outcome outcome = change.try_collapse(h, mesh_->store(position));
+    if (outcome != Change::Outcome::refused) return outcome;
+  }
+  return Change::Outcome::refused;
 }
 
 double PositionFit::energy_now(const Change& change) {

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
 #include <vector>
 
 #include "operation/change.h"
@@ -27,6 +28,9 @@ class PositionFit {
   };
   /// Of the faces as the change would leave them, its vertex at `position`. About 10 ns a face and piece.
   Fit fit(const Change& change, const glm::dvec3& position);
+  /// Tries a collapse, which `change` then holds, at fitted positions: from `start` a step for each of the limits,
+  /// until it is possible. With a deviation beyond the step's limit before it, over the tolerance, it is refused.
+  Change::Outcome collapse(Change& change, Change::Halfedge h, const glm::dvec3& start, std::span<const double> limits);
   /// Energy of the same faces as they are.
   double energy_now(const Change& change);
 

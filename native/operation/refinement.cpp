@@ -4,7 +4,6 @@
 #include "operation/refinement.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace tolvol {
 namespace {
@@ -129,22 +128,6 @@ void Refinement::flip(Edge e) {
   tried = clock_;
 }
 
-bool Refinement::fit_collapse(Halfedge h, const glm::dvec3& start) {
-  glm::dvec3 position = start;
-  bool first = true;
-  for (const double hopeless : kHopeless) {
-    if (!change_.prepare_collapse(h, mesh_.store(position))) return false;
-    if (std::exchange(first, false)) fit_.gather(change_);
-    const PositionFit::Fit fit = fit_.fit(change_, position);
-    if (fit.deviation > hopeless) return false;
-    position = fit.position;
-    const Change::Outcome outcome = change_.try_collapse(h, mesh_.store(position));
-    if (outcome == Change::Outcome::possible) return true;
-    if (outcome == Change::Outcome::impossible) return false;
-  }
-  return false;
-}
-
 void Refinement::collapse(Edge e) {
   std::uint64_t& tried = collapsed_[static_cast<std::size_t>(e.idx())];
   if (last_touched(e) <= tried) return;
@@ -155,8 +138,9 @@ void Refinement::collapse(Edge e) {
   constexpr auto kPossible = Change::Outcome::possible;
   bool possible = false;
   if (freedom == BoundedMesh::Freedom::anywhere) {
-    possible = fit_collapse(h, 0.5 * (from.position + to.position)) || fit_collapse(h, from.position) ||
-               fit_collapse(h, to.position);
+    for (const glm::dvec3& start : {0.5 * (from.position + to.position), from.position, to.position}) {
+      possible = possible || fit_.collapse(change_, h, start, kHopeless) == kPossible;
+    }
   } else if (freedom != BoundedMesh::Freedom::none) {
     possible = change_.try_collapse(h, to) == kPossible;
     if (!possible && freedom == BoundedMesh::Freedom::either_way) {

@@ -32,7 +32,6 @@ class Refinement {
   void relocate(std::uint32_t vertex);
   void flip(Edge e);
   void collapse(Edge e);
-  bool fit_collapse(Halfedge h, const glm::dvec3& start);
   void apply();
   std::uint64_t last_touched(Edge e) const;
 
