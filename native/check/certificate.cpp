@@ -21,6 +21,8 @@ constexpr double kFloor = 0.02;                // of the tolerance: a piece this
 constexpr double kWorthCutting = 0.25;         // of the tolerance
 constexpr std::size_t kBudget = 1 << 20;       // parts looked at before a piece is left unproved,
 constexpr std::size_t kQuickBudget = 1 << 13;  // and where the answer is only one of many tries
+constexpr double kProbeSpacing = 2.0;          // of the tolerance, along the longest edge of a triangle,
+constexpr int kMostProbes = 8;                 // and so many at most
 constexpr double kSmall = 2.0;  // of the tolerance: shorter pieces are worth trying against all eight nodes
 constexpr double kExact = 0.7;  // of the tolerance: shorter pieces are worth an exact search
 constexpr double kRoom = 0.7;   // of the tolerance: up to here the grid's guess of a distance does
@@ -80,6 +82,21 @@ std::optional<glm::dvec3> TriangleCertificate::near(const glm::dvec3& p) const {
     if (q.distance_squared < nearest2) nearest2 = q.distance_squared, nearest = q.point;
   }
   return nearest;
+}
+
+bool TriangleCertificate::shows_outside(const glm::dvec3 (&corners)[3]) const {
+  const auto& [a, b, c] = corners;
+  const double longest = std::sqrt(std::max({squared_length(b - a), squared_length(c - b), squared_length(a - c)}));
+  const double wanted = std::min(longest / (kProbeSpacing * within_), static_cast<double>(kMostProbes));
+  const int n = std::max(2, static_cast<int>(wanted));
+  const glm::dvec3 u = (b - a) * (1.0 / n), v = (c - a) * (1.0 / n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = i == 0; i + j <= n && j < n; ++j) {  // all but the corners
+      const glm::dvec3 p = a + static_cast<double>(i) * u + static_cast<double>(j) * v;
+      if (!(distance_bound(p) <= within_) && hierarchy_->nearest(p, within_).triangle == Hierarchy::kNone) return true;
+    }
+  }
+  return false;
 }
 
 template <bool kProve>

@@ -63,6 +63,10 @@ class TriangleCertificate {
   /// none; infinity when p is not within().
   double distance_bound(const glm::dvec3& p) const;
 
+  /// Whether one of at most 42 points of the triangle is not within(): a hundredth of what a proof for a large triangle
+  /// takes, and finds most of those that have none.
+  bool shows_outside(const glm::dvec3 (&corners)[3]) const;
+
   /// A point of the reference near p, where that is far seldom not the nearest: of the triangles that the
   /// nodes around p name.
   std::optional<glm::dvec3> near(const glm::dvec3& p) const;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Based on the initial band of [Botsch04, §2]: each triangle writes exact distances to the nodes of its enlarged box,
 // the smallest stays. Here the box is enlarged by the whole band, so that no marching is needed and every value is
-// exact, and nodes are taken eight along x at once. Rows that the triangle's box or its plane keep out of the band are
-// skipped.
+// exact, and nodes are taken eight along x at once. Of a small triangle nearly all nodes in the band have a nearer one:
+// eight of them are passed over where its box is too far to be nearest. Of a large triangle the runs of nodes that its
+// box or its plane keep out of the band are skipped.
 #include "field/scatter.h"
 
 #include <algorithm>
@@ -17,6 +18,8 @@ namespace tolvol {
 namespace {
 
 constexpr int kLanes = DistanceGrid::kLanes;
+constexpr int kWide = 3 * kLanes;  // nodes: a longer row of a triangle's box is cut to what is in the band
+constexpr double kSlack = 1e-5;    // of a squared distance: float32 rounds it by less
 using Floats = float __attribute__((vector_size(4 * kLanes)));
 using Masks = std::int32_t __attribute__((vector_size(4 * kLanes)));
 
@@ -27,7 +30,9 @@ struct Prepared {
   glm::vec3 ab, ac, bc;
   glm::vec3 gs, gt;  ///< gradients of the barycentric coordinates of b and c
   glm::vec3 normal;  ///< unit, zero when degenerate
+  glm::vec3 middle;  ///< of the box
   float inverse_ab, inverse_ac, inverse_bc;
+  float room;  ///< a node at most d, within the band, from the triangle is within sqrt(d^2 + room) of the middle
   float slab;  ///< |normal . p| of the band about the plane, with the rounding of float32; infinite when degenerate
 };
 
@@ -39,6 +44,10 @@ Prepared prepare(const TriangleMesh& mesh, std::uint32_t id, double band) {
   Prepared r;
   r.a = a;
   r.box.add(a), r.box.add(b), r.box.add(c);
+  const glm::dvec3 middle = (r.box.lower + r.box.upper) * 0.5;
+  const double radius = std::max({glm::length(a - middle), glm::length(b - middle), glm::length(c - middle)});
+  r.middle = middle - a;
+  r.room = static_cast<float>(radius * (2 * band + radius) + kSlack * (band + radius) * (band + radius));
   const glm::dvec3 ab = b - a, ac = c - a, bc = c - b, n = glm::cross(ab, ac);
   const double nn = glm::dot(n, n), ab2 = glm::dot(ab, ab), ac2 = glm::dot(ac, ac);
   r.ab = ab, r.ac = ac, r.bc = bc;
@@ -54,6 +63,12 @@ Prepared prepare(const TriangleMesh& mesh, std::uint32_t id, double band) {
     r.slab = std::numeric_limits<float>::infinity();
   }
   return r;
+}
+
+TOLVOL_INLINE bool any(Masks masks) {
+  using Wide = std::int64_t __attribute__((vector_size(sizeof(Masks))));
+  const Wide wide = reinterpret_cast<Wide>(masks);
+  return (wide[0] | wide[1] | wide[2] | wide[3]) != 0;
 }
 
 TOLVOL_INLINE Floats clamp01(Floats x) {
@@ -79,6 +94,8 @@ TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid
   const int zend = std::min(z1 - 1, static_cast<int>(std::floor(high.z)));
   const int ybegin = std::max(0, static_cast<int>(std::ceil(low.y)));
   const int yend = std::min(grid.nodes.y - 1, static_cast<int>(std::floor(high.y)));
+  const int box_begin = std::max(0, static_cast<int>(std::ceil(low.x)));
+  const int box_end = std::min(grid.nodes.x - 1, static_cast<int>(std::floor(high.x)));
   Floats lane;
   for (int i = 0; i < kLanes; ++i) lane[i] = static_cast<float>(i) * hf;
   const Masks ids = Masks{} + static_cast<std::int32_t>(id);
@@ -93,20 +110,28 @@ TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid
       const float by = std::max({0.0f, lower.y - py, py - upper.y});
       const float room = band2 - by * by - bz * bz;
       if (room <= 0) continue;
-      const float half = std::sqrt(room);
-      float xlow = lower.x - half, xhigh = upper.x + half;
       const float plane = t.normal.y * py + t.normal.z * pz;
-      if (std::abs(t.normal.x) > 1e-3f) {
-        const float middle = -plane / t.normal.x, reach = t.slab / std::abs(t.normal.x);
-        xlow = std::max(xlow, middle - reach), xhigh = std::min(xhigh, middle + reach);
-      } else if (std::abs(plane) > t.slab + 1e-3f * std::max(std::abs(xlow), std::abs(xhigh))) {
-        continue;
+      int xbegin = box_begin, xend = box_end;
+      if (xend - xbegin >= kWide) {
+        const float half = std::sqrt(room);
+        float xlow = lower.x - half, xhigh = upper.x + half;
+        if (std::abs(t.normal.x) > 1e-3f) {
+          const float middle = -plane / t.normal.x, reach = t.slab / std::abs(t.normal.x);
+          xlow = std::max(xlow, middle - reach), xhigh = std::min(xhigh, middle + reach);
+        } else if (std::abs(plane) > t.slab + 1e-3f * std::max(std::abs(xlow), std::abs(xhigh))) {
+          continue;
+        }
+        xbegin = std::max(0, static_cast<int>(std::floor((xlow - first.x) / hf)));
+        xend = std::min(grid.nodes.x - 1, static_cast<int>(std::ceil((xhigh - first.x) / hf)));
       }
-      const int xbegin = std::max(0, static_cast<int>(std::floor((xlow - first.x) / hf)));
-      const int xend = std::min(grid.nodes.x - 1, static_cast<int>(std::ceil((xhigh - first.x) / hf)));
+      const float my = py - t.middle.y, mz = pz - t.middle.z, to_middle = my * my + mz * mz - t.room;
       const std::size_t row = grid.index(0, y, z);
       for (int x = xbegin & ~(kLanes - 1); x <= xend; x += kLanes) {
         const Floats px = (first.x + static_cast<float>(x) * hf) + lane;
+        Floats old;
+        __builtin_memcpy(&old, &grid.distance[row + x], sizeof old);
+        const Floats mx = px - t.middle.x;
+        if (!any(mx * mx + to_middle < old)) continue;
         const Floats s = px * t.gs.x + (py * t.gs.y + pz * t.gs.z), u = px * t.gt.x + (py * t.gt.y + pz * t.gt.z);
         const Floats off = px * t.normal.x + plane;
         Floats d = edge_distance(px, py, pz, t.ab, t.inverse_ab);
@@ -116,9 +141,7 @@ TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid
         d = d < d3 ? d : d3;
         const Masks inside = (s >= 0.0f) & (u >= 0.0f) & (s + u <= 1.0f);
         d = inside ? off * off : d;
-        Floats old;
         Masks old_ids;
-        __builtin_memcpy(&old, &grid.distance[row + x], sizeof old);
         const Masks nearer = d < old;
         __builtin_memcpy(&old_ids, &grid.triangle[row + x], sizeof old_ids);
         d = nearer ? d : old;

@@ -294,6 +294,16 @@ bool Change::within_bounds() {
     }
     const auto& distance = mesh_->distance_;
     predecessors_.clear();
+    // Before anything is proved in vain.
+    for (std::size_t k = 0; k < elements_.size(); ++k) {
+      const std::size_t i = (suspect_ + k) % elements_.size();
+      const Coverage::Element& element = elements_[i];
+      if (element.moved == 0 || !is_large(element)) continue;
+      if (bounds.forward->narrowed(share(faces_[i])).shows_outside(element.corners)) {
+        suspect_ = i;
+        return false;
+      }
+    }
     for (std::size_t k = 0; k < elements_.size(); ++k) {
       const std::size_t i = (suspect_ + k) % elements_.size();
       const Coverage::Element& element = elements_[i];

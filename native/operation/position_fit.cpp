@@ -86,8 +86,9 @@ void PositionFit::add_pieces(const Change& change, Sums& sums) const {
   }
 }
 
-void PositionFit::add_faces(const Change& change, Sums& sums) const {
-  for (std::size_t i = 0; i < faces_.size(); ++i) {
+/// Until a deviation is beyond the limit.
+void PositionFit::add_faces(const Change& change, double limit, Sums& sums) const {
+  for (std::size_t i = 0; i < faces_.size() && sums.largest2 <= limit * limit; ++i) {
     const WitnessTriangle& t = faces_[i];
     const glm::dvec3 corners[3] = {t.a, t.a + t.ab, t.a + t.ac};
     const Change::Face& face = change.faces()[i];
@@ -101,15 +102,15 @@ void PositionFit::add_faces(const Change& change, Sums& sums) const {
   }
 }
 
-PositionFit::Fit PositionFit::fit(const Change& change, const glm::dvec3& position) {
+PositionFit::Fit PositionFit::fit(const Change& change, const glm::dvec3& position, double limit) {
   const double within = mesh_->bounds().forward->within();
   Sums sums{1 / (within * within)};
   prepare(change, true);
   add_pieces(change, sums);
-  add_faces(change, sums);
+  add_faces(change, limit, sums);
   const double trace = sums.m[0][0] + sums.m[1][1] + sums.m[2][2];
   const double deviation = std::sqrt(sums.largest2);
-  if (!(trace > 0)) return {sums.energy, deviation, position};
+  if (!(trace > 0) || deviation > limit) return {sums.energy, deviation, position};
   for (int i = 0; i < 3; ++i) sums.m[i][i] += kDamping * trace;
   glm::dvec3 step = glm::inverse(sums.m) * sums.g;
   const double length = glm::length(step);
@@ -124,7 +125,7 @@ Change::Outcome PositionFit::collapse(Change& change, Change::Halfedge h, const 
   for (const double limit : limits) {
     if (!change.prepare_collapse(h, mesh_->store(position))) return Change::Outcome::impossible;
     if (std::exchange(first, false)) gather(change);
-    const Fit found = fit(change, position);
+    const Fit found = fit(change, position, limit);
     if (found.deviation > limit) break;
     position = found.position;
     const Change::Outcome outcome = change.try_collapse(h, mesh_->store(position));
@@ -138,7 +139,7 @@ double PositionFit::energy_now(const Change& change) {
   Sums sums{1 / (within * within)};
   prepare(change, false);
   add_pieces(change, sums);
-  add_faces(change, sums);
+  add_faces(change, std::numeric_limits<double>::infinity(), sums);
   return sums.energy;
 }
 

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -26,8 +27,9 @@ class PositionFit {
     double deviation;     ///< the largest of those looked at, over the tolerance; like the energy of where it was asked
     glm::dvec3 position;  ///< lowers it, to first order
   };
-  /// Of the faces as the change would leave them, its vertex at `position`. About 10 ns a face and piece.
-  Fit fit(const Change& change, const glm::dvec3& position);
+  /// Of the faces as the change would leave them, its vertex at `position`. About 10 ns a face and piece. Where the
+  /// deviation is beyond `limit`, that is all that is found.
+  Fit fit(const Change& change, const glm::dvec3& position, double limit = std::numeric_limits<double>::infinity());
   /// Tries a collapse, which `change` then holds, at fitted positions: from `start` a step for each of the limits,
   /// until it is possible. With a deviation beyond the step's limit before it, over the tolerance, it is refused.
   Change::Outcome collapse(Change& change, Change::Halfedge h, const glm::dvec3& start, std::span<const double> limits);
@@ -38,7 +40,7 @@ class PositionFit {
   struct Sums;
   void prepare(const Change& change, bool changed);
   void add_pieces(const Change& change, Sums& sums) const;
-  void add_faces(const Change& change, Sums& sums) const;
+  void add_faces(const Change& change, double limit, Sums& sums) const;
 
   const BoundedMesh* mesh_;
   std::vector<Coverage::Sample> samples_;

@@ -185,6 +185,35 @@ TEST(Certificate, ProvesLargeFacesOverTrianglesOfAnySize) {
   }
 }
 
+TEST(Certificate, ProbesFindWhatHasNoProofAndNothingElse) {
+  const TriangleMesh torus = shapes::torus(60);
+  const double tolerance = 0.02;
+  const ToleranceVolume volume(torus.vertices, torus.triangles, kIdentity, tolerance);
+  const Placement placed = kIdentity.in(volume.frame());
+  const TriangleCertificate certificate(volume.witnesses(), volume.grid(), volume.hierarchy(), volume.provable(0),
+                                        volume.refutable(0));
+  std::mt19937 engine(9);
+  std::uniform_real_distribution<double> u(0, 1);
+  int outside = 0, shown = 0;
+  for (int i = 0; i < 3000; ++i) {
+    // Corners on the torus, chords and saddles between them.
+    const double around = 6.28 * u(engine), across = 6.28 * u(engine), size = 0.6 * u(engine);
+    dvec3 corners[3];
+    for (dvec3& p : corners) {
+      const double s = around + size * u(engine), t = across + 2 * size * u(engine);
+      p = placed.frame(
+          dvec3((1 + 0.4 * std::cos(t)) * std::cos(s), (1 + 0.4 * std::cos(t)) * std::sin(s), 0.4 * std::sin(t)));
+    }
+    const Verdict verdict = certificate.verdict(corners, dvec3(TriangleCertificate::kUnproved));
+    const bool shows = certificate.shows_outside(corners);
+    EXPECT_FALSE(shows && verdict == Verdict::inside);
+    outside += verdict == Verdict::outside, shown += shows;
+  }
+  EXPECT_GT(outside, 300);
+  EXPECT_GT(shown, 0.9 * outside);
+  EXPECT_LT(outside, 2700);
+}
+
 TEST(Certificate, PointsSegmentsAndQuads) {
   const TriangleMesh plane = shapes::grid(4);
   const ToleranceVolume volume(plane.vertices, plane.triangles, kIdentity, 0.1);

@@ -64,6 +64,11 @@ TEST(PositionFit, BringsALiftedVertexBackToThePlane) {
   EXPECT_LT(std::abs(first.position.z - start.z + height), 0.05 * height) << "a plane is met in one step";
   EXPECT_LT(glm::length(glm::dvec2(first.position - start)), 0.05 * height) << "and nothing pulls it sideways";
 
+  const double inside = 2 * first.deviation, beyond = 0.5 * first.deviation;
+  EXPECT_EQ(fit.fit(change, start, inside).position, first.position);
+  EXPECT_GT(fit.fit(change, start, beyond).deviation, beyond);
+  EXPECT_EQ(fit.fit(change, start, beyond).position, start) << "is given up";
+
   ASSERT_TRUE(change.prepare_relocate(plate.lifted, {first.position, first.position}));
   EXPECT_LT(fit.fit(change, first.position).energy, 1e-3 * first.energy);
   EXPECT_DOUBLE_EQ(fit.energy_now(change), first.energy) << "of the faces as they are";
