@@ -31,8 +31,8 @@ def timed(call, *arguments, **named):
     return result, time.perf_counter() - started
 
 
-def tolerance_volumes(effort):
-    """`tolvol.decimate` as it comes: the volume and the decimation, both ways."""
+def tolerance_volumes(**options):
+    """`tolvol.decimate`: the volume and the decimation, both ways."""
 
     def run(vertices, triangles, tolerance, threads):
         sys.path.insert(0, os.environ.get("TOLVOL_PYTHON_PATH", str(ROOT / "build" / "release" / "python")))
@@ -40,7 +40,7 @@ def tolerance_volumes(effort):
 
         def work():
             volume = tolvol.ToleranceVolume(vertices, triangles, tolerance, threads=threads)
-            return tolvol.decimate(vertices, triangles, volume, effort=effort, threads=threads)
+            return tolvol.decimate(vertices, triangles, volume, threads=threads, **options)
 
         result, seconds = timed(work)
         return result.vertices, result.triangles, seconds
@@ -311,7 +311,8 @@ def searched(title, package, run):
     return Tool(title, package, run, run)
 
 
-FAST, THOROUGH = tolerance_volumes("fast"), tolerance_volumes("thorough")
+FAST, THOROUGH = tolerance_volumes(), tolerance_volumes(effort="thorough")
+SUBSET = tolerance_volumes(placement="subset")
 WEIGHTED = {
     "angleWeightedDistToPlane": True,
     "stabilizer": 0,
@@ -322,6 +323,7 @@ TOOLS = {
     "ours-1": Tool("**Tolerance Volumes**, one thread", "tolvol", on_one_thread(FAST)),
     "thorough": Tool("**Tolerance Volumes**, thorough", "tolvol", THOROUGH),
     "thorough-1": Tool("**Tolerance Volumes**, thorough, one thread", "tolvol", on_one_thread(THOROUGH)),
+    "subset": Tool("**Tolerance Volumes**, vertices of the input alone", "tolvol", SUBSET),
     "cgal": searched("CGAL, polyhedral envelope", "cgal", cgal),
     "manifold3d": searched("Manifold, simplify", "manifold3d", manifold3d),
     "meshlib": searched("MeshLib", "meshlib", meshlib()),

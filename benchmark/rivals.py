@@ -5,8 +5,8 @@
 /usr/bin/python3 benchmark/rivals.py MESH... [--tolerance 1% --tolerance 0.1%] [--only NAME...] [--again]
     [--write FILE.md] [--picture FILE.png] [--json FILE]
 
-MESH: .obj, .ply or .stl. The tools are in benchmark/rival_tools.py, each with what its documentation says; in the versions of
-benchmark/rivals.txt they are installed from PyPI into build/rivals/venv, and CGAL's is built where libcgal-dev is installed.
+MESH: .obj, .ply or .stl, or scan: one made here, with the noise of a range camera (benchmark/scan.py). The tools are in
+benchmark/rival_tools.py, each with what its documentation says; in the versions of benchmark/rivals.txt they are installed from PyPI into build/rivals/venv, and CGAL's is built where libcgal-dev is installed.
 Each runs in a process of its own: seconds are those of its call alone, the best of three where one takes less than 5 s.
 Then its parameter is searched for the fewest triangles that keep both directions, unless one call takes more than 20 s.
 Results are kept in build/rivals/results and taken from there the next time; --again measures anew.
@@ -35,6 +35,7 @@ from common import USAGE, Stop, in_units, length, machine, require_folder, whole
 from rival_page import draw, row, text, title  # noqa: E402
 from rival_tools import CGAL_PROGRAM, ROOT, TOOLS  # noqa: E402
 from rival_worker import Worker  # noqa: E402
+from scan import scan  # noqa: E402
 
 sys.path.insert(0, os.environ.get("TOLVOL_PYTHON_PATH", str(ROOT / "build" / "release" / "python")))
 try:
@@ -56,6 +57,7 @@ SEARCH_LIMIT = 60  # and one that takes longer than that counts as not kept
 NEAR = 1.01  # a bracket so narrow is not bisected any more
 
 FORMATS = (".obj", ".ply", ".stl")
+SCAN = "scan"  # in place of a file
 
 
 @dataclass
@@ -115,6 +117,9 @@ def versions():
 
 
 def read_mesh(path, folder):
+    if path == SCAN:
+        vertices, triangles = scan()
+        return Mesh(SCAN, vertices, triangles, tolvol.size(vertices, triangles))
     arrays = folder / "vertices.npy", folder / "triangles.npy"
     done = subprocess.run([PYTHON, rival_tools.__file__, "read", path, *arrays], capture_output=True, text=True)
     if done.returncode:
@@ -287,7 +292,7 @@ def arguments(words):
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("mesh", nargs="+", metavar="MESH", help=", ".join(FORMATS))
+    parser.add_argument("mesh", nargs="+", metavar="MESH", help=", ".join([*FORMATS, SCAN]))
     parser.add_argument(
         "--tolerance",
         action="append",
@@ -322,6 +327,8 @@ def refuse(message):
 
 def main(options):
     for path in options.mesh:
+        if path == SCAN:
+            continue
         if not Path(path).is_file():
             raise Stop(f"{path}: no such file")
         if Path(path).suffix.lower() not in FORMATS:

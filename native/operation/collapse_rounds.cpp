@@ -20,13 +20,12 @@ constexpr std::size_t kLeastRegions = 12;     // for as many threads
 constexpr std::size_t kLeastVertices = 1024;  // a mesh of fewer is not cut: rims would be much of it
 constexpr double kRoundShare = 0.8;           // of the edges that the first of a round may collapse
 constexpr double kLeastGain = 0.1;            // of the triangles: after a round that removes fewer there is no other
-constexpr unsigned kMostThreads = 16;         // more would wait for each other
 
 class Rounds {
  public:
-  Rounds(BoundedMesh& mesh, unsigned threads, Progress* progress)
+  Rounds(BoundedMesh& mesh, Team& team, Progress* progress)
       : mesh_(mesh),
-        team_(std::min(thread_count(threads), kMostThreads)),
+        team_(team),
         collapse_(mesh),
         shared_(collapse_),
         costs_(mesh.connectivity().n_edges()),
@@ -94,7 +93,7 @@ class Rounds {
   }
 
   BoundedMesh& mesh_;
-  Team team_;
+  Team& team_;
   EdgeCollapse collapse_;
   CollapseLoop::Shared shared_;
   std::vector<double> costs_;
@@ -103,11 +102,9 @@ class Rounds {
 
 }  // namespace
 
-void collapse_edges(BoundedMesh& mesh, std::size_t target, unsigned threads, Progress* progress) {
-  // A rival answers one question after another.
-  const bool rival = mesh.bounds().rival;
-  Rounds rounds(mesh, rival ? 1 : threads, progress);
-  if (target == 0 && !rival) rounds.by_regions();
+void collapse_edges(BoundedMesh& mesh, std::size_t target, Team& team, Progress* progress) {
+  Rounds rounds(mesh, team, progress);
+  if (target == 0 && !mesh.bounds().rival) rounds.by_regions();
   rounds.whole(target);
 }
 

@@ -9,12 +9,13 @@
 #include <cstddef>
 
 #include "operation/bounded_mesh.h"
+#include "reference/parallel.h"
 #include "reference/progress.h"
 
 namespace tolvol {
 
 /// Until no edge can collapse or `target` triangles are left; with a target there are no rounds, because its order is
-/// that of the whole. `threads`: 0 means one per core. O(n log n) without bounds. Throws Cancelled.
-void collapse_edges(BoundedMesh& mesh, std::size_t target, unsigned threads, Progress* progress);
+/// that of the whole. O(n log n) without bounds. Throws Cancelled.
+void collapse_edges(BoundedMesh& mesh, std::size_t target, Team& team, Progress* progress);
 
 }  // namespace tolvol

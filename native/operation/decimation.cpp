@@ -17,11 +17,13 @@
 #include "operation/refinement.h"
 #include "operation/wedges.h"
 #include "reference/errors.h"
+#include "reference/parallel.h"
 
 namespace tolvol {
 namespace {
 
 constexpr std::uint32_t kNone = CutMesh::kNone;
+constexpr unsigned kMostThreads = 16;  // more would wait for each other
 
 class Decimation {
  public:
@@ -64,10 +66,13 @@ class Decimation {
     BoundedMesh mesh(mesh_input(), bounds);
     const std::size_t apart = cut_.aside.size();
     const std::size_t target = options_.target_triangles > apart ? options_.target_triangles - apart : 0;
-    collapse_edges(mesh, target, options_.threads, options_.progress);
+    // A rival answers one question after another.
+    Team team(options_.rival ? 1 : std::min(thread_count(options_.threads), kMostThreads));
+    collapse_edges(mesh, target, team, options_.progress);
     if (volume_ && !options_.rival && options_.effort == DecimationOptions::Effort::thorough) {
-      Refinement(mesh).run(
-          target, [&] { return ended_early(); }, options_.progress);
+      Refinement(mesh, team)
+          .run(
+              target, [&] { return ended_early(); }, options_.progress);
     }
     result_.stopped_at_target =
         options_.target_triangles > 0 && mesh.triangle_count() + apart <= options_.target_triangles;

@@ -1,43 +1,83 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// Fewer triangles after the collapse loop has ended: vertices move to where they fit best and edges are flipped, which
 /// makes room for further collapses, round after round until one brings nothing. Every step keeps the bounds.
+///
+/// Steps are tried in a fixed order. With several threads the next few are tried ahead, all at once; what was found is
+/// used when its turn comes, unless a face around it has changed meanwhile: the result is the same for any number of
+/// threads.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
+#include <span>
 #include <vector>
 
 #include "operation/bounded_mesh.h"
 #include "operation/change.h"
 #include "operation/position_fit.h"
+#include "reference/parallel.h"
 #include "reference/progress.h"
 
 namespace tolvol {
 
 class Refinement {
  public:
-  /// Changes `mesh`, which needs a forward bound, and keeps a reference to it.
-  explicit Refinement(BoundedMesh& mesh);
+  /// Changes `mesh`, which needs a forward bound, and keeps references to both.
+  Refinement(BoundedMesh& mesh, Team& team);
 
   /// Until some rounds collapse nothing, `target` triangles are left, or `expired`, asked before every step, says so.
   /// Throws Cancelled.
   void run(std::size_t target, const std::function<bool()>& expired, Progress* progress);
 
  private:
-  using Edge = BoundedMesh::Edge;
   using Halfedge = BoundedMesh::Halfedge;
 
-  void relocate(std::uint32_t vertex);
-  void flip(Edge e);
-  void collapse(Edge e);
-  void apply();
-  std::uint64_t last_touched(Edge e) const;
+  /// What came of trying a step, and the scratch of it.
+  struct Attempt {
+    explicit Attempt(const BoundedMesh& mesh) : change(mesh), fit(mesh) {}
+    Change change;
+    PositionFit fit;
+    bool possible = false;
+    std::size_t place = kNowhere;  ///< of the step in its order
+    std::uint64_t at = 0;          ///< of the clock
+  };
+  /// A kind of step, of a vertex or an edge each.
+  struct Kind {
+    /// When what a try reads has changed last.
+    std::uint64_t (Refinement::*read)(std::uint32_t) const;
+    bool (Refinement::*wanted)(std::uint32_t) const;
+    void (Refinement::*attempt)(std::uint32_t, Attempt&) const;
+    void (Refinement::*carry_out)(std::uint32_t, Attempt&);
+  };
+  static const Kind kRelocation, kFlip, kCollapse;
+  static constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
+
+  bool sweep(const Kind& kind, std::span<const std::uint32_t> steps, const std::function<bool()>& go_on);
+  Attempt& tried(const Kind& kind, std::span<const std::uint32_t> steps, std::size_t place);
+
+  std::uint64_t around_vertex(std::uint32_t vertex) const { return touched_[vertex]; }
+  bool relocation_wanted(std::uint32_t vertex) const;
+  void try_relocation(std::uint32_t vertex, Attempt& a) const;
+  bool find_move(std::uint32_t vertex, Attempt& a) const;
+  void relocate(std::uint32_t vertex, Attempt& a);
+
+  std::uint64_t around_edge(std::uint32_t edge) const;
+  std::uint64_t around_diagonals(std::uint32_t edge) const;
+  bool flip_wanted(std::uint32_t edge) const;
+  void try_flip(std::uint32_t edge, Attempt& a) const;
+  void flip(std::uint32_t edge, Attempt& a);
+
+  bool collapse_wanted(std::uint32_t edge) const;
+  void try_collapse(std::uint32_t edge, Attempt& a) const;
+  void collapse(std::uint32_t edge, Attempt& a);
+
+  void apply(Attempt& a);
 
   BoundedMesh& mesh_;
-  Change change_;
-  PositionFit fit_;
+  Team& team_;
+  std::vector<Attempt> attempts_;  ///< of the steps that come next, by place
   // Steps are counted; what failed is not tried again until a face around it has changed since.
   std::uint64_t clock_ = 1;
   std::vector<std::uint64_t> touched_;                          ///< per vertex: when a face around it changed last

@@ -147,14 +147,18 @@ TEST(Refinement, CornersOfAFaceKeepToOneSideOfASeam) {
 }
 
 TEST(Refinement, ThreadsDoNotChangeABit) {
-  const Case c = torus();
-  Options options = thorough();
-  options.threads = 1;
-  const DecimationResult one = run(c, options);
-  options.threads = 3;
-  const DecimationResult three = run(c, options);
-  EXPECT_EQ(one.vertices, three.vertices);
-  EXPECT_EQ(one.triangles, three.triangles);
+  for (const Case& c : {torus(), Case{shapes::stored(shapes::grid(20))}}) {
+    for (const bool two_sided : {true, false}) {
+      Options options = thorough();
+      options.two_sided = two_sided;
+      options.threads = 1;
+      const DecimationResult one = run(c, options);
+      options.threads = 3;
+      const DecimationResult three = run(c, options);
+      EXPECT_EQ(one.vertices, three.vertices);
+      EXPECT_EQ(one.triangles, three.triangles);
+    }
+  }
 }
 
 TEST(Refinement, TimeAndTargetEndIt) {
