@@ -3,7 +3,7 @@
 """Other people's decimation asked for the same tolerance on the same meshes, and judged by the same certified distances.
 
 /usr/bin/python3 benchmark/rivals.py MESH... [--tolerance 1% --tolerance 0.1%] [--only NAME...] [--again]
-    [--write FILE.md] [--picture FILE.png] [--json FILE]
+    [--write FILE.md] [--table NAME] [--picture FILE.png] [--json FILE]
 
 MESH: .obj, .ply or .stl, or scan: one made here, with the noise of a range camera (benchmark/scan.py). The tools are in
 benchmark/rival_tools.py, each with what its documentation says; in the versions of benchmark/rivals.txt they are installed from PyPI into build/rivals/venv, and CGAL's is built where libcgal-dev is installed.
@@ -303,6 +303,7 @@ def arguments(words):
     parser.add_argument("--only", nargs="+", choices=TOOLS, default=list(TOOLS), metavar="NAME", help=", ".join(TOOLS))
     parser.add_argument("--again", action="store_true", help="measure what is remembered as well")
     parser.add_argument("--write", metavar="FILE.md", help="put the table there")
+    parser.add_argument("--table", default="rivals", metavar="NAME", help="its name in FILE.md, default: %(default)s")
     parser.add_argument("--picture", metavar="FILE.png", help="draw triangles against seconds there")
     parser.add_argument("--json", metavar="FILE", help="write the figures there")
     parser.add_argument(
@@ -360,7 +361,7 @@ def main(options):
     if options.json:
         Path(options.json).write_text(json.dumps(figures, indent=1) + "\n")
     if options.write:
-        tables.write(options.write, "rivals", text(figures))
+        tables.write(options.write, options.table, text(figures))
     if options.picture:
         draw(figures["cases"], options.picture)
     return 0

@@ -102,6 +102,20 @@ def test_merged_makes_a_surface_of_a_soup():
     assert points.dtype == np.float32 and faces.dtype == np.int32
 
 
+def test_scan_is_open_noisy_and_the_same_every_time(tmp_path):
+    mesh = rivals.read_mesh("scan", tmp_path)
+    vertices, triangles = mesh.vertices, mesh.triangles
+    assert (vertices.dtype, triangles.dtype) == (np.float32, np.int32) and len(triangles) > 100_000
+    assert np.array_equal(np.unique(triangles), np.arange(len(vertices)))
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), 1)
+    uses = np.unique(edges, axis=0, return_counts=True)[1]
+    assert uses.max() == 2 and (uses == 1).sum() > 1000
+    again = rivals.read_mesh("scan", tmp_path)
+    assert mesh.digest() == again.digest()
+    result = rivals.tolvol.decimate(vertices, triangles, rivals.tolvol.ToleranceVolume(vertices, triangles, 0.04))
+    assert len(result.triangles) < 0.01 * len(triangles)
+
+
 def worker(tmp_path, name="ours"):
     """By this Python, which has the module under test alone."""
     return rival_worker.Worker(sys.executable, name, torus(), 1, tmp_path)
