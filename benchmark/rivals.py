@@ -6,7 +6,8 @@
     [--write FILE.md] [--table NAME] [--picture FILE.png] [--json FILE]
 
 MESH: .obj, .ply or .stl, or scan: one made here, with the noise of a range camera (benchmark/scan.py). The tools are in
-benchmark/rival_tools.py, each with what its documentation says; in the versions of benchmark/rivals.txt they are installed from PyPI into build/rivals/venv, and CGAL's is built where libcgal-dev is installed.
+benchmark/rival_tools.py, each with what its documentation says; in the versions of benchmark/rivals.txt they are installed from
+PyPI into build/rivals/venv, and CGAL's is built where libcgal-dev is installed.
 Each runs in a process of its own: seconds are those of its call alone, the best of three where one takes less than 5 s.
 Then its parameter is searched for the fewest triangles that keep both directions, unless one call takes more than 20 s.
 Results are kept in build/rivals/results and taken from there the next time; --again measures anew.
