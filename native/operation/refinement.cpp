@@ -19,13 +19,6 @@ constexpr std::size_t kAhead = 8;  // steps tried at once by several threads: st
 
 }  // namespace
 
-const Refinement::Kind Refinement::kRelocation{&Refinement::around_vertex, &Refinement::relocation_wanted,
-                                               &Refinement::try_relocation, &Refinement::relocate};
-const Refinement::Kind Refinement::kFlip{&Refinement::around_diagonals, &Refinement::flip_wanted, &Refinement::try_flip,
-                                         &Refinement::flip};
-const Refinement::Kind Refinement::kCollapse{&Refinement::around_edge, &Refinement::collapse_wanted,
-                                             &Refinement::try_collapse, &Refinement::collapse};
-
 Refinement::Refinement(BoundedMesh& mesh, Team& team)
     : mesh_(mesh),
       team_(team),

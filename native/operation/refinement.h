@@ -51,7 +51,6 @@ class Refinement {
     void (Refinement::*attempt)(std::uint32_t, Attempt&) const;
     void (Refinement::*carry_out)(std::uint32_t, Attempt&);
   };
-  static const Kind kRelocation, kFlip, kCollapse;
   static constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
 
   bool sweep(const Kind& kind, std::span<const std::uint32_t> steps, const std::function<bool()>& go_on);
@@ -74,6 +73,13 @@ class Refinement {
   void collapse(std::uint32_t edge, Attempt& a);
 
   void apply(Attempt& a);
+
+  static constexpr Kind kRelocation{&Refinement::around_vertex, &Refinement::relocation_wanted,
+                                    &Refinement::try_relocation, &Refinement::relocate};
+  static constexpr Kind kFlip{&Refinement::around_diagonals, &Refinement::flip_wanted, &Refinement::try_flip,
+                              &Refinement::flip};
+  static constexpr Kind kCollapse{&Refinement::around_edge, &Refinement::collapse_wanted, &Refinement::try_collapse,
+                                  &Refinement::collapse};
 
   BoundedMesh& mesh_;
   Team& team_;
