@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <vector>
 
 #include "operation/bounded_mesh.h"
@@ -50,6 +51,8 @@ class Change {
   const std::vector<Coverage::Element>& elements() const { return elements_; }
   const std::vector<Face>& faces() const { return faces_; }  ///< parallel to elements()
   const std::vector<Coverage::Removed>& removed() const { return removed_; }
+  /// The vertex that a collapse leaves or that a relocation moves; none of a flip.
+  std::optional<std::uint32_t> vertex() const { return kind_ == Kind::flip ? std::nullopt : std::optional(vertex_); }
   /// Starts a series of tries around one place. What it finds depends on nothing before.
   void begin() { suspect_ = 0, backward_.begin(), boundary_backward_.begin(); }
 

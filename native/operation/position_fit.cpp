@@ -88,7 +88,7 @@ void PositionFit::add_pieces(const Change& change, Sums& sums) const {
 
 /// Until a deviation is beyond the limit.
 void PositionFit::add_faces(const Change& change, double limit, Sums& sums) const {
-  for (std::size_t i = 0; i < faces_.size() && sums.largest2 <= limit * limit; ++i) {
+  for (std::size_t i = 0; i < faces_.size() && std::sqrt(sums.largest2) <= limit; ++i) {
     const WitnessTriangle& t = faces_[i];
     const glm::dvec3 corners[3] = {t.a, t.a + t.ab, t.a + t.ac};
     const Change::Face& face = change.faces()[i];

@@ -4,6 +4,7 @@
 #include "operation/refinement.h"
 
 #include <algorithm>
+#include <optional>
 
 namespace tolvol {
 namespace {
@@ -22,6 +23,7 @@ constexpr std::size_t kAhead = 8;  // steps tried at once by several threads: st
 Refinement::Refinement(BoundedMesh& mesh, Team& team)
     : mesh_(mesh),
       team_(team),
+      changed_(mesh.connectivity().n_vertices(), 1),
       touched_(mesh.connectivity().n_vertices(), 1),
       relocated_(mesh.connectivity().n_vertices(), 0),
       flipped_(mesh.connectivity().n_edges(), 0),
@@ -97,9 +99,16 @@ Refinement::Attempt& Refinement::tried(const Kind& kind, std::span<const std::ui
 void Refinement::apply(Attempt& a) {
   ++clock_;
   for (const Change::Face& face : a.change.faces()) {
-    for (const std::uint32_t v : face.vertices) touched_[v] = clock_;
+    for (const std::uint32_t v : face.vertices) touched_[v] = changed_[v] = clock_;
   }
   mesh_.apply(a.change);
+  // A vertex that stays where it was has another share, distance and boundary, though its other faces are the same.
+  const std::optional<std::uint32_t> kept = a.change.vertex();
+  if (!kept) return;
+  changed_[*kept] = clock_;
+  for (const auto v : mesh_.connectivity().vv_range(BoundedMesh::handle(*kept))) {
+    changed_[static_cast<std::size_t>(v.idx())] = clock_;
+  }
 }
 
 bool Refinement::relocation_wanted(std::uint32_t vertex) const {
@@ -139,24 +148,29 @@ void Refinement::relocate(std::uint32_t vertex, Attempt& a) {
   relocated_[vertex] = clock_;
 }
 
-std::uint64_t Refinement::around_edge(std::uint32_t edge) const {
+std::uint64_t Refinement::read_at_ends(std::uint32_t edge) const {
   const Halfedge h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
-  return std::max(touched_[mesh_.from(h)], touched_[mesh_.to(h)]);
+  return std::max(changed_[mesh_.from(h)], changed_[mesh_.to(h)]);
 }
 
 /// Of the other diagonal as well: an edge may have come there.
-std::uint64_t Refinement::around_diagonals(std::uint32_t edge) const {
+std::uint64_t Refinement::read_at_diagonals(std::uint32_t edge) const {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
-  std::uint64_t last = around_edge(edge);
+  std::uint64_t last = read_at_ends(edge);
   for (unsigned side = 0; side < 2; ++side) {
     const Halfedge h = connectivity.halfedge_handle(BoundedMesh::edge(edge), side);
-    if (!connectivity.is_boundary(h)) last = std::max(last, touched_[mesh_.to(connectivity.next_halfedge_handle(h))]);
+    if (!connectivity.is_boundary(h)) last = std::max(last, changed_[mesh_.to(connectivity.next_halfedge_handle(h))]);
   }
   return last;
 }
 
+std::uint64_t Refinement::touched_at_ends(std::uint32_t edge) const {
+  const Halfedge h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
+  return std::max(touched_[mesh_.from(h)], touched_[mesh_.to(h)]);
+}
+
 bool Refinement::flip_wanted(std::uint32_t edge) const {
-  return !mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted() && around_edge(edge) > flipped_[edge];
+  return !mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted() && touched_at_ends(edge) > flipped_[edge];
 }
 
 void Refinement::try_flip(std::uint32_t edge, Attempt& a) const {
@@ -175,7 +189,7 @@ void Refinement::flip(std::uint32_t edge, Attempt& a) {
 }
 
 bool Refinement::collapse_wanted(std::uint32_t edge) const {
-  return !mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted() && around_edge(edge) > collapsed_[edge];
+  return !mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted() && touched_at_ends(edge) > collapsed_[edge];
 }
 
 void Refinement::try_collapse(std::uint32_t edge, Attempt& a) const {

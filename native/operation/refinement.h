@@ -45,7 +45,7 @@ class Refinement {
   };
   /// A kind of step, of a vertex or an edge each.
   struct Kind {
-    /// When what a try reads has changed last.
+    /// When what a try reads changed last.
     std::uint64_t (Refinement::*read)(std::uint32_t) const;
     bool (Refinement::*wanted)(std::uint32_t) const;
     void (Refinement::*attempt)(std::uint32_t, Attempt&) const;
@@ -56,14 +56,15 @@ class Refinement {
   bool sweep(const Kind& kind, std::span<const std::uint32_t> steps, const std::function<bool()>& go_on);
   Attempt& tried(const Kind& kind, std::span<const std::uint32_t> steps, std::size_t place);
 
-  std::uint64_t around_vertex(std::uint32_t vertex) const { return touched_[vertex]; }
+  std::uint64_t read_at(std::uint32_t vertex) const { return changed_[vertex]; }
   bool relocation_wanted(std::uint32_t vertex) const;
   void try_relocation(std::uint32_t vertex, Attempt& a) const;
   bool find_move(std::uint32_t vertex, Attempt& a) const;
   void relocate(std::uint32_t vertex, Attempt& a);
 
-  std::uint64_t around_edge(std::uint32_t edge) const;
-  std::uint64_t around_diagonals(std::uint32_t edge) const;
+  std::uint64_t read_at_ends(std::uint32_t edge) const;
+  std::uint64_t read_at_diagonals(std::uint32_t edge) const;
+  std::uint64_t touched_at_ends(std::uint32_t edge) const;
   bool flip_wanted(std::uint32_t edge) const;
   void try_flip(std::uint32_t edge, Attempt& a) const;
   void flip(std::uint32_t edge, Attempt& a);
@@ -74,11 +75,11 @@ class Refinement {
 
   void apply(Attempt& a);
 
-  static constexpr Kind kRelocation{&Refinement::around_vertex, &Refinement::relocation_wanted,
-                                    &Refinement::try_relocation, &Refinement::relocate};
-  static constexpr Kind kFlip{&Refinement::around_diagonals, &Refinement::flip_wanted, &Refinement::try_flip,
+  static constexpr Kind kRelocation{&Refinement::read_at, &Refinement::relocation_wanted, &Refinement::try_relocation,
+                                    &Refinement::relocate};
+  static constexpr Kind kFlip{&Refinement::read_at_diagonals, &Refinement::flip_wanted, &Refinement::try_flip,
                               &Refinement::flip};
-  static constexpr Kind kCollapse{&Refinement::around_edge, &Refinement::collapse_wanted, &Refinement::try_collapse,
+  static constexpr Kind kCollapse{&Refinement::read_at_ends, &Refinement::collapse_wanted, &Refinement::try_collapse,
                                   &Refinement::collapse};
 
   BoundedMesh& mesh_;
@@ -86,6 +87,9 @@ class Refinement {
   std::vector<Attempt> attempts_;  ///< of the steps that come next, by place
   // Steps are counted; what failed is not tried again until a face around it has changed since.
   std::uint64_t clock_ = 1;
+  /// Per vertex: when a face around it changed last, or what is known of a vertex of one: what was found there no
+  /// longer holds, though a step that failed would fail again.
+  std::vector<std::uint64_t> changed_;
   std::vector<std::uint64_t> touched_;                          ///< per vertex: when a face around it changed last
   std::vector<std::uint64_t> relocated_, flipped_, collapsed_;  ///< per vertex, edge, edge: when it was tried last
 };

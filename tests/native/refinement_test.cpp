@@ -148,16 +148,60 @@ TEST(Refinement, CornersOfAFaceKeepToOneSideOfASeam) {
 
 TEST(Refinement, ThreadsDoNotChangeABit) {
   for (const Case& c : {torus(), Case{shapes::stored(shapes::grid(20))}}) {
+    std::vector<double> shares(c.mesh.vertices.size(), 1);
+    const auto locked = std::make_unique<bool[]>(shares.size());
+    for (std::size_t v = 0; v < shares.size(); v += 7) shares[v] = 0.5, locked[v] = v % 2 == 0;
     for (const bool two_sided : {true, false}) {
-      Options options = thorough();
-      options.two_sided = two_sided;
-      options.threads = 1;
-      const DecimationResult one = run(c, options);
-      options.threads = 3;
-      const DecimationResult three = run(c, options);
-      EXPECT_EQ(one.vertices, three.vertices);
-      EXPECT_EQ(one.triangles, three.triangles);
+      for (const auto vertices : {Options::Vertices::optimal, Options::Vertices::subset}) {
+        for (const bool bound : {true, false}) {
+          Options options = thorough();
+          options.two_sided = two_sided, options.vertices = vertices;
+          if (bound) options.shares = shares, options.locked = {locked.get(), shares.size()};
+          options.threads = 1;
+          const DecimationResult one = run(c, options);
+          options.threads = 3;
+          const DecimationResult three = run(c, options);
+          EXPECT_EQ(one.vertices, three.vertices);
+          EXPECT_EQ(one.triangles, three.triangles);
+        }
+      }
     }
+  }
+}
+
+// A vertex into which another merges stays where it is and has a smaller share from then on; so have faces around it
+// that the collapse does not touch. Two fans, at (3, 0) and (-3.5, -0.28), meet in the first vertex.
+TEST(Refinement, WhatIsTriedAheadKnowsWhatAVertexThatStaysMayStillUse) {
+  TriangleMesh fans;
+  fans.vertices = {{0, 0, 0},         {-0.1, -0.0757, 0},  {6.1, -0.0043, 0},    {6.1, 0.0043, 0},
+                   {-0.1, 0.0757, 0}, {3, 0, 0.3},         {-7, -0.2, 0},        {-7, -0.36, 0},
+                   {0, -0.56, 0},     {-3.5, -0.28, 0.95}, {-0.505, -0.28, -0.2}};
+  const auto fan = [&](std::uint32_t middle, const std::vector<std::uint32_t>& rim) {
+    for (std::size_t i = 0; i < rim.size(); ++i) fans.triangles.emplace_back(middle, rim[i], rim[(i + 1) % rim.size()]);
+  };
+  fan(5, {1, 2, 3, 4, 0}), fan(9, {0, 6, 7, 8, 10});
+  fans.triangles.emplace_back(0, 10, 1);
+  const std::size_t triangles = fans.triangles.size();
+  // Aside, so that the mesh has steps enough to be tried at once.
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    const double x = 10.0 + i;
+    const auto n = static_cast<std::uint32_t>(fans.vertices.size());
+    fans.vertices.insert(fans.vertices.end(), {{x, 10, 0}, {x + 0.5, 10, 0}, {x, 10.5, 0}});
+    fans.triangles.emplace_back(n, n + 1, n + 2);
+  }
+  const TriangleMesh reference{{{-20, -20, 0}, {20, -20, 0}, {20, 20, 0}, {-20, 20, 0}}, {{0, 1, 2}, {0, 2, 3}}};
+  const Placement placement(glm::dmat4(1), Storage::float64);
+  const ToleranceVolume volume(reference.vertices, reference.triangles, placement, 1.0);
+  std::vector<double> shares(fans.vertices.size(), 1);
+  shares[5] = 0.17;
+  const auto locked = std::make_unique<bool[]>(shares.size());
+  for (std::size_t v = 0; v < shares.size(); ++v) locked[v] = v != 5 && v != 9;
+  Options options = thorough();
+  options.two_sided = false, options.shares = shares, options.locked = {locked.get(), shares.size()};
+  for (const unsigned threads : {1u, 2u, 4u}) {
+    options.threads = threads;
+    const DecimationResult r = decimate(fans.vertices, fans.triangles, placement, &volume, options);
+    EXPECT_EQ(r.triangles.size(), triangles - 2 + 3) << threads << " threads";
   }
 }
 
