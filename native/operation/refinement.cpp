@@ -148,9 +148,9 @@ void Refinement::relocate(std::uint32_t vertex, Attempt& a) {
   relocated_[vertex] = clock_;
 }
 
-std::uint64_t Refinement::read_at_ends(std::uint32_t edge) const {
+std::uint64_t Refinement::at_ends(const std::vector<std::uint64_t>& times, std::uint32_t edge) const {
   const Halfedge h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
-  return std::max(changed_[mesh_.from(h)], changed_[mesh_.to(h)]);
+  return std::max(times[mesh_.from(h)], times[mesh_.to(h)]);
 }
 
 /// Of the other diagonal as well: an edge may have come there.
@@ -164,13 +164,8 @@ std::uint64_t Refinement::read_at_diagonals(std::uint32_t edge) const {
   return last;
 }
 
-std::uint64_t Refinement::touched_at_ends(std::uint32_t edge) const {
-  const Halfedge h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
-  return std::max(touched_[mesh_.from(h)], touched_[mesh_.to(h)]);
-}
-
 bool Refinement::flip_wanted(std::uint32_t edge) const {
-  return !mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted() && touched_at_ends(edge) > flipped_[edge];
+  return !mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted() && at_ends(touched_, edge) > flipped_[edge];
 }
 
 void Refinement::try_flip(std::uint32_t edge, Attempt& a) const {
@@ -189,7 +184,7 @@ void Refinement::flip(std::uint32_t edge, Attempt& a) {
 }
 
 bool Refinement::collapse_wanted(std::uint32_t edge) const {
-  return !mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted() && touched_at_ends(edge) > collapsed_[edge];
+  return !mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted() && at_ends(touched_, edge) > collapsed_[edge];
 }
 
 void Refinement::try_collapse(std::uint32_t edge, Attempt& a) const {

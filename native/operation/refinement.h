@@ -3,8 +3,8 @@
 /// makes room for further collapses, round after round until one brings nothing. Every step keeps the bounds.
 ///
 /// Steps are tried in a fixed order. With several threads the next few are tried ahead, all at once; what was found is
-/// used when its turn comes, unless a face around it has changed meanwhile: the result is the same for any number of
-/// threads.
+/// used when its turn comes, unless something that the try read has changed meanwhile: the result is the same for any
+/// number of threads.
 #pragma once
 
 #include <cstddef>
@@ -62,9 +62,10 @@ class Refinement {
   bool find_move(std::uint32_t vertex, Attempt& a) const;
   void relocate(std::uint32_t vertex, Attempt& a);
 
-  std::uint64_t read_at_ends(std::uint32_t edge) const;
+  /// The later of an edge's two ends.
+  std::uint64_t at_ends(const std::vector<std::uint64_t>& times, std::uint32_t edge) const;
+  std::uint64_t read_at_ends(std::uint32_t edge) const { return at_ends(changed_, edge); }
   std::uint64_t read_at_diagonals(std::uint32_t edge) const;
-  std::uint64_t touched_at_ends(std::uint32_t edge) const;
   bool flip_wanted(std::uint32_t edge) const;
   void try_flip(std::uint32_t edge, Attempt& a) const;
   void flip(std::uint32_t edge, Attempt& a);
