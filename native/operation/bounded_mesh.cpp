@@ -100,8 +100,9 @@ BoundedMesh::Merge BoundedMesh::merge(Edge e) const {
 }
 
 void BoundedMesh::apply(Change& change) {
+  const bool proved = change.proof_ == Change::Proof::now;
   if (bounds_.rival) bounds_.rival->commit();
-  if (bounds_.backward) bounds_.backward->commit(change.backward_);
+  if (bounds_.backward && proved) bounds_.backward->commit(change.backward_);
   if (!change.boundary_elements_.empty()) bounds_.boundary_backward->commit(change.boundary_backward_);
   for (const Change::NewWedge& n : change.new_wedges_) {
     wedges_[n.triangle][n.corner] = n.gained.wedge;
@@ -111,7 +112,7 @@ void BoundedMesh::apply(Change& change) {
     const Change::Face& face = change.faces_[i];
     const std::uint32_t id = change.elements_[i].id;
     triangles_[id] = {face.vertices[0], face.vertices[1], face.vertices[2]};
-    if (bounds_.forward) face_distance_[id] = face.distance;
+    if (bounds_.forward && proved) face_distance_[id] = face.distance;
   }
   if (change.kind_ == Change::Kind::flip) {
     mesh_.flip(change.edge_);

@@ -95,11 +95,13 @@ class BoundedMesh {
   /// Whether a vertex may move by itself.
   bool movable(std::uint32_t vertex) const { return !subset_ && !pinned_[vertex] && !seam_[vertex]; }
 
-  /// Carries out a change whose last try succeeded on this mesh as it is.
+  /// Carries out a change whose last try succeeded on this mesh as it is. What is to be proved later then is, by a
+  /// DeferredProof.
   void apply(Change& change);
 
  private:
   friend class Change;
+  friend class DeferredProof;
 
   void build(bool on_reference);
   int rank(std::uint32_t vertex) const;

@@ -35,7 +35,9 @@ Change::Outcome Change::try_relocate(std::uint32_t vertex, const Spot& spot) {
 Change::Outcome Change::try_flip(Edge e) { return prepare_flip(e) ? check() : Outcome::impossible; }
 
 Change::Outcome Change::check() {
-  return !folds_over() && within_bounds() && boundary_within_bounds() ? Outcome::possible : Outcome::refused;
+  const bool kept =
+      !folds_over() && (proof_ == Proof::later ? vertex_within() : within_bounds() && boundary_within_bounds());
+  return kept ? Outcome::possible : Outcome::refused;
 }
 
 void Change::clear(Kind kind, const Spot& spot) {
@@ -284,14 +286,17 @@ bool Change::is_large(const Coverage::Element& e) const {
   return longest_squared({{e.corners[0], e.corners[1], e.corners[2]}}) > limit * limit;
 }
 
+bool Change::vertex_within() {
+  const TriangleCertificate& forward = *mesh_->bounds().forward;
+  new_distance_ = forward.distance_bound(spot_.position);
+  return new_distance_ <= share_ * forward.within();
+}
+
 bool Change::within_bounds() {
   const Bounds& bounds = mesh_->bounds();
   if (bounds.rival) return bounds.rival->accepts(elements_, removed_);
   if (bounds.forward) {
-    if (kind_ != Kind::flip) {
-      new_distance_ = bounds.forward->distance_bound(spot_.position);
-      if (!(new_distance_ <= share_ * bounds.forward->within())) return false;
-    }
+    if (kind_ != Kind::flip && !vertex_within()) return false;
     const auto& distance = mesh_->distance_;
     predecessors_.clear();
     // Before anything is proved in vain.

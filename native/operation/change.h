@@ -31,8 +31,12 @@ class Change {
     double distance;  ///< upper bound on the distance of its points to the reference
   };
 
+  /// Whether check() looks for the proofs of all bounds, or leaves them to a DeferredProof and asks only where the
+  /// vertex is.
+  enum class Proof { now, later };
+
   /// Keeps a reference to `mesh`.
-  explicit Change(const BoundedMesh& mesh) : mesh_(&mesh) {}
+  explicit Change(const BoundedMesh& mesh, Proof proof = Proof::now) : mesh_(&mesh), proof_(proof) {}
 
   /// The start of `h` merges into its end, which goes to `spot`.
   Outcome try_collapse(Halfedge h, const Spot& spot);
@@ -48,6 +52,7 @@ class Change {
   bool prepare_flip(Edge e);
   Outcome check();
 
+  Proof proof() const { return proof_; }
   const std::vector<Coverage::Element>& elements() const { return elements_; }
   const std::vector<Face>& faces() const { return faces_; }  ///< parallel to elements()
   const std::vector<Coverage::Removed>& removed() const { return removed_; }
@@ -78,12 +83,14 @@ class Change {
   bool folds_over() const;
   void gather_predecessors();
   bool is_large(const Coverage::Element& e) const;
+  bool vertex_within();
   bool within_bounds();
   bool boundary_within_bounds();
   void boundary_of_collapse();
   void boundary_of_relocation();
 
   const BoundedMesh* mesh_;
+  Proof proof_;
   Kind kind_ = Kind::collapse;
   Halfedge halfedge_;
   Edge edge_;

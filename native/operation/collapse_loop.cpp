@@ -19,14 +19,15 @@ CollapseLoop::Shared::Shared(EdgeCollapse& c)
       stamps(c.mesh().connectivity().n_edges(), 0),
       refused(stamps.size()) {}
 
-CollapseLoop::CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t region)
+CollapseLoop::CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t region, DeferredProof* later)
     : shared_(shared),
       collapse_(shared.collapse),
       mesh_(collapse_.mesh()),
       regions_(&regions),
       region_(region),
+      later_(later),
       queue_(shared.stamps) {
-  attempts_.emplace_back(mesh_);
+  attempts_.emplace_back(mesh_, later ? Change::Proof::later : Change::Proof::now);
 }
 
 CollapseLoop::CollapseLoop(Shared& shared, Team& team)
@@ -111,8 +112,9 @@ CollapseLoop::Attempt& CollapseLoop::try_ahead(std::uint32_t edge) {
 void CollapseLoop::carry_out(Attempt& a) {
   const std::uint32_t edge = std::exchange(a.edge, kNoEdge);
   if (a.outcome == EdgeCollapse::Outcome::possible) {
+    if (later_) later_->note(a.change);
     renew_around(collapse_.carry_out(a));
-  } else if (a.outcome == EdgeCollapse::Outcome::refused) {
+  } else if (a.outcome == EdgeCollapse::Outcome::refused && !later_) {
     shared_.refused[edge].store(true, std::memory_order_relaxed);
   }
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "operation/collapse_queue.h"
+#include "operation/deferred_proof.h"
 #include "operation/edge_collapse.h"
 #include "operation/regions.h"
 #include "reference/parallel.h"
@@ -28,8 +29,8 @@ class CollapseLoop {
     std::vector<std::uint32_t> stamps;       ///< per edge, of the queues
     std::vector<std::atomic<bool>> refused;  ///< per edge: it failed a bound and waits for its neighbourhood to change
   };
-  /// Over one region.
-  CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t region);
+  /// Over one region; what is collapsed is noted in `later`, if that is not null, instead of being proved.
+  CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t region, DeferredProof* later);
   /// Over the whole mesh, on the threads of `team`.
   CollapseLoop(Shared& shared, Team& team);
 
@@ -63,6 +64,7 @@ class CollapseLoop {
   const BoundedMesh& mesh_;
   const Regions* regions_ = nullptr;  ///< null: the whole
   std::uint32_t region_ = 0;
+  DeferredProof* later_ = nullptr;
   Team* team_ = nullptr;  ///< where there are others than the caller
   CollapseQueue queue_;
   std::vector<Attempt> attempts_;

@@ -4,10 +4,12 @@
 #include "operation/collapse_rounds.h"
 
 #include <algorithm>
+#include <atomic>
 #include <iterator>
 #include <vector>
 
 #include "operation/collapse_loop.h"
+#include "operation/deferred_proof.h"
 #include "operation/edge_collapse.h"
 #include "operation/regions.h"
 #include "reference/parallel.h"
@@ -18,8 +20,9 @@ namespace {
 constexpr std::size_t kMostVertices = 4096;   // of a region
 constexpr std::size_t kLeastRegions = 12;     // for as many threads
 constexpr std::size_t kLeastVertices = 1024;  // a mesh of fewer is not cut: rims would be much of it
-constexpr double kRoundShare = 0.8;           // of the edges that the first of a round may collapse
+constexpr double kRoundShare = 0.9;           // of the edges that the first of a round may collapse
 constexpr double kLeastGain = 0.1;            // of the triangles: after a round that removes fewer there is no other
+constexpr double kMostTakenBack = 0.25;       // of the regions: after such a round each collapse is proved at once
 
 class Rounds {
  public:
@@ -29,11 +32,13 @@ class Rounds {
         collapse_(mesh),
         shared_(collapse_),
         costs_(mesh.connectivity().n_edges()),
+        places_(mesh.bounds().forward ? mesh.connectivity().n_faces() : 0),
         progress_(progress) {
     if (progress) progress->begin("decimating");
   }
 
   void by_regions() {
+    bool on_trust = mesh_.bounds().forward;
     for (int round = 0;; ++round) {
       const std::size_t triangles = mesh_.triangle_count(), vertices = triangles / 2;
       if (vertices < kLeastVertices) return;
@@ -42,12 +47,26 @@ class Rounds {
       // Every other time the rims come to lie elsewhere.
       const Regions parts =
           regions(mesh_, std::min(kMostVertices, vertices / kLeastRegions), round % 2 == 0 ? 0.5 : 0.35);
-      const std::vector<std::vector<std::uint32_t>> edges = edges_of(parts);
+      const std::vector<Members> members = members_of(parts);
+      std::atomic<std::size_t> taken_back = 0;
       team_.run(parts.count, 1, [&](std::size_t i, std::size_t) {
-        CollapseLoop loop(shared_, parts, static_cast<std::uint32_t>(i));
-        for (const std::uint32_t e : edges[i]) loop.add(e, costs_[e]);
-        loop.run({limit, 0}, progress_);
+        const auto work = [&](DeferredProof* later) {
+          CollapseLoop loop(shared_, parts, static_cast<std::uint32_t>(i), later);
+          for (const std::uint32_t e : members[i].edges) loop.add(e, costs_[e]);
+          loop.run({limit, 0}, progress_);
+        };
+        if (on_trust) {
+          DeferredProof later(collapse_, mesh_, members[i].vertices, members[i].faces, places_);
+          if (later.possible()) {
+            work(&later);
+            if (later.holds()) return;
+            later.take_back();
+            ++taken_back;
+          }
+        }
+        work(nullptr);
       });
+      on_trust = on_trust && static_cast<double>(taken_back) <= kMostTakenBack * static_cast<double>(parts.count);
       const double left = static_cast<double>(mesh_.triangle_count()) / static_cast<double>(triangles);
       if (left > 1 - kLeastGain) return;
     }
@@ -82,12 +101,27 @@ class Rounds {
     return *at;
   }
 
-  std::vector<std::vector<std::uint32_t>> edges_of(const Regions& parts) const {
-    std::vector<std::vector<std::uint32_t>> out(parts.count);
+  struct Members {
+    std::vector<std::uint32_t> edges;  ///< that can collapse
+    std::vector<std::uint32_t> vertices;
+    std::vector<std::uint32_t> faces;  ///< around them
+  };
+
+  std::vector<Members> members_of(const Regions& parts) const {
+    std::vector<Members> out(parts.count);
     for (std::uint32_t e = 0; e < costs_.size(); ++e) {
       if (!(costs_[e] < EdgeCollapse::kNever)) continue;
       const std::uint32_t part = parts.of_edge(mesh_, e);
-      if (part != Regions::kNone) out[part].push_back(e);
+      if (part != Regions::kNone) out[part].edges.push_back(e);
+    }
+    for (std::uint32_t v = 0; v < parts.of_vertex.size(); ++v) {
+      if (parts.of_vertex[v] != Regions::kNone) out[parts.of_vertex[v]].vertices.push_back(v);
+    }
+    for (std::uint32_t f = 0; f < mesh_.connectivity().n_faces(); ++f) {
+      if (!mesh_.alive(f)) continue;
+      const glm::uvec3& t = mesh_.triangle(f);
+      const std::uint32_t part = std::min({parts.of_vertex[t.x], parts.of_vertex[t.y], parts.of_vertex[t.z]});
+      if (part != Regions::kNone) out[part].faces.push_back(f);
     }
     return out;
   }
@@ -97,6 +131,7 @@ class Rounds {
   EdgeCollapse collapse_;
   CollapseLoop::Shared shared_;
   std::vector<double> costs_;
+  std::vector<std::uint32_t> places_;  ///< per face, for the deferred proofs of the region that it is in
   Progress* progress_;
 };
 

@@ -90,17 +90,18 @@ void Coverage::sample(std::uint32_t element, std::size_t stride, std::vector<Sam
 
 bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const {
   trial.stack_.assign(1, whole);
+  if (trial.hierarchy_) trial.looked_ = 0;  // they are many changes at once
   while (!trial.stack_.empty()) {
     if (trial.stack_.size() > 1 && ++trial.looked_ > kBudget) return false;
     const Part piece = trial.stack_.back();
     trial.stack_.pop_back();
     const FourPoints points = with_centre(piece);
     double centre2 = std::numeric_limits<double>::infinity();
-    const WitnessTriangle* below = nullptr;
+    std::uint32_t below = first;
     const auto covered_by = [&](std::uint32_t i) {
       double d2[4];
       witness_distances(trial.candidates_[i].witness, points, d2);
-      if (d2[3] < centre2) centre2 = d2[3], below = &trial.candidates_[i].witness;
+      if (d2[3] < centre2) centre2 = d2[3], below = i;
       // Written so that NaN is not covered.
       if (d2[0] <= within2_ && d2[1] <= within2_ && d2[2] <= within2_) {
         trial.candidates_[i].distance =
@@ -115,23 +116,32 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
     const std::uint32_t second = trial.last_;
     if (covered_by(first) || (second != first && covered_by(second))) continue;
     bool covered = false;
-    for (std::uint32_t i = 0; i < trial.candidates_.size() && !covered; ++i) {
-      if (i != first && i != second) covered = covered_by(i);
+    if (trial.hierarchy_) {
+      const glm::dvec3 centre(points.x[3], points.y[3], points.z[3]);
+      const Hierarchy::Nearest nearest = trial.hierarchy_->nearest(centre, within_, below);
+      covered = nearest.triangle != Hierarchy::kNone && covered_by(nearest.triangle);
+    } else {
+      for (std::uint32_t i = 0; i < trial.candidates_.size() && !covered; ++i) {
+        if (i != first && i != second) covered = covered_by(i);
+      }
     }
     if (covered) continue;
     if (!(centre2 <= within2_) || longest_squared(piece) <= kFloor * kFloor * within2_ || piece.cuts == kMostCuts) {
       return false;
     }
-    if (!cut(piece, *below, kWorthCutting * within_, trial.stack_)) split(piece, trial.stack_);
+    if (!cut(piece, trial.candidates_[below].witness, kWorthCutting * within_, trial.stack_))
+      split(piece, trial.stack_);
   }
   return true;
 }
 
-bool Coverage::try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial) const {
+bool Coverage::try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial,
+                          const Hierarchy* hierarchy) const {
   trial.candidates_.clear();
   trial.heirlooms_.clear();
   trial.moved_.clear();
   trial.last_ = 0;
+  trial.hierarchy_ = hierarchy;
   trial.looked_ = 0;
   bool settled = true;
   for (const Element& e : elements) {

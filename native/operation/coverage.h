@@ -61,8 +61,9 @@ class Coverage {
 
   class Trial;
   /// Whether all pieces of the elements named have witnesses among `elements`; only reads. Nothing changes until
-  /// commit().
-  bool try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial) const;
+  /// commit(). `hierarchy`: of the elements, where there are too many to look at each.
+  bool try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial,
+                  const Hierarchy* hierarchy = nullptr) const;
   /// Carries out the last change tried, which must have succeeded on this state.
   void commit(const Trial& trial);
 
@@ -121,6 +122,7 @@ class Coverage::Trial {
   std::vector<Heirloom> heirlooms_;
   std::vector<Moved> moved_;
   std::vector<Part> stack_;
+  const Hierarchy* hierarchy_ = nullptr;
   std::size_t looked_ = 0;     ///< pieces looked at in this change
   std::uint32_t last_ = 0;     ///< the candidate that took the last piece
   std::uint32_t suspect_ = 0;  ///< the one whose pieces failed last: tried first, to be refused soon

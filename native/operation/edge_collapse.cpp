@@ -103,7 +103,8 @@ void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
     const Outcome second = a.change.try_collapse(other, mesh_.spot(mesh_.from(h)));
     if (second == Outcome::possible) a.halfedge = other;
     a.outcome = std::max(a.outcome, second);
-  } else if (a.outcome == Outcome::refused && p->freedom == Freedom::anywhere) {
+  } else if (a.outcome == Outcome::refused && p->freedom == Freedom::anywhere &&
+             a.change.proof() == Change::Proof::now) {
     a.outcome = search(a, p->position);
   }
 }

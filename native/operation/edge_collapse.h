@@ -34,7 +34,8 @@ class EdgeCollapse {
 
   /// What came of trying an edge, and the scratch of it: one a thread.
   struct Attempt {
-    explicit Attempt(const BoundedMesh& mesh) : change(mesh), fit(mesh) {}
+    explicit Attempt(const BoundedMesh& mesh, Change::Proof proof = Change::Proof::now)
+        : change(mesh, proof), fit(mesh) {}
     Outcome outcome = Outcome::impossible;
     Halfedge halfedge;  ///< whose start would merge into its end
     Change change;
@@ -44,6 +45,10 @@ class EdgeCollapse {
   void attempt(std::uint32_t edge, Attempt& a) const;
   /// Carries out an attempt that is possible on the mesh as it is. Returns the vertex that stays.
   std::uint32_t carry_out(Attempt& a);
+
+  const Quadric& quadric(std::uint32_t vertex) const { return quadrics_[vertex]; }
+  /// Where collapses are taken back.
+  void set_quadric(std::uint32_t vertex, const Quadric& quadric) { quadrics_[vertex] = quadric; }
 
  private:
   using Freedom = BoundedMesh::Freedom;
