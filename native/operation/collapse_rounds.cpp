@@ -23,6 +23,9 @@ constexpr std::size_t kLeastVertices = 1024;  // a mesh of fewer is not cut: rim
 constexpr double kRoundShare = 0.9;           // of the edges that the first of a round may collapse
 constexpr double kLeastGain = 0.1;            // of the triangles: after a round that removes fewer there is no other
 constexpr double kMostTakenBack = 0.25;       // of the regions: after such a round each collapse is proved at once
+/// Of the fourth power of the tolerance, which has the costs' unit: up to here hardly a collapse is refused, and a
+/// round on trust goes on.
+constexpr double kTrustedCost = 1;
 
 class Rounds {
  public:
@@ -43,7 +46,7 @@ class Rounds {
       const std::size_t triangles = mesh_.triangle_count(), vertices = triangles / 2;
       if (vertices < kLeastVertices) return;
       price();
-      const double limit = cost_at(kRoundShare);
+      const double limit = std::max(cost_at(kRoundShare), on_trust ? trusted_cost() : 0);
       // Every other time the rims come to lie elsewhere.
       const Regions parts =
           regions(mesh_, std::min(kMostVertices, vertices / kLeastRegions), round % 2 == 0 ? 0.5 : 0.35);
@@ -99,6 +102,11 @@ class Rounds {
     const auto at = finite.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(finite.size() - 1));
     std::nth_element(finite.begin(), at, finite.end());
     return *at;
+  }
+
+  double trusted_cost() const {
+    const double within = mesh_.bounds().forward->within();
+    return kTrustedCost * within * within * within * within;
   }
 
   struct Members {

@@ -30,7 +30,7 @@ void DeferredProof::save_face(std::uint32_t f) {
   const Kernel& kernel = mesh_.mesh_;
   const bool wedges = !mesh_.wedges_.empty();
   saved_faces_.push_back({mesh_.triangles_[f], wedges ? mesh_.wedges_[f] : glm::uvec3(0), mesh_.corner_source_[f],
-                          kernel.face(BoundedMesh::face(f))});
+                          mesh_.face_distance_[f], kernel.face(BoundedMesh::face(f))});
   for (const auto h : kernel.fh_range(BoundedMesh::face(f))) {
     const BoundedMesh::Vertex from = kernel.from_vertex_handle(h);
     const BoundedMesh::Halfedge opposite = kernel.opposite_halfedge_handle(h);
@@ -119,6 +119,7 @@ void DeferredProof::take_back() {
     kernel.status(BoundedMesh::face(f)).set_deleted(false);
     mesh_.triangles_[f] = s.triangle;
     mesh_.corner_source_[f] = s.corner_source;
+    mesh_.face_distance_[f] = s.distance;
     if (!mesh_.wedges_.empty()) mesh_.wedges_[f] = s.wedges;
   }
   for (std::size_t i = 0; i < vertices_.size(); ++i) {

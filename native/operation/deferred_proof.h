@@ -45,6 +45,7 @@ class DeferredProof {
   };
   struct SavedFace {
     glm::uvec3 triangle, wedges, corner_source;
+    double distance;
     Kernel::Face kernel;
   };
   struct SavedHalfedge {
