@@ -70,6 +70,12 @@ class BoundedMesh {
   Spot store(const glm::dvec3& position) const { return store_(position); }
   /// Whether the vertex left its original position.
   bool moved(std::uint32_t vertex) const { return moved_[vertex] != 0; }
+  /// Upper bounds on the distance to the reference, where there is a forward bound to keep: of a vertex, and of all
+  /// points of a face (infinite where none is known).
+  double distance(std::uint32_t vertex) const { return distance_[vertex]; }
+  double face_distance(std::uint32_t triangle) const { return face_distance_[triangle]; }
+  /// Of the forward bound, what new faces around the vertex may use.
+  double share(std::uint32_t vertex) const { return shares_.empty() ? 1 : shares_[vertex]; }
   bool on_boundary(std::uint32_t vertex) const { return mesh_.is_boundary(handle(vertex)); }
   /// Whether vertices of the kernel are one vertex of the result: what one may do then depends on where the others are.
   bool has_copies() const { return !copies_.empty(); }
@@ -105,7 +111,6 @@ class BoundedMesh {
 
   void build(bool on_reference);
   int rank(std::uint32_t vertex) const;
-  double share(std::uint32_t vertex) const { return shares_.empty() ? 1 : shares_[vertex]; }
   bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
 
   OpenMesh::TriConnectivity mesh_;
@@ -119,8 +124,7 @@ class BoundedMesh {
   std::vector<double> shares_;
   std::vector<std::uint32_t> slots_;
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> copies_;  ///< by slot, where there are several
-  std::vector<double> distance_;       ///< upper bound on each vertex's distance to the reference
-  std::vector<double> face_distance_;  ///< the same for every point of a face
+  std::vector<double> distance_, face_distance_;
   std::vector<glm::uvec3> wedges_, corner_source_;
   mutable std::vector<std::uint32_t> merged_into_;
   std::atomic<std::size_t> triangle_count_ = 0;

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "operation/deferred_proof.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <optional>
+
+#include "check/certificate.h"
+#include "measure/hausdorff.h"
+#include "operation/collapse_loop.h"
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+/// A mesh that is its own reference, with seams across it, and the regions that it is cut into.
+struct Worked {
+  explicit Worked(double tolerance) {
+    reference = shapes::grid(60);
+    for (dvec3& p : reference.vertices) p.z = 0.05 * std::sin(9 * p.x) * std::cos(7 * p.y);
+    volume.emplace(reference.vertices, reference.triangles, Placement(glm::dmat4(1), Storage::float64), tolerance,
+                   ToleranceVolume::Options{.precision = 2});
+    placement = Placement(glm::dmat4(1), Storage::float64).in(volume->frame());
+    const double within = volume->frame_tolerance() * (1 - 1e-9);
+    certificate.emplace(volume->witnesses(), volume->grid(), volume->hierarchy(), within, within);
+    coverage.emplace(volume->reference(), within, reference.triangles.size());
+    for (std::uint32_t i = 0; i < reference.triangles.size(); ++i) coverage->own(i, i);
+    BoundedMeshInput input;
+    input.triangles = reference.triangles;
+    for (std::uint32_t v = 0; v < reference.vertices.size(); ++v) {
+      input.spots.push_back({reference.vertices[v], placement->frame(reference.vertices[v])});
+      input.slots.push_back(v);
+      input.shares.push_back(v % 5 == 0 ? 0.5 : 1);
+    }
+    for (const glm::uvec3& t : reference.triangles) {
+      const dvec3 centre = (reference.vertices[t.x] + reference.vertices[t.y] + reference.vertices[t.z]) / 3.0;
+      input.wedges.push_back(t + glm::uvec3(centre.x > 0.5 ? std::uint32_t(reference.vertices.size()) : 0));
+    }
+    input.pinned.assign(reference.vertices.size(), false);
+    input.pinned[40] = true;
+    input.on_reference = true;
+    input.store = [this](const dvec3& p) {
+      const dvec3 stored = placement->store(p);
+      return Spot{stored, placement->frame(stored)};
+    };
+    Bounds bounds;
+    bounds.forward = &*certificate, bounds.backward = &*coverage;
+    mesh.emplace(std::move(input), bounds);
+    collapse.emplace(*mesh);
+    shared.emplace(*collapse);
+    parts = regions(*mesh, 1200, 0.5);
+    members_of_first();
+    places.resize(reference.triangles.size());
+  }
+
+  void members_of_first() {
+    for (std::uint32_t v = 0; v < parts.of_vertex.size(); ++v) {
+      if (parts.of_vertex[v] == 0) vertices.push_back(v);
+    }
+    for (std::uint32_t f = 0; f < reference.triangles.size(); ++f) {
+      const glm::uvec3& t = reference.triangles[f];
+      for (int k = 0; k < 3; ++k) {
+        if (parts.of_vertex[t[k]] != 0) continue;
+        faces.push_back(f);
+        break;
+      }
+    }
+  }
+
+  /// Collapses the first region on trust, up to edges of a cost. Returns whether it holds.
+  bool work(DeferredProof& later, double cost) {
+    CollapseLoop loop(*shared, parts, 0, &later);
+    for (std::uint32_t e = 0; e < mesh->connectivity().n_edges(); ++e) {
+      if (parts.of_edge(*mesh, e) == 0) loop.add(e, collapse->cost(e));
+    }
+    loop.run({cost, 0}, nullptr);
+    return later.holds();
+  }
+
+  TriangleMesh now() const {
+    TriangleMesh out;
+    for (std::uint32_t v = 0; v < reference.vertices.size(); ++v) out.vertices.push_back(mesh->stored(v));
+    for (std::uint32_t f = 0; f < reference.triangles.size(); ++f) {
+      if (mesh->alive(f)) out.triangles.push_back(mesh->triangle(f));
+    }
+    return out;
+  }
+
+  TriangleMesh reference;
+  std::optional<Placement> placement;
+  std::optional<ToleranceVolume> volume;
+  std::optional<TriangleCertificate> certificate;
+  std::optional<Coverage> coverage;
+  std::optional<BoundedMesh> mesh;
+  std::optional<EdgeCollapse> collapse;
+  std::optional<CollapseLoop::Shared> shared;
+  Regions parts;
+  std::vector<std::uint32_t> vertices, faces, places;
+};
+
+void expect_same(const BoundedMesh& a, const BoundedMesh& b) {
+  const OpenMesh::TriConnectivity &x = a.connectivity(), &y = b.connectivity();
+  for (int i = 0; i < int(x.n_vertices()); ++i) {
+    const OpenMesh::VertexHandle v(i);
+    ASSERT_EQ(x.status(v).deleted(), y.status(v).deleted());
+    ASSERT_EQ(x.halfedge_handle(v), y.halfedge_handle(v)) << "of vertex " << i;
+    ASSERT_EQ(a.survivor(std::uint32_t(i)), b.survivor(std::uint32_t(i)));
+    ASSERT_EQ(a.position(std::uint32_t(i)), b.position(std::uint32_t(i)));
+    ASSERT_EQ(a.moved(std::uint32_t(i)), b.moved(std::uint32_t(i)));
+    ASSERT_EQ(a.distance(std::uint32_t(i)), b.distance(std::uint32_t(i)));
+    ASSERT_EQ(a.share(std::uint32_t(i)), b.share(std::uint32_t(i)));
+  }
+  for (int i = 0; i < int(x.n_halfedges()); ++i) {
+    const OpenMesh::HalfedgeHandle h(i);
+    ASSERT_EQ(x.status(h).deleted(), y.status(h).deleted());
+    ASSERT_EQ(x.next_halfedge_handle(h), y.next_halfedge_handle(h)) << "of halfedge " << i;
+    ASSERT_EQ(x.prev_halfedge_handle(h), y.prev_halfedge_handle(h)) << "of halfedge " << i;
+    ASSERT_EQ(x.to_vertex_handle(h), y.to_vertex_handle(h)) << "of halfedge " << i;
+    ASSERT_EQ(x.face_handle(h), y.face_handle(h)) << "of halfedge " << i;
+  }
+  for (int i = 0; i < int(x.n_edges()); ++i) {
+    ASSERT_EQ(x.status(OpenMesh::EdgeHandle(i)).deleted(), y.status(OpenMesh::EdgeHandle(i)).deleted());
+  }
+  for (int i = 0; i < int(x.n_faces()); ++i) {
+    const OpenMesh::FaceHandle f(i);
+    ASSERT_EQ(x.status(f).deleted(), y.status(f).deleted());
+    ASSERT_EQ(x.halfedge_handle(f), y.halfedge_handle(f)) << "of face " << i;
+    ASSERT_EQ(a.face_distance(std::uint32_t(i)), b.face_distance(std::uint32_t(i)));
+    for (int k = 0; k < 3; ++k) {
+      ASSERT_EQ(a.corner_source(std::uint32_t(i), k), b.corner_source(std::uint32_t(i), k));
+    }
+  }
+}
+
+constexpr double kTolerance = 0.004;
+
+double fourth_power_of_tolerance() { return std::pow(Worked(kTolerance).certificate->within(), 4); }
+
+TEST(DeferredProof, HoldsOnlyWithinTheTolerance) {
+  const double unit = fourth_power_of_tolerance();
+  int holding = 0, failing = 0;
+  for (const double share : {0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4, 1e6}) {
+    Worked worked(kTolerance);
+    DeferredProof later(*worked.collapse, *worked.mesh, worked.vertices, worked.faces, worked.places);
+    ASSERT_TRUE(later.possible());
+    const bool holds = worked.work(later, share * unit);
+    const TriangleMesh now = worked.now();
+    const double forward = hausdorff(now, worked.reference, {kTolerance, 1, nullptr}).lower,
+                 backward = hausdorff(worked.reference, now, {kTolerance, 1, nullptr}).lower;
+    if (std::max(forward, backward) > kTolerance) {
+      EXPECT_FALSE(holds) << "up to a cost of " << share;
+    }
+    (holds ? holding : failing) += now.triangles.size() < worked.reference.triangles.size();
+  }
+  EXPECT_GE(holding, 3) << "collapses were proved together";
+  EXPECT_GE(failing, 3) << "and some could not be";
+}
+
+TEST(DeferredProof, TakesBackEverything) {
+  const double unit = fourth_power_of_tolerance();
+  int taken_back = 0;
+  for (const double share : {1.0, 10.0, 100.0, 1e3, 1e4, 1e6}) {
+    Worked worked(kTolerance), untouched(kTolerance);
+    {
+      DeferredProof later(*worked.collapse, *worked.mesh, worked.vertices, worked.faces, worked.places);
+      if (worked.work(later, share * unit)) continue;
+      later.take_back();
+      ++taken_back;
+    }
+    ASSERT_EQ(worked.mesh->triangle_count(), untouched.mesh->triangle_count());
+    expect_same(*worked.mesh, *untouched.mesh);
+    // What cannot be seen, pieces and quadrics, decides what further collapses come to.
+    for (Worked* w : {&worked, &untouched}) {
+      CollapseLoop loop(*w->shared, w->parts, 0, nullptr);
+      for (std::uint32_t e = 0; e < w->mesh->connectivity().n_edges(); ++e) {
+        if (w->parts.of_edge(*w->mesh, e) == 0) loop.add(e, w->collapse->cost(e));
+      }
+      loop.run({EdgeCollapse::kNever, 0}, nullptr);
+    }
+    expect_same(*worked.mesh, *untouched.mesh);
+    EXPECT_EQ(worked.now().triangles, untouched.now().triangles);
+    EXPECT_LT(worked.mesh->triangle_count(), worked.reference.triangles.size());
+  }
+  EXPECT_GE(taken_back, 3);
+}
+
+TEST(DeferredProof, LeavesBoundariesWithBoundsToOthers) {
+  Worked worked(kTolerance);
+  Bounds bounds = worked.mesh->bounds();
+  bounds.boundary_forward = bounds.forward, bounds.boundary_backward = bounds.backward;
+  BoundedMeshInput input;
+  input.triangles = worked.reference.triangles;
+  for (std::uint32_t v = 0; v < worked.reference.vertices.size(); ++v) {
+    input.spots.push_back({worked.mesh->stored(v), worked.mesh->position(v)});
+    input.slots.push_back(v);
+  }
+  input.pinned.assign(worked.reference.vertices.size(), false);
+  BoundedMesh mesh(std::move(input), bounds);
+  EdgeCollapse collapse(mesh);
+  EXPECT_FALSE(DeferredProof(collapse, mesh, worked.vertices, worked.faces, worked.places).possible());
+}
+
+}  // namespace
