@@ -8,8 +8,9 @@
 namespace tolvol {
 namespace {
 
-// Edges tried at once: one for so many triangles, because collapses come in each other's way, and at most so many.
-constexpr std::size_t kTrianglesPerAttempt = 48, kMostAttempts = 64;
+// Edges looked at to be tried at once: one for so many triangles, because collapses come in each other's way, and at
+// most so many.
+constexpr std::size_t kTrianglesPerAttempt = 12, kMostAttempts = 64;
 
 }  // namespace
 
@@ -40,6 +41,7 @@ CollapseLoop::CollapseLoop(Shared& shared, Team& team)
   while (attempts_.size() < 2 * kMostAttempts) attempts_.emplace_back(mesh_);
   attempt_of_.assign(mesh_.connectivity().n_edges(), 0);
   touched_.assign(mesh_.connectivity().n_vertices(), 0);
+  reserved_.assign(mesh_.connectivity().n_vertices(), 0);
 }
 
 bool CollapseLoop::deleted(std::uint32_t edge) const {
@@ -97,16 +99,36 @@ CollapseLoop::Attempt& CollapseLoop::try_ahead(std::uint32_t edge) {
   const std::size_t most = std::clamp<std::size_t>(mesh_.triangle_count() / kTrianglesPerAttempt, 1, kMostAttempts);
   std::vector<Attempt*> batch{&first};
   std::vector<CollapseQueue::Entry> ahead;
+  ++batches_;
+  reserve_around(edge);
   while (ahead.size() + 1 < most) {
     const auto entry = queue_.pop();
     if (!entry) break;
     if (deleted(entry->edge)) continue;
     ahead.push_back(*entry);
-    if (!found(entry->edge)) batch.push_back(&take(entry->edge));
+    const Attempt* const tried = found(entry->edge);
+    if (!tried && !reserved(entry->edge)) batch.push_back(&take(entry->edge));
+    if (!tried || tried->outcome == EdgeCollapse::Outcome::possible) reserve_around(entry->edge);
   }
   for (const CollapseQueue::Entry& entry : ahead) queue_.push(entry.edge, entry.cost);
   team_->run(batch.size(), 1, [&](std::size_t i, std::size_t) { collapse_.attempt(batch[i]->edge, *batch[i]); });
   return first;
+}
+
+/// Once the edge is collapsed, nothing holds that was found for edges of the vertices around it.
+void CollapseLoop::reserve_around(std::uint32_t edge) {
+  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
+  const auto h = connectivity.halfedge_handle(BoundedMesh::edge(edge), 0);
+  for (const std::uint32_t end : {mesh_.from(h), mesh_.to(h)}) {
+    for (const auto near : connectivity.vv_range(BoundedMesh::handle(end))) {
+      reserved_[static_cast<std::size_t>(near.idx())] = batches_;
+    }
+  }
+}
+
+bool CollapseLoop::reserved(std::uint32_t edge) const {
+  const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
+  return reserved_[mesh_.from(h)] == batches_ || reserved_[mesh_.to(h)] == batches_;
 }
 
 void CollapseLoop::carry_out(Attempt& a) {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The greedy edge-collapse loop: cheapest edge first, each collapse checked when its turn comes, over a whole mesh or
-/// over one of its regions beside others.
+/// The greedy edge-collapse loop: cheapest edge first, each collapse checked when its turn comes or carried out on
+/// trust, over a whole mesh or over one of its regions beside others.
 ///
-/// With a team of threads the next few edges are tried ahead, all at once, and what was found is kept for their turn.
-/// It holds unless a face around the edge has changed meanwhile: the result is the same for any number of threads.
+/// With a team of threads the next few edges are tried ahead, all at once but for those in each other's way, and what
+/// was found is kept for their turn. It holds unless a face around the edge has changed meanwhile: the result is the
+/// same for any number of threads.
 #pragma once
 
 #include <atomic>
@@ -56,6 +57,8 @@ class CollapseLoop {
   bool own(std::uint32_t edge) const;
   Attempt* found(std::uint32_t edge);
   Attempt& try_ahead(std::uint32_t edge);
+  void reserve_around(std::uint32_t edge);
+  bool reserved(std::uint32_t edge) const;
   void carry_out(Attempt& a);
   void renew_around(std::uint32_t vertex);
 
@@ -71,7 +74,9 @@ class CollapseLoop {
   std::vector<std::uint32_t> attempt_of_;  ///< per edge: its place in attempts_, if that names the edge
   std::size_t next_ = 0;                   ///< place in attempts_ that is taken next, the longest taken
   std::uint32_t clock_ = 0;                ///< collapses carried out
-  std::vector<std::uint32_t> touched_;     ///< per vertex: when a face around it changed last
+  std::vector<std::uint32_t> touched_;     ///< per vertex: when a face around it changed last,
+  std::vector<std::uint32_t> reserved_;    ///< and the last batch of tries whose collapses may change one
+  std::uint32_t batches_ = 0;              ///< of tries, so far
 };
 
 }  // namespace tolvol

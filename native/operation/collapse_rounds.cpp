@@ -23,8 +23,8 @@ constexpr std::size_t kLeastVertices = 1024;  // a mesh of fewer is not cut: rim
 constexpr double kRoundShare = 0.9;           // of the edges that the first of a round may collapse
 constexpr double kLeastGain = 0.1;            // of the triangles: after a round that removes fewer there is no other
 constexpr double kMostTakenBack = 0.25;       // of the regions: after such a round each collapse is proved at once
-/// Of the fourth power of the tolerance, which has the costs' unit: up to here hardly a collapse is refused, and a
-/// round on trust goes on.
+/// Of the fourth power of the tolerance, which has the costs' unit: up to here hardly a collapse is refused, and while
+/// regions are worked on on trust their rounds go on.
 constexpr double kTrustedCost = 1;
 
 class Rounds {

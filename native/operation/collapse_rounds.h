@@ -2,8 +2,9 @@
 /// Decimation of a mesh by edge collapses: rounds in which regions are worked on side by side, each as cheap edges as
 /// in the others, then one loop over all that is left.
 ///
-/// A region fits the cache, and the threads share them out. How the mesh is cut into regions depends on the mesh alone:
-/// the result is the same for any number of threads.
+/// In the first rounds regions are collapsed on trust and proved afterwards, because hardly a collapse would be
+/// refused. A region fits the cache, and the threads share them out. How the mesh is cut into regions depends on the
+/// mesh alone: the result is the same for any number of threads.
 #pragma once
 
 #include <cstddef>

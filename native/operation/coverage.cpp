@@ -13,8 +13,9 @@ namespace {
 
 constexpr double kWorthCutting = 0.25;  // of the tolerance
 constexpr double kFloor = 0.1;          // of the tolerance: a shorter piece is not split further
-// Pieces that splitting may add before a change is refused, and in assign() of one triangle of the reference.
+// Pieces that splitting may add before a change is refused, and in assign() of one triangle of the reference,
 constexpr std::size_t kBudget = 1 << 14;
+constexpr std::size_t kBudgetOfPiece = 16;  // and so many more for each piece that is placed
 
 constexpr std::uint32_t kNeverWhole = 1u << 31;  // in split_into_: some of the triangle is out of reach
 
@@ -90,9 +91,9 @@ void Coverage::sample(std::uint32_t element, std::size_t stride, std::vector<Sam
 
 bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const {
   trial.stack_.assign(1, whole);
-  if (trial.hierarchy_) trial.looked_ = 0;  // they are many changes at once
+  trial.budget_ += kBudgetOfPiece;
   while (!trial.stack_.empty()) {
-    if (trial.stack_.size() > 1 && ++trial.looked_ > kBudget) return false;
+    if (trial.stack_.size() > 1 && trial.budget_-- == 0) return false;
     const Part piece = trial.stack_.back();
     trial.stack_.pop_back();
     const FourPoints points = with_centre(piece);
@@ -142,7 +143,7 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   trial.moved_.clear();
   trial.last_ = 0;
   trial.hierarchy_ = hierarchy;
-  trial.looked_ = 0;
+  trial.budget_ = kBudget;
   bool settled = true;
   for (const Element& e : elements) {
     const List& list = lists_[e.id];

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the collapses of a region change is all within the faces around its vertices, so that regions can be worked on,
-// proved and put back side by side.
+// What the collapses of a region change is all within the faces around its vertices, but for the boundary: its
+// halfedges beyond the region name those of the region that they follow or that follow them. No two regions change the
+// same one of these names, so that regions can be worked on, proved and put back side by side.
 #include "operation/deferred_proof.h"
 
 #include <algorithm>
@@ -109,6 +110,10 @@ void DeferredProof::take_back() {
     kernel.halfedge(s.halfedge) = s.kernel;
     kernel.status(s.halfedge).set_deleted(false);
     kernel.status(kernel.edge_handle(s.halfedge)).set_deleted(false);
+  }
+  for (const SavedHalfedge& s : saved_halfedges_) {  // sets what its neighbours name, too
+    kernel.set_next_halfedge_handle(s.halfedge, kernel.next_halfedge_handle(s.halfedge));
+    kernel.set_next_halfedge_handle(kernel.prev_halfedge_handle(s.halfedge), s.halfedge);
   }
   for (const SavedAnchor& s : saved_anchors_) kernel.set_halfedge_handle(BoundedMesh::handle(s.vertex), s.halfedge);
   for (std::size_t i = 0; i < faces_.size(); ++i) {
