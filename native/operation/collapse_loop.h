@@ -75,7 +75,7 @@ class CollapseLoop {
   std::size_t next_ = 0;                   ///< place in attempts_ that is taken next, the longest taken
   std::uint32_t clock_ = 0;                ///< collapses carried out
   std::vector<std::uint32_t> touched_;     ///< per vertex: when a face around it changed last,
-  std::vector<std::uint32_t> reserved_;    ///< and the last batch of tries whose collapses may change one
+  std::vector<std::uint32_t> reserved_;    ///< and the last batch of tries in which one could change before its turn
   std::uint32_t batches_ = 0;              ///< of tries, so far
 };
 

@@ -13,9 +13,9 @@ namespace {
 
 constexpr double kWorthCutting = 0.25;  // of the tolerance
 constexpr double kFloor = 0.1;          // of the tolerance: a shorter piece is not split further
-// Pieces that splitting may add before a change is refused, and in assign() of one triangle of the reference,
+// Pieces that splitting may add before a change is refused; and those that assign() splits of one triangle.
 constexpr std::size_t kBudget = 1 << 14;
-constexpr std::size_t kBudgetOfPiece = 16;  // and so many more for each piece that is placed
+constexpr std::size_t kBudgetOfPiece = 16;  // so many more for each piece that a change places
 
 constexpr std::uint32_t kNeverWhole = 1u << 31;  // in split_into_: some of the triangle is out of reach
 
