@@ -3,9 +3,9 @@
 #include "operation/bounded_mesh.h"
 
 #include <algorithm>
-#include <stdexcept>
 
 #include "operation/change.h"
+#include "operation/connectivity.h"
 
 namespace tolvol {
 
@@ -28,12 +28,7 @@ void BoundedMesh::build(bool on_reference) {
   mesh_.request_halfedge_status();
   mesh_.request_face_status();
   const std::size_t n = positions_.size(), m = triangles_.size();
-  mesh_.reserve(static_cast<unsigned>(n), static_cast<unsigned>(3 * m / 2 + n), static_cast<unsigned>(m));
-  for (std::size_t i = 0; i < n; ++i) mesh_.new_vertex();
-  for (const glm::uvec3& t : triangles_) {
-    const Vertex corners[3] = {handle(t.x), handle(t.y), handle(t.z)};
-    if (!mesh_.add_face(corners, 3).is_valid()) throw std::logic_error("the cut mesh is not a manifold");
-  }
+  connect(n, triangles_, mesh_);
   triangle_count_ = m;
   for (std::uint32_t v = 0; v < n; ++v) {
     if (slots_[v] != v) copies_.try_emplace(slots_[v], 1, slots_[v]).first->second.push_back(v);

@@ -243,6 +243,8 @@ class Cutter {
     }
     corner_vertex_.resize(mate_.size());
     for (Side s = 0; s < mate_.size(); ++s) corner_vertex_[s] = corners.find(s);
+    // Vertices that stay what they were have no edges but those that join_sides() saw.
+    if (!renamed_ && cut_.cut_edges == 0) return true;
 
     std::vector<KeyedSide> sides;
     sides.reserve(mate_.size());

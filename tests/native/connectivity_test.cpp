@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "operation/connectivity.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <stdexcept>
+#include <vector>
+
+#include "operation/manifold_cut.h"
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using OpenMesh::TriConnectivity;
+
+TriConnectivity one_by_one(std::size_t vertices, const std::vector<glm::uvec3>& triangles) {
+  TriConnectivity mesh;
+  for (std::size_t i = 0; i < vertices; ++i) mesh.new_vertex();
+  for (const glm::uvec3& t : triangles) {
+    const OpenMesh::VertexHandle corners[3] = {OpenMesh::VertexHandle(int(t.x)), OpenMesh::VertexHandle(int(t.y)),
+                                               OpenMesh::VertexHandle(int(t.z))};
+    EXPECT_TRUE(mesh.add_face(corners, 3).is_valid());
+  }
+  return mesh;
+}
+
+TriConnectivity at_once(std::size_t vertices, const std::vector<glm::uvec3>& triangles) {
+  TriConnectivity mesh;
+  connect(vertices, triangles, mesh);
+  return mesh;
+}
+
+void expect_same(const TriConnectivity& a, const TriConnectivity& b) {
+  ASSERT_EQ(a.n_vertices(), b.n_vertices());
+  ASSERT_EQ(a.n_edges(), b.n_edges());
+  ASSERT_EQ(a.n_faces(), b.n_faces());
+  for (const auto h : a.halfedges()) {
+    ASSERT_EQ(a.to_vertex_handle(h), b.to_vertex_handle(h)) << "halfedge " << h.idx();
+    ASSERT_EQ(a.face_handle(h), b.face_handle(h)) << "halfedge " << h.idx();
+    ASSERT_EQ(a.next_halfedge_handle(h), b.next_halfedge_handle(h)) << "halfedge " << h.idx();
+    ASSERT_EQ(a.prev_halfedge_handle(h), b.prev_halfedge_handle(h)) << "halfedge " << h.idx();
+  }
+  for (const auto v : a.vertices()) ASSERT_EQ(a.halfedge_handle(v), b.halfedge_handle(v)) << "vertex " << v.idx();
+  for (const auto f : a.faces()) ASSERT_EQ(a.halfedge_handle(f), b.halfedge_handle(f)) << "face " << f.idx();
+}
+
+TEST(Connectivity, IsWhatTheKernelMakesFaceByFace) {
+  const TriangleMesh triangle{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{2, 0, 1}}};
+  const TriangleMesh nothing{{{0, 0, 0}}, {}};
+  for (const TriangleMesh& mesh : {shapes::torus(12), shapes::grid(9), shapes::box(4), triangle, nothing,
+                                   shapes::joined(shapes::grid(5), shapes::torus(7))}) {
+    expect_same(one_by_one(mesh.vertices.size(), mesh.triangles), at_once(mesh.vertices.size(), mesh.triangles));
+  }
+}
+
+TEST(Connectivity, TrianglesInAnyOrderAndRaggedHoles) {
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    TriangleMesh mesh = seed % 2 ? shapes::torus(10) : shapes::grid(10);
+    std::mt19937 engine(seed);
+    std::shuffle(mesh.triangles.begin(), mesh.triangles.end(), engine);
+    for (glm::uvec3& t : mesh.triangles) {
+      for (unsigned turns = engine() % 3; turns > 0; --turns) t = {t.y, t.z, t.x};
+    }
+    mesh.triangles.resize(mesh.triangles.size() * (1 + seed % 4) / 4);
+    const CutMesh cut = cut_to_manifold(mesh.vertices, mesh.triangles);
+    expect_same(one_by_one(cut.vertex_input.size(), cut.triangles), at_once(cut.vertex_input.size(), cut.triangles));
+  }
+}
+
+TEST(Connectivity, RefusesWhatIsNoOrientedManifold) {
+  EXPECT_THROW(at_once(5, {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}}), std::logic_error);  // three faces at an edge
+  EXPECT_THROW(at_once(4, {{0, 1, 2}, {0, 1, 3}}), std::logic_error);             // two the same way around
+  EXPECT_THROW(at_once(5, {{0, 1, 2}, {0, 3, 4}}), std::logic_error);             // two boundaries at a vertex
+}
+
+}  // namespace
