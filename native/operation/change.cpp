@@ -186,13 +186,8 @@ bool Change::gather(Halfedge h, const glm::dvec3& position) {
     removed_.push_back({static_cast<std::uint32_t>(f), static_cast<std::uint32_t>(place), std::max(moved0, moved1)});
   }
   // The last closed shape, a tetrahedron, is kept: two coinciding faces would be left of it.
-  if (of_v0 == 1 && apex[0] != Coverage::kNone && apex[1] != Coverage::kNone) {
-    const Halfedge across = mesh.find_halfedge(BoundedMesh::handle(apex[0]), BoundedMesh::handle(apex[1]));
-    for (const Halfedge side : {across, mesh.opposite_halfedge_handle(across)}) {
-      if (!mesh.is_boundary(side) && mesh_->to(mesh.next_halfedge_handle(side)) == v1) return false;
-    }
-  }
-  return true;
+  return !(of_v0 == 1 && apex[0] != Coverage::kNone && apex[1] != Coverage::kNone &&
+           mesh.valence(BoundedMesh::handle(v1)) == 3 && !mesh_->on_boundary(v1));
 }
 
 bool Change::wedges_fit(Halfedge h) {
