@@ -72,7 +72,7 @@ def measure(name, vertices, triangles, options):
         return tolvol.decimate(vertices, triangles, volume, two_sided=two_sided, threads=threads)
 
     def unbounded(count):
-        return tolvol.decimate(vertices, triangles, None, target_triangles=count)
+        return tolvol.decimate(vertices, triangles, None, target_triangles=count, threads=threads)
 
     memory = PeakMemory()
     decimate(build())

@@ -20,6 +20,11 @@ constexpr double kLengthWeight = 1e-6;
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
+double length_cost(const glm::dvec3& a, const glm::dvec3& b) {
+  const double length2 = squared_length(b - a);
+  return kLengthWeight * length2 * length2;
+}
+
 }  // namespace
 
 EdgeCollapse::EdgeCollapse(BoundedMesh& mesh) : mesh_(mesh) { sum_quadrics(); }
@@ -84,9 +89,7 @@ std::optional<EdgeCollapse::Plan> EdgeCollapse::plan(Edge e) const {
 double EdgeCollapse::cost(std::uint32_t edge) const {
   const auto p = plan(BoundedMesh::edge(edge));
   if (!p) return kNever;
-  const double length2 =
-      squared_length(mesh_.position(mesh_.from(p->halfedge)) - mesh_.position(mesh_.to(p->halfedge)));
-  return p->cost + kLengthWeight * length2 * length2;
+  return p->cost + length_cost(mesh_.position(mesh_.from(p->halfedge)), mesh_.position(mesh_.to(p->halfedge)));
 }
 
 void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
@@ -109,12 +112,20 @@ void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
   }
 }
 
-/// Other positions for a collapse whose best one fails: fitted ones or, where there is nothing to fit to, the ends and
-/// the middle.
+/// Other positions for a collapse whose best one fails: an end that costs nothing either, as on a plane, then fitted
+/// ones; where there is nothing to fit to, the ends and the middle.
 EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) const {
   const Halfedge h = a.halfedge;
-  if (mesh_.bounds().forward) return a.fit.collapse(a.change, h, best, kHopeless);
   const Spot s0 = mesh_.spot(mesh_.from(h)), s1 = mesh_.spot(mesh_.to(h));
+  if (mesh_.bounds().forward) {
+    const Quadric q = quadrics_[mesh_.from(h)] + quadrics_[mesh_.to(h)];
+    const double nothing = length_cost(s0.position, s1.position);
+    for (const Spot& end : {s0, s1}) {
+      if (end.position == best || q(end.position) > nothing) continue;
+      if (a.change.try_collapse(h, end) == Outcome::possible) return Outcome::possible;
+    }
+    return a.fit.collapse(a.change, h, best, kHopeless);
+  }
   for (const Spot& other : {s0, s1, mesh_.store((s0.position + s1.position) * 0.5)}) {
     const Outcome outcome = a.change.try_collapse(h, other);
     if (outcome != Outcome::refused) return outcome;

@@ -402,6 +402,13 @@ TEST(Decimation, FlatPlatesEndAtAnyTolerance) {
   }
 }
 
+TEST(Decimation, OfALargePlateAnEdgeMayEndAtEitherVertex) {
+  const Case c{shapes::stored(shapes::grid(150)), glm::dmat4(1), Storage::float32, 0.03};
+  const DecimationResult r = run(c);
+  expect_within(c, r);
+  EXPECT_LE(r.triangles.size(), 4u);
+}
+
 TEST(Decimation, UnboundedReachesItsTarget) {
   const Case c{shapes::torus(40)};
   Options options;
