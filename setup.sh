@@ -14,7 +14,7 @@ targets=extension
 case "${1-}" in
 "") ;;
 --tests)
-  packages="$packages python3-pytest python3-pytest-xdist python3-venv python3-matplotlib libcgal-dev clang-format clang-tidy
+  packages="$packages python3-pytest python3-pytest-xdist python3-venv libcgal-dev clang-format clang-tidy
     xvfb xdotool imagemagick"
   targets="all extension"
   ;;
