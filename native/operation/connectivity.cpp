@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "operation/sort_by.h"
+
 namespace tolvol {
 namespace {
 
@@ -29,23 +31,18 @@ class Sides {
   std::uint32_t to(std::uint32_t side) const { return from(next(side)); }
 
   /// Per side: the other triangle's side on the same edge, or kNone.
-  std::vector<std::uint32_t> mates(std::size_t vertices) const {
-    // By the lower of their vertices and then, a handful at a time, by the higher.
-    const auto lower = [&](std::uint32_t side) { return std::min(from(side), to(side)); };
-    const auto higher = [&](std::uint32_t side) { return std::max(from(side), to(side)); };
-    std::vector<std::uint32_t> end(vertices + 1, 0), sorted(count()), mates(count(), kNone);
-    for (std::uint32_t s = 0; s < count(); ++s) ++end[lower(s) + 1];
-    std::partial_sum(end.begin(), end.end(), end.begin());
-    for (std::uint32_t s = 0; s < count(); ++s) sorted[end[lower(s)]++] = s;
-    for (std::uint32_t v = 0, begin = 0; v < vertices; begin = end[v++]) {
-      std::sort(sorted.begin() + begin, sorted.begin() + end[v],
-                [&](std::uint32_t a, std::uint32_t b) { return higher(a) < higher(b); });
-      for (std::uint32_t i = begin + 1; i < end[v]; ++i) {
-        const std::uint32_t s = sorted[i], other = sorted[i - 1];
-        if (higher(s) != higher(other)) continue;
-        require_manifold(from(s) == to(other) && mates[other] == kNone);
-        mates[s] = other, mates[other] = s;
-      }
+  std::vector<std::uint32_t> mates() const {
+    const auto ends = [&](std::uint32_t side) { return std::minmax({from(side), to(side)}); };
+    std::vector<std::uint32_t> sorted(count()), mates(count(), kNone);
+    std::iota(sorted.begin(), sorted.end(), 0u);
+    sort_by(
+        sorted, [&](std::uint32_t side) { return ends(side).first; },
+        [&](std::uint32_t a, std::uint32_t b) { return ends(a) < ends(b); });
+    for (std::uint32_t i = 1; i < count(); ++i) {
+      const std::uint32_t s = sorted[i], other = sorted[i - 1];
+      if (ends(s) != ends(other)) continue;
+      require_manifold(from(s) == to(other) && mates[other] == kNone);
+      mates[s] = other, mates[other] = s;
     }
     return mates;
   }
@@ -61,7 +58,7 @@ void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, OpenMe
   using OpenMesh::HalfedgeHandle;
   const auto vertex = [](std::uint32_t i) { return OpenMesh::VertexHandle(static_cast<int>(i)); };
   const Sides sides(triangles);
-  const std::vector<std::uint32_t> mates = sides.mates(vertices);
+  const std::vector<std::uint32_t> mates = sides.mates();
   const auto first_of_edge = [&](std::uint32_t s) { return mates[s] == kNone || mates[s] > s; };
   std::size_t edges = 0;
   for (std::uint32_t s = 0; s < sides.count(); ++s) edges += first_of_edge(s);
@@ -96,6 +93,12 @@ void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, OpenMe
     mesh.set_next_halfedge_handle(mesh.opposite_halfedge_handle(halfedge[s]),
                                   mesh.halfedge_handle(vertex(sides.from(s))));
   }
+  // A walk around a vertex sees one fan of faces: no vertex may have another.
+  std::size_t seen = 0;
+  for (const auto v : mesh.vertices()) {
+    for (const auto h : mesh.voh_range(v)) seen += !mesh.is_boundary(h);
+  }
+  require_manifold(seen == sides.count());
 }
 
 }  // namespace tolvol

@@ -13,6 +13,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "operation/sort_by.h"
 #include "reference/triangle_mesh.h"
 #include "reference/union_find.h"
 
@@ -27,24 +28,6 @@ Side next_corner(Side s) { return s % 3 == 2 ? s - 2 : s + 1; }
 
 std::uint64_t pair_key(std::uint32_t a, std::uint32_t b) {
   return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
-}
-
-/// Puts things in the order of what `before` compares, which must begin with first(thing): one pass by that, and short
-/// sorts of those that share it, because a mesh has few sides or triangles that do.
-template <class T, class First, class Before>
-void sort_by(std::vector<T>& things, First&& first, Before&& before) {
-  std::uint32_t groups = 0;
-  for (const T& t : things) groups = std::max(groups, first(t) + 1);
-  std::vector<std::size_t> end(groups + 1, 0);
-  for (const T& t : things) ++end[first(t) + 1];
-  std::partial_sum(end.begin(), end.end(), end.begin());
-  std::vector<T> sorted(things.size());
-  for (const T& t : things) sorted[end[first(t)]++] = t;
-  for (std::size_t group = 0, begin = 0; group < groups; begin = end[group++]) {
-    std::sort(sorted.begin() + static_cast<std::ptrdiff_t>(begin),
-              sorted.begin() + static_cast<std::ptrdiff_t>(end[group]), before);
-  }
-  things.swap(sorted);
 }
 
 class Cutter {

@@ -74,6 +74,8 @@ TEST(Connectivity, RefusesWhatIsNoOrientedManifold) {
   EXPECT_THROW(at_once(5, {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}}), std::logic_error);  // three faces at an edge
   EXPECT_THROW(at_once(4, {{0, 1, 2}, {0, 1, 3}}), std::logic_error);             // two the same way around
   EXPECT_THROW(at_once(5, {{0, 1, 2}, {0, 3, 4}}), std::logic_error);             // two boundaries at a vertex
+  EXPECT_THROW(at_once(7, {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}, {0, 4, 5}, {0, 5, 6}, {0, 6, 4}, {4, 6, 5}}),
+               std::logic_error);  // two closed fans
 }
 
 }  // namespace
