@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every step may add to the bound. It takes a fixed share of the room that is left, so that after many steps there is
-// some left to take: a hundred of them use 96 % of it.
+// Every step may add to the bound. It takes no more than a fixed share of the room that is left, so that after many
+// steps there is some left to take, and no more than it needs: on a plane next to nothing.
 #include "operation/predecessors.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace tolvol {
@@ -26,8 +27,9 @@ void Predecessors::add(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec
 double Predecessors::bound(const glm::dvec3 (&corners)[3], double within) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const double step = kStep * (within - farthest_);
-  const double near = kLookedFor * step, near2 = near * near;
-  if (!(step >= kLeast * within && step - near >= witness_error(2 * (1 + within)))) return kNone;
+  const double near = kLookedFor * step, near2 = near * near, rounding = witness_error(2 * (1 + within));
+  if (!(step >= kLeast * within && near + rounding <= step)) return kNone;
+  double used2 = 0;
   parts_.assign(1, {{corners[0], corners[1], corners[2]}});
   for (std::size_t looked = 0; !parts_.empty(); ++looked) {
     if (looked == kMostParts) return kNone;
@@ -42,14 +44,16 @@ double Predecessors::bound(const glm::dvec3 (&corners)[3], double within) {
       double d2[4];
       witness_distances(face, points, d2);
       if (d2[3] < centre2) centre2 = d2[3], below = &face;
-      return d2[0] <= near2 && d2[1] <= near2 && d2[2] <= near2;
+      if (!(d2[0] <= near2 && d2[1] <= near2 && d2[2] <= near2)) return false;
+      used2 = std::max({used2, d2[0], d2[1], d2[2]});
+      return true;
     });
     if (covered) continue;
     // Written so that NaN ends here.
     if (!(centre2 <= near2) || longest_squared(part) <= kFloor * kFloor * near2 || part.cuts == kMostCuts) return kNone;
     if (!cut(part, *below, kWorthCutting * near, parts_)) split(part, parts_);
   }
-  return farthest_ + step;
+  return farthest_ + std::sqrt(used2) + rounding;
 }
 
 }  // namespace tolvol

@@ -38,14 +38,28 @@ TEST(Predecessors, BoundWhatLiesInTheirPlane) {
   Predecessors faces = faces_of(mesh, 0);
   const dvec3 across[3] = {mesh.vertices[1], mesh.vertices[3], mesh.vertices[6]};
   const double bound = faces.bound(across, kWithin);
-  EXPECT_LE(bound, 0.05 * kWithin);
+  EXPECT_LE(bound, 1e-9 * kWithin);
   EXPECT_GT(bound, 0);
-  // Again and again, and there is still room.
-  double distance = 0;
-  for (int i = 0; i < 100; ++i) {
+  // Again and again, from where hardly any room is left.
+  double distance = 0.9999 * kWithin;
+  for (int i = 0; i < 1'000; ++i) {
     Predecessors next = faces_of(mesh, distance);
     distance = next.bound(across, kWithin);
-    ASSERT_LE(distance, kWithin) << i;
+    ASSERT_LE(distance, 0.99991 * kWithin) << i;
+  }
+}
+
+TEST(Predecessors, TakeAShareOfTheRoomThatIsLeftAndNoMore) {
+  // A corner a little above their plane each time.
+  const TriangleMesh mesh = fan(7, 0);
+  double distance = 0;
+  for (int i = 0; i < 100; ++i) {
+    const double height = 0.01 * (kWithin - distance);
+    const dvec3 corners[3] = {{0.1, 0.1, height}, {0.4, 0.1, 0}, {0.1, 0.4, 0}};
+    const double before = distance;
+    distance = faces_of(mesh, distance).bound(corners, kWithin);
+    ASSERT_GE(distance, before + height) << i;
+    ASSERT_LT(distance, kWithin) << i;
   }
 }
 
