@@ -24,6 +24,7 @@ constexpr std::size_t kQuickBudget = 1 << 13;  // and where the answer is only o
 constexpr double kProbeSpacing = 2.0;          // of the tolerance, along the longest edge of a triangle,
 constexpr int kMostProbes = 8;                 // and so many at most
 constexpr double kSmall = 2.0;  // of the tolerance: shorter pieces are worth trying against all eight nodes
+constexpr double kLong = 1.9;   // of the tolerance: see where it is used
 constexpr double kExact = 0.7;  // of the tolerance: shorter pieces are worth an exact search
 constexpr double kRoom = 0.7;   // of the tolerance: up to here the grid's guess of a distance does
 
@@ -145,9 +146,17 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       return false;
     };
     const std::uint32_t guess = grid_->triangle_near(centre);
+    const double longest2 = longest_squared(part);
+    if (!kProve && guess != DistanceGrid::kNone && part.cuts < kMostCuts) {
+      // Of triangles smaller than the tolerance none covers a long part, and no cut along one's edge helps.
+      const WitnessTriangle& t = (*reference_)[guess];
+      if (longest2 > kLong * kLong * within2_ && std::max(squared_length(t.ab), squared_length(t.ac)) <= within2_) {
+        split(part, queue);
+        continue;
+      }
+    }
     if (covered_by(near.x) || covered_by(near.y) || covered_by(near.z) || covered_by(guess)) continue;
 
-    const double longest2 = longest_squared(part);
     const bool seems_outside = !(centre2 <= within2_);
     if (guess != DistanceGrid::kNone && (seems_outside || longest2 < kSmall * kSmall * within2_)) {
       const glm::dvec3 cell = glm::floor((centre - grid_->origin) * (1 / grid_->spacing));

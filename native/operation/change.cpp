@@ -287,46 +287,54 @@ bool Change::vertex_within() {
   return new_distance_ <= share_ * forward.within();
 }
 
+/// Whether a point of a large face is outside: before anything is proved in vain.
+bool Change::shows_outside() {
+  for (std::size_t k = 0; k < elements_.size(); ++k) {
+    const std::size_t i = (suspect_ + k) % elements_.size();
+    const Coverage::Element& element = elements_[i];
+    if (element.moved == 0 || !is_large(element)) continue;
+    if (mesh_->bounds().forward->narrowed(share(faces_[i])).shows_outside(element.corners)) {
+      suspect_ = i;
+      return true;
+    }
+  }
+  return false;
+}
+
+bool Change::faces_within() {
+  const auto& distance = mesh_->distance_;
+  predecessors_.clear();
+  for (std::size_t k = 0; k < elements_.size(); ++k) {
+    const std::size_t i = (suspect_ + k) % elements_.size();
+    const Coverage::Element& element = elements_[i];
+    Face& face = faces_[i];
+    const TriangleCertificate forward = mesh_->bounds().forward->narrowed(share(face));
+    // No point of the face moves farther than its moving corner.
+    face.distance = mesh_->face_distance_[element.id] + element.moved;
+    if (element.moved == 0 || face.distance <= forward.within()) continue;
+    if (is_large(element)) {
+      if (predecessors_.empty()) gather_predecessors();
+      face.distance = predecessors_.bound(element.corners, forward.within());
+      if (face.distance <= forward.within()) continue;
+    }
+    glm::dvec3 corners(distance[face.vertices[0]], distance[face.vertices[1]], distance[face.vertices[2]]);
+    if (kind_ != Kind::flip) corners[face.corner] = new_distance_;
+    face.distance = forward.bound(element.corners, corners);
+    if (face.distance == TriangleCertificate::kUnproved) {
+      suspect_ = i;
+      return false;
+    }
+  }
+  return true;
+}
+
+/// In the order of what the answers cost.
 bool Change::within_bounds() {
   const Bounds& bounds = mesh_->bounds();
   if (bounds.rival) return bounds.rival->accepts(elements_, removed_);
-  if (bounds.forward) {
-    if (kind_ != Kind::flip && !vertex_within()) return false;
-    const auto& distance = mesh_->distance_;
-    predecessors_.clear();
-    // Before anything is proved in vain.
-    for (std::size_t k = 0; k < elements_.size(); ++k) {
-      const std::size_t i = (suspect_ + k) % elements_.size();
-      const Coverage::Element& element = elements_[i];
-      if (element.moved == 0 || !is_large(element)) continue;
-      if (bounds.forward->narrowed(share(faces_[i])).shows_outside(element.corners)) {
-        suspect_ = i;
-        return false;
-      }
-    }
-    for (std::size_t k = 0; k < elements_.size(); ++k) {
-      const std::size_t i = (suspect_ + k) % elements_.size();
-      const Coverage::Element& element = elements_[i];
-      Face& face = faces_[i];
-      const TriangleCertificate forward = bounds.forward->narrowed(share(face));
-      // No point of the face moves farther than its moving corner.
-      face.distance = mesh_->face_distance_[element.id] + element.moved;
-      if (element.moved == 0 || face.distance <= forward.within()) continue;
-      if (is_large(element)) {
-        if (predecessors_.empty()) gather_predecessors();
-        face.distance = predecessors_.bound(element.corners, forward.within());
-        if (face.distance <= forward.within()) continue;
-      }
-      glm::dvec3 corners(distance[face.vertices[0]], distance[face.vertices[1]], distance[face.vertices[2]]);
-      if (kind_ != Kind::flip) corners[face.corner] = new_distance_;
-      face.distance = forward.bound(element.corners, corners);
-      if (face.distance == TriangleCertificate::kUnproved) {
-        suspect_ = i;
-        return false;
-      }
-    }
-  }
-  return !bounds.backward || bounds.backward->try_change(elements_, removed_, backward_);
+  if (bounds.forward && ((kind_ != Kind::flip && !vertex_within()) || shows_outside())) return false;
+  if (bounds.backward && !bounds.backward->try_change(elements_, removed_, backward_)) return false;
+  return !bounds.forward || faces_within();
 }
 
 void Change::boundary_of_collapse() {

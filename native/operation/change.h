@@ -84,6 +84,8 @@ class Change {
   void gather_predecessors();
   bool is_large(const Coverage::Element& e) const;
   bool vertex_within();
+  bool shows_outside();
+  bool faces_within();
   bool within_bounds();
   bool boundary_within_bounds();
   void boundary_of_collapse();
