@@ -23,10 +23,11 @@ constexpr std::size_t kBudget = 1 << 20;       // parts looked at before a piece
 constexpr std::size_t kQuickBudget = 1 << 13;  // and where the answer is only one of many tries
 constexpr double kProbeSpacing = 2.0;          // of the tolerance, along the longest edge of a triangle,
 constexpr int kMostProbes = 8;                 // and so many at most
-constexpr double kSmall = 2.0;  // of the tolerance: shorter pieces are worth trying against all eight nodes
-constexpr double kLong = 1.9;   // of the tolerance: see where it is used
-constexpr double kExact = 0.7;  // of the tolerance: shorter pieces are worth an exact search
-constexpr double kRoom = 0.7;   // of the tolerance: up to here the grid's guess of a distance does
+constexpr double kSmall = 2.0;             // of the tolerance: shorter pieces are worth trying against all eight nodes
+constexpr double kLong = 1.9;              // of the tolerance: longer pieces over small triangles are split at once
+constexpr double kExact = 0.7;             // of the tolerance: shorter pieces are worth an exact search
+constexpr double kRoomToLeave = 1.0 / 32;  // of the tolerance
+constexpr double kRoom = 0.7;              // of the tolerance: up to here the grid's guess of a distance does
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
@@ -146,17 +147,9 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       return false;
     };
     const std::uint32_t guess = grid_->triangle_near(centre);
-    const double longest2 = longest_squared(part);
-    if (!kProve && guess != DistanceGrid::kNone && part.cuts < kMostCuts) {
-      // Of triangles smaller than the tolerance none covers a long part, and no cut along one's edge helps.
-      const WitnessTriangle& t = (*reference_)[guess];
-      if (longest2 > kLong * kLong * within2_ && std::max(squared_length(t.ab), squared_length(t.ac)) <= within2_) {
-        split(part, queue);
-        continue;
-      }
-    }
     if (covered_by(near.x) || covered_by(near.y) || covered_by(near.z) || covered_by(guess)) continue;
 
+    const double longest2 = longest_squared(part);
     const bool seems_outside = !(centre2 <= within2_);
     if (guess != DistanceGrid::kNone && (seems_outside || longest2 < kSmall * kSmall * within2_)) {
       const glm::dvec3 cell = glm::floor((centre - grid_->origin) * (1 / grid_->spacing));
@@ -184,7 +177,11 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       result = Verdict::unproved;
       continue;
     }
-    if (!cut(part, (*reference_)[below], kWorthCutting * within_, queue)) split(part, queue);
+    // Among triangles smaller than the tolerance a cut along an edge of one brings a long part no nearer to its end.
+    const WitnessTriangle& t = (*reference_)[below];
+    const bool long_over_small =
+        longest2 > kLong * kLong * within2_ && std::max(squared_length(t.ab), squared_length(t.ac)) <= within2_;
+    if (long_over_small || !cut(part, t, kWorthCutting * within_, queue)) split(part, queue);
   }
   farthest = std::sqrt(farthest2);
   return result;
@@ -194,6 +191,11 @@ double TriangleCertificate::bound(const glm::dvec3 (&corners)[3], const glm::dve
                                   const glm::uvec3& near) const {
   double farthest = 0;
   return decide<false>(corners, bounds, near, farthest) == Verdict::inside ? farthest : kUnproved;
+}
+
+double TriangleCertificate::bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
+  const double bounded = narrowed(1 - kRoomToLeave).bound(corners, bounds);
+  return bounded == kUnproved ? bound(corners, bounds) : bounded;
 }
 
 Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,

@@ -45,6 +45,10 @@ class TriangleCertificate {
   double bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
                const glm::uvec3& near = glm::uvec3(Hierarchy::kNone)) const;
 
+  /// The same, but one that leaves some of within() where there is such a one: what a triangle has left, those that
+  /// take its place may use. Up to twice the cost where there is none.
+  double bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
+
   /// Whether bound() finds one, and if not, whether a point outside proves that there is none.
   Verdict verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
                   const glm::uvec3& near = glm::uvec3(Hierarchy::kNone)) const;

@@ -319,7 +319,7 @@ bool Change::faces_within() {
     }
     glm::dvec3 corners(distance[face.vertices[0]], distance[face.vertices[1]], distance[face.vertices[2]]);
     if (kind_ != Kind::flip) corners[face.corner] = new_distance_;
-    face.distance = forward.bound(element.corners, corners);
+    face.distance = forward.bound_with_room(element.corners, corners);
     if (face.distance == TriangleCertificate::kUnproved) {
       suspect_ = i;
       return false;

@@ -68,8 +68,8 @@ bool DeferredProof::faces_hold() {
     const glm::uvec3& t = mesh_.triangle(f);
     const TriangleCertificate forward =
         mesh_.bounds().forward->narrowed(std::min({mesh_.share(t.x), mesh_.share(t.y), mesh_.share(t.z)}));
-    const double distance = forward.bound({mesh_.position(t.x), mesh_.position(t.y), mesh_.position(t.z)},
-                                          {mesh_.distance_[t.x], mesh_.distance_[t.y], mesh_.distance_[t.z]});
+    const double distance = forward.bound_with_room({mesh_.position(t.x), mesh_.position(t.y), mesh_.position(t.z)},
+                                                    {mesh_.distance_[t.x], mesh_.distance_[t.y], mesh_.distance_[t.z]});
     if (distance == TriangleCertificate::kUnproved) return false;
     mesh_.face_distance_[f] = distance;
   }

@@ -40,15 +40,22 @@ double Predecessors::bound(const glm::dvec3 (&corners)[3], double within) {
     points.set(a, b, c, (a + b + c) * (1.0 / 3));
     double centre2 = kNone;
     const WitnessTriangle* below = nullptr;  // the nearest to the centre
-    const bool covered = std::any_of(faces_.begin(), faces_.end(), [&](const WitnessTriangle& face) {
+    double least2 = near2;                   // how far the corners are from one face at most
+    bool covered = false;
+    for (const WitnessTriangle& face : faces_) {
       double d2[4];
       witness_distances(face, points, d2);
       if (d2[3] < centre2) centre2 = d2[3], below = &face;
-      if (!(d2[0] <= near2 && d2[1] <= near2 && d2[2] <= near2)) return false;
-      used2 = std::max({used2, d2[0], d2[1], d2[2]});
-      return true;
-    });
-    if (covered) continue;
+      // Written so that NaN is not covered.
+      if (d2[0] <= least2 && d2[1] <= least2 && d2[2] <= least2) {
+        least2 = std::max({d2[0], d2[1], d2[2]});
+        covered = true;
+      }
+    }
+    if (covered) {
+      used2 = std::max(used2, least2);
+      continue;
+    }
     // Written so that NaN ends here.
     if (!(centre2 <= near2) || longest_squared(part) <= kFloor * kFloor * near2 || part.cuts == kMostCuts) return kNone;
     if (!cut(part, *below, kWorthCutting * near, parts_)) split(part, parts_);

@@ -412,6 +412,17 @@ TEST(Decimation, LargePlatesBecomeTwoTriangles) {
   }
 }
 
+TEST(Decimation, RoundingToFloatDoesNotKeepAPlateInPieces) {
+  // Turned, a plate of float32 is flat up to a two-thousandth of this tolerance.
+  Case c{shapes::grid(128), glm::dmat4(1), Storage::float32, 0.1};
+  const dvec3 u = glm::normalize(dvec3(1, 2, 3)), v = glm::normalize(glm::cross(u, dvec3(1, 0, -2)));
+  for (dvec3& p : c.mesh.vertices) p = dvec3(0.3, -0.2, 0.7) + p.x * u + p.y * v + p.z * glm::cross(u, v);
+  c.mesh = shapes::stored(c.mesh);
+  const DecimationResult r = run(c);
+  expect_within(c, r);
+  EXPECT_LE(r.triangles.size(), 4u);
+}
+
 TEST(Decimation, UnboundedReachesItsTarget) {
   const Case c{shapes::torus(40)};
   Options options;
