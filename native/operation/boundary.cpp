@@ -7,14 +7,14 @@ namespace tolvol {
 
 BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh,
                                std::span<const glm::dvec3> positions, bool mesh_is_reference, double within,
-                               double provable) {
+                               double provable, Team& team) {
   if (mesh.boundary.empty()) return;
   if (mesh_is_reference) {
     reference_.vertices.assign(positions.begin(), positions.end());
     for (const glm::uvec2& e : mesh.boundary) reference_.triangles.emplace_back(e.x, e.y, e.y);
   } else {
     const TriangleMesh& whole = volume.reference();
-    const CutMesh cut = cut_to_manifold(whole.vertices, whole.triangles);
+    const CutMesh cut = cut_to_manifold(whole.vertices, whole.triangles, team);
     reference_.vertices = whole.vertices;
     for (const glm::uvec2& e : cut.boundary) {
       const std::uint32_t a = cut.vertex_input[e.x], b = cut.vertex_input[e.y];

@@ -9,7 +9,7 @@
 
 namespace tolvol {
 
-BoundedMesh::BoundedMesh(BoundedMeshInput input, const Bounds& bounds)
+BoundedMesh::BoundedMesh(BoundedMeshInput input, const Bounds& bounds, Team& team)
     : bounds_(bounds),
       subset_(input.subset),
       store_(std::move(input.store)),
@@ -19,16 +19,16 @@ BoundedMesh::BoundedMesh(BoundedMeshInput input, const Bounds& bounds)
       slots_(std::move(input.slots)),
       wedges_(std::move(input.wedges)) {
   for (const Spot& s : input.spots) positions_.push_back(s.position), stored_.push_back(s.stored);
-  build(input.on_reference);
+  build(input.on_reference, input.mates, team);
 }
 
-void BoundedMesh::build(bool on_reference) {
+void BoundedMesh::build(bool on_reference, std::span<const std::uint32_t> mates, Team& team) {
   mesh_.request_vertex_status();
   mesh_.request_edge_status();
   mesh_.request_halfedge_status();
   mesh_.request_face_status();
   const std::size_t n = positions_.size(), m = triangles_.size();
-  connect(n, triangles_, mesh_);
+  connect(n, triangles_, mates, mesh_, team);
   triangle_count_ = m;
   for (std::uint32_t v = 0; v < n; ++v) {
     if (slots_[v] != v) copies_.try_emplace(slots_[v], 1, slots_[v]).first->second.push_back(v);

@@ -15,6 +15,7 @@
 #include "check/certificate.h"
 #include "operation/coverage.h"
 #include "operation/ring_check.h"
+#include "reference/parallel.h"
 
 namespace tolvol {
 
@@ -36,6 +37,7 @@ struct Spot {
 
 struct BoundedMeshInput {
   std::vector<glm::uvec3> triangles;  ///< an oriented manifold with boundary
+  std::vector<std::uint32_t> mates;   ///< as those of a CutMesh
   std::vector<Spot> spots;            ///< of the vertices
   std::vector<bool> pinned;           ///< per vertex: neither moves nor vanishes, and an edge between two such stays
   std::vector<double> shares;  ///< per vertex: of the forward bound that new faces around it may use; may be empty
@@ -55,7 +57,7 @@ class BoundedMesh {
   using Edge = OpenMesh::EdgeHandle;
   using Face = OpenMesh::FaceHandle;
 
-  BoundedMesh(BoundedMeshInput input, const Bounds& bounds);
+  BoundedMesh(BoundedMeshInput input, const Bounds& bounds, Team& team);
 
   const OpenMesh::TriConnectivity& connectivity() const { return mesh_; }
   const Bounds& bounds() const { return bounds_; }
@@ -109,7 +111,7 @@ class BoundedMesh {
   friend class Change;
   friend class DeferredProof;
 
-  void build(bool on_reference);
+  void build(bool on_reference, std::span<const std::uint32_t> mates, Team& team);
   int rank(std::uint32_t vertex) const;
   bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
 

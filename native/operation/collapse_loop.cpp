@@ -27,19 +27,17 @@ CollapseLoop::CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t
       regions_(&regions),
       region_(region),
       later_(later),
-      queue_(shared.stamps) {
-  attempts_.emplace_back(mesh_, later ? Change::Proof::later : Change::Proof::now);
-}
+      queue_(shared.stamps),
+      tried_(1) {}
 
 CollapseLoop::CollapseLoop(Shared& shared, Team& team)
-    : shared_(shared), collapse_(shared.collapse), mesh_(collapse_.mesh()), queue_(shared.stamps) {
-  attempts_.emplace_back(mesh_);
+    : shared_(shared), collapse_(shared.collapse), mesh_(collapse_.mesh()), queue_(shared.stamps), tried_(1) {
   // Copies are looked up beyond the faces around an edge.
   if (team.alone() || mesh_.has_copies()) return;
   team_ = &team;
   // Those of the last time, too, may still be waiting for their turn.
-  while (attempts_.size() < 2 * kMostAttempts) attempts_.emplace_back(mesh_);
-  attempt_of_.assign(mesh_.connectivity().n_edges(), 0);
+  tried_.resize(2 * kMostAttempts);
+  tried_of_.assign(mesh_.connectivity().n_edges(), 0);
   touched_.assign(mesh_.connectivity().n_vertices(), 0);
   reserved_.assign(mesh_.connectivity().n_vertices(), 0);
 }
@@ -67,37 +65,63 @@ void CollapseLoop::run(const Until& until, Progress* progress) {
     const auto entry = queue_.pop();
     if (!entry || entry->cost >= until.cost) break;
     if (deleted(entry->edge)) continue;
-    Attempt* const tried = found(entry->edge);
+    Tried* const tried = found(entry->edge);
     carry_out(tried ? *tried : try_ahead(entry->edge));
   }
 }
 
 /// What was found for the edge, if that still holds.
-CollapseLoop::Attempt* CollapseLoop::found(std::uint32_t edge) {
+CollapseLoop::Tried* CollapseLoop::found(std::uint32_t edge) {
   if (!team_) return nullptr;
-  Attempt& a = attempts_[attempt_of_[edge]];
-  if (a.edge != edge) return nullptr;
+  Tried& tried = tried_[tried_of_[edge]];
+  if (tried.edge != edge) return nullptr;
   const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
-  return std::max(touched_[mesh_.from(h)], touched_[mesh_.to(h)]) <= a.at ? &a : nullptr;
+  return std::max(touched_[mesh_.from(h)], touched_[mesh_.to(h)]) <= tried.at ? &tried : nullptr;
+}
+
+std::unique_ptr<CollapseLoop::Attempt> CollapseLoop::take_attempt() {
+  const std::lock_guard lock(idle_mutex_);
+  if (idle_.empty()) return std::make_unique<Attempt>(mesh_, later_ ? Change::Proof::later : Change::Proof::now);
+  std::unique_ptr<Attempt> last = std::move(idle_.back());
+  idle_.pop_back();
+  return last;
+}
+
+void CollapseLoop::give_back(std::unique_ptr<Attempt> attempt) {
+  if (!attempt) return;
+  const std::lock_guard lock(idle_mutex_);
+  idle_.push_back(std::move(attempt));
+}
+
+void CollapseLoop::try_now(Tried& tried) {
+  std::unique_ptr<Attempt> attempt = take_attempt();
+  collapse_.attempt(tried.edge, *attempt);
+  tried.outcome = attempt->outcome;
+  if (tried.outcome == EdgeCollapse::Outcome::possible) {
+    tried.attempt = std::move(attempt);
+  } else {
+    give_back(std::move(attempt));
+  }
 }
 
 /// Tries the edge and, with several threads, those that would come next.
-CollapseLoop::Attempt& CollapseLoop::try_ahead(std::uint32_t edge) {
+CollapseLoop::Tried& CollapseLoop::try_ahead(std::uint32_t edge) {
   if (!team_) {
-    attempts_[0].edge = edge;
-    collapse_.attempt(edge, attempts_[0]);
-    return attempts_[0];
+    tried_[0].edge = edge;
+    try_now(tried_[0]);
+    return tried_[0];
   }
-  const auto take = [&](std::uint32_t e) -> Attempt& {
-    attempt_of_[e] = static_cast<std::uint32_t>(next_);
-    Attempt& a = attempts_[next_];
-    next_ = (next_ + 1) % attempts_.size();
-    a.edge = e, a.at = clock_;
-    return a;
+  const auto take = [&](std::uint32_t e) -> Tried& {
+    tried_of_[e] = static_cast<std::uint32_t>(next_);
+    Tried& tried = tried_[next_];
+    next_ = (next_ + 1) % tried_.size();
+    give_back(std::move(tried.attempt));  // of what was void before its turn came
+    tried = {.edge = e, .at = clock_};
+    return tried;
   };
-  Attempt& first = take(edge);
+  Tried& first = take(edge);
   const std::size_t most = std::clamp<std::size_t>(mesh_.triangle_count() / kTrianglesPerAttempt, 1, kMostAttempts);
-  std::vector<Attempt*> batch{&first};
+  std::vector<Tried*> batch{&first};
   std::vector<CollapseQueue::Entry> ahead;
   ++batches_;
   reserve_around(edge);
@@ -106,12 +130,12 @@ CollapseLoop::Attempt& CollapseLoop::try_ahead(std::uint32_t edge) {
     if (!entry) break;
     if (deleted(entry->edge)) continue;
     ahead.push_back(*entry);
-    const Attempt* const tried = found(entry->edge);
+    const Tried* const tried = found(entry->edge);
     if (!tried && !reserved(entry->edge)) batch.push_back(&take(entry->edge));
     if (!tried || tried->outcome == EdgeCollapse::Outcome::possible) reserve_around(entry->edge);
   }
   for (const CollapseQueue::Entry& entry : ahead) queue_.push(entry.edge, entry.cost);
-  team_->run(batch.size(), 1, [&](std::size_t i, std::size_t) { collapse_.attempt(batch[i]->edge, *batch[i]); });
+  team_->run(batch.size(), 1, [&](std::size_t i, std::size_t) { try_now(*batch[i]); });
   return first;
 }
 
@@ -131,12 +155,13 @@ bool CollapseLoop::reserved(std::uint32_t edge) const {
   return reserved_[mesh_.from(h)] == batches_ || reserved_[mesh_.to(h)] == batches_;
 }
 
-void CollapseLoop::carry_out(Attempt& a) {
-  const std::uint32_t edge = std::exchange(a.edge, kNoEdge);
-  if (a.outcome == EdgeCollapse::Outcome::possible) {
-    if (later_) later_->note(a.change);
-    renew_around(collapse_.carry_out(a));
-  } else if (a.outcome == EdgeCollapse::Outcome::refused && !later_) {
+void CollapseLoop::carry_out(Tried& tried) {
+  const std::uint32_t edge = std::exchange(tried.edge, kNoEdge);
+  if (tried.outcome == EdgeCollapse::Outcome::possible) {
+    if (later_) later_->note(tried.attempt->change);
+    renew_around(collapse_.carry_out(*tried.attempt));
+    give_back(std::move(tried.attempt));
+  } else if (tried.outcome == EdgeCollapse::Outcome::refused && !later_) {
     shared_.refused[edge].store(true, std::memory_order_relaxed);
   }
 }

@@ -9,6 +9,8 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
+#include <mutex>
 #include <vector>
 
 #include "operation/collapse_queue.h"
@@ -46,20 +48,26 @@ class CollapseLoop {
   void run(const Until& until, Progress* progress);
 
  private:
-  struct Attempt : EdgeCollapse::Attempt {
-    using EdgeCollapse::Attempt::Attempt;
+  using Attempt = EdgeCollapse::Attempt;
+  static constexpr std::uint32_t kNoEdge = 0xFFFFFFFFu;
+  /// An edge that was tried.
+  struct Tried {
     std::uint32_t edge = kNoEdge;
     std::uint32_t at = 0;  ///< of the collapses carried out
+    EdgeCollapse::Outcome outcome = EdgeCollapse::Outcome::impossible;
+    std::unique_ptr<Attempt> attempt;  ///< where it is possible
   };
-  static constexpr std::uint32_t kNoEdge = 0xFFFFFFFFu;
 
   bool deleted(std::uint32_t edge) const;
   bool own(std::uint32_t edge) const;
-  Attempt* found(std::uint32_t edge);
-  Attempt& try_ahead(std::uint32_t edge);
+  Tried* found(std::uint32_t edge);
+  Tried& try_ahead(std::uint32_t edge);
+  void try_now(Tried& tried);
   void reserve_around(std::uint32_t edge);
   bool reserved(std::uint32_t edge) const;
-  void carry_out(Attempt& a);
+  void carry_out(Tried& tried);
+  std::unique_ptr<Attempt> take_attempt();
+  void give_back(std::unique_ptr<Attempt> attempt);
   void renew_around(std::uint32_t vertex);
 
   Shared& shared_;
@@ -70,13 +78,16 @@ class CollapseLoop {
   DeferredProof* later_ = nullptr;
   Team* team_ = nullptr;  ///< where there are others than the caller
   CollapseQueue queue_;
-  std::vector<Attempt> attempts_;
-  std::vector<std::uint32_t> attempt_of_;  ///< per edge: its place in attempts_, if that names the edge
-  std::size_t next_ = 0;                   ///< place in attempts_ that is taken next, the longest taken
-  std::uint32_t clock_ = 0;                ///< collapses carried out
-  std::vector<std::uint32_t> touched_;     ///< per vertex: when a face around it changed last,
-  std::vector<std::uint32_t> reserved_;    ///< and the last batch of tries in which one could change before its turn
-  std::uint32_t batches_ = 0;              ///< of tries, so far
+  std::vector<Tried> tried_;
+  std::vector<std::uint32_t> tried_of_;  ///< per edge: its place in tried_, if that names the edge
+  std::size_t next_ = 0;                 ///< place in tried_ that is taken next, the longest taken
+  std::uint32_t clock_ = 0;              ///< collapses carried out
+  std::vector<std::uint32_t> touched_;   ///< per vertex: when a face around it changed last,
+  std::vector<std::uint32_t> reserved_;  ///< and the last batch of tries in which one could change before its turn
+  std::uint32_t batches_ = 0;            ///< of tries, so far
+  /// Kept for their memory; the last given back is taken first, while it is in the cache.
+  std::vector<std::unique_ptr<Attempt>> idle_;
+  std::mutex idle_mutex_;  ///< guards idle_
 };
 
 }  // namespace tolvol

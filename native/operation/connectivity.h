@@ -7,12 +7,16 @@
 #include <glm/glm.hpp>
 #include <span>
 
+#include "reference/parallel.h"
+
 namespace tolvol {
 
 /// The same, down to every index, that `mesh` would hold after new_vertex() for each vertex and add_face() for each
-/// triangle, in about a third of the time. `mesh` must be empty; the triangles an oriented manifold with boundary, each
-/// on three vertices. Throws std::logic_error where more than two of them, or two the same way around, meet at an edge,
-/// or where the faces around a vertex are not one fan. O(n + m) for few edges at each vertex.
-void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, OpenMesh::TriConnectivity& mesh);
+/// triangle, in a fraction of the time. `mesh` must be empty; the triangles an oriented manifold with boundary, each
+/// on three vertices, with one edge between two vertices at most (not checked); `mates` as those of a CutMesh. Throws
+/// std::logic_error where sides that are joined do not run against each other, or where the faces around a vertex are
+/// not one fan. O(n + m).
+void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, std::span<const std::uint32_t> mates,
+             OpenMesh::TriConnectivity& mesh, Team& team);
 
 }  // namespace tolvol

@@ -29,7 +29,13 @@ class Decimation {
  public:
   Decimation(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const Placement& placement,
              const ToleranceVolume* volume, const DecimationOptions& options)
-      : vertices_(vertices), triangles_(triangles), volume_(volume), options_(options), placement_(placement) {
+      : vertices_(vertices),
+        triangles_(triangles),
+        volume_(volume),
+        options_(options),
+        placement_(placement),
+        // A rival answers one question after another.
+        team_(options.rival ? 1 : std::min(thread_count(options.threads), kMostThreads)) {
     validate(vertices, triangles);
     if (!volume && options.target_triangles == 0) throw InvalidInput("without a volume a target is needed");
     if (!volume && options.rival) throw InvalidInput("without a volume there is no tolerance for a rival to keep");
@@ -51,7 +57,7 @@ class Decimation {
   }
 
   DecimationResult run() {
-    cut_ = cut_to_manifold(vertices_, triangles_);
+    cut_ = cut_to_manifold(vertices_, triangles_, team_);
     positions_.resize(cut_.vertex_input.size());
     for (std::size_t v = 0; v < positions_.size(); ++v)
       positions_[v] = placement_.frame(vertices_[cut_.vertex_input[v]]);
@@ -63,14 +69,12 @@ class Decimation {
     }
     Bounds bounds;
     if (volume_) bounds = set_bounds();
-    BoundedMesh mesh(mesh_input(), bounds);
+    BoundedMesh mesh(mesh_input(), bounds, team_);
     const std::size_t apart = cut_.aside.size();
     const std::size_t target = options_.target_triangles > apart ? options_.target_triangles - apart : 0;
-    // A rival answers one question after another.
-    Team team(options_.rival ? 1 : std::min(thread_count(options_.threads), kMostThreads));
-    collapse_edges(mesh, target, team, options_.progress);
+    collapse_edges(mesh, target, team_, options_.progress);
     if (volume_ && !options_.rival && options_.effort == DecimationOptions::Effort::thorough) {
-      Refinement(mesh, team)
+      Refinement(mesh, team_)
           .run(
               target, [&] { return ended_early(); }, options_.progress);
     }
@@ -156,7 +160,7 @@ class Decimation {
       cover(provable);
       bounds.backward = &*backward_;
     } else {
-      boundary_.emplace(*volume_, cut_, positions_, identical_, within, provable);
+      boundary_.emplace(*volume_, cut_, positions_, identical_, within, provable, team_);
       for (const std::uint32_t v : boundary_->uncertified()) pin(v, "boundary not near the reference's boundary");
       if (boundary_->any()) {
         bounds.boundary_forward = &boundary_->forward();
@@ -233,6 +237,7 @@ class Decimation {
   BoundedMeshInput mesh_input() {
     BoundedMeshInput input;
     input.triangles = cut_.triangles;
+    input.mates = std::move(cut_.mates);
     for (std::size_t v = 0; v < positions_.size(); ++v)
       input.spots.push_back({vertices_[cut_.vertex_input[v]], positions_[v]});
     input.pinned = pinned_;
@@ -394,6 +399,7 @@ class Decimation {
   const DecimationOptions& options_;
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   Placement placement_;
+  Team team_;
 
   CutMesh cut_;
   std::vector<glm::dvec3> positions_;  // of the cut mesh, in the frame

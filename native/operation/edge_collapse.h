@@ -32,7 +32,7 @@ class EdgeCollapse {
   /// The order in which edges are collapsed; kNever for one that stays. Reads faces around its ends.
   double cost(std::uint32_t edge) const;
 
-  /// What came of trying an edge, and the scratch of it: one a thread.
+  /// What came of trying an edge, and the scratch of it: not for two threads at once.
   struct Attempt {
     explicit Attempt(const BoundedMesh& mesh, Change::Proof proof = Change::Proof::now)
         : change(mesh, proof), fit(mesh) {}

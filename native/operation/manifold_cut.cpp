@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The "local" method of Guéziec et al.: mark the edges to cut, then let the corners that stay connected through uncut
-// edges form the vertices. Deviations: edges are matched in two passes (index, then position), orientation is made
-// consistent on the way, and triangles are cut off whole in the rare case that two distinct edges would end in the same
-// two vertices.
+// edges, a fan each, form the vertices. Deviations: edges are matched in two passes (index, then position), orientation
+// is made consistent on the way, and triangles are cut off whole in the rare case that two distinct edges would end in
+// the same two vertices.
 #include "operation/manifold_cut.h"
 
 #include <algorithm>
@@ -15,7 +15,6 @@
 
 #include "operation/sort_by.h"
 #include "reference/triangle_mesh.h"
-#include "reference/union_find.h"
 
 namespace tolvol {
 namespace {
@@ -25,6 +24,7 @@ constexpr std::uint32_t kNone = CutMesh::kNone;
 /// A side is the edge of triangle side / 3 from corner side % 3 to the next.
 using Side = std::uint32_t;
 Side next_corner(Side s) { return s % 3 == 2 ? s - 2 : s + 1; }
+Side previous_corner(Side s) { return s % 3 == 0 ? s + 2 : s - 1; }
 
 std::uint64_t pair_key(std::uint32_t a, std::uint32_t b) {
   return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
@@ -32,8 +32,8 @@ std::uint64_t pair_key(std::uint32_t a, std::uint32_t b) {
 
 class Cutter {
  public:
-  Cutter(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles)
-      : input_(triangles), weld_(weld_equal_positions(vertices)) {
+  Cutter(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, Team& team)
+      : team_(team), input_(triangles), weld_(weld_equal_positions(vertices)) {
     cut_.stand_in.resize(triangles.size());
     std::iota(cut_.stand_in.begin(), cut_.stand_in.end(), 0u);
     const std::vector<bool> used = used_vertices(vertices.size(), triangles);
@@ -44,7 +44,7 @@ class Cutter {
     }
   }
 
-  CutMesh run(std::size_t vertex_count) {
+  CutMesh run() {
     sort_out_triangles();
     mate_.assign(3 * triangles_.size(), kNone);
     is_cut_.assign(3 * triangles_.size(), false);
@@ -52,7 +52,7 @@ class Cutter {
     orient();
     while (!form_vertices()) {
     }
-    write(vertex_count);
+    write();
     return std::move(cut_);
   }
 
@@ -66,9 +66,9 @@ class Cutter {
     std::uint32_t triangle;
   };
   /// Lowers first[t] to the first triangle that has the same key as t.
-  static void find_first(std::vector<Keyed>& triangles, std::vector<std::uint32_t>& first) {
+  void find_first(std::vector<Keyed>& triangles, std::vector<std::uint32_t>& first) const {
     sort_by(
-        triangles, [](const Keyed& t) { return t.key[0]; },
+        triangles, weld_.size(), team_, [](const Keyed& t) { return t.key[0]; },
         [](const Keyed& a, const Keyed& b) { return std::tie(a.key, a.triangle) < std::tie(b.key, b.triangle); });
     std::uint32_t of_key = 0;
     for (std::size_t i = 0; i < triangles.size(); ++i) {
@@ -132,48 +132,49 @@ class Cutter {
     }
   }
 
-  using KeyedSide = std::pair<std::uint64_t, Side>;
-  static void sort_sides(std::vector<KeyedSide>& sides) {
+  /// Calls visit() once for all sides that have the same two ends, which it gets in ascending order. end_of(corner) is
+  /// the vertex there, a number below `vertices`.
+  template <class EndOf, class Visit>
+  void by_ends(const std::vector<Side>& sides, std::size_t vertices, EndOf&& end_of, Visit&& visit) const {
+    using Keyed = std::pair<std::uint64_t, Side>;
+    std::vector<Keyed> sorted(sides.size());
+    team_.run(sides.size(), 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        sorted[i] = {pair_key(end_of(sides[i]), end_of(next_corner(sides[i]))), sides[i]};
+    });
     sort_by(
-        sides, [](const KeyedSide& s) { return static_cast<std::uint32_t>(s.first >> 32); }, std::less<KeyedSide>());
-  }
-
-  /// Sides by their key, those with the same key in a row, in ascending order of side.
-  template <class Key>
-  std::vector<KeyedSide> sorted_sides(Key&& key) const {
-    std::vector<KeyedSide> sides;
-    sides.reserve(mate_.size());
-    for (Side s = 0; s < mate_.size(); ++s) {
-      if (mate_[s] == kNone && !is_cut_[s]) sides.emplace_back(key(s), s);
-    }
-    sort_sides(sides);
-    return sides;
-  }
-
-  template <class Visit>
-  static void for_each_run(const std::vector<KeyedSide>& sides, Visit&& visit) {
-    for (std::size_t begin = 0, end; begin < sides.size(); begin = end) {
-      for (end = begin + 1; end < sides.size() && sides[end].first == sides[begin].first;) ++end;
-      visit(std::span(sides).subspan(begin, end - begin));
+        sorted, vertices, team_, [](const Keyed& s) { return s.first >> 32; }, std::less<Keyed>());
+    std::vector<Side> alike;
+    for (std::size_t i = 0; i < sorted.size(); ++i) {
+      alike.push_back(sorted[i].second);
+      if (i + 1 < sorted.size() && sorted[i + 1].first == sorted[i].first) continue;
+      visit(alike);
+      alike.clear();
     }
   }
 
   void join_sides() {
     for (const bool by_position : {false, true}) {
-      const auto sides = sorted_sides([&](Side s) {
-        return by_position ? pair_key(welded(s), welded(next_corner(s))) : pair_key(vertex(s), vertex(next_corner(s)));
-      });
-      for_each_run(sides, [&](auto run) {
-        if (run.size() == 2) {
-          mate_[run[0].second] = run[1].second;
-          mate_[run[1].second] = run[0].second;
-        } else if (run.size() > 2) {
-          for (const auto& side : run) is_cut_[side.second] = true;
+      if (by_position && !renamed_) return;  // it would find what it has found
+      std::vector<Side> open;
+      for (Side s = 0; s < mate_.size(); ++s) {
+        if (mate_[s] == kNone && !is_cut_[s]) open.push_back(s);
+      }
+      const auto end_of = [&](Side corner) { return by_position ? welded(corner) : vertex(corner); };
+      by_ends(open, weld_.size(), end_of, [&](const std::vector<Side>& alike) {
+        if (alike.size() == 2) {
+          mate_[alike[0]] = alike[1], mate_[alike[1]] = alike[0];
+          oriented_ = oriented_ && opposed(alike[0], alike[1]);
+        } else if (alike.size() > 2) {
+          for (const Side s : alike) is_cut_[s] = true;
           ++cut_.cut_edges;
         }
       });
     }
   }
+
+  /// Whether two sides run against each other, as those of neighbours should.
+  bool opposed(Side s, Side other) const { return welded(s) == welded(next_corner(other)); }
 
   void cut_side(Side s) {
     const Side other = mate_[s];
@@ -185,6 +186,7 @@ class Cutter {
 
   void orient() {
     flip_.assign(triangles_.size(), false);
+    if (oriented_) return;
     std::vector<bool> seen(triangles_.size(), false);
     std::vector<std::uint32_t> queue;
     for (std::uint32_t seed = 0; seed < triangles_.size(); ++seed) {
@@ -197,8 +199,7 @@ class Cutter {
         for (Side s = 3 * t; s < 3 * t + 3; ++s) {
           const Side other = mate_[s];
           if (other == kNone) continue;
-          const bool opposed = welded(s) == welded(next_corner(other));  // as neighbours should be
-          const bool flip = flip_[t] != !opposed;
+          const bool flip = flip_[t] != !opposed(s, other);
           if (!seen[other / 3]) {
             seen[other / 3] = true;
             flip_[other / 3] = flip;
@@ -216,29 +217,24 @@ class Cutter {
   /// Corners connected through uncut edges form the vertices. False when two different edges ended in the same two
   /// vertices: their triangles were cut off, and the vertices must be formed anew.
   bool form_vertices() {
-    UnionFind corners(mate_.size());
+    corner_vertex_.assign(mate_.size(), kNone);
+    std::uint32_t count = 0;
     for (Side s = 0; s < mate_.size(); ++s) {
-      const Side other = mate_[s];
-      if (other == kNone || other < s) continue;
-      const bool opposed = welded(s) == welded(next_corner(other));
-      corners.join(s, opposed ? next_corner(other) : other);
-      corners.join(next_corner(s), opposed ? other : next_corner(other));
+      if (corner_vertex_[s] != kNone) continue;
+      corner_vertex_[s] = count;
+      for (const bool forth : {true, false}) walk(s, forth, count);
+      ++count;
     }
-    corner_vertex_.resize(mate_.size());
-    for (Side s = 0; s < mate_.size(); ++s) corner_vertex_[s] = corners.find(s);
     // Vertices that stay what they were have no edges but those that join_sides() saw.
     if (!renamed_ && cut_.cut_edges == 0) return true;
 
-    std::vector<KeyedSide> sides;
-    sides.reserve(mate_.size());
-    for (Side s = 0; s < mate_.size(); ++s) {
-      sides.emplace_back(pair_key(corner_vertex_[s], corner_vertex_[next_corner(s)]), s);
-    }
-    sort_sides(sides);
+    std::vector<Side> all(mate_.size());
+    std::iota(all.begin(), all.end(), 0u);
     std::vector<std::uint32_t> offenders;
-    for_each_run(sides, [&](auto run) {
-      if (run.size() > 2 || (run.size() == 2 && mate_[run[0].second] != run[1].second)) {
-        for (const auto& side : run) offenders.push_back(side.second / 3);
+    const auto end_of = [&](Side corner) { return corner_vertex_[corner]; };
+    by_ends(all, count, end_of, [&](const std::vector<Side>& alike) {
+      if (alike.size() > 2 || (alike.size() == 2 && mate_[alike[0]] != alike[1])) {
+        for (const Side s : alike) offenders.push_back(s / 3);
       }
     });
     for (const std::uint32_t t : offenders) {
@@ -250,16 +246,25 @@ class Cutter {
     return offenders.empty();
   }
 
-  void write(std::size_t vertex_count) {
-    std::vector<std::uint32_t> dense(mate_.size(), kNone);  // union root -> vertex
-    cut_.input_vertex.assign(vertex_count, kNone);
-    std::vector<bool> several(vertex_count, false);  // input vertices that became several
+  /// From triangle to triangle around a vertex, leaving each through the side that begins at its corner (`forth`) or
+  /// the one that ends there.
+  void walk(Side corner, bool forth, std::uint32_t name) {
+    for (;;) {
+      const Side through = forth ? corner : previous_corner(corner), other = mate_[through];
+      if (other == kNone) return;
+      if (flip_[through / 3] != flip_[other / 3]) forth = !forth;
+      corner = forth ? next_corner(other) : other;
+      if (corner_vertex_[corner] != kNone) return;
+      corner_vertex_[corner] = name;
+    }
+  }
+
+  void write() {
+    cut_.input_vertex.assign(weld_.size(), kNone);
+    std::vector<bool> several(weld_.size(), false);  // input vertices that became several
     for (Side s = 0; s < mate_.size(); ++s) {
-      std::uint32_t& v = dense[corner_vertex_[s]];
-      if (v == kNone) {
-        v = static_cast<std::uint32_t>(cut_.vertex_input.size());
-        cut_.vertex_input.push_back(vertex(s));
-      }
+      const std::uint32_t v = corner_vertex_[s];
+      if (v == cut_.vertex_input.size()) cut_.vertex_input.push_back(vertex(s));
       cut_.vertex_input[v] = std::min(cut_.vertex_input[v], vertex(s));
       std::uint32_t& of_input = cut_.input_vertex[vertex(s)];
       if (of_input != kNone && of_input != v) several[vertex(s)] = true;
@@ -271,24 +276,28 @@ class Cutter {
       for (int k = 0; k < 3; ++k) tied.insert(weld_[input_[i][k]]);
     }
     for (Side s = 0; s < mate_.size(); ++s) {
-      const std::uint32_t v = dense[corner_vertex_[s]];
+      const std::uint32_t v = corner_vertex_[s];
       if (!tied.empty() && cut_.cause[v] == CutCause::none && tied.contains(welded(s)))
         cut_.cause[v] = CutCause::degenerate;
       if (several[vertex(s)]) cut_.cause[v] = CutCause::non_manifold;
       if (is_cut_[s]) {
         cut_.cause[v] = CutCause::non_manifold;
-        cut_.cause[dense[corner_vertex_[next_corner(s)]]] = CutCause::non_manifold;
+        cut_.cause[corner_vertex_[next_corner(s)]] = CutCause::non_manifold;
       }
     }
+    // Turned over, the last side of a triangle is its first.
+    const auto turned = [&](Side s) { return flip_[s / 3] ? s - s % 3 + 2 - s % 3 : s; };
+    cut_.mates.resize(mate_.size());
+    for (Side s = 0; s < mate_.size(); ++s) cut_.mates[turned(s)] = mate_[s] == kNone ? kNone : turned(mate_[s]);
+    cut_.triangles.reserve(triangles_.size());
     for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
-      glm::uvec3 corners(dense[corner_vertex_[3 * t]], dense[corner_vertex_[3 * t + 1]],
-                         dense[corner_vertex_[3 * t + 2]]);
+      glm::uvec3 corners(corner_vertex_[3 * t], corner_vertex_[3 * t + 1], corner_vertex_[3 * t + 2]);
       if (flip_[t]) std::swap(corners.y, corners.z);
       cut_.triangles.push_back(corners);
     }
     for (Side s = 0; s < mate_.size(); ++s) {
       if (mate_[s] != kNone || is_cut_[s]) continue;
-      glm::uvec2 edge(dense[corner_vertex_[s]], dense[corner_vertex_[next_corner(s)]]);
+      glm::uvec2 edge(corner_vertex_[s], corner_vertex_[next_corner(s)]);
       if (flip_[s / 3]) std::swap(edge.x, edge.y);
       cut_.boundary.push_back(edge);
     }
@@ -317,6 +326,7 @@ class Cutter {
         cut_.input_vertex[input] = entry->second;
       }
     }
+    if (triangles_.size() == input_.size()) return;
     // Input vertices that only dropped triangles use follow the vertex at their position.
     std::unordered_map<std::uint32_t, std::uint32_t> any;
     for (std::uint32_t i = 0; i < cut_.input_vertex.size(); ++i) {
@@ -338,21 +348,23 @@ class Cutter {
     }
   }
 
+  Team& team_;
   std::span<const glm::uvec3> input_;
   std::vector<std::uint32_t> weld_;
-  bool renamed_ = false;                  // a vertex that is used is not its own representative
-  std::vector<std::uint32_t> triangles_;  // input triangles that go into the manifold
-  std::vector<Side> mate_;                // per side: the side joined to it
-  std::vector<bool> is_cut_;              // per side: cut, so that its vertices are tied
-  std::vector<bool> flip_;
-  std::vector<std::uint32_t> corner_vertex_;  // per corner: the root of its union
+  bool renamed_ = false;                      // a vertex that is used is not its own representative
+  std::vector<std::uint32_t> triangles_;      // input triangles that go into the manifold
+  std::vector<Side> mate_;                    // per side: the side joined to it
+  std::vector<bool> is_cut_;                  // per side: cut, so that its vertices are tied
+  bool oriented_ = true;                      // all sides were opposed when they were joined
+  std::vector<bool> flip_;                    // per triangle: joined sides are opposed once these are turned over
+  std::vector<std::uint32_t> corner_vertex_;  // per corner, numbered in the order of their first ones
   CutMesh cut_;
 };
 
 }  // namespace
 
-CutMesh cut_to_manifold(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles) {
-  return Cutter(vertices, triangles).run(vertices.size());
+CutMesh cut_to_manifold(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, Team& team) {
+  return Cutter(vertices, triangles, team).run();
 }
 
 }  // namespace tolvol

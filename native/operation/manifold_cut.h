@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "reference/parallel.h"
+
 namespace tolvol {
 
 /// What ties a vertex of the cut mesh down. Its copies are one vertex again in the result.
@@ -15,7 +17,10 @@ enum class CutCause : std::uint8_t { none, non_manifold, degenerate };
 
 struct CutMesh {
   // The manifold.
-  std::vector<glm::uvec3> triangles;          ///< vertices of the manifold; all consistently oriented
+  std::vector<glm::uvec3> triangles;  ///< vertices of the manifold; all consistently oriented
+  /// Per side, which is the edge of triangle side / 3 from corner side % 3 to the next: the side joined to it, or
+  /// kNone.
+  std::vector<std::uint32_t> mates;
   std::vector<std::uint32_t> triangle_input;  ///< per triangle: the input triangle it is
   std::vector<bool> reversed;                 ///< per triangle: its corners 1 and 2 are swapped against the input
   std::vector<std::uint32_t> vertex_input;    ///< per vertex: the lowest input vertex it stands for
@@ -40,7 +45,7 @@ struct CutMesh {
 /// Joins triangles across edges by vertex index first and, where that leaves an edge open, by exactly equal position,
 /// so that soups and seam splits decimate without cracks while sheets that merely touch stay apart. Edges of more than
 /// two triangles are cut. O(m) expected. After A. Guéziec et al., "Cutting and stitching: converting sets of polygons
-/// to manifold surfaces", 2001.
-CutMesh cut_to_manifold(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles);
+/// to manifold surfaces", 2001. The same on any number of threads.
+CutMesh cut_to_manifold(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, Team& team);
 
 }  // namespace tolvol

@@ -3,42 +3,50 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "reference/triangle_mesh.h"
 
 namespace tolvol {
 namespace {
 
-class Cutter {
- public:
-  Cutter(const BoundedMesh& mesh, std::size_t most, Regions& out) : mesh_(mesh), most_(most), out_(out) {}
+using Vertices = std::span<std::uint32_t>;
 
-  void cut(std::span<std::uint32_t> vertices, double share) {
-    if (vertices.size() <= most_) {
-      for (const std::uint32_t v : vertices) out_.of_vertex[v] = out_.count;
-      ++out_.count;
-      return;
+/// Cuts in two across the longest side of their box.
+std::pair<Vertices, Vertices> halves(const BoundedMesh& mesh, Vertices vertices, double share) {
+  Box box;
+  for (const std::uint32_t v : vertices) box.add(mesh.position(v));
+  const glm::dvec3 size = box.upper - box.lower;
+  const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  const std::size_t place = std::clamp<std::size_t>(
+      static_cast<std::size_t>(share * static_cast<double>(vertices.size())), 1, vertices.size() - 1);
+  std::nth_element(vertices.begin(), vertices.begin() + static_cast<std::ptrdiff_t>(place), vertices.end(),
+                   [&](std::uint32_t a, std::uint32_t b) {
+                     const double x = mesh.position(a)[axis], y = mesh.position(b)[axis];
+                     return x < y || (x == y && a < b);
+                   });
+  return {vertices.first(place), vertices.subspan(place)};
+}
+
+/// Cuts again and again until none has more than `most`; the first time `first` of them go to one side.
+std::vector<Vertices> pieces(const BoundedMesh& mesh, Vertices all, std::size_t most, double first, Team& team) {
+  std::vector<Vertices> found{all};
+  double share = first;
+  while (std::ranges::any_of(found, [&](Vertices vertices) { return vertices.size() > most; })) {
+    std::vector<std::pair<Vertices, Vertices>> cut(found.size());
+    team.run(found.size(), 1, [&](std::size_t i, std::size_t) {
+      cut[i] = found[i].size() > most ? halves(mesh, found[i], share) : std::pair{found[i], Vertices{}};
+    });
+    found.clear();
+    for (const auto& [one, other] : cut) {
+      found.push_back(one);
+      if (!other.empty()) found.push_back(other);
     }
-    Box box;
-    for (const std::uint32_t v : vertices) box.add(mesh_.position(v));
-    const glm::dvec3 size = box.upper - box.lower;
-    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-    const std::size_t place = std::clamp<std::size_t>(
-        static_cast<std::size_t>(share * static_cast<double>(vertices.size())), 1, vertices.size() - 1);
-    std::nth_element(vertices.begin(), vertices.begin() + static_cast<std::ptrdiff_t>(place), vertices.end(),
-                     [&](std::uint32_t a, std::uint32_t b) {
-                       const double x = mesh_.position(a)[axis], y = mesh_.position(b)[axis];
-                       return x < y || (x == y && a < b);
-                     });
-    cut(vertices.first(place), 0.5);
-    cut(vertices.subspan(place), 0.5);
+    share = 0.5;
   }
-
- private:
-  const BoundedMesh& mesh_;
-  std::size_t most_;
-  Regions& out_;
-};
+  return found;
+}
 
 }  // namespace
 
@@ -48,7 +56,7 @@ std::uint32_t Regions::of_edge(const BoundedMesh& mesh, std::uint32_t edge) cons
   return a == b ? a : kNone;
 }
 
-Regions regions(const BoundedMesh& mesh, std::size_t most, double first) {
+Regions regions(const BoundedMesh& mesh, std::size_t most, double first, Team& team) {
   Regions out;
   const OpenMesh::TriConnectivity& connectivity = mesh.connectivity();
   out.of_vertex.assign(connectivity.n_vertices(), Regions::kNone);
@@ -58,7 +66,10 @@ Regions regions(const BoundedMesh& mesh, std::size_t most, double first) {
     alive.push_back(v);
     if (mesh.has_copies(v)) rim.push_back(v);
   }
-  Cutter(mesh, most, out).cut(alive, first);
+  for (const Vertices vertices : pieces(mesh, alive, most, first, team)) {
+    for (const std::uint32_t v : vertices) out.of_vertex[v] = out.count;
+    ++out.count;
+  }
   for (const auto e : connectivity.edges()) {
     const auto h = connectivity.halfedge_handle(e, 0);
     const std::uint32_t a = mesh.from(h), b = mesh.to(h);

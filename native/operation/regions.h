@@ -22,7 +22,8 @@ struct Regions {
 };
 
 /// Cuts along the longest axis at a median, over and over, until no region has more than `most` vertices. The first cut
-/// is at `first` of the vertices instead, by which the rims come to lie elsewhere. O(n log n); the same everywhere.
-Regions regions(const BoundedMesh& mesh, std::size_t most, double first);
+/// is at `first` of the vertices instead, by which the rims come to lie elsewhere. O(n log n); the same everywhere, on
+/// any number of threads.
+Regions regions(const BoundedMesh& mesh, std::size_t most, double first, Team& team);
 
 }  // namespace tolvol

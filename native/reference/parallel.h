@@ -28,6 +28,8 @@ class Team {
   Team(const Team&) = delete;
   Team& operator=(const Team&) = delete;
 
+  /// Threads, the caller's among them.
+  std::size_t size() const { return helpers_.size() + 1; }
   bool alone() const { return helpers_.empty(); }
 
   /// Calls body(begin, end) for blocks of [0, count). Blocks are handed out in order, so body must write only to what

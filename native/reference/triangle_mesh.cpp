@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <sstream>
-#include <unordered_map>
 
 #include "reference/errors.h"
 
@@ -40,21 +39,26 @@ std::vector<bool> used_vertices(std::size_t vertex_count, std::span<const glm::u
 }
 
 std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vertices) {
-  struct Hash {
-    std::size_t operator()(const glm::dvec3& p) const {
-      std::uint64_t h = 0;
-      for (int k = 0; k < 3; ++k) {
-        h ^= std::bit_cast<std::uint64_t>(p[k] + 0.0);  // -0 + 0 is 0: equal numbers hash alike
-        h *= 0x9E3779B97F4A7C15u;
-        h ^= h >> 32;
-      }
-      return h;
+  // Open addressing, at most half full.
+  constexpr std::uint32_t kFree = 0xFFFFFFFFu;
+  std::vector<std::uint32_t> first(std::bit_ceil(2 * vertices.size() + 1), kFree);
+  const int bits = std::countr_zero(first.size());
+  const auto place_of = [&](const glm::dvec3& p) {
+    std::uint64_t h = 0;
+    for (int k = 0; k < 3; ++k) {
+      h ^= h >> 32;
+      h ^= std::bit_cast<std::uint64_t>(p[k] + 0.0);  // -0 + 0 is 0: equal numbers hash alike
+      h *= 0x9E3779B97F4A7C15u;
     }
+    return static_cast<std::size_t>(h >> (64 - bits));  // the bits that depend on all others
   };
-  std::unordered_map<glm::dvec3, std::uint32_t, Hash> first(vertices.size() * 2);
   std::vector<std::uint32_t> representative(vertices.size());
-  for (std::uint32_t i = 0; i < vertices.size(); ++i)
-    representative[i] = first.try_emplace(vertices[i], i).first->second;
+  for (std::uint32_t i = 0; i < vertices.size(); ++i) {
+    std::size_t place = place_of(vertices[i]);
+    while (first[place] != kFree && vertices[first[place]] != vertices[i]) place = (place + 1) & (first.size() - 1);
+    if (first[place] == kFree) first[place] = i;
+    representative[i] = first[place];
+  }
   return representative;
 }
 

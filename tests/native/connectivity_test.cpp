@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <random>
 #include <stdexcept>
 #include <vector>
@@ -27,10 +28,28 @@ TriConnectivity one_by_one(std::size_t vertices, const std::vector<glm::uvec3>& 
   return mesh;
 }
 
-TriConnectivity at_once(std::size_t vertices, const std::vector<glm::uvec3>& triangles) {
+/// The first two sides between the same vertices are mates.
+std::vector<std::uint32_t> mates_of(const std::vector<glm::uvec3>& triangles) {
+  std::vector<std::uint32_t> mates(3 * triangles.size(), CutMesh::kNone);
+  std::map<std::pair<unsigned, unsigned>, std::uint32_t> first;
+  for (std::uint32_t s = 0; s < mates.size(); ++s) {
+    const auto [other, added] = first.emplace(std::minmax(triangles[s / 3][s % 3], triangles[s / 3][(s + 1) % 3]), s);
+    if (added || mates[other->second] != CutMesh::kNone) continue;
+    mates[s] = other->second, mates[other->second] = s;
+  }
+  return mates;
+}
+
+TriConnectivity at_once(std::size_t vertices, const std::vector<glm::uvec3>& triangles,
+                        const std::vector<std::uint32_t>& mates) {
   TriConnectivity mesh;
-  connect(vertices, triangles, mesh);
+  Team team(2);
+  connect(vertices, triangles, mates, mesh, team);
   return mesh;
+}
+
+TriConnectivity at_once(std::size_t vertices, const std::vector<glm::uvec3>& triangles) {
+  return at_once(vertices, triangles, mates_of(triangles));
 }
 
 void expect_same(const TriConnectivity& a, const TriConnectivity& b) {
@@ -50,8 +69,8 @@ void expect_same(const TriConnectivity& a, const TriConnectivity& b) {
 TEST(Connectivity, IsWhatTheKernelMakesFaceByFace) {
   const TriangleMesh triangle{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{2, 0, 1}}};
   const TriangleMesh nothing{{{0, 0, 0}}, {}};
-  for (const TriangleMesh& mesh : {shapes::torus(12), shapes::grid(9), shapes::box(4), triangle, nothing,
-                                   shapes::joined(shapes::grid(5), shapes::torus(7))}) {
+  for (const TriangleMesh& mesh : {shapes::torus(12), shapes::torus(60), shapes::grid(9), shapes::box(4), triangle,
+                                   nothing, shapes::joined(shapes::grid(5), shapes::torus(7))}) {
     expect_same(one_by_one(mesh.vertices.size(), mesh.triangles), at_once(mesh.vertices.size(), mesh.triangles));
   }
 }
@@ -65,8 +84,11 @@ TEST(Connectivity, TrianglesInAnyOrderAndRaggedHoles) {
       for (unsigned turns = engine() % 3; turns > 0; --turns) t = {t.y, t.z, t.x};
     }
     mesh.triangles.resize(mesh.triangles.size() * (1 + seed % 4) / 4);
-    const CutMesh cut = cut_to_manifold(mesh.vertices, mesh.triangles);
-    expect_same(one_by_one(cut.vertex_input.size(), cut.triangles), at_once(cut.vertex_input.size(), cut.triangles));
+    Team team(1);
+    const CutMesh cut = cut_to_manifold(mesh.vertices, mesh.triangles, team);
+    EXPECT_EQ(cut.mates, mates_of(cut.triangles));
+    expect_same(one_by_one(cut.vertex_input.size(), cut.triangles),
+                at_once(cut.vertex_input.size(), cut.triangles, cut.mates));
   }
 }
 
@@ -76,6 +98,16 @@ TEST(Connectivity, RefusesWhatIsNoOrientedManifold) {
   EXPECT_THROW(at_once(5, {{0, 1, 2}, {0, 3, 4}}), std::logic_error);             // two boundaries at a vertex
   EXPECT_THROW(at_once(7, {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}, {0, 4, 5}, {0, 5, 6}, {0, 6, 4}, {4, 6, 5}}),
                std::logic_error);  // two closed fans
+  EXPECT_THROW(
+      at_once(4, {{0, 1, 2}, {1, 0, 3}}, {1, 0, CutMesh::kNone, CutMesh::kNone, CutMesh::kNone, CutMesh::kNone}),
+      std::logic_error);
+  constexpr std::uint32_t kNone = CutMesh::kNone;
+  EXPECT_THROW(at_once(4, {{0, 1, 2}, {1, 0, 3}}, {3, kNone, kNone, kNone, kNone, kNone}), std::logic_error);
+  EXPECT_THROW(at_once(4, {{0, 1, 2}, {1, 0, 3}}, {99, kNone, kNone, kNone, kNone, kNone}), std::logic_error);
+  EXPECT_THROW(at_once(4, {{0, 1, 2}, {1, 0, 3}}, {}), std::logic_error);
+  TriangleMesh large = shapes::torus(60);
+  std::swap(large.triangles.back().x, large.triangles.back().y);
+  EXPECT_THROW(at_once(large.vertices.size(), large.triangles), std::logic_error);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "check/certificate.h"
 #include "measure/hausdorff.h"
 #include "operation/collapse_loop.h"
+#include "operation/manifold_cut.h"
 #include "shapes.h"
 
 namespace {
@@ -41,7 +42,9 @@ struct Worked {
     coverage.emplace(volume->reference(), within, reference.triangles.size());
     for (std::uint32_t i = 0; i < reference.triangles.size(); ++i) coverage->own(i, i);
     BoundedMeshInput input;
+    Team alone(1);
     input.triangles = reference.triangles;
+    input.mates = cut_to_manifold(reference.vertices, reference.triangles, alone).mates;
     for (std::uint32_t v = 0; v < reference.vertices.size(); ++v) {
       input.spots.push_back({reference.vertices[v], placement->frame(reference.vertices[v])});
       input.slots.push_back(v);
@@ -61,10 +64,10 @@ struct Worked {
     };
     Bounds bounds;
     bounds.forward = &*certificate, bounds.backward = &*coverage;
-    mesh.emplace(std::move(input), bounds);
+    mesh.emplace(std::move(input), bounds, alone);
     collapse.emplace(*mesh);
     shared.emplace(*collapse);
-    parts = regions(*mesh, 1200, 0.5);
+    parts = regions(*mesh, 1200, 0.5, alone);
     vertices.resize(parts.count), faces.resize(parts.count);
     for (std::uint32_t v = 0; v < parts.of_vertex.size(); ++v) {
       if (parts.of_vertex[v] != Regions::kNone) vertices[parts.of_vertex[v]].push_back(v);
@@ -217,13 +220,15 @@ TEST(DeferredProof, LeavesBoundariesWithBoundsToOthers) {
   Bounds bounds = worked.mesh->bounds();
   bounds.boundary_forward = bounds.forward, bounds.boundary_backward = bounds.backward;
   BoundedMeshInput input;
+  Team alone(1);
   input.triangles = worked.reference.triangles;
+  input.mates = cut_to_manifold(worked.reference.vertices, worked.reference.triangles, alone).mates;
   for (std::uint32_t v = 0; v < worked.reference.vertices.size(); ++v) {
     input.spots.push_back({worked.mesh->stored(v), worked.mesh->position(v)});
     input.slots.push_back(v);
   }
   input.pinned.assign(worked.reference.vertices.size(), false);
-  BoundedMesh mesh(std::move(input), bounds);
+  BoundedMesh mesh(std::move(input), bounds, alone);
   EdgeCollapse collapse(mesh);
   EXPECT_FALSE(DeferredProof(collapse, mesh, worked.vertices[0], worked.faces[0], worked.places).possible());
 }

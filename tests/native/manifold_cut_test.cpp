@@ -14,10 +14,23 @@ namespace {
 
 using namespace tolvol;
 
-CutMesh cut(const TriangleMesh& mesh) { return cut_to_manifold(mesh.vertices, mesh.triangles); }
+CutMesh cut(const TriangleMesh& mesh) {
+  Team team(2);
+  return cut_to_manifold(mesh.vertices, mesh.triangles, team);
+}
 
-/// An oriented manifold: every directed edge once, and the triangles around a vertex in one fan.
+/// An oriented manifold: every directed edge once with its mate, and the triangles around a vertex in one fan.
 void expect_manifold(const CutMesh& mesh) {
+  std::map<std::pair<unsigned, unsigned>, std::uint32_t> side;
+  const auto ends = [&](std::uint32_t s) {
+    return std::pair(mesh.triangles[s / 3][s % 3], mesh.triangles[s / 3][(s + 1) % 3]);
+  };
+  ASSERT_EQ(mesh.mates.size(), 3 * mesh.triangles.size());
+  for (std::uint32_t s = 0; s < mesh.mates.size(); ++s) side[ends(s)] = s;
+  for (std::uint32_t s = 0; s < mesh.mates.size(); ++s) {
+    const auto mate = side.find({ends(s).second, ends(s).first});
+    ASSERT_EQ(mesh.mates[s], mate == side.end() ? CutMesh::kNone : mate->second) << "side " << s;
+  }
   std::set<std::pair<unsigned, unsigned>> directed;
   std::map<unsigned, std::vector<std::pair<unsigned, unsigned>>> links;
   for (const glm::uvec3& t : mesh.triangles) {
@@ -179,6 +192,21 @@ TEST(ManifoldCut, AnySoupBecomesAManifold) {
       mesh.triangles.emplace_back(engine() % vertices, engine() % vertices, engine() % vertices);
     const CutMesh result = cut(mesh);
     expect_manifold(result);
+    for (const unsigned threads : {1u, 3u, 16u}) {
+      Team team(threads);
+      const CutMesh other = cut_to_manifold(mesh.vertices, mesh.triangles, team);
+      EXPECT_EQ(other.triangles, result.triangles);
+      EXPECT_EQ(other.mates, result.mates);
+      EXPECT_EQ(other.triangle_input, result.triangle_input);
+      EXPECT_EQ(other.reversed, result.reversed);
+      EXPECT_EQ(other.vertex_input, result.vertex_input);
+      EXPECT_EQ(other.cause, result.cause);
+      EXPECT_EQ(other.boundary, result.boundary);
+      EXPECT_EQ(other.output_slot, result.output_slot);
+      EXPECT_EQ(other.input_vertex, result.input_vertex);
+      EXPECT_EQ(other.stand_in, result.stand_in);
+      EXPECT_EQ(other.cut_edges, result.cut_edges);
+    }
     EXPECT_EQ(result.triangles.size() + result.duplicates + result.degenerate_on_edge + result.aside.size(), triangles);
     for (const glm::uvec3& t : mesh.triangles) {
       for (int k = 0; k < 3; ++k) {

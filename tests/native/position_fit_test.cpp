@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "check/certificate.h"
+#include "operation/manifold_cut.h"
 #include "shapes.h"
 
 namespace {
@@ -27,7 +28,9 @@ struct Plate {
     coverage.emplace(volume->reference(), volume->frame_tolerance(), reference.triangles.size());
     for (std::uint32_t i = 0; i < reference.triangles.size(); ++i) coverage->own(i, i);
     BoundedMeshInput input;
+    Team alone(1);
     input.triangles = reference.triangles;
+    input.mates = cut_to_manifold(reference.vertices, reference.triangles, alone).mates;
     for (std::uint32_t v = 0; v < reference.vertices.size(); ++v) {
       dvec3 p = reference.vertices[v];
       if (v == lifted) p.z = height;
@@ -38,7 +41,7 @@ struct Plate {
     input.store = [this](const dvec3& p) { return Spot{placement->store(p), p}; };
     Bounds bounds;
     bounds.forward = &*certificate, bounds.backward = &*coverage;
-    mesh.emplace(std::move(input), bounds);
+    mesh.emplace(std::move(input), bounds, alone);
   }
 
   TriangleMesh reference;
