@@ -70,15 +70,18 @@ std::optional<glm::dvec3> TriangleCertificate::near(const glm::dvec3& p) const {
   constexpr double kNear = 0.3;  // of the tolerance: a point this near is near enough
   std::optional<glm::dvec3> nearest;
   double nearest2 = std::numeric_limits<double>::infinity();
-  std::uint32_t last = DistanceGrid::kNone;
+  std::array<std::uint32_t, 8> seen;
+  int count = 0;
   const glm::dvec3 cell = (p - grid_->origin) * (1 / grid_->spacing), low = glm::floor(cell);
   const glm::ivec3 first(glm::greaterThan(cell - low, glm::dvec3(0.5)));  // the nearest node of the eight
   for (int i = 0; i < 8 && nearest2 > kNear * kNear * within2_; ++i) {
     const glm::ivec3 node = glm::ivec3(low) + (first ^ glm::ivec3(i & 1, (i >> 1) & 1, i >> 2));
     if (glm::any(glm::lessThan(node, glm::ivec3(0))) || glm::any(glm::greaterThanEqual(node, grid_->nodes))) continue;
     const std::uint32_t triangle = grid_->triangle[grid_->index(node.x, node.y, node.z)];
-    if (triangle == DistanceGrid::kNone || triangle == last) continue;
-    last = triangle;
+    if (triangle == DistanceGrid::kNone ||
+        std::find(seen.begin(), seen.begin() + count, triangle) != seen.begin() + count)
+      continue;
+    seen[count++] = triangle;
     const WitnessTriangle& t = (*reference_)[triangle];
     const ClosestPoint q = closest_point(p, t.a, t.a + t.ab, t.a + t.ac);
     if (q.distance_squared < nearest2) nearest2 = q.distance_squared, nearest = q.point;

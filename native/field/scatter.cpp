@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kLanes = DistanceGrid::kLanes;
 constexpr int kWide = 3 * kLanes;  // nodes: a longer row of a triangle's box is cut to what is in the band
-constexpr double kSlack = 1e-5;    // of a squared distance: float32 rounds it by less
+constexpr double kSlack = 1e-5;    // of a distance: float32 rounds it by less
 using Floats = float __attribute__((vector_size(4 * kLanes)));
 using Masks = std::int32_t __attribute__((vector_size(4 * kLanes)));
 
@@ -32,8 +32,8 @@ struct Prepared {
   glm::vec3 normal;  ///< unit, zero when degenerate
   glm::vec3 middle;  ///< of the box
   float inverse_ab, inverse_ac, inverse_bc;
-  float room;  ///< a node at most d, within the band, from the triangle is within sqrt(d^2 + room) of the middle
-  float slab;  ///< |normal . p| of the band about the plane, with the rounding of float32; infinite when degenerate
+  float radius;  ///< of the box, about its middle
+  float slab;    ///< |normal . p| of the band about the plane, with the rounding of float32; infinite when degenerate
 };
 
 float safe_inverse(double x) { return x > 0 ? static_cast<float>(std::min(1 / x, 1e30)) : 0.0f; }
@@ -47,7 +47,7 @@ Prepared prepare(const TriangleMesh& mesh, std::uint32_t id, double band) {
   const glm::dvec3 middle = (r.box.lower + r.box.upper) * 0.5;
   const double radius = std::max({glm::length(a - middle), glm::length(b - middle), glm::length(c - middle)});
   r.middle = middle - a;
-  r.room = static_cast<float>(radius * (2 * band + radius) + kSlack * (band + radius) * (band + radius));
+  r.radius = static_cast<float>(radius + kSlack * (band + radius));
   const glm::dvec3 ab = b - a, ac = c - a, bc = c - b, n = glm::cross(ab, ac);
   const double nn = glm::dot(n, n), ab2 = glm::dot(ab, ab), ac2 = glm::dot(ac, ac);
   r.ab = ab, r.ac = ac, r.bc = bc;
@@ -124,14 +124,16 @@ TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid
         xbegin = std::max(0, static_cast<int>(std::floor((xlow - first.x) / hf)));
         xend = std::min(grid.nodes.x - 1, static_cast<int>(std::ceil((xhigh - first.x) / hf)));
       }
-      const float my = py - t.middle.y, mz = pz - t.middle.z, to_middle = my * my + mz * mz - t.room;
+      const float my = py - t.middle.y, mz = pz - t.middle.z, to_middle = my * my + mz * mz;
       const std::size_t row = grid.index(0, y, z);
-      for (int x = xbegin & ~(kLanes - 1); x <= xend; x += kLanes) {
+      for (int next = xbegin; next <= xend; next += kLanes) {
+        const int x = std::min(next, grid.pitch - kLanes);  // no vector runs into the next row
         const Floats px = (first.x + static_cast<float>(x) * hf) + lane;
         Floats old;
         __builtin_memcpy(&old, &grid.distance[row + x], sizeof old);
         const Floats mx = px - t.middle.x;
-        if (!any(mx * mx + to_middle < old)) continue;
+        const Floats reach = old + t.radius;
+        if (!any(mx * mx + to_middle < reach * reach)) continue;
         const Floats s = px * t.gs.x + (py * t.gs.y + pz * t.gs.z), u = px * t.gt.x + (py * t.gt.y + pz * t.gt.z);
         const Floats off = px * t.normal.x + plane;
         Floats d = edge_distance(px, py, pz, t.ab, t.inverse_ab);
@@ -141,6 +143,7 @@ TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid
         d = d < d3 ? d : d3;
         const Masks inside = (s >= 0.0f) & (u >= 0.0f) & (s + u <= 1.0f);
         d = inside ? off * off : d;
+        for (int i = 0; i < kLanes; ++i) d[i] = std::sqrt(d[i]);
         Masks old_ids;
         const Masks nearer = d < old;
         __builtin_memcpy(&old_ids, &grid.triangle[row + x], sizeof old_ids);
@@ -195,16 +198,12 @@ std::vector<int> slab_bounds(const TriangleMesh& mesh, const DistanceGrid& grid,
 void scatter(const TriangleMesh& reference, DistanceGrid& grid, unsigned threads, Progress* progress) {
   if (progress) progress->begin("measuring distances");
   const std::size_t size = static_cast<std::size_t>(grid.pitch) * grid.nodes.y * grid.nodes.z;
-  const float band = static_cast<float>(grid.band);
-  grid.distance.assign(size, band * band);
+  grid.distance.assign(size, static_cast<float>(grid.band));
   grid.triangle.assign(size, DistanceGrid::kNone);
   const auto kernel = simd_path() == Simd::avx2 ? splat_avx2 : splat_baseline;
   const std::vector<int> bounds = slab_bounds(reference, grid, thread_count(threads));
   parallel_for(bounds.size() - 1, 1, threads, [&](std::size_t slab, std::size_t) {
     kernel(reference, grid, bounds[slab], bounds[slab + 1], progress);
-    float* const begin = grid.distance.data() + grid.index(0, 0, bounds[slab]);
-    float* const end = grid.distance.data() + grid.index(0, 0, bounds[slab + 1]);
-    for (float* d = begin; d != end; ++d) *d = std::sqrt(*d);
   });
 }
 

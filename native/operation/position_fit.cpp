@@ -31,6 +31,7 @@ struct PositionFit::Sums {
   glm::dmat3 m{0};
   glm::dvec3 g{0};
 
+  double deviation() const { return std::sqrt(largest2); }
   void add(const glm::dvec3& residual, double area, double beta) {
     const double d2 = glm::dot(residual, residual), relative2 = d2 * unit2, weight = area * relative2 * relative2;
     energy += weight * relative2;
@@ -61,8 +62,9 @@ void PositionFit::prepare(const Change& change, bool changed) {
   }
 }
 
-void PositionFit::add_pieces(const Change& change, Sums& sums) const {
-  for (std::size_t first = 0; first < samples_.size(); first += 4) {
+/// Until a deviation is beyond the limit, and so the next.
+void PositionFit::add_pieces(const Change& change, double limit, Sums& sums) const {
+  for (std::size_t first = 0; first < samples_.size() && sums.deviation() <= limit; first += 4) {
     const auto at = [&](std::size_t k) { return std::min(first + k, samples_.size() - 1); };
     FourPoints points;
     points.set(samples_[at(0)].point, samples_[at(1)].point, samples_[at(2)].point, samples_[at(3)].point);
@@ -86,9 +88,8 @@ void PositionFit::add_pieces(const Change& change, Sums& sums) const {
   }
 }
 
-/// Until a deviation is beyond the limit.
 void PositionFit::add_faces(const Change& change, double limit, Sums& sums) const {
-  for (std::size_t i = 0; i < faces_.size() && std::sqrt(sums.largest2) <= limit; ++i) {
+  for (std::size_t i = 0; i < faces_.size() && sums.deviation() <= limit; ++i) {
     const WitnessTriangle& t = faces_[i];
     const glm::dvec3 corners[3] = {t.a, t.a + t.ab, t.a + t.ac};
     const Change::Face& face = change.faces()[i];
@@ -106,10 +107,10 @@ PositionFit::Fit PositionFit::fit(const Change& change, const glm::dvec3& positi
   const double within = mesh_->bounds().forward->within();
   Sums sums{1 / (within * within)};
   prepare(change, true);
-  add_pieces(change, sums);
+  add_pieces(change, limit, sums);
   add_faces(change, limit, sums);
   const double trace = sums.m[0][0] + sums.m[1][1] + sums.m[2][2];
-  const double deviation = std::sqrt(sums.largest2);
+  const double deviation = sums.deviation();
   if (!(trace > 0) || deviation > limit) return {sums.energy, deviation, position};
   for (int i = 0; i < 3; ++i) sums.m[i][i] += kDamping * trace;
   glm::dvec3 step = glm::inverse(sums.m) * sums.g;
@@ -138,8 +139,9 @@ double PositionFit::energy_now(const Change& change) {
   const double within = mesh_->bounds().forward->within();
   Sums sums{1 / (within * within)};
   prepare(change, false);
-  add_pieces(change, sums);
-  add_faces(change, std::numeric_limits<double>::infinity(), sums);
+  constexpr double kAll = std::numeric_limits<double>::infinity();
+  add_pieces(change, kAll, sums);
+  add_faces(change, kAll, sums);
   return sums.energy;
 }
 

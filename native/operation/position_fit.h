@@ -39,7 +39,7 @@ class PositionFit {
  private:
   struct Sums;
   void prepare(const Change& change, bool changed);
-  void add_pieces(const Change& change, Sums& sums) const;
+  void add_pieces(const Change& change, double limit, Sums& sums) const;
   void add_faces(const Change& change, double limit, Sums& sums) const;
 
   const BoundedMesh* mesh_;
