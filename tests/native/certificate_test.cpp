@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <random>
 
+#include "many.h"
 #include "measure/hausdorff.h"
 #include "reference/errors.h"
 #include "reference/simd.h"
@@ -86,13 +87,14 @@ TEST_P(RandomCandidates, NoWrongVerdictAndFewUnproved) {
   const double tolerance = GetParam();
   for (const TriangleMesh& reference : {shapes::torus(40, 0.01), shapes::box(6)}) {
     const ToleranceVolume volume(reference.vertices, reference.triangles, kIdentity, tolerance);
-    const Candidates candidates = near_surface(reference, tolerance, 20'000, 3);
+    const int count = many(20'000);
+    const Candidates candidates = near_surface(reference, tolerance, count, 3);
     const Score score = judge(reference, tolerance, candidates, check(volume, candidates));
     EXPECT_EQ(score.wrong_inside, 0);
     EXPECT_EQ(score.wrong_outside, 0);
     EXPECT_LE(score.unproved_clear, score.clear / 1000);
-    EXPECT_GT(score.inside, 1000);
-    EXPECT_GT(score.outside, 1000);
+    EXPECT_GT(score.inside, count / 20);
+    EXPECT_GT(score.outside, count / 20);
   }
 }
 
@@ -255,7 +257,7 @@ TEST(Certificate, SameVerdictsOnAnyThreadsAndInstructions) {
 
 TEST(Certificate, HoldsAtAnyPrecision) {
   const TriangleMesh reference = shapes::torus(30, 0.01);
-  const Candidates candidates = near_surface(reference, 0.03, 3000, 12);
+  const Candidates candidates = near_surface(reference, 0.03, many(3000), 12);
   for (const double precision : {0.01, 0.1, 0.5, 2.0, 4.0}) {
     ToleranceVolume::Options options;
     options.precision = precision;

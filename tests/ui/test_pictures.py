@@ -31,6 +31,7 @@ _SNOUT = (0.36, 0.72), (0.38, 0.75)
 def test_pictures_for_the_documentation():
     yield from reset(solid_monkey)
     yield from maximize()
+    bpy.context.preferences.system.viewport_aa = "8"
     space = view()[1].spaces[0]
     space.show_gizmo = space.show_region_toolbar = space.overlay.show_cursor = False
     from_the_front()
@@ -75,6 +76,7 @@ def test_pictures_for_the_documentation():
     assert measured.forward_within and measured.backward_within and min(sides()) > 300 and magenta() == 0
     space.overlay.show_wireframes = False
     space.show_gizmo = space.show_region_toolbar = space.overlay.show_cursor = True
+    bpy.context.preferences.system.viewport_aa = "OFF"
     yield from maximize()
 
 

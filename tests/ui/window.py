@@ -98,14 +98,21 @@ def find_property(name, across):
     return (yield from _find(f".tolvol.{name}", "ctrl+shift+alt+c", across))
 
 
+_found_at = {}
+
+
 def _find(copied, keys, across):
     sidebar = region("UI")
-    for y in range(30, sidebar.height - 5, 12):
+    # Mostly it is where it was the last time.
+    rows = range(30, sidebar.height - 5, 12)
+    last = _found_at.get((copied, across))
+    for y in rows if last is None else (last, *rows):
         place = on_screen(sidebar, int(sidebar.width * across), y)
         bpy.context.window_manager.clipboard = ""
         xdotool("mousemove", *place, "sleep", "0.03", "key", keys)
         yield 0.08
         if copied in bpy.context.window_manager.clipboard:
+            _found_at[copied, across] = y
             return place
     return None
 

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// How much of the same a test looks at.
+#pragma once
+
+namespace tolvol {
+
+/// So many, or an eighth under the sanitizers: they are ten times as slow, and what they look for any few show.
+constexpr int many(int count) {
+#ifdef TOLVOL_SANITIZED
+  return count / 8;
+#else
+  return count;
+#endif
+}
+
+}  // namespace tolvol
