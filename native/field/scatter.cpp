@@ -2,8 +2,8 @@
 // Based on the initial band of [Botsch04, §2]: each triangle writes exact distances to the nodes of its enlarged box,
 // the smallest stays. Here the box is enlarged by the whole band, so that no marching is needed and every value is
 // exact, and nodes are taken eight along x at once. Of a small triangle nearly all nodes in the band have a nearer one:
-// eight of them are passed over where its box is too far to be nearest. Of a large triangle the runs of nodes that its
-// box or its plane keep out of the band are skipped.
+// eight of them are passed over where a ball around it is too far to be nearest. Of a large triangle the runs of nodes
+// that its box or its plane keep out of the band are skipped.
 #include "field/scatter.h"
 
 #include <algorithm>
@@ -32,7 +32,7 @@ struct Prepared {
   glm::vec3 normal;  ///< unit, zero when degenerate
   glm::vec3 middle;  ///< of the box
   float inverse_ab, inverse_ac, inverse_bc;
-  float radius;  ///< of the box, about its middle
+  float radius;  ///< of a ball about that middle which holds the triangle, with room for rounding
   float slab;    ///< |normal . p| of the band about the plane, with the rounding of float32; infinite when degenerate
 };
 
