@@ -8,17 +8,16 @@
 #include <stdexcept>
 #include <vector>
 
+#include "operation/manifold_cut.h"
+
 namespace tolvol {
 namespace {
 
-constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+constexpr std::uint32_t kNone = CutMesh::kNone;
 
 void require_manifold(bool holds) {
   if (!holds) throw std::logic_error("the triangles are not an oriented manifold");
 }
-
-/// A side is the edge of triangle side / 3 from corner side % 3 to the next.
-std::uint32_t next_side(std::uint32_t side) { return side % 3 == 2 ? side - 2 : side + 1; }
 
 }  // namespace
 
@@ -30,7 +29,7 @@ void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, std::s
   const auto sides = static_cast<std::uint32_t>(3 * triangles.size());
   require_manifold(mates.size() == sides);
   const auto from = [&](std::uint32_t s) { return triangles[s / 3][s % 3]; };
-  const auto to = [&](std::uint32_t s) { return from(next_side(s)); };
+  const auto to = [&](std::uint32_t s) { return from(next_corner(s)); };
   team.run(sides, 4096, [&](std::size_t begin, std::size_t end) {
     for (auto s = static_cast<std::uint32_t>(begin); s < end; ++s) {
       const std::uint32_t other = mates[s];
@@ -56,7 +55,7 @@ void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, std::s
   for (std::uint32_t s = 0; s < sides; ++s) {
     const FaceHandle face(static_cast<int>(s / 3));
     mesh.set_face_handle(halfedge[s], face);
-    mesh.set_next_halfedge_handle(halfedge[s], halfedge[next_side(s)]);
+    mesh.set_next_halfedge_handle(halfedge[s], halfedge[next_corner(s)]);
     mesh.set_halfedge_handle(vertex(from(s)), halfedge[s]);
     mesh.set_halfedge_handle(face, halfedge[s]);
   }

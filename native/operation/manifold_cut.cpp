@@ -23,7 +23,6 @@ constexpr std::uint32_t kNone = CutMesh::kNone;
 
 /// A side is the edge of triangle side / 3 from corner side % 3 to the next.
 using Side = std::uint32_t;
-Side next_corner(Side s) { return s % 3 == 2 ? s - 2 : s + 1; }
 Side previous_corner(Side s) { return s % 3 == 0 ? s + 2 : s - 1; }
 
 std::uint64_t pair_key(std::uint32_t a, std::uint32_t b) {

@@ -42,6 +42,9 @@ struct CutMesh {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 };
 
+/// The next corner of the same triangle, and the next side: each side is named by the corner where it begins.
+inline std::uint32_t next_corner(std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
+
 /// Joins triangles across edges by vertex index first and, where that leaves an edge open, by exactly equal position,
 /// so that soups and seam splits decimate without cracks while sheets that merely touch stay apart. Edges of more than
 /// two triangles are cut. O(m) expected. After A. Guéziec et al., "Cutting and stitching: converting sets of polygons

@@ -62,7 +62,7 @@ void PositionFit::prepare(const Change& change, bool changed) {
   }
 }
 
-/// Until a deviation is beyond the limit, and so the next.
+/// Ends at the first deviation beyond the limit, as add_faces() does.
 void PositionFit::add_pieces(const Change& change, double limit, Sums& sums) const {
   for (std::size_t first = 0; first < samples_.size() && sums.deviation() <= limit; first += 4) {
     const auto at = [&](std::size_t k) { return std::min(first + k, samples_.size() - 1); };

@@ -18,7 +18,7 @@ sys.dont_write_bytecode = True
 sys.path[:0] = [str(FOLDER), str(FOLDER.parents[1]), str(FOLDER.parent / "blender")]
 # Only before the first window is drawn.
 bpy.context.preferences.view.show_splash = False
-bpy.context.preferences.system.viewport_aa = "OFF"  # a third of the time of drawing in software
+bpy.context.preferences.system.viewport_aa = "OFF"  # more than half of the work of drawing in software
 
 import addon  # noqa: E402
 from addon import native  # noqa: E402
