@@ -133,6 +133,7 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
     std::uint32_t below = DistanceGrid::kNone;                 // the triangle it is of
     std::array<std::uint32_t, 13> tried;
     int tries = 0;
+    std::uint32_t exact = Hierarchy::kNone;  // the nearest triangle, once it was looked for
     const auto covered_by = [&](std::uint32_t triangle) {
       if (triangle == DistanceGrid::kNone) return false;
       for (int i = 0; i < tries; ++i) {
@@ -169,8 +170,8 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       if (hint == Hierarchy::kNone) hint = guess;
       const Hierarchy::Nearest nearest = hierarchy_->nearest(centre, kProve ? beyond_ : within_, hint);
       if (nearest.triangle == Hierarchy::kNone) return Verdict::outside;
-      hint = nearest.triangle;
-      if (covered_by(nearest.triangle)) continue;
+      hint = exact = nearest.triangle;
+      if (covered_by(exact)) continue;
       // Without a proof to look for, a centre outside ends it.
       if (!kProve && !(centre2 <= within2_)) return Verdict::unproved;
     }
@@ -180,11 +181,22 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
       result = Verdict::unproved;
       continue;
     }
-    // Among triangles smaller than the tolerance a cut along an edge of one brings a long part no nearer to its end.
+    const auto cut_along = [&](std::uint32_t triangle) {
+      return cut(part, (*reference_)[triangle], kWorthCutting * within_, queue);
+    };
     const WitnessTriangle& t = (*reference_)[below];
+    // Among triangles smaller than the tolerance a cut along an edge of one brings a long part no nearer to its end.
     const bool long_over_small =
         longest2 > kLong * kLong * within2_ && std::max(squared_length(t.ab), squared_length(t.ac)) <= within2_;
-    if (long_over_small || !cut(part, t, kWorthCutting * within_, queue)) split(part, queue);
+    if (!long_over_small) {
+      if (cut_along(below)) continue;
+      // Among slivers the triangle below the centre may be one that no node of the grid names.
+      if (exact == Hierarchy::kNone) {
+        exact = hierarchy_->nearest(centre, within_, below).triangle;
+        if (exact != below && (covered_by(exact) || cut_along(exact))) continue;
+      }
+    }
+    split(part, queue);
   }
   farthest = std::sqrt(farthest2);
   return result;

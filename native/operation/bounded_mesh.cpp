@@ -33,6 +33,8 @@ void BoundedMesh::build(bool on_reference, std::span<const std::uint32_t> mates,
   for (std::uint32_t v = 0; v < n; ++v) {
     if (slots_[v] != v) copies_.try_emplace(slots_[v], 1, slots_[v]).first->second.push_back(v);
   }
+  faces_around_ = std::vector<std::atomic<std::uint32_t>>(n);
+  for (const glm::uvec3& t : triangles_) count_around(t, 1);
   moved_.assign(n, false);
   seam_.assign(n, false);
   merged_into_.resize(n);
@@ -53,6 +55,13 @@ void BoundedMesh::build(bool on_reference, std::span<const std::uint32_t> mates,
   if (bounds_.forward) {
     for (std::size_t i = 0; i < n && !on_reference; ++i) distance_[i] = bounds_.forward->distance_bound(positions_[i]);
     face_distance_.assign(m, on_reference ? 0 : TriangleCertificate::kUnproved);
+  }
+}
+
+/// Adds to the counts at the corners of a triangle.
+void BoundedMesh::count_around(const glm::uvec3& triangle, std::int32_t change) {
+  for (int k = 0; k < 3; ++k) {
+    faces_around_[triangle[k]].fetch_add(static_cast<std::uint32_t>(change), std::memory_order_relaxed);
   }
 }
 
@@ -103,20 +112,26 @@ void BoundedMesh::apply(Change& change) {
     wedges_[n.triangle][n.corner] = n.gained.wedge;
     corner_source_[n.triangle][n.corner] = n.gained.source;
   }
+  const bool is_flip = change.kind_ == Change::Kind::flip;
   for (std::size_t i = 0; i < change.faces_.size(); ++i) {
     const Change::Face& face = change.faces_[i];
     const std::uint32_t id = change.elements_[i].id;
-    triangles_[id] = {face.vertices[0], face.vertices[1], face.vertices[2]};
+    const glm::uvec3 triangle(face.vertices[0], face.vertices[1], face.vertices[2]);
+    if (is_flip) count_around(triangles_[id], -1), count_around(triangle, 1);
+    triangles_[id] = triangle;
     if (bounds_.forward && proved) face_distance_[id] = face.distance;
   }
-  if (change.kind_ == Change::Kind::flip) {
+  if (is_flip) {
     mesh_.flip(change.edge_);
     return;
   }
   const std::uint32_t v = change.vertex_;
   if (change.kind_ == Change::Kind::collapse) {
-    merged_into_[from(change.halfedge_)] = v;
-    if (!shares_.empty()) shares_[v] = std::min(shares_[v], shares_[from(change.halfedge_)]);
+    const std::uint32_t merged = from(change.halfedge_);
+    merged_into_[merged] = v;
+    if (!shares_.empty()) shares_[v] = std::min(shares_[v], shares_[merged]);
+    for (const Coverage::Removed& r : change.removed_) count_around(triangles_[r.id], -1);
+    faces_around_[v].fetch_add(faces_around_[merged].exchange(0, std::memory_order_relaxed), std::memory_order_relaxed);
     triangle_count_ -= change.removed_.size();
     mesh_.collapse(change.halfedge_);
   }

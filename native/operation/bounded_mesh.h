@@ -78,6 +78,10 @@ class BoundedMesh {
   double face_distance(std::uint32_t triangle) const { return face_distance_[triangle]; }
   /// Of the forward bound, what new faces around the vertex may use.
   double share(std::uint32_t vertex) const { return shares_.empty() ? 1 : shares_[vertex]; }
+  /// How many faces have the vertex as a corner.
+  std::uint32_t faces_around(std::uint32_t vertex) const {
+    return faces_around_[vertex].load(std::memory_order_relaxed);
+  }
   bool on_boundary(std::uint32_t vertex) const { return mesh_.is_boundary(handle(vertex)); }
   /// Whether vertices of the kernel are one vertex of the result: what one may do then depends on where the others are.
   bool has_copies() const { return !copies_.empty(); }
@@ -113,6 +117,7 @@ class BoundedMesh {
 
   void build(bool on_reference, std::span<const std::uint32_t> mates, Team& team);
   int rank(std::uint32_t vertex) const;
+  void count_around(const glm::uvec3& triangle, std::int32_t change);
   bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
 
   OpenMesh::TriConnectivity mesh_;
@@ -122,7 +127,8 @@ class BoundedMesh {
   std::vector<glm::uvec3> triangles_;
   std::vector<glm::dvec3> positions_, stored_;
   std::vector<bool> pinned_, seam_;
-  std::vector<std::uint8_t> moved_;  ///< not bits, which threads would share
+  std::vector<std::atomic<std::uint32_t>> faces_around_;  ///< atomic: regions share the vertices between them
+  std::vector<std::uint8_t> moved_;                       ///< not bits, which threads would share
   std::vector<double> shares_;
   std::vector<std::uint32_t> slots_;
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> copies_;  ///< by slot, where there are several

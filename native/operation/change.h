@@ -58,6 +58,8 @@ class Change {
   const std::vector<Coverage::Removed>& removed() const { return removed_; }
   /// The vertex that a collapse leaves or that a relocation moves; none of a flip.
   std::optional<std::uint32_t> vertex() const { return kind_ == Kind::flip ? std::nullopt : std::optional(vertex_); }
+  /// Parts of the reference's pieces that the series of tries has looked at.
+  std::size_t looked_at() const { return backward_.looked_at(); }
   /// Starts a series of tries around one place. What it finds depends on nothing before.
   void begin() { suspect_ = 0, backward_.begin(), boundary_backward_.begin(); }
 

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A rejected edge waits until its two-ring changes.
+// A rejected edge waits until its two-ring changes. Around a vertex with many faces every collapse would call back all
+// its edges, each try as costly as there are faces, which makes the cube of their number: there the edges wait until
+// an eighth of the faces has gone, and of those that come back only some are tried.
 #include "operation/collapse_loop.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace tolvol {
@@ -11,6 +14,8 @@ namespace {
 // Edges looked at to be tried at once: one for so many triangles, because collapses come in each other's way, and at
 // most so many.
 constexpr std::size_t kTrianglesPerAttempt = 12, kMostAttempts = 64;
+constexpr std::uint32_t kCrowded = 24;           // faces around a vertex: with more, tries are rationed,
+constexpr std::uint64_t kCrowdBudget = 1 << 15;  // to so many faces and parts of the reference's pieces looked at
 
 }  // namespace
 
@@ -46,6 +51,34 @@ bool CollapseLoop::deleted(std::uint32_t edge) const {
   return mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted();
 }
 
+/// Whether an end of the edge had its share of tries.
+bool CollapseLoop::rationed(std::uint32_t edge) const {
+  if (crowds_.empty()) return false;
+  const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
+  return std::ranges::any_of(std::array{mesh_.from(h), mesh_.to(h)}, [&](std::uint32_t end) {
+    const auto found = crowds_.find(end);
+    return found != crowds_.end() && found->second.work >= kCrowdBudget;
+  });
+}
+
+void CollapseLoop::note_refusal(const Tried& tried) {
+  const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(tried.edge), 0);
+  for (const std::uint32_t end : {mesh_.from(h), mesh_.to(h)}) {
+    const std::uint32_t faces = mesh_.faces_around(end);
+    if (faces > kCrowded) crowds_.try_emplace(end, Crowd{faces, 0}).first->second.work += faces + tried.looked_at;
+  }
+}
+
+/// Whether edges of the vertex that were refused may be tried again, after a face around it has changed.
+bool CollapseLoop::ready(std::uint32_t vertex) {
+  const auto found = crowds_.find(vertex);
+  if (found == crowds_.end()) return true;
+  const std::uint32_t faces = mesh_.faces_around(vertex), before = found->second.faces;
+  if (faces > before - before / 8 && faces < before + before / 8) return false;
+  crowds_.erase(found);
+  return true;
+}
+
 bool CollapseLoop::own(std::uint32_t edge) const { return !regions_ || regions_->of_edge(mesh_, edge) == region_; }
 
 void CollapseLoop::add(std::uint32_t edge, double cost) {
@@ -65,6 +98,10 @@ void CollapseLoop::run(const Until& until, Progress* progress) {
     const auto entry = queue_.pop();
     if (!entry || entry->cost >= until.cost) break;
     if (deleted(entry->edge)) continue;
+    if (rationed(entry->edge)) {
+      shared_.refused[entry->edge].store(true, std::memory_order_relaxed);
+      continue;
+    }
     Tried* const tried = found(entry->edge);
     carry_out(tried ? *tried : try_ahead(entry->edge));
   }
@@ -96,7 +133,7 @@ void CollapseLoop::give_back(std::unique_ptr<Attempt> attempt) {
 void CollapseLoop::try_now(Tried& tried) {
   std::unique_ptr<Attempt> attempt = take_attempt();
   collapse_.attempt(tried.edge, *attempt);
-  tried.outcome = attempt->outcome;
+  tried.outcome = attempt->outcome, tried.looked_at = attempt->change.looked_at();
   if (tried.outcome == EdgeCollapse::Outcome::possible) {
     tried.attempt = std::move(attempt);
   } else {
@@ -116,7 +153,8 @@ CollapseLoop::Tried& CollapseLoop::try_ahead(std::uint32_t edge) {
     Tried& tried = tried_[next_];
     next_ = (next_ + 1) % tried_.size();
     give_back(std::move(tried.attempt));  // of what was void before its turn came
-    tried = {.edge = e, .at = clock_};
+    tried = {};
+    tried.edge = e, tried.at = clock_;
     return tried;
   };
   Tried& first = take(edge);
@@ -156,14 +194,16 @@ bool CollapseLoop::reserved(std::uint32_t edge) const {
 }
 
 void CollapseLoop::carry_out(Tried& tried) {
-  const std::uint32_t edge = std::exchange(tried.edge, kNoEdge);
+  const std::uint32_t edge = tried.edge;
   if (tried.outcome == EdgeCollapse::Outcome::possible) {
     if (later_) later_->note(tried.attempt->change);
     renew_around(collapse_.carry_out(*tried.attempt));
     give_back(std::move(tried.attempt));
-  } else if (tried.outcome == EdgeCollapse::Outcome::refused && !later_) {
-    shared_.refused[edge].store(true, std::memory_order_relaxed);
+  } else if (tried.outcome == EdgeCollapse::Outcome::refused) {
+    note_refusal(tried);
+    if (!later_) shared_.refused[edge].store(true, std::memory_order_relaxed);
   }
+  tried.edge = kNoEdge;
 }
 
 /// After a collapse: the costs that it changes, and the edges that may now be possible.
@@ -181,6 +221,7 @@ void CollapseLoop::renew_around(std::uint32_t vertex) {
   for (const auto e : connectivity.ve_range(v)) renew(static_cast<std::uint32_t>(e.idx()));
   for (const auto near : connectivity.vv_range(v)) {
     touch(static_cast<std::uint32_t>(near.idx()));
+    if (!crowds_.empty() && !ready(static_cast<std::uint32_t>(near.idx()))) continue;
     for (const auto e : connectivity.ve_range(near)) {
       // At a rim it may be another region's too.
       std::atomic<bool>& refused = shared_.refused[static_cast<std::size_t>(e.idx())];

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <unordered_map>
 #include <vector>
 
 #include "operation/collapse_queue.h"
@@ -55,10 +56,20 @@ class CollapseLoop {
     std::uint32_t edge = kNoEdge;
     std::uint32_t at = 0;  ///< of the collapses carried out
     EdgeCollapse::Outcome outcome = EdgeCollapse::Outcome::impossible;
+    std::size_t looked_at = 0;         ///< parts of the reference's pieces
     std::unique_ptr<Attempt> attempt;  ///< where it is possible
   };
 
+  /// Tries at a vertex with many faces around it: each costs as much as there are faces.
+  struct Crowd {
+    std::uint32_t faces;  ///< around it when the first of them was made
+    std::uint64_t work;   ///< of all of them: faces and parts of the reference's pieces looked at
+  };
+
   bool deleted(std::uint32_t edge) const;
+  bool rationed(std::uint32_t edge) const;
+  void note_refusal(const Tried& tried);
+  bool ready(std::uint32_t vertex);
   bool own(std::uint32_t edge) const;
   Tried* found(std::uint32_t edge);
   Tried& try_ahead(std::uint32_t edge);
@@ -79,10 +90,11 @@ class CollapseLoop {
   Team* team_ = nullptr;  ///< where there are others than the caller
   CollapseQueue queue_;
   std::vector<Tried> tried_;
-  std::vector<std::uint32_t> tried_of_;  ///< per edge: its place in tried_, if that names the edge
-  std::size_t next_ = 0;                 ///< place in tried_ that is taken next, the longest taken
-  std::uint32_t clock_ = 0;              ///< collapses carried out
-  std::vector<std::uint32_t> touched_;   ///< per vertex: when a face around it changed last,
+  std::vector<std::uint32_t> tried_of_;              ///< per edge: its place in tried_, if that names the edge
+  std::unordered_map<std::uint32_t, Crowd> crowds_;  ///< by vertex, of those where tries were refused
+  std::size_t next_ = 0;                             ///< place in tried_ that is taken next, the longest taken
+  std::uint32_t clock_ = 0;                          ///< collapses carried out
+  std::vector<std::uint32_t> touched_;               ///< per vertex: when a face around it changed last,
   std::vector<std::uint32_t> reserved_;  ///< and the last batch of tries in which one could change before its turn
   std::uint32_t batches_ = 0;            ///< of tries, so far
   /// Kept for their memory; the last given back is taken first, while it is in the cache.

@@ -14,8 +14,9 @@ namespace {
 constexpr double kWorthCutting = 0.25;  // of the tolerance
 constexpr double kFloor = 0.1;          // of the tolerance: a shorter piece is not split further
 // Pieces that splitting may add before a change is refused; and those that assign() splits of one triangle.
-constexpr std::size_t kBudget = 1 << 14;
-constexpr std::size_t kBudgetOfPiece = 16;  // so many more for each piece that a change places
+constexpr std::size_t kBudget = 1 << 12;
+constexpr std::size_t kBudgetOfPiece = 4;  // so many more for each piece that a change places
+constexpr std::size_t kMany = 64;          // candidates: of more, a piece looks at the nearest ones alone
 
 constexpr std::uint32_t kNeverWhole = 1u << 31;  // in split_into_: some of the triangle is out of reach
 
@@ -24,6 +25,16 @@ FourPoints with_centre(const Part& part) {
   FourPoints points;
   points.set(a, b, c, (a + b + c) * (1.0 / 3));
   return points;
+}
+
+TriangleMesh mesh_of(std::span<const Coverage::Element> elements) {
+  TriangleMesh mesh;
+  for (const Coverage::Element& e : elements) {
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    mesh.triangles.emplace_back(first, first + 1, first + 2);
+    for (const glm::dvec3& corner : e.corners) mesh.vertices.push_back(corner);
+  }
+  return mesh;
 }
 
 }  // namespace
@@ -94,6 +105,7 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
   trial.budget_ += kBudgetOfPiece;
   while (!trial.stack_.empty()) {
     if (trial.stack_.size() > 1 && trial.budget_-- == 0) return false;
+    ++trial.looked_at_;
     const Part piece = trial.stack_.back();
     trial.stack_.pop_back();
     const FourPoints points = with_centre(piece);
@@ -136,13 +148,12 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
   return true;
 }
 
-bool Coverage::try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial,
-                          const Hierarchy* hierarchy) const {
+bool Coverage::try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial) const {
   trial.candidates_.clear();
   trial.heirlooms_.clear();
   trial.moved_.clear();
   trial.last_ = 0;
-  trial.hierarchy_ = hierarchy;
+  trial.hierarchy_.reset();
   trial.budget_ = kBudget;
   bool settled = true;
   for (const Element& e : elements) {
@@ -165,6 +176,7 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   for (std::size_t i = 0; i < elements.size(); ++i) {
     trial.candidates_[i].witness = {elements[i].corners[0], elements[i].corners[1], elements[i].corners[2]};
   }
+  if (elements.size() > kMany) trial.hierarchy_.emplace(mesh_of(elements));
   thread_local std::vector<std::uint32_t> gathered;  // per triangle of the reference, all 0 between calls
   if (gathered.size() < split_into_.size()) gathered.resize(split_into_.size(), 0);
   const auto for_each_split = [&](auto&& call) {

@@ -12,6 +12,7 @@
 #include <atomic>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -61,9 +62,8 @@ class Coverage {
 
   class Trial;
   /// Whether all pieces of the elements named have witnesses among `elements`; only reads. Nothing changes until
-  /// commit(). `hierarchy`: of the elements, where there are too many to look at each.
-  bool try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial,
-                  const Hierarchy* hierarchy = nullptr) const;
+  /// commit().
+  bool try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial) const;
   /// Carries out the last change tried, which must have succeeded on this state.
   void commit(const Trial& trial);
 
@@ -93,7 +93,9 @@ class Coverage {
 class Coverage::Trial {
  public:
   /// Starts a series of tries around one place: what they find depends on nothing before.
-  void begin() { suspect_ = 0; }
+  void begin() { suspect_ = 0, looked_at_ = 0; }
+  /// Parts of pieces that the series has looked at.
+  std::size_t looked_at() const { return looked_at_; }
 
  private:
   friend class Coverage;
@@ -122,8 +124,9 @@ class Coverage::Trial {
   std::vector<Heirloom> heirlooms_;
   std::vector<Moved> moved_;
   std::vector<Part> stack_;
-  const Hierarchy* hierarchy_ = nullptr;
-  std::size_t budget_ = 0;     ///< pieces that this change may still add
+  std::optional<Hierarchy> hierarchy_;  ///< of the candidates, where there are too many to look at each
+  std::size_t budget_ = 0;              ///< pieces that this change may still add
+  std::size_t looked_at_ = 0;
   std::uint32_t last_ = 0;     ///< the candidate that took the last piece
   std::uint32_t suspect_ = 0;  ///< the one whose pieces failed last: tried first, to be refused soon
 };

@@ -85,21 +85,16 @@ bool DeferredProof::pieces_hold() {
   constexpr double kAnywhere = std::numeric_limits<double>::infinity();
   std::vector<Coverage::Element> elements;
   std::vector<Coverage::Removed> removed;
-  TriangleMesh mesh;
   for (const std::uint32_t i : alive_) {
     const glm::uvec3& t = mesh_.triangle(faces_[i]);
     elements.push_back(
         {faces_[i], {mesh_.position(t.x), mesh_.position(t.y), mesh_.position(t.z)}, changed_[i] ? kAnywhere : 0});
-    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-    mesh.triangles.emplace_back(first, first + 1, first + 2);
-    for (const glm::dvec3& corner : elements.back().corners) mesh.vertices.push_back(corner);
   }
   for (std::uint32_t i = 0; i < faces_.size(); ++i) {
     if (heirs_[i] != i) removed.push_back({faces_[i], rank_[heir(i)], kAnywhere});
   }
-  const Hierarchy hierarchy(mesh);
   Coverage::Trial trial;
-  if (!mesh_.bounds().backward->try_change(elements, removed, trial, &hierarchy)) return false;
+  if (!mesh_.bounds().backward->try_change(elements, removed, trial)) return false;
   mesh_.bounds().backward->commit(trial);
   return true;
 }
@@ -119,7 +114,12 @@ void DeferredProof::take_back() {
   for (std::size_t i = 0; i < faces_.size(); ++i) {
     const std::uint32_t f = faces_[i];
     const SavedFace& s = saved_faces_[i];
-    if (!mesh_.alive(f)) ++mesh_.triangle_count_;
+    if (mesh_.alive(f)) {
+      mesh_.count_around(mesh_.triangles_[f], -1);
+    } else {
+      ++mesh_.triangle_count_;
+    }
+    mesh_.count_around(s.triangle, 1);
     kernel.face(BoundedMesh::face(f)) = s.kernel;
     kernel.status(BoundedMesh::face(f)).set_deleted(false);
     mesh_.triangles_[f] = s.triangle;

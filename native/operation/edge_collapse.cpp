@@ -124,7 +124,13 @@ EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) c
       if (end.position == best || q(end.position) > nothing) continue;
       if (a.change.try_collapse(h, end) == Outcome::possible) return Outcome::possible;
     }
-    return a.fit.collapse(a.change, h, best, kHopeless);
+    const Outcome fitted = a.fit.collapse(a.change, h, best, kHopeless);
+    if (fitted != Outcome::refused) return fitted;
+    for (const Spot& end : {s0, s1}) {
+      if (end.position == best || !(q(end.position) > nothing)) continue;
+      if (a.change.try_collapse(h, end) == Outcome::possible) return Outcome::possible;
+    }
+    return Outcome::refused;
   }
   for (const Spot& other : {s0, s1, mesh_.store((s0.position + s1.position) * 0.5)}) {
     const Outcome outcome = a.change.try_collapse(h, other);
