@@ -31,6 +31,7 @@ PERCENTILES = (50, 90, 95, 99, 99.9)
 EXTENSIONS = (".json", ".csv", ".html")
 
 _METHOD = "certified interval; one sample for each piece of the surface, ranges from bounds on the pieces"
+_FORMULA = "=+-@\uff1d\uff0b\uff0d\uff20"  # the latter: the wide ones of East Asian fonts
 _BINS = 30  # a side of the histogram, about
 
 
@@ -106,8 +107,8 @@ def _way(largest, spread, polygons, bounds, edges):
     }
 
 
-def save(run, path, pictures=()):
-    """Writes a deviation with its `a` and `b` in the format that the extension names.
+def content(run, path, pictures=()):
+    """The bytes of a deviation with its `a` and `b`, in the format that the extension of a path names.
 
     pictures: (caption, bytes of a PNG) pairs, for the page alone.
     """
@@ -116,11 +117,15 @@ def save(run, path, pictures=()):
         ".csv": lambda: table(run),
         ".html": lambda: deviation_page.page(run, pictures),
     }
-    Path(path).write_text(writers[Path(path).suffix.lower()](), encoding="utf-8")
+    # A name of a file may have bytes that are no text.
+    return writers[Path(path).suffix.lower()]().encode("utf-8", "backslashreplace")
 
 
 def table(run):
-    """The same as CSV: one number a row, with the parameter it is for and the ends of its range where it has one."""
+    """The same as CSV: one number a row, with the parameter it is for and the ends of its range where it has one.
+
+    Text that a spreadsheet would take for a formula has a ' before it.
+    """
     rows = [("direction", "quantity", "at", "value", "lower", "upper")]
     rows += [("", "version", "", run["version"], "", ""), ("", "unit", "", run["unit"], "", "")]
     rows += [("", "size", "", run["size"], "", "")]
@@ -131,8 +136,14 @@ def table(run):
     for way in ("forward", "backward"):
         rows += [(way, *row) for row in _rows(run[way])]
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows([_harmless(cell) for cell in row] for row in rows)
     return text.getvalue()
+
+
+def _harmless(cell):
+    """Names come from files of other people: as a formula one could run programs where the table is opened."""
+    begins = isinstance(cell, str) and (cell[:1] in tuple("\t\r\n") or cell.lstrip()[:1] in tuple(_FORMULA))
+    return f"'{cell}" if begins else cell
 
 
 def _rows(way):
