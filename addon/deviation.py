@@ -21,6 +21,7 @@ A deviation is a dictionary as a .json report holds it; lengths are in the units
 import csv
 import io
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -142,8 +143,10 @@ def table(run):
 
 def _harmless(cell):
     """Names come from files of other people: as a formula one could run programs where the table is opened."""
-    begins = isinstance(cell, str) and (cell[:1] in tuple("\t\r\n") or cell.lstrip()[:1] in tuple(_FORMULA))
-    return f"'{cell}" if begins else cell
+    if not isinstance(cell, str):
+        return cell
+    line = re.sub(r"[\t\r\n]", " ", cell)  # a lone \r would begin a row for some readers
+    return f"'{line}" if line.lstrip()[:1] in tuple(_FORMULA) else line
 
 
 def _rows(way):
