@@ -68,13 +68,12 @@ def identity(path):
 
 def require_apart(written, read):
     """Raises Refused where two written files are one, or one of them is also read. Pairs (what messages call it, path)."""
-    names = {}
-    for name, path in read:
-        names.setdefault(identity(path), f"{name}, which is read")
+    names = {identity(path): f"{name}, which is read" for name, path in read}
     for name, path in written:
-        other = names.setdefault(identity(path), name)
-        if other is not name:
-            raise Refused(f"{name} is the same file as {other}: choose another name")
+        found = identity(path)
+        if found in names:
+            raise Refused(f"{name} is the same file as {names[found]}: choose another name")
+        names[found] = name
 
 
 class Staged:
