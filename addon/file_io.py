@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from . import file_check, mesh_io
+from . import file_check, gltf_check, mesh_io
 from .errors import Refused
 
 _GLTF = (".gltf", ".glb")
@@ -30,12 +30,16 @@ _OBJ_STEP = 1e-6
 
 
 class MeshFile:
-    """The mesh objects of a file, now in the scene, and what its reader left out."""
+    """The mesh objects of a file, now in the scene, and what its reader left out.
 
-    def __init__(self, path, objects, repairs):
+    extras: how many there are in the file of what is no mesh, such as {"skins": 1}.
+    """
+
+    def __init__(self, path, objects, repairs, extras):
         self.path = path
         self.objects = objects
         self.repairs = repairs
+        self.extras = extras
 
     @functools.cached_property
     def counts(self):
@@ -81,7 +85,8 @@ def read_file(path):
             bpy.context.view_layer.update()
     except RuntimeError as error:
         raise Refused(f"{path}: Blender cannot read it: {str(error).strip().splitlines()[-1]}") from None
-    objects = [ob for ob in bpy.data.objects if ob not in before and ob.type == "MESH" and ob.data.polygons]
+    added = [ob for ob in bpy.data.objects if ob not in before and not _is_bone_shape(ob)]
+    objects = [ob for ob in added if ob.type == "MESH" and ob.data.polygons]
     if not objects:
         raise Refused(f"{path}: it has no faces")
     for ob in objects:
@@ -91,7 +96,7 @@ def read_file(path):
     if dropped > 0:
         message = f"{dropped:,} faces that repeat a corner or another face left out when {Path(path).name} was read"
         repairs.append({"kind": "unreadable", "count": dropped, "message": message})
-    return MeshFile(path, objects, repairs)
+    return MeshFile(path, objects, repairs, gltf_check.extras(data) if extension in _GLTF else {})
 
 
 def write_file(path, objects, textures_beside):
@@ -128,6 +133,11 @@ def rounding(path, objects):
             largest = (np.abs(matrix[:3, :3]) @ reach + np.abs(matrix[:3, 3])).max()
             step = max(step, _OBJ_STEP * (extension == ".obj") + 4 * float(np.finfo(np.float32).eps) * largest)
     return step * 3**0.5
+
+
+def _is_bone_shape(ob):
+    """Whether the glTF reader made it, to draw bones with."""
+    return any(collection.name.startswith("glTF_not_exported") for collection in ob.users_collection)
 
 
 def _turn_back(objects):

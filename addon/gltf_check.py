@@ -48,6 +48,12 @@ def parts(data):
     return document, binary
 
 
+def extras(data):
+    """How many skins, animations and cameras a file has."""
+    document, _ = parts(data)
+    return {kind: len(document.get(kind, ())) for kind in ("skins", "animations", "cameras")}
+
+
 def _chunks(data):
     found, offset = {}, 12
     if len(data) < 20:

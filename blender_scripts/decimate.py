@@ -157,7 +157,7 @@ class Command:
             )
         ]
         repairs = source.repairs + (reference_file.repairs if reference_file else [])
-        whole = self._write(source.objects, names, references, runs, tolerance, size)
+        whole = self._write(source, names, references, runs, tolerance, size)
         whole["input"] = whole_input
         whole["repairs"] = repairs + whole["repairs"]
         whole["seconds"]["total"] = time.perf_counter() - self.started
@@ -248,10 +248,10 @@ class Command:
         self._stage(f"decimated {ob.name}: {report.counts(run)}", start)
         return run
 
-    def _write(self, objects, names, references, runs, tolerance, size):
+    def _write(self, source, names, references, runs, tolerance, size):
         """Writes OUT beside its place, and certifies what is read back; the report of the whole file."""
         start = time.perf_counter()
-        written = self._export(objects)
+        written = self._export(source.objects)
         self._stage(f"wrote {self.exported.name} and read it back", start)
         start = time.perf_counter()
         found = {ob.name: volume.surface_of(ob) for ob in written.objects}
@@ -265,6 +265,10 @@ class Command:
             judged = [self._certify(volume.joined(found.values()), volume.joined(references), tolerance, kept)]
         whole = self._summary(names, runs, judged, tolerance, size)
         whole["output"] = {"file": self.options.output, **written.counts}
+        for kind, count in source.extras.items():
+            if lost := count - written.extras.get(kind, 0):
+                message = f"{lost} of the {count} {kind} of IN are not in OUT"
+                whole["repairs"].append({"kind": kind, "count": lost, "message": message})
         whole["seconds"]["certify"] += time.perf_counter() - start
         self._stage("certified it both ways", start)
         if not report.proved(whole):

@@ -225,6 +225,35 @@ def test_textures_beside_out_are_never_overwritten(tmp_path):
 
 
 @needs_gltf
+def test_bones_are_no_meshes_and_what_is_lost_is_said(tmp_path):
+    """Blender draws bones with meshes of its own."""
+    found, binary = torus_document(nodes=[{"mesh": 0, "skin": 0, "name": "part"}, {"name": "bone"}])
+    attributes, count = found["meshes"][0]["primitives"][0]["attributes"], found["accessors"][1]["count"]
+    for name, kind, array in (
+        ("JOINTS_0", 5121, np.zeros((count, 4), "u1")),
+        ("WEIGHTS_0", 5126, np.eye(4)[[0] * count]),
+    ):
+        data = array.astype("<f4" if kind == 5126 else "u1").tobytes()
+        found["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": len(data)})
+        attributes[name] = len(found["accessors"])
+        found["accessors"].append(
+            {"bufferView": attributes[name], "componentType": kind, "count": count, "type": "VEC4"}
+        )
+        binary += data
+    found["buffers"][0]["byteLength"] = len(binary)
+    found |= {"skins": [{"joints": [1]}], "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}]}
+    source = write(tmp_path / "in.glb", found, binary)
+    done = decimate(source, tmp_path / "out.glb", "--tolerance", "1%", "--report", tmp_path / "r.json")
+    succeeded(done)
+    judged(parsed(tmp_path / "out.glb"), parsed(source), 0.01 * native.module.size(*parsed(source)) * (1 + 1e-5))
+    run = json.loads((tmp_path / "r.json").read_text())
+    assert [part["name"] for part in run["objects"]] == ["part"]
+    assert {"note: 1 of the 1 skins of IN are not in OUT", "note: 1 of the 1 cameras of IN are not in OUT"} <= set(
+        done[1].splitlines()
+    )
+
+
+@needs_gltf
 def test_the_buffer_of_in_is_not_that_of_out(tmp_path):
     source = write(tmp_path / "data.gltf", *torus_document())
     source.rename(tmp_path / "in.gltf")
