@@ -179,7 +179,7 @@ def _import(extension, path, groups):
     elif extension == ".stl":
         bpy.ops.import_mesh.stl(filepath=path, axis_forward="Y", axis_up="Z")
     else:
-        bpy.ops.import_scene.gltf(filepath=path)
+        bpy.ops.import_scene.gltf(filepath=path, import_pack_images=False)  # packed they would forget their folder
 
 
 def _export(extension, path, objects):

@@ -270,6 +270,16 @@ def test_a_bad_file_is_refused(tmp_path):
     assert code == 2 and "in.glb: the file ends early" in err and len(err.splitlines()) == 1
 
 
+@needs_gltf
+def test_an_obj_names_the_textures_of_a_gltf(tmp_path):
+    source = write(tmp_path / "in.gltf", *torus_document(uvs=torus_arrays()[0][:, :2] / 4 + 0.5, image="skin.png"))
+    picture(tmp_path / "skin.png", (1, 0, 0))
+    (tmp_path / "other").mkdir()
+    for folder, name in ((tmp_path, "skin.png"), (tmp_path / "other", tmp_path / "skin.png")):
+        succeeded(decimate(source, folder / "out.obj", "--tolerance", "1%"))
+        assert f"map_Kd {name}\n" in (folder / "out.mtl").read_text()
+
+
 # Names of textures --------------------------------------------------------------------------------------------------
 
 
