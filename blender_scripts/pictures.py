@@ -21,6 +21,7 @@ _VIEWS = {"Y": {"direction": (0.55, 0.4, 1), "up": (0, 1, 0)}, "Z": {"direction"
 
 def require(option, path):
     """What a picture needs must be there before the work begins."""
+    cli.require_folder(path, option)
     if Path(path).suffix.lower() != ".png":
         raise cli.Stop(f"{option} {path}: the extension must be .png")
     if reason := unavailable():
