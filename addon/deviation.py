@@ -21,6 +21,7 @@ A deviation is a dictionary as a .json report holds it; lengths are in the units
 import csv
 import io
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,7 @@ PERCENTILES = (50, 90, 95, 99, 99.9)
 EXTENSIONS = (".json", ".csv", ".html")
 
 _METHOD = "certified interval; one sample for each piece of the surface, ranges from bounds on the pieces"
+_FORMULA = "=+-@\uff1d\uff0b\uff0d\uff20"  # the latter: the wide ones of East Asian fonts
 _BINS = 30  # a side of the histogram, about
 
 
@@ -106,8 +108,8 @@ def _way(largest, spread, polygons, bounds, edges):
     }
 
 
-def save(run, path, pictures=()):
-    """Writes a deviation with its `a` and `b` in the format that the extension names.
+def content(run, path, pictures=()):
+    """The bytes of a deviation with its `a` and `b`, in the format that the extension of a path names.
 
     pictures: (caption, bytes of a PNG) pairs, for the page alone.
     """
@@ -116,11 +118,15 @@ def save(run, path, pictures=()):
         ".csv": lambda: table(run),
         ".html": lambda: deviation_page.page(run, pictures),
     }
-    Path(path).write_text(writers[Path(path).suffix.lower()](), encoding="utf-8")
+    # A name of a file may have bytes that are no text.
+    return writers[Path(path).suffix.lower()]().encode("utf-8", "backslashreplace")
 
 
 def table(run):
-    """The same as CSV: one number a row, with the parameter it is for and the ends of its range where it has one."""
+    """The same as CSV: one number a row, with the parameter it is for and the ends of its range where it has one.
+
+    Text that a spreadsheet would take for a formula has a ' before it.
+    """
     rows = [("direction", "quantity", "at", "value", "lower", "upper")]
     rows += [("", "version", "", run["version"], "", ""), ("", "unit", "", run["unit"], "", "")]
     rows += [("", "size", "", run["size"], "", "")]
@@ -131,8 +137,16 @@ def table(run):
     for way in ("forward", "backward"):
         rows += [(way, *row) for row in _rows(run[way])]
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows([_harmless(cell) for cell in row] for row in rows)
     return text.getvalue()
+
+
+def _harmless(cell):
+    """Names come from files of other people: as a formula one could run programs where the table is opened."""
+    if not isinstance(cell, str):
+        return cell
+    line = re.sub(r"[\t\r\n]", " ", cell)  # a lone \r would begin a row for some readers
+    return f"'{line}" if line.lstrip()[:1] in tuple(_FORMULA) else line
 
 
 def _rows(way):

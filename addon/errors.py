@@ -14,3 +14,7 @@ class NotProved(Refused):
 
     def __init__(self, intervals):
         super().__init__(f"{NOT_PROVED}: {intervals}")
+
+
+class NotWritten(Refused):
+    """A file could not be written where it was wanted: the system refused, or there is no room. No other file was changed."""

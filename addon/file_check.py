@@ -12,6 +12,7 @@ import warnings
 
 import numpy as np
 
+from . import gltf_check
 from .errors import Refused
 
 _LARGEST = float(np.finfo(np.float32).max)
@@ -29,15 +30,16 @@ _PLY_TYPES = {
 }
 
 
-def check(extension, data):
-    """The number of faces that the content of a file declares; None for a format that is not looked into.
+def check(extension, data, folder):
+    """The number of faces that the content of a file declares. In `folder` are the files that it may name.
 
     Raises Refused with what is wrong, without the file's name.
     """
     if not data:
         raise Refused("the file is empty")
-    checks = {".obj": _check_obj, ".ply": _check_ply, ".stl": _check_stl}
-    return checks[extension](data) if extension in checks else None
+    if extension in (".gltf", ".glb"):
+        return gltf_check.check(data, folder)
+    return {".obj": _check_obj, ".ply": _check_ply, ".stl": _check_stl}[extension](data)
 
 
 def _require_finite(coordinates):

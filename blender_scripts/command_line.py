@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the commands here have in common: arguments, exit codes, and the add-on loaded without being installed.
 
-Exit codes: 0 done and proved, 1 a bug, 2 bad usage or input (one line on stderr), 3 not proved.
+Exit codes: 0 done and proved, 1 a file that could not be written or a bug, 2 bad usage or input, 3 not proved; all but a bug
+with one line on stderr. A signal ends the command with 128 and its number, without temporary files.
 """
 
 import argparse
+import os
+import shutil
+import signal
+import socket
 import sys
+import threading
 import traceback
 from pathlib import Path
 
@@ -14,9 +20,9 @@ import bpy
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import addon
-from addon import native
-from addon.errors import Refused
-from common import NOT_PROVED, USAGE, Stop, in_units, length, require_folder, whole_number  # noqa: F401
+from addon import native, safe_files, side_files
+from addon.errors import NotWritten, Refused
+from common import NOT_PROVED, NOT_WRITTEN, USAGE, Stop, in_units, length, require_folder, whole_number  # noqa: F401
 
 
 class Parser(argparse.ArgumentParser):
@@ -49,9 +55,38 @@ class Parser(argparse.ArgumentParser):
         return self.parse_args(joined)
 
 
+def reads(option, path):
+    """(what messages call it, path) of a mesh file that is read and of all files that it needs."""
+    return [(f"{option} {path}", path)] + [(f"{file} of {option}", file) for file in side_files.read_with(path)]
+
+
+def _end_on_signals(script):
+    """SIGTERM, Ctrl-C and a closed terminal remove the temporary files and end the process, within native calls as well."""
+    # Python runs handlers between two of its own instructions, which may be minutes away: a thread reads what came.
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+    signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
+    for name in ("SIGTERM", "SIGINT", "SIGHUP"):
+        number = getattr(signal, name, None)  # Windows has fewer
+        if number is not None and signal.getsignal(number) != signal.SIG_IGN:  # nohup has it ignored
+            signal.signal(number, lambda *_: None)
+    scratch = bpy.app.tempdir
+
+    def end():
+        with writer:  # kept open by this
+            number = reader.recv(1)[0]
+        safe_files.remove_all()
+        shutil.rmtree(scratch, ignore_errors=True)
+        print(f"{script}: ended by {signal.Signals(number).name}", file=sys.stderr, flush=True)
+        os._exit(128 + number)
+
+    threading.Thread(target=end, daemon=True).start()
+
+
 def run(script, arguments, main):
     """Calls main(arguments()) of a script with an empty scene and the add-on registered, and ends Blender with the exit code."""
     code = 1
+    _end_on_signals(Path(script).name)
     try:
         code = _with_addon(main, arguments())
     except SystemExit as done:  # --help
@@ -74,6 +109,8 @@ def _with_addon(main, options):
     addon.register()
     try:
         return main(options)
+    except NotWritten as error:
+        raise Stop(str(error), NOT_WRITTEN) from None
     except (Refused, native.module.TolvolError) as error:
         raise Stop(str(error)) from None
     finally:

@@ -8,7 +8,7 @@ import platform
 import re
 from pathlib import Path
 
-USAGE, NOT_PROVED = 2, 3
+NOT_WRITTEN, USAGE, NOT_PROVED = 1, 2, 3
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
 
@@ -52,7 +52,7 @@ def in_units(value_and_percent, size):
 
 def require_folder(path, what):
     """The folder that a file is to be written to must be there before the work begins."""
-    folder = Path(path).resolve().parent
+    folder = Path(os.path.realpath(path)).parent
     if not folder.is_dir():
         raise Stop(f"{what} {path}: the folder {folder} does not exist")
     if Path(path).is_dir():

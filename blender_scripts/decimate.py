@@ -4,11 +4,9 @@
 blender --background --python blender_scripts/decimate.py -- IN OUT --tolerance 1%
 """
 
+import io
 import json
-import os
-import shutil
 import sys
-import tempfile
 import time
 from pathlib import Path
 
@@ -20,9 +18,9 @@ try:
 
     import command_line as cli
     import pictures
-    from addon import file_io, mesh_io, report, volume
+    from addon import file_io, mesh_io, report, safe_files, side_files, volume
     from addon.certify import certify
-    from addon.errors import NOT_PROVED
+    from addon.errors import NOT_PROVED, NotWritten, Refused
 except ImportError as error:  # left alone, Blender would end with exit code 0
     print(f"decimate.py: Blender's Python lacks something: {error}; install Debian's python3-numpy", file=sys.stderr)
     sys.exit(2)
@@ -33,8 +31,9 @@ OUT as it is read back, before it takes its place. Files: .obj .ply .stl, .gltf 
 
 _EPILOG = """\
 The last line of the output says what was reached; its percentages are of the size of the reference (the longest diagonal of
-its bounding box), its time is that of the whole command. Exit codes: 0 proved; 2 bad usage or input; 3 not proved; 1 a bug.
-OUT is written with 0 alone."""
+its bounding box), its time is that of the whole command. Exit codes: 0 proved; 2 bad usage or input; 3 not proved; 1 a file
+that could not be written, or a bug. OUT, its side files, the report and the picture are written with 0 alone, all of them or
+none. Symbolic links are followed. OUT may be IN; no other file that is read is overwritten, nor are textures beside OUT."""
 
 
 def arguments():
@@ -90,19 +89,50 @@ def arguments():
 class Command:
     """One run: read, decimate object by object, write beside OUT, read that back, certify it, move it to OUT."""
 
-    def __init__(self, options):
+    def __init__(self, options, staged):
         self.options = options
-        self.output = Path(options.output)
+        self.staged = staged
         self.started = time.perf_counter()
         if options.max_seconds and options.effort != "thorough":
             raise cli.Stop("--max-seconds is for --effort thorough: fast is one pass")
         file_io.extension_of(options.input)
-        file_io.extension_of(options.output)
-        cli.require_folder(options.output, "OUT")
-        if options.report:
-            cli.require_folder(options.report, "--report")
+        extension = file_io.extension_of(options.output)
+        self.target = safe_files.Target(options.output, "OUT")
+        place = self.target.place
+        # A link may lead to a name without the extension, which says in which format to write.
+        self.exported = place if place.suffix.lower() == extension else place.with_name(place.name + extension)
+        self.sides = [
+            safe_files.Target(path, "OUT's side file") for path in side_files.written_with(self.exported, extension)
+        ]
+        for target in (self.target, *self.sides):
+            if target.is_device:
+                raise cli.Stop(f"{target.name}: this is a device or a pipe, not a file")
+        self.report = safe_files.Target(options.report, "--report") if options.report else None
+        self.picture = safe_files.Target(options.picture, "--picture") if options.picture else None
+        self._require_apart()
         if options.picture:
             pictures.require("--picture", options.picture)
+        # A folder that cannot be written to is found before the work, not after it.
+        for target in self._targets_written():
+            if not target.is_device:
+                staged.folder(target)
+
+    def _require_apart(self):
+        """Nothing that is written may be something that is read, but for OUT, which may be IN with all that belongs to it."""
+        read = cli.reads("IN", self.options.input)
+        if self.options.reference:
+            reference = cli.reads("--reference", self.options.reference)
+            reference_is_in = safe_files.identity(self.options.reference) == safe_files.identity(self.options.input)
+        else:
+            reference, reference_is_in = [], True
+        outputs = [(target.name, target.place) for target in (self.target, *self.sides)]
+        others = [(target.name, target.place) for target in (self.report, self.picture) if target]
+        safe_files.require_apart(outputs + others, [])
+        safe_files.require_apart(others, read + reference)
+        if safe_files.identity(self.target.place) != safe_files.identity(self.options.input):
+            safe_files.require_apart(outputs, read + reference)
+        elif not reference_is_in:
+            safe_files.require_apart(outputs, reference)
 
     def run(self):
         reference_file = self._read("--reference", self.options.reference) if self.options.reference else None
@@ -114,10 +144,11 @@ class Command:
         reference_objects = self._pair(source.objects, reference_file)
         references = [volume.surface_of(ob) for ob in reference_objects]
         tolerance, size = self._tolerance(references)
-        working = tolerance - file_io.rounding(self.options.output, source.objects)
+        working = tolerance - file_io.rounding(self.exported, source.objects)
         if working <= 0:
             raise cli.Stop(
-                f"--tolerance: {tolerance:.3g} is less than what {self.output.suffix} text rounds away; use .ply for OUT"
+                f"--tolerance: {tolerance:.3g} is less than what writing {self.exported.suffix} rounds away; "
+                "use .ply for OUT, and objects that are neither moved nor turned in IN"
             )
         runs = [
             self._decimate(ob, reference, min(working, surface.size()), target)
@@ -126,12 +157,15 @@ class Command:
             )
         ]
         repairs = source.repairs + (reference_file.repairs if reference_file else [])
-        whole = self._publish(source.objects, names, references, runs, tolerance, size)
+        whole = self._write(source, names, references, runs, tolerance, size)
         whole["input"] = whole_input
         whole["repairs"] = repairs + whole["repairs"]
         whole["seconds"]["total"] = time.perf_counter() - self.started
-        if self.options.report:
-            Path(self.options.report).write_text(json.dumps(whole, indent=1) + "\n")
+        if self.report:
+            self.staged.write(self.report, (json.dumps(whole, indent=1) + "\n").encode())
+        # OUT itself last: once it is there, all of it is.
+        self.staged.add(self.target, self.staged.folder(self.target) / self.exported.name)
+        self.staged.publish()
         for note in [*(repair["message"] for repair in whole["repairs"]), *whole["warnings"]]:
             print(f"note: {note}")
         print(report.line(whole, whole["seconds"]["total"]))
@@ -214,46 +248,69 @@ class Command:
         self._stage(f"decimated {ob.name}: {report.counts(run)}", start)
         return run
 
-    def _publish(self, objects, names, references, runs, tolerance, size):
-        """Writes OUT when what is read back is proved; the report of the whole file."""
+    def _write(self, source, names, references, runs, tolerance, size):
+        """Writes OUT beside its place, and certifies what is read back; the report of the whole file."""
         start = time.perf_counter()
-        try:
-            folder = Path(tempfile.mkdtemp(prefix=".tolvol-", dir=self.output.resolve().parent))
-        except OSError as error:
-            raise cli.Stop(f"OUT {self.output}: {error.strerror}") from None
-        try:
-            file_io.write_file(folder / self.output.name, objects, self.output.parent)
-            bpy.ops.wm.read_factory_settings(use_empty=True)
-            written = file_io.read_file(folder / self.output.name)
-            self._stage(f"wrote {self.output.name} and read it back", start)
+        written = self._export(source.objects)
+        self._stage(f"wrote {self.exported.name} and read it back", start)
+        start = time.perf_counter()
+        found = {ob.name: volume.surface_of(ob) for ob in written.objects}
+        if found.keys() == set(names):
+            judged = [
+                self._certify(found[name], reference, tolerance, run["outside"]["faces"])
+                for name, reference, run in zip(names, references, runs)
+            ]
+        else:  # a format of one object
+            kept = sum(run["outside"]["faces"] for run in runs)
+            judged = [self._certify(volume.joined(found.values()), volume.joined(references), tolerance, kept)]
+        whole = self._summary(names, runs, judged, tolerance, size)
+        whole["output"] = {"file": self.options.output, **written.counts}
+        for kind, count in source.extras.items():
+            if lost := count - written.extras.get(kind, 0):
+                message = f"{lost} of the {count} {kind} of IN are not in OUT"
+                whole["repairs"].append({"kind": kind, "count": lost, "message": message})
+        whole["seconds"]["certify"] += time.perf_counter() - start
+        self._stage("certified it both ways", start)
+        if not report.proved(whole):
+            raise cli.Stop(
+                f"{NOT_PROVED}: {report.intervals(whole)}; {self.options.output} was not written", cli.NOT_PROVED
+            )
+        if self.picture:
             start = time.perf_counter()
-            found = {ob.name: volume.surface_of(ob) for ob in written.objects}
-            if found.keys() == set(names):
-                judged = [
-                    self._certify(found[name], reference, tolerance, run["outside"]["faces"])
-                    for name, reference, run in zip(names, references, runs)
-                ]
-            else:  # a format of one object
-                kept = sum(run["outside"]["faces"] for run in runs)
-                judged = [self._certify(volume.joined(found.values()), volume.joined(references), tolerance, kept)]
-            whole = self._summary(names, runs, judged, tolerance, size)
-            whole["output"] = {"file": self.options.output, **written.counts}
-            whole["seconds"]["certify"] += time.perf_counter() - start
-            self._stage("certified it both ways", start)
-            if not report.proved(whole):
-                raise cli.Stop(
-                    f"{NOT_PROVED}: {report.intervals(whole)}; {self.output} was not written", cli.NOT_PROVED
-                )
-            if self.options.picture:
-                start = time.perf_counter()
-                self._draw(volume.joined(found.values()), volume.joined(references), tolerance, size)
-                self._stage(f"drew {self.options.picture}", start)
-            # OUT itself last: once it is there, all of it is.
-            for path in sorted(folder.iterdir(), key=lambda path: path.name == self.output.name):
-                os.replace(path, self.output.resolve().parent / path.name)
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
+            self._draw(volume.joined(found.values()), volume.joined(references), tolerance, size)
+            self._stage(f"drew {self.options.picture}", start)
         return whole
+
+    def _export(self, objects):
+        """Writes objects beside the place of OUT, with their side files; the MeshFile that is read back from there."""
+        folder = self.staged.folder(self.target)
+        file = folder / self.exported.name
+        try:
+            file_io.write_file(file, objects, self.exported.parent)
+            textures = []
+            if file.suffix.lower() == ".gltf":
+                meant = [safe_files.identity(target.place) for target in self._targets_written()]
+                textures = side_files.keep_textures(
+                    file, self.exported.parent, lambda path: safe_files.identity(path) in meant
+                )
+        except OSError as error:
+            raise self.target.failed(error) from None
+        for texture in textures:
+            self.staged.add(safe_files.Target(self.exported.with_name(texture.name), "the texture"), texture, new=True)
+        for side in self.sides:
+            if (folder / side.path.name).exists():
+                self.staged.add(side, folder / side.path.name)
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        try:
+            return file_io.read_file(file)
+        except Refused as error:
+            reason = str(error).removeprefix(f"{file}: ")
+            raise NotWritten(
+                f"{self.target.name}: what was written cannot be read back ({reason}); is there room on the disk?"
+            ) from None
+
+    def _targets_written(self):
+        return [target for target in (self.target, *self.sides, self.report, self.picture) if target]
 
     def _certify(self, surface, reference, tolerance, kept):
         return certify(surface, reference, tolerance, kept, self.options.threads)
@@ -261,10 +318,9 @@ class Command:
     def _draw(self, result, reference, tolerance, size):
         surfaces = [(surface.world(), surface.arrays.triangles) for surface in (result, reference)]
         like = self.options.reference or self.options.input
-        try:
-            pictures.save_deviation(self.options.picture, *surfaces, tolerance, size, like, self.options.threads)
-        except OSError as error:
-            raise cli.Stop(f"--picture {self.options.picture}: {error.strerror}") from None
+        png = io.BytesIO()
+        pictures.save_deviation(png, *surfaces, tolerance, size, like, self.options.threads)
+        self.staged.write(self.picture, png.getvalue())
 
     def _summary(self, names, runs, judged, tolerance, size):
         """The report of the whole file: the worst of its objects, as certified in the file."""
@@ -317,4 +373,12 @@ def _not_above(length):
     return float(candidate)
 
 
-cli.run(__file__, arguments, lambda options: Command(options).run())
+def main(options):
+    with safe_files.Staged() as staged:
+        try:
+            return Command(options, staged).run()
+        except NotWritten as error:
+            raise cli.Stop(f"{error}; {options.output} was not written", cli.NOT_WRITTEN) from None
+
+
+cli.run(__file__, arguments, main)

@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 try:
     import command_line as cli
     import pictures
-    from addon import deviation, file_io, report, volume
+    from addon import deviation, file_io, report, safe_files, volume
 except ImportError as error:  # left alone, Blender would end with exit code 0
     print(f"report.py: Blender's Python lacks something: {error}; install Debian's python3-numpy", file=sys.stderr)
     sys.exit(2)
@@ -25,7 +25,8 @@ where a surface is closed."""
 
 _EPILOG = """\
 Percentages are of the size of B: the longest diagonal of its bounding box. Exit codes: 0 measured; 2 bad usage or input; 1 a
-bug."""
+file that could not be written, or a bug. Reports and pictures are written with 0 alone, all of them or none, never over a file
+that is read. Symbolic links are followed."""
 
 
 def bounds(text):
@@ -64,12 +65,23 @@ def arguments():
 
 
 def main(options):
+    with safe_files.Staged() as staged:
+        return _report(options, staged)
+
+
+def _report(options, staged):
     for path in (options.a, options.b):
         file_io.extension_of(path)
-    for path in options.report:
-        cli.require_folder(path, "--report")
-    if options.picture:
+    reports = [safe_files.Target(path, "--report") for path in options.report]
+    picture = safe_files.Target(options.picture, "--picture") if options.picture else None
+    targets = [*reports, picture] if picture else reports
+    read = cli.reads("A", options.a) + cli.reads("B", options.b)
+    safe_files.require_apart([(target.name, target.place) for target in targets], read)
+    if picture:
         pictures.require("--picture", options.picture)
+    for target in targets:  # a folder that cannot be written to is found before the work, not after it
+        if not target.is_device:
+            staged.folder(target)
     surfaces, files = [], []
     for path in (options.a, options.b):
         found = file_io.read_file(path)
@@ -83,16 +95,16 @@ def main(options):
     for way, label in (("forward", "A from B"), ("backward", "B from A")):
         print(_line(result[way], label, size))
     drawn = _draw(surfaces, result, options)
-    for path in options.report:
-        try:
-            deviation.save(result, path, drawn)
-        except OSError as error:
-            raise cli.Stop(f"--report {path}: {error.strerror}") from None
+    if picture:
+        staged.write(picture, drawn[0][1])
+    for path, target in zip(options.report, reports):
+        staged.write(target, deviation.content(result, path, drawn))
+    staged.publish()
     return 0
 
 
 def _draw(surfaces, result, options):
-    """Writes --picture; (caption, PNG) of both directions where a page asks for them."""
+    """(caption, PNG) of both directions where a page asks for them, of the first for --picture."""
     in_page = any(Path(path).suffix.lower() == ".html" for path in options.report)
     if in_page and (reason := pictures.unavailable()):
         print(f"note: no pictures in the report: {reason}")
@@ -106,11 +118,6 @@ def _draw(surfaces, result, options):
             png = io.BytesIO()
             pictures.save_deviation(png, *pair, scale, result["size"], path, options.threads)
             drawn.append((f"{Path(path).name}, coloured by its distance from {Path(other).name}", png.getvalue()))
-    if options.picture:
-        try:
-            Path(options.picture).write_bytes(drawn[0][1])
-        except OSError as error:
-            raise cli.Stop(f"--picture {options.picture}: {error.strerror}") from None
     return drawn
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from .. import deviation
+from .. import deviation, safe_files
 from ..errors import Refused
 from .check import Comparison
 
@@ -47,9 +47,12 @@ class TOLVOL_OT_save_report(Comparison, bpy.types.Operator):
         path = Path(bpy.path.abspath(self.filepath))
         if path.suffix.lower() not in deviation.EXTENSIONS:
             raise Refused(f"{path.name} does not end in {', '.join(deviation.EXTENSIONS)}")
-        if not path.parent.is_dir():
-            raise Refused(f"The folder {path.parent} does not exist")
-        self._path = path
+        self._target = safe_files.Target(path)
+        used = [path for path in (bpy.data.filepath, *bpy.utils.blend_paths(absolute=True)) if path]
+        safe_files.require_apart([(str(path), path)], [(path, path) for path in used])
+        with safe_files.Staged() as staged:  # a folder that cannot be written to is found before the work
+            if not self._target.is_device:
+                staged.folder(self._target)
         self._about = {
             "a": _counted(self.ob.name, self.ob.data),
             "b": _counted("its reference", self.ob.tolvol.snapshot),
@@ -65,11 +68,10 @@ class TOLVOL_OT_save_report(Comparison, bpy.types.Operator):
         )
 
     def finish(self, context, outcome):
-        try:
-            deviation.save(outcome | self._about, self._path)
-        except OSError as error:
-            raise Refused(f"{self._path}: {error.strerror}") from None
-        self.report({"INFO"}, f"Saved {self._path}")
+        with safe_files.Staged() as staged:
+            staged.write(self._target, deviation.content(outcome | self._about, self._target.name))
+            staged.publish()
+        self.report({"INFO"}, f"Saved {self._target.name}")
 
 
 def _counted(name, mesh):

@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from addon import file_io, volume
 from scenes import add_object
@@ -15,18 +16,29 @@ LINE = re.compile(
     r"([\d,]+) -> ([\d,]+) triangles(?: \((.*)\))?, tolerance ([\d.e-]+) % = ([\d.e-]+), result within ([\d.e+-]+) %, "
     r"reference within ([\d.e+-]+) % \(certified\), [\d.]+ s"
 )
+READS_GLTF = bpy.app.version >= (4, 0) or "bool" in vars(np)
 
 
-def command(script, *arguments, before=None):
-    """(exit code, stdout, stderr); `before` is Python that runs first."""
+def running(script, *arguments, before=None):
+    """The process of a command; `before` is Python that runs first."""
     patch = ["--python-expr", before] if before else []
-    done = subprocess.run(
+    return subprocess.Popen(
         [bpy.app.binary_path, "--background", *patch, "--python", SCRIPTS / script, "--", *map(str, arguments)],
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
-        timeout=120,
     )
-    return done.returncode, done.stdout, done.stderr
+
+
+def command(script, *arguments, **options):
+    """(exit code, stdout, stderr)."""
+    with running(script, *arguments, **options) as process:
+        try:
+            out, err = process.communicate(timeout=120)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            raise
+    return process.returncode, out, err
 
 
 def decimate(*arguments, **options):

@@ -4,6 +4,7 @@
 import csv
 import io
 import json
+import os
 import re
 from html.parser import HTMLParser
 
@@ -180,7 +181,8 @@ def test_table_holds_the_same_numbers(tmp_path):
     a, b = step()
     run = measured(a, b, tolerance=0.05, bounds=(0.02,))
     for extension in deviation.EXTENSIONS:
-        deviation.save(run, tmp_path / f"r{extension}", [("picture", PNG)])
+        path = tmp_path / f"r{extension}"
+        path.write_bytes(deviation.content(run, path, [("picture", PNG)]))
     assert json.loads((tmp_path / "r.json").read_text()) == run
     assert "data:image/png" in (tmp_path / "r.html").read_text()
     rows = list(csv.DictReader(io.StringIO((tmp_path / "r.csv").read_text())))
@@ -193,6 +195,28 @@ def test_table_holds_the_same_numbers(tmp_path):
         assert [float(found["position", axis]["value"]) for axis in "xyz"] == run[way]["position"]
         shares = [float(row["value"]) for (quantity, _), row in found.items() if quantity == "histogram from"]
         assert shares == run[way]["histogram"]["shares"]
+
+
+@pytest.mark.parametrize(
+    "name", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", " =1", "\uff1d1", '=HYPERLINK("http://x","y")']
+)
+def test_no_name_is_a_formula_in_the_table(name):
+    a, b = step()
+    run = measured(a, b) | {"unit": name}
+    run["a"] |= {"name": name}
+    run["b"] |= {"name": "plain-name\r= x"}
+    run["forward"]["position"] = [-0.5, 0.0, 0.0]
+    rows = {tuple(row[:3]): row[3] for row in csv.reader(io.StringIO(deviation.table(run), newline=""))}
+    assert rows["", "a name", ""] == rows["", "unit", ""] == "'" + name.replace("\t", " ").replace("\r", " ")
+    assert rows["", "b name", ""] == "plain-name = x" and rows["forward", "position", "x"] == "-0.5"
+
+
+def test_names_of_files_need_not_be_text():
+    a, b = step()
+    run = measured(a, b)
+    run["a"] |= {"name": os.fsdecode(b"scan \xff")}
+    for extension in deviation.EXTENSIONS:
+        assert b"scan \\udcff" in deviation.content(run, f"r{extension}")
 
 
 # report.py ----------------------------------------------------------------------------------------------------------
@@ -262,7 +286,7 @@ def test_save_report_refuses(tmp_path):
         with pytest.raises(RuntimeError, match=message):
             bpy.ops.tolvol.save_report(filepath=str(tmp_path / name))
     (tmp_path / "r.csv").mkdir()
-    with pytest.raises(RuntimeError, match="r.csv: Is a directory"):
+    with pytest.raises(RuntimeError, match="r.csv: this is a folder"):
         bpy.ops.tolvol.save_report(filepath=str(tmp_path / "r.csv"))
     activate(torus("without a reference"))
     assert not bpy.ops.tolvol.save_report.poll()
