@@ -6,7 +6,6 @@ is never written to. An object that is its own reference carries it along: snaps
 the object's present matrix. Another object's reference stays where it was in the world when it was set.
 """
 
-from collections import OrderedDict
 from dataclasses import dataclass
 
 import bpy
@@ -15,10 +14,9 @@ from bpy.app.handlers import persistent
 
 from . import mesh_io, native
 from .errors import Refused
+from .volume_cache import VolumeCache
 
-# Bytes that the volumes used last may hold together; the one in use is kept whatever it holds.
-_KEPT = 600_000_000
-_volumes = OrderedDict()
+_volumes = VolumeCache(most_bytes=600_000_000)
 
 # What panels show of a mesh (its size, its fingerprint), by object; forgotten whenever any mesh changes.
 _shown = {}
@@ -193,21 +191,18 @@ def on_top(ob):
 def native_volume(surface, tolerance, threads=0, progress=None):
     """The tolerance volume of a surface: built, or the one that was built of the same content before."""
     key = (surface.arrays.fingerprint(), surface.matrix.tobytes(), tolerance)
-    if key in _volumes:
-        _volumes.move_to_end(key)
-        return _volumes[key]
-    volume = native.module.ToleranceVolume(
-        surface.arrays.vertices,
-        surface.arrays.triangles,
-        tolerance,
-        to_world=surface.matrix,
-        threads=threads,
-        progress=progress,
-    )
-    _volumes[key] = volume
-    while len(_volumes) > 1 and sum(kept.memory for kept in _volumes.values()) > _KEPT:
-        _volumes.popitem(last=False)
-    return volume
+
+    def build():
+        return native.module.ToleranceVolume(
+            surface.arrays.vertices,
+            surface.arrays.triangles,
+            tolerance,
+            to_world=surface.matrix,
+            threads=threads,
+            progress=progress,
+        )
+
+    return _volumes.get(key, build, progress)
 
 
 def exact(value):
