@@ -13,7 +13,7 @@ from bpy.props import EnumProperty, IntProperty
 from .. import measure, mesh_io, native, preferences, protect, report, transfer, volume
 from ..certify import certify
 from ..errors import NotProved, Refused
-from ..job import JobOperator, alive
+from ..job import JobOperator
 from ..operation_settings import PROTECTED, decimate_settings
 from ..properties import PLACEMENTS, tolerance_settings
 from . import settings as shared
@@ -94,12 +94,14 @@ the settings of the active one. A mesh without a reference becomes it"""
         draw_protect_settings(layout, self, context.active_object)
         layout.prop(self, "outside")
 
+    def targets(self, context):
+        return targets(context)
+
     def prepare(self, context):
         context.view_layer.update()
-        self._objects = targets(context)
         self._take_settings(self.ob.tolvol)
         tasks = []
-        for ob in self._objects:
+        for ob in self.objects:
             if reason := decimate_blocked(ob):
                 raise Refused(f"{ob.name}: {reason}")
             tasks.append(self._task(context, ob))
@@ -122,17 +124,16 @@ the settings of the active one. A mesh without a reference becomes it"""
         return task
 
     def finish(self, context, outcomes):
-        objects = [alive(ob) for ob in self._objects]
         # All meshes are tried before the first is written.
         with contextlib.ExitStack() as stack:
             writes = [
                 stack.enter_context(transfer.Writing(ob.data, surface.arrays, result))
-                for ob, (surface, _, result, _) in zip(objects, outcomes)
+                for ob, (surface, _, result, _) in zip(self.objects, outcomes)
             ]
             for write in writes:
                 write.write()
-        for ob, (_, reference, _, run) in zip(objects, outcomes):
-            self._keep(ob, reference, run, f"{ob.name}: " if len(objects) > 1 else "")
+        for ob, (_, reference, _, run) in zip(self.objects, outcomes):
+            self._keep(ob, reference, run, f"{ob.name}: " if len(self.objects) > 1 else "")
 
     def _keep(self, ob, reference, run, prefix):
         """What is remembered and said of one object."""
