@@ -75,15 +75,30 @@ class _Claim:
         try:
             name = self._ob.name
         except ReferenceError:
-            raise Refused(f"{self._name} was deleted meanwhile, nothing was changed") from None
+            raise Refused(f"{self._name} was deleted meanwhile: nothing was changed") from None
         if name != self._name:
-            raise Refused(f"{self._name} was renamed to {name} meanwhile, nothing was changed")
+            raise Refused(f"{self._name} was renamed to {name} meanwhile: nothing was changed")
         if self._state() != self._mesh:
-            raise Refused(f"The mesh or the mode of {name} was changed meanwhile, nothing was changed by this")
+            raise Refused(f"The mesh or the mode of {name} was changed meanwhile: nothing more was changed")
 
     def _state(self):
         mesh = self._ob.data
         return mesh.as_pointer(), len(mesh.vertices), len(mesh.loops), len(mesh.polygons), self._ob.mode
+
+
+def run_all(tasks, progress):
+    """The outcomes of task.run(progress); an error says which of several tasks it is of, by task.name."""
+    if len(tasks) == 1:
+        return [tasks[0].run(progress)]
+    outcomes = []
+    for task in tasks:
+        try:
+            outcomes.append(task.run(progress))
+        except native.module.Cancelled:
+            raise
+        except (Refused, native.module.TolvolError) as error:
+            raise Refused(f"{task.name}: {native.said(error)}") from None
+    return outcomes
 
 
 class JobOperator:
@@ -127,6 +142,8 @@ class JobOperator:
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
+        if not self._interrupted:
+            self._look()
         if self._interrupted:
             self._leave(context)
             self.report({"WARNING"}, self._interrupted)
@@ -161,6 +178,18 @@ class JobOperator:
         """Ends the job while what it began with is still there; modal() or cancel() follows."""
         self._interrupted = f"{self.bl_label} was stopped, because {happens}. It has changed nothing"
         self._end()
+
+    def _look(self):
+        """Ends the job as soon as its outcome could not be written any more."""
+        try:
+            self._check()
+        except Refused as error:
+            self._interrupted = str(error)
+            self._end()
+
+    def _check(self):
+        for claim in self._claims:
+            claim.check()
 
     def _end(self):
         self._progress.cancel()
@@ -203,8 +232,7 @@ class JobOperator:
             outcome = self._job.outcome()
             if self._progress.cancelled:  # after the last thing that would have noticed
                 raise native.module.Cancelled("cancelled")
-            for claim in self._claims:
-                claim.check()
+            self._check()
         except BaseException as error:
             return self._steps.throw(error)
         return self._steps.send(outcome)

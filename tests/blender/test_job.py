@@ -63,9 +63,9 @@ def change_the_mode():
 @pytest.mark.parametrize(
     ("happens", "said"),
     [
-        (delete, "torus was deleted meanwhile, nothing was changed"),
-        (delete_with_its_mesh, "torus was deleted meanwhile, nothing was changed"),
-        (rename, "torus was renamed to ring meanwhile, nothing was changed"),
+        (delete, "torus was deleted meanwhile: nothing was changed"),
+        (delete_with_its_mesh, "torus was deleted meanwhile: nothing was changed"),
+        (rename, "torus was renamed to ring meanwhile: nothing was changed"),
         (edit, "The mesh or the mode of torus was changed meanwhile"),
         (change_the_mode, "The mesh or the mode of torus was changed meanwhile"),
     ],
