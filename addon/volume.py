@@ -117,6 +117,8 @@ def stale_reason(ob):
     settings = ob.tolvol
     if settings.snapshot is None:
         return None
+    if not _sound(settings.snapshot_size):
+        return "what the file holds of it is damaged"
     if settings.snapshot_kind != settings.reference_kind:
         return "another one was chosen"
     if settings.snapshot_kind == "OBJECT" and settings.snapshot_object != settings.reference_object:
@@ -156,6 +158,8 @@ def measurement_of(ob):
     measurement = ob.tolvol.measurement
     if ob.mode != "OBJECT" or not measurement.fingerprint or measurement.fingerprint != shown_fingerprint(ob):
         return None
+    if not all(map(_sound, (measurement.tolerance, 1 + measurement.forward, 1 + measurement.backward))):
+        return None  # a damaged file
     before, now = _stored_matrix(measurement.matrix), mesh_io.matrix_array(ob.matrix_world)
     moves_along = ob.tolvol.snapshot_kind == "SELF" and same_shape(before, now)
     return measurement if moves_along or np.array_equal(before, now) else None
@@ -165,6 +169,11 @@ def same_shape(matrix, other):
     """Whether two placements differ by a rigid motion only, so that lengths are the same."""
     metric, metric_other = (m[:3, :3].T @ m[:3, :3] for m in (matrix, other))
     return np.abs(metric - metric_other).max() <= _RIGID * np.abs(metric).max()
+
+
+def _sound(length):
+    """Whether a stored length can be one: what a damaged file holds may be anything."""
+    return 0 < length < np.inf
 
 
 def _stored_matrix(values):
@@ -220,7 +229,7 @@ def tolerance_length(settings, size):
 def shown_size(ob):
     """What 100 % is, for drawing; None while it cannot be known."""
     if ob.tolvol.snapshot is not None:
-        return ob.tolvol.snapshot_size
+        return ob.tolvol.snapshot_size if _sound(ob.tolvol.snapshot_size) else None
     source = source_object(ob)
     if source is None or source.type != "MESH" or not source.data.polygons or native.module is None:
         return None
