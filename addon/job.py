@@ -6,15 +6,24 @@ and touches nothing of Blender; and finish(), which writes the outcome in one go
 is a generator instead, steps(). A script, Adjust Last Operation and Blender without a window run the same at once.
 """
 
+import atexit
 import threading
 import time
 
-from . import native
+import bpy
+from bpy.app.handlers import persistent
+
+from . import native, status_bar
 from .errors import Refused
 
 # What ends sooner than this is waited for: no status line has to flash up for it.
 _PATIENCE = 0.4
 _TICK = 0.1
+
+# All of these are touched by the main thread alone.
+_at_work = []  # jobs whose threads may be running
+_under_way = []  # operators that go on while Blender does
+_to_say = []  # what to say once another file is open
 
 
 class Job:
@@ -23,6 +32,8 @@ class Job:
         self._outcome = None
         self._error = None
         self._thread = threading.Thread(target=self._run, args=(work,), daemon=True)
+        _at_work[:] = [job for job in _at_work if not job.done()]
+        _at_work.append(self)
         self._thread.start()
 
     def _run(self, work):
@@ -42,13 +53,52 @@ class Job:
         return self._outcome
 
 
-def alive(ob):
-    """The object, unless it was removed since."""
-    try:
-        ob.name  # noqa: B018
-    except ReferenceError:
-        raise Refused("The object was removed meanwhile") from None
-    return ob
+def end_all():
+    """Cancels every job and waits for its thread: one that outlives Python's interpreter takes Blender down with it."""
+    for job in _at_work:
+        job.progress.cancel()
+    for job in _at_work:
+        job.done(None)
+    _at_work.clear()
+
+
+class _Claim:
+    """An object that an operator works on, as it was when the operator began."""
+
+    def __init__(self, ob):
+        self._ob = ob
+        self._name = ob.name
+        self._mesh = self._state()
+
+    def check(self):
+        """Raises Refused unless the outcome can still be written to it."""
+        try:
+            name = self._ob.name
+        except ReferenceError:
+            raise Refused(f"{self._name} was deleted meanwhile: nothing was changed") from None
+        if name != self._name:
+            raise Refused(f"{self._name} was renamed to {name} meanwhile: nothing was changed")
+        if self._state() != self._mesh:
+            raise Refused(f"The mesh or the mode of {name} was changed meanwhile: nothing more was changed")
+
+    def _state(self):
+        mesh = self._ob.data
+        return mesh.as_pointer(), len(mesh.vertices), len(mesh.loops), len(mesh.polygons), self._ob.mode
+
+
+def run_all(tasks, progress):
+    """The outcomes of task.run(progress); an error says which of several tasks it is of, by task.name."""
+    if len(tasks) == 1:
+        return [tasks[0].run(progress)]
+    outcomes = []
+    for task in tasks:
+        try:
+            outcomes.append(task.run(progress))
+        except native.module.Cancelled:
+            raise
+        except (Refused, native.module.TolvolError) as error:
+            raise Refused(f"{task.name}: {native.said(error)}") from None
+    return outcomes
 
 
 class JobOperator:
@@ -60,12 +110,15 @@ class JobOperator:
     _progress = None
     _job = None
     _timer = None
-    _ob = None
+    _interrupted = None  # what happened to the objects, so that they must not be touched any more
+
+    def targets(self, context):
+        """The objects that it works on, the first of which its settings are of."""
+        return [context.active_object]
 
     @property
     def ob(self):
-        """The object that was active when the operator began."""
-        return alive(self._ob)
+        return self.objects[0]
 
     def steps(self, context):
         """Yields work(progress) and is sent its outcome, in the main thread; only its end may change anything."""
@@ -85,9 +138,16 @@ class JobOperator:
         manager = context.window_manager
         self._timer = manager.event_timer_add(_TICK, window=context.window)
         manager.modal_handler_add(self)
+        _under_way.append(self)
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
+        if not self._interrupted:
+            self._look()
+        if self._interrupted:
+            self._leave(context)
+            self.report({"WARNING"}, self._interrupted)
+            return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS":
             if _improving(self._progress):
                 self._progress.finish()
@@ -106,14 +166,39 @@ class JobOperator:
         return {"RUNNING_MODAL"}
 
     def cancel(self, context):
-        """Blender closes the window, or the file."""
+        """Blender closes the window, or the file, or a dialog before anything was begun."""
+        if self._job is None:
+            return
+        if self._interrupted:
+            _to_say.append(self._interrupted)
+        self._end()
+        self._leave(context)
+
+    def interrupt(self, happens):
+        """Ends the job while what it began with is still there; modal() or cancel() follows."""
+        self._interrupted = f"{self.bl_label} was stopped, because {happens}. It has changed nothing"
+        self._end()
+
+    def _look(self):
+        """Ends the job as soon as its outcome could not be written any more."""
+        try:
+            self._check()
+        except Refused as error:
+            self._interrupted = str(error)
+            self._end()
+
+    def _check(self):
+        for claim in self._claims:
+            claim.check()
+
+    def _end(self):
         self._progress.cancel()
         self._job.done(None)
         self._steps.close()
-        self._leave(context)
 
     def _begin(self, context):
-        self._ob = context.active_object
+        self.objects = self.targets(context)
+        self._claims = [_Claim(ob) for ob in self.objects]
         self._steps = self.steps(context)
         self._progress = native.module.Progress()
         self._job = None
@@ -147,11 +232,13 @@ class JobOperator:
             outcome = self._job.outcome()
             if self._progress.cancelled:  # after the last thing that would have noticed
                 raise native.module.Cancelled("cancelled")
+            self._check()
         except BaseException as error:
             return self._steps.throw(error)
         return self._steps.send(outcome)
 
     def _leave(self, context):
+        _under_way.remove(self)
         context.window_manager.event_timer_remove(self._timer)
         context.workspace.status_text_set(None)
 
@@ -169,3 +256,52 @@ def _status(progress, doing):
     share = f" {progress.fraction:.0%}" if progress.fraction else ""
     escape = "Keep What There Is" if _improving(progress) else "Cancel"
     return f"{doing or progress.stage.capitalize() + share + left}    Esc: {escape}"
+
+
+def _interrupt(happens):
+    for operator in _under_way:
+        operator.interrupt(happens)
+
+
+@persistent
+def _before_load(*_):
+    _interrupt("another file was opened")
+
+
+@persistent
+def _before_undo(*_):
+    _interrupt("a step was undone")
+
+
+@persistent
+def _before_redo(*_):
+    _interrupt("a step was redone")
+
+
+@persistent
+def _after_load(*_):
+    for text in _to_say:
+        status_bar.say(text)
+    _to_say.clear()
+
+
+_HANDLERS = (
+    ("load_pre", _before_load),
+    ("undo_pre", _before_undo),
+    ("redo_pre", _before_redo),
+    ("load_post", _after_load),
+)
+
+
+def register():
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
+    atexit.register(end_all)  # Blender does not unregister what a script has registered
+
+
+def unregister():
+    atexit.unregister(end_all)
+    end_all()
+    for name, handler in reversed(_HANDLERS):
+        getattr(bpy.app.handlers, name).remove(handler)
+    status_bar.clear()

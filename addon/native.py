@@ -6,7 +6,8 @@ this order: the add-on's own folder (bin/ or beside this file), the folders in t
 TOLVOL_PYTHON_PATH, and build/release/python of a checkout.
 
 What is loaded is a private copy named by its content: Blender unloads no library, so that a file which is replaced
-while it is mapped (the add-on installed again, the module built again) would crash the running session.
+while it is mapped (the add-on installed again, the module built again) would crash the running session. The copy is put
+into the first folder that programs may be started from: the one for temporary files is mounted `noexec` on some machines.
 """
 
 import hashlib
@@ -17,6 +18,8 @@ import shutil
 import sys
 import tempfile
 from pathlib import Path
+
+import bpy
 
 _FOLDER = Path(__file__).resolve().parent
 
@@ -55,16 +58,29 @@ def _load():
     name = f"tolvol_{hashlib.blake2b(path.read_bytes(), digest_size=8).hexdigest()}"
     # The registry outlives this file's reload, so that one content is loaded once per session.
     if name not in sys.modules:
-        try:
-            sys.modules[name] = _load_copy(path, name)
-        except (ImportError, OSError) as error:
-            return None, None, f"{path} does not load: {error}"
+        problems = []
+        for folder in _folders_for_copies():
+            try:
+                sys.modules[name] = _load_copy(path, name, folder)
+                break
+            except (ImportError, OSError) as error:
+                problems.append((folder, error))
+        else:
+            return None, None, _why_not_loaded(path, problems)
     return sys.modules[name], path, None
 
 
-def _load_copy(path, name):
+def _folders_for_copies():
+    """Where a copy may be loaded from, the best first."""
+    yield Path(tempfile.gettempdir())
+    yield Path(bpy.app.tempdir)  # the preferences may have set it
+    yield Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    yield _FOLDER
+
+
+def _load_copy(path, name, parent):
     # Once loaded the copy needs no name in the file system; where it cannot be removed then (Windows) it stays.
-    with tempfile.TemporaryDirectory(prefix="tolvol-", ignore_cleanup_errors=True) as folder:
+    with tempfile.TemporaryDirectory(prefix="tolvol-", dir=parent, ignore_cleanup_errors=True) as folder:
         copy = Path(folder) / name / path.name
         copy.parent.mkdir()
         # With the libraries that the package brings along: the module looks for them beside itself.
@@ -74,6 +90,25 @@ def _load_copy(path, name):
         loaded = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(loaded)
     return loaded
+
+
+def _why_not_loaded(path, problems):
+    """problems: (folder, error) of every try."""
+    able = [error for folder, error in problems if not _forbids_programs(folder) and not isinstance(error, OSError)]
+    if able:  # the module itself is what does not load
+        return f"{path} does not load: {able[0]}"
+    tried = "; ".join(f"{folder}: {error}" for folder, error in problems)
+    return (
+        f"{path} does not load: none of the folders that were tried takes a copy that may be started ({tried}). "
+        "Start Blender with the environment variable TMPDIR set to a folder on a disk that is not mounted noexec"
+    )
+
+
+def _forbids_programs(folder):
+    try:
+        return bool(os.statvfs(folder).f_flag & os.ST_NOEXEC)
+    except (AttributeError, OSError):  # Windows, or no such folder
+        return False
 
 
 module, path, reason = _load()

@@ -77,12 +77,15 @@ DEFORM_MODES = (
 )
 
 
+def automatic_placement(mesh):
+    """The placement until somebody chooses one: exact UVs for a mesh that has any."""
+    return "SUBSET" if isinstance(mesh, bpy.types.Mesh) and mesh.uv_layers else "OPTIMAL"
+
+
 def _get_placement(settings):
-    """What was chosen; until something is, exact UVs for a mesh that has any."""
     if settings.placement_choice >= 0:
         return settings.placement_choice
-    mesh = settings.id_data.data
-    return 1 if isinstance(mesh, bpy.types.Mesh) and mesh.uv_layers else 0
+    return [name for name, *_ in PLACEMENTS].index(automatic_placement(settings.id_data.data))
 
 
 def _set_placement(settings, value):

@@ -26,10 +26,7 @@ def unselected(ob):
 
 def unselected_vertices(ob):
     """(n,) bool: vertices that are not selected."""
-    selected = column(ob.data.vertices, "select", 1, bool)
-    if not selected.any():
-        raise Refused(f"No vertex of {ob.name} is selected")
-    return ~selected
+    return ~column(ob.data.vertices, "select", 1, bool)
 
 
 def on_edges(mesh, kinds):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The numbers of a run. A run is a dictionary as --report writes it (`decimation_run`), lengths in world units."""
 
+import json
 import math
 
 from . import native
@@ -79,6 +80,14 @@ def counts(run):
         remarks.append(f"{run['outside']['faces']:,} faces outside kept")
     remark = f" ({', '.join(remarks)})" if remarks else ""
     return f"{run['input']['triangles']:,} -> {run['output']['triangles']:,} triangles{remark}"
+
+
+def remembered_counts(text):
+    """counts() of a run that a file keeps as JSON, or None when the text is no such run: a file may be damaged."""
+    try:
+        return counts(json.loads(text))
+    except (ValueError, TypeError, LookupError, RecursionError):
+        return None
 
 
 def intervals(run):

@@ -6,7 +6,6 @@ is never written to. An object that is its own reference carries it along: snaps
 the object's present matrix. Another object's reference stays where it was in the world when it was set.
 """
 
-from collections import OrderedDict
 from dataclasses import dataclass
 
 import bpy
@@ -15,10 +14,9 @@ from bpy.app.handlers import persistent
 
 from . import mesh_io, native
 from .errors import Refused
+from .volume_cache import VolumeCache
 
-# Bytes that the volumes used last may hold together; the one in use is kept whatever it holds.
-_KEPT = 600_000_000
-_volumes = OrderedDict()
+_volumes = VolumeCache(most_bytes=600_000_000)
 
 # What panels show of a mesh (its size, its fingerprint), by object; forgotten whenever any mesh changes.
 _shown = {}
@@ -119,6 +117,8 @@ def stale_reason(ob):
     settings = ob.tolvol
     if settings.snapshot is None:
         return None
+    if not _sound(settings.snapshot_size):
+        return "what the file holds of it is damaged"
     if settings.snapshot_kind != settings.reference_kind:
         return "another one was chosen"
     if settings.snapshot_kind == "OBJECT" and settings.snapshot_object != settings.reference_object:
@@ -158,6 +158,8 @@ def measurement_of(ob):
     measurement = ob.tolvol.measurement
     if ob.mode != "OBJECT" or not measurement.fingerprint or measurement.fingerprint != shown_fingerprint(ob):
         return None
+    if not all(map(_sound, (measurement.tolerance, 1 + measurement.forward, 1 + measurement.backward))):
+        return None  # a damaged file
     before, now = _stored_matrix(measurement.matrix), mesh_io.matrix_array(ob.matrix_world)
     moves_along = ob.tolvol.snapshot_kind == "SELF" and same_shape(before, now)
     return measurement if moves_along or np.array_equal(before, now) else None
@@ -167,6 +169,11 @@ def same_shape(matrix, other):
     """Whether two placements differ by a rigid motion only, so that lengths are the same."""
     metric, metric_other = (m[:3, :3].T @ m[:3, :3] for m in (matrix, other))
     return np.abs(metric - metric_other).max() <= _RIGID * np.abs(metric).max()
+
+
+def _sound(length):
+    """Whether a stored length can be one: what a damaged file holds may be anything."""
+    return 0 < length < np.inf
 
 
 def _stored_matrix(values):
@@ -193,21 +200,18 @@ def on_top(ob):
 def native_volume(surface, tolerance, threads=0, progress=None):
     """The tolerance volume of a surface: built, or the one that was built of the same content before."""
     key = (surface.arrays.fingerprint(), surface.matrix.tobytes(), tolerance)
-    if key in _volumes:
-        _volumes.move_to_end(key)
-        return _volumes[key]
-    volume = native.module.ToleranceVolume(
-        surface.arrays.vertices,
-        surface.arrays.triangles,
-        tolerance,
-        to_world=surface.matrix,
-        threads=threads,
-        progress=progress,
-    )
-    _volumes[key] = volume
-    while len(_volumes) > 1 and sum(kept.memory for kept in _volumes.values()) > _KEPT:
-        _volumes.popitem(last=False)
-    return volume
+
+    def build():
+        return native.module.ToleranceVolume(
+            surface.arrays.vertices,
+            surface.arrays.triangles,
+            tolerance,
+            to_world=surface.matrix,
+            threads=threads,
+            progress=progress,
+        )
+
+    return _volumes.get(key, build, progress)
 
 
 def exact(value):
@@ -225,7 +229,7 @@ def tolerance_length(settings, size):
 def shown_size(ob):
     """What 100 % is, for drawing; None while it cannot be known."""
     if ob.tolvol.snapshot is not None:
-        return ob.tolvol.snapshot_size
+        return ob.tolvol.snapshot_size if _sound(ob.tolvol.snapshot_size) else None
     source = source_object(ob)
     if source is None or source.type != "MESH" or not source.data.polygons or native.module is None:
         return None

@@ -10,7 +10,8 @@ import time
 import bpy
 from bpy.app.handlers import persistent
 
-from . import edit, lattice, sculpt, status_bar, undo
+from .. import status_bar
+from . import edit, lattice, sculpt, undo
 
 # Setting of Object.tolvol.guard -> module. Each has wanted(ob), blocked(ob), follow(ob, restored, depsgraph), watches.
 ROOMS = {"sculpting": sculpt, "editing": edit, "lattice": lattice}
@@ -77,7 +78,7 @@ def _sweep():
 def _tick():
     """What has to wait until Blender has time; seconds to the next call, None when there is nothing."""
     _sweep()
-    busy = undo.expect() | status_bar.look()
+    busy = undo.expect()
     for room in ROOMS.values():
         for name, watch in room.watches:
             busy |= _look_after(room, bpy.data.objects[name], watch)
@@ -148,6 +149,5 @@ def unregister():
         getattr(bpy.app.handlers, name).remove(handler)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
-    status_bar.clear()
     _forget()
     undo.unregister()

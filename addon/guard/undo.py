@@ -8,7 +8,8 @@ the mouse for it, Blender is made to send a move to where the mouse rests.
 
 import bpy
 
-from . import edit, status_bar
+from .. import status_bar
+from . import edit
 
 _item = None  # (keymap, its item) while there is something to undo
 _sent_for = None  # what the last move of a resting mouse was sent for

@@ -8,14 +8,14 @@ import time
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, IntProperty
 
 from .. import measure, mesh_io, native, preferences, protect, report, transfer, volume
 from ..certify import certify
 from ..errors import NotProved, Refused
-from ..job import JobOperator, alive
+from ..job import JobOperator, run_all
 from ..operation_settings import PROTECTED, decimate_settings
-from ..properties import PLACEMENTS, tolerance_settings
+from ..properties import PLACEMENTS, automatic_placement, tolerance_settings
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
 
@@ -56,6 +56,10 @@ def targets(context):
     return [active, *(ob for ob in context.selected_objects if ob.type == "MESH" and ob != active)]
 
 
+def _choose_placement(operator, _context):
+    operator.own_placements = False
+
+
 class TOLVOL_OT_decimate(JobOperator, bpy.types.Operator):
     """Reduce the selected meshes to the fewest triangles that stay within the tolerance, each of its own reference, with \
 the settings of the active one. A mesh without a reference becomes it"""
@@ -67,7 +71,15 @@ the settings of the active one. A mesh without a reference becomes it"""
     # Those not given are the object's own. SKIP_SAVE: never those of the last run, which may have been another object's.
     __annotations__ = tolerance_settings(options={"SKIP_SAVE"}) | decimate_settings({"SKIP_SAVE"})
     placement: EnumProperty(
-        name="Placement", description="Where the remaining vertices go", items=PLACEMENTS, options={"SKIP_SAVE"}
+        name="Placement",
+        description="Where the remaining vertices go",
+        items=PLACEMENTS,
+        options={"SKIP_SAVE"},
+        update=_choose_placement,
+    )
+    own_placements: BoolProperty(
+        description="Nobody has chosen a placement: it depends on the UV maps of each mesh",
+        options={"HIDDEN", "SKIP_SAVE"},
     )
     outside: EnumProperty(
         name="Outside",
@@ -94,21 +106,27 @@ the settings of the active one. A mesh without a reference becomes it"""
         draw_protect_settings(layout, self, context.active_object)
         layout.prop(self, "outside")
 
+    def targets(self, context):
+        return targets(context)
+
     def prepare(self, context):
         context.view_layer.update()
-        self._objects = targets(context)
         self._take_settings(self.ob.tolvol)
         tasks = []
-        for ob in self._objects:
+        for ob in self.objects:
             if reason := decimate_blocked(ob):
                 raise Refused(f"{ob.name}: {reason}")
             tasks.append(self._task(context, ob))
-        return functools.partial(_run_all, tasks)
+        return functools.partial(run_all, tasks)
 
     def _task(self, context, ob):
         surface, reference = volume.surface_of(ob), volume.reference_of(ob)
         task = _Task(
-            ob.name, surface, reference, volume.tolerance_length(self, reference.size()), self._options(context)
+            ob.name,
+            surface,
+            reference,
+            volume.tolerance_length(self, reference.size()),
+            self._options(context, ob.data),
         )
         task.uvs = mesh_io.corner_uvs(ob.data)
         task.locked[mesh_io.loose_edges(ob.data)] = True
@@ -122,23 +140,22 @@ the settings of the active one. A mesh without a reference becomes it"""
         return task
 
     def finish(self, context, outcomes):
-        objects = [alive(ob) for ob in self._objects]
         # All meshes are tried before the first is written.
         with contextlib.ExitStack() as stack:
             writes = [
                 stack.enter_context(transfer.Writing(ob.data, surface.arrays, result))
-                for ob, (surface, _, result, _) in zip(objects, outcomes)
+                for ob, (surface, _, result, _) in zip(self.objects, outcomes)
             ]
             for write in writes:
                 write.write()
-        for ob, (_, reference, _, run) in zip(objects, outcomes):
-            self._keep(ob, reference, run, f"{ob.name}: " if len(objects) > 1 else "")
+        for ob, (_, reference, _, run) in zip(self.objects, outcomes):
+            self._keep(ob, reference, run, f"{ob.name}: " if len(self.objects) > 1 else "")
 
     def _keep(self, ob, reference, run, prefix):
         """What is remembered and said of one object."""
         if ob.tolvol.snapshot is None:
             volume.set_reference(ob, reference)
-        shared.give(self, ob.tolvol, _SHARED)
+        shared.give(self, ob.tolvol, _SHARED if self.own_placements else {*_SHARED, "placement"})
         volume.remember(ob, volume.surface_of(ob), run, run["tolerance"]["absolute"])
         ob.tolvol.last_run_of = ob.tolvol.measurement.fingerprint
         ob.tolvol.last_run = json.dumps(run)
@@ -155,10 +172,14 @@ the settings of the active one. A mesh without a reference becomes it"""
         if given("target_triangles") and not given("use_target"):
             self.use_target = True
         shared.take(self, settings, _SHARED)
+        if not given("placement"):
+            self.placement = settings.placement
+            self.own_placements = settings.placement_choice < 0
 
-    def _options(self, context):
+    def _options(self, context, mesh):
+        placement = automatic_placement(mesh) if self.own_placements else self.placement
         return {
-            "placement": self.placement.lower(),
+            "placement": placement.lower(),
             "two_sided": self.keep == "BOTH",
             "effort": self.effort.lower(),
             "max_seconds": self.max_seconds,
@@ -168,21 +189,7 @@ the settings of the active one. A mesh without a reference becomes it"""
         }
 
 
-_SHARED = {*tolerance_settings(), *decimate_settings(), "placement"}
-
-
-def _run_all(tasks, progress):
-    if len(tasks) == 1:
-        return [tasks[0].run(progress)]
-    outcomes = []
-    for task in tasks:
-        try:
-            outcomes.append(task.run(progress))
-        except native.module.Cancelled:
-            raise
-        except (Refused, native.module.TolvolError) as error:
-            raise Refused(f"{task.name}: {error}") from None
-    return outcomes
+_SHARED = {*tolerance_settings(), *decimate_settings()}
 
 
 class _Task:

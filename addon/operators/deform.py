@@ -14,9 +14,8 @@ from .blocked import allowed, decimate_blocked
 
 
 class TOLVOL_OT_deform(JobOperator, bpy.types.Operator):
-    """Carry the mesh along with a lattice, within the tolerance of the reference. Without a reference this mesh as it \
-is becomes it. The points of the lattice are taken as control points of a B-spline of degree 3, or less where there are \
-fewer than 4 along an axis, whatever its own interpolation. Vertices outside of the lattice stay where they are"""
+    """Carry the mesh along with a lattice, taken as a B-spline of degree 3, within the tolerance of the reference. \
+Vertices outside of the lattice stay. Without a reference this mesh as it is becomes it"""
 
     bl_idname = "tolvol.deform"
     bl_label = "Lattice Deform in Tolerance"

@@ -148,8 +148,7 @@ reference permits. The modifier acts on the base mesh, without those above it. W
 
 class TOLVOL_OT_fit_modifier(_ModifierOperator, bpy.types.Operator):
     """Find the setting of a Decimate, Remesh or Weld modifier that leaves the fewest triangles within the tolerance, \
-proved both ways, and apply it. The modifier acts on the base mesh, without those above it. Without a reference the base \
-mesh becomes it"""
+proved both ways, and apply it to the base mesh, which becomes the reference if there is none"""
 
     bl_idname = "tolvol.fit_modifier"
     bl_label = "Fit Modifier to Tolerance"

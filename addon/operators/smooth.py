@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Smoothing within the tolerance."""
 
+import functools
+
 import bpy
 import numpy as np
 from bpy.props import IntProperty
 
 from .. import mesh_io, native, preferences, protect
 from ..errors import Refused
-from ..job import JobOperator
+from ..job import JobOperator, run_all
 from ..motion import Motion
 from ..operation_settings import smooth_settings
 from . import settings as shared
@@ -26,7 +28,7 @@ def draw_smooth_settings(layout, settings, ob):
 
 class TOLVOL_OT_smooth(JobOperator, bpy.types.Operator):
     """Smooth the mesh as far as it stays within the tolerance of the reference. Without a reference this mesh as it is \
-becomes it. In Edit Mode: the selected vertices"""
+becomes it. In Edit Mode: the selected vertices of all meshes that are edited"""
 
     bl_idname = "tolvol.smooth"
     bl_label = "Smooth in Tolerance"
@@ -43,10 +45,23 @@ becomes it. In Edit Mode: the selected vertices"""
         self.layout.use_property_split = True
         draw_smooth_settings(self.layout, self, context.active_object)
 
+    def targets(self, context):
+        """The active object; in Edit Mode all that are edited."""
+        active = context.active_object
+        edited = [ob for ob in context.view_layer.objects if ob.type == "MESH" and ob.mode == "EDIT" and ob != active]
+        return [active, *(edited if active.mode == "EDIT" else [])]
+
     def prepare(self, context):
         context.view_layer.update()
-        ob = self.ob
-        shared.take(self, ob.tolvol.smooth, smooth_settings())
+        shared.take(self, self.ob.tolvol.smooth, smooth_settings())
+        self._chosen = [ob for ob in self.objects if _anything_to_smooth(ob)]
+        if not self._chosen:
+            raise Refused(f"No vertex of {_names(self.objects)} is selected")
+        return functools.partial(run_all, [self._task(context, ob) for ob in self._chosen])
+
+    def _task(self, context, ob):
+        if reason := decimate_blocked(ob, _MODES):
+            raise Refused(f"{ob.name}: {reason}")
         if ob.mode == "EDIT" and ob.active_shape_key_index > 0:
             basis = ob.data.shape_keys.reference_key.name
             raise Refused(f"What is smoothed is the mesh of {ob.name}: choose its shape key {basis} first")
@@ -63,34 +78,63 @@ becomes it. In Edit Mode: the selected vertices"""
             "locked": locked,
             "strength": protect.group_weights(ob, self.vertex_group, self.invert_vertex_group),
         }
+        return _Task(ob.name, motion, options)
 
-        def work(progress):
-            smoothed = native.module.smooth(
-                motion.before,
-                motion.surface.arrays.triangles,
-                motion.volume(progress),
-                to_world=motion.surface.matrix,
-                threads=motion.threads,
-                progress=progress,
-                **options,
-            )
-            # What was smoothed is inside as Blender shows its quads; held, it is however they are cut.
-            vertices = motion.hold(smoothed.vertices, progress)
-            return motion, vertices, smoothed.report, motion.certify(vertices, progress)
+    def finish(self, context, outcomes):
+        moved = [
+            (ob, *outcome)
+            for ob, outcome in zip(self._chosen, outcomes)
+            if not np.array_equal(outcome[1], outcome[0].before)
+        ]
+        if not moved:
+            names = _names(self._chosen)
+            raise Refused(f"Nothing of {names} can be smoothed: it is even, or all of its vertices have to stay")
+        # All meshes are proved before the first is written.
+        proved = [motion.settle(vertices, certified) for _, motion, vertices, _, certified in moved]
+        for (ob, motion, vertices, run, _), certified in zip(moved, proved):
+            motion.write(ob, vertices, certified)
+            shared.give(self, ob.tolvol.smooth, smooth_settings())
+            self._say(motion, vertices, run, certified, f"{ob.name}: " if len(moved) > 1 else "")
 
-        return work
-
-    def finish(self, context, outcome):
-        motion, vertices, run, certified = outcome
-        ob = self.ob
-        if np.array_equal(vertices, motion.before):
-            raise Refused(f"Nothing of {ob.name} can be smoothed: it is even, or all of its vertices have to stay")
-        certified = motion.settle(vertices, certified)
-        motion.write(ob, vertices, certified)
-        shared.give(self, ob.tolvol.smooth, smooth_settings())
+    def _say(self, motion, vertices, run, certified, prefix):
         for warning in run["warnings"]:
-            self.report({"WARNING"}, warning)
+            self.report({"WARNING"}, prefix + warning)
         held = max(run["held_back"], default=0)
         remarks = [f"{self.iterations:,} iterations", *motion.moved(vertices, vertices)]
         remarks += [f"up to {held:,} held back"] * bool(held)
-        self.report({"INFO"}, motion.line(remarks, certified))
+        self.report({"INFO"}, prefix + motion.line(remarks, certified))
+
+
+def _anything_to_smooth(ob):
+    if ob.mode != "EDIT":
+        return True
+    ob.update_from_editmode()
+    return ob.data.total_vert_sel > 0
+
+
+def _names(objects):
+    return ", ".join(ob.name for ob in objects)
+
+
+class _Task:
+    """What runs in the thread for one object."""
+
+    def __init__(self, name, motion, options):
+        self.name = name
+        self._motion = motion
+        self._options = options
+
+    def run(self, progress):
+        motion = self._motion
+        smoothed = native.module.smooth(
+            motion.before,
+            motion.surface.arrays.triangles,
+            motion.volume(progress),
+            to_world=motion.surface.matrix,
+            threads=motion.threads,
+            progress=progress,
+            **self._options,
+        )
+        # What was smoothed is inside as Blender shows its quads; held, it is however they are cut.
+        vertices = motion.hold(smoothed.vertices, progress)
+        return motion, vertices, smoothed.report, motion.certify(vertices, progress)

@@ -25,7 +25,7 @@ def later(about, seconds, prepare, finish):
     begin = _waiting[about][0] if about in _waiting else time.monotonic() + seconds
     _waiting[about] = begin, prepare, finish
     if not bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.register(_tick, first_interval=0)
+        bpy.app.timers.register(_tick, first_interval=0, persistent=True)  # whatever file is opened
 
 
 def _tick():

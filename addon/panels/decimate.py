@@ -1,6 +1,4 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-import json
-
 import bpy
 
 from .. import report, volume
@@ -20,7 +18,13 @@ class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
         count = len(targets(context))
         layout.operator("tolvol.decimate", text=f"Decimate {count} Objects" if count > 1 else "Decimate")
         if ob.tolvol.last_run and ob.tolvol.last_run_of == volume.shown_fingerprint(ob):
-            text_lines(context, layout, report.counts(json.loads(ob.tolvol.last_run)), "CHECKMARK")
+            counts = report.remembered_counts(ob.tolvol.last_run)
+            text_lines(
+                context,
+                layout,
+                counts or "The report of the last run is damaged: decimate again to have a new one",
+                "CHECKMARK" if counts else "ERROR",
+            )
         say_blocked(context, layout, ob)
 
 

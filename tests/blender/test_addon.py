@@ -46,15 +46,55 @@ def test_versions_agree():
     assert manifest["name"] == info["name"] and info["blender"] == (3, 4, 0)
 
 
+# Bytes of a description that Blender keeps of a class; the rest is cut off.
+LONGEST_TOOLTIP = 239
+
+
+def registered_classes():
+    """All classes of the add-on that Blender knows."""
+    modules = [module for name, module in list(sys.modules.items()) if name.split(".")[0] == "addon"]
+    found = {value for module in modules for value in vars(module).values() if isinstance(value, type)}
+    ours = (cls for cls in found if issubclass(cls, bpy.types.bpy_struct) and cls.__module__.startswith("addon"))
+    return sorted((cls for cls in ours if getattr(cls, "is_registered", False)), key=lambda cls: cls.__name__)
+
+
+def shown_text(cls):
+    """(what Blender shows of a registered class, what was written for it)."""
+    if issubclass(cls, bpy.types.Operator):
+        rna = getattr(bpy.ops.tolvol, cls.bl_idname.split(".")[1]).get_rna_type()
+    else:
+        rna = cls.bl_rna
+    return rna, getattr(cls, "bl_description", None) or cls.__doc__ or ""
+
+
+def tooltips(cls):
+    """(which, text) of a registered class, its properties and their choices."""
+    rna, written = shown_text(cls)
+    yield cls.__name__, written
+    for item in rna.properties:
+        if item.identifier in ("rna_type", "name"):
+            continue
+        yield f"{cls.__name__}.{item.identifier}", item.description
+        if item.type == "ENUM":
+            for choice in item.enum_items:
+                yield f"{cls.__name__}.{item.identifier} {choice.identifier}", choice.description
+
+
 def test_tooltips_and_labels_follow_blender():
-    """Every operator and setting says what it does, without a full stop."""
-    for name in sorted(registered()[0]):
-        cls = getattr(bpy.types, name)
+    """Every operator and setting says what it does, without a full stop and whole."""
+    classes = registered_classes()
+    for kind in (bpy.types.Operator, bpy.types.PropertyGroup, bpy.types.AddonPreferences, bpy.types.Menu):
+        assert any(issubclass(cls, kind) for cls in classes), kind
+    for cls in classes:
+        rna, written = shown_text(cls)
         if issubclass(cls, bpy.types.Operator):
-            text = getattr(bpy.ops.tolvol, cls.bl_idname.split(".")[1]).get_rna_type().description
-            assert text and not text.endswith(".") and "\n" not in text, name
-        for rna in cls.bl_rna.properties if issubclass(cls, bpy.types.PropertyGroup) else ():
-            assert not rna.description.endswith("."), (name, rna.identifier, rna.description)
+            assert written and rna.description == written, cls
+        for which, text in tooltips(cls):
+            assert len(text.encode()) <= LONGEST_TOOLTIP, (which, text)
+            if not issubclass(cls, (bpy.types.Panel, bpy.types.Menu)) and which != cls.__name__:
+                assert not text.endswith("."), (which, text)
+            if issubclass(cls, bpy.types.Operator):
+                assert not text.endswith(".") and "\n" not in text, (which, text)
 
 
 def test_loaded_module_is_a_private_copy():
@@ -65,8 +105,8 @@ def test_loaded_module_is_a_private_copy():
     assert importlib.reload(native).module is native.module  # one content is loaded once
 
 
-def run_blender(script, tmp_path, **environment):
-    """stdout of a Blender with settings of its own; the script's last line must be ok()."""
+def run_blender(script, tmp_path, within=(), **environment):
+    """stdout of a Blender with settings of its own; the script's last line must be ok(). within: the command it runs in."""
     text = "import sys, os, traceback\ndef ok():\n    sys.stdout.flush()\n    os._exit(0)\ntry:\n"
     text += (
         "".join(f"    {line}\n" for line in script.splitlines()) + "except BaseException:\n    traceback.print_exc()\n"
@@ -74,7 +114,7 @@ def run_blender(script, tmp_path, **environment):
     text += "sys.stdout.flush()\nos._exit(1)\n"
     (tmp_path / "script.py").write_text(text)
     done = subprocess.run(
-        [bpy.app.binary_path, "--background", "--factory-startup", "--python", tmp_path / "script.py"],
+        [*within, bpy.app.binary_path, "--background", "--factory-startup", "--python", tmp_path / "script.py"],
         env=os.environ
         | dict.fromkeys(("BLENDER_USER_RESOURCES", "BLENDER_USER_SCRIPTS"), str(tmp_path / "user"))
         | environment,
@@ -240,6 +280,37 @@ ok()""",
         tmp_path,
         TOLVOL_PYTHON_PATH=str(tmp_path),
     )
+
+
+def noexec(*folders):
+    """A command that runs another one with these folders on disks that programs may not be started from."""
+    bind = "".join(f"mount --bind '{f}' '{f}' && mount -o remount,bind,noexec '{f}' && " for f in folders)
+    command = ["unshare", "--mount", "--map-root-user", "sh", "-c", f'{bind}exec "$@"', "sh"]
+    if subprocess.run([*command, "true"], capture_output=True).returncode:
+        pytest.skip("this machine does not let a test mount a folder")
+    return command
+
+
+@pytest.mark.parametrize("everywhere", [False, True], ids=["another folder", "no folder"])
+def test_a_temporary_folder_mounted_noexec(tmp_path, everywhere):
+    temporary, cache = tmp_path / "temporary", tmp_path / "cache"
+    for folder in (temporary, cache):
+        folder.mkdir()
+    checks = "assert native.module is not None, native.reason\n"
+    if everywhere:
+        checks = (
+            "assert native.module is None\n"
+            f"assert {str(temporary)!r} in native.reason and {str(cache)!r} in native.reason, native.reason\n"
+            "assert 'may be started' in native.reason and 'TMPDIR' in native.reason, native.reason\n"
+        )
+    run_blender(
+        f"sys.path.insert(0, {str(ROOT)!r})\nfrom addon import native\n{checks}ok()",
+        tmp_path,
+        noexec(temporary, *((cache, ROOT / "addon") if everywhere else ())),
+        TMPDIR=str(temporary),
+        XDG_CACHE_HOME=str(cache),
+    )
+    assert not [left for folder in (temporary, cache, ROOT / "addon") for left in folder.glob("tolvol-*")]
 
 
 def test_module_is_looked_for_in_the_environments_folder(tmp_path):

@@ -264,6 +264,40 @@ def test_all_selected_meshes_in_one_step():
         assert np.array_equal(world_triangles(ob)[0], reference[0]) and ob.tolvol.snapshot is None
 
 
+def placements(objects):
+    return [json.loads(ob.tolvol.last_run)["placement"] for ob in objects]
+
+
+def test_a_placement_that_nobody_chose_is_that_of_each_mesh():
+    objects = three()
+    objects[1].data.uv_layers.new()
+    activate(objects[0])
+    for ob in objects:
+        ob.select_set(True)
+    bpy.ops.tolvol.decimate()
+    assert placements(objects) == ["optimal", "subset", "optimal"]
+    assert [ob.tolvol.placement_choice for ob in objects] == [-1, -1, -1]
+    # One that was chosen holds for all, whether on the active object or for this run.
+    for choose in ("object", "run"):
+        for ob in objects:
+            ob.tolvol.placement_choice = -1
+        if choose == "object":
+            objects[0].tolvol.placement = "OPTIMAL"
+        bpy.ops.tolvol.decimate(**({"placement": "OPTIMAL"} if choose == "run" else {}))
+        assert placements(objects) == ["optimal"] * 3
+        assert [ob.tolvol.placement for ob in objects] == ["OPTIMAL"] * 3
+
+
+def test_a_placement_chosen_in_adjust_last_operation_holds_for_all():
+    objects = three()
+    objects[1].data.uv_layers.new()
+    bpy.ops.tolvol.decimate("EXEC_DEFAULT", True)
+    adjusted = bpy.context.window_manager.operators[-1].properties
+    assert adjusted.own_placements
+    adjusted.placement = adjusted.placement
+    assert not adjusted.own_placements
+
+
 def test_one_that_cannot_be_done_leaves_all_as_they_are(monkeypatch):
     objects = three()
     other = bpy.data.objects.new("user", objects[1].data)

@@ -222,6 +222,49 @@ def test_shape_keys_follow_what_edit_mode_smooths():
         bpy.ops.tolvol.smooth()
 
 
+def edited_together(select, *objects):
+    """Takes the objects into Edit Mode; the first one is active. select: which vertices of each."""
+    for ob in objects:
+        ob.select_set(True)
+    bpy.context.view_layer.objects.active = objects[0]
+    bpy.ops.object.mode_set(mode="EDIT")
+    for ob, chosen in zip(objects, select):
+        edited = bmesh.from_edit_mesh(ob.data)
+        for vertex in edited.verts:
+            vertex.select_set(chosen)
+        bmesh.update_edit_mesh(ob.data)
+
+
+def test_in_edit_mode_all_edited_meshes_with_a_selection_are_smoothed():
+    objects = [torus("one", noise=0.02), torus("two", noise=0.03), torus("three", noise=0.02)]
+    objects[1].tolvol.tolerance_percent = 0.2
+    before, references = [coordinates(ob) for ob in objects], [world_triangles(ob) for ob in objects]
+    edited_together((True, True, False), *objects)
+    assert bpy.ops.tolvol.smooth(iterations=60, method="LAPLACIAN") == {"FINISHED"}
+    after = [stored(ob) for ob in objects]
+    assert [(now != then).any() for now, then in zip(after, before)] == [True, True, False]
+    for ob, reference, percent in zip(objects[:2], references, (1, 0.2)):  # each has a tolerance of its own
+        tolerance = percent / 100 * native.module.size(*reference)
+        judged = native.module.hausdorff(*world_triangles(ob), *reference, bound=tolerance)
+        assert 0.5 * tolerance < judged.upper <= tolerance
+        assert ob.tolvol.snapshot is not None and ob.tolvol.smooth.iterations == 60
+    assert objects[2].tolvol.snapshot is None
+
+
+def test_in_edit_mode_one_mesh_that_is_refused_leaves_all_as_they_were():
+    objects = [torus("one", noise=0.02), torus("two", noise=0.02)]
+    bpy.ops.tolvol.set_reference()
+    objects[1].data.vertices[5].co.z += 1
+    before = [coordinates(ob) for ob in objects]
+    edited_together((True, True), *objects)
+    with pytest.raises(RuntimeError, match="two: .*faces are not within the tolerance"):
+        bpy.ops.tolvol.smooth()
+    assert all(np.array_equal(stored(ob), then) for ob, then in zip(objects, before))
+    edited_together((False, False), *objects)
+    with pytest.raises(RuntimeError, match="No vertex of one, two is selected"):
+        bpy.ops.tolvol.smooth()
+
+
 def test_in_edit_mode_nothing_selected_is_refused():
     ob, _ = in_edit_mode(torus, lambda co: co[:, 0] > 9)
     before = coordinates(ob)

@@ -8,6 +8,7 @@ import numpy as np
 
 import scenes
 from addon import job, mesh_io, native, volume
+from addon.panels import decimate
 from window import (
     centre,
     click,
@@ -243,3 +244,26 @@ def test_what_is_in_the_way_is_said():
     native.module, native.reason = found, None
     view()[1].tag_redraw()
     yield 0.5
+
+
+def test_a_damaged_file_breaks_no_panel():
+    yield from reset(monkey)
+    yield from open_tab()
+    yield from press("tolvol.decimate")
+    yield from finished(lambda: suzanne().tolvol.last_run)
+    yield 1.0
+    said, text_lines = [], decimate.text_lines
+    decimate.text_lines = lambda context, layout, text, icon: (
+        said.append(text) or text_lines(context, layout, text, icon)
+    )
+    try:
+        suzanne().tolvol.last_run = suzanne().tolvol.last_run[:100]
+        suzanne().tolvol.measurement.forward = float("nan")
+        view()[1].tag_redraw()
+        yield from finished(lambda: any("damaged" in text for text in said))
+        suzanne().tolvol.snapshot_size = 0.0
+        view()[1].tag_redraw()
+        yield 1.0
+        screenshot("damaged")
+    finally:
+        decimate.text_lines = text_lines

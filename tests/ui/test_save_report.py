@@ -7,6 +7,7 @@ from pathlib import Path
 
 import bpy
 
+from addon.operators.report import TOLVOL_OT_save_report
 from test_panel import finished, monkey, suzanne
 from window import key, open_tab, press, reset, screenshot, xdotool
 
@@ -35,3 +36,22 @@ def test_save_report_by_mouse():
             assert "Suzanne from its reference" in saved.read_text()
         finally:
             os.environ["HOME"] = home
+
+
+def test_escape_in_the_file_browser_of_save_report():
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
+    yield from reset(monkey)
+    yield from open_tab()
+    yield from press("tolvol.set_reference")
+    yield from finished(lambda: suzanne().tolvol.snapshot is not None)
+    ended, cancel = [], TOLVOL_OT_save_report.cancel
+    TOLVOL_OT_save_report.cancel = lambda operator, context: ended.append(cancel(operator, context))
+    try:
+        yield from press("tolvol.save_report")
+        yield 1.0
+        xdotool("mousemove", 640, 400)
+        yield
+        key("Escape")
+        yield from finished(lambda: ended)
+    finally:
+        TOLVOL_OT_save_report.cancel = cancel

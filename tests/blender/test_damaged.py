@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a damaged .blend holds of a run, a measurement and a reference, as the panels read it at every draw."""
+
+import json
+import math
+
+import bpy
+import pytest
+
+from addon import report, volume
+from scenes import torus
+
+
+@pytest.fixture
+def decimated():
+    ob = torus()
+    bpy.ops.tolvol.decimate()
+    assert report.remembered_counts(ob.tolvol.last_run) and volume.measurement_of(ob)
+    return ob
+
+
+def damaged_runs(text):
+    run = json.loads(text)
+    yield from ("{", text[: len(text) // 2], "null", "7", "[]", "{}", '"run"', "[" * 100_000, "\udcff")
+    for key in ("input", "output", "target_triangles", "stopped_by", "outside"):
+        yield json.dumps({name: value for name, value in run.items() if name != key})
+    for key in ("input", "output", "outside"):
+        for value in (None, [], 3, "text", {}, {"triangles": None, "faces": "x"}, {"triangles": [], "faces": [1]}):
+            yield json.dumps(run | {key: value})
+
+
+def test_a_damaged_run_is_no_run(decimated):
+    for text in damaged_runs(decimated.tolvol.last_run):
+        assert report.remembered_counts(text) is None, text[:200]
+
+
+@pytest.mark.parametrize("value", [math.nan, -1.0])
+@pytest.mark.parametrize("name", ["tolerance", "forward", "backward"])
+def test_a_damaged_measurement_is_none(decimated, name, value):
+    setattr(decimated.tolvol.measurement, name, value)
+    assert volume.measurement_of(decimated) is None
+
+
+@pytest.mark.parametrize("value", [math.nan, 0.0, -1.0])
+def test_a_damaged_reference_has_to_be_set_anew(decimated, value):
+    decimated.tolvol.snapshot_size = value
+    assert volume.shown_size(decimated) is None
+    assert volume.stale_reason(decimated) == "what the file holds of it is damaged"
+    with pytest.raises(RuntimeError, match="damaged"):
+        bpy.ops.tolvol.check()
+    bpy.ops.tolvol.set_reference()
+    assert bpy.ops.tolvol.check() == {"FINISHED"}

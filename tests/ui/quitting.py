@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Quits Blender while the add-on is at work: blender --python tests/ui/quitting.py -- WHAT. Blender's exit code and what it
+prints are the outcome."""
+
+import sys
+from pathlib import Path
+
+import bpy
+
+FOLDER = Path(__file__).resolve().parent
+sys.dont_write_bytecode = True
+sys.path[:0] = [str(FOLDER.parents[1]), str(FOLDER)]
+bpy.context.preferences.view.show_splash = False
+bpy.context.preferences.view.use_save_prompt = False
+bpy.context.preferences.system.viewport_aa = "OFF"
+
+import addon  # noqa: E402
+from addon import job, volume  # noqa: E402
+from window import window_context  # noqa: E402
+
+_TICK = 0.05
+_MOST_TICKS = 2000
+
+
+def mesh(across):
+    """A flat grid with 2 * across^2 triangles, active."""
+    for ob in list(bpy.data.objects):
+        bpy.data.objects.remove(ob)
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=across, y_subdivisions=across)
+    ob = bpy.context.object
+    ob.tolvol.show_deviation = False
+    return ob
+
+
+def decimating():
+    ob = mesh(200)
+    for i, vertex in enumerate(ob.data.vertices):
+        vertex.co.z = 1e-3 * (i % 7)
+    ob.tolvol.effort, ob.tolvol.tolerance_percent = "THOROUGH", 0.3
+    bpy.ops.tolvol.decimate("INVOKE_DEFAULT")
+
+
+def fitting():
+    mesh(300).modifiers.new("decimate", "DECIMATE")
+    bpy.ops.tolvol.fit_modifier("INVOKE_DEFAULT")
+
+
+def guarding():
+    ob = mesh(707)
+    volume.set_reference(ob, volume.surface_of(ob))
+    ob.tolvol.guard.sculpting = True
+    bpy.ops.object.mode_set(mode="SCULPT")
+
+
+def showing():
+    ob = mesh(400)
+    ob.tolvol.show_deviation = True
+    volume.set_reference(ob, volume.surface_of(ob))
+
+
+def start():
+    with window_context():
+        globals()[sys.argv[sys.argv.index("--") + 1]]()
+
+
+_ticks = iter(range(_MOST_TICKS))
+
+
+def leave():
+    """Quits as soon as a thread is at work."""
+    if all(work.done() for work in job._at_work):
+        return _TICK if next(_ticks, None) is not None else None
+    print("at work", flush=True)
+    with window_context():
+        bpy.ops.wm.quit_blender()
+    return None
+
+
+addon.register()
+bpy.app.timers.register(start, first_interval=1.0)
+bpy.app.timers.register(leave, first_interval=1.0 + _TICK)

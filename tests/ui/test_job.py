@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a person or a script does while a job runs."""
+
+import tempfile
+from pathlib import Path
+
+import bpy
+
+from addon import job, status_bar
+from test_panel import finished, monkey, stored, suzanne
+from window import reset, view, window_context
+
+_SMOOTHER = 1  # subdivision on top of the monkey's: slow enough that something happens meanwhile
+
+
+def begin():
+    """A decimation that goes on; what is said from now on."""
+    with window_context():
+        suzanne().modifiers.new("more", "SUBSURF").levels = _SMOOTHER
+        bpy.ops.object.modifier_apply(modifier="more")
+        suzanne().tolvol.tolerance_percent = 0.05
+        bpy.ops.ed.undo_push(message="ready")
+        suzanne().location.x = 1
+        bpy.ops.ed.undo_push(message="moved")
+        said = len(reports())
+        assert bpy.ops.tolvol.decimate("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
+    assert len(job._under_way) == 1
+    return said
+
+
+def reports():
+    """Lines of Blender's info area."""
+    window, area = view()
+    kind, area.type = area.type, "INFO"
+    try:
+        with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
+            bpy.ops.info.select_all(action="SELECT")
+            bpy.ops.info.report_copy()
+            bpy.ops.info.select_all(action="DESELECT")
+        return bpy.context.window_manager.clipboard.splitlines()
+    finally:
+        area.type = kind
+
+
+def ends(said, text):
+    yield from finished(lambda: not job._under_way)
+    yield 0.5
+    assert any(text in line for line in reports()[said:]), reports()[said:]
+
+
+def test_an_undo_ends_a_job():
+    yield from reset(monkey)
+    said = begin()
+    before = stored()
+    with window_context():
+        bpy.ops.ed.undo()
+    yield from ends(said, "Decimate in Tolerance was stopped, because a step was undone. It has changed nothing")
+    assert stored() == before and suzanne().tolvol.snapshot is None
+
+
+def test_a_job_whose_object_is_deleted_ends():
+    yield from reset(monkey)
+    said = begin()
+    bpy.data.objects.remove(suzanne())
+    yield from ends(said, "Suzanne was deleted meanwhile: nothing was changed")
+
+
+def test_a_job_whose_object_is_renamed_ends():
+    yield from reset(monkey)
+    said = begin()
+    before = stored()
+    suzanne().name = "Susan"
+    yield from ends(said, "Suzanne was renamed to Susan meanwhile: nothing was changed")
+    bpy.data.objects["Susan"].name = "Suzanne"
+    assert stored() == before and suzanne().tolvol.snapshot is None
+
+
+def test_opening_a_file_ends_a_job():
+    yield from reset(monkey)
+    before, shown, say = stored(), [], status_bar.say
+    with tempfile.TemporaryDirectory() as folder:
+        path = str(Path(folder) / "monkey.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+        begin()
+        status_bar.say = lambda text: shown.append(text) or say(text)
+        try:
+            with window_context():
+                bpy.ops.wm.open_mainfile(filepath=path)
+            yield 1.0
+        finally:
+            status_bar.say = say
+    assert shown == ["Decimate in Tolerance was stopped, because another file was opened. It has changed nothing"]
+    assert not job._under_way and all(work.done() for work in job._at_work)
+    yield 1.0
+    assert stored() == before and suzanne().tolvol.snapshot is None
