@@ -90,7 +90,11 @@ def main():
         print(f"{count} x {what}")
     print("fuzz:", ", ".join(f"{count} {name}" for name, count in operations.most_common()))
     print(f"fuzz: seed {options.seed}, {number - options.first} cases, ", end="")
-    print(f"{outcomes['refused']} refused with reason, {outcomes['found']} findings of {len(findings)} kinds")
+    print(
+        f"{outcomes['refused']} refused with reason, {outcomes['endless']} without an end that none was promised, ",
+        end="",
+    )
+    print(f"{outcomes['found']} findings of {len(findings)} kinds")
     return bool(findings)
 
 

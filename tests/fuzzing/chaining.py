@@ -40,7 +40,7 @@ def chain(run):
             two_sided = both_ways and step != "one-sided"
             return tolvol.decimate(v, t, volume, two_sided=two_sided, effort=effort, **place)
 
-        result = run.call(step, call)
+        result = run.call(step, call, run.threads[0])
         vertices = result.vertices
         # Vertices that no triangle uses go with the first decimation; what moves keeps the rest.
         triangles = getattr(result, "triangles", triangles)

@@ -26,7 +26,8 @@ def case_of(seed, number):
         )
         shift = rng.standard_normal(3) * (np.abs(vertices).max() if len(vertices) else 1) * rng.integers(0, 3)
         case.to_world = meshes.matrix(linear, shift)
-    case.tolerance = 10 ** rng.uniform(-3.7, -0.7) * (case.size() or 1.0)
+    share = rng.uniform(-3.7, -0.7) if rng.random() < 0.95 else rng.uniform(-12, 0.3)
+    case.tolerance = 10**share * (case.size() or 1.0)
     common = case.options
     common["threads"] = [int(k) for k in rng.permutation([1, int(rng.integers(2, 4))])]
     common["cgal"] = bool(rng.random() < 0.2)
@@ -34,5 +35,7 @@ def case_of(seed, number):
         common["cancel"] = float(rng.random())
     if rng.random() < 0.1:
         common["precision"] = float(rng.choice([0.25, 1, 2]))
+    if rng.random() < 0.05:
+        common["field"] = "fast_marching"
     operations.DRAW[case.operation](rng, case)
     return case

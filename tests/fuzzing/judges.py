@@ -23,7 +23,7 @@ def within(run, of, to, tolerance, what):
     # Where the case has a matrix, its vertices were rounded once more on their way here.
     largest = max(np.abs(of[0]).max(), np.abs(to[0]).max())
     slack = 0 if run.case.to_world is None else 1e-15 * largest
-    interval = run.call("hausdorff", lambda: tolvol.hausdorff(*of, *to, bound=tolerance + slack))
+    interval = run.call("hausdorff", lambda: tolvol.hausdorff(*of, *to, bound=tolerance + slack, threads=1))
     if interval.lower > tolerance + slack:
         raise Finding(
             f"beyond: {what}", f"{what}: at least {interval.lower / tolerance} tolerances, {interval.position}"
@@ -71,10 +71,11 @@ def valid(run, vertices, triangles, dtype):
 
 
 def proper_faces(vertices, triangles):
-    """The faces by places instead of vertices, each once, without those that are segments or points."""
+    """The faces by places instead of vertices, without those that are segments or points. A face that is there twice
+    counts twice: as the two sides of a sheet, which may move apart."""
     places, label = np.unique(vertices + 0.0, axis=0, return_inverse=True)
     faces = np.sort(label[triangles], 1)
-    return places, np.unique(faces[(np.diff(faces, axis=1) > 0).all(1)], axis=0).reshape(-1, 3)
+    return places, faces[(np.diff(faces, axis=1) > 0).all(1)]
 
 
 def edge_counts(faces):

@@ -346,7 +346,7 @@ def _outlier(rng, vertices, triangles):
 
 
 def _scaled(rng, vertices, triangles):
-    return vertices * 10 ** rng.uniform(-18, 18), triangles
+    return vertices * 10 ** rng.uniform(*(-18, 18) if rng.random() < 0.8 else (-100, 100)), triangles
 
 
 def _far(rng, vertices, triangles):
@@ -373,5 +373,6 @@ def draw(rng, n):
         if rng.random() < likely and len(triangles):
             vertices, triangles = change(rng, vertices, triangles)
             name += change.__name__
-    dtype = np.float32 if rng.random() < 0.5 else np.float64
+    largest = np.abs(vertices).max(initial=0)
+    dtype = np.float32 if rng.random() < 0.5 and 1e-25 < largest < 1e25 else np.float64
     return name, np.ascontiguousarray(vertices, dtype), np.ascontiguousarray(triangles, np.int32)

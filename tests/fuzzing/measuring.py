@@ -39,7 +39,8 @@ def check(run):
         # Of a quad, one of the four triangles must be outside.
         corners = face[[[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]] if len(face) == 4 else [np.resize(face, 3)]
         far = run.call(
-            "hausdorff", lambda c=corners: tolvol.hausdorff(placed, np.array(c), *reference, bound=case.tolerance)
+            "hausdorff",
+            lambda c=corners: tolvol.hausdorff(placed, np.array(c), *reference, bound=case.tolerance, threads=1),
         )
         if far.upper < case.tolerance * (1 - 1e-9):
             raise Finding(
@@ -47,7 +48,7 @@ def check(run):
             )
     labels = np.arange(len(faces)) // 3
     least = np.minimum.reduceat(verdict, np.arange(0, len(faces), 3))[labels]
-    grouped = run.call("check", lambda: call(faces, groups=labels)(run.threads[0], None)).verdict
+    grouped = run.call("check", lambda: call(faces, groups=labels)(1, None)).verdict
     if not np.array_equal(grouped, least):
         raise Finding("groups", "a group has not the worst verdict of its faces")
     inside = faces[verdict == 2]
@@ -76,7 +77,7 @@ def distance(run):
     reference, placed = (case.world(case.vertices), case.triangles), case.world(points)
     slack = 1e-12 * (np.abs(placed).max() + np.abs(reference[0]).max())
     for v in np.linspace(0, len(points) - 1, 10).astype(int):
-        far = run.call("hausdorff", lambda v=v: tolvol.hausdorff(placed, np.array([[v, v, v]]), *reference))
+        far = run.call("hausdorff", lambda v=v: tolvol.hausdorff(placed, np.array([[v, v, v]]), *reference, threads=1))
         if not far.lower - slack <= found[v] <= far.upper + slack:
             raise Finding("distance", f"point {v} is at {found[v]} and, by hausdorff, {far.lower} to {far.upper}")
 
@@ -117,7 +118,7 @@ def hausdorff(run):
     if found.lower > 1e-6 * size:
         bounds.append(found.lower * (1 - 1e-6))
     for bound in bounds:
-        judged = run.call("hausdorff", lambda bound=bound: tolvol.hausdorff(*a, *b, bound=bound))
+        judged = run.call("hausdorff", lambda bound=bound: tolvol.hausdorff(*a, *b, bound=bound, threads=1))
         if judged.lower > found.upper * (1 + 1e-12) or judged.upper < found.lower * (1 - 1e-12):
             raise Finding(
                 "bound", f"{found.lower} to {found.upper}, but {judged.lower} to {judged.upper} with {bound=}"
@@ -142,7 +143,7 @@ def deviation(run):
         return tolvol.deviation(*a, *b, bounds=bounds, percentiles=percentiles, threads=threads, progress=progress)
 
     found = run.repeated("deviation", call, ("mean", "rms", "percentiles", "share_beyond", "distances", "weights"))
-    largest = run.call("hausdorff", lambda: tolvol.hausdorff(*a, *b))
+    largest = run.call("hausdorff", lambda: tolvol.hausdorff(*a, *b, threads=1))
     slack = 1e-9 * np.abs(np.concatenate([a[0], b[0]]).astype(np.float64)).max()
     for name in ("mean", "rms", "percentiles", "share_beyond"):
         value = np.atleast_1d(getattr(found, name))

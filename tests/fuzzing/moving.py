@@ -126,7 +126,7 @@ def constrain(run):
         )
     if options["mode"] == "reset":
         return
-    reset = run.call("constrain", lambda: bounded("reset", run.threads[0], None)).factors
+    reset = run.call("constrain", lambda: bounded("reset", 1, None)).factors
     if (f < reset).any():
         raise Finding("factors", f"vertex {np.flatnonzero(f < reset)[0]} goes less far than by reset")
     before = vertices.astype(np.float64)

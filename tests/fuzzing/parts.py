@@ -36,7 +36,7 @@ def moved(run):
 def proved_inside(run, vertices, triangles, volume):
     """For each face whether the check proves it; none of which it does is beyond."""
     verdicts = run.call(
-        "check", lambda: volume.check(vertices, triangles, to_world=run.case.to_world, threads=run.threads[0])
+        "check", lambda: volume.check(vertices, triangles, to_world=run.case.to_world, threads=1)
     ).verdict
     return verdicts == 2
 

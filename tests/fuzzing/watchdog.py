@@ -16,7 +16,7 @@ MEMORY = 8 << 30
 
 
 def outcome(case, tell=lambda step: None):
-    """("passed" | "refused" | "found", what, message) of one case, in this process."""
+    """("passed" | "refused" | "endless" | "found", what, message) of one case, in this process."""
     try:
         operations.OPERATIONS[case.operation](Run(case, tell))
     except Refused as reason:
@@ -43,7 +43,8 @@ class Watchdog:
         self._child = None
 
     def run(self, case, seconds=HANG_SECONDS):
-        """What outcome() says, or that the child crashed or said nothing for so many seconds."""
+        """What outcome() says, or that the child crashed or said nothing for so many seconds: found, or endless where
+        no end within a time is promised."""
         if self._child is None:
             self._pipe, end = self._context.Pipe()
             self._child = self._context.Process(target=_work, args=(end,), daemon=True)
@@ -55,7 +56,8 @@ class Watchdog:
             while True:
                 if not self._pipe.poll(max(0.1, seconds - (time.monotonic() - started))):
                     self.close()
-                    return "found", f"hang: {step}", f"{step} did not end within {seconds} s"
+                    found = "found" if case.is_limited() else "endless"
+                    return found, f"hang: {step}", f"{step} did not end within {seconds} s"
                 kind, value = self._pipe.recv()
                 if kind == "outcome":
                     return value
