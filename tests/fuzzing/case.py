@@ -39,9 +39,9 @@ class Case:
 
     def is_limited(self):
         """Whether every call has to end within a time: no area and no tolerance that make it long by themselves."""
-        a, b, c = self.world(self.vertices)[self.triangles].transpose(1, 0, 2)
+        a, b, c = self.world(self.vertices)[self.triangles].transpose(1, 0, 2) / (self.size() or 1.0)
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
-        return area <= 100 * self.size() ** 2 and self.tolerance >= 0.001 * self.size()
+        return area <= 100 and self.tolerance >= 0.001 * self.size()
 
     def line(self):
         percent = 100 * self.tolerance / self.size() if self.size() else float("inf")

@@ -145,6 +145,10 @@ def deviation(run):
     found = run.repeated("deviation", call, ("mean", "rms", "percentiles", "share_beyond", "distances", "weights"))
     largest = run.call("hausdorff", lambda: tolvol.hausdorff(*a, *b, threads=1))
     slack = 1e-9 * np.abs(np.concatenate([a[0], b[0]]).astype(np.float64)).max()
+    if abs(found.weights.sum() - 1) > 1e-6 or len(found.weights) != len(found.distances):
+        raise Finding("weights", f"{len(found.weights)} weights of together {found.weights.sum()}")
+    if np.abs(found.distances).max() > largest.upper + slack:
+        raise Finding("distances", f"a sample at {np.abs(found.distances).max()}, where {largest.upper} is the largest")
     for name in ("mean", "rms", "percentiles", "share_beyond"):
         value = np.atleast_1d(getattr(found, name))
         lower, upper = np.atleast_2d(getattr(found, name + "_range")).T
@@ -154,7 +158,3 @@ def deviation(run):
             raise Finding("range", f"{name}: {value} is not in {lower} to {upper}")
         if name != "share_beyond" and (lower > largest.upper + slack).any():
             raise Finding("range", f"{name}: at least {lower}, where the largest distance is at most {largest.upper}")
-    if abs(found.weights.sum() - 1) > 1e-6 or len(found.weights) != len(found.distances):
-        raise Finding("weights", f"{len(found.weights)} weights of together {found.weights.sum()}")
-    if np.abs(found.distances).max() > largest.upper + slack:
-        raise Finding("distances", f"a sample at {np.abs(found.distances).max()}, where {largest.upper} is the largest")
