@@ -11,7 +11,7 @@ from .parts import faces_of, lattice_of, motion_of, moved, proved_inside, some, 
 
 def draw_smooth(rng, case):
     options, n = case.options, len(case.vertices)
-    options["iterations"] = int(some(rng, 0, 1, 3, 10))
+    options["iterations"] = int(some(rng, 0, 1, 3, 10, 30))
     options["operator"] = some(rng, "laplacian", "bilaplacian")
     options["weights"] = some(rng, "uniform", "cotangent")
     options["boundary"] = some(rng, "fixed", "along")
