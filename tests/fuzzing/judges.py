@@ -12,8 +12,8 @@ from . import ROOT
 from .case import Finding
 
 CGAL = ROOT / "build/release/tests/native/tolvol_cgal_judge"
-CGAL_FACES = 2000
-CGAL_SECONDS = 20
+CGAL_FACES = 1000
+CGAL_SECONDS = 5
 
 
 def within(run, of, to, tolerance, what):

@@ -109,7 +109,10 @@ def hausdorff(run):
         return _Interval(tolvol.hausdorff(*a, *b, threads=threads, progress=progress))
 
     found = run.repeated("hausdorff", call, ("lower", "upper", "position", "triangle"))
-    size = np.abs(np.concatenate([a[0], b[0]]).astype(np.float64)).max()
+    together = np.concatenate([a[0], b[0]]).astype(np.float64)
+    size = np.abs(together).max()
+    if not np.ptp(together, axis=0).any():
+        size = max(size, 1.0)  # a single point has no size that rounding could be compared with
     if not 0 <= found.lower <= found.upper or not np.isfinite(found.upper):
         raise Finding("interval", f"{found.lower} to {found.upper}")
     if found.upper - found.lower > 0.01 * found.upper + 1e-13 * size:

@@ -142,6 +142,9 @@ def constrain(run):
 
 
 def draw_guard(rng, case):
+    largest = np.abs(case.vertices).max(initial=0)
+    if largest and not 1e-25 < largest < 1e25:  # beyond float32, which is all that a guard takes
+        case.vertices, case.tolerance = case.vertices / largest, case.tolerance / largest
     case.vertices = case.vertices.astype(np.float32)
     case.options["seed"] = int(rng.integers(1 << 30))
     case.options["edits"] = int(rng.integers(1, 6))
