@@ -108,8 +108,8 @@ def _judge_decimation(run, result, vertices, triangles, volume, given, side):
         judges.within(run, reference, (placed, result.triangles), case.tolerance, "reference to result")
     before, after = (vertices, triangles), (result.vertices, result.triangles)
     judges.connected_alike(run, before, after)
-    if not given["two_sided"] and not kept.any():
-        judges.rims_alike(run, (case.world(vertices), triangles), (placed, result.triangles), case.tolerance)
+    if not given["two_sided"] and vertices is case.vertices:
+        judges.rims_alike(run, reference, (placed, result.triangles), case.tolerance)
 
 
 def _judge_locked(result, vertices, triangles, locked):
