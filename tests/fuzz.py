@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from fuzzing import ROOT, draw, judges  # noqa: E402
 from fuzzing.case import Case  # noqa: E402
+from fuzzing.run import SECONDS  # noqa: E402
 from fuzzing.shrink import Shrink  # noqa: E402
 from fuzzing.watchdog import Watchdog  # noqa: E402
 
@@ -43,8 +44,13 @@ def report(watchdog, case, name, found, options):
     _, what, message = found
     print(f"\nFOUND {name}: {what}: {message}\n  {case.line()}", flush=True)
     if options.shrink:
-        seconds = max(10, options.shrink / 3)
-        case = Shrink(case, lambda smaller: watchdog.run(smaller, seconds)[1] == what, options.shrink).case
+
+        def still(smaller):
+            # What was slow does not need to end to be so again.
+            again = watchdog.run(smaller, SECONDS)[1]
+            return again.replace("hang: ", "slow: ") == what.replace("hang: ", "slow: ")
+
+        case = Shrink(case, still, options.shrink).case
         print(f"  smaller: {case.line()}")
     options.out.mkdir(parents=True, exist_ok=True)
     path = options.out / f"{name}.npz"
