@@ -118,11 +118,17 @@ def _judge_locked(result, vertices, triangles, locked):
     now = result.vertex_map[locked & used]
     if (now < 0).any() or not np.array_equal(result.vertices[now], vertices[locked & used]):
         raise Finding("locked", "a locked vertex is not where it was")
-    # Sheets that touch without sharing vertices are different ones: these edges are told by their vertices.
+    # Edges are told by their vertices, as sheets that touch without sharing any are different ones; but of a face that
+    # is there twice with vertices of its own one is dropped, and then the other has the edge.
     edges = judges.edge_counts(triangles[(triangles != np.roll(triangles, 1, axis=1)).all(1)])[0]
     wanted = np.sort(result.vertex_map[edges[locked[edges].all(1)]], 1)
-    there = {tuple(edge) for edge in judges.edge_counts(result.triangles)[0]}
-    lost = [tuple(edge) for edge in wanted if edge[0] != edge[1] and tuple(edge) not in there]
+    there = judges.edge_counts(result.triangles)[0]
+    by_vertex = {tuple(edge) for edge in there.tolist()}
+    lost = [edge for edge in wanted.tolist() if edge[0] != edge[1] and tuple(edge) not in by_vertex]
     if lost:
-        a, b = result.vertices[list(lost[0])]
+        place = np.unique(result.vertices + 0.0, axis=0, return_inverse=True)[1]
+        by_place = {tuple(sorted(edge)) for edge in place[there].tolist()}
+        lost = [edge for edge in lost if tuple(sorted(place[edge].tolist())) not in by_place]
+    if lost:
+        a, b = result.vertices[lost[0]]
         raise Finding("locked edge", f"{len(lost)} edges between locked vertices are gone, {a} to {b}")
