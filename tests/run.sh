@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Sets up and runs every test, or only the runners that are named: sh tests/run.sh [native|asan|python|blender|ui|style]...
+# Sets up and runs every test, or only the runners that are named: sh tests/run.sh [native|asan|python|fuzz|blender|ui|style]...
 #   sh tests/run.sh --bpy VERSION    instead: the tests of the add-on in PyPI's bpy of that version, 4.2 or later
 # One closing line a runner; what a runner printed is in build/tests/, and is shown when it fails.
 set -eu
@@ -10,7 +10,7 @@ if [ "${1-}" = --bpy ]; then
   shift
   exec sh tests/bpy/run.sh "$@"
 fi
-runners="native asan python blender ui style"
+runners="native asan python fuzz blender ui style"
 for name in "$@"; do
   case " $runners " in
   *" $name "*) ;;
@@ -40,6 +40,7 @@ in_shards() {
   return $result
 }
 python() { /usr/bin/python3 -m pytest -q -p no:cacheprovider -n "$(nproc)" tests/python; }
+fuzz() { /usr/bin/python3 tests/fuzz.py --minutes 1 --seed 1; }
 # A Blender on each core, with every so many files.
 blender() {
   at_once=$(nproc) index=0 running="" result=0

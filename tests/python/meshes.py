@@ -161,7 +161,9 @@ def component_count(vertices, triangles):
         lowest = root[corners].min(1)
         before = root.copy()
         for k in range(3):
-            np.minimum.at(root, corners[:, k], lowest)
+            np.minimum.at(root, before[corners[:, k]], lowest)
+        while not np.array_equal(root, root[root]):  # a long strip takes few rounds, too
+            root = root[root]
         if np.array_equal(root, before):
             return len(np.unique(root))
 

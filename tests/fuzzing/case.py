@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One case: a mesh, an operation and its options, complete in itself, so that it can be stored, shrunk and repeated."""
+
+import json
+from dataclasses import dataclass, field
+
+import numpy as np
+
+import meshes
+
+
+class Finding(Exception):
+    """Something that must not happen. `what` stays the same while the case is shrunk, the message may not."""
+
+    def __init__(self, what, message):
+        super().__init__(message)
+        self.what = what
+
+
+@dataclass
+class Case:
+    kind: str
+    operation: str
+    vertices: np.ndarray
+    triangles: np.ndarray
+    tolerance: float
+    to_world: np.ndarray | None = None
+    options: dict = field(default_factory=dict)  # what JSON can hold
+    arrays: dict = field(default_factory=dict)  # a row for each vertex
+
+    def world(self, vertices):
+        return vertices.astype(np.float64) if self.to_world is None else meshes.transform(self.to_world, vertices)
+
+    def size(self):
+        """The diagonal of the used vertices in the world, at least half of what tolvol.size says."""
+        if not len(self.triangles):
+            return 0.0
+        return float(np.linalg.norm(np.ptp(self.world(self.vertices[self.triangles.ravel()]), axis=0)))
+
+    def is_limited(self):
+        """Whether every call has to end within a time: no area and no tolerance that make it long by themselves."""
+        a, b, c = self.world(self.vertices)[self.triangles].transpose(1, 0, 2) / (self.size() or 1.0)
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+        return area <= 100 and self.tolerance >= 0.001 * self.size()
+
+    def line(self):
+        percent = 100 * self.tolerance / self.size() if self.size() else float("inf")
+        options = ", ".join(
+            f"{name}={value}" for name, value in {**self.options, **dict.fromkeys(self.arrays, "...")}.items()
+        )
+        placed = "" if self.to_world is None else ", to_world"
+        return (
+            f"{self.operation}({options}{placed}) of {self.kind}, {len(self.vertices)} {self.vertices.dtype} vertices, "
+            f"{len(self.triangles)} triangles, tolerance {self.tolerance:.9g} ({percent:.3g} %)"
+        )
+
+    def save(self, path):
+        scalars = {"kind": self.kind, "operation": self.operation, "tolerance": self.tolerance, "options": self.options}
+        arrays = {f"array {name}": values for name, values in self.arrays.items()}
+        if self.to_world is not None:
+            arrays["to_world"] = self.to_world
+        np.savez_compressed(
+            path, scalars=json.dumps(scalars), vertices=self.vertices, triangles=self.triangles, **arrays
+        )
+
+    @classmethod
+    def load(cls, path):
+        with np.load(path) as file:
+            arrays = {name[len("array ") :]: file[name] for name in file.files if name.startswith("array ")}
+            return cls(
+                vertices=file["vertices"],
+                triangles=file["triangles"],
+                to_world=file["to_world"] if "to_world" in file.files else None,
+                arrays=arrays,
+                **json.loads(str(file["scalars"])),
+            )

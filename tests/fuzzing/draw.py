@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a seed and a number to a case: always the same one, whatever was tried before."""
+
+import numpy as np
+
+import meshes
+
+from . import kinds, operations
+from .case import Case
+
+# How often an operation comes, compared with others.
+LIKELY = {"decimate": 4, "chain": 2}
+
+
+def case_of(seed, number):
+    rng = np.random.default_rng([seed, number])
+    # Small ones find as much as large ones, in less time; a twentieth are large enough to be slow.
+    most = np.log10(kinds.MAX_FACES) if rng.random() < 0.05 else 3.5
+    kind, vertices, triangles = kinds.draw(rng, int(10 ** rng.uniform(0, most)))
+    names = list(operations.OPERATIONS)
+    weights = np.array([LIKELY.get(name, 1) for name in names], float)
+    case = Case(kind, str(rng.choice(names, p=weights / weights.sum())), vertices, triangles, tolerance=1.0)
+    if case.operation not in ("hausdorff", "deviation") and rng.random() < 0.2:
+        linear = meshes.random_rotation(int(rng.integers(1 << 30))) @ np.diag(
+            rng.choice([-1, 1], 3) * rng.uniform(0.2, 3, 3)
+        )
+        shift = rng.standard_normal(3) * (np.abs(vertices).max() if len(vertices) else 1) * rng.integers(0, 3)
+        case.to_world = meshes.matrix(linear, shift)
+    share = rng.uniform(-3.7, -0.7) if rng.random() < 0.95 else rng.uniform(-12, 0.3)
+    case.tolerance = 10**share * (case.size() or 1.0)
+    common = case.options
+    common["threads"] = [int(k) for k in rng.permutation([1, int(rng.integers(2, 4))])]
+    common["cgal"] = bool(rng.random() < 0.2)
+    if rng.random() < 0.15:
+        common["cancel"] = float(rng.random())
+    if rng.random() < 0.1:
+        common["precision"] = float(rng.choice([0.25, 1, 2]))
+    if rng.random() < 0.05:
+        common["field"] = "fast_marching"
+    operations.DRAW[case.operation](rng, case)
+    return case

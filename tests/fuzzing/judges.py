@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether a result is what was promised, by code that did not steer the operations: tolvol.hausdorff, CGAL, NumPy."""
+
+import subprocess
+
+import numpy as np
+import tolvol
+
+import meshes
+
+from . import ROOT
+from .case import Finding
+
+CGAL = ROOT / "build/release/tests/native/tolvol_cgal_judge"
+CGAL_FACES = 1000
+CGAL_SECONDS = 5
+
+
+def within(run, of, to, tolerance, what):
+    """Every point of the mesh `of` (vertices, triangles: in the world) is within `tolerance` of the mesh `to`."""
+    if not len(of[1]):
+        return
+    # Where the case has a matrix, its vertices were rounded once more on their way here.
+    largest = max(np.abs(of[0]).max(), np.abs(to[0]).max())
+    slack = 0 if run.case.to_world is None else 1e-15 * largest
+    interval = run.call("hausdorff", lambda: tolvol.hausdorff(*of, *to, bound=tolerance + slack, threads=1))
+    if interval.lower > tolerance + slack:
+        raise Finding(
+            f"beyond: {what}", f"{what}: at least {interval.lower / tolerance} tolerances, {interval.position}"
+        )
+    if not interval.upper <= tolerance + slack:
+        raise Finding(
+            f"undecided: {what}",
+            f"{what}: from {interval.lower / tolerance} to {interval.upper / tolerance} tolerances",
+        )
+    if run.case.options.get("cgal"):
+        error = 0.01 * tolerance
+        by_cgal = cgal_distance(of, to, error)
+        if by_cgal is not None and by_cgal > tolerance + slack + error:
+            raise Finding(f"CGAL: {what}", f"{what}: {by_cgal / tolerance} tolerances by CGAL, not {interval.upper}")
+
+
+def cgal_distance(of, to, error, seconds=CGAL_SECONDS):
+    """The one-sided Hausdorff distance to within `error`; None where CGAL is not there or takes too long, and where a
+    triangle has no area: the distance of a segment from a segment came out 3 % too large (CGAL 5.5.1)."""
+    if not CGAL.exists() or len(of[1]) + len(to[1]) > CGAL_FACES:
+        return None
+    corners = [np.ascontiguousarray(mesh[0][mesh[1]], np.float64) for mesh in (of, to)]
+    for a, b, c in (faces.transpose(1, 0, 2) for faces in corners):
+        longest = np.maximum.reduce([((p - q) ** 2).sum(1) for p, q in ((a, b), (b, c), (c, a))])
+        if (np.linalg.norm(np.cross(b - a, c - a), axis=1) <= 1e-6 * longest).any():
+            return None
+    # About a size of 1 around the origin: what is asked of CGAL is a second opinion, not an answer at any scale.
+    centre = (corners[1].min((0, 1)) + corners[1].max((0, 1))) / 2
+    scale = max(np.abs(c - centre).max() for c in corners) or 1.0
+    head = np.array([len(of[1]), len(to[1]), error / scale])
+    data = b"".join(a.tobytes() for a in (head, *((c - centre) / scale for c in corners)))
+    try:
+        answer = subprocess.run([CGAL], input=data, capture_output=True, timeout=seconds)
+    except subprocess.TimeoutExpired:
+        return None
+    return float(answer.stdout) * scale if answer.returncode == 0 else None
+
+
+def valid(run, vertices, triangles, dtype):
+    if vertices.dtype != dtype:
+        raise Finding("type", f"vertices came as {dtype} and went as {vertices.dtype}")
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3:
+        raise Finding("shape", f"vertices {vertices.shape}, triangles {triangles.shape}")
+    if not np.isfinite(vertices).all():
+        raise Finding(
+            "not finite", f"vertex {np.flatnonzero(~np.isfinite(vertices).all(1))[0]} of the result is not finite"
+        )
+    if len(triangles) and not (0 <= triangles.min() and triangles.max() < len(vertices)):
+        raise Finding("index", f"an index of the result is out of range: {triangles.min()}, {triangles.max()}")
+
+
+def proper_faces(vertices, triangles):
+    """The faces by places instead of vertices, without those that are segments or points. A face that is there twice
+    counts twice: as the two sides of a sheet, which may move apart."""
+    places, label = np.unique(vertices + 0.0, axis=0, return_inverse=True)
+    faces = np.sort(label[triangles], 1)
+    return places, faces[(np.diff(faces, axis=1) > 0).all(1)]
+
+
+def edge_counts(faces):
+    """(edges (k, 2), how many faces have each)."""
+    return np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), 1), axis=0, return_counts=True)
+
+
+def _components(faces):
+    """Parts that hang together by edges: what merely touches in a point is another part, which may move apart."""
+    if not len(faces):
+        return 0
+    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), 1)
+    edges, side_edge = np.unique(sides, axis=0, return_inverse=True)
+    return meshes.component_count(np.arange(len(edges))[:, None], side_edge.reshape(-1, 3))
+
+
+def connected_alike(run, before, after):
+    """Once welded: no edges of more than two faces that are new, no component lost or joined to another."""
+    faces, (new_places, new_faces) = proper_faces(*before)[1], proper_faces(*after)
+    had = (edge_counts(faces)[1] > 2).sum()
+    edges, count = edge_counts(new_faces)
+    if (count > 2).sum() > had:
+        a, b = new_places[edges[count > 2][0]]
+        raise Finding("non-manifold", f"{(count > 2).sum()} edges have more than two faces, {had} had: {a} to {b}")
+    components, left = _components(faces), _components(new_faces)
+    # Where more than two faces meet, some of them may be sheets that merely touch and move apart.
+    if left < components or (left > components and not had):
+        raise Finding("components", f"{components} components became {left}")
+
+
+def rims_alike(run, before, after, tolerance):
+    """One-sided operations keep boundaries: each is within the tolerance of the other. Only where edges have one or
+    two faces and no face is there twice: what is a boundary is not clear elsewhere."""
+    (places, faces), (new_places, new_faces) = proper_faces(*before), proper_faces(*after)
+    if edge_counts(faces)[1].max(initial=0) > 2 or len(np.unique(faces, axis=0)) < len(faces):
+        return
+    rim, new_rim = meshes.boundary_segments(places, faces), meshes.boundary_segments(new_places, new_faces)
+    if (len(rim) == 0) != (len(new_rim) == 0):
+        raise Finding("boundary", f"a boundary of {len(rim)} edges became one of {len(new_rim)}")
+    if len(rim):
+        within(run, (new_places, new_rim), (places, rim), tolerance, "boundary of the result to that of the input")
+        within(run, (places, rim), (new_places, new_rim), tolerance, "boundary of the input to that of the result")

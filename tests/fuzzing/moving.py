@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""smooth, deform, constrain and Guard with any of their options, judged by what their docstrings promise."""
+
+import numpy as np
+import tolvol
+
+from . import judges
+from .case import Finding
+from .parts import faces_of, lattice_of, motion_of, moved, proved_inside, some, within_as_pieces
+
+
+def draw_smooth(rng, case):
+    options, n = case.options, len(case.vertices)
+    options["iterations"] = int(some(rng, 0, 1, 3, 10, 30))
+    options["operator"] = some(rng, "laplacian", "bilaplacian")
+    options["weights"] = some(rng, "uniform", "cotangent")
+    options["boundary"] = some(rng, "fixed", "along")
+    options["mode"] = some(rng, "pull_back", "reset")
+    if rng.random() < 0.2:
+        case.arrays["locked"] = rng.random(n) < rng.random()
+    if rng.random() < 0.2:
+        case.arrays["strength"] = rng.random(n) * (rng.random(n) < 0.8)
+    if rng.random() < 0.2:
+        options["moved"], options["outside"] = float(some(rng, 0.1, 0.5, 2)), some(rng, "error", "keep", "keep")
+        case.arrays["motion"] = motion_of(rng, case, options["moved"])
+
+
+def smooth(run):
+    case, options, arrays = run.case, run.case.options, run.case.arrays
+    vertices, triangles, volume = moved(run), case.triangles, run.volume()
+    names = ("iterations", "operator", "weights", "boundary", "mode", "outside")
+    given = {name: options[name] for name in names if name in options}
+    given |= {name: arrays[name] for name in ("locked", "strength") if name in arrays}
+
+    def call(threads, progress):
+        return tolvol.smooth(
+            vertices, triangles, volume, to_world=case.to_world, threads=threads, progress=progress, **given
+        )
+
+    result = run.repeated("smooth", call, ("vertices",))
+    stay = arrays.get("locked", np.zeros(len(vertices), bool)) | (arrays.get("strength", np.ones(len(vertices))) == 0)
+    if len(result.report["held_back"]) != given.get("iterations", 10):
+        raise Finding("report", f"held_back has {len(result.report['held_back'])} entries")
+    _judge_motion(run, result, vertices, triangles, volume, stay)
+
+
+def _judge_motion(run, result, vertices, faces, volume, stay):
+    """What smooth, deform and constrain have in common."""
+    case = run.case
+    run.tell("judging")
+    judges.valid(run, result.vertices, case.triangles, vertices.dtype)
+    if not np.array_equal(result.vertices[stay], vertices[stay]):
+        raise Finding("locked", f"vertex {np.flatnonzero(stay)[0]} or another that is to stay has moved")
+    kept = np.zeros(len(faces), bool)
+    if result.report["outside"]["faces"]:
+        kept = ~proved_inside(run, vertices, faces, volume)
+        if not np.array_equal(result.vertices[faces[kept]], vertices[faces[kept]]):
+            raise Finding("outside", "a face that was outside has moved")
+    reference = case.world(case.vertices), case.triangles
+    within_as_pieces(run, case.world(result.vertices), faces[~kept], reference)
+
+
+def draw_deform(rng, case):
+    options = case.options
+    options["mode"] = some(rng, "blocked", "farthest", "pull_back")
+    options["points"] = [int(k) for k in rng.integers(2, 6, 3)]
+    options["amplitude"] = float(10 ** rng.uniform(-2, 2))
+    options["seed"] = int(rng.integers(1 << 30))
+    options["reach"] = float(some(rng, 0.5, 1.0, 1.2))
+    if case.operation == "deform" and rng.random() < 0.2:
+        options["moved"], options["outside"] = float(some(rng, 0.1, 0.5, 2)), some(rng, "error", "keep", "keep")
+        case.arrays["motion"] = motion_of(rng, case, options["moved"])
+
+
+def deform(run):
+    case, options = run.case, run.case.options
+    vertices, triangles, volume = moved(run), case.triangles, run.volume()
+    lattice = run.call("Lattice", lambda: lattice_of(run, vertices))
+    given = {name: options[name] for name in ("mode", "outside") if name in options}
+
+    def call(threads, progress):
+        return tolvol.deform(
+            vertices, lattice, triangles, volume, to_world=case.to_world, threads=threads, progress=progress, **given
+        )
+
+    result = run.repeated("deform", call, ("vertices",))
+    fraction = result.report["permitted_fraction"]
+    if fraction is not None and not 0 <= fraction <= 1:
+        raise Finding("report", f"permitted_fraction is {fraction}")
+    stay = np.full(len(vertices), options["mode"] == "blocked" and result.report["leaving"]["faces"] > 0)
+    _judge_motion(run, result, vertices, triangles, volume, stay)
+
+
+def draw_constrain(rng, case):
+    case.options["corners"] = int(some(rng, 1, 2, 3, 3, 3, 4))
+    case.options["mode"] = some(rng, "pull_back", "pull_back", "reset")
+    case.options["outside"] = "keep" if case.options["corners"] == 4 else "error"
+    case.arrays["wish"] = motion_of(rng, case, 10 ** rng.uniform(-1, 2))
+
+
+def constrain(run):
+    case, options = run.case, run.case.options
+    vertices, volume = case.vertices, run.volume()
+    faces = faces_of(case)
+    wish = (vertices + case.arrays.get("wish", 0)).astype(vertices.dtype)
+
+    def bounded(mode, threads, progress):
+        return tolvol.constrain(
+            vertices,
+            wish,
+            faces,
+            volume,
+            to_world=case.to_world,
+            mode=mode,
+            outside=options["outside"],
+            threads=threads,
+            progress=progress,
+        )
+
+    result = run.repeated("constrain", lambda *how: bounded(options["mode"], *how), ("vertices", "factors"))
+    f = result.factors
+    _judge_motion(run, result, vertices, faces, volume, f == 0)
+    if not ((f >= 0) & (f <= 1)).all() or result.report["held_back"] != (f < 1).sum():
+        raise Finding(
+            "factors", f"factors from {f.min()} to {f.max()}, {result.report['held_back']} said to be held back"
+        )
+    if options["mode"] == "reset":
+        return
+    reset = run.call("constrain", lambda: bounded("reset", 1, None)).factors
+    if (f < reset).any():
+        raise Finding("factors", f"vertex {np.flatnonzero(f < reset)[0]} goes less far than by reset")
+    before = vertices.astype(np.float64)
+    kept = np.zeros(len(vertices), bool)
+    kept[faces[~proved_inside(run, vertices, faces, volume)]] = True
+    for v in np.flatnonzero((f < 1) & ~kept)[:3]:
+        higher = result.vertices.copy()
+        to = before[v] + min(1, f[v] + 1 / 64) * (wish[v].astype(np.float64) - before[v])
+        higher[v] = wish[v] if f[v] + 1 / 64 >= 1 else to
+        around = faces[(faces == v).any(1)]
+        if proved_inside(run, higher, around, volume).all():
+            raise Finding("factors", f"vertex {v} could go on: its factor is {f[v]}, and 1/64 more is inside")
+
+
+def draw_guard(rng, case):
+    largest = np.abs(case.vertices).max(initial=0)
+    if largest and not 1e-25 < largest < 1e25:  # beyond float32, which is all that a guard takes
+        case.vertices, case.tolerance = case.vertices / largest, case.tolerance / largest
+    case.vertices = case.vertices.astype(np.float32)
+    case.options["seed"] = int(rng.integers(1 << 30))
+    case.options["edits"] = int(rng.integers(1, 6))
+    case.options["amplitude"] = float(10 ** rng.uniform(-1, 2))
+
+
+def guard(run):
+    case, options = run.case, run.case.options
+    volume = run.volume()
+
+    class Edited:
+        """The mesh after some edits, each corrected by the guard."""
+
+        def __init__(self, threads, progress):
+            rng = np.random.default_rng(options["seed"])
+            guard = tolvol.Guard(
+                case.vertices, case.triangles, volume, to_world=case.to_world, threads=threads, progress=progress
+            )
+            self.vertices = case.vertices.copy()
+            scale = 1 if case.to_world is None else np.linalg.norm(case.to_world[:3, :3], 2)
+            for _ in range(options["edits"]):
+                touched = rng.random(len(self.vertices)) < rng.random()
+                motion = rng.standard_normal((touched.sum(), 3)) * options["amplitude"] * case.tolerance / scale
+                self.vertices[touched] += motion.astype(np.float32)
+                indices, back = guard.constrain(self.vertices)
+                self.vertices[indices] = back
+            self.again = len(guard.constrain(self.vertices)[0])
+
+    result = run.repeated("Guard", Edited, ("vertices",))
+    if result.again:
+        raise Finding("guard", f"{result.again} vertices go back again, though nothing was edited")
+    judges.valid(run, result.vertices, case.triangles, np.float32)
+    within_as_pieces(run, case.world(result.vertices), case.triangles, (case.world(case.vertices), case.triangles))

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What several operations of tests/fuzz.py need: wishes, moved meshes, faces of any kind, a lattice, the judge of pieces."""
+
+import numpy as np
+import tolvol
+
+import meshes
+
+from . import judges
+
+
+def some(rng, *values):
+    return values[rng.integers(len(values))]
+
+
+def motion_of(rng, case, tolerances):
+    """A wish for each vertex: noise, one direction, or a few vertices alone; in the world's units, of local axes."""
+    n, kind = len(case.vertices), rng.integers(3)
+    motion = rng.standard_normal((n, 3))
+    if kind == 1:
+        motion[:] = motion[:1]
+    if kind == 2:
+        motion[rng.random(n) < 0.8] = 0
+    scale = 1 if case.to_world is None else np.linalg.norm(case.to_world[:3, :3], 2)
+    return motion * tolerances * case.tolerance / scale
+
+
+def moved(run):
+    """The case's vertices, or, where it has the option `moved`, near them, and whether they are all inside."""
+    case = run.case
+    if not case.options.get("moved"):
+        return case.vertices
+    return (case.vertices + case.arrays["motion"]).astype(case.vertices.dtype)
+
+
+def proved_inside(run, vertices, triangles, volume):
+    """For each face whether the check proves it; none of which it does is beyond."""
+    verdicts = run.call(
+        "check", lambda: volume.check(vertices, triangles, to_world=run.case.to_world, threads=1)
+    ).verdict
+    return verdicts == 2
+
+
+def within_as_pieces(run, vertices, faces, reference):
+    """Points and segments are degenerate triangles, quads both of their triangulations."""
+    corners = faces.shape[1]
+    cuts = {1: [[0, 0, 0]], 2: [[0, 1, 1]], 3: [[0, 1, 2]], 4: [[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]}[corners]
+    triangles = np.concatenate([faces[:, cut] for cut in cuts])
+    judges.within(run, (vertices, triangles), reference, run.case.tolerance, "result to reference")
+
+
+def faces_of(case):
+    """The triangles as faces of 1 to 4 corners; pairs of neighbours as quads, with triangles that repeat a corner."""
+    corners, triangles = case.options["corners"], case.triangles
+    if corners < 4:
+        return np.ascontiguousarray(triangles[:, :corners])
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), 1)
+    order = np.lexsort(edges.T)
+    same = (edges[order[1:]] == edges[order[:-1]]).all(1)
+    quads, taken = [], np.zeros(len(triangles), bool)
+    for first, second in zip(order[:-1][same], order[1:][same]):
+        a, b = first // 3, second // 3
+        if a != b and not taken[a] and not taken[b]:
+            taken[a] = taken[b] = True
+            x, y, z = np.roll(triangles[a], -(first % 3))
+            quads.append([x, np.roll(triangles[b], -(second % 3))[2], y, z])
+    rest = triangles[~taken][:, [0, 1, 2, 0]]
+    return np.concatenate([np.array(quads, np.int32).reshape(-1, 4), rest])
+
+
+def lattice_of(run, vertices):
+    options = run.case.options
+    placed = run.case.world(vertices)
+    lower, upper = placed.min(0), placed.max(0)
+    edges = (upper - lower) * options["reach"] + 1e-6 * np.ptp(placed)
+    domain = meshes.matrix(np.diag(edges), lower - edges * 0.01)
+    points = tolvol.lattice_points(options["points"], domain)
+    rng = np.random.default_rng(options["seed"])
+    return tolvol.Lattice(
+        points + rng.standard_normal(points.shape) * options["amplitude"] * run.case.tolerance, domain
+    )
