@@ -1,21 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the 3D views draw: the surfaces of the objects that show their deviation, and the legend of one."""
 
-import bpy
 import gpu
 import numpy as np
 
 from .. import mesh_io, volume
+from ..redraw import redraw_views
 from . import field, legend, reasons, shaders, shares
 
 _STRIPE = 12  # pixels from one stripe to the next
-
-
-def redraw():
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
 
 
 def _in_view(context, names):
@@ -54,7 +47,7 @@ def surfaces(context, shown):
     for ob in objects:
         surface = shown[ob.name]
         surface.update(ob, depsgraph)
-        found, _ = field.field_of(ob, _tolerance(ob), redraw)
+        found, _ = field.field_of(ob, _tolerance(ob), redraw_views)
         if found is not None:
             _draw(context, ob, surface, found)
     gpu.state.blend_set("NONE")
@@ -115,13 +108,13 @@ def legend_of_one(context, shown):
     ob = context.active_object if context.active_object in objects else objects[0]
     found, reason = None, reasons.hidden(ob)
     if not reason:
-        found, reason = field.field_of(ob, _tolerance(ob), redraw)
+        found, reason = field.field_of(ob, _tolerance(ob), redraw_views)
     heading = f"Deviation of {ob.name}"
     if found is None:
         legend.draw_note(context, f"{heading}: {reason}")
         return
     signed, tolerance = _signed(ob, found.grid), _tolerance(ob)
-    bands = shares.known(ob, shown[ob.name], found, tolerance, redraw)
+    bands = shares.known(ob, shown[ob.name], found, tolerance, redraw_views)
     legend.draw(context, heading, note(ob), signed, tolerance, bands and shares.fold(bands, signed))
 
 

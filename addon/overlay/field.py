@@ -2,6 +2,7 @@
 """Distance textures: one for each reference that is shown, made in a thread and kept while it is of use."""
 
 import functools
+import math
 
 import bpy
 import gpu
@@ -66,7 +67,11 @@ def field_of(ob, tolerance, changed):
     field = _fields.get(key)
     if reason := _failed.get((key, tolerance)):
         return None, reason
-    if field is None or field.tolerance != tolerance:
+    own = ob.tolvol.snapshot_kind == "SELF"
+    if field and own and not volume.same_shape(field.placement, volume.reference_matrix(ob)):  # scaled since
+        field = None
+    # The size of an object that is turned, and a percentage of it, changes by the rounding of its matrix.
+    if field is None or not math.isclose(field.tolerance, tolerance, rel_tol=1e-6):
         work.later(
             ("field", key),
             _SETTLE if field else 0,
