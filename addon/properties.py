@@ -227,7 +227,7 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     show_deviation: BoolProperty(
         name="Show Deviation",
         description="Colour the mesh in the 3D view by its distance to the reference, live; what is beyond the "
-        "tolerance is striped. The colours are interpolated and prove nothing, Check does",
+        "tolerance is striped. The colours prove nothing, Check does",
         default=True,
         update=_changed,
     )

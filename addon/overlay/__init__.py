@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Show Deviation: the mesh in the 3D view coloured at every pixel by its distance to the reference, with a legend.
 
-While no object shows it there is neither a handler nor memory. Distances are read from a grid and interpolated: they
-are shown, not proved.
+While no object shows it there is neither a handler nor memory. Distances are computed by the
+graphics driver: they are shown, not proved.
 """
 
 import functools

@@ -18,7 +18,7 @@ def known(ob, surface, found, tolerance, changed):
 
     Those of another mesh, place or tolerance say nothing: they are counted anew, and then changed() is called.
     """
-    placement = np.linalg.inv(found.to_nodes) @ field.vertex_to_nodes(found, ob)
+    placement = np.linalg.inv(found.to_frame) @ field.vertex_to_frame(found, ob)
     about = surface.changes, id(found), tolerance, placement.tobytes()
     name = ob.name
     last = _known.get(name)
@@ -26,12 +26,11 @@ def known(ob, surface, found, tolerance, changed):
         return last[1]
     if surface.triangles is not None and len(surface.triangles):
         count = functools.partial(
-            found.grid.shares,
+            found.tree.shares,
             surface.vertices,
             surface.triangles,
             tolerance * _EIGHTHS,
             placement,
-            nearest=found.nearest,
         )
         work.later(
             ("shares", name),
