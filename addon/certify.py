@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The numbers that a decimated mesh has to prove, whether it is still in memory or was read back from a file."""
 
+import numpy as np
+
 from . import measure, volume
 
 INSIDE = 2  # of the native verdicts; unproved counts as outside
@@ -11,6 +13,18 @@ def verdicts(surface, reference, tolerance, threads=0, progress=None):
     built = volume.native_volume(reference, tolerance, threads, progress)
     arrays, matrix = surface.arrays, surface.matrix
     return built.check(arrays.vertices, arrays.triangles, to_world=matrix, threads=threads, progress=progress).verdict
+
+
+def outside(surface, reference, tolerance, threads=0, progress=None):
+    """(m,) bool: the triangles of a Surface that are not proved; none where certify() finds it within the tolerance, at
+    least one where it does not."""
+    pair = (surface.world(), surface.arrays.triangles), (reference.world(), reference.arrays.triangles)
+    found = measure.largest_distance(*pair, tolerance, threads, progress)
+    if found.within(tolerance):
+        return np.zeros(len(surface.arrays.triangles), bool)
+    unproved = verdicts(surface, reference, tolerance, threads, progress) < INSIDE
+    unproved[found.triangle] = True
+    return unproved
 
 
 def certify(surface, reference, tolerance, kept_faces=0, threads=0, progress=None):

@@ -18,6 +18,9 @@ class Interval:
     def within(self, tolerance):
         return self.upper <= tolerance
 
+    def beyond(self, tolerance):
+        return self.lower > tolerance
+
 
 def largest_distance(from_surface, to_surface, tolerance=None, threads=0, progress=None):
     """Interval of the largest distance of a point of the one (vertices, triangles) from the other.

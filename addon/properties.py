@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the panel shows and a file keeps, at Object.tolvol. Settings that an operator shares are declared once, here."""
 
+import math
+
 import bpy
 from bpy.props import (
     BoolProperty,
@@ -21,22 +23,23 @@ TOLERANCE_UNITS = (
 )
 
 
-def tolerance_settings(percent=None, **options):
-    """name -> property of the tolerance; `options` go to each, those in `percent` to the percentage alone."""
+def tolerance_settings(options=frozenset(), unit=None, percent=None, length=None):
+    """name -> property of the tolerance; `options` for all, what `unit`, `percent` and `length` have for one each."""
     return {
         "tolerance_mode": EnumProperty(
             name="Tolerance Unit",
             description="What the tolerance is given in",
             items=TOLERANCE_UNITS,
-            **options,
+            options=set(options),
+            **(unit or {}),
         ),
         "tolerance_percent": FloatProperty(
             name="Tolerance",
             description="How far the mesh may lie from the reference, in percent of the reference's size",
             default=preferences.TOLERANCE,
             **preferences.PERCENT,
+            options=set(options),
             **(percent or {}),
-            **options,
         ),
         "tolerance_length": FloatProperty(
             name="Tolerance",
@@ -47,7 +50,17 @@ def tolerance_settings(percent=None, **options):
             step=1,
             precision=5,
             subtype="DISTANCE",
-            **options,
+            options=set(options),
+            **(length or {}),
+        ),
+        # Blender's FloatProperty is float32.
+        "tolerance_percent_converted": StringProperty(
+            description="All digits of the percentage, where it was converted from a length",
+            options={"HIDDEN", *options},
+        ),
+        "tolerance_length_converted": StringProperty(
+            description="All digits of the length, where it was converted from a percentage",
+            options={"HIDDEN", *options},
         ),
     }
 
@@ -101,17 +114,51 @@ def _set_percent(settings, value):
     settings.percent_choice = value
 
 
+def _double(name):
+    """A number in double precision, kept as the text `name`: what decides is not rounded to Blender's float32.
+
+    Not a number (nan) where none is kept, or none that can be read.
+    """
+
+    def read(group):
+        try:
+            return float(getattr(group, name))
+        except ValueError:
+            return math.nan
+
+    def write(group, value):
+        setattr(group, name, repr(float(value)))
+
+    return property(read, write)
+
+
+_LENGTHS = {
+    "tolerance": "That it was compared with",
+    "size": "What was 100 % then",
+    "forward_lower": "The mesh is somewhere at least this far from the reference",
+    "forward": "The mesh is nowhere farther from the reference than this",
+    "backward_lower": "The reference is somewhere at least this far from the mesh",
+    "backward": "The reference is nowhere farther from the mesh than this",
+}
+
+
 class TOLVOL_PG_measurement(bpy.types.PropertyGroup):
     """The certified distances of one state of a mesh, in world units."""
 
-    fingerprint: StringProperty(description="Of the mesh that was measured; empty: none was")
-    matrix: FloatVectorProperty(size=16, description="Of the object then")
-    tolerance: FloatProperty(description="That it was compared with")
-    forward: FloatProperty(description="The mesh is nowhere farther from the reference than this")
-    backward: FloatProperty(description="The reference is nowhere farther from the mesh than this")
-    forward_within: BoolProperty(description="Proved to be within the tolerance")
-    backward_within: BoolProperty(description="Proved to be within the tolerance")
-    share_outside: FloatProperty(description="Share of the mesh's area that is beyond the tolerance")
+    __annotations__ = {
+        "fingerprint": StringProperty(description="Of the mesh that was measured; empty: none was"),
+        "matrix": FloatVectorProperty(size=16, description="Of the object then"),
+        "share_outside": FloatProperty(description="Share of the mesh's area that is beyond the tolerance"),
+    } | {f"{name}_digits": StringProperty(description=text) for name, text in _LENGTHS.items()}
+
+    tolerance, size = _double("tolerance_digits"), _double("size_digits")
+    forward_lower, forward = _double("forward_lower_digits"), _double("forward_digits")
+    backward_lower, backward = _double("backward_lower_digits"), _double("backward_digits")
+
+    @property
+    def complete(self):
+        """Whether something was measured, and all of it can be read."""
+        return bool(self.fingerprint) and not any(math.isnan(getattr(self, name)) for name in _LENGTHS)
 
 
 class TOLVOL_PG_smooth(bpy.types.PropertyGroup):
@@ -123,6 +170,25 @@ class TOLVOL_PG_modifiers(bpy.types.PropertyGroup):
 
 
 def _changed(_settings, _context):
+    volume.notify()
+
+
+def _percent_changed(settings, _context):
+    settings.tolerance_percent_converted = ""
+    volume.notify()
+
+
+def _length_changed(settings, _context):
+    settings.tolerance_length_converted = ""
+    volume.notify()
+
+
+def _unit_changed(settings, _context):
+    """The tolerance stays what it is, in the other unit."""
+    mode, size = settings.tolerance_mode, volume.shown_size(settings.id_data)
+    if mode != (settings.tolerance_mode_before or "PERCENT") and size:
+        volume.convert_tolerance(settings, size, mode)
+    settings.tolerance_mode_before = mode
     volume.notify()
 
 
@@ -151,14 +217,20 @@ class TOLVOL_PG_guard(bpy.types.PropertyGroup):
 
 class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     __annotations__ = (
-        tolerance_settings({"get": _get_percent, "set": _set_percent}, update=_changed) | decimate_settings()
+        tolerance_settings(
+            unit={"update": _unit_changed},
+            percent={"get": _get_percent, "set": _set_percent, "update": _percent_changed},
+            length={"update": _length_changed},
+        )
+        | decimate_settings()
     )
+    tolerance_mode_before: StringProperty(description="The unit until it was last changed; empty: percent")
     percent_choice: FloatProperty(description="The percentage that was chosen; 0: none was")
 
     show_deviation: BoolProperty(
         name="Show Deviation",
         description="Colour the mesh in the 3D view by its distance to the reference, live; what is beyond the "
-        "tolerance is striped. The colours are interpolated and prove nothing, Check does",
+        "tolerance is striped. The colours prove nothing, Check does",
         default=True,
         update=_changed,
     )
@@ -222,8 +294,12 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     snapshot_kind: StringProperty(description="The kind of reference that was chosen then")
     snapshot_object: PointerProperty(type=bpy.types.Object, description="The object that was chosen then")
     snapshot_matrix: FloatVectorProperty(size=16, description="The place of the snapshot in the world then")
-    snapshot_size: FloatProperty(description="The length that is 100 %")
     snapshot_fingerprint: StringProperty(description="Tells the snapshot from others")
+
+    @property
+    def snapshot_size(self):
+        """The length that is 100 %, in double, as the object is scaled now."""
+        return volume.snapshot_size(self.id_data)
 
     smooth: PointerProperty(type=TOLVOL_PG_smooth)
     modifiers: PointerProperty(type=TOLVOL_PG_modifiers)

@@ -104,6 +104,10 @@ def percent(value, whole):
     share = 100 * value / whole
     if share <= 0:
         return "0 %"
+    excess = share - 100
+    if 1e-9 < excess < 1:  # however little is beyond the whole is seen, and not made more of
+        digits = 1 - math.floor(math.log10(excess))
+        return f"{100 + math.ceil(excess * 10**digits - 1e-4) / 10**digits:.{digits}f} %"
     step = 10.0 ** (math.floor(math.log10(share)) - 2)
     # A last digit is not rounded up for less than a ten-thousandth of it, which is what float32 does to 1 %.
     return f"{math.ceil(share / step - 1e-4) * step:#.3g}".rstrip(".") + " %"

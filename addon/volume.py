@@ -2,10 +2,12 @@
 """The reference of an object: a snapshot of a mesh and its place, and the native tolerance volumes built of it.
 
 The snapshot is a Mesh datablock that Object.tolvol points to, so that it is saved with the file and followed by undo; it
-is never written to. An object that is its own reference carries it along: snapshot and mesh are mapped to the world by
-the object's present matrix. Another object's reference stays where it was in the world when it was set.
+is never written to. An object that is its own reference carries it along, moved, turned or scaled: snapshot and mesh are
+mapped to the world by the object's present matrix. Another object's reference stays where it was in the world when it was
+set.
 """
 
+import math
 from dataclasses import dataclass
 
 import bpy
@@ -14,6 +16,8 @@ from bpy.app.handlers import persistent
 
 from . import mesh_io, native
 from .errors import Refused
+from .redraw import redraw_views
+from .units import shortest, typed
 from .volume_cache import VolumeCache
 
 _volumes = VolumeCache(most_bytes=600_000_000)
@@ -21,10 +25,13 @@ _volumes = VolumeCache(most_bytes=600_000_000)
 # What panels show of a mesh (its size, its fingerprint), by object; forgotten whenever any mesh changes.
 _shown = {}
 
+# fingerprint of a snapshot -> the box of its used vertices, (2, 3) float32; a snapshot never changes.
+_boxes = {}
+
 # Called whenever the reference of an object may have become another one: set, let go of, undone, loaded.
 listeners = []
 
-# How far the lengths of an object's axes and the angles between them may stray before it counts as rescaled: ten
+# How far the lengths of an object's axes and the angles between them may stray before it counts as scaled: ten
 # times what float32 rotations add up to.
 _RIGID = 1e-5
 
@@ -78,10 +85,32 @@ def reference_of(ob):
         return surface_of(source)
     reason = stale_reason(ob)
     if reason:
-        raise Refused(f"The reference of {ob.name} is out of date: {reason}. Press Update")
+        raise Refused(f"The reference of {ob.name} is out of date: {reason}. {REMEDY}")
+    return Surface(mesh_io.read_mesh(settings.snapshot), reference_matrix(ob))
+
+
+def reference_matrix(ob):
+    """(4, 4): from the snapshot to the world, now."""
+    settings = ob.tolvol
     own = settings.snapshot_kind == "SELF"
-    matrix = mesh_io.matrix_array(ob.matrix_world) if own else _stored_matrix(settings.snapshot_matrix)
-    return Surface(mesh_io.read_mesh(settings.snapshot), matrix)
+    return mesh_io.matrix_array(ob.matrix_world) if own else _stored_matrix(settings.snapshot_matrix)
+
+
+def snapshot_size(ob):
+    """What reference_of(ob).size() is, bit for bit, in the time of a glance; cheap enough to draw.
+
+    Not a number (nan) where a damaged file holds no surface.
+    """
+    settings = ob.tolvol
+    key = settings.snapshot_fingerprint
+    if key not in _boxes:
+        arrays = mesh_io.read_mesh(settings.snapshot)
+        used = arrays.vertices[np.unique(arrays.triangles)]
+        _boxes[key] = np.array([used.min(0), used.max(0)]) if len(used) else np.full((2, 3), np.nan)
+    if not np.isfinite(_boxes[key]).all():
+        return math.nan
+    # The size is that of the box of the used vertices.
+    return native.module.size(_boxes[key], np.array([[0, 1, 1]]), to_world=reference_matrix(ob))
 
 
 def set_reference(ob, surface):
@@ -92,7 +121,6 @@ def set_reference(ob, surface):
     settings.snapshot_kind = settings.reference_kind
     settings.snapshot_object = settings.reference_object if settings.reference_kind == "OBJECT" else None
     settings.snapshot_matrix = surface.matrix.ravel()
-    settings.snapshot_size = surface.size()
     settings.snapshot_fingerprint = surface.arrays.fingerprint()
     settings.tolerance_percent = settings.tolerance_percent  # no longer what the preferences say
     notify()
@@ -110,6 +138,10 @@ def clear_reference(ob):
 def notify():
     for listener in listeners:
         listener()
+    redraw_views()
+
+
+REMEDY = "Replace the reference, or choose the one before again"
 
 
 def stale_reason(ob):
@@ -123,9 +155,6 @@ def stale_reason(ob):
         return "another one was chosen"
     if settings.snapshot_kind == "OBJECT" and settings.snapshot_object != settings.reference_object:
         return "another object was chosen"
-    before, now = _stored_matrix(settings.snapshot_matrix), mesh_io.matrix_array(ob.matrix_world)
-    if settings.snapshot_kind == "SELF" and not same_shape(before, now):
-        return "the object was rescaled"
     return None
 
 
@@ -134,20 +163,20 @@ def reference_missing(ob):
     if ob.tolvol.snapshot is None:
         return "Set the reference first"
     if reason := stale_reason(ob):
-        return f"The reference is out of date: {reason}; press Update"
+        return f"The reference is out of date: {reason}. {REMEDY}"
     return None
 
 
 def remember(ob, surface, certified, tolerance, share_outside=0.0):
-    """Keeps what was certified of `surface`, the object's mesh as it is now, for the panel."""
+    """Keeps what was certified of `surface`, the object's mesh as it is now, and shows it at once."""
     measurement = ob.tolvol.measurement
     measurement.fingerprint = surface.arrays.fingerprint()
     measurement.matrix = surface.matrix.ravel()
-    measurement.tolerance = tolerance
-    measurement.forward, measurement.backward = certified["forward"][1], certified["backward"][1]
-    measurement.forward_within = certified["forward"][1] <= tolerance
-    measurement.backward_within = certified["backward"][1] <= tolerance
+    measurement.tolerance, measurement.size = tolerance, snapshot_size(ob)
+    measurement.forward_lower, measurement.forward = certified["forward"]
+    measurement.backward_lower, measurement.backward = certified["backward"]
     measurement.share_outside = share_outside
+    redraw_views()
 
 
 def measurement_of(ob):
@@ -156,7 +185,7 @@ def measurement_of(ob):
     In other modes than Object Mode the mesh is being changed by Blender, out of sight: nothing is known of it there.
     """
     measurement = ob.tolvol.measurement
-    if ob.mode != "OBJECT" or not measurement.fingerprint or measurement.fingerprint != shown_fingerprint(ob):
+    if ob.mode != "OBJECT" or not measurement.complete or measurement.fingerprint != shown_fingerprint(ob):
         return None
     if not all(map(_sound, (measurement.tolerance, 1 + measurement.forward, 1 + measurement.backward))):
         return None  # a damaged file
@@ -182,14 +211,8 @@ def _stored_matrix(values):
 
 def built_of(ob):
     """The tolerance volume of the reference that is set, if it is in memory; cheap enough to draw."""
-    settings = ob.tolvol
-    own = settings.snapshot_kind == "SELF"
-    matrix = mesh_io.matrix_array(ob.matrix_world) if own else _stored_matrix(settings.snapshot_matrix)
-    tolerance = tolerance_length(settings, settings.snapshot_size)  # of a size that is stored as float32
-    for (fingerprint, place, of), volume in _volumes.items():
-        if (fingerprint, place) == (settings.snapshot_fingerprint, matrix.tobytes()) and abs(of / tolerance - 1) < 1e-6:
-            return volume
-    return None
+    tolerance = tolerance_length(ob.tolvol, snapshot_size(ob))
+    return _volumes.get((ob.tolvol.snapshot_fingerprint, reference_matrix(ob).tobytes(), tolerance))
 
 
 def on_top(ob):
@@ -214,22 +237,43 @@ def native_volume(surface, tolerance, threads=0, progress=None):
     return _volumes.get(key, build, progress)
 
 
-def exact(value):
-    """The number a person typed: the shortest decimal that Blender's float32 property stands for."""
-    return float(str(np.float32(value)))
-
-
 def tolerance_length(settings, size):
-    """The tolerance in world units; `settings` has the three tolerance properties."""
+    """The tolerance in world units, in double; `settings` has what properties.tolerance_settings() declares."""
     if settings.tolerance_mode == "LENGTH":
-        return exact(settings.tolerance_length)
-    return exact(settings.tolerance_percent) / 100 * size
+        return _chosen(settings, "tolerance_length")
+    return _chosen(settings, "tolerance_percent") / 100 * size
+
+
+def _chosen(settings, name):
+    """What is chosen, in double: what was converted from the other unit, or the decimal that a person typed."""
+    value = getattr(settings, name)
+    try:
+        converted = float(getattr(settings, f"{name}_converted"))
+    except ValueError:
+        converted = math.nan
+    if np.float32(converted) == np.float32(value):
+        return converted
+    return typed(value, bpy.context.scene.unit_settings) if name == "tolerance_length" else shortest(value)
+
+
+def convert_tolerance(settings, size, mode):
+    """Makes the tolerance in unit `mode` equal to that in the other unit, in double."""
+    if mode == "LENGTH":
+        name, value = "tolerance_length", _chosen(settings, "tolerance_percent") / 100 * size
+    else:
+        name, value = "tolerance_percent", 100 * _chosen(settings, "tolerance_length") / size
+        # There and back again is the number that was typed.
+        if math.isclose(shortest(value), value, rel_tol=1e-15):
+            value = shortest(value)
+    setattr(settings, name, value)
+    setattr(settings, f"{name}_converted", repr(value))
 
 
 def shown_size(ob):
     """What 100 % is, for drawing; None while it cannot be known."""
     if ob.tolvol.snapshot is not None:
-        return ob.tolvol.snapshot_size if _sound(ob.tolvol.snapshot_size) else None
+        size = snapshot_size(ob)
+        return size if _sound(size) else None
     source = source_object(ob)
     if source is None or source.type != "MESH" or not source.data.polygons or native.module is None:
         return None
@@ -265,6 +309,7 @@ def _forget_changed(_scene, depsgraph):
 @persistent
 def _forget_all(*_):
     _shown.clear()
+    _boxes.clear()
     _volumes.clear()
     notify()
 

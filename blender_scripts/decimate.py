@@ -18,7 +18,7 @@ try:
 
     import command_line as cli
     import pictures
-    from addon import file_io, mesh_io, report, safe_files, side_files, volume
+    from addon import file_io, mesh_io, report, safe_files, side_files, units, volume
     from addon.certify import certify
     from addon.errors import NOT_PROVED, NotWritten, Refused
 except ImportError as error:  # left alone, Blender would end with exit code 0
@@ -228,10 +228,12 @@ class Command:
         asked = {"target_triangles": target} if target else {"use_target": False}
         if self.options.placement:
             asked["placement"] = self.options.placement.upper()
+        length = _not_above(tolerance)
         try:
             with file_io.quiet():
                 bpy.ops.tolvol.decimate(
-                    tolerance_length=_not_above(tolerance),
+                    tolerance_length=length,
+                    tolerance_length_converted=repr(units.shortest(length)),
                     keep="ONE" if self.options.one_sided else "BOTH",
                     effort=self.options.effort.upper(),
                     max_seconds=self.options.max_seconds or 0,
@@ -368,7 +370,7 @@ class Command:
 def _not_above(length):
     """The largest number that Blender's float32 property can stand for and that is not above `length`."""
     candidate = np.float32(length)
-    while volume.exact(candidate) > length:
+    while units.shortest(candidate) > length:
         candidate = np.nextafter(candidate, np.float32(0))
     return float(candidate)
 

@@ -46,8 +46,8 @@ def situation(ob):
         ob.data.as_pointer(),
         key.name if key else None,
         mesh_io.matrix_array(ob.matrix_world).tobytes(),
-        (settings.tolerance_mode, settings.tolerance_percent, settings.tolerance_length),
-        (settings.snapshot.as_pointer(), settings.snapshot_size, settings.snapshot_fingerprint),
+        volume.tolerance_length(settings, settings.snapshot_size),
+        (settings.snapshot.as_pointer(), settings.snapshot_fingerprint),
     )
 
 

@@ -2,14 +2,17 @@
 """Comparing an object with its reference: certified distances both ways, and the faces that are outside."""
 
 import functools
+from dataclasses import replace
 
 import bpy
 import numpy as np
 from bpy.props import IntProperty
 
 from .. import mesh_io, native, preferences, report, volume
-from ..certify import INSIDE, certify, verdicts
+from ..certify import certify, outside
 from ..job import JobOperator
+from ..measure import Interval
+from ..verdict import BEYOND, ONE_WAY, WITHIN, Verdict
 from .blocked import allowed, check_blocked
 
 
@@ -42,26 +45,27 @@ and how much of the mesh is beyond the tolerance"""
     @staticmethod
     def compare(surface, reference, tolerance, threads, progress):
         certified = certify(surface, reference, tolerance, 0, threads, progress)
-        beyond = 0.0
-        if certified["forward"][1] > tolerance:
+        found = Verdict(tolerance, Interval(*certified["forward"]), Interval(*certified["backward"]))
+        if not found.forward_within:
             own = surface.world(), surface.arrays.triangles
             other = reference.world(), reference.arrays.triangles
-            found = native.module.deviation(*own, *other, bounds=(tolerance,), threads=threads, progress=progress)
-            beyond = float(found.share_beyond[0])
-        return surface, tolerance, certified, beyond
+            spread = native.module.deviation(*own, *other, bounds=(tolerance,), threads=threads, progress=progress)
+            found = replace(found, share_outside=float(spread.share_beyond[0]))
+        return surface, certified, found
 
     def finish(self, context, outcome):
-        surface, tolerance, certified, beyond = outcome
-        volume.remember(self.ob, surface, certified, tolerance, beyond)
-        largest = report.percent(max(certified["forward"][1], certified["backward"][1]), tolerance)
-        if certified["forward"][1] > tolerance:
-            self.report(
-                {"WARNING"}, f"Beyond the tolerance: up to {largest} of it, {100 * beyond:.1f} % of the area outside"
-            )
-        elif certified["backward"][1] > tolerance:
-            self.report({"WARNING"}, f"Within the tolerance, but the reference is up to {largest} of it from the mesh")
-        else:
+        surface, certified, found = outcome
+        volume.remember(self.ob, surface, certified, found.tolerance, found.share_outside)
+        largest = report.percent(max(found.forward.upper, found.backward.upper), found.tolerance)
+        if found.kind == WITHIN:
             self.report({"INFO"}, f"Within the tolerance both ways: at most {largest} of it, proved")
+        elif found.kind == ONE_WAY:
+            self.report({"WARNING"}, f"Within the tolerance, but the reference is up to {largest} of it from the mesh")
+        elif found.kind == BEYOND:
+            share = f"{100 * found.share_outside:.1f} % of the area outside"
+            self.report({"WARNING"}, f"Beyond the tolerance: up to {largest} of it, {share}")
+        else:
+            self.report({"WARNING"}, found.line())
 
 
 class TOLVOL_OT_select_outside(Comparison, bpy.types.Operator):
@@ -73,17 +77,17 @@ class TOLVOL_OT_select_outside(Comparison, bpy.types.Operator):
 
     @staticmethod
     def compare(surface, reference, tolerance, threads, progress):
-        return surface, verdicts(surface, reference, tolerance, threads, progress)
+        return surface, outside(surface, reference, tolerance, threads, progress)
 
     def finish(self, context, outcome):
-        surface, verdict = outcome
+        surface, triangles = outcome
         mesh = self.ob.data
-        outside = np.zeros(len(mesh.polygons), bool)
-        outside[surface.arrays.polygons[verdict < INSIDE]] = True
-        if not outside.any():
+        faces = np.zeros(len(mesh.polygons), bool)
+        faces[surface.arrays.polygons[triangles]] = True
+        if not faces.any():
             self.report({"INFO"}, "No face is outside")
             return
-        mesh_io.select_faces(mesh, outside)
+        mesh_io.select_faces(mesh, faces)
         context.tool_settings.mesh_select_mode = (False, False, True)
         bpy.ops.object.mode_set(mode="EDIT")
-        self.report({"WARNING"}, f"{outside.sum():,} of {len(outside):,} faces are outside")
+        self.report({"WARNING"}, f"{faces.sum():,} of {len(faces):,} faces are outside")

@@ -69,7 +69,7 @@ the settings of the active one. A mesh without a reference becomes it"""
     bl_options = {"REGISTER", "UNDO"}
 
     # Those not given are the object's own. SKIP_SAVE: never those of the last run, which may have been another object's.
-    __annotations__ = tolerance_settings(options={"SKIP_SAVE"}) | decimate_settings({"SKIP_SAVE"})
+    __annotations__ = tolerance_settings({"SKIP_SAVE"}) | decimate_settings({"SKIP_SAVE"})
     placement: EnumProperty(
         name="Placement",
         description="Where the remaining vertices go",
@@ -117,6 +117,9 @@ the settings of the active one. A mesh without a reference becomes it"""
             if reason := decimate_blocked(ob):
                 raise Refused(f"{ob.name}: {reason}")
             tasks.append(self._task(context, ob))
+        # Changing the unit in Adjust Last Operation changes nothing else.
+        other = "PERCENT" if self.tolerance_mode == "LENGTH" else "LENGTH"
+        volume.convert_tolerance(self, tasks[0].reference.size(), other)
         return functools.partial(run_all, tasks)
 
     def _task(self, context, ob):

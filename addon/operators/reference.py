@@ -2,25 +2,71 @@
 """Setting the reference of an object, and letting go of it."""
 
 import bpy
-from bpy.props import IntProperty
+import numpy as np
+from bpy.props import BoolProperty, IntProperty
 
 from .. import preferences, volume
 from ..job import JobOperator
 from .blocked import allowed, reference_blocked
 
 
+def replace_label(ob):
+    """What setting the reference does to one that is there; the label of the button, where that is so."""
+    source = volume.source_object(ob)
+    if source is None or source == ob:
+        return "Replace Reference by This Mesh"
+    return f"Replace Reference by {source.name}"
+
+
+def loses_something(ob):
+    """Whether setting the reference gives up a snapshot that is not what would be taken."""
+    if ob.tolvol.snapshot is None:
+        return False
+    surface = volume.surface_of(volume.source_object(ob))
+    same_place = surface.matrix.astype(np.float32).tobytes() == volume.reference_matrix(ob).astype(np.float32).tobytes()
+    return not same_place or surface.arrays.fingerprint() != ob.tolvol.snapshot_fingerprint
+
+
+def _ask(context, operator, ob):
+    """Opens a menu that says what would be lost; only its entry replaces the reference."""
+
+    def draw(menu, _context):
+        count = len(ob.tolvol.snapshot.polygons)
+        menu.layout.label(text=f"The reference of {count:,} triangles is given up.")
+        menu.layout.label(text="What was lost from it so far no longer counts as deviation.")
+        menu.layout.separator()
+        menu.layout.operator_context = "INVOKE_DEFAULT"
+        menu.layout.operator(operator.bl_idname, text=replace_label(ob), icon="ERROR").replace = True
+
+    context.window_manager.popup_menu(draw, title=f"Replace the reference of {ob.name}?", icon="QUESTION")
+
+
 class TOLVOL_OT_set_reference(JobOperator, bpy.types.Operator):
-    """Take a snapshot of the reference, which the tolerance refers to from now on, and build the tolerance volume"""
+    """Take a snapshot of the reference, which the tolerance refers to from now on, and build the tolerance volume. A \
+reference that is set already is replaced, after a question where that loses anything"""
 
     bl_idname = "tolvol.set_reference"
     bl_label = "Set Reference"
     bl_options = {"REGISTER", "UNDO"}
 
     threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+    replace: BoolProperty(
+        name="Replace",
+        description="Give up the reference that is set, without a question",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
 
     @classmethod
     def poll(cls, context):
         return allowed(cls, reference_blocked(context.active_object))
+
+    def invoke(self, context, event):
+        ob = context.active_object
+        if self.replace or not loses_something(ob):
+            return super().invoke(context, event)
+
+        _ask(context, self, ob)
+        return {"CANCELLED"}
 
     def prepare(self, context):
         context.view_layer.update()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Show Deviation: the mesh in the 3D view coloured at every pixel by its distance to the reference, with a legend.
 
-While no object shows it there is neither a handler nor memory. Distances are read from a grid and interpolated: they
-are shown, not proved.
+While no object shows it there is neither a handler nor memory. Distances are computed by the
+graphics driver: they are shown, not proved.
 """
 
 import functools
@@ -11,6 +11,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .. import native, preferences, volume
+from ..redraw import redraw_views
 from . import draw, field, legend, reasons, shaders, shares, work
 from .surface import Surface
 
@@ -39,7 +40,7 @@ def refresh():
     field.keep_only({field.key_of(bpy.data.objects[name]) for name in names})
     if not _drawing:
         _begin()
-    draw.redraw()
+    redraw_views()
 
 
 def _wanted():
@@ -65,7 +66,7 @@ def _end():
         bpy.app.handlers.depsgraph_update_post.remove(_note_changes)
         bpy.app.handlers.frame_change_post.remove(_note_frame)
         work.stop()
-        draw.redraw()
+        redraw_views()
     _surfaces.clear()
     shares.forget()
     field.keep_only(set())

@@ -1,21 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the 3D views draw: the surfaces of the objects that show their deviation, and the legend of one."""
 
-import bpy
 import gpu
 import numpy as np
 
 from .. import mesh_io, volume
+from ..redraw import redraw_views
 from . import field, legend, reasons, shaders, shares
 
 _STRIPE = 12  # pixels from one stripe to the next
-
-
-def redraw():
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
 
 
 def _in_view(context, names):
@@ -38,8 +31,8 @@ def _tolerance(ob):
     return volume.tolerance_length(ob.tolvol, ob.tolvol.snapshot_size)
 
 
-def _signed(ob, grid):
-    return ob.tolvol.deviation_kind == "SIGNED" and grid.closed
+def _signed(ob, tree):
+    return ob.tolvol.deviation_kind == "SIGNED" and tree.closed
 
 
 def surfaces(context, shown):
@@ -54,7 +47,7 @@ def surfaces(context, shown):
     for ob in objects:
         surface = shown[ob.name]
         surface.update(ob, depsgraph)
-        found, _ = field.field_of(ob, _tolerance(ob), redraw)
+        found, _ = field.field_of(ob, _tolerance(ob), redraw_views)
         if found is not None:
             _draw(context, ob, surface, found)
     gpu.state.blend_set("NONE")
@@ -65,21 +58,21 @@ def surfaces(context, shown):
 def _draw(context, ob, surface, found):
     shading = context.space_data.shading
     x_ray = shading.type == "SOLID" and shading.show_xray
-    to_nodes = field.vertex_to_nodes(found, ob)
+    to_frame = field.vertex_to_frame(found, ob)
     told = shaders.told(
         context.region_data.perspective_matrix,
         ob.matrix_world,
-        to_nodes,
-        _eye(context.region_data, to_nodes @ np.linalg.inv(mesh_io.matrix_array(ob.matrix_world))),
-        _tolerance(ob) / found.grid.spacing,
-        found.grid.band / found.grid.spacing,
-        _signed(ob, found.grid),
+        to_frame,
+        _eye(context.region_data, to_frame @ np.linalg.inv(mesh_io.matrix_array(ob.matrix_world))),
+        _tolerance(ob) * found.tree.scale,
+        found.leaves,
+        _signed(ob, found.tree),
         _STRIPE * context.preferences.system.ui_scale,
         ob.tolvol.deviation_opacity * (shading.xray_alpha if x_ray else 1),
     )
-    shader = shaders.surface(found.nearest)
+    shader = shaders.surface()
     shader.bind()
-    shader.uniform_sampler("transfer", shaders.transfer(_signed(ob, found.grid)))
+    shader.uniform_sampler("transfer", shaders.transfer(_signed(ob, found.tree)))
     found.bind(shader)
     shader.uniform_block("told", told)
     if x_ray:
@@ -99,11 +92,11 @@ def _draw(context, ob, surface, found):
             surface.draw_edges(shader, selected)
 
 
-def _eye(view, world_to_nodes):
-    """In nodes; of a view without perspective a direction, with 0 behind it."""
+def _eye(view, world_to_frame):
+    """In the frame; of a view without perspective a direction, with 0 behind it."""
     inverse = view.view_matrix.inverted()
     eye = (*inverse.translation, 1) if view.is_perspective else inverse.col[2]
-    return world_to_nodes @ np.array(eye)
+    return world_to_frame @ np.array(eye)
 
 
 def legend_of_one(context, shown):
@@ -115,13 +108,13 @@ def legend_of_one(context, shown):
     ob = context.active_object if context.active_object in objects else objects[0]
     found, reason = None, reasons.hidden(ob)
     if not reason:
-        found, reason = field.field_of(ob, _tolerance(ob), redraw)
+        found, reason = field.field_of(ob, _tolerance(ob), redraw_views)
     heading = f"Deviation of {ob.name}"
     if found is None:
         legend.draw_note(context, f"{heading}: {reason}")
         return
-    signed, tolerance = _signed(ob, found.grid), _tolerance(ob)
-    bands = shares.known(ob, shown[ob.name], found, tolerance, redraw)
+    signed, tolerance = _signed(ob, found.tree), _tolerance(ob)
+    bands = shares.known(ob, shown[ob.name], found, tolerance, redraw_views)
     legend.draw(context, heading, note(ob), signed, tolerance, bands and shares.fold(bands, signed))
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Distance textures: one for each reference that is shown, made in a thread and kept while it is of use."""
+"""What distances are read from: a tree of triangles for each reference that is shown, made in a thread and kept while it
+is of use. The tolerance is no part of it."""
 
 import functools
 
@@ -9,49 +10,39 @@ import numpy as np
 
 from .. import mesh_io, native, preferences, volume
 from ..errors import Refused
-from . import work
+from . import shaders, work
 
-_ROW = 2048  # texels in a row of triangle corners
-_LONGEST = 2048  # texels along an axis that every GPU of Blender's takes
-_NODES = 16_000_000  # 32 MB on the GPU
-_SETTLE = 0.3  # seconds after a change of the tolerance: often it goes on changing
-# A tolerance may grow this far towards the band of a grid that was made for a smaller one.
-_REACH = 0.98
+# Of what a shader rounds a distance by: a smaller tolerance cannot be shown.
+_FINEST = 4
 
 _fields = {}  # key -> Field
-_failed = {}  # key, tolerance -> why there is none
+_failed = {}  # key -> why there is none
 
 
 class Field:
-    """A reference on the GPU; of its textures those that are bound to a program of shaders.surface(nearest)."""
+    """A reference on the GPU."""
 
-    def __init__(self, grid, tolerance, placement):
-        self.grid = grid
-        self.tolerance = tolerance
-        self.to_nodes = grid.to_nodes
-        self.placement = placement  # of the reference when the grid was made
-        self.nearest = grid.precision < grid.INTERPOLATED
+    def __init__(self, tree, placement):
+        self.tree = tree
+        self.to_frame = tree.to_frame
+        self.placement = placement  # of the reference when the tree was made
+        self.leaves = len(tree.nodes) // 4
         self._textures = None
 
     def bind(self, shader):
         """While drawing."""
         if self._textures is None:
-            self._textures = self._nearest() if self.nearest else {"field": _texture(self.grid.distances, "R16F")}
+            self._textures = {"nodes": _texture(self.tree.nodes), "corners": _texture(self.tree.corners)}
         for name, texture in self._textures.items():
             shader.uniform_sampler(name, texture)
 
-    def _nearest(self):
-        ids = self.grid.nearest.astype(np.int32).astype(np.float32)  # the largest, which is none, becomes -1
-        corners = self.grid.corners.reshape(-1, 3)
-        texels = np.zeros((-(-len(corners) // _ROW), _ROW, 4), np.float32)
-        texels.reshape(-1, 4)[: len(corners), :3] = corners
-        return {"field": _texture(ids, "R32F"), "corners": _texture(texels, "RGBA32F", 2)}
 
-
-def _texture(texels, kind, axes=3):
-    texels = np.ascontiguousarray(texels)
+def _texture(rows):
+    """(k, 4) float32 as a texture of rows of shaders.ROW texels."""
+    texels = np.zeros((-(-len(rows) // shaders.ROW), shaders.ROW, 4), np.float32)
+    texels.reshape(-1, 4)[: len(rows)] = rows
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
-    return gpu.types.GPUTexture(texels.shape[axes - 1 :: -1], format=kind, data=data)
+    return gpu.types.GPUTexture((shaders.ROW, len(texels)), format="RGBA32F", data=data)
 
 
 def key_of(ob):
@@ -64,17 +55,19 @@ def field_of(ob, tolerance, changed):
     """(Field, None), or (None, why it is not there yet). One that is missing is made, and then changed() is called."""
     key = key_of(ob)
     field = _fields.get(key)
-    if reason := _failed.get((key, tolerance)):
+    if reason := _failed.get(key):
         return None, reason
-    if field is None or field.tolerance != tolerance:
+    own = ob.tolvol.snapshot_kind == "SELF"
+    if field is None or own and not volume.same_shape(field.placement, volume.reference_matrix(ob)):  # scaled since
         work.later(
             ("field", key),
-            _SETTLE if field else 0,
+            0,
             functools.partial(_prepare, ob.name, tolerance),
-            functools.partial(_finish, key, tolerance, changed),
+            functools.partial(_finish, key, changed),
         )
-        if field is None or tolerance > _REACH * field.grid.band:
-            return None, "Preparing"
+        return None, "Preparing"
+    if tolerance * field.tree.scale < _FINEST * native.module.DisplayTree.ROUNDING:
+        return None, "The tolerance is finer than colours can show"
     return field, None
 
 
@@ -95,17 +88,16 @@ def _prepare(name, tolerance):
 
     def make(progress):
         built = volume.native_volume(reference, tolerance, threads, progress)
-        grid = native.module.DisplayGrid(built, longest=_LONGEST, nodes=_NODES, threads=threads, progress=progress)
-        return Field(grid, tolerance, reference.matrix)
+        return Field(native.module.DisplayTree(built, progress), reference.matrix)
 
     return make
 
 
-def _finish(key, tolerance, changed, field, error):
+def _finish(key, changed, field, error):
     if error is None:
         _fields[key] = field
     elif not isinstance(error, native.module.Cancelled):
-        _failed[key, tolerance] = str(error) or "not enough memory"
+        _failed[key] = str(error) or "not enough memory"
     changed()
 
 
@@ -116,7 +108,7 @@ def keep_only(keys):
     _failed.clear()
 
 
-def vertex_to_nodes(field, ob):
-    """(4, 4): from the object's vertices to the nodes of the field."""
+def vertex_to_frame(field, ob):
+    """(4, 4): from the object's vertices to the frame of the field's tree."""
     own = ob.tolvol.snapshot_kind == "SELF"
-    return field.to_nodes @ (field.placement if own else mesh_io.matrix_array(ob.matrix_world))
+    return field.to_frame @ (field.placement if own else mesh_io.matrix_array(ob.matrix_world))

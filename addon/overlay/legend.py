@@ -125,7 +125,7 @@ def _label(context, value, signed):
 
 def percent(share):
     """A little must not read as nothing, nor nearly all as all."""
-    percent = 100 * share
+    percent = 100 * round(share, 9)  # sums of shares have rounding
     if 0 < percent < 0.1:
         return f"<{NO_BREAK}0.1{NO_BREAK}%"
     if 99.9 < percent < 100:

@@ -39,6 +39,6 @@ def hidden(ob):
 def unsigned(ob):
     """Why only the magnitude is shown although the sign was asked for, or None."""
     found = field.at_hand(ob)
-    if ob.tolvol.deviation_kind == "SIGNED" and found is not None and not found.grid.closed:
+    if ob.tolvol.deviation_kind == "SIGNED" and found is not None and not found.tree.closed:
         return "Magnitude only: the reference is open, so it has no inside"
     return None

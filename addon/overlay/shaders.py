@@ -28,7 +28,7 @@ vec4 displayed(vec3 colour, float opacity) {
 # in clip space some steps of a depth buffer of 24 bits.
 _SURFACE_VERTEX = """
 void main() {
-  place = (told.to_nodes * vec4(position, 1.0)).xyz;
+  place = (told.to_frame * vec4(position, 1.0)).xyz;
   gl_Position = told.view_projection * vec4((told.model * vec4(position, 1.0)).xyz, 1.0);
   gl_Position.z -= NEARER * gl_Position.w;
 }
@@ -36,7 +36,9 @@ void main() {
 
 _SURFACE_FRAGMENT = """
 void main() {
-  float d = DISTANCE / told.tolerance;
+  // A little beyond the tolerance is still told from it.
+  float reach = 1.001 * told.tolerance + 2.0 * ROUNDING;
+  float d = surface_distance(nodes, corners, int(told.leaves), place, reach, ROUNDING) / told.tolerance;
   vec3 colour;
   if (abs(d) > 1.0) {
     colour = outside_colour(gl_FragCoord.xy, told.period, OUTSIDE, STRIPE);
@@ -56,10 +58,10 @@ void main() { shown = displayed(flat_colour.rgb, flat_colour.a); }
 # As std140 lays it out: whole vectors first, and sixteen bytes filled up.
 _SURFACE_TOLD = """
 struct Told {
-  mat4 view_projection, model, to_nodes;
+  mat4 view_projection, model, to_frame;
   vec4 eye;
   float tolerance, lowest, period, opacity;
-  vec4 band;
+  float leaves, unused_1, unused_2, unused_3;
 };
 """
 
@@ -83,6 +85,9 @@ void main() {
 }
 """
 
+# Texels in a row of the textures that hold a tree.
+ROW = 2048
+
 # What a rectangle of the legend is filled with.
 FLAT, BAR, STRIPES = 0.0, 1.0, 2.0
 
@@ -105,33 +110,29 @@ def _info(varying, position, vertex, fragment, shared=()):
 
 
 @functools.cache
-def surface(nearest):
-    """Colours a mesh by its distance; told() is what its buffer `told` holds.
-
-    nearest: `field` has the triangle of each node, and `corners` its corners; else distances to be interpolated.
-    """
-    shared = "nearest_distance.glsl" if nearest else "signed_distance.glsl", "distance_colour.glsl"
+def surface():
+    """Colours a mesh by its distance from the tree in `nodes` and `corners`; told() is what its buffer `told` holds."""
+    shared = "surface_distance.glsl", "distance_colour.glsl"
     info = _info(("VEC3", "place"), ("VEC3", "position"), _SURFACE_VERTEX, _SURFACE_FRAGMENT, shared)
     info.sampler(0, "FLOAT_1D", "transfer")
-    info.sampler(1, "FLOAT_3D", "field")
-    if nearest:
-        info.sampler(2, "FLOAT_2D", "corners")
-        info.define("DISTANCE", "nearest_distance(field, corners, place, told.band.x)")
-    else:
-        info.define("DISTANCE", "signed_distance(field, place)")
+    info.sampler(1, "FLOAT_2D", "nodes")
+    info.sampler(2, "FLOAT_2D", "corners")
+    info.define("ROW", str(ROW))
+    info.define("ROUNDING", str(native.module.DisplayTree.ROUNDING))
     info.typedef_source(_SURFACE_TOLD)
     info.uniform_buf(0, "Told", "told")
     info.define("NEARER", "1e-6")
     return gpu.shader.create_from_info(info)
 
 
-def told(view_projection, model, to_nodes, eye, tolerance, band, signed, period, opacity):
+def told(view_projection, model, to_frame, eye, tolerance, leaves, signed, period, opacity):
     """The buffer for surface().
 
-    to_nodes: from vertices; eye: (x, y, z, 1) or a direction with 0, in nodes, as are `tolerance` and `band`.
+    to_frame: from vertices to the frame of the tree, which has so many `leaves`; eye: (x, y, z, 1) or a direction with
+    0, there, as is `tolerance`.
     """
-    matrices = [np.array(matrix, np.float32).T.ravel() for matrix in (view_projection, model, to_nodes)]
-    numbers = tolerance, lowest(signed), period, opacity, band, 0, 0, 0
+    matrices = [np.array(matrix, np.float32).T.ravel() for matrix in (view_projection, model, to_frame)]
+    numbers = tolerance, lowest(signed), period, opacity, leaves, 0, 0, 0
     values = np.concatenate([*matrices, eye, numbers]).astype(np.float32)
     return gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", values.size, values))
 

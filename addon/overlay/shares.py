@@ -14,22 +14,23 @@ _known = {}  # name of an object -> (what they are the shares of, shares)
 
 
 def known(ob, surface, found, tolerance, changed):
-    """The shares in the eighths, and beyond them at both ends, that were counted last; None before the first time.
+    """The shares in the eighths, and beyond them at both ends; None while they are not known.
 
-    When they are of another mesh, place or tolerance they are counted anew, and then changed() is called.
+    Those of another mesh, place or tolerance say nothing: they are counted anew, and then changed() is called.
     """
-    placement = np.linalg.inv(found.to_nodes) @ field.vertex_to_nodes(found, ob)
+    placement = np.linalg.inv(found.to_frame) @ field.vertex_to_frame(found, ob)
     about = surface.changes, id(found), tolerance, placement.tobytes()
     name = ob.name
     last = _known.get(name)
-    if (last is None or last[0] != about) and surface.triangles is not None and len(surface.triangles):
+    if last is not None and last[0] == about:
+        return last[1]
+    if surface.triangles is not None and len(surface.triangles):
         count = functools.partial(
-            found.grid.shares,
+            found.tree.shares,
             surface.vertices,
             surface.triangles,
             tolerance * _EIGHTHS,
             placement,
-            nearest=found.nearest,
         )
         work.later(
             ("shares", name),
@@ -37,7 +38,7 @@ def known(ob, surface, found, tolerance, changed):
             lambda: lambda _progress: count(),
             functools.partial(_finish, name, about, changed),
         )
-    return last and last[1]
+    return None
 
 
 def _finish(name, about, changed, shares, error):

@@ -2,12 +2,13 @@
 """How far the mesh is from its reference, proved."""
 
 import bpy
-import numpy as np
 
-from .. import overlay, report, volume
+from .. import overlay, report, verdict
 from ..overlay import reasons
-from ..units import NO_BREAK, length
+from ..units import length
 from .layout import AMBER, GREEN, GREY, RED, SubPanel, right, text_lines
+
+_COLOURS = {verdict.WITHIN: GREEN, verdict.ONE_WAY: AMBER, verdict.UNDECIDED: AMBER, verdict.BEYOND: RED}
 
 
 class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
@@ -26,40 +27,20 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
 
     def _draw_measured(self, context, ob):
         """The same rows whether there is a measurement or not: buttons below do not jump."""
-        measured = volume.measurement_of(ob)
-        tolerance = volume.tolerance_length(ob.tolvol, volume.shown_size(ob) or 0.0)
+        found = verdict.of(ob)
         column = self.layout.column(align=True)
         column.label(text="Largest Deviation")
         for text, side in (("Mesh", "forward"), ("Reference", "backward")):
             row = column.split(factor=0.4)
             row.label(text=text)
-            value = getattr(measured, side) if measured else None
-            right(row, f"{length(context, value)}  {report.percent(value, tolerance)}" if measured else "\u2013")
-        if not measured:
-            text = "Not measured yet" if ob.tolvol.snapshot else "Set the reference first"
-            if ob.mode != "OBJECT":
-                text = "Measure in Object Mode"
-            text_lines(context, column, text, GREY)
-            return
-        # A tolerance that was changed since is compared with what was measured.
-        same = np.float32(tolerance) == np.float32(measured.tolerance)
-        forward, backward = (
-            getattr(measured, side + "_within") if same else getattr(measured, side) < tolerance * (1 - 1e-6)
-            for side in ("forward", "backward")
-        )
-        if forward and backward:
-            text_lines(context, column, "Within the tolerance both ways, proved", GREEN)
-        elif forward:
-            text_lines(
-                context, column, "Within the tolerance one way, proved: parts of the reference are farther", AMBER
-            )
+            value = getattr(found, side).upper if found else None
+            right(row, f"{length(context, value)}  {report.percent(value, found.tolerance)}" if found else "\u2013")
+        if found:
+            text_lines(context, column, found.line(), _COLOURS[found.kind])
+        elif ob.mode != "OBJECT":
+            text_lines(context, column, "Measure in Object Mode", GREY)
         else:
-            share = (
-                f": {100 * measured.share_outside:.1f}{NO_BREAK}% of the mesh"
-                if same and measured.share_outside
-                else ""
-            )
-            text_lines(context, column, f"Beyond the tolerance{share}", RED)
+            text_lines(context, column, "Not measured yet" if ob.tolvol.snapshot else "Set the reference first", GREY)
 
 
 class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):

@@ -34,7 +34,7 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
         row.menu("TOLVOL_MT_tolerances", text="", icon="PRESET")
         right(layout, self._other_form(context, ob))
         row = layout.row(align=True)
-        row.operator("tolvol.set_reference", text="Update" if settings.snapshot else "Set Reference")
+        row.operator("tolvol.set_reference", text="Replace Reference..." if settings.snapshot else "Set Reference")
         if settings.snapshot:
             row.operator("tolvol.clear_reference", text="", icon="X")
         _status(context, layout, ob)

@@ -38,6 +38,14 @@ std::vector<bool> used_vertices(std::size_t vertex_count, std::span<const glm::u
   return used;
 }
 
+double enclosed_volume(const TriangleMesh& mesh) {
+  double volume = 0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    volume += glm::dot(mesh.vertices[t.x], glm::cross(mesh.vertices[t.y], mesh.vertices[t.z]));
+  }
+  return volume;
+}
+
 std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vertices) {
   // Open addressing, at most half full.
   constexpr std::uint32_t kFree = 0xFFFFFFFFu;

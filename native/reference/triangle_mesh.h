@@ -34,6 +34,9 @@ void validate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> 
 /// For each vertex whether a triangle uses it. O(n + m).
 std::vector<bool> used_vertices(std::size_t vertex_count, std::span<const glm::uvec3> triangles);
 
+/// Six times the volume that a closed mesh encloses, negative where its faces run the other way round. O(m).
+double enclosed_volume(const TriangleMesh& mesh);
+
 /// For each vertex the first vertex with exactly the same coordinates (itself when it is alone). Equal as numbers: -0
 /// is 0. O(n) expected.
 std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vertices);

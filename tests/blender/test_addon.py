@@ -166,7 +166,7 @@ def test_package_holds_what_is_here():
     libraries = {name for name in others if re.fullmatch(r"tolerance_volumes/bin/(tolvol\.|lib).*", name)}
     modules = {name for name in libraries if "/tolvol." in name}
     assert {Path(name).name for name in modules} == {path.name for path in native.path.parent.glob("tolvol.*.so")}
-    assert native.path.name in {Path(name).name for name in modules} and len(shaders) == 3
+    assert native.path.name in {Path(name).name for name in modules} and len(shaders) == 2
     assert others - libraries - shaders == {"tolerance_volumes/LICENSE"}
 
 

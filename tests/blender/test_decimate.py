@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import mesh_io, native, volume
+from addon import mesh_io, native, verdict, volume
 from scenes import activate, assert_within, link, sampled_distance, sheet, torus, world_triangles
 
 PERCENT = 1.0
@@ -161,7 +161,7 @@ def test_saved_and_reopened(tmp_path):
     assert np.array_equal(mesh_io.read_mesh(ob.tolvol.snapshot).triangles, original[1])
     assert json.loads(ob.tolvol.last_run)["output"]["triangles"] == len(again[1])
     assert bpy.ops.tolvol.check() == {"FINISHED"}
-    assert ob.tolvol.measurement.forward_within and ob.tolvol.measurement.backward_within
+    assert verdict.of(ob).forward_within and verdict.of(ob).backward_within
     bpy.ops.tolvol.decimate(tolerance_percent=PERCENT)
     assert len(ob.data.polygons) < len(again[1])
     assert_within(world_triangles(ob), original, tolerance_of(original))
@@ -179,10 +179,10 @@ def test_another_objects_reference():
     # The scan may go: what counts is the snapshot, where it was in the world.
     bpy.data.objects.remove(scan)
     bpy.ops.tolvol.check()
-    assert model.tolvol.measurement.forward_within
+    assert verdict.of(model).forward_within
     model.location.x += 0.5
     bpy.ops.tolvol.check()
-    assert not model.tolvol.measurement.forward_within
+    assert not verdict.of(model).forward_within
     assert model.tolvol.measurement.forward == pytest.approx(0.5, abs=0.1)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import mesh_io, native, volume
+from addon import mesh_io, native, verdict, volume
 from addon.operators.deform import native_lattice
 from scenes import activate, add_object, assert_within, link, sheet, torus, world_triangles
 
@@ -115,7 +115,7 @@ def test_stays_within_the_tolerance_in_the_world(matrix, mode):
     assert judged.upper <= tolerance * (1 + 1e-6)
     assert_within(stored, reference, tolerance, both_ways=False)
     measured = volume.measurement_of(ob)
-    assert measured.forward_within and judged.lower <= measured.forward
+    assert verdict.of(ob).forward_within and judged.lower <= measured.forward
     assert np.array_equal(mesh_io.read_mesh(ob.tolvol.snapshot).triangles, reference[1])
     assert ob.tolvol.lattice == lattice and ob.tolvol.deform_mode == mode
 

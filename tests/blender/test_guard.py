@@ -208,11 +208,9 @@ def test_reasons():
     multires = ob.modifiers.new("multires", "MULTIRES")
     assert "Apply the Multiresolution modifier first" in state(ob)["sculpting"][0]
     ob.modifiers.remove(multires)
-    ob.scale.x = 2
-    bpy.context.view_layer.update()
-    assert "the object was rescaled" in state(ob)["sculpting"][0]
-    ob.scale.x = 1
-    bpy.context.view_layer.update()
+    ob.tolvol.reference_kind = "OBJECT"
+    assert "another one was chosen" in state(ob)["sculpting"][0]
+    ob.tolvol.reference_kind = "SELF"
     ob.tolvol.guard.lattice = True
     assert state(ob)["lattice"] == ("sheet has no Lattice modifier with a lattice", False)
 

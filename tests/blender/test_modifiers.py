@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import fit, mesh_io, native, volume
+from addon import fit, mesh_io, native, verdict, volume
 from addon.evaluation import Evaluation
 from addon.mesh_io import column
 from scenes import activate, add_object, link, torus, world_triangles
@@ -75,7 +75,7 @@ def test_keeps_the_tolerance_and_goes_as_far(kind, matrix):
     stored = world_triangles(ob)
     judged = native.module.hausdorff(*stored, *reference, bound=tolerance)
     assert 0.9 * tolerance < judged.upper <= tolerance
-    assert not ob.modifiers and volume.measurement_of(ob).forward_within
+    assert not ob.modifiers and verdict.of(ob).forward_within
     # Each vertex lies on its way.
     way, went = wished - before, coordinates(ob) - before
     share = (went * way).sum(1) / np.maximum((way * way).sum(1), 1e-20)
@@ -120,7 +120,7 @@ def test_new_object_leaves_this_one_alone():
     assert np.array_equal(coordinates(ob), before) and len(ob.modifiers) == 1 and not new.modifiers
     assert native.module.hausdorff(*world_triangles(new), *reference, bound=tolerance).upper <= tolerance
     assert not np.array_equal(coordinates(new), before)
-    assert volume.measurement_of(new).forward_within and ob.tolvol.snapshot is None
+    assert verdict.of(new).forward_within and ob.tolvol.snapshot is None
     assert np.array_equal(column(new.tolvol.snapshot.vertices, "co", 3), before)
 
 
@@ -191,8 +191,7 @@ def test_fitted_is_within_both_ways_and_much_smaller(kind, settings, matrix):
     for pair in ((stored, reference), (reference, stored)):
         assert native.module.hausdorff(*pair[0], *pair[1], bound=tolerance).upper <= tolerance
     assert len(stored[1]) < 0.85 * len(reference[1])
-    measured = volume.measurement_of(ob)
-    assert measured.forward_within and measured.backward_within
+    assert verdict.of(ob).forward_within and verdict.of(ob).backward_within
     assert not ob.modifiers and ob.data.name == mesh and len(bpy.data.scenes) == 1
 
 
@@ -244,7 +243,7 @@ def test_a_value_that_is_given_is_certified_and_not_searched_for():
     ob.modifiers[0].keyframe_insert("ratio", frame=20)
     bpy.ops.tolvol.fit_modifier(value=0.75)
     assert len(world_triangles(ob)[1]) == pytest.approx(0.75 * before, abs=2)
-    assert volume.measurement_of(ob).forward_within
+    assert verdict.of(ob).forward_within
 
 
 def test_no_setting_and_no_range_of_settings():
@@ -273,5 +272,5 @@ def test_new_object_of_a_fit_keeps_materials_and_uvs():
     assert np.array_equal(coordinates(ob), before) and len(ob.modifiers) == 1 and not new.modifiers
     assert new.data.materials[0].name == "steel" and new.data.uv_layers[0].name == "map"
     assert new.data.vertices[0].groups[0].weight == 1.0 and new.data["made by"] == "hand"
-    assert len(new.data.polygons) < 500 and volume.measurement_of(new).backward_within
+    assert len(new.data.polygons) < 500 and verdict.of(new).backward_within
     assert ob.tolvol.modifiers.result == "OBJECT"

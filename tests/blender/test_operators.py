@@ -7,8 +7,8 @@ import pytest
 from mathutils import Matrix
 
 import addon
-from addon import mesh_io, native, overlay, preferences, volume
-from addon.operators import blocked, presets
+from addon import mesh_io, native, overlay, preferences, report, verdict, volume
+from addon.operators import blocked, presets, reference
 from addon.overlay import draw, reasons
 from scenes import activate, add_object, link, sheet, torus, world_triangles
 
@@ -48,7 +48,7 @@ def test_update_replaces_and_clear_lets_go():
     assert not bpy.ops.tolvol.clear_reference.poll()
 
 
-def test_own_reference_moves_along_and_rescaling_makes_it_stale():
+def test_own_reference_is_carried_along_moved_and_scaled():
     ob = torus(matrix=Matrix.Diagonal((1, 2, 1, 1)))
     bpy.ops.tolvol.set_reference()
     ob.matrix_world = Matrix.Translation((3, 1, 2)) @ Matrix.Rotation(1.1, 4, (1, 1, 0)) @ Matrix.Diagonal((1, 2, 1, 1))
@@ -56,14 +56,45 @@ def test_own_reference_moves_along_and_rescaling_makes_it_stale():
     assert volume.stale_reason(ob) is None
     bpy.ops.tolvol.check()
     assert ob.tolvol.measurement.forward <= 1e-5 and ob.tolvol.measurement.backward <= 1e-5
-    ob.scale.x *= 1.01
+    ob.scale.x *= 1.5
     bpy.context.view_layer.update()
-    assert volume.stale_reason(ob) == "the object was rescaled"
-    assert not bpy.ops.tolvol.decimate.poll() and not bpy.ops.tolvol.check.poll()
-    with pytest.raises(RuntimeError, match="rescaled.*press Update"):
-        bpy.ops.tolvol.decimate()
+    assert volume.stale_reason(ob) is None and verdict.of(ob) is None
+    bpy.ops.tolvol.check()
+    assert verdict.of(ob).forward.upper <= 1e-5 and verdict.of(ob).backward.upper <= 1e-5
+
+
+def test_a_scaled_object_keeps_its_original_as_the_reference():
+    ob = torus()
+    original = mesh_io.read_mesh(ob.data)
+    bpy.ops.tolvol.decimate(tolerance_percent=4)
+    bpy.ops.tolvol.check()
+    before = verdict.of(ob)
+    ob.scale = (10, 10, 10)
+    bpy.context.view_layer.update()
+    reference = volume.reference_of(ob)
+    assert reference.arrays.fingerprint() == original.fingerprint()
+    assert ob.tolvol.snapshot_size == reference.size()
+    bpy.ops.tolvol.check()
+    after = verdict.of(ob)
+    assert after.tolerance == pytest.approx(10 * before.tolerance)
+    assert after.forward.lower > 5 * before.forward.lower > 0 and after.backward_within
+
+
+def test_when_a_reference_that_is_replaced_would_be_lost():
+    ob = torus()
     bpy.ops.tolvol.set_reference()
-    assert volume.stale_reason(ob) is None and bpy.ops.tolvol.decimate.poll()
+    assert not reference.loses_something(ob)
+    ob.scale.x = 2
+    bpy.context.view_layer.update()
+    assert not reference.loses_something(ob), "it was scaled as well"
+    bpy.ops.tolvol.decimate()
+    assert reference.loses_something(ob)
+    assert reference.replace_label(ob) == "Replace Reference by This Mesh"
+    ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", torus("other")
+    activate(ob)
+    assert reference.loses_something(ob) and reference.replace_label(ob) == "Replace Reference by other"
+    bpy.ops.tolvol.set_reference(replace=True)
+    assert not reference.loses_something(ob)
 
 
 def test_choosing_another_reference_makes_it_stale():
@@ -109,14 +140,14 @@ def test_check_measures_both_ways_and_the_share_outside():
     bpy.ops.tolvol.check()
     measured = ob.tolvol.measurement
     assert measured.forward == pytest.approx(0.1, rel=0.011)
-    assert not measured.forward_within and not measured.backward_within
+    assert not verdict.of(ob).forward_within and not verdict.of(ob).backward_within
     # A quarter of the sheet is 0.1 up, and half of the slope (0.1 wide) to it.
     area = 2 * 2 * 0.75 - 2 * 0.1 + 2 * np.hypot(0.1, 0.1) + 2 * 2 * 0.25
     assert measured.share_outside == pytest.approx((2 * 2 * 0.25 + np.hypot(0.1, 0.1)) / area, abs=0.01)
     assert volume.measurement_of(ob) is not None
     ob.tolvol.tolerance_length = 0.2
     bpy.ops.tolvol.check()
-    assert ob.tolvol.measurement.forward_within and ob.tolvol.measurement.backward_within
+    assert verdict.of(ob).forward_within and verdict.of(ob).backward_within
 
 
 def test_measurement_is_dropped_when_mesh_place_or_reference_change():
@@ -178,6 +209,68 @@ def test_select_outside_leaves_an_object_that_is_inside_alone():
     ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.2
     bpy.ops.tolvol.select_outside()
     assert ob.mode == "OBJECT"
+
+
+def lifted_exactly(height):
+    """A flat square at z = 0 and the same at `height`, which float32 has exactly."""
+    ob = sheet(count=2, bumps=0.0)
+    bpy.ops.tolvol.set_reference()
+    for vertex in ob.data.vertices:
+        vertex.co.z = height
+    ob.data.update()
+    activate(ob)
+    ob.tolvol.tolerance_mode = "LENGTH"
+    return ob
+
+
+def test_verdicts_agree_about_what_float32_cannot_tell_from_the_tolerance():
+    """Closer to the tolerance than the steps of Blender's own numbers, above it and below."""
+    height = float(np.float32(0.1))  # 0.100000001490116
+    ob = lifted_exactly(height)
+    ob.tolvol.tolerance_length = 0.1
+    bpy.ops.tolvol.check()
+    assert np.float32(verdict.of(ob).tolerance) == np.float32(verdict.of(ob).forward.upper)
+    assert verdict.of(ob).kind == verdict.BEYOND and "Beyond" in verdict.of(ob).line()
+    bpy.ops.tolvol.select_outside()
+    assert ob.mode == "EDIT"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    ob.tolvol.tolerance_length = 0.3
+    ob.tolvol.tolerance_length = 0.1
+    ob.tolvol.tolerance_length_converted = repr(height * (1 + 1e-9))  # as converted from a percentage
+    assert volume.tolerance_length(ob.tolvol, 1.0) > height
+    assert verdict.of(ob).kind == verdict.WITHIN, "of what was measured, before it is measured again"
+    bpy.ops.tolvol.check()
+    assert verdict.of(ob).kind == verdict.WITHIN
+    bpy.ops.tolvol.select_outside()
+    assert ob.mode == "OBJECT"
+
+
+def test_exactly_at_the_tolerance_is_not_called_beyond():
+    ob = lifted_exactly(0.25)
+    ob.tolvol.tolerance_length = 0.25
+    bpy.ops.tolvol.check()
+    found = verdict.of(ob)
+    assert found.forward.lower <= 0.25 < found.forward.upper and found.kind == verdict.UNDECIDED
+    assert report.percent(found.forward.upper, found.tolerance) == "100 %"
+    bpy.ops.tolvol.select_outside()
+    assert ob.mode == "EDIT", "what is not proved counts as outside"
+
+
+def test_a_measurement_that_cannot_be_read_is_none():
+    ob = torus()
+    bpy.ops.tolvol.set_reference()
+    bpy.ops.tolvol.check()
+    assert verdict.of(ob).kind == verdict.WITHIN
+    ob.tolvol.measurement.forward_digits = "much"
+    assert verdict.of(ob) is None
+    ob.tolvol.measurement.forward_digits = ""
+    assert verdict.of(ob) is None
+
+
+def test_a_little_more_than_the_tolerance_is_not_shown_as_a_percent_more():
+    assert report.percent(1 + 4.75e-8, 1) == "100.0000048 %"
+    assert report.percent(1.005, 1) == "100.50 %"
+    assert report.percent(1 + 1e-13, 1) == "100 %" == report.percent(0.99999, 1)
 
 
 # Refused ------------------------------------------------------------------------------------------------------------
@@ -332,7 +425,7 @@ def test_another_mesh_on_the_object_is_noticed():
 
 
 def assert_whole(ob):
-    assert volume.stale_reason(ob) is None and volume.measurement_of(ob).forward_within
+    assert volume.stale_reason(ob) is None and verdict.of(ob).forward_within
     assert len(ob.tolvol.snapshot.vertices) == 48 * 24 and ob.tolvol.tolerance_percent == 1
     assert bpy.ops.tolvol.check() == {"FINISHED"} and bpy.ops.tolvol.decimate.poll()
 
@@ -415,7 +508,7 @@ def test_undo_of_a_second_decimation_keeps_the_reference_of_the_first():
     activate(ob)
     assert stored(ob) == first and len(ob.tolvol.snapshot.vertices) == 48 * 24
     bpy.ops.tolvol.check()
-    assert ob.tolvol.measurement.forward_within
+    assert verdict.of(ob).forward_within
 
 
 # Settings -----------------------------------------------------------------------------------------------------------
@@ -514,3 +607,59 @@ def test_percent_that_was_typed_is_the_percent_that_is_used():
     ob = torus()
     ob.tolvol.tolerance_percent = 0.1  # not a float32
     assert volume.tolerance_length(ob.tolvol, 1.0) == 0.1 / 100
+
+
+def test_changing_the_unit_keeps_the_tolerance():
+    ob = torus()
+    ob.scale = (0.1, 0.1, 0.1)
+    bpy.context.view_layer.update()
+    size = volume.shown_size(ob)
+    ob.tolvol.tolerance_percent = 0.3
+    wanted = 0.3 / 100 * size
+    ob.tolvol.tolerance_mode = "LENGTH"
+    assert volume.tolerance_length(ob.tolvol, size) == wanted and ob.tolvol.tolerance_length == pytest.approx(wanted)
+    ob.tolvol.tolerance_mode = "PERCENT"
+    assert volume.tolerance_length(ob.tolvol, size) == wanted and ob.tolvol.tolerance_percent == pytest.approx(0.3)
+    bpy.ops.tolvol.decimate()
+    assert verdict.of(ob).kind == verdict.WITHIN
+    # The operator, in Adjust Last Operation, has both forms of what it used.
+    ob.tolvol.tolerance_mode = "LENGTH"
+    assert verdict.of(ob).kind == verdict.WITHIN and verdict.of(ob).tolerance == wanted
+    ob.tolvol.tolerance_length = 0.05
+    assert volume.tolerance_length(ob.tolvol, size) == 0.05
+    ob.tolvol.tolerance_mode = "LENGTH"
+    assert volume.tolerance_length(ob.tolvol, size) == 0.05, "not converted again"
+    ob.tolvol.tolerance_mode = "PERCENT"
+    assert volume.tolerance_length(ob.tolvol, size) == pytest.approx(0.05, rel=1e-15)
+
+
+def test_a_quarter_of_a_metre():
+    """0.3 % of 250 mm are 0.75 mm."""
+    ob = add_object("rod", [(0, 0, 0), (0.15, 0, 0), (0.15, 0.2, 0), (0, 0.2, 0)], [(0, 1, 2, 3)])
+    ob.tolvol.tolerance_percent = 0.3
+    ob.tolvol.tolerance_mode = "LENGTH"
+    assert ob.tolvol.tolerance_length == pytest.approx(0.00075, rel=1e-6)
+    assert bpy.ops.tolvol.decimate(tolerance_percent=0.3) == {"FINISHED"}
+    assert ob.tolvol.tolerance_mode == "PERCENT" and ob.tolvol.tolerance_length == pytest.approx(0.00075, rel=1e-6)
+
+
+def test_a_length_typed_in_a_unit_of_the_scene_is_that_length():
+    ob = torus()
+    settings, units = ob.tolvol, bpy.context.scene.unit_settings
+    settings.tolerance_mode = "LENGTH"
+    for system, scale, metres, wanted in (
+        ("METRIC", 0.001, 0.0005, 0.5),
+        ("METRIC", 0.001, 0.00075, 0.75),
+        ("METRIC", 0.01, 0.0005, 0.05),
+        ("METRIC", 1.0, 0.0005, 0.0005),
+        ("IMPERIAL", 1.0, 0.0254 / 8, 0.003175),
+        ("IMPERIAL", 0.001, 0.3048, 304.8),
+        ("NONE", 0.001, 0.0005, 0.5),
+    ):
+        units.system, units.scale_length = system, scale
+        scale_as_stored = 1.0 if system == "NONE" else units.scale_length
+        settings.tolerance_length = wanted if system == "NONE" else metres / scale_as_stored  # as Blender reads a field
+        assert volume.tolerance_length(settings, 1.0) == pytest.approx(wanted, rel=1e-15), (system, scale, metres)
+    units.system, units.scale_length = "METRIC", 0.001
+    settings.tolerance_length = 0.123456789  # dragged
+    assert np.float32(volume.tolerance_length(settings, 1.0)) == np.float32(0.123456789)

@@ -7,7 +7,7 @@ import pytest
 
 import addon
 from addon import overlay, preferences, volume
-from addon.overlay import legend, reasons, shares, surface
+from addon.overlay import field, legend, reasons, shares, surface, work
 from scenes import add_object, sheet, torus
 
 
@@ -62,11 +62,9 @@ def test_reasons_follow_preference_reference_and_mode(monkeypatch):
     assert "Set the reference" in reasons.hidden(ob)
     with_reference(ob)
     assert reasons.hidden(ob) is None
-    ob.scale.x = 2
-    bpy.context.view_layer.update()
-    assert "out of date: the object was rescaled" in reasons.hidden(ob)
-    ob.scale.x = 1
-    bpy.context.view_layer.update()
+    ob.tolvol.reference_kind = "OBJECT"
+    assert "out of date: another one was chosen" in reasons.hidden(ob)
+    ob.tolvol.reference_kind = "SELF"
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     assert "Sculpt Mode" in reasons.hidden(ob)
     bpy.ops.object.mode_set(mode="SCULPT")
@@ -132,6 +130,37 @@ def test_bands_of_the_legend():
     assert shares.fold(eighths, False) == pytest.approx([0.15, 0.24, 0.33, 0.22, 0.06])
     said = [legend.percent(share).replace("\u00a0", " ") for share in (0, 1e-5, 0.0123, 0.99999, 1)]
     assert said == ["0.0 %", "< 0.1 %", "1.2 %", "> 99.9 %", "100.0 %"]
+
+
+def test_shares_of_another_tolerance_or_mesh_are_left_blank(monkeypatch):
+    ob = with_reference(torus())
+    found = surface.Surface()
+    found.update(ob, bpy.context.evaluated_depsgraph_get())
+    waiting = []
+    monkeypatch.setattr(work, "later", lambda _about, _seconds, prepare, finish: waiting.append((prepare, finish)))
+    made = field._prepare(ob.name, 0.05)(None)
+
+    def known(tolerance):
+        return shares.known(ob, found, made, tolerance, lambda: None)
+
+    def count():
+        prepare, finish = waiting.pop()
+        finish(prepare()(None), None)
+
+    assert known(0.05) is None
+    count()
+    assert sum(known(0.05)) == pytest.approx(1) and not waiting
+    assert known(0.04) is None
+    count()
+    assert known(0.04) is not None and known(0.05) is None
+    count()
+    ob.data.vertices[0].co.z += 1
+    ob.data.update()
+    bpy.context.view_layer.update()
+    found.touch(True)
+    found.update(ob, bpy.context.evaluated_depsgraph_get())
+    assert known(0.05) is None
+    shares.forget()
 
 
 def test_an_object_of_edges_alone_has_no_surface():

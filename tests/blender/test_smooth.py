@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import mesh_io, native, volume
+from addon import mesh_io, native, verdict, volume
 from addon.mesh_io import column
 from scenes import add_object, sheet, torus, world_triangles
 
@@ -50,7 +50,7 @@ def test_stays_within_the_tolerance_in_the_world(matrix):
     assert 0.9 * tolerance < judged.upper <= tolerance
     assert roughness(ob) < 0.8 * rough
     measured = volume.measurement_of(ob)
-    assert measured.forward_within and judged.lower <= measured.forward
+    assert verdict.of(ob).forward_within and judged.lower <= measured.forward
     assert np.array_equal(mesh_io.read_mesh(ob.tolvol.snapshot).triangles, reference[1])
     assert ob.tolvol.smooth.iterations == 60 and ob.tolvol.smooth.method == "LAPLACIAN"
 
@@ -188,7 +188,7 @@ def test_in_edit_mode_the_selected_vertices_are_smoothed_in_one_undo_step():
     assert np.array_equal(stored(ob), after)
     bpy.ops.object.mode_set(mode="OBJECT")
     assert np.array_equal(coordinates(ob), after)
-    assert volume.measurement_of(ob).forward_within
+    assert verdict.of(ob).forward_within
 
 
 def test_in_edit_mode_what_is_not_yet_in_the_mesh_counts():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The grid that viewports show distances from."""
+"""The tree that viewports show distances from."""
 
 import numpy as np
 import pytest
@@ -10,69 +10,55 @@ import meshes
 
 def display(mesh=None, tolerance=0.1, to_world=None, **options):
     mesh = mesh or meshes.sphere(3)
-    return tolvol.DisplayGrid(tolvol.ToleranceVolume(*mesh, tolerance, to_world), **options)
+    return tolvol.DisplayTree(tolvol.ToleranceVolume(*mesh, tolerance, to_world), **options)
 
 
 @pytest.mark.parametrize("scale", [1, -2])
-def test_distances_and_triangles_are_at_their_places_in_the_world(scale):
+def test_triangles_are_at_their_places_in_the_world(scale):
     mesh = meshes.sphere(3)
     to_world = meshes.matrix(np.diag([scale, abs(scale), abs(scale)]), (7, 8, 9))
-    grid = display(mesh, 0.1 * abs(scale), to_world)
-    assert grid.closed and grid.precision == 4 and grid.spacing == pytest.approx(0.025 * abs(scale))
-    z, y, x = np.indices(grid.distances.shape)
-    nodes = np.stack([x, y, z], -1).reshape(-1, 3)
-    to_nodes = np.linalg.inv(grid.to_nodes)
-    world = nodes @ to_nodes[:3, :3].T + to_nodes[:3, 3]
-    expected = np.linalg.norm(world - (7, 8, 9), axis=1) - abs(scale)
-    near = np.abs(expected) < 0.1 * abs(scale)
-    assert near.sum() > 1000
-    shown = grid.distances.reshape(-1) * grid.spacing
-    assert np.abs(shown - expected)[near].max() < 0.04 * abs(scale), "the sphere has flat faces"
-    ids = grid.nearest.reshape(-1)
-    corners = grid.corners
-    assert corners.shape == (len(mesh[1]), 3, 3)
-    to_triangle = corners[ids[near]].mean(1) - nodes[near]
-    assert (np.linalg.norm(to_triangle, axis=1) * grid.spacing < 0.35 * abs(scale)).all()
+    tree = display(mesh, 0.1 * abs(scale), to_world)
+    assert tree.closed
+    assert tree.corners.shape == (3 * len(mesh[1]), 4) and len(tree.nodes) % 4 == 0
+    from_frame = np.linalg.inv(tree.to_frame)
+    corners = (tree.corners[:, :3] @ from_frame[:3, :3].T + from_frame[:3, 3]).reshape(-1, 3, 3)
+    world = (mesh[0] @ to_world[:3, :3].T + to_world[:3, 3])[mesh[1]]
+    assert np.allclose(np.sort(corners.mean(1), 0), np.sort(world.mean(1), 0), atol=1e-5)
+    assert np.linalg.norm(tree.to_frame[:3, 0]) == pytest.approx(tree.scale)
     outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    centre = grid.to_nodes @ (7, 8, 9, 1)
-    assert (np.einsum("ij,ij->i", outward, corners.mean(1) - centre[:3]) > 0).all()
-    for values in (grid.distances, grid.nearest, grid.corners):
+    assert (np.einsum("ij,ij->i", outward, corners.mean(1) - (7, 8, 9)) > 0).all()
+    lower, upper = tree.nodes[2], tree.nodes[3]
+    assert (lower[3], upper[3]) == (0, len(mesh[1]))
+    assert np.array_equal(lower[:3], tree.corners[:, :3].min(0))
+    assert np.array_equal(upper[:3], tree.corners[:, :3].max(0))
+    for values in (tree.nodes, tree.corners):
         assert not values.flags.writeable
 
 
-@pytest.mark.parametrize("nearest", [False, True])
-def test_shares_follow_the_mesh_its_place_and_the_edges(nearest):
+def test_shares_follow_the_mesh_its_place_and_the_edges():
     sphere = meshes.sphere(4)
-    grid = display(sphere)
+    tree = display(sphere)
     edges = (-0.1, 0, 0.03, 0.1)
-    assert np.allclose(grid.shares(*meshes.sphere(4, 1.06), edges, nearest=nearest), [0, 0, 0, 1, 0])
-    assert np.allclose(grid.shares(*meshes.sphere(4, 0.95), edges, nearest=nearest), [0, 1, 0, 0, 0])
-    assert np.allclose(grid.shares(*meshes.sphere(4, 1.5), edges, nearest=nearest), [0, 0, 0, 0, 1])
-    shifted = grid.shares(*sphere, edges, to_world=meshes.matrix(np.eye(3), (0, 0, 0.09)), nearest=nearest)
+    assert np.allclose(tree.shares(*meshes.sphere(4, 1.06), edges), [0, 0, 0, 1, 0])
+    assert np.allclose(tree.shares(*meshes.sphere(4, 0.95), edges), [0, 1, 0, 0, 0])
+    assert np.allclose(tree.shares(*meshes.sphere(4, 1.5), edges), [0, 0, 0, 0, 1])
+    shifted = tree.shares(*sphere, edges, to_world=meshes.matrix(np.eye(3), (0, 0, 0.09)))
     assert shifted[1] == pytest.approx(0.5, abs=0.03) and sum(shifted) == pytest.approx(1)
-    assert grid.shares(*sphere, edges, nearest=nearest, threads=1) == grid.shares(*sphere, edges, nearest=nearest)
+    assert tree.shares(*sphere, edges, threads=1) == tree.shares(*sphere, edges)
 
 
-def test_limits_are_kept_and_open_references_said():
-    plate = meshes.plate(9)
-    assert not display(plate).closed
-    coarse = display(plate, longest=20)
-    assert max(coarse.distances.shape) <= 20 and coarse.precision < 4
-    assert display(plate, nodes=5000).distances.size <= 5000
-    assert display(plate, precision=2).precision == 2
+def test_open_references_are_said():
+    assert not display(meshes.plate(9)).closed
 
 
 def test_bad_input_is_named():
-    for options, said in (({"precision": 0}, "precision"), ({"longest": 3}, "16 nodes"), ({"nodes": 10}, "4096")):
-        with pytest.raises(tolvol.InvalidInput, match=said):
-            display(**options)
-    grid = display()
+    tree = display()
     for edges in ((0, float("nan")), (1, 0)):
         with pytest.raises(tolvol.InvalidInput, match="ascending"):
-            grid.shares(*meshes.sphere(2), edges)
+            tree.shares(*meshes.sphere(2), edges)
     with pytest.raises(tolvol.InvalidInput, match="9"):
-        grid.shares(np.zeros((3, 3)), np.array([[0, 1, 9]]), (0,))
+        tree.shares(np.zeros((3, 3)), np.array([[0, 1, 9]]), (0,))
     progress = tolvol.Progress()
     progress.cancel()
     with pytest.raises(tolvol.Cancelled):
-        display(progress=progress)
+        display(meshes.sphere(5), progress=progress)

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 import scenes
-from addon import job, mesh_io, native, volume
+from addon import job, mesh_io, native, verdict, volume
 from addon.panels import decimate
 from window import (
     centre,
@@ -17,11 +17,13 @@ from window import (
     key,
     on_screen,
     open_tab,
+    pixels,
     press,
     region,
     reset,
     screenshot,
     view,
+    window_context,
     xdotool,
 )
 
@@ -202,7 +204,9 @@ def test_reference_check_and_select_outside():
     yield 1.0
     screenshot("8 checked")
     measured = suzanne().tolvol.measurement
-    assert not measured.forward_within and 0.05 < measured.forward < 0.2 and 0 < measured.share_outside < 0.2
+    assert (
+        not verdict.of(suzanne()).forward_within and 0.05 < measured.forward < 0.2 and 0 < measured.share_outside < 0.2
+    )
     yield from press("tolvol.select_outside", across=0.7)
     yield from finished(lambda: suzanne().mode == "EDIT")
     yield 0.5
@@ -219,15 +223,15 @@ def test_what_is_in_the_way_is_said():
     yield from reset(monkey)
     yield from open_tab()
     yield from press("tolvol.set_reference")
-    suzanne().scale.x = 2
+    suzanne().tolvol.reference_kind = "OBJECT"
     yield 0.5
-    screenshot("11 rescaled")
+    screenshot("11 another reference")
     before = stored()
     yield from press("tolvol.decimate")  # greyed
     yield 1.0
     assert stored() == before
     xdotool("mousemove", *centre())
-    suzanne().scale.x = 1
+    suzanne().tolvol.reference_kind = "SELF"
     suzanne().modifiers.new("on top", "WAVE")
     twin = suzanne().copy()
     bpy.context.collection.objects.link(twin)
@@ -261,9 +265,88 @@ def test_a_damaged_file_breaks_no_panel():
         suzanne().tolvol.measurement.forward = float("nan")
         view()[1].tag_redraw()
         yield from finished(lambda: any("damaged" in text for text in said))
-        suzanne().tolvol.snapshot_size = 0.0
+        suzanne().tolvol.snapshot.clear_geometry()
+        volume._forget_all()
         view()[1].tag_redraw()
         yield 1.0
         screenshot("damaged")
     finally:
         decimate.text_lines = text_lines
+
+
+def sidebar_pixels():
+    place = region("UI")
+    x, y = on_screen(place, 0, 0)
+    return pixels()[y : y + place.height, x : x + place.width]
+
+
+def test_the_answer_of_check_is_seen_without_moving_the_mouse():
+    yield from reset(monkey)
+    yield from open_tab()
+    yield from press("tolvol.set_reference")
+    xdotool("mousemove", *centre())
+    yield 2.0
+    before, patience = sidebar_pixels(), job._PATIENCE
+    job._PATIENCE = 0.0  # however quick the machine is, it ends in a timer
+    with window_context():
+        bpy.ops.tolvol.check("INVOKE_DEFAULT")
+    job._PATIENCE = patience
+    yield from finished(lambda: verdict.of(suzanne()) is not None)
+    yield 1.0
+    seen = sidebar_pixels()
+    screenshot("14 checked without the mouse")
+    view()[1].tag_redraw()
+    yield 1.0
+    assert (seen != before).any()
+    assert (seen == sidebar_pixels()).all()
+
+
+def test_what_replaces_the_original_asks():
+    yield from reset(scenes.torus)
+    yield from open_tab()
+    ob = bpy.data.objects["torus"]
+    yield from press("tolvol.decimate")
+    yield from finished(lambda: len(ob.data.polygons) < 500)
+    original = ob.tolvol.snapshot_fingerprint
+    ob.scale = (1.5, 1.5, 1.5)
+    yield 0.5
+    assert len(ob.tolvol.snapshot.polygons) == 2304
+    screenshot("15 scaled")
+    yield from press("tolvol.set_reference")
+    yield 1.0
+    screenshot("16 asked")
+    assert ob.tolvol.snapshot_fingerprint == original
+    xdotool("mousemove", *centre())
+    yield
+    key("Escape")
+    yield 0.5
+    assert ob.tolvol.snapshot_fingerprint == original
+    yield from press("tolvol.set_reference")
+    yield 0.5
+    key("Down")
+    key("Return")
+    yield from finished(lambda: ob.tolvol.snapshot_fingerprint != original)
+    assert ob.tolvol.snapshot_fingerprint == mesh_io.read_mesh(ob.data).fingerprint()
+    key("ctrl+z")
+    yield from finished(lambda: bpy.data.objects["torus"].tolvol.snapshot_fingerprint == original)
+
+
+def test_a_length_typed_in_millimetres():
+    yield from reset(scenes.torus)
+    units = bpy.context.scene.unit_settings
+    units.scale_length, units.length_unit = 0.001, "MILLIMETERS"
+    ob = bpy.data.objects["torus"]
+    ob.tolvol.tolerance_mode = "LENGTH"
+    yield from open_tab()
+    place = yield from find_property("tolerance_length", 0.6)
+    xdotool("mousemove", *place)
+    yield 0.6
+    key("Return")
+    yield 0.5
+    xdotool("key", "ctrl+a", "type", "0.5mm")
+    key("Return")
+    yield from finished(lambda: abs(ob.tolvol.tolerance_length - 0.5) < 1e-3)
+    yield 0.5
+    screenshot("17 typed")
+    assert volume.tolerance_length(ob.tolvol, 1) == 0.5, ob.tolvol.tolerance_length
+    units.scale_length, units.length_unit = 1.0, "METERS"

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from mathutils import Euler, Vector
 
-from addon import guard, volume
+from addon import guard, verdict, volume
 from test_guard import all_panels, only_guard_panel
 from test_panel import finished
 from test_show_deviation import sides, solid_monkey, stroke, surface, the_object, to_mode
@@ -72,8 +72,8 @@ def test_pictures_for_the_documentation():
     yield from finished(lambda: volume.measurement_of(the_object()) is not None)
     yield from settled()
     picture("panel")
-    measured = volume.measurement_of(the_object())
-    assert measured.forward_within and measured.backward_within and min(sides()) > 300 and magenta() == 0
+    found = verdict.of(the_object())
+    assert found.forward_within and found.backward_within and min(sides()) > 300 and magenta() == 0
     space.overlay.show_wireframes = False
     space.show_gizmo = space.show_region_toolbar = space.overlay.show_cursor = True
     bpy.context.preferences.system.viewport_aa = "OFF"

@@ -4,7 +4,8 @@
 import bpy
 import numpy as np
 
-from addon import native, overlay
+import scenes
+from addon import native, overlay, verdict
 from test_panel import finished
 from window import (
     centre,
@@ -147,6 +148,77 @@ def test_sides_of_a_closed_reference():
     assert sides()[1] > blue + 300
 
 
+def thin_sheets():
+    """Open and thin: two wavy sheets, a hundredth of the tolerance apart, with turned fronts."""
+    vertices, faces = scenes.sheet_arrays(count=60)
+    other = vertices + np.array([0, 0, 2e-4], np.float32)
+    both = np.concatenate([faces, faces[:, ::-1] + len(vertices)])
+    ob = scenes.add_object("sheets", np.concatenate([vertices, other]), both)
+    shown_as_magnitude(ob, 1)
+
+
+def fine_monkey():
+    """Open at the eyes, of 62,976 triangles."""
+    bpy.ops.mesh.primitive_monkey_add()
+    ob = bpy.context.object
+    ob.modifiers.new("subdivision", "SUBSURF").levels = 3
+    with bpy.context.temp_override(window=view()[0], area=view()[1], object=ob):
+        bpy.ops.object.modifier_apply(modifier="subdivision")
+    shown_as_magnitude(ob, 0.05)
+
+
+def shown_as_magnitude(ob, percent):
+    ob.tolvol.tolerance_percent = percent
+    ob.tolvol.deviation_kind, ob.tolvol.deviation_opacity = "MAGNITUDE", 1
+    view()[1].spaces[0].region_3d.view_distance = 5
+    view()[1].spaces[0].overlay.show_outline_selected = False
+
+
+def counted():
+    """The tolerance that the legend's shares are of; None while they are blank."""
+    last = overlay.shares._known.get(the_object().name)
+    return last and last[0][2]
+
+
+def far():
+    """Pixels with the colours of a deviation of a quarter of the tolerance and more, lit or not: green, blue and violet
+    where nothing is yellow."""
+    red, green, blue = np.moveaxis(surface(), -1, 0)
+    return int(((blue > 60) & (np.maximum(abs(red - green), abs(green - blue)) > 25)).sum())
+
+
+def test_what_deviates_by_nothing_is_drawn_as_nothing():
+    for make in (thin_sheets, fine_monkey):
+        yield from reset(make)
+        yield from open_tab()
+        yield from press("tolvol.set_reference")
+        xdotool("mousemove", *beside())
+        space = view()[1].spaces[0]
+        space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
+        space.show_gizmo = space.overlay.show_object_origins = space.overlay.show_cursor = False
+        yield from finished(lambda: near() > 15_000)
+        yield 1.0
+        screenshot(f"overlay 7 {make.__name__} untouched")
+        assert striped() == 0 and far() == 0, make
+        the_object().tolvol.deviation_kind = "SIGNED"
+        yield 1.0
+        assert striped() == 0
+    # Nor is there a speck where the result is proved.
+    the_object().tolvol.tolerance_percent = 0.1
+    yield from press("tolvol.decimate")
+    yield from finished(lambda: verdict.of(the_object()) is not None)
+    xdotool("mousemove", *beside())
+    yield from finished(lambda: counted() == 0.1 / 100 * the_object().tolvol.snapshot_size)
+    yield 1.0
+    screenshot("overlay 8 proved")
+    assert verdict.of(the_object()).kind == verdict.WITHIN and striped() == 0
+    the_object().tolvol.tolerance_percent = 0.05
+    yield from finished(lambda: striped() > 1000)
+    screenshot("overlay 9 half the tolerance")
+    space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = True
+    space.show_gizmo = space.overlay.show_object_origins = space.overlay.show_cursor = True
+
+
 def stroke(start, end, steps=8):
     """Draws with the brush."""
     xdotool("mousemove", *start, "sleep", "0.2", "mousedown", 1)
@@ -184,9 +256,9 @@ def test_views_places_and_switches():
     yield 0.7
     assert near() > 30_000, "moved and mirrored"
     the_object().scale.x *= 2
-    yield 0.7
-    screenshot("overlay 4 rescaled")
-    assert gone()
+    yield from finished(lambda: near() > 40_000)
+    screenshot("overlay 4 scaled with its reference")
+    assert striped() == 0
     the_object().scale.x /= 2
     the_object().name = "another"
     yield from finished(lambda: near() > 30_000)

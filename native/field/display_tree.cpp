@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "field/display_tree.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+
+#include "reference/closest_point.h"
+#include "reference/errors.h"
+#include "reference/parallel.h"
+#include "reference/pseudonormals.h"
+
+namespace tolvol {
+namespace {
+
+constexpr std::size_t kLeaf = 4;  // triangles in a leaf, at most
+constexpr double kTie = 2e-6;     // frame lengths; the same in surface_distance.glsl
+constexpr double kTiny = 1e-30;
+constexpr double kSamples = 1 << 16;
+// Samples of a triangle, or the first ones of neighbouring triangles, are spread evenly by these steps [M. Roberts, The
+// Unreasonable Effectiveness of Quasirandom Sequences, 2018].
+constexpr double kStepU = 0.7548776662466927, kStepV = 0.5698402909980532;
+
+/// Sorts the triangles so that each half of each range lies together.
+class Split {
+ public:
+  Split(const TriangleMesh& mesh, Progress* progress) : progress_(progress), order_(mesh.triangles.size()) {
+    std::iota(order_.begin(), order_.end(), 0u);
+    centres_.reserve(mesh.triangles.size());
+    for (const glm::uvec3& t : mesh.triangles) {
+      centres_.push_back(mesh.vertices[t.x] + mesh.vertices[t.y] + mesh.vertices[t.z]);
+    }
+  }
+
+  /// leaves: how many this range is cut into, a power of two.
+  void cut(std::size_t first_leaf, std::size_t leaves, std::size_t all_leaves) {
+    if (leaves == 1) return;
+    const std::size_t half = leaves / 2;
+    const auto at = [&](std::size_t leaf) { return order_.begin() + begin_of(leaf, all_leaves); };
+    const auto begin = at(first_leaf), middle = at(first_leaf + half), end = at(first_leaf + leaves);
+    if (progress_ && end - begin > 4096) progress_->update(0);
+    Box box;
+    for (auto i = begin; i != end; ++i) box.add(centres_[*i]);
+    const glm::dvec3 side = box.upper - box.lower;
+    const int axis = side.x >= side.y && side.x >= side.z ? 0 : side.y >= side.z ? 1 : 2;
+    // Equal centres in the order of their numbers: the same tree on every machine.
+    std::nth_element(begin, middle, end, [&](std::uint32_t i, std::uint32_t j) {
+      const double u = centres_[i][axis], v = centres_[j][axis];
+      return u != v ? u < v : i < j;
+    });
+    cut(first_leaf, half, all_leaves);
+    cut(first_leaf + half, half, all_leaves);
+  }
+
+  std::ptrdiff_t begin_of(std::size_t leaf, std::size_t all_leaves) const {
+    return static_cast<std::ptrdiff_t>(leaf * order_.size() / all_leaves);
+  }
+  const std::vector<std::uint32_t>& order() const { return order_; }
+
+ private:
+  Progress* progress_;
+  std::vector<std::uint32_t> order_;
+  std::vector<glm::dvec3> centres_;
+};
+
+}  // namespace
+
+DisplayTree::DisplayTree(const TriangleMesh& reference, bool mirrored, Progress* progress) {
+  const std::size_t count = reference.triangles.size();
+  if (count > kMost) throw InvalidInput("a reference of more than 16,777,216 triangles cannot be shown");
+  if (progress) progress->begin("preparing");
+  closed = Pseudonormals(reference).closed();
+  const bool turned = closed ? enclosed_volume(reference) < 0 : mirrored;
+  const std::size_t leaves = std::bit_ceil((count + kLeaf - 1) / kLeaf);
+  Split split(reference, progress);
+  split.cut(0, leaves, leaves);
+  corners.reserve(3 * count);
+  for (const std::uint32_t i : split.order()) {
+    const glm::uvec3& t = reference.triangles[i];
+    for (const std::uint32_t v : {t.x, turned ? t.z : t.y, turned ? t.y : t.z}) {
+      corners.emplace_back(glm::vec3(reference.vertices[v]), 0);
+    }
+  }
+  nodes.assign(2 * leaves, {glm::vec3(0), 0, glm::vec3(0), 0});
+  for (std::size_t leaf = 0; leaf < leaves; ++leaf) {
+    const std::ptrdiff_t begin = split.begin_of(leaf, leaves), end = split.begin_of(leaf + 1, leaves);
+    Node node{glm::vec3(HUGE_VALF), static_cast<float>(begin), glm::vec3(-HUGE_VALF), static_cast<float>(end)};
+    for (std::ptrdiff_t corner = 3 * begin; corner < 3 * end; ++corner) {
+      const glm::vec3 p(corners[static_cast<std::size_t>(corner)]);
+      node.lower = glm::min(node.lower, p);
+      node.upper = glm::max(node.upper, p);
+    }
+    nodes[leaves + leaf] = node;
+  }
+  for (std::size_t i = leaves - 1; i > 0; --i) {
+    const Node &a = nodes[2 * i], &b = nodes[2 * i + 1];
+    nodes[i] = {glm::min(a.lower, b.lower), a.begin, glm::max(a.upper, b.upper), b.end};
+  }
+}
+
+double DisplayTree::distance(const glm::dvec3& place, double reach) const {
+  const std::size_t leaves = nodes.size() / 2;
+  const auto from_box = [&](std::size_t i) {
+    const glm::dvec3 lower(nodes[i].lower), upper(nodes[i].upper);
+    return glm::length(glm::max(glm::max(lower - place, place - upper), 0.0));
+  };
+  const auto from_triangle = [&](std::size_t t) {
+    return place - closest_point(place, corners[3 * t], corners[3 * t + 1], corners[3 * t + 2]).point;
+  };
+  double found = reach, steepest = 0, side = 1;
+  std::size_t i = 1;
+  if (from_box(i) > found) return found;
+  // The triangles in the nearer half of the nearer half are near: a bound to begin with, whatever the reach.
+  while (i < leaves) i = from_box(2 * i) <= from_box(2 * i + 1) ? 2 * i : 2 * i + 1;
+  for (auto t = static_cast<std::size_t>(nodes[i].begin); t < static_cast<std::size_t>(nodes[i].end); ++t) {
+    found = std::min(found, glm::length(from_triangle(t)));
+  }
+  i = 1;
+  do {
+    const Node& node = nodes[i];
+    if (from_box(i) <= found + kTie) {
+      if (i < leaves) {
+        i *= 2;
+        continue;
+      }
+      for (auto t = static_cast<std::size_t>(node.begin); t < static_cast<std::size_t>(node.end); ++t) {
+        const glm::dvec3 a(corners[3 * t]), b(corners[3 * t + 1]), c(corners[3 * t + 2]);
+        const glm::dvec3 away = from_triangle(t), normal = glm::cross(b - a, c - a);
+        const double d = glm::length(away), across = glm::dot(away, normal) / std::max(glm::length(normal), kTiny);
+        // Of two faces at an edge that it is equally far from, the one that it is more above tells the side.
+        if (!(d < found + kTie) || (d > found - kTie && std::abs(across) < steepest)) continue;
+        found = std::min(d, found), steepest = std::abs(across), side = across < 0 ? -1 : 1;
+      }
+    }
+    // The next part that is not within this one: up as long as this is the second half, then to the other half.
+    for (++i; i % 2 == 0; i /= 2) {
+    }
+  } while (i != 1);
+  return side * found;
+}
+
+std::vector<double> area_shares(const DisplayTree& tree, std::span<const glm::dvec3> vertices,
+                                std::span<const glm::uvec3> triangles, std::span<const double> edges,
+                                unsigned threads) {
+  std::vector<double> area(triangles.size());
+  double whole = 0;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const glm::dvec3 a = vertices[triangles[i].x];
+    area[i] = glm::length(glm::cross(vertices[triangles[i].y] - a, vertices[triangles[i].z] - a));
+    whole += area[i];
+  }
+  const std::size_t bins = edges.size() + 1;
+  std::vector<double> shares(bins, 0);
+  if (!(whole > 0)) return shares;
+  double reach = 0;
+  for (const double edge : edges) reach = std::max(reach, 1.001 * std::abs(edge) + 2 * DisplayTree::kRounding);
+  // A sum for each block, added in order: the same for any number of threads.
+  constexpr std::size_t kBlock = 1024;
+  std::vector<double> sums((triangles.size() + kBlock - 1) / kBlock * bins, 0);
+  parallel_for(triangles.size(), kBlock, threads, [&](std::size_t begin, std::size_t end) {
+    double* sum = &sums[begin / kBlock * bins];
+    for (std::size_t i = begin; i < end; ++i) {
+      const glm::dvec3 a = vertices[triangles[i].x], ab = vertices[triangles[i].y] - a,
+                       ac = vertices[triangles[i].z] - a;
+      const auto count = 1 + static_cast<std::size_t>(area[i] / whole * kSamples);
+      for (std::size_t k = i; k < i + count; ++k) {
+        double u = glm::fract(kStepU * static_cast<double>(k)), v = glm::fract(kStepV * static_cast<double>(k));
+        if (u + v > 1) u = 1 - u, v = 1 - v;
+        const double d = tree.distance(a + u * ab + v * ac, reach);
+        const double shown = std::copysign(std::max(std::abs(d) - DisplayTree::kRounding, 0.0), d);
+        sum[std::upper_bound(edges.begin(), edges.end(), shown) - edges.begin()] +=
+            area[i] / (static_cast<double>(count) * whole);
+      }
+    }
+  });
+  for (std::size_t i = 0; i < sums.size(); ++i) shares[i % bins] += sums[i];
+  return shares;
+}
+
+}  // namespace tolvol
