@@ -6,6 +6,7 @@
 
 #include "field/scatter.h"
 #include "field/signs.h"
+#include "reference/call.h"
 #include "reference/closest_point.h"
 #include "reference/parallel.h"
 #include "reference/pseudonormals.h"
@@ -32,6 +33,7 @@ double enclosed_volume(const TriangleMesh& mesh) {
 }  // namespace
 
 DisplayGrid::DisplayGrid(const TriangleMesh& reference, bool mirrored, double tolerance, const Options& options) {
+  const Call call(options.progress);
   const std::vector<bool> used = used_vertices(reference.vertices.size(), reference.triangles);
   Box box;
   for (std::size_t i = 0; i < used.size(); ++i) {
@@ -56,6 +58,7 @@ DisplayGrid::DisplayGrid(const TriangleMesh& reference, bool mirrored, double to
   for (float& d : grid.distance) d *= to_spacings;
   corners.reserve(3 * reference.triangles.size());
   for (const glm::uvec3& t : reference.triangles) {
+    poll_at(corners.size() / 3);
     for (const std::uint32_t v : {t.x, turned ? t.z : t.y, turned ? t.y : t.z}) {
       corners.emplace_back((reference.vertices[v] - grid.origin) / grid.spacing);
     }
@@ -125,6 +128,7 @@ std::vector<double> area_shares(const DisplayGrid& display, bool nearest, std::s
     double* sum = &sums[begin / kBlock * bins];
     for (std::size_t i = begin; i < end; ++i) {
       const glm::dvec3 a = nodes[triangles[i].x], ab = nodes[triangles[i].y] - a, ac = nodes[triangles[i].z] - a;
+      poll_at(i);
       const auto count = 1 + static_cast<std::size_t>(area[i] / whole * kSamples);
       for (std::size_t k = i; k < i + count; ++k) {
         double u = glm::fract(kStepU * static_cast<double>(k)), v = glm::fract(kStepV * static_cast<double>(k));

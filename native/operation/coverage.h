@@ -124,6 +124,7 @@ class Coverage::Trial {
   std::vector<Part> stack_;
   const Hierarchy* hierarchy_ = nullptr;
   std::size_t budget_ = 0;     ///< pieces that this change may still add
+  std::size_t looked_ = 0;     ///< at candidates since the last poll
   std::uint32_t last_ = 0;     ///< the candidate that took the last piece
   std::uint32_t suspect_ = 0;  ///< the one whose pieces failed last: tried first, to be refused soon
 };

@@ -7,6 +7,7 @@
 #include "operation/constrain.h"
 #include "operation/guard.h"
 #include "python/arrays.h"
+#include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
 #include "reference/errors.h"
@@ -47,7 +48,7 @@ Constrained constrain_arrays(const py::object& before, const py::object& after, 
   options.progress = progress;
   ConstrainResult r;
   {
-    const py::gil_scoped_release release;
+    const Interruptible call(progress);
     r = constrain(from.values, to.values, indices, corners, placement, volume.native, options);
   }
   Constrained result{from_vertices(r.vertices, from.storage), from_vector<double>(r.factors), {}};
@@ -92,16 +93,16 @@ std::unique_ptr<LockedGuard> make_guard(const py::object& positions, const py::o
   std::vector<std::uint32_t> indices = to_faces(faces, "faces", corners);
   const glm::dmat4 matrix = to_matrix(to_world);
   const Guard::Options options{to_outside(outside), to_threads(threads), progress};
-  const py::gil_scoped_release release;
+  const Interruptible call(progress);
   return std::unique_ptr<LockedGuard>(
       new LockedGuard{{values(p), std::move(indices), corners, matrix, volume.native, options}, {}});
 }
 
-py::tuple guard_constrain(LockedGuard& guard, const py::object& positions) {
+py::tuple guard_constrain(LockedGuard& guard, const py::object& positions, Progress* progress) {
   const Positions p = to_positions(positions);
   Guard::Correction correction;
   {
-    const py::gil_scoped_release release;
+    const Interruptible call(progress);
     const std::lock_guard lock(guard.mutex);
     correction = guard.native.constrain(values(p));
   }
@@ -112,7 +113,7 @@ py::tuple guard_constrain(LockedGuard& guard, const py::object& positions) {
 
 void guard_reset(LockedGuard& guard, const py::object& positions, Progress* progress) {
   const Positions p = to_positions(positions);
-  const py::gil_scoped_release release;
+  const Interruptible call(progress);
   const std::lock_guard lock(guard.mutex);
   guard.native.reset(values(p), progress);
 }
@@ -155,14 +156,14 @@ void bind_constrain(py::module_& module) {
            "positions: (n, 3) float32, local, the state to start from. faces, outside: as for constrain. Raises "
            "InvalidInput and\n"
            "Cancelled. Cost: about 1 us a vertex.")
-      .def("constrain", &guard_constrain, py::arg("positions"),
+      .def("constrain", &guard_constrain, py::arg("positions"), py::arg("progress") = py::none(),
            "Takes the mesh as it was edited since the last call and returns (indices (k,) int32, positions (k, 3) "
            "float32): the\n"
            "vertices that have to go back, and where to; write them before the next call. All others stay bit for bit "
            "as they came.\n"
-           "positions: (n, 3) float32, not copied when contiguous. Undo is an edit like others. Raises InvalidInput, "
-           "keeping the\n"
-           "state, for another number of vertices and for one that moved and is not finite.")
+           "positions: (n, 3) float32, not copied when contiguous. Undo is an edit like others. Raises InvalidInput "
+           "for another\n"
+           "number of vertices and for one that moved and is not finite, and Cancelled; both keep the state.")
       .def("reset", &guard_reset, py::arg("positions"), py::arg("progress") = py::none(),
            "Starts anew from these positions. Raises InvalidInput, keeping the state, when faces are outside; "
            "Cancelled. Cost: about\n"

@@ -5,6 +5,7 @@
 
 #include "field/display_grid.h"
 #include "python/arrays.h"
+#include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
 #include "reference/errors.h"
@@ -28,7 +29,7 @@ std::unique_ptr<Display> make_display(const Volume& volume, double precision, in
   if (longest < 16 || nodes < 4096) throw InvalidInput("a grid needs at least 16 nodes along an axis and 4096 in all");
   const ToleranceVolume& v = volume.native;
   const DisplayGrid::Options options{precision, longest, nodes, to_threads(threads), progress};
-  const py::gil_scoped_release release;
+  const Interruptible call(progress);
   return std::unique_ptr<Display>(
       new Display{{v.reference(), v.mirrored(), v.frame_tolerance(), options}, v.frame(), v.frame_tolerance()});
 }
@@ -63,12 +64,13 @@ py::array_t<double> to_nodes(const Display& display) {
 }
 
 std::vector<double> shares(const Display& display, const py::object& vertices, const py::object& triangles,
-                           std::vector<double> edges, const py::object& to_world, bool nearest, int threads) {
+                           std::vector<double> edges, const py::object& to_world, bool nearest, int threads,
+                           Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const Placement placement = Placement(to_matrix(to_world), v.storage).in(display.frame);
   const unsigned count = to_threads(threads);
-  const py::gil_scoped_release release;
+  const Interruptible call(progress);
   validate(v.values, t);
   for (std::size_t i = 0; i < edges.size(); ++i) {
     edges[i] *= display.frame.scale() / display.native.grid.spacing;
@@ -125,6 +127,7 @@ void bind_display(py::module_& module) {
           "guess.")
       .def("shares", &shares, py::arg("vertices"), py::arg("triangles"), py::arg("edges"),
            py::arg("to_world") = py::none(), py::arg("nearest") = false, py::arg("threads") = 0,
+           py::arg("progress") = py::none(),
            "The shares of a mesh's area, 0 to 1, whose signed distance lies between ascending `edges` (world units): "
            "len(edges) + 1\n"
            "numbers, from beyond the first to beyond the last. By one sample a triangle and 65,536 more, "
