@@ -76,7 +76,7 @@ def decimate_settings(options=frozenset()):
         ),
         "max_seconds": FloatProperty(
             name="Time Limit",
-            description="Seconds after which Thorough stops with what it has reached of an object; 0 for no limit",
+            description="Seconds after which an object is left with what is proved by then; 0 for no limit",
             min=0,
             soft_max=600,
             step=100,

@@ -62,7 +62,7 @@ def arguments():
         "--max-seconds",
         type=cli.whole_number(1),
         metavar="S",
-        help="thorough stops after S seconds an object with what it has reached (default: no limit)",
+        help="stop after S seconds an object with what is proved by then (default: no limit)",
     )
     parser.add_argument(
         "--target-triangles",
@@ -93,8 +93,6 @@ class Command:
         self.options = options
         self.staged = staged
         self.started = time.perf_counter()
-        if options.max_seconds and options.effort != "thorough":
-            raise cli.Stop("--max-seconds is for --effort thorough: fast is one pass")
         file_io.extension_of(options.input)
         extension = file_io.extension_of(options.output)
         self.target = safe_files.Target(options.output, "OUT")

@@ -24,8 +24,7 @@ def draw_decimate_settings(layout, settings):
     """The same rows in the panel and in Adjust Last Operation."""
     layout.prop(settings, "keep")
     layout.prop(settings, "effort")
-    if settings.effort == "THOROUGH":
-        layout.prop(settings, "max_seconds")
+    layout.prop(settings, "max_seconds")
     column = layout.column(align=True)
     column.use_property_split = False  # the names need the width
     column.label(text="Placement")

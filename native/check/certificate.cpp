@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "check/part.h"
+#include "reference/call.h"
 #include "reference/closest_point.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
@@ -21,6 +22,7 @@ constexpr double kFloor = 0.02;                // of the tolerance: a piece this
 constexpr double kWorthCutting = 0.25;         // of the tolerance
 constexpr std::size_t kBudget = 1 << 20;       // parts looked at before a piece is left unproved,
 constexpr std::size_t kQuickBudget = 1 << 13;  // and where the answer is only one of many tries
+constexpr std::size_t kBetweenPolls = 256;     // parts
 constexpr double kProbeSpacing = 2.0;          // of the tolerance, along the longest edge of a triangle,
 constexpr int kMostProbes = 8;                 // and so many at most
 constexpr double kSmall = 2.0;             // of the tolerance: shorter pieces are worth trying against all eight nodes
@@ -124,6 +126,7 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
   std::uint32_t hint = near.x;
   for (std::size_t next = 0; next < queue.size(); ++next) {
     if (next == (kProve ? kBudget : kQuickBudget)) return Verdict::unproved;
+    if ((next + 1) % kBetweenPolls == 0) poll();
     const Part part = queue[next];
     const auto& [a, b, c] = part.corners;
     const glm::dvec3 centre = (a + b + c) * (1.0 / 3);
@@ -220,6 +223,7 @@ Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::
 }
 
 std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& options) const {
+  const Call call(options.progress);
   require_valid(pieces);
   const double within = volume_->provable(pieces.mapping_error), beyond = volume_->refutable(pieces.mapping_error);
   const TriangleCertificate certificate(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within, beyond);
@@ -229,7 +233,7 @@ std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& opt
   std::vector<bool> used(pieces.points.size(), false);
   for (const std::uint32_t i : pieces.indices) used[i] = true;
   std::vector<TriangleCertificate::Near> nearest(pieces.points.size());
-  constexpr std::size_t kBlock = 512;
+  constexpr std::size_t kBlock = 128;
   parallel_for(nearest.size(), kBlock, options.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       if (used[i]) nearest[i] = certificate.nearest(pieces.points[i], beyond);
@@ -263,6 +267,7 @@ std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& opt
       }
     }
   });
+  poll();  // a call that was cancelled at its end has no verdicts, either
   return verdicts;
 }
 

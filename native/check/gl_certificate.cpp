@@ -13,20 +13,21 @@
 #include <sstream>
 
 #include "gl/context.h"
+#include "reference/call.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
 
 namespace tolvol {
 namespace {
 
-constexpr std::size_t kBatch = 1 << 18;      // triangles on the GPU at a time, 12 MB
-constexpr std::size_t kSlowBatch = 1 << 12;  // of those that may take the whole budget each, to begin with,
-constexpr double kQuick = 0.1;               // and seconds below which the next batch may be larger
-constexpr int kBudget = 1 << 12;             // parts looked at before a triangle is left unproved
-constexpr int kTries = 8;                    // nodes around a part's centre
-constexpr double kShortest = 1.0 / 16;       // of the tolerance: a part this short is not split further
-constexpr GLuint kGroup = 64;                // local_size_x of certificate.comp
-constexpr float kFar = 16;                   // a coordinate far from any reference, whose are below 1, and tolerance
+constexpr std::size_t kBatch = 1 << 17;     // triangles on the GPU at a time, 6 MB
+constexpr std::size_t kSlowBatch = 1 << 6;  // of those that may take the whole budget each, to begin with,
+constexpr double kQuick = 0.04;             // and seconds below which the next batch may be larger
+constexpr int kBudget = 1 << 12;            // parts looked at before a triangle is left unproved
+constexpr int kTries = 8;                   // nodes around a part's centre
+constexpr double kShortest = 1.0 / 16;      // of the tolerance: a part this short is not split further
+constexpr GLuint kGroup = 64;               // local_size_x of certificate.comp
+constexpr float kFar = 16;                  // a coordinate far from any reference, whose are below 1, and tolerance
 
 /// A squared distance in floating point, at most this, is of a distance of at most `within`: the two sums, the squares
 /// and this number's own rounding each change it by a factor of at most 1 + 2^-23, and there is room for twice as many.
@@ -89,6 +90,7 @@ GlCertificate::GlCertificate(const ToleranceVolume& volume) : volume_(&volume), 
     std::vector<float> values;
     values.reserve(3 * reference.size());
     for (const WitnessTriangle& t : reference) {
+      poll_at(values.size());
       for (int k = 0; k < 3; ++k) values.push_back(static_cast<float>((t.*member)[k]));
     }
     return values;
@@ -105,6 +107,7 @@ GlCertificate::GlCertificate(const ToleranceVolume& volume) : volume_(&volume), 
 }
 
 std::vector<Verdict> GlCertificate::check(const Pieces& pieces, const Options& options) const {
+  const Call call(options.progress);
   require_valid(pieces);
   std::vector<Verdict> verdicts(pieces.size(), Verdict::unproved);
   const double tolerance = volume_->frame_tolerance(), magnitude = 1 + 2 * tolerance;
@@ -144,6 +147,7 @@ std::vector<Verdict> GlCertificate::check(const Pieces& pieces, const Options& o
 
   for (std::size_t begin = 0; begin < pieces.size(); begin += per_batch) {
     const auto update = [&] {
+      poll();
       if (options.progress) options.progress->update(static_cast<double>(begin) / static_cast<double>(pieces.size()));
     };
     update();
@@ -173,6 +177,7 @@ std::vector<Verdict> GlCertificate::check(const Pieces& pieces, const Options& o
       if (std::ranges::all_of(own, [](std::uint32_t p) { return p == 1; })) verdicts[begin + i] = Verdict::inside;
     }
   }
+  poll();
   return verdicts;
 }
 

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "gl/context.h"
+#include "reference/call.h"
 #include "reference/errors.h"
 
 namespace tolvol {
@@ -22,9 +23,9 @@ constexpr int kSmallestSide = 256;     // pixels: 16 cells keep some processors 
 constexpr std::size_t kChunk = 1024;   // triangles drawn before a flush: more leave the caches of a tiled renderer
 constexpr std::size_t kInFlight = 64;  // queries begun before the result of the first is waited for
 // A batch ends with the piece that reaches either of these. The first keeps a buffer below the 128 MB that every GL
-// allows, the second the wait for a cancelled call near a second.
+// allows, the second the wait for a cancelled call below a tenth of a second.
 constexpr std::size_t kBatchParts = std::size_t{1} << 15;
-constexpr std::uint64_t kBatchPoints = std::uint64_t{1} << 25;
+constexpr std::uint64_t kBatchPoints = std::uint64_t{1} << 21;
 
 std::uint64_t lattice_points(float subdivisions) {
   const auto n = static_cast<std::uint64_t>(subdivisions);
@@ -83,17 +84,20 @@ std::vector<Verdict> LatticeCheck::check_groups(const Pieces& pieces, std::span<
 std::vector<Verdict> LatticeCheck::decide(const Pieces& pieces, std::span<const std::uint32_t> order,
                                           std::span<const std::uint32_t> labels, bool queries,
                                           const Options& options) const {
+  const Call call(options.progress);
   if (options.progress) options.progress->begin("checking");
   const float bound = this->bound(pieces.mapping_error);
   std::vector<Sum> sums(order.empty() ? 0 : labels[order.back()] + 1);
   std::future<void> drawing;  // of one batch, while the next is made
   for (std::size_t next = 0; next < order.size();) {
+    poll();
     if (options.progress) options.progress->update(static_cast<double>(next) / static_cast<double>(order.size()));
     Batch batch = make_batch(pieces, order, labels, next);
     if (drawing.valid()) drawing.get();
     drawing = std::async(std::launch::async, [&, batch = std::move(batch)] { draw(batch, bound, queries, sums); });
   }
   if (drawing.valid()) drawing.get();
+  poll();
   std::vector<Verdict> verdicts(pieces.size());
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     const Sum& sum = sums[labels[i]];

@@ -7,6 +7,7 @@
 #include "field/fast_marching.h"
 #include "field/scatter.h"
 #include "field/signs.h"
+#include "reference/call.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
 
@@ -37,6 +38,7 @@ auto in_the_world(const TriangleMesh& reference, bool mirrored, Use&& use) {
 ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                                  const Placement& placement, double tolerance, const Options& options)
     : tolerance_(tolerance), field_(options.field), mirrored_(placement.mirrors()) {
+  const Call call(options.progress);
   validate(vertices, triangles);
   size_ = reference_size(vertices, triangles, placement.to_world());
   if (!(tolerance > 0) || !std::isfinite(tolerance)) {

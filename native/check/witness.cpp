@@ -6,6 +6,7 @@
 
 #include <cstdint>
 
+#include "reference/call.h"
 #include "reference/simd.h"
 
 namespace tolvol {
@@ -81,8 +82,10 @@ WitnessTriangle::WitnessTriangle(const glm::dvec3& a, const glm::dvec3& b, const
 std::vector<WitnessTriangle> prepare_witnesses(const TriangleMesh& mesh) {
   std::vector<WitnessTriangle> witnesses;
   witnesses.reserve(mesh.triangles.size());
-  for (const glm::uvec3& t : mesh.triangles)
+  for (const glm::uvec3& t : mesh.triangles) {
+    poll_at(witnesses.size());
     witnesses.emplace_back(mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]);
+  }
   return witnesses;
 }
 

@@ -16,6 +16,7 @@ constexpr double kCoarser = 0.8;  // a step towards a grid that fits
 }  // namespace
 
 DisplayGrid::DisplayGrid(const TriangleMesh& reference, bool mirrored, double tolerance, const Options& options) {
+  const Call call(options.progress);
   const std::vector<bool> used = used_vertices(reference.vertices.size(), reference.triangles);
   Box box;
   for (std::size_t i = 0; i < used.size(); ++i) {

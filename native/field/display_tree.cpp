@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "reference/call.h"
 #include "reference/closest_point.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
@@ -25,7 +26,7 @@ constexpr double kStepU = 0.7548776662466927, kStepV = 0.5698402909980532;
 /// Sorts the triangles so that each half of each range lies together.
 class Split {
  public:
-  Split(const TriangleMesh& mesh, Progress* progress) : progress_(progress), order_(mesh.triangles.size()) {
+  explicit Split(const TriangleMesh& mesh) : order_(mesh.triangles.size()) {
     std::iota(order_.begin(), order_.end(), 0u);
     centres_.reserve(mesh.triangles.size());
     for (const glm::uvec3& t : mesh.triangles) {
@@ -39,7 +40,7 @@ class Split {
     const std::size_t half = leaves / 2;
     const auto at = [&](std::size_t leaf) { return order_.begin() + begin_of(leaf, all_leaves); };
     const auto begin = at(first_leaf), middle = at(first_leaf + half), end = at(first_leaf + leaves);
-    if (progress_ && end - begin > 4096) progress_->update(0);
+    if (end - begin > 4096) poll();
     Box box;
     for (auto i = begin; i != end; ++i) box.add(centres_[*i]);
     const glm::dvec3 side = box.upper - box.lower;
@@ -59,7 +60,6 @@ class Split {
   const std::vector<std::uint32_t>& order() const { return order_; }
 
  private:
-  Progress* progress_;
   std::vector<std::uint32_t> order_;
   std::vector<glm::dvec3> centres_;
 };
@@ -73,7 +73,7 @@ DisplayTree::DisplayTree(const TriangleMesh& reference, bool mirrored, Progress*
   closed = Pseudonormals(reference).closed();
   const bool turned = closed ? enclosed_volume(reference) < 0 : mirrored;
   const std::size_t leaves = std::bit_ceil((count + kLeaf - 1) / kLeaf);
-  Split split(reference, progress);
+  Split split(reference);
   split.cut(0, leaves, leaves);
   corners.reserve(3 * count);
   for (const std::uint32_t i : split.order()) {
@@ -165,6 +165,7 @@ std::vector<double> area_shares(const DisplayTree& tree, std::span<const glm::dv
                        ac = vertices[triangles[i].z] - a;
       const auto count = 1 + static_cast<std::size_t>(area[i] / whole * kSamples);
       for (std::size_t k = i; k < i + count; ++k) {
+        if (k % 256 == 0) poll();
         double u = glm::fract(kStepU * static_cast<double>(k)), v = glm::fract(kStepV * static_cast<double>(k));
         if (u + v > 1) u = 1 - u, v = 1 - v;
         const double d = tree.distance(a + u * ab + v * ac, reach);

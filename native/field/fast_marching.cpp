@@ -21,6 +21,7 @@
 
 #include "field/scatter.h"
 #include "field/signs.h"
+#include "reference/call.h"
 
 namespace tolvol {
 namespace {
@@ -40,6 +41,7 @@ class Front {
         strides_{1, grid.index(0, 1, 0), grid.index(0, 0, 1)} {
     for (int z = 0; z < grid.nodes.z; ++z) {
       for (int y = 0; y < grid.nodes.y; ++y) {
+        poll();
         for (int x = 0; x < grid.nodes.x; ++x) {
           const glm::ivec3 at(x, y, z);
           if (known_[grid.index(x, y, z)]) continue;
@@ -52,13 +54,16 @@ class Front {
   }
 
   void march(double stop, Progress* progress) {
-    constexpr std::size_t kBetween = 1 << 16;  // nodes from one look at the progress to the next
+    constexpr std::size_t kBetween = 1 << 12;  // nodes from one look at the progress to the next
     float reached = 0;
     for (std::size_t count = 1; !heap_.empty() && !(static_cast<double>(reached) > stop); ++count) {
       std::pop_heap(heap_.begin(), heap_.end(), std::greater());
       const std::uint64_t top = heap_.back();
       heap_.pop_back();
-      if (progress && count % kBetween == 0) progress->update(std::min(1.0, static_cast<double>(reached) / stop));
+      if (count % kBetween == 0) {
+        poll();
+        if (progress) progress->update(std::min(1.0, static_cast<double>(reached) / stop));
+      }
       const std::uint32_t node = static_cast<std::uint32_t>(top);
       if (known_[node]) continue;  // an older entry of a node that came nearer
       reached = std::bit_cast<float>(static_cast<std::uint32_t>(top >> 32));

@@ -11,6 +11,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "reference/call.h"
 #include "reference/parallel.h"
 #include "reference/simd.h"
 
@@ -18,8 +19,9 @@ namespace tolvol {
 namespace {
 
 constexpr int kLanes = DistanceGrid::kLanes;
-constexpr int kWide = 3 * kLanes;  // nodes: a longer row of a triangle's box is cut to what is in the band
-constexpr double kSlack = 1e-5;    // of a distance: float32 rounds it by less
+constexpr int kWide = 3 * kLanes;            // nodes: a longer row of a triangle's box is cut to what is in the band
+constexpr std::size_t kBetweenPolls = 1024;  // rows of nodes, and triangles
+constexpr double kSlack = 1e-5;              // of a distance: float32 rounds it by less
 using Floats = float __attribute__((vector_size(4 * kLanes)));
 using Masks = std::int32_t __attribute__((vector_size(4 * kLanes)));
 
@@ -102,10 +104,12 @@ TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid
 
   const glm::vec3 lower = t.box.lower - t.a, upper = t.box.upper - t.a;
   const glm::vec3 first = grid.origin - t.a;
+  std::size_t rows = 0;
   for (int z = zbegin; z <= zend; ++z) {
     const float pz = first.z + static_cast<float>(z) * hf;
     const float bz = std::max({0.0f, lower.z - pz, pz - upper.z});
     for (int y = ybegin; y <= yend; ++y) {
+      if (++rows % kBetweenPolls == 0) poll();
       const float py = first.y + static_cast<float>(y) * hf;
       const float by = std::max({0.0f, lower.y - py, py - upper.y});
       const float room = band2 - by * by - bz * bz;
@@ -160,8 +164,10 @@ TOLVOL_INLINE void splat_all(const TriangleMesh& mesh, DistanceGrid& grid, int z
   const double zlow = grid.origin.z + z0 * grid.spacing - grid.band,
                zhigh = grid.origin.z + (z1 - 1) * grid.spacing + grid.band;
   for (std::uint32_t id = 0; id < mesh.triangles.size(); ++id) {
-    if (progress && id % 4096 == 0)
-      progress->update(static_cast<double>(id) / static_cast<double>(mesh.triangles.size()));
+    if (id % kBetweenPolls == 0) {
+      poll();
+      if (progress) progress->update(static_cast<double>(id) / static_cast<double>(mesh.triangles.size()));
+    }
     const glm::uvec3 t = mesh.triangles[id];
     const double a = mesh.vertices[t.x].z, b = mesh.vertices[t.y].z, c = mesh.vertices[t.z].z;
     if (std::max({a, b, c}) < zlow || std::min({a, b, c}) > zhigh) continue;
@@ -186,6 +192,7 @@ std::vector<int> slab_bounds(const TriangleMesh& mesh, const DistanceGrid& grid,
     const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() * i / slabs);
     std::nth_element(begin, middle, heights.end());
     begin = middle;
+    poll();
     const int z = static_cast<int>(std::lround((*middle - grid.origin.z) / grid.spacing));
     bounds.push_back(std::clamp(z, bounds.back(), grid.nodes.z));
   }
@@ -198,7 +205,9 @@ std::vector<int> slab_bounds(const TriangleMesh& mesh, const DistanceGrid& grid,
 void scatter(const TriangleMesh& reference, DistanceGrid& grid, unsigned threads, Progress* progress) {
   if (progress) progress->begin("measuring distances");
   const std::size_t size = static_cast<std::size_t>(grid.pitch) * grid.nodes.y * grid.nodes.z;
+  poll();
   grid.distance.assign(size, static_cast<float>(grid.band));
+  poll();
   grid.triangle.assign(size, DistanceGrid::kNone);
   const auto kernel = simd_path() == Simd::avx2 ? splat_avx2 : splat_baseline;
   const std::vector<int> bounds = slab_bounds(reference, grid, thread_count(threads));

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reference/call.h"
 #include "reference/parallel.h"
 
 namespace tolvol {
@@ -12,6 +13,7 @@ void sign_by_triangle(const TriangleMesh& reference, const Pseudonormals& normal
                       std::span<float> distance, unsigned threads) {
   parallel_for(static_cast<std::size_t>(grid.nodes.z), 1, threads, [&](std::size_t z, std::size_t) {
     for (int y = 0; y < grid.nodes.y; ++y) {
+      poll();
       const std::size_t row = grid.index(0, y, static_cast<int>(z));
       for (int x = 0; x < grid.nodes.x; ++x) {
         const std::uint32_t id = grid.triangle[row + x];
@@ -34,6 +36,7 @@ void spread_signs(const DistanceGrid& grid, std::span<const std::uint8_t> known,
     const auto at = [&](int i, int count) { return back ? count - 1 - i : i; };
     for (int k = 0; k < grid.nodes.z; ++k) {
       for (int j = 0; j < grid.nodes.y; ++j) {
+        poll();
         for (int i = 0; i < grid.nodes.x; ++i) {
           const std::size_t node = grid.index(at(i, grid.nodes.x), at(j, grid.nodes.y), at(k, grid.nodes.z));
           if (reached[node]) continue;
@@ -57,6 +60,7 @@ std::vector<float> signed_distance(const TriangleMesh& reference, const Distance
 
 std::vector<float> signed_distance(const TriangleMesh& reference, const Pseudonormals& normals,
                                    const DistanceGrid& grid, unsigned threads) {
+  poll();
   std::vector<float> result = grid.distance;
   if (grid.is_signed) return result;
   sign_by_triangle(reference, normals, grid, result, threads);

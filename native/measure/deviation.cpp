@@ -16,6 +16,7 @@
 
 #include "measure/placed_pair.h"
 #include "measure/split.h"
+#include "reference/call.h"
 #include "reference/parallel.h"
 #include "reference/pseudonormals.h"
 
@@ -118,9 +119,14 @@ class Distribution {
   template <class Number>
   Distribution(const std::vector<Piece>& pieces, Number&& number) {
     for (const Piece& piece : pieces) {
+      poll_at(steps_.size());
       if (piece.weight > 0) steps_.push_back({number(piece), piece.weight});
     }
-    std::sort(steps_.begin(), steps_.end(), [](const Step& x, const Step& y) { return x.value < y.value; });
+    std::size_t compared = 0;
+    std::sort(steps_.begin(), steps_.end(), [&](const Step& x, const Step& y) {
+      poll_at(++compared);
+      return x.value < y.value;
+    });
     Sum sum;
     for (Step& step : steps_) {
       sum.add(step.weight);
@@ -177,6 +183,7 @@ class Cover {
       total_ = Sum();
       pieces_.clear();
       for (const glm::uvec3& t : a.triangles) {
+        poll_at(pieces_.size());
         pieces_.push_back({simplex_of({a.vertices[t.x], a.vertices[t.y], a.vertices[t.z]}, measure), 0, {}, 0, false});
         total_.add(measure_of(pieces_.back().simplex));
       }
@@ -188,7 +195,10 @@ class Cover {
       const double whole = measure_of(triangle.simplex), parts = whole / total_.value() * kPieces;
       const int k = std::max(1, int(std::lround(measure_ == area ? std::sqrt(parts) : parts)));
       const double share = measure_ == number ? 1 : 1.0 / (measure_ == area ? double(k) * k : k);
-      cut(triangle.simplex, k, [&](const Simplex& part) { pieces_.push_back({part, whole * share, {}, 0, false}); });
+      cut(triangle.simplex, k, [&](const Simplex& part) {
+        poll_at(pieces_.size());
+        pieces_.push_back({part, whole * share, {}, 0, false});
+      });
     }
     budget_ = std::max({kBudget, kBudgetPerTriangle * a.triangles.size(), pieces_.size()});
   }
@@ -228,6 +238,7 @@ class Cover {
 
   /// Cuts the worst pieces; false when there is nothing more to gain or to spend.
   bool refine() {
+    poll();
     Sum gap;
     double largest = 0;
     for (const Piece& piece : pieces_) {
@@ -251,12 +262,14 @@ class Cover {
       worst.resize(room);
       std::sort(worst.begin(), worst.end());
     }
+    poll();
     std::vector<Piece> parts;
     for (const std::size_t i : worst) {
       const std::size_t before = parts.size();
       halve(pieces_[i], [&](const Simplex& part) { parts.push_back({part, measure_of(part), {}, 0, false}); });
       if (parts.size() > before) pieces_[i].weight = -1;
     }
+    poll();
     std::erase_if(pieces_, [](const Piece& piece) { return piece.weight < 0; });
     const std::size_t first = pieces_.size();
     pieces_.insert(pieces_.end(), parts.begin(), parts.end());
@@ -328,6 +341,7 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
   for (std::size_t i = 0; i < options.percentiles.size(); ++i) {
     require(options.percentiles[i] >= 0 && options.percentiles[i] <= 100, "percentile", i, "between 0 and 100");
   }
+  const Call call(options.progress);
   if (options.progress) options.progress->begin("averaging");
   const PlacedPair pair(a, b);
   const double scale = pair.frame.scale();

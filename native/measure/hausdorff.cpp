@@ -36,6 +36,7 @@
 
 #include "measure/placed_pair.h"
 #include "measure/split.h"
+#include "reference/call.h"
 #include "reference/hierarchy.h"
 #include "reference/parallel.h"
 
@@ -165,6 +166,7 @@ class Search {
   }
 
   void refine() {
+    poll();
     std::vector<Piece> batch;
     const double enough = cutoff();
     while (batch.size() < kBatch && !queue_.empty() && queue_.front().upper > enough) {
@@ -288,6 +290,7 @@ class Search {
 
 HausdorffInterval hausdorff(const TriangleMesh& a, const TriangleMesh& b, const HausdorffOptions& options) {
   if (options.bound && !(*options.bound >= 0)) throw InvalidInput("bound is not a length of 0 or more");
+  const Call call(options.progress);
   if (options.progress) options.progress->begin("measuring");
   const PlacedPair pair(a, b);
   const Frame& frame = pair.frame;

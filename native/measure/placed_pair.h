@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "reference/call.h"
 #include "reference/errors.h"
 #include "reference/frame.h"
 #include "reference/triangle_mesh.h"
@@ -20,7 +21,9 @@ struct PlacedPair {
     Box box;
     for (const TriangleMesh* mesh : {&world_a, &world_b}) {
       validate(mesh->vertices, mesh->triangles);
+      std::size_t turn = 0;
       for (const glm::uvec3& t : mesh->triangles) {
+        poll_at(++turn);
         for (int k = 0; k < 3; ++k) box.add(mesh->vertices[t[k]]);
       }
     }
@@ -33,6 +36,7 @@ struct PlacedPair {
  private:
   TriangleMesh placed(const TriangleMesh& mesh) const {
     TriangleMesh copy = mesh;
+    poll();
     for (glm::dvec3& p : copy.vertices) p = frame.from_world(p);
     return copy;
   }

@@ -3,6 +3,8 @@
 
 #include <limits>
 
+#include "reference/call.h"
+
 namespace tolvol {
 
 BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh,
@@ -36,6 +38,7 @@ BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mes
   TriangleMesh elements{{positions.begin(), positions.end()}, {}};
   std::vector<std::uint32_t> ids;
   for (const glm::uvec2& e : mesh.boundary) {
+    poll_at(ids.size());
     const std::uint32_t a = e.x, b = e.y;
     elements.triangles.emplace_back(a, b, b);
     // A boundary edge runs against its triangle, and is named by the vertex it starts from.
@@ -47,7 +50,10 @@ BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mes
   }
   const Hierarchy near(elements);
   std::vector<std::uint32_t> nearest;
-  for (std::uint32_t i = 0; i < reference_.triangles.size(); ++i) backward_->assign(i, near, ids, provable, nearest);
+  for (std::uint32_t i = 0; i < reference_.triangles.size(); ++i) {
+    poll_at(i);
+    backward_->assign(i, near, ids, provable, nearest);
+  }
   for (const std::uint32_t t : nearest) {
     uncertified_.push_back(elements.triangles[t].x);
     uncertified_.push_back(elements.triangles[t].y);

@@ -6,6 +6,7 @@
 
 #include "operation/change.h"
 #include "operation/connectivity.h"
+#include "reference/call.h"
 
 namespace tolvol {
 
@@ -53,7 +54,10 @@ void BoundedMesh::build(bool on_reference, std::span<const std::uint32_t> mates,
   }
   distance_.assign(n, 0);
   if (bounds_.forward) {
-    for (std::size_t i = 0; i < n && !on_reference; ++i) distance_[i] = bounds_.forward->distance_bound(positions_[i]);
+    for (std::size_t i = 0; i < n && !on_reference; ++i) {
+      poll_at(i);
+      distance_[i] = bounds_.forward->distance_bound(positions_[i]);
+    }
     face_distance_.assign(m, on_reference ? 0 : TriangleCertificate::kUnproved);
   }
 }

@@ -8,6 +8,8 @@
 #include <array>
 #include <utility>
 
+#include "reference/call.h"
+
 namespace tolvol {
 namespace {
 
@@ -91,6 +93,7 @@ void CollapseLoop::add(std::uint32_t edge, double cost) {
 
 void CollapseLoop::run(const Until& until, Progress* progress) {
   for (std::size_t left; (left = mesh_.triangle_count()) > until.triangles;) {
+    poll();
     if (progress) {
       progress->set_count(left);
       progress->update(static_cast<double>(shared_.before - left) / static_cast<double>(shared_.before));

@@ -45,7 +45,8 @@ class CollapseLoop {
     double cost;
     std::size_t triangles;
   };
-  /// Collapses until then, or until no edge can. O(n log n) without bounds. Throws Cancelled.
+  /// Collapses until then, or until no edge can. O(n log n) without bounds. Throws Cancelled,
+  /// between two collapses.
   void run(const Until& until, Progress* progress);
 
  private:

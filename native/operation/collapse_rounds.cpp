@@ -12,6 +12,7 @@
 #include "operation/deferred_proof.h"
 #include "operation/edge_collapse.h"
 #include "operation/regions.h"
+#include "reference/call.h"
 #include "reference/parallel.h"
 
 namespace tolvol {
@@ -61,8 +62,13 @@ class Rounds {
         if (on_trust) {
           DeferredProof later(collapse_, mesh_, members[i].vertices, members[i].faces, places_);
           if (later.possible()) {
-            work(&later);
-            if (later.holds()) return;
+            try {
+              work(&later);
+              if (later.holds()) return;
+            } catch (const Cancelled&) {
+              later.take_back();
+              throw;
+            }
             later.take_back();
             ++taken_back;
           }
@@ -78,7 +84,10 @@ class Rounds {
   void whole(std::size_t target) {
     price();
     CollapseLoop loop(shared_, team_);
-    for (std::uint32_t e = 0; e < costs_.size(); ++e) loop.add(e, costs_[e]);
+    for (std::uint32_t e = 0; e < costs_.size(); ++e) {
+      poll_at(e);
+      loop.add(e, costs_[e]);
+    }
     loop.run({EdgeCollapse::kNever, target}, progress_);
   }
 
@@ -99,6 +108,7 @@ class Rounds {
     std::copy_if(costs_.begin(), costs_.end(), std::back_inserter(finite),
                  [](double cost) { return cost < EdgeCollapse::kNever; });
     if (finite.empty()) return 0;
+    poll();
     const auto at = finite.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(finite.size() - 1));
     std::nth_element(finite.begin(), at, finite.end());
     return *at;
@@ -118,6 +128,7 @@ class Rounds {
   std::vector<Members> members_of(const Regions& parts) const {
     std::vector<Members> out(parts.count);
     for (std::uint32_t e = 0; e < costs_.size(); ++e) {
+      poll_at(e);
       if (!(costs_[e] < EdgeCollapse::kNever)) continue;
       const std::uint32_t part = parts.of_edge(mesh_, e);
       if (part != Regions::kNone) out[part].edges.push_back(e);

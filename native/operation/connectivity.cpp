@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "operation/manifold_cut.h"
+#include "reference/call.h"
 
 namespace tolvol {
 namespace {
@@ -45,6 +46,7 @@ void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, std::s
   std::vector<HalfedgeHandle> halfedge(sides);
   int next = 0;
   for (std::uint32_t s = 0; s < sides; ++s) {
+    poll_at(s);
     if (!first_of_edge(s)) continue;
     halfedge[s] = HalfedgeHandle(next++);
     const HalfedgeHandle other(next++);
@@ -53,6 +55,7 @@ void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, std::s
     if (mates[s] != kNone) halfedge[mates[s]] = other;
   }
   for (std::uint32_t s = 0; s < sides; ++s) {
+    poll_at(s);
     const FaceHandle face(static_cast<int>(s / 3));
     mesh.set_face_handle(halfedge[s], face);
     mesh.set_next_halfedge_handle(halfedge[s], halfedge[next_corner(s)]);
@@ -61,12 +64,14 @@ void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, std::s
   }
   // A vertex on the boundary names the halfedge there.
   for (std::uint32_t s = 0; s < sides; ++s) {
+    poll_at(s);
     if (mates[s] != kNone) continue;
     const auto v = vertex(to(s));
     require_manifold(!mesh.is_boundary(v));
     mesh.set_halfedge_handle(v, mesh.opposite_halfedge_handle(halfedge[s]));
   }
   for (std::uint32_t s = 0; s < sides; ++s) {
+    poll_at(s);
     if (mates[s] != kNone) continue;
     mesh.set_next_halfedge_handle(mesh.opposite_halfedge_handle(halfedge[s]), mesh.halfedge_handle(vertex(from(s))));
   }

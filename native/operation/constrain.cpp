@@ -2,6 +2,7 @@
 #include "operation/constrain.h"
 
 #include "operation/input.h"
+#include "reference/call.h"
 #include "reference/errors.h"
 
 namespace tolvol {
@@ -13,6 +14,7 @@ ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const gl
     throw InvalidInput("before has " + std::to_string(before.size()) + " vertices and after " +
                        std::to_string(after.size()) + "; both must be the same ones");
   }
+  const Call call(options.progress);
   PullBack pull_back(volume, placement, faces, corners, before.size(), options.threads);
   const MovingMesh::Start start = pull_back.start(before, options.progress);
   ConstrainResult result;

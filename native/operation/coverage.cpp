@@ -8,6 +8,8 @@
 #include <cmath>
 #include <utility>
 
+#include "reference/call.h"
+
 namespace tolvol {
 namespace {
 
@@ -17,6 +19,8 @@ constexpr double kFloor = 0.1;          // of the tolerance: a shorter piece is 
 constexpr std::size_t kBudget = 1 << 12;
 constexpr std::size_t kBudgetOfPiece = 4;  // so many more for each piece that a change places
 constexpr std::size_t kMany = 64;          // candidates: of more, a piece looks at the nearest ones alone
+
+constexpr std::size_t kBetweenPolls = 64;  // parts of pieces, each of which may look at kMany candidates
 
 constexpr std::uint32_t kNeverWhole = 1u << 31;  // in split_into_: some of the triangle is out of reach
 
@@ -60,6 +64,7 @@ bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::s
   std::size_t looked = 0;
   std::uint32_t hint = Hierarchy::kNone;
   while (!stack.empty()) {
+    poll();
     const Part piece = stack.back();
     stack.pop_back();
     const auto& c = piece.corners;
@@ -105,7 +110,7 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
   trial.budget_ += kBudgetOfPiece;
   while (!trial.stack_.empty()) {
     if (trial.stack_.size() > 1 && trial.budget_-- == 0) return false;
-    ++trial.looked_at_;
+    if (++trial.looked_at_ % kBetweenPolls == 0) poll();
     const Part piece = trial.stack_.back();
     trial.stack_.pop_back();
     const FourPoints points = with_centre(piece);
@@ -184,10 +189,15 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
       if (piece.cuts > 0) call(gathered[piece.of]);
     });
   };
+  // However the search ends, the next one finds no marks.
+  const struct Clear {
+    const decltype(for_each_split)& each;
+    ~Clear() {
+      each([](std::uint32_t& count) { count = 0; });
+    }
+  } clear{for_each_split};
   for_each_split([](std::uint32_t& count) { ++count; });
-  const bool placed = place_all(trial, gathered);
-  for_each_split([](std::uint32_t& count) { count = 0; });
-  return placed;
+  return place_all(trial, gathered);
 }
 
 /// Places the pieces of what is replaced. `gathered`: how many there are of each triangle that was split.

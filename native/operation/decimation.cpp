@@ -16,6 +16,7 @@
 #include "operation/manifold_cut.h"
 #include "operation/refinement.h"
 #include "operation/wedges.h"
+#include "reference/call.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
 
@@ -72,8 +73,9 @@ class Decimation {
     BoundedMesh mesh(mesh_input(), bounds, team_);
     const std::size_t apart = cut_.aside.size();
     const std::size_t target = options_.target_triangles > apart ? options_.target_triangles - apart : 0;
-    collapse_edges(mesh, target, team_, options_.progress);
-    if (volume_ && !options_.rival && options_.effort == DecimationOptions::Effort::thorough) {
+    collapse(mesh, target);
+    if (volume_ && !options_.rival && options_.effort == DecimationOptions::Effort::thorough &&
+        !result_.stopped_at_time) {
       Refinement(mesh, team_)
           .run(
               target, [&] { return ended_early(); }, options_.progress);
@@ -87,9 +89,24 @@ class Decimation {
   }
 
  private:
-  bool ended_early() {
+  bool out_of_time() const {
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start_;
-    result_.stopped_at_time = options_.max_seconds > 0 && spent.count() > options_.max_seconds;
+    return options_.max_seconds > 0 && spent.count() > options_.max_seconds;
+  }
+
+  /// Until no edge can be collapsed, or the time is over: what was being tried then is not carried out.
+  void collapse(BoundedMesh& mesh, std::size_t target) {
+    const Call limited(nullptr, [this] { return out_of_time(); });
+    try {
+      collapse_edges(mesh, target, team_, options_.progress);
+    } catch (const Cancelled&) {
+      if (!limited.stopped()) throw;
+      result_.stopped_at_time = true;
+    }
+  }
+
+  bool ended_early() {
+    result_.stopped_at_time = out_of_time();
     result_.stopped_on_request = options_.progress && options_.progress->finishing();
     return result_.stopped_at_time || result_.stopped_on_request;
   }
@@ -212,6 +229,7 @@ class Decimation {
     const std::size_t count = volume_->reference().triangles.size();
     if (options_.progress) options_.progress->begin("comparing");
     for (std::uint32_t i = 0; i < count; ++i) {
+      poll_at(i);
       if (options_.progress) options_.progress->update(static_cast<double>(i) / static_cast<double>(count));
       if (!backward_->assign(i, hierarchy, ids, provable, nearest) && uncovered++ == 0) first = i;
     }
@@ -302,6 +320,7 @@ class Decimation {
     for (const std::uint32_t i : cut_.aside) kept.emplace_back(i, kNone);
     std::sort(kept.begin(), kept.end());
     for (const auto& [input, t] : kept) {
+      poll_at(order.size());
       for (int k = 0; k < 3; ++k) use(corner(input, t, k));
     }
     std::sort(order.begin(), order.end(),
@@ -339,6 +358,7 @@ class Decimation {
     std::optional<Hierarchy> own;
     const TriangleMesh input{positions_, cut_.triangles};
     for (std::size_t i = 0; i < kept_.size(); ++i) {
+      poll_at(i);
       glm::uvec3 triangle(result_.triangle_source[i]);
       glm::dmat3 weights = unit;
       for (int k = 0; k < 3 && kept_[i] != kNone; ++k) {
@@ -418,6 +438,7 @@ class Decimation {
 
 DecimationResult decimate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                           const Placement& placement, const ToleranceVolume* volume, const DecimationOptions& options) {
+  const Call call(options.progress);
   return Decimation(vertices, triangles, placement, volume, options).run();
 }
 

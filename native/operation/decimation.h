@@ -24,7 +24,7 @@ struct DecimationOptions {
       Vertices::optimal;             ///< optimal: fewest triangles; subset: every surviving vertex is an original one
   bool two_sided = true;             ///< also keep the whole reference within the tolerance of the result
   Effort effort = Effort::fast;      ///< thorough: then moves vertices and flips edges to collapse more
-  double max_seconds = 0;            ///< thorough stops there with what it has; 0: no limit
+  double max_seconds = 0;            ///< it stops there with what is proved by then; 0: no limit
   std::size_t target_triangles = 0;  ///< stop at this many; 0: as few as the tolerance allows
   /// Per input vertex, may be empty: neither moves nor vanishes, and an edge between two such stays.
   std::span<const bool> locked = {};

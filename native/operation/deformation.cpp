@@ -10,6 +10,7 @@
 #include "check/certificate.h"
 #include "operation/constrain.h"
 #include "operation/input.h"
+#include "reference/call.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
 
@@ -233,6 +234,7 @@ class Deformation {
 DeformationResult deform(std::span<const glm::dvec3> vertices, std::span<const std::uint32_t> faces, int corners,
                          const Placement& placement, const ToleranceVolume* volume, const LatticeDeformation& lattice,
                          const DeformationOptions& options) {
+  const Call call(options.progress);
   return Deformation(vertices, faces, corners, placement, volume, lattice, options).run();
 }
 

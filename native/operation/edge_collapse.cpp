@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "reference/call.h"
+
 namespace tolvol {
 namespace {
 
@@ -33,6 +35,7 @@ void EdgeCollapse::sum_quadrics() {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
   quadrics_.assign(connectivity.n_vertices(), Quadric());
   for (std::uint32_t i = 0; i < connectivity.n_faces(); ++i) {
+    poll_at(i);
     const glm::uvec3& t = mesh_.triangle(i);
     const glm::dvec3 &a = mesh_.position(t.x), &b = mesh_.position(t.y), &c = mesh_.position(t.z);
     const glm::dvec3 normal = glm::cross(b - a, c - a);

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "operation/input.h"
+#include "reference/call.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
 
@@ -37,6 +38,7 @@ void Guard::require_size(std::span<const float> positions) const {
 }
 
 void Guard::begin(std::span<const float> positions, Progress* progress) {
+  const Call call(progress);
   std::vector<glm::dvec3> stored(positions.size() / 3);
   for (std::size_t v = 0; v < stored.size(); ++v) stored[v] = at(positions, v);
   MovingMesh::Start start = pull_back_.start(stored, progress);
@@ -53,6 +55,7 @@ void Guard::reset(std::span<const float> positions, Progress* progress) {
   try {
     begin(positions, progress);
   } catch (...) {
+    const Call::Within no_call(nullptr);
     begin(std::vector<float>(last_), nullptr);
     throw;
   }

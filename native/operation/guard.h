@@ -40,7 +40,8 @@ class Guard {
 
   /// Takes the mesh as it was edited since the last call: what is inside is the new state, the rest is pulled back
   /// along its motion since then, as by constrain(); going back to an earlier state by undo is an edit like others.
-  /// Throws InvalidInput, keeping the state, for another number of vertices or a moved one that is not finite.
+  /// Throws InvalidInput for another number of vertices or a moved one that is not finite, and Cancelled; both keep
+  /// the state.
   Correction constrain(std::span<const float> positions);
 
   /// Starts anew from these positions, whatever came before. Throws like the constructor, keeping the state.

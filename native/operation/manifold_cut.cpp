@@ -14,6 +14,7 @@
 #include <unordered_set>
 
 #include "operation/sort_by.h"
+#include "reference/call.h"
 #include "reference/triangle_mesh.h"
 
 namespace tolvol {
@@ -81,6 +82,7 @@ class Cutter {
     std::vector<Keyed> turned, same;
     std::vector<std::uint32_t> degenerate;
     for (std::uint32_t i = 0; i < input_.size(); ++i) {
+      poll_at(i);
       std::array<std::uint32_t, 3> t{weld_[input_[i].x], weld_[input_[i].y], weld_[input_[i].z]};
       if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) {
         degenerate.push_back(i);
@@ -113,6 +115,7 @@ class Cutter {
   void sort_out_degenerate(const std::vector<std::uint32_t>& degenerate) {
     std::unordered_map<std::uint64_t, std::uint32_t> holder;  // an edge, or a point as (p, p): a triangle that has it
     for (const std::uint32_t i : triangles_) {
+      poll_at(i);
       for (int k = 0; k < 3; ++k) {
         const std::uint32_t a = weld_[input_[i][k]], b = weld_[input_[i][(k + 1) % 3]];
         holder.try_emplace(pair_key(a, b), i);
@@ -145,6 +148,7 @@ class Cutter {
         sorted, vertices, team_, [](const Keyed& s) { return s.first >> 32; }, std::less<Keyed>());
     std::vector<Side> alike;
     for (std::size_t i = 0; i < sorted.size(); ++i) {
+      poll_at(i);
       alike.push_back(sorted[i].second);
       if (i + 1 < sorted.size() && sorted[i + 1].first == sorted[i].first) continue;
       visit(alike);
@@ -189,11 +193,13 @@ class Cutter {
     std::vector<bool> seen(triangles_.size(), false);
     std::vector<std::uint32_t> queue;
     for (std::uint32_t seed = 0; seed < triangles_.size(); ++seed) {
+      poll_at(seed);
       if (seen[seed]) continue;
       seen[seed] = true;
       queue.assign(1, seed);
       std::size_t flipped = 0;
       for (std::size_t at = 0; at < queue.size(); ++at) {
+        poll_at(at + 1);
         const std::uint32_t t = queue[at];
         for (Side s = 3 * t; s < 3 * t + 3; ++s) {
           const Side other = mate_[s];
@@ -219,6 +225,7 @@ class Cutter {
     corner_vertex_.assign(mate_.size(), kNone);
     std::uint32_t count = 0;
     for (Side s = 0; s < mate_.size(); ++s) {
+      poll_at(s);
       if (corner_vertex_[s] != kNone) continue;
       corner_vertex_[s] = count;
       for (const bool forth : {true, false}) walk(s, forth, count);
@@ -262,6 +269,7 @@ class Cutter {
     cut_.input_vertex.assign(weld_.size(), kNone);
     std::vector<bool> several(weld_.size(), false);  // input vertices that became several
     for (Side s = 0; s < mate_.size(); ++s) {
+      poll_at(s);
       const std::uint32_t v = corner_vertex_[s];
       if (v == cut_.vertex_input.size()) cut_.vertex_input.push_back(vertex(s));
       cut_.vertex_input[v] = std::min(cut_.vertex_input[v], vertex(s));
@@ -275,6 +283,7 @@ class Cutter {
       for (int k = 0; k < 3; ++k) tied.insert(weld_[input_[i][k]]);
     }
     for (Side s = 0; s < mate_.size(); ++s) {
+      poll_at(s);
       const std::uint32_t v = corner_vertex_[s];
       if (!tied.empty() && cut_.cause[v] == CutCause::none && tied.contains(welded(s)))
         cut_.cause[v] = CutCause::degenerate;
@@ -290,6 +299,7 @@ class Cutter {
     for (Side s = 0; s < mate_.size(); ++s) cut_.mates[turned(s)] = mate_[s] == kNone ? kNone : turned(mate_[s]);
     cut_.triangles.reserve(triangles_.size());
     for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
+      poll_at(t);
       glm::uvec3 corners(corner_vertex_[3 * t], corner_vertex_[3 * t + 1], corner_vertex_[3 * t + 2]);
       if (flip_[t]) std::swap(corners.y, corners.z);
       cut_.triangles.push_back(corners);
@@ -342,6 +352,7 @@ class Cutter {
     std::unordered_map<std::uint32_t, std::uint32_t> slot_at;
     cut_.output_slot.resize(cut_.vertex_input.size());
     for (std::uint32_t v = 0; v < cut_.output_slot.size(); ++v) {
+      poll_at(v);
       cut_.output_slot[v] =
           cut_.cause[v] == CutCause::none ? v : slot_at.try_emplace(weld_[cut_.vertex_input[v]], v).first->second;
     }

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "operation/input.h"
+#include "reference/call.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
 
@@ -93,6 +94,7 @@ void MovingMesh::make_rings(std::size_t vertex_count) {
   ring_start_.assign(vertex_count + 1, 0);
   const auto each_use = [&](auto&& use) {
     for (std::uint32_t f = 0; f < faces_.size() / corners_; ++f) {
+      poll_at(f);
       const auto corners = corners_of(f);
       for (std::size_t k = 0; k < corners_; ++k) {
         if (std::find(corners.begin(), corners.begin() + k, corners[k]) == corners.begin() + k) use(corners[k], f);
@@ -110,6 +112,7 @@ void MovingMesh::make_rings(std::size_t vertex_count) {
 MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress* progress) {
   std::vector<glm::dvec3> extremes;  // what mapping errors are judged by
   for (std::uint32_t v = 0; v < stored.size(); ++v) {
+    poll_at(v);
     if (!finite(stored[v])) refuse("vertex", v, stored[v], "is not finite");
     if (!ring(v).empty()) extremes.push_back(stored[v]);
   }

@@ -11,14 +11,16 @@
 #include <limits>
 #include <utility>
 
+#include "reference/call.h"
 #include "reference/closest_point.h"
 
 namespace tolvol {
 namespace {
 
-constexpr std::size_t kStride = 24;  // of the pieces one stands for so many: fewer triangles come of no more
-constexpr double kDamping = 1e-3;    // of the trace: along directions that nothing determines the vertex stays
-constexpr double kFaceShare = 0.1;   // of a face's area, that each of its own points stands for
+constexpr std::size_t kStride = 24;         // of the pieces one stands for so many: fewer triangles come of no more
+constexpr std::size_t kBetweenPolls = 256;  // samples
+constexpr double kDamping = 1e-3;           // of the trace: along directions that nothing determines the vertex stays
+constexpr double kFaceShare = 0.1;          // of a face's area, that each of its own points stands for
 // Points of a face, as the weight of the moving corner and, of what is left, that of the corner before it.
 constexpr double kFacePoints[][2] = {{1, 0},   {0.75, 0}, {0.75, 1}, {0.5, 0},     {0.5, 0.5},
                                      {0.5, 1}, {0.25, 0}, {0.25, 1}, {0.25, 0.33}, {0.25, 0.67}};
@@ -66,6 +68,7 @@ void PositionFit::prepare(const Change& change, bool changed) {
 void PositionFit::add_pieces(const Change& change, double limit, Sums& sums) const {
   for (std::size_t first = 0; first < samples_.size() && sums.deviation() <= limit; first += 4) {
     const auto at = [&](std::size_t k) { return std::min(first + k, samples_.size() - 1); };
+    if (first % kBetweenPolls == 0) poll();
     FourPoints points;
     points.set(samples_[at(0)].point, samples_[at(1)].point, samples_[at(2)].point, samples_[at(3)].point);
     double nearest[4];

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "reference/call.h"
+
 namespace tolvol {
 namespace {
 
@@ -49,6 +51,7 @@ void Refinement::run(std::size_t target, const std::function<bool()>& expired, P
     return glm::dot(d, d);
   };
   const auto go_on = [&] {
+    poll();
     if (progress) {
       progress->set_count(mesh_.triangle_count());
       progress->update(0);

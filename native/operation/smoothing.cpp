@@ -15,6 +15,7 @@
 
 #include "check/certificate.h"
 #include "operation/input.h"
+#include "reference/call.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
 
@@ -95,6 +96,7 @@ class Smoothing {
     std::vector<std::uint32_t> start(count + 1, 0);
     const auto each_side = [&](auto&& use) {
       for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
+        poll_at(t);
         for (std::uint32_t k = 0; k < 3; ++k) {
           const std::uint32_t a = triangles_[t][(k + 1) % 3], b = triangles_[t][(k + 2) % 3];
           if (a != b) use(Side{a, b, 3 * t + k}), use(Side{b, a, 3 * t + k});
@@ -112,6 +114,7 @@ class Smoothing {
     link_start_.assign(1, 0);
     std::vector<Link> around, rim;
     for (std::uint32_t v = 0; v < count; ++v) {
+      poll_at(v);
       const auto first = sides.begin() + start[v], last = sides.begin() + start[v + 1];
       std::sort(first, last,
                 [](const Side& a, const Side& b) { return a.to != b.to ? a.to < b.to : a.opposite < b.opposite; });
@@ -289,6 +292,7 @@ class Smoothing {
 
 SmoothingResult smooth(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                        const Placement& placement, const ToleranceVolume* volume, const SmoothingOptions& options) {
+  const Call call(options.progress);
   return Smoothing(vertices, triangles, placement, volume, options).run();
 }
 

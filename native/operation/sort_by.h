@@ -8,6 +8,7 @@
 #include <numeric>
 #include <vector>
 
+#include "reference/call.h"
 #include "reference/parallel.h"
 
 namespace tolvol {
@@ -43,7 +44,10 @@ void sort_by(std::vector<T>& things, std::size_t groups, Team& team, First&& fir
     for (const T& t : things) {
       if (const std::size_t group = first(t); lower <= group && group < upper) sorted[end[group]++] = t;
     }
-    for (std::size_t group = lower; group < upper; begin = end[group++]) std::sort(at(begin), at(end[group]), before);
+    for (std::size_t group = lower; group < upper; begin = end[group++]) {
+      poll_at(group);
+      std::sort(at(begin), at(end[group]), before);
+    }
   });
   things.swap(sorted);
 }

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "gl/context.h"
+#include "reference/call.h"
 #include "reference/errors.h"
 #include "reference/parallel.h"
 
@@ -74,8 +75,10 @@ Image Canvas::draw(const Resolution& r, int tile, const std::function<void(const
   Image image{r.size.x, r.size.y,
               std::vector<std::uint8_t>(std::size_t{4} * static_cast<std::size_t>(r.size.x) *
                                         static_cast<std::size_t>(r.size.y))};
+  const Call call(progress);
   if (progress) progress->begin("picture");
   for (int i = 0; i < tiles.x * tiles.y; ++i) {
+    poll();
     if (progress) progress->update(static_cast<double>(i) / (tiles.x * tiles.y));
     const glm::ivec2 from = glm::ivec2(i % tiles.x, i / tiles.x) * side, count = glm::min(side, r.size - from);
     std::vector<std::uint8_t> drawn;

@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "reference/call.h"
 #include "reference/errors.h"
 
 namespace tolvol {
@@ -26,6 +27,7 @@ DrawnMesh::DrawnMesh(std::span<const glm::dvec3> stored, std::span<const glm::uv
   const std::vector<bool> used = used_vertices(stored.size(), t);
   nodes.resize(stored.size());
   for (std::size_t i = 0; i < stored.size(); ++i) {
+    poll_at(i);
     if (!used[i]) continue;
     const glm::dvec3 p = placement.frame(stored[i]);
     nodes[i] = field.node(p);

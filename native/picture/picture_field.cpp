@@ -3,6 +3,7 @@
 
 #include "field/display_grid.h"
 #include "gl/context.h"
+#include "reference/call.h"
 
 namespace tolvol {
 
@@ -13,6 +14,7 @@ PictureField::PictureField(const TriangleMesh& reference, bool mirrored, double 
   gl::run([&] { options.longest = gl::Texture::largest_3d(); });
   DisplayGrid display(reference, mirrored, tolerance, options);
   grid_ = std::move(display.grid);
+  poll();
   for (const glm::uvec3& t : reference.triangles) {
     for (int k = 0; k < 3; ++k) box_.add(reference.vertices[t[k]]);
   }

@@ -6,7 +6,7 @@
 namespace tolvol {
 namespace {
 
-constexpr int kTile = 2048;    // samples: a usual picture is one tile, and none needs more than 32 MB
+constexpr int kTile = 1024;    // samples: a wish to stop is heeded between tiles
 constexpr float kStripe = 12;  // pixels from one stripe to the next
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace tolvol {
 namespace {
 
-constexpr int kTile = 512;     // samples: a wish to stop is heeded between tiles
+constexpr int kTile = 256;     // samples: a wish to stop is heeded between tiles
 constexpr int kFarNodes = 40;  // along the longest side; more cost more to fill than they save in steps
 
 glm::vec4 plane_in_nodes(const VolumeRenderer::Cut& cut, const Frame& frame, const PictureField& field) {

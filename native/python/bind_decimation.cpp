@@ -6,6 +6,7 @@
 #include "operation/decimation.h"
 #include "operation/wedges.h"
 #include "python/arrays.h"
+#include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
 #include "reference/errors.h"
@@ -98,7 +99,7 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
   DecimationResult r;
   double seconds = 0;
   {
-    const py::gil_scoped_release release;
+    const Interruptible call(progress);
     const auto start = std::chrono::steady_clock::now();
     r = decimate(v.values, t, placed, volume ? &volume->native : nullptr, options);
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -179,9 +180,10 @@ void bind_decimation(py::module_& module) {
       "\"keep\" the input faces that are not within the tolerance as they are. wedges: (m, 3) labels from wedges(). "
       "effort: \"fast\", or \"thorough\": then vertices move and "
       "edges flip to\n"
-      "make room for further collapses, for a sixth fewer triangles in two to four times the time; max_seconds "
-      "ends that early\n"
-      "(0: never), with what there is; what it finds then depends on the machine's speed. volume None: no "
+      "make room for further collapses, for a sixth fewer triangles in two to four times the time. "
+      "max_seconds (0: none)\n"
+      "ends either early, once the input is certified, with what is proved by then, which depends on the machine's "
+      "speed. volume None: no "
       "tolerance at all, for comparison; a "
       "target is needed.\n"
       "Raises InvalidInput and Cancelled. Cost: about 5 us a triangle. Quadric error metric: M. Garland, P. "

@@ -6,6 +6,7 @@
 
 #include "operation/deformation.h"
 #include "python/arrays.h"
+#include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
 #include "reference/errors.h"
@@ -148,7 +149,7 @@ Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, c
   DeformationResult r;
   double seconds = 0;
   {
-    const py::gil_scoped_release release;
+    const Interruptible call(progress);
     const auto start = std::chrono::steady_clock::now();
     r = deform(v.values, faces, corners, placed, volume ? &volume->native : nullptr, lattice.native, options);
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

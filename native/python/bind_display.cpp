@@ -5,6 +5,7 @@
 
 #include "field/display_tree.h"
 #include "python/arrays.h"
+#include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
 #include "reference/errors.h"
@@ -20,7 +21,7 @@ struct Display {
 
 std::unique_ptr<Display> make_display(const Volume& volume, Progress* progress) {
   const ToleranceVolume& v = volume.native;
-  const py::gil_scoped_release release;
+  const Interruptible call(progress);
   return std::unique_ptr<Display>(new Display{{v.reference(), v.mirrored(), progress}, v.frame()});
 }
 
@@ -43,12 +44,12 @@ py::array_t<double> to_frame(const Display& display) {
 }
 
 std::vector<double> shares(const Display& display, const py::object& vertices, const py::object& triangles,
-                           std::vector<double> edges, const py::object& to_world, int threads) {
+                           std::vector<double> edges, const py::object& to_world, int threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const Placement placement = Placement(to_matrix(to_world), v.storage).in(display.frame);
   const unsigned count = to_threads(threads);
-  const py::gil_scoped_release release;
+  const Interruptible call(progress);
   validate(v.values, t);
   for (std::size_t i = 0; i < edges.size(); ++i) {
     edges[i] *= display.frame.scale();
@@ -96,7 +97,7 @@ void bind_display(py::module_& module) {
           "Whether the reference has an inside: every edge has two faces that agree on it. Elsewhere signs are a "
           "guess.")
       .def("shares", &shares, py::arg("vertices"), py::arg("triangles"), py::arg("edges"),
-           py::arg("to_world") = py::none(), py::arg("threads") = 0,
+           py::arg("to_world") = py::none(), py::arg("threads") = 0, py::arg("progress") = py::none(),
            "The shares of a mesh's area, 0 to 1, whose signed distance lies between ascending `edges` (world units): "
            "len(edges) + 1\n"
            "numbers, from beyond the first to beyond the last; what is farther than all edges on either side is in the "

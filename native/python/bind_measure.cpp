@@ -4,6 +4,7 @@
 #include "measure/deviation.h"
 #include "measure/hausdorff.h"
 #include "python/arrays.h"
+#include "python/interruptible.h"
 #include "python/module.h"
 
 namespace tolvol::python {
@@ -47,7 +48,7 @@ void bind_measure(py::module_& module) {
       [](const py::object& va, const py::object& ta, const py::object& vb, const py::object& tb,
          std::optional<double> bound, int threads, Progress* progress) {
         const TriangleMesh a = to_mesh(va, ta, "_a"), b = to_mesh(vb, tb, "_b");
-        const py::gil_scoped_release release;
+        const Interruptible call(progress);
         return hausdorff(a, b, {bound, to_threads(threads), progress});
       },
       py::arg("vertices_a"), py::arg("triangles_a"), py::arg("vertices_b"), py::arg("triangles_b"),
@@ -104,7 +105,7 @@ void bind_measure(py::module_& module) {
       [](const py::object& va, const py::object& ta, const py::object& vb, const py::object& tb,
          const std::vector<double>& bounds, const std::vector<double>& percentiles, int threads, Progress* progress) {
         const TriangleMesh a = to_mesh(va, ta, "_a"), b = to_mesh(vb, tb, "_b");
-        const py::gil_scoped_release release;
+        const Interruptible call(progress);
         return deviation(a, b, {bounds, percentiles, to_threads(threads), progress});
       },
       py::arg("vertices_a"), py::arg("triangles_a"), py::arg("vertices_b"), py::arg("triangles_b"),

@@ -6,6 +6,7 @@
 #include "picture/camera.h"
 #include "picture/transfer.h"
 #include "python/arrays.h"
+#include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
 #include "reference/errors.h"
@@ -112,7 +113,7 @@ py::array_t<std::uint8_t> render_distance(const py::object& vertices, const py::
   const unsigned thread_count = to_threads(threads);
   Image image;
   {
-    const py::gil_scoped_release release;
+    const Interruptible call(progress);
     require(options.resolution);
     const Camera from = camera_or_framing(camera, v, t, placement, size, 0);
     image = draw_picture(volume, thread_count, progress, [&](Pictures& pictures) {
@@ -149,7 +150,7 @@ py::array_t<std::uint8_t> render_volume(const Volume& volume, const std::optiona
   const unsigned thread_count = to_threads(threads);
   Image image;
   {
-    const py::gil_scoped_release release;
+    const Interruptible call(progress);
     require(options.resolution);
     const Camera from = camera_or_framing(camera, v, t, placement, size, volume.native.tolerance());
     image = draw_picture(volume, thread_count, progress, [&](Pictures& pictures) {

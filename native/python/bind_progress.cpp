@@ -14,7 +14,11 @@ void bind_progress(pybind11::module_& module) {
       .def_property_readonly("stage", &Progress::stage, "What is being done, in a few words.")
       .def_property_readonly("count", &Progress::count, "What the stage counts: for decimation the triangles left.")
       .def_property_readonly("cancelled", &Progress::cancelled)
-      .def("cancel", &Progress::cancel, "Asks the call to stop; it then raises Cancelled within a moment.")
+      .def("cancel", &Progress::cancel,
+           "Asks the call to stop; it then raises Cancelled within 0.2 s. Ctrl-C in a call on the main thread does the "
+           "same, "
+           "with KeyboardInterrupt or\n"
+           "whatever the handler of the signal raises.")
       .def_property_readonly("finishing", &Progress::finishing)
       .def("finish", &Progress::finish,
            "Asks a call that improves its result step by step, decimate() in stage \"refining\", for the one it has.");

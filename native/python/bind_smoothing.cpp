@@ -5,6 +5,7 @@
 
 #include "operation/smoothing.h"
 #include "python/arrays.h"
+#include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
 #include "reference/errors.h"
@@ -64,7 +65,7 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
   SmoothingResult r;
   double seconds = 0;
   {
-    const py::gil_scoped_release release;
+    const Interruptible call(progress);
     const auto start = std::chrono::steady_clock::now();
     r = smooth(v.values, t, placement, volume ? &volume->native : nullptr, options);
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

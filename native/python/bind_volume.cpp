@@ -5,6 +5,7 @@
 
 #include "check/tolerance_volume.h"
 #include "python/arrays.h"
+#include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
 #include "reference/errors.h"
@@ -25,7 +26,7 @@ std::unique_ptr<Volume> make_volume(const py::object& vertices, const py::object
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const Placement placement(to_matrix(to_world), v.storage);
-  const py::gil_scoped_release release;
+  const Interruptible call(progress);
   const auto start = std::chrono::steady_clock::now();
   auto volume = std::unique_ptr<Volume>(
       new Volume{{v.values, t, placement, tolerance, {precision, to_threads(threads), progress, to_field(field)}},
@@ -52,7 +53,7 @@ CheckResult check(const Volume& volume, const py::object& points, const py::obje
   std::shared_ptr<const ToleranceCheck> by;
   std::vector<Verdict> verdicts;
   {
-    const py::gil_scoped_release release;
+    const Interruptible call(progress);
     const std::vector<glm::dvec3> in_frame = placement.frame(v.values);
     for (std::size_t i = 0; i < in_frame.size(); ++i) {
       if (!std::isfinite(glm::dot(in_frame[i], glm::dvec3(1)))) {
@@ -71,12 +72,13 @@ CheckResult check(const Volume& volume, const py::object& points, const py::obje
   return {from_vector<std::uint8_t>(verdicts), by->method(), by->renderer()};
 }
 
-py::array_t<double> distance(const Volume& volume, const py::object& points, const py::object& to_world, int threads) {
+py::array_t<double> distance(const Volume& volume, const py::object& points, const py::object& to_world, int threads,
+                             Progress* progress) {
   const Vertices v = to_vertices(points, "points");
   const Placement placement = Placement(to_matrix(to_world), v.storage).in(volume.native.frame());
   std::vector<double> result(v.values.size());
   {
-    const py::gil_scoped_release release;
+    const Interruptible call(progress);
     constexpr std::size_t kBlock = 256;
     parallel_for(result.size(), kBlock, to_threads(threads), [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
@@ -90,7 +92,7 @@ py::array_t<double> distance(const Volume& volume, const py::object& points, con
   return from_vector<double>(result);
 }
 
-py::tuple grid(const py::object& self, bool with_signs) {
+py::tuple grid(const py::object& self, bool with_signs, Progress* progress) {
   const ToleranceVolume& volume = py::cast<const Volume&>(self).native;
   const DistanceGrid& g = volume.grid();
   py::object owner = self;
@@ -98,7 +100,7 @@ py::tuple grid(const py::object& self, bool with_signs) {
   if (with_signs && !g.is_signed) {
     auto made = std::make_unique<std::vector<float>>();
     {
-      const py::gil_scoped_release release;
+      const Interruptible call(progress);
       *made = volume.signed_distance();
     }
     values = made->data();
@@ -161,9 +163,11 @@ void bind_volume(py::module_& module) {
            "Raises GlUnavailable, with nothing accepted, where a GL method finds no OpenGL 4.5 or fails on the way.\n"
            "After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 4.")
       .def("distance", &distance, py::arg("points"), py::arg("to_world") = py::none(), py::arg("threads") = 0,
-           "(k,) float64: the exact unsigned distance of (k, 3) points to the reference, in world units. About 1 us a "
-           "point.")
-      .def("grid", &grid, py::kw_only(), py::arg("signed") = false,
+           py::arg("progress") = py::none(),
+           "(k,) float64: the exact unsigned distance of (k, 3) points to the reference, in world units. Raises "
+           "InvalidInput,\n"
+           "Cancelled. Cost: about 1 us a point.")
+      .def("grid", &grid, py::kw_only(), py::arg("signed") = false, py::arg("progress") = py::none(),
            "The distance grid as (distances, origin, spacing, unit): distances is a read-only float32 array (nz, ny, "
            "nx) in units of\n"
            "`unit` world lengths, capped at the band; origin and spacing are in world units. A view, unsigned with "

@@ -24,7 +24,8 @@ void bind_errors(pybind11::module_& module) {
     } catch (const GlUnavailable& error) {
       PyErr_SetString(gl_unavailable.ptr(), error.what());
     } catch (const Cancelled& error) {
-      PyErr_SetString(cancelled.ptr(), error.what());
+      // After a signal the exception of its handler is set already.
+      if (!PyErr_Occurred()) PyErr_SetString(cancelled.ptr(), error.what());
     }
   });
 }

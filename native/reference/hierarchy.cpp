@@ -40,8 +40,10 @@ void radix_sort(std::vector<Key>& keys) {
   for (int shift = 0; shift < 63; shift += kBits) {
     std::array<std::uint32_t, (1 << kBits) + 1> start{};
     auto digit = [&](const Key& key) { return key.code >> shift & ((1 << kBits) - 1); };
+    poll();
     for (const Key& key : keys) ++start[digit(key) + 1];
     for (int i = 0; i < 1 << kBits; ++i) start[i + 1] += start[i];
+    poll();
     for (const Key& key : keys) other[start[digit(key)]++] = key;
     keys.swap(other);
   }
@@ -102,7 +104,9 @@ struct Hierarchy::Build {
     const auto corner = [&](const Key& key, int k) -> const glm::dvec3& {
       return mesh.vertices[mesh.triangles[key.triangle][k]];
     };
+    std::size_t compared = 0;
     const auto order = [&](const Key& x, const Key& y) {  // -1, 0, 1
+      poll_at(++compared);
       for (int i = 0; i < 9; ++i) {
         const double u = corner(x, i / 3)[i % 3], v = corner(y, i / 3)[i % 3];
         if (u != v) return u < v ? -1 : 1;
@@ -169,6 +173,7 @@ struct Hierarchy::Build {
       parts[largest].end = middle;
     }
     const std::size_t index = tree.nodes_.size();
+    poll_at(index);
     tree.nodes_.emplace_back();
     FloatBox whole;
     for (int i = 0; i < kWidth; ++i) {
@@ -206,6 +211,7 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh) {
   Build build{*this, std::vector<Key>(count)};
   place_.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
+    poll_at(i);
     const glm::uvec3& t = mesh.triangles[i];
     const glm::dvec3 &a = mesh.vertices[t.x], &b = mesh.vertices[t.y], &c = mesh.vertices[t.z];
     const glm::dvec3 middle =
@@ -222,6 +228,7 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh) {
   corners_.resize(build.keys.size());
   triangle_.resize(build.keys.size());
   for (std::uint32_t place = 0; place < build.keys.size(); ++place) {
+    poll_at(place);
     const std::uint32_t index = build.keys[place].triangle;
     triangle_[place] = index;
     for (int k = 0; k < 3; ++k) corners_[place][k] = scaled(mesh.vertices[mesh.triangles[index][k]]);

@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "reference/call.h"
 #include "reference/closest_point.h"
 #include "reference/triangle_mesh.h"
 
@@ -206,7 +207,9 @@ void Hierarchy::walk_in(const std::array<glm::dvec3, Count>& points, double& bou
   std::array<Entry, 7 * 96 + kWidth> stack;
   int height = 0;
   stack[height++] = {Real(0), 0};
-  while (height > 0) {
+  constexpr unsigned kBetweenPolls = 1024;  // nodes; nearly all searches visit fewer
+  for (unsigned visited = 1; height > 0; ++visited) {
+    if (visited % kBetweenPolls == 0) poll();
     const Entry top = stack[--height];
     Real limit = threshold();
     if (top.squared > limit) continue;

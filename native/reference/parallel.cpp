@@ -2,6 +2,7 @@
 #include "reference/parallel.h"
 
 #include <algorithm>
+#include <chrono>
 #include <system_error>
 
 namespace tolvol {
@@ -9,6 +10,8 @@ namespace {
 
 /// Turns given to other threads before one goes to sleep: the next loop, or the end of this one, is often near.
 constexpr int kPatience = 2000;
+/// Between two polls of a caller that waits for the others.
+constexpr std::chrono::milliseconds kBetweenPolls(20);
 
 template <class Condition>
 void wait_a_little(Condition&& condition) {
@@ -53,7 +56,15 @@ void Team::run(Loop& loop) {
     const auto left = [&] { return inside_ == 0; };
     wait_a_little(left);
     std::unique_lock lock(mutex_);
-    left_.wait(lock, left);
+    while (!left_.wait_for(lock, kBetweenPolls, left)) {
+      lock.unlock();
+      try {
+        poll();
+      } catch (...) {
+        fail(loop);  // the others stop at their next poll
+      }
+      lock.lock();
+    }
   }
   if (loop.error) std::rethrow_exception(loop.error);
 }
@@ -61,13 +72,19 @@ void Team::run(Loop& loop) {
 void Team::work(Loop& loop) {
   try {
     for (std::size_t begin; (begin = loop.next.fetch_add(loop.block)) < loop.count;) {
+      poll();
       loop.call(loop.body, begin, std::min(begin + loop.block, loop.count));
     }
   } catch (...) {
-    std::lock_guard lock(mutex_);
-    if (!loop.error) loop.error = std::current_exception();
-    loop.next = loop.count;
+    fail(loop);
   }
+}
+
+/// With the exception that is being handled.
+void Team::fail(Loop& loop) {
+  std::lock_guard lock(mutex_);
+  if (!loop.error) loop.error = std::current_exception();
+  loop.next = loop.count;
 }
 
 void Team::help() {
@@ -82,7 +99,10 @@ void Team::help() {
     Loop& loop = *open_;
     ++inside_;
     lock.unlock();
-    work(loop);
+    {
+      const Call::Within within(loop.call_of_caller);
+      work(loop);
+    }
     lock.lock();
     --inside_;
     left_.notify_one();

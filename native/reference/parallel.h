@@ -12,6 +12,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "reference/call.h"
+
 namespace tolvol {
 
 /// 0 means one per core.
@@ -33,7 +35,8 @@ class Team {
   bool alone() const { return helpers_.empty(); }
 
   /// Calls body(begin, end) for blocks of [0, count). Blocks are handed out in order, so body must write only to what
-  /// its own indices own. The first exception is rethrown after the join. About 1 us, and 50 us when the others sleep.
+  /// its own indices own. The first exception is rethrown after the join. Polls before each block, for the call that
+  /// the caller works for. About 1 us, and 50 us when the others sleep.
   template <class Body>
   void run(std::size_t count, std::size_t block, Body&& body) {
     // A body that is const comes back as it was.
@@ -51,10 +54,12 @@ class Team {
     void (*call)(void* body, std::size_t begin, std::size_t end);
     std::atomic<std::size_t> next{0};
     std::exception_ptr error{};
+    Call* const call_of_caller = Call::current();
   };
 
   void run(Loop& loop);
   void work(Loop& loop);
+  void fail(Loop& loop);
   void help();
 
   std::mutex mutex_;

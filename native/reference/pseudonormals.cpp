@@ -8,6 +8,7 @@
 #include <numbers>
 #include <span>
 
+#include "reference/call.h"
 #include "reference/union_find.h"
 
 namespace tolvol {
@@ -41,14 +42,18 @@ HalfEdges half_edges(const std::vector<glm::uvec3>& corners, std::size_t vertice
   for (std::size_t v = 0; v < vertices; ++v) result.first[v + 1] += result.first[v];
   std::vector<std::uint32_t> next(result.first.begin(), result.first.end() - 1);
   for (std::uint32_t i = 0; i < corners.size(); ++i) {
+    poll_at(i);
     for (std::uint32_t k = 0; k < 3; ++k) {
       const std::uint32_t a = corners[i][k], b = corners[i][(k + 1) % 3];
       result.sorted[next[std::min(a, b)]++] = {std::max(a, b), 3 * i + k};
     }
   }
+  std::size_t compared = 0;
   for (std::size_t v = 0; v < vertices; ++v) {
+    poll_at(v);
     std::sort(result.sorted.begin() + result.first[v], result.sorted.begin() + result.first[v + 1],
-              [](const HalfEdge& a, const HalfEdge& b) {
+              [&](const HalfEdge& a, const HalfEdge& b) {
+                poll_at(++compared);
                 return a.other != b.other ? a.other < b.other : a.place < b.place;
               });
   }
@@ -59,6 +64,7 @@ HalfEdges half_edges(const std::vector<glm::uvec3>& corners, std::size_t vertice
 template <class Visit>
 void for_edges(const HalfEdges& edges, Visit&& visit) {
   for (std::uint32_t v = 0; v + 1 < edges.first.size(); ++v) {
+    poll_at(v);
     for (std::uint32_t i = edges.first[v], end; i < edges.first[v + 1]; i = end) {
       for (end = i + 1; end < edges.first[v + 1] && edges.sorted[end].other == edges.sorted[i].other;) ++end;
       if (edges.sorted[i].other != v) visit(std::span(edges.sorted).subspan(i, end - i));
@@ -90,6 +96,7 @@ Pseudonormals::Pseudonormals(const TriangleMesh& mesh)
   face_.reserve(corners_.size());
   std::vector<bool> flat(corners_.size());
   for (std::size_t i = 0; i < corners_.size(); ++i) {
+    poll_at(i);
     const glm::uvec3& t = corners_[i];
     const glm::dvec3 ab = mesh.vertices[t.y] - mesh.vertices[t.x], ac = mesh.vertices[t.z] - mesh.vertices[t.x];
     const glm::dvec3 n = glm::cross(ab, ac);
@@ -107,6 +114,7 @@ Pseudonormals::Pseudonormals(const TriangleMesh& mesh)
     closed_ = closed_ && edge.size() == 2 && start(edge[0]) != start(edge[1]);
   });
   for (std::size_t i = 0; i < corners_.size(); ++i) {
+    poll_at(i);
     for (int k = 0; k < 3; ++k) vertex_[corners_[i][k]] += angle(mesh, corners_[i], k) * face_[i];
   }
   if (std::find(flat.begin(), flat.end(), true) == flat.end()) return;

@@ -6,6 +6,7 @@
 #include <limits>
 #include <sstream>
 
+#include "reference/call.h"
 #include "reference/errors.h"
 
 namespace tolvol {
@@ -14,6 +15,7 @@ void validate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> 
   if (vertices.empty()) throw InvalidInput("the mesh has no vertices");
   if (triangles.empty()) throw InvalidInput("the mesh has no faces");
   for (std::size_t i = 0; i < vertices.size(); ++i) {
+    poll_at(i);
     const glm::dvec3& p = vertices[i];
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
       std::ostringstream text;
@@ -22,6 +24,7 @@ void validate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> 
     }
   }
   for (std::size_t i = 0; i < triangles.size(); ++i) {
+    poll_at(i);
     for (int k = 0; k < 3; ++k) {
       if (triangles[i][k] >= vertices.size()) {
         std::ostringstream text;
@@ -62,6 +65,7 @@ std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vert
   };
   std::vector<std::uint32_t> representative(vertices.size());
   for (std::uint32_t i = 0; i < vertices.size(); ++i) {
+    poll_at(i);
     std::size_t place = place_of(vertices[i]);
     while (first[place] != kFree && vertices[first[place]] != vertices[i]) place = (place + 1) & (first.size() - 1);
     if (first[place] == kFree) first[place] = i;

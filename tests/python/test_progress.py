@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Long calls show how far they are to another thread, which can stop them."""
 
+import _thread
+import signal
 import threading
 import time
 
@@ -37,8 +39,13 @@ CALLS = {
     "Guard": lambda progress: tolvol.Guard(LARGE[0].astype(np.float32), LARGE[1], VOLUME, progress=progress),
     "smooth": lambda progress: tolvol.smooth(*LARGE, VOLUME, progress=progress),
     "hausdorff": lambda progress: tolvol.hausdorff(*LARGE, *meshes.torus(), progress=progress),
+    "distance": lambda progress: VOLUME.distance(LARGE[0], progress=progress),
+    "grid": lambda progress: VOLUME.grid(signed=True, progress=progress),
+    "DisplayGrid": lambda progress: tolvol.DisplayGrid(VOLUME, progress=progress),
+    "deform": lambda progress: tolvol.deform(LARGE[0], LATTICE, LARGE[1], VOLUME, progress=progress),
     "deviation": lambda progress: tolvol.deviation(*LARGE, *meshes.torus(), progress=progress),
 }
+LATTICE = tolvol.Lattice(tolvol.lattice_points(4))
 VOLUME = tolvol.ToleranceVolume(*LARGE, TOLERANCE)
 
 
@@ -104,6 +111,47 @@ def test_a_call_that_is_cancelled_before_it_starts(call):
     progress.cancel()
     with pytest.raises(tolvol.Cancelled):
         CALLS[call](progress)
+
+
+def after(seconds, action):
+    timer = threading.Timer(seconds, action)
+    timer.start()
+    return timer
+
+
+def test_ctrl_c_stops_a_call():
+    timer = after(0.3, _thread.interrupt_main)
+    with pytest.raises(KeyboardInterrupt):
+        tolvol.decimate(*LARGE, VOLUME, effort="thorough")
+    timer.join()
+    # Nothing of it is left for the next call.
+    assert (VOLUME.check(*LARGE).verdict == 2).all()
+
+
+def test_a_handler_of_ctrl_c_may_keep_what_a_thorough_decimation_has():
+    progress = tolvol.Progress()
+    before = signal.signal(signal.SIGINT, lambda *_: progress.finish())
+
+    def interrupt():
+        while progress.stage != "refining":
+            time.sleep(0.001)
+        _thread.interrupt_main()
+
+    timer = after(0, interrupt)
+    try:
+        result = tolvol.decimate(*LARGE, VOLUME, effort="thorough", progress=progress)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    timer.join()
+    assert result.report["stopped_by"] == "request"
+    assert tolvol.hausdorff(result.vertices, result.triangles, *LARGE, bound=TOLERANCE).upper <= TOLERANCE
+
+
+def test_max_seconds_ends_the_fast_phase_with_what_is_proved():
+    whole = tolvol.decimate(*LARGE, VOLUME)
+    result = tolvol.decimate(*LARGE, VOLUME, max_seconds=1e-9)
+    assert result.report["stopped_by"] == "time" and len(result.triangles) > len(whole.triangles)
+    assert tolvol.hausdorff(result.vertices, result.triangles, *LARGE, bound=TOLERANCE).upper <= TOLERANCE
 
 
 def test_progress_changes_no_result():

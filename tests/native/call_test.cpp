@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "reference/call.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "check/certificate.h"
+#include "field/display_grid.h"
+#include "field/signs.h"
+#include "measure/deviation.h"
+#include "measure/hausdorff.h"
+#include "operation/constrain.h"
+#include "operation/decimation.h"
+#include "operation/deformation.h"
+#include "operation/guard.h"
+#include "operation/smoothing.h"
+#include "reference/parallel.h"
+#include "shapes.h"
+
+namespace tolvol {
+namespace {
+
+/// Polls of a call, counted; from the `last`-th on the call is asked to stop.
+struct Counted {
+  std::size_t polls = 0, last;
+  const Call call;
+
+  explicit Counted(std::size_t last_poll = static_cast<std::size_t>(-1))
+      : last(last_poll), call(nullptr, [this] { return ++polls >= last; }) {}
+};
+
+template <class Run>
+std::size_t polls_of(Run&& run) {
+  const Counted whole;
+  run();
+  return whole.polls;
+}
+
+const TriangleMesh& wavy() {
+  static const TriangleMesh mesh = shapes::torus(40, 0.004);
+  return mesh;
+}
+
+constexpr double kTolerance = 0.02;
+
+const ToleranceVolume& volume() {
+  static const ToleranceVolume instance(wavy().vertices, wavy().triangles, Placement(glm::dmat4(1), Storage::float64),
+                                        kTolerance);
+  return instance;
+}
+
+std::vector<glm::dvec3> pushed() {
+  std::vector<glm::dvec3> result = wavy().vertices;
+  for (std::size_t i = 0; i < result.size(); ++i) result[i] *= 1 + 0.02 * std::sin(7.0 * double(i));
+  return result;
+}
+
+std::vector<std::uint32_t> indices() {
+  std::vector<std::uint32_t> result;
+  for (const glm::uvec3& t : wavy().triangles) result.insert(result.end(), {t.x, t.y, t.z});
+  return result;
+}
+
+struct NamedCall {
+  const char* name;
+  std::function<void()> run;
+};
+
+std::vector<NamedCall> calls() {
+  static const Placement placement(glm::dmat4(1), Storage::float64);
+  static const std::vector<std::uint32_t> faces = indices();
+  static const std::vector<glm::dvec3> moved = pushed();
+  static const auto decimated = [](auto&& set) {
+    DecimationOptions options;
+    options.threads = 1;
+    set(options);
+    decimate(wavy().vertices, wavy().triangles, placement, &volume(), options);
+  };
+  return {
+      {"ToleranceVolume",
+       [] {
+         ToleranceVolume(wavy().vertices, wavy().triangles, placement, kTolerance, {std::nullopt, 1, nullptr});
+       }},
+      {"fast marching",
+       [] {
+         ToleranceVolume(wavy().vertices, wavy().triangles, placement, kTolerance,
+                         {1, 1, nullptr, Field::fast_marching});
+       }},
+      {"signed_distance", [] { signed_distance(volume().reference(), volume().grid(), 1); }},
+      {"DisplayGrid", [] { DisplayGrid(wavy(), false, kTolerance, {.threads = 1}); }},
+      {"check",
+       [] {
+         Certificate(volume()).check({moved, faces, 3, 0}, {1, nullptr});
+       }},
+      {"decimate", [] { decimated([](DecimationOptions&) {}); }},
+      {"decimate one way", [] { decimated([](DecimationOptions& o) { o.two_sided = false; }); }},
+      {"decimate thorough",
+       [] { decimated([](DecimationOptions& o) { o.effort = DecimationOptions::Effort::thorough; }); }},
+      {"smooth",
+       [] {
+         SmoothingOptions options;
+         options.threads = 1;
+         smooth(wavy().vertices, wavy().triangles, placement, &volume(), options);
+       }},
+      {"constrain",
+       [] {
+         ConstrainOptions options;
+         options.threads = 1;
+         constrain(wavy().vertices, moved, faces, 3, placement, volume(), options);
+       }},
+      {"hausdorff",
+       [] {
+         hausdorff({moved, wavy().triangles}, wavy(), {std::nullopt, 1, nullptr});
+       }},
+      {"deviation",
+       [] {
+         deviation({moved, wavy().triangles}, wavy(), {{}, {}, 1, nullptr});
+       }},
+  };
+}
+
+TEST(Call, StopsEveryOperationInItsMiddle) {
+  for (const NamedCall& named : calls()) {
+    SCOPED_TRACE(named.name);
+    const std::size_t polls = polls_of(named.run);
+    ASSERT_GE(polls, 8u);
+    for (const double share : {0.02, 0.5, 0.97}) {
+      const Counted part(1 + static_cast<std::size_t>(share * static_cast<double>(polls)));
+      EXPECT_THROW(named.run(), Cancelled) << share;
+      EXPECT_EQ(part.polls, part.last) << share;
+    }
+  }
+}
+
+TEST(Call, IsHeardInsideOneFace) {
+  // The face lies where hardly a part of it is nearer than the tolerance or farther: it takes the whole budget.
+  const TriangleMesh waves = shapes::squares(
+      100, [](const glm::dvec3& p) { return glm::dvec3(p.x, p.y, 0.01 * std::sin(60 * p.x) * std::sin(60 * p.y)); });
+  const ToleranceVolume around(waves.vertices, waves.triangles, Placement(glm::dmat4(1), Storage::float64), 0.00995);
+  const Frame& frame = around.frame();
+  const std::vector<glm::dvec3> corners{frame.from_world({0.02, 0.02, 0}), frame.from_world({0.98, 0.02, 0}),
+                                        frame.from_world({0.98, 0.98, 0})};
+  const std::vector<std::uint32_t> face{0, 1, 2};
+  const auto check = [&] { Certificate(around).check({corners, face, 3, 0}, {1, nullptr}); };
+  const std::size_t polls = polls_of(check);
+  ASSERT_GE(polls, 20u);
+  const Counted part(polls / 2);
+  EXPECT_THROW(check(), Cancelled);
+}
+
+TEST(Call, IsHeardInsideOneSearch) {
+  // From its centre all triangles of a sphere are equally far.
+  TriangleMesh ball = shapes::box(60);
+  for (glm::dvec3& p : ball.vertices) p = glm::normalize(p - 0.5);
+  const Hierarchy hierarchy(ball);
+  EXPECT_GE(polls_of([&] { hierarchy.nearest(glm::dvec3(0)); }), 3u);
+}
+
+TEST(Call, CancelledAtTheEndOfACheckLeavesNoVerdicts) {
+  const std::vector<std::uint32_t> faces = indices();
+  const Certificate certificate(volume());
+  const auto check = [&] { certificate.check({volume().reference().vertices, faces, 3, 0}, {1, nullptr}); };
+  const Counted part(polls_of(check));
+  EXPECT_THROW(check(), Cancelled);
+}
+
+TEST(Call, LeavesTheGuardAsItWas) {
+  std::vector<float> start, wish;
+  for (const glm::dvec3& p : wavy().vertices) start.insert(start.end(), {float(p.x), float(p.y), float(p.z)});
+  for (const glm::dvec3& p : pushed()) wish.insert(wish.end(), {float(p.x), float(p.y), float(p.z)});
+  Guard stopped(start, indices(), 3, glm::dmat4(1), volume(), {.threads = 1});
+  Guard plain(start, indices(), 3, glm::dmat4(1), volume(), {.threads = 1});
+  Guard other(start, indices(), 3, glm::dmat4(1), volume(), {.threads = 1});
+  const std::size_t polls = polls_of([&] { other.constrain(wish); });
+  ASSERT_GE(polls, 8u);
+  for (const std::size_t divisor : {8, 3, 2}) {
+    const Counted part(polls - polls / divisor);
+    EXPECT_THROW(stopped.constrain(wish), Cancelled);
+  }
+  const Guard::Correction after = stopped.constrain(wish), without = plain.constrain(wish);
+  EXPECT_EQ(after.vertices, without.vertices);
+  EXPECT_EQ(after.positions, without.positions);
+}
+
+TEST(Call, IsThatOfWhoeverSharesALoop) {
+  Team team(3);
+  Progress progress;
+  const Call call(&progress);
+  std::atomic<int> begun = 0;
+  EXPECT_THROW(team.run(3, 1,
+                        [&](std::size_t, std::size_t) {
+                          if (++begun == 3) progress.cancel();
+                          for (;;) poll();
+                        }),
+               Cancelled);
+}
+
+TEST(Call, EndsTheFastPhaseInTimeWithWhatIsProved) {
+  DecimationOptions options;
+  options.threads = 1;
+  const Placement placement(glm::dmat4(1), Storage::float64);
+  const std::size_t whole = decimate(wavy().vertices, wavy().triangles, placement, &volume(), options).triangles.size();
+  options.max_seconds = 1e-9;
+  for (const auto effort : {DecimationOptions::Effort::fast, DecimationOptions::Effort::thorough}) {
+    options.effort = effort;
+    const DecimationResult result = decimate(wavy().vertices, wavy().triangles, placement, &volume(), options);
+    EXPECT_TRUE(result.stopped_at_time);
+    EXPECT_GT(result.triangles.size(), whole);
+    const TriangleMesh mesh{result.vertices, result.triangles};
+    EXPECT_LE(hausdorff(mesh, wavy(), {kTolerance}).upper, kTolerance);
+    EXPECT_LE(hausdorff(wavy(), mesh, {kTolerance}).upper, kTolerance);
+  }
+}
+
+}  // namespace
+}  // namespace tolvol
