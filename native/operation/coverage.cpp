@@ -172,10 +172,16 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
       if (piece.cuts > 0) call(gathered[piece.of]);
     });
   };
+  // By an exception, too, the counts are left at 0: the next try of this thread relies on it.
+  struct Clear {
+    decltype(for_each_split)& each;
+    ~Clear() {
+      each([](std::uint32_t& count) { count = 0; });
+    }
+  };
+  const Clear clear{for_each_split};
   for_each_split([](std::uint32_t& count) { ++count; });
-  const bool placed = place_all(trial, gathered);
-  for_each_split([](std::uint32_t& count) { count = 0; });
-  return placed;
+  return place_all(trial, gathered);
 }
 
 /// Places the pieces of what is replaced. `gathered`: how many there are of each triangle that was split.
