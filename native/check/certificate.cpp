@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "check/part.h"
+#include "check/segment_cover.h"
 #include "reference/call.h"
 #include "reference/closest_point.h"
 #include "reference/errors.h"
@@ -32,6 +33,24 @@ constexpr double kRoomToLeave = 1.0 / 32;  // of the tolerance
 constexpr double kRoom = 0.7;              // of the tolerance: up to here the grid's guess of a distance does
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
+
+bool comes_first(const glm::dvec3& p, const glm::dvec3& q) {
+  if (p.x != q.x) return p.x < q.x;
+  return p.y != q.y ? p.y < q.y : p.z < q.z;
+}
+
+/// The corners in an order that follows from their positions alone, a segment as (a, b, b).
+struct Ordered {
+  Ordered(const glm::dvec3 (&from)[3], const glm::uvec3& near_from) {
+    const int second = comes_first(from[1], from[0]), third = comes_first(from[2], from[0]),
+              last = comes_first(from[2], from[1]);
+    const int place[3] = {second + third, 1 - second + last, 2 - third - last};
+    for (int i = 0; i < 3; ++i) corners[place[i]] = from[i], near[place[i]] = near_from[i];
+    if (corners[0] == corners[1]) corners[1] = corners[2], near[1] = near[2];
+  }
+  glm::dvec3 corners[3];
+  glm::uvec3 near;
+};
 
 }  // namespace
 
@@ -106,21 +125,20 @@ bool TriangleCertificate::shows_outside(const glm::dvec3 (&corners)[3]) const {
   return false;
 }
 
+/// From short edges between corners known to be near.
+inline double TriangleCertificate::bound_by_corners(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
+  const auto& [a, b, c] = corners;
+  // Every point of a triangle is within L / sqrt(3) of a corner, L its longest edge.
+  const double corner = std::max({bounds.x, bounds.y, bounds.z}), room = within_ - corner;
+  const double longest2 = std::max({squared_length(b - a), squared_length(c - b), squared_length(a - c)});
+  return room > 0 && longest2 <= 3 * room * room ? corner + std::sqrt(longest2 * (1.0 / 3)) : kUnproved;
+}
+
+/// Sets `farthest` where the verdict is inside.
 template <bool kProve>
-Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& near,
-                                    double& farthest) const {
-  const glm::dvec3 &p0 = corners[0], &p1 = corners[1], &p2 = corners[2];
-  {
-    // Every point of a triangle is within L / sqrt(3) of a corner, L its longest edge.
-    const double corner = std::max({bounds.x, bounds.y, bounds.z}), room = within_ - corner;
-    const double longest2 = std::max({squared_length(p1 - p0), squared_length(p2 - p1), squared_length(p0 - p2)});
-    if (room > 0 && longest2 <= 3 * room * room) {
-      farthest = corner + std::sqrt(longest2 * (1.0 / 3));
-      return Verdict::inside;
-    }
-  }
+Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::uvec3& near, double& farthest) const {
   thread_local std::vector<Part> queue;
-  queue.assign(1, {{p0, p1, p2}});
+  queue.assign(1, {{corners[0], corners[1], corners[2]}});
   Verdict result = Verdict::inside;
   double farthest2 = 0;  // over the parts proved so far
   std::uint32_t hint = near.x;
@@ -207,8 +225,15 @@ Verdict TriangleCertificate::decide(const glm::dvec3 (&corners)[3], const glm::d
 
 double TriangleCertificate::bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
                                   const glm::uvec3& near) const {
-  double farthest = 0;
-  return decide<false>(corners, bounds, near, farthest) == Verdict::inside ? farthest : kUnproved;
+  double farthest = bound_by_corners(corners, bounds);
+  if (farthest != kUnproved) return farthest;
+  return search<false>(corners, near, farthest) == Verdict::inside ? farthest : kUnproved;
+}
+
+double TriangleCertificate::bound_in_any_order(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
+                                               const glm::uvec3& near) const {
+  const Ordered ordered(corners, near);
+  return bound(ordered.corners, bounds, ordered.near);
 }
 
 double TriangleCertificate::bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
@@ -218,8 +243,13 @@ double TriangleCertificate::bound_with_room(const glm::dvec3 (&corners)[3], cons
 
 Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
                                      const glm::uvec3& near) const {
+  if (bound_by_corners(corners, bounds) != kUnproved) return Verdict::inside;
+  const Ordered ordered(corners, near);
   double farthest = 0;
-  return decide<true>(corners, bounds, near, farthest);
+  const Verdict found = search<true>(ordered.corners, ordered.near, farthest);
+  const auto& [a, b, c] = ordered.corners;
+  if (found != Verdict::unproved || b != c) return found;
+  return covers_segment(*reference_, *hierarchy_, a, b, within_) ? Verdict::inside : Verdict::unproved;
 }
 
 std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& options) const {

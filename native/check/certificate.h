@@ -5,6 +5,14 @@
 /// epsilon. Then every convex combination of the corners is within epsilon of the same combination of the witnesses,
 /// which is in T: the whole piece is inside. This needs a guess for T (the grid's closest-triangle ids), no
 /// interpolation, and holds at any precision. Pieces that no single triangle covers are split.
+///
+/// What is proved of a piece is proved of its parts, whatever they are asked as: corners, edges, a triangle in any
+/// order of its corners, a quad (a, b, c, a). Two things make this so. The search for a proof takes the corners in an
+/// order of its own, by position, so that it does not depend on the order in which they come. And a segment or point
+/// that the search leaves unproved is decided along its line (segment_cover.h), where the search is exhaustive:
+/// whatever proof there is of a larger piece, its witnesses cover the segment, and witnesses that cover a segment are
+/// found. Short edges between near corners, the reason that is tried first, hold for every part as they hold for the
+/// piece.
 #pragma once
 
 #include <optional>
@@ -49,7 +57,12 @@ class TriangleCertificate {
   /// take its place may use. Up to twice the cost where there is none.
   double bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
 
-  /// Whether bound() finds one, and if not, whether a point outside proves that there is none.
+  /// The same where the order of the corners makes no difference. What has a bound here has the verdict inside.
+  double bound_in_any_order(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
+                            const glm::uvec3& near = glm::uvec3(Hierarchy::kNone)) const;
+
+  /// Whether there is a proof, in any order of the corners, and if not, whether a point outside proves that there is
+  /// none. The reference has the size of a frame, see witness_error().
   Verdict verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
                   const glm::uvec3& near = glm::uvec3(Hierarchy::kNone)) const;
 
@@ -82,9 +95,9 @@ class TriangleCertificate {
   }
 
  private:
+  double bound_by_corners(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
   template <bool kProve>
-  Verdict decide(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& near,
-                 double& farthest) const;
+  Verdict search(const glm::dvec3 (&corners)[3], const glm::uvec3& near, double& farthest) const;
 
   const std::vector<WitnessTriangle>* reference_;
   const DistanceGrid* grid_;

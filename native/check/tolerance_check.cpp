@@ -2,12 +2,50 @@
 #include "check/tolerance_check.h"
 
 #include <algorithm>
+#include <cmath>
 #include <unordered_map>
 
 #include "reference/call.h"
 #include "reference/errors.h"
 
 namespace tolvol {
+
+namespace {
+
+/// Of the frame: the reference is within 1 of its centre and no tolerance is larger than 2, so that a point twice as
+/// far from either is refuted.
+constexpr double kFar = 8;
+
+bool finite(const glm::dvec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
+
+}  // namespace
+
+PlacedPoints::PlacedPoints(std::span<const glm::dvec3> stored, const Placement& placement,
+                           const ToleranceVolume& volume) {
+  const Frame& frame = volume.frame();
+  const Placement world = placement.in(Frame()), placed = placement.in(frame);
+  const glm::dvec3 centre = frame.to_world(glm::dvec3(0));
+  points.reserve(stored.size());
+  std::vector<glm::dvec3> near;
+  near.reserve(stored.size());
+  for (const glm::dvec3& p : stored) {
+    const glm::dvec3 at = placed.frame(p);
+    if (glm::all(glm::lessThanEqual(glm::abs(at), glm::dvec3(kFar)))) {
+      near.push_back(p), points.push_back(at);
+      continue;
+    }
+    const std::string name = "point " + std::to_string(points.size());
+    if (!finite(p)) throw InvalidInput(name + " is not finite");
+    // In the world: a point may leave the range of double by the frame's scale alone.
+    const glm::dvec3 away = glm::abs(world.world(p) - centre);
+    const double certain = kFar / frame.scale() + world.mapping_error(std::span(&p, 1));
+    if (!(std::max({away.x, away.y, away.z}) > certain)) {
+      throw InvalidInput(name + " is too far away for double precision under to_world; move it nearer to the origin");
+    }
+    points.push_back(glm::clamp(at, -kFar, kFar));
+  }
+  mapping_error = placed.mapping_error(near);
+}
 
 void require_valid(const Pieces& pieces) {
   if (pieces.corners < 1 || pieces.corners > 4) {

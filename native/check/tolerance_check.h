@@ -30,6 +30,17 @@ struct Pieces {
   std::size_t size() const { return indices.size() / static_cast<std::size_t>(corners); }
 };
 
+/// Points as they are stored, placed in the frame of a volume for a check.
+struct PlacedPoints {
+  /// Throws InvalidInput, naming the first offender, for a point that is not finite, and for one of which double
+  /// precision cannot tell under its matrix where it is. Points that are certainly farther away than any tolerance are
+  /// drawn near to where they are still outside, so that what mapping costs them is not charged to the others.
+  PlacedPoints(std::span<const glm::dvec3> stored, const Placement& placement, const ToleranceVolume& volume);
+
+  std::vector<glm::dvec3> points;
+  double mapping_error;  ///< of all but those
+};
+
 class ToleranceCheck {
  public:
   struct Options {

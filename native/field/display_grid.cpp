@@ -6,6 +6,7 @@
 
 #include "field/scatter.h"
 #include "field/signs.h"
+#include "reference/call.h"
 #include "reference/pseudonormals.h"
 
 namespace tolvol {

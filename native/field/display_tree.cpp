@@ -67,9 +67,11 @@ class Split {
 }  // namespace
 
 DisplayTree::DisplayTree(const TriangleMesh& reference, bool mirrored, Progress* progress) {
+  const Call call(progress);
   const std::size_t count = reference.triangles.size();
   if (count > kMost) throw InvalidInput("a reference of more than 16,777,216 triangles cannot be shown");
   if (progress) progress->begin("preparing");
+  poll();
   closed = Pseudonormals(reference).closed();
   const bool turned = closed ? enclosed_volume(reference) < 0 : mirrored;
   const std::size_t leaves = std::bit_ceil((count + kLeaf - 1) / kLeaf);

@@ -24,7 +24,6 @@ namespace tolvol {
 namespace {
 
 constexpr std::uint32_t kNone = CutMesh::kNone;
-constexpr unsigned kMostThreads = 16;  // more would wait for each other
 
 class Decimation {
  public:

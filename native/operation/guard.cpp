@@ -52,13 +52,9 @@ void Guard::begin(std::span<const float> positions, Progress* progress) {
 
 void Guard::reset(std::span<const float> positions, Progress* progress) {
   require_size(positions);
-  try {
-    begin(positions, progress);
-  } catch (...) {
-    const Call::Within no_call(nullptr);
-    begin(std::vector<float>(last_), nullptr);
-    throw;
-  }
+  interrupted_ = true;
+  begin(positions, progress);
+  interrupted_ = false;
 }
 
 /// Vertices of which any bit is not as in the state, ascending.
@@ -84,18 +80,23 @@ std::vector<std::uint32_t> Guard::changed(std::span<const float> positions) cons
 
 Guard::Correction Guard::constrain(std::span<const float> positions) {
   require_size(positions);
+  if (interrupted_) begin(std::vector<float>(last_), nullptr);
+  interrupted_ = true;
   const PullBack::Moving moving = pull_back_.moving(changed(positions));
   std::vector<glm::dvec3> before, after;
   for (const std::uint32_t v : moving.vertices) before.push_back(at(last_, v)), after.push_back(at(positions, v));
   const PullBack::Result ends = pull_back_.move(moving, before, after, PullBack::Mode::settle, nullptr);
   Correction correction;
   for (std::size_t i = 0; i < moving.vertices.size(); ++i) {
-    const std::uint32_t v = moving.vertices[i];
-    for (int k = 0; k < 3; ++k) last_[3 * v + k] = static_cast<float>(ends.reached[i][k]);
     if (ends.factors[i] >= 1) continue;
-    correction.vertices.push_back(v);
-    correction.positions.insert(correction.positions.end(), &last_[3 * v], &last_[3 * v] + 3);
+    correction.vertices.push_back(moving.vertices[i]);
+    for (int k = 0; k < 3; ++k) correction.positions.push_back(static_cast<float>(ends.reached[i][k]));
   }
+  // From here on nothing throws.
+  for (std::size_t i = 0; i < moving.vertices.size(); ++i) {
+    for (int k = 0; k < 3; ++k) last_[3 * moving.vertices[i] + k] = static_cast<float>(ends.reached[i][k]);
+  }
+  interrupted_ = false;
   return correction;
 }
 

@@ -40,8 +40,8 @@ class Guard {
 
   /// Takes the mesh as it was edited since the last call: what is inside is the new state, the rest is pulled back
   /// along its motion since then, as by constrain(); going back to an earlier state by undo is an edit like others.
-  /// Throws InvalidInput for another number of vertices or a moved one that is not finite, and Cancelled; both keep
-  /// the state.
+  /// Throws InvalidInput for another number of vertices or a moved one that is not finite, and Cancelled; both keep the
+  /// state. The call after one that threw costs as much as a start.
   Correction constrain(std::span<const float> positions);
 
   /// Starts anew from these positions, whatever came before. Throws like the constructor, keeping the state.
@@ -56,6 +56,7 @@ class Guard {
   void require_size(std::span<const float> positions) const;
   std::vector<std::uint32_t> changed(std::span<const float> positions) const;
 
+  bool interrupted_ = false;  // a call was left by an exception: pull_back_ no longer holds the state, last_ does
   std::vector<std::uint32_t> faces_;
   std::vector<float> last_;  // the state, as it is stored
   Options options_;

@@ -257,7 +257,8 @@ double MovingMesh::reach_by_certificate(std::uint32_t face) const {
   // First as Certificate decides, so that it proves the face again; then the headroom.
   double reach = kUnproved;
   for (const TriangleCertificate& certificate : certificates_) {
-    reach = over_triangulations(face, [&](const auto&... triangle) { return certificate.bound(triangle...); });
+    reach =
+        over_triangulations(face, [&](const auto&... triangle) { return certificate.bound_in_any_order(triangle...); });
     if (reach <= within_ || reach == kUnproved) break;
   }
   return reach;

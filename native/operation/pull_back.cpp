@@ -12,7 +12,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "reference/call.h"
 #include "reference/parallel.h"
 
 namespace tolvol {
@@ -53,18 +52,6 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
   mesh_.try_all(vertices, before, after);
   Result result{std::vector<double>(vertices.size(), 1), {after.begin(), after.end()}, 0};
   if (mode == Mode::settle) mesh_.remember_refusals();
-  // Whatever ends this early leaves the state as it was.
-  struct TakeBack {
-    PullBack& all;
-    const std::vector<std::uint32_t>& vertices;
-    bool accepted = false;
-    ~TakeBack() {
-      for (std::size_t i = 0; !accepted && i < vertices.size(); ++i) {
-        all.mesh_.take_back(vertices[i]);
-        all.held_index_[vertices[i]] = kNone;
-      }
-    }
-  } take_back{*this, vertices};
   std::vector<std::uint32_t> failed = mesh_.failing(moving.faces, progress);
   if (!failed.empty()) {
     std::vector<Held> held = hold(moving, before, after, std::move(failed), progress);
@@ -85,9 +72,7 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
     result.factors[i] = 0, result.reached[i] = before[i];
     ++result.held_back;
   }
-  const Call::Within no_call(nullptr);
   mesh_.accept(vertices, moving.faces);
-  take_back.accepted = true;
   return result;
 }
 

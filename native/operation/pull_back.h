@@ -41,9 +41,9 @@ class PullBack {
   Moving moving(std::vector<std::uint32_t> vertices);
 
   /// Moves each vertex from `before`, its stored position now, towards `after`, and makes where it ends the new state.
-  /// All faces of the new state are inside; see constrain.h for what else holds of the factors. Throws InvalidInput
-  /// for a wish that is not finite, and Cancelled; both change nothing. Settled faces cost about 10 ns each, those near
-  /// the tolerance about 1 us a try.
+  /// All faces of the new state are inside; see constrain.h for what else holds of the factors. Throws InvalidInput,
+  /// changing nothing, for a wish that is not finite. After Cancelled only start() may be called. Settled faces cost
+  /// about 10 ns each, those near the tolerance about 1 us a try.
   Result move(const Moving& moving, std::span<const glm::dvec3> before, std::span<const glm::dvec3> after, Mode mode,
               Progress* progress);
 

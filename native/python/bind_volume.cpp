@@ -2,6 +2,7 @@
 #include <pybind11/stl.h>
 
 #include <chrono>
+#include <cmath>
 
 #include "check/tolerance_volume.h"
 #include "python/arrays.h"
@@ -46,7 +47,7 @@ CheckResult check(const Volume& volume, const py::object& points, const py::obje
   const Vertices v = to_vertices(points, "points");
   int corners = 3;
   const std::vector<std::uint32_t> indices = to_faces(faces, "faces", corners);
-  const Placement placement = Placement(to_matrix(to_world), v.storage).in(volume.native.frame());
+  const Placement placement(to_matrix(to_world), v.storage);
   std::vector<std::int32_t> labels;
   if (!groups.is_none()) labels = to_labels(groups, "groups");
   const ToleranceCheck::Options options{to_threads(threads), progress};
@@ -54,13 +55,8 @@ CheckResult check(const Volume& volume, const py::object& points, const py::obje
   std::vector<Verdict> verdicts;
   {
     const Interruptible call(progress);
-    const std::vector<glm::dvec3> in_frame = placement.frame(v.values);
-    for (std::size_t i = 0; i < in_frame.size(); ++i) {
-      if (!std::isfinite(glm::dot(in_frame[i], glm::dvec3(1)))) {
-        throw InvalidInput("point " + std::to_string(i) + " is not finite");
-      }
-    }
-    const Pieces pieces{in_frame, indices, corners, placement.mapping_error(v.values)};
+    const PlacedPoints placed(v.values, placement, volume.native);
+    const Pieces pieces{placed.points, indices, corners, placed.mapping_error};
     by = volume.check(method);
     try {
       verdicts = groups.is_none() ? by->check(pieces, options) : by->check_groups(pieces, labels, options);
@@ -70,6 +66,23 @@ CheckResult check(const Volume& volume, const py::object& points, const py::obje
     }
   }
   return {from_vector<std::uint8_t>(verdicts), by->method(), by->renderer()};
+}
+
+/// Of point `i`, in world units; infinity where that is more than a double holds.
+double distance_to(const ToleranceVolume& volume, const Placement& placement, const glm::dvec3& stored, std::size_t i) {
+  const auto finite = [](const glm::dvec3& p) {
+    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+  };
+  const Frame& frame = volume.frame();
+  const glm::dvec3 at = placement.frame(stored);
+  if (finite(at)) return volume.hierarchy().nearest(at).distance / frame.scale();
+  const std::string name = "point " + std::to_string(i);
+  if (!finite(stored)) throw InvalidInput(name + " is not finite");
+  const glm::dvec3 world = placement.world(stored);
+  if (!finite(world)) throw InvalidInput(name + " is too far away for double precision under to_world");
+  // So much farther than the reference is large that the reference is a point.
+  const glm::dvec3 away = world - frame.to_world(glm::dvec3(0));
+  return std::hypot(away.x, away.y, away.z);
 }
 
 py::array_t<double> distance(const Volume& volume, const py::object& points, const py::object& to_world, int threads,
@@ -82,10 +95,7 @@ py::array_t<double> distance(const Volume& volume, const py::object& points, con
     constexpr std::size_t kBlock = 256;
     parallel_for(result.size(), kBlock, to_threads(threads), [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        const glm::dvec3 p = placement.frame(v.values[i]);
-        if (!std::isfinite(glm::dot(p, glm::dvec3(1))))
-          throw InvalidInput("point " + std::to_string(i) + " is not finite");
-        result[i] = volume.native.hierarchy().nearest(p).distance / volume.native.frame().scale();
+        result[i] = distance_to(volume.native, placement, v.values[i], i);
       }
     });
   }

@@ -16,6 +16,23 @@ void refuse_newer_numpy() {
 #endif
 }
 
+// An object that __new__ made without __init__ holds nothing. Where a call needs what it should
+// hold, pybind11 would allocate that and leave it uninitialised; it asks the class for the memory, and gets this
+// answer.
+void* refuse_uninitialised(std::size_t) {
+  throw pybind11::type_error(
+      "this object was never initialised: make one by calling its class, or the function that "
+      "returns it");
+}
+
+void refuse_uninitialised_objects(const pybind11::module_& module) {
+  for (const auto& entry : module.attr("__dict__").cast<pybind11::dict>()) {
+    if (!PyType_Check(entry.second.ptr())) continue;
+    auto* const type = reinterpret_cast<PyTypeObject*>(entry.second.ptr());
+    if (auto* const info = pybind11::detail::get_type_info(type)) info->operator_new = refuse_uninitialised;
+  }
+}
+
 }  // namespace
 
 PYBIND11_MODULE(tolvol, module) {
@@ -39,4 +56,5 @@ PYBIND11_MODULE(tolvol, module) {
   tolvol::python::bind_deformation(module);
   tolvol::python::bind_measure(module);
   tolvol::python::bind_picture(module);
+  refuse_uninitialised_objects(module);
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <new>
 #include <system_error>
 
 namespace tolvol {
@@ -21,10 +22,12 @@ void wait_a_little(Condition&& condition) {
 }  // namespace
 
 Team::Team(unsigned threads) {
+  // Those that do start, and the caller, do the work. An exception that left here would end the process, as threads
+  // that run are not to be destroyed.
   try {
     for (unsigned i = 1; i < threads; ++i) helpers_.emplace_back([this] { help(); });
   } catch (const std::system_error&) {
-    // Those that did start, and the caller, do the work.
+  } catch (const std::bad_alloc&) {
   }
 }
 

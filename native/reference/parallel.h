@@ -16,15 +16,19 @@
 
 namespace tolvol {
 
-/// 0 means one per core.
+/// Threads that wait for each other often gain nothing from more.
+inline constexpr unsigned kMostThreads = 16;
+
+/// 0 means one per core. More than there are cores, and more than kMostThreads, would only cost memory and time.
 inline unsigned thread_count(unsigned wanted) {
-  return wanted ? wanted : std::max(1u, std::thread::hardware_concurrency());
+  const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
+  return wanted ? std::min(wanted, std::max(cores, kMostThreads)) : cores;
 }
 
 /// Threads that wait between the loops they share, for loops too short to start threads for. One caller at a time.
 class Team {
  public:
-  /// `threads`: the caller's among them. Fewer where the system starts no more.
+  /// `threads`: the caller's among them. Fewer where the system starts no more, or has no memory for them.
   explicit Team(unsigned threads);
   ~Team();
   Team(const Team&) = delete;

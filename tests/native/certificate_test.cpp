@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numeric>
 #include <random>
 
 #include "many.h"
@@ -240,6 +241,66 @@ TEST(Certificate, PointsSegmentsAndQuads) {
   EXPECT_EQ(Certificate(over).check({corners, quad, 4, 0}, {})[0], Verdict::outside);
   EXPECT_EQ(Certificate(over).check({corners, halves, 3, 0}, {})[0], Verdict::inside);
   EXPECT_THROW(Certificate(over).check({corners, quad, 5, 0}, {}), InvalidInput);
+}
+
+/// Triangles of a rough mesh whose corners have moved apart until the proof that is left is the last: a little farther
+/// there is none.
+std::vector<dvec3> barely_inside(const ToleranceVolume& volume, const TriangleCertificate& certificate, int count,
+                                 unsigned seed) {
+  std::mt19937 engine(seed);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const TriangleMesh& reference = volume.reference();
+  std::vector<dvec3> result;
+  while (result.size() < 3 * static_cast<std::size_t>(count)) {
+    const glm::uvec3 t = reference.triangles[engine() % reference.triangles.size()];
+    const dvec3 step[3] = {
+        {u(engine), u(engine), u(engine)}, {u(engine), u(engine), u(engine)}, {u(engine), u(engine), u(engine)}};
+    const auto moved = [&](double by, dvec3(&corners)[3]) {
+      for (int k = 0; k < 3; ++k) corners[k] = reference.vertices[t[k]] + by * step[k];
+    };
+    dvec3 corners[3];
+    double inside = 0, beyond = 3 * volume.frame_tolerance();
+    for (int halving = 0; halving < 14; ++halving) {
+      const double middle = 0.5 * (inside + beyond);
+      moved(middle, corners);
+      const bool proved = certificate.verdict(corners, dvec3(TriangleCertificate::kUnproved)) == Verdict::inside;
+      (proved ? inside : beyond) = middle;
+    }
+    moved(inside, corners);
+    result.insert(result.end(), corners, corners + 3);
+  }
+  return result;
+}
+
+TEST(Certificate, WhatIsProvedOfAPieceIsProvedOfItsParts) {
+  const TriangleMesh reference = shapes::torus(40, 0.03);
+  for (const double tolerance : {0.1, 0.03, 0.01}) {
+    const ToleranceVolume volume(reference.vertices, reference.triangles, kIdentity, tolerance);
+    const TriangleCertificate certificate(volume.witnesses(), volume.grid(), volume.hierarchy(), volume.provable(0),
+                                          volume.refutable(0));
+    const std::vector<dvec3> points = barely_inside(volume, certificate, many(30'000), 17);
+    const Certificate check(volume);
+    std::vector<std::uint32_t> whole(points.size());
+    std::iota(whole.begin(), whole.end(), 0u);
+    const std::vector<Verdict> verdicts = check.check({points, whole, 3, 0}, {});
+    std::size_t inside = 0;
+    for (const std::vector<std::uint32_t>& part : std::vector<std::vector<std::uint32_t>>{
+             {0},          {1},          {2},          {0, 1},       {1, 0},      {1, 2},       {2, 1},
+             {2, 0},       {0, 2},       {1, 2, 0},    {2, 0, 1},    {2, 1, 0},   {1, 0, 2},    {0, 2, 1},
+             {0, 0, 1},    {0, 1, 0},    {0, 1, 1},    {2, 1, 2},    {2, 2, 2},   {0, 1, 2, 0}, {0, 1, 2, 2},
+             {0, 0, 1, 2}, {0, 1, 1, 2}, {1, 0, 1, 2}, {2, 0, 2, 0}, {1, 1, 0, 0}}) {
+      std::vector<std::uint32_t> indices;
+      for (std::uint32_t i = 0; i < points.size(); i += 3) {
+        if (verdicts[i / 3] != Verdict::inside) continue;
+        for (const std::uint32_t corner : part) indices.push_back(i + corner);
+      }
+      const std::vector<Verdict> of_parts = check.check({points, indices, static_cast<int>(part.size()), 0}, {});
+      inside = of_parts.size();
+      EXPECT_EQ(std::count(of_parts.begin(), of_parts.end(), Verdict::inside), static_cast<std::ptrdiff_t>(inside))
+          << testing::PrintToString(part) << " at " << tolerance;
+    }
+    EXPECT_GT(inside, points.size() / 3 * 9 / 10);
+  }
 }
 
 TEST(Certificate, SameVerdictsOnAnyThreadsAndInstructions) {

@@ -207,13 +207,16 @@ TEST(Refinement, WhatIsTriedAheadKnowsWhatAVertexThatStaysMayStillUse) {
 
 TEST(Refinement, TimeAndTargetEndIt) {
   const Case c = torus();
-  const std::size_t fast = run(c).triangles.size();
   Options options = thorough();
   options.max_seconds = 1e-9;
   const DecimationResult late = run(c, options);
   EXPECT_TRUE(late.stopped_at_time);
-  EXPECT_EQ(late.triangles.size(), fast);
+  EXPECT_GT(late.triangles.size(), run(c).triangles.size());
   cases::expect_within(c, late);
+  // With a target the collapses go by another order: how far they come alone, the refinement goes beyond.
+  Options alone;
+  alone.target_triangles = 4;
+  const std::size_t fast = run(c, alone).triangles.size();
   options.max_seconds = 0;
   options.target_triangles = fast - 4;
   const DecimationResult at_target = run(c, options);

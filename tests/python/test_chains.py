@@ -53,3 +53,18 @@ def test_one_reference_for_the_whole_chain_keeps_it_inside_and_one_a_step_does_n
         )
     assert len(one[1]) < len(triangles) / 2
     assert drift[-1][2] > 1.5 * tolerance
+
+
+def test_what_one_step_left_inside_the_next_takes_in_any_form():
+    """As triangles, as quads with a corner twice, as edges: no step refuses what the step before proved."""
+    vertices, triangles = meshes.sphere(4)
+    rng = np.random.default_rng(3)
+    vertices = vertices * (1 + 0.1 * rng.standard_normal((len(vertices), 1)))
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.04 * tolvol.size(vertices, triangles))
+    forms = ([0, 1, 2], [0, 1, 2, 0], [1, 2, 2, 0], [2, 1, 0], [0, 1], [2, 0, 2], [1, 2], [0, 0, 1, 2], [1, 2, 0])
+    for form in forms:
+        wish = vertices + 3 * volume.tolerance * rng.standard_normal(vertices.shape)
+        vertices = tolvol.constrain(vertices, wish, triangles, volume).vertices
+        faces = np.ascontiguousarray(triangles[:, form])
+        assert (volume.check(vertices, faces).verdict == 2).all(), form
+        tolvol.constrain(vertices, vertices, faces, volume, outside="error")

@@ -41,7 +41,7 @@ CALLS = {
     "hausdorff": lambda progress: tolvol.hausdorff(*LARGE, *meshes.torus(), progress=progress),
     "distance": lambda progress: VOLUME.distance(LARGE[0], progress=progress),
     "grid": lambda progress: VOLUME.grid(signed=True, progress=progress),
-    "DisplayGrid": lambda progress: tolvol.DisplayGrid(VOLUME, progress=progress),
+    "DisplayTree": lambda progress: tolvol.DisplayTree(VOLUME, progress=progress),
     "deform": lambda progress: tolvol.deform(LARGE[0], LATTICE, LARGE[1], VOLUME, progress=progress),
     "deviation": lambda progress: tolvol.deviation(*LARGE, *meshes.torus(), progress=progress),
 }

@@ -165,3 +165,40 @@ def test_check_gives_the_same_on_any_number_of_threads():
     assert np.array_equal(verdicts[0], verdicts[1]) and np.array_equal(verdicts[0], verdicts[2])
     grids = [tolvol.ToleranceVolume(vertices, triangles, 0.02, threads=n).grid()[0] for n in (1, 2, 3)]
     assert np.array_equal(grids[0], grids[1]) and np.array_equal(grids[0], grids[2])
+
+
+CLASSES = [c for c in vars(tolvol).values() if isinstance(c, type) and not issubclass(c, Exception)]
+
+
+@pytest.mark.parametrize("kind", CLASSES, ids=lambda kind: kind.__name__)
+def test_an_object_that_was_never_initialised_is_a_type_error(kind):
+    empty = kind.__new__(kind)
+    read_by_the_object = [n for n, value in vars(kind).items() if type(value) is property]
+    for name in read_by_the_object:
+        with pytest.raises(TypeError, match="never initialised"):
+            getattr(empty, name)
+
+
+def test_far_is_outside_and_only_not_finite_is_invalid():
+    vertices, triangles = meshes.torus(24, 12)
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.05)
+    points = np.array([[1.4, 0, 0], [1e19, 0, 0], [1.7e308, 1.7e308, 0], [-1.7e308, -1.7e308, 0]])
+    assert volume.check(points, np.arange(4)[:, None]).verdict.tolist() == [2, 0, 0, 0]
+    assert volume.check(points, np.array([[0, 0], [0, 1], [2, 3]])).verdict.tolist() == [2, 0, 0]
+    assert volume.distance(points)[1] == pytest.approx(1e19)
+    assert np.isinf(volume.distance(points)[2:]).all()
+    small = tolvol.ToleranceVolume(vertices * 1e-6, triangles, 0.05e-6)
+    assert small.check(points[2:], np.arange(2)[:, None]).verdict.tolist() == [0, 0]
+    assert small.distance(np.array([[1.7e308, 0, 0]])) == pytest.approx(1.7e308)
+    for bad in (np.nan, np.inf):
+        broken = np.array([[0, bad, 0]])
+        with pytest.raises(tolvol.InvalidInput, match="point 0 is not finite"):
+            volume.check(broken, np.array([[0]]))
+        with pytest.raises(tolvol.InvalidInput, match="point 0 is not finite"):
+            volume.distance(broken)
+
+
+def test_a_hundred_thousand_threads_are_as_good_as_those_there_are():
+    vertices, triangles = meshes.torus(24, 12)
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.05, threads=100_000)
+    assert tolvol.hausdorff(vertices, triangles, vertices, triangles, threads=100_000).upper < volume.tolerance

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Every operation while the n-th allocation fails, for all n of its run (decimation: for n that grow by a tenth): the
+// exception comes out, what was there before is as it was, and the next call gives what it always gives.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstdlib>
+#include <functional>
+#include <new>
+#include <vector>
+
+#include "check/certificate.h"
+#include "field/display_grid.h"
+#include "measure/deviation.h"
+#include "measure/hausdorff.h"
+#include "operation/constrain.h"
+#include "operation/decimation.h"
+#include "operation/deformation.h"
+#include "operation/guard.h"
+#include "operation/smoothing.h"
+#include "shapes.h"
+
+namespace {
+
+std::atomic<long> allocations_left{-1};  // the one after these fails; negative: none does
+
+void* allocate(std::size_t size, std::size_t alignment) {
+  // Once: what is allocated while the exception is on its way succeeds.
+  if (allocations_left.load(std::memory_order_relaxed) >= 0 && allocations_left.fetch_sub(1) == 0)
+    throw std::bad_alloc();
+  size = (std::max<std::size_t>(size, 1) + alignment - 1) / alignment * alignment;
+  if (void* const memory = std::aligned_alloc(alignment, size)) return memory;
+  throw std::bad_alloc();
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) { return allocate(size, __STDCPP_DEFAULT_NEW_ALIGNMENT__); }
+void* operator new[](std::size_t size) { return allocate(size, __STDCPP_DEFAULT_NEW_ALIGNMENT__); }
+void* operator new(std::size_t size, std::align_val_t alignment) { return allocate(size, std::size_t(alignment)); }
+void* operator new[](std::size_t size, std::align_val_t alignment) { return allocate(size, std::size_t(alignment)); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+/// Where an operation ended, in numbers.
+using Numbers = std::vector<double>;
+
+void add(Numbers& numbers, const std::vector<dvec3>& points) {
+  for (const dvec3& p : points) numbers.insert(numbers.end(), {p.x, p.y, p.z});
+}
+
+const Placement kStored(glm::dmat4(1), Storage::float32);
+
+struct Scene {
+  TriangleMesh mesh = shapes::torus(10, 0.02);
+  ToleranceVolume volume{mesh.vertices, mesh.triangles, kStored, 0.08, {.precision = 1, .threads = 1}};
+  std::vector<std::uint32_t> faces = indices(mesh);
+  std::vector<dvec3> wish = pushed(0.3);
+
+  static std::vector<std::uint32_t> indices(const TriangleMesh& mesh) {
+    std::vector<std::uint32_t> result;
+    for (const glm::uvec3& t : mesh.triangles) result.insert(result.end(), {t.x, t.y, t.z});
+    return result;
+  }
+  /// Every third vertex by up to so much.
+  std::vector<dvec3> pushed(double by) const {
+    std::vector<dvec3> result = mesh.vertices;
+    for (std::size_t v = 0; v < result.size(); v += 3) result[v] += by * dvec3(0.1 * double(v % 7), 0.3, 0.5);
+    for (dvec3& p : result) p = rounded_to_float32(p);
+    return result;
+  }
+  std::vector<float> flat(const std::vector<dvec3>& points) const {
+    std::vector<float> result;
+    for (const dvec3& p : points) result.insert(result.end(), {float(p.x), float(p.y), float(p.z)});
+    return result;
+  }
+  Numbers decimated(DecimationOptions options) const {
+    const DecimationResult result = decimate(mesh.vertices, mesh.triangles, kStored, &volume, options);
+    Numbers numbers;
+    add(numbers, result.vertices);
+    for (const glm::uvec3& t : result.triangles) numbers.insert(numbers.end(), {double(t.x), double(t.y), double(t.z)});
+    return numbers;
+  }
+};
+
+/// Calls `operation` with the n-th allocation failing until a run has no n-th, and after each failure once more: it
+/// must give what it gave first. `growth`: n grows by so much of itself, for what takes long. Returns how many
+/// allocations there were, at least.
+long fail_allocations(const std::function<Numbers()>& operation, double growth = 0) {
+  const Numbers expected = operation();
+  EXPECT_FALSE(expected.empty());
+  for (long n = 0;; n += 1 + long(growth * double(n))) {
+    bool failed = false;
+    allocations_left = n;
+    try {
+      operation();
+    } catch (const std::bad_alloc&) {
+      failed = true;
+    }
+    const bool reached = allocations_left.exchange(-1) < 0;
+    EXPECT_TRUE(reached || !failed) << n;
+    if (!reached) return n;
+    if (operation() != expected) {
+      ADD_FAILURE() << "another result after allocation " << n << " failed";
+      return n;
+    }
+  }
+}
+
+TEST(Allocation, DecimationInEveryForm) {
+  const Scene scene;
+  for (const unsigned threads : {1u, 2u}) {
+    for (const bool two_sided : {true, false}) {
+      DecimationOptions options;
+      options.two_sided = two_sided, options.threads = threads;
+      EXPECT_GT(fail_allocations([&] { return scene.decimated(options); }, 0.1), 100);
+    }
+  }
+  DecimationOptions options;
+  options.vertices = DecimationOptions::Vertices::subset, options.threads = 1;
+  EXPECT_GT(fail_allocations([&] { return scene.decimated(options); }, 0.1), 100);
+  options.effort = DecimationOptions::Effort::thorough;
+  EXPECT_GT(fail_allocations([&] { return scene.decimated(options); }, 0.5), 100);
+}
+
+TEST(Allocation, VolumeAndChecks) {
+  const Scene scene;
+  const auto distances = [&](unsigned threads) {
+    const ToleranceVolume volume(scene.mesh.vertices, scene.mesh.triangles, kStored, 0.08,
+                                 {.precision = 1, .threads = threads});
+    return Numbers(volume.grid().distance.begin(), volume.grid().distance.end());
+  };
+  for (const unsigned threads : {1u, 2u}) {
+    EXPECT_GT(fail_allocations([&] { return distances(threads); }), 10);
+  }
+  const auto verdicts = [&](unsigned threads) {
+    const PlacedPoints placed(scene.wish, kStored, scene.volume);
+    std::vector<std::int32_t> groups(scene.mesh.triangles.size());
+    for (std::size_t i = 0; i < groups.size(); ++i) groups[i] = std::int32_t(i / 2);
+    const std::vector<Verdict> found =
+        Certificate(scene.volume)
+            .check_groups({placed.points, scene.faces, 3, placed.mapping_error}, groups, {threads, nullptr});
+    Numbers numbers;
+    for (const Verdict verdict : found) numbers.push_back(double(verdict));
+    return numbers;
+  };
+  for (const unsigned threads : {1u, 2u}) {
+    EXPECT_GT(fail_allocations([&] { return verdicts(threads); }), 5);
+  }
+  EXPECT_GT(fail_allocations([&] {
+              const DisplayGrid display(scene.volume.reference(), false, scene.volume.frame_tolerance(),
+                                        {.threads = 1});
+              return Numbers(display.grid.distance.begin(), display.grid.distance.end());
+            }),
+            5);
+}
+
+TEST(Allocation, Motion) {
+  const Scene scene;
+  for (const unsigned threads : {1u, 2u}) {
+    EXPECT_GT(fail_allocations([&] {
+                const ConstrainResult result = constrain(scene.mesh.vertices, scene.wish, scene.faces, 3, kStored,
+                                                         scene.volume, {.threads = threads});
+                Numbers numbers = result.factors;
+                add(numbers, result.vertices);
+                return numbers;
+              }),
+              20);
+    EXPECT_GT(fail_allocations([&] {
+                SmoothingOptions options;
+                options.threads = threads, options.iterations = 2;
+                Numbers numbers;
+                add(numbers,
+                    smooth(scene.mesh.vertices, scene.mesh.triangles, kStored, &scene.volume, options).vertices);
+                return numbers;
+              }),
+              20);
+  }
+}
+
+TEST(Allocation, Deformation) {
+  const Scene scene;
+  Lattice lattice;
+  lattice.size = glm::uvec3(4);
+  lattice.domain = glm::dmat4(4);
+  lattice.domain[3] = glm::dvec4(-2, -2, -2, 1);
+  lattice.points = rest_points(lattice.size, lattice.domain);
+  for (std::size_t i = 0; i < lattice.points.size(); i += 3) lattice.points[i].z += 1;
+  DeformationOptions options;
+  options.mode = DeformationOptions::Mode::pull_back, options.threads = 1;
+  EXPECT_GT(fail_allocations([&] {
+              Numbers numbers;
+              add(numbers, deform(scene.mesh.vertices, scene.faces, 3, kStored, &scene.volume,
+                                  LatticeDeformation(lattice), options)
+                               .vertices);
+              return numbers;
+            }),
+            20);
+}
+
+TEST(Allocation, AGuardKeepsItsState) {
+  const Scene scene;
+  const std::vector<float> start = scene.flat(scene.mesh.vertices), wish = scene.flat(scene.wish);
+  const Guard::Options options{ConstrainOptions::Outside::error, 1, nullptr};
+  const auto made = [&] { return Guard(start, scene.faces, 3, glm::dmat4(1), scene.volume, options).vertex_count(); };
+  EXPECT_GT(fail_allocations([&] { return Numbers{double(made())}; }), 10);
+
+  Guard guard(start, scene.faces, 3, glm::dmat4(1), scene.volume, options);
+  const auto correction_of_the_wish = [&] {
+    const Guard::Correction correction = guard.constrain(wish);
+    Numbers numbers(correction.vertices.begin(), correction.vertices.end());
+    numbers.insert(numbers.end(), correction.positions.begin(), correction.positions.end());
+    return numbers;
+  };
+  const Numbers expected = correction_of_the_wish();
+  EXPECT_GT(expected.size(), 10u);
+  const std::vector<float> other = scene.flat(scene.pushed(0.03));
+  for (const std::function<void()>& call :
+       {std::function<void()>([&] { guard.constrain(wish); }), std::function<void()>([&] { guard.reset(other); })}) {
+    for (long n = 0;; ++n) {
+      guard.reset(start);
+      allocations_left = n;
+      bool failed = false;
+      try {
+        call();
+      } catch (const std::bad_alloc&) {
+        failed = true;
+      }
+      if (allocations_left.exchange(-1) >= 0) break;
+      // The state is that before the call that failed.
+      if (failed) {
+        ASSERT_EQ(correction_of_the_wish(), expected) << "after allocation " << n << " failed";
+      }
+    }
+  }
+}
+
+TEST(Allocation, Measures) {
+  const Scene scene;
+  const TriangleMesh other{scene.wish, scene.mesh.triangles};
+  for (const unsigned threads : {1u, 2u}) {
+    EXPECT_GT(fail_allocations([&] {
+                const HausdorffInterval found = hausdorff(other, scene.mesh, {{}, threads, nullptr});
+                return Numbers{found.lower, found.upper};
+              }),
+              10);
+  }
+  EXPECT_GT(fail_allocations(
+                [&] {
+                  DeviationOptions options;
+                  options.threads = 1;
+                  const Deviation found = deviation(other, scene.mesh, options);
+                  return Numbers{found.mean.value, found.rms.value};
+                },
+                4),
+            10);
+}
+
+}  // namespace
