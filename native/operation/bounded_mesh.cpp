@@ -17,6 +17,7 @@ BoundedMesh::BoundedMesh(BoundedMeshInput input, const Bounds& bounds, Team& tea
       triangles_(std::move(input.triangles)),
       pinned_(std::move(input.pinned)),
       shares_(std::move(input.shares)),
+      joined_(input.joined.begin(), input.joined.end()),
       slots_(std::move(input.slots)),
       wedges_(std::move(input.wedges)) {
   for (const Spot& s : input.spots) positions_.push_back(s.position), stored_.push_back(s.stored);
@@ -31,8 +32,11 @@ void BoundedMesh::build(bool on_reference, std::span<const std::uint32_t> mates,
   const std::size_t n = positions_.size(), m = triangles_.size();
   connect(n, triangles_, mates, mesh_, team);
   triangle_count_ = m;
+  joined_.resize(n, false);
   for (std::uint32_t v = 0; v < n; ++v) {
-    if (slots_[v] != v) copies_.try_emplace(slots_[v], 1, slots_[v]).first->second.push_back(v);
+    if (slots_[v] == v) continue;
+    copies_.try_emplace(slots_[v], 1, slots_[v]).first->second.push_back(v);
+    joined_[v] = joined_[slots_[v]] = true;
   }
   faces_around_ = std::vector<std::atomic<std::uint32_t>>(n);
   for (const glm::uvec3& t : triangles_) count_around(t, 1);
@@ -76,12 +80,8 @@ std::uint32_t BoundedMesh::survivor(std::uint32_t v) const {
 
 /// Whether an edge joins the two in the result, be it between copies of them.
 bool BoundedMesh::joined_by_other(std::uint32_t a, std::uint32_t b) const {
-  const auto with_copies = [&](const std::uint32_t& v) {
-    const auto found = copies_.find(slots_[v]);
-    return found == copies_.end() ? std::span(&v, 1) : std::span<const std::uint32_t>(found->second);
-  };
-  for (const std::uint32_t x : with_copies(a)) {
-    for (const std::uint32_t y : with_copies(b)) {
+  for (const std::uint32_t x : copies(a)) {
+    for (const std::uint32_t y : copies(b)) {
       if ((x != a || y != b) && mesh_.find_halfedge(handle(x), handle(y)).is_valid()) {
         return true;
       }
@@ -92,19 +92,43 @@ bool BoundedMesh::joined_by_other(std::uint32_t a, std::uint32_t b) const {
 
 /// A vertex of higher rank can only be the one that stays.
 int BoundedMesh::rank(std::uint32_t vertex) const {
-  return pinned_[vertex] ? 4 : (seam_[vertex] ? 2 : 0) + (on_boundary(vertex) ? 1 : 0);
+  if (pinned_[vertex]) return 5;
+  return joined(vertex) ? 4 : (seam_[vertex] ? 2 : 0) + (on_boundary(vertex) ? 1 : 0);
 }
 
 BoundedMesh::Merge BoundedMesh::merge(Edge e) const {
   const Halfedge h = mesh_.halfedge_handle(e, 0);
   const std::uint32_t v0 = from(h), v1 = to(h);
   const int rank0 = rank(v0), rank1 = rank(v1);
-  if (pinned_[v0] && pinned_[v1]) return {Freedom::none, h};
+  if ((pinned_[v0] && pinned_[v1]) || slots_[v0] == slots_[v1]) return {Freedom::none, h};
+  // Where sheets touch in a point, that point may slide along the boundary of one.
+  if (joined(v0) != joined(v1) && !pinned_[v0] && !pinned_[v1] && wedges_.empty() && mesh_.is_boundary(e)) {
+    return {Freedom::either_way, h};
+  }
   // A boundary vertex never leaves the boundary, not even for a vertex that must stay.
   if (rank0 > rank1 && on_boundary(v1) && !on_boundary(v0)) return {Freedom::none, h};
   if (rank1 > rank0 && on_boundary(v0) && !on_boundary(v1)) return {Freedom::none, h};
   if (rank0 == rank1) return {movable(v0) ? Freedom::anywhere : Freedom::either_way, h};
   return {Freedom::one_way, rank0 > rank1 ? mesh_.opposite_halfedge_handle(h) : h};
+}
+
+/// The vertex that vanishes becomes one with the one that stays: its copies that do not vanish are that one's from now
+/// on.
+void BoundedMesh::merge_copies(const Change& change) {
+  const std::uint32_t merged = slots_[from(change.halfedge_)], kept = slots_[change.vertex_];
+  copies_.erase(merged);
+  if (!change.carried_.empty()) {
+    std::vector<std::uint32_t>& all = copies_.try_emplace(kept, 1, change.vertex_).first->second;
+    all.insert(all.end(), change.carried_.begin(), change.carried_.end());
+  }
+  for (const std::uint32_t v : change.carried_) {
+    slots_[v] = kept;
+    moved_[v] = true;
+    positions_[v] = change.spot_.position;
+    stored_[v] = change.spot_.stored;
+    if (bounds_.forward) distance_[v] = change.new_distance_;
+  }
+  for (const std::uint32_t v : copies(change.vertex_)) joined_[v] = true;
 }
 
 void BoundedMesh::apply(Change& change) {
@@ -131,13 +155,17 @@ void BoundedMesh::apply(Change& change) {
   }
   const std::uint32_t v = change.vertex_;
   if (change.kind_ == Change::Kind::collapse) {
-    const std::uint32_t merged = from(change.halfedge_);
-    merged_into_[merged] = v;
-    if (!shares_.empty()) shares_[v] = std::min(shares_[v], shares_[merged]);
     for (const Coverage::Removed& r : change.removed_) count_around(triangles_[r.id], -1);
-    faces_around_[v].fetch_add(faces_around_[merged].exchange(0, std::memory_order_relaxed), std::memory_order_relaxed);
     triangle_count_ -= change.removed_.size();
-    mesh_.collapse(change.halfedge_);
+    if (joined(from(change.halfedge_))) merge_copies(change);
+    for (const Halfedge h : change.collapses_) {
+      const std::uint32_t merged = from(h), kept = to(h);
+      merged_into_[merged] = kept;
+      if (!shares_.empty()) shares_[kept] = std::min(shares_[kept], shares_[merged]);
+      faces_around_[kept].fetch_add(faces_around_[merged].exchange(0, std::memory_order_relaxed),
+                                    std::memory_order_relaxed);
+      mesh_.collapse(h);
+    }
   }
   moved_[v] = moved_[v] || change.spot_.position != positions_[v];
   positions_[v] = change.spot_.position;

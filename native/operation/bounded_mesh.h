@@ -41,7 +41,8 @@ struct BoundedMeshInput {
   std::vector<Spot> spots;            ///< of the vertices
   std::vector<bool> pinned;           ///< per vertex: neither moves nor vanishes, and an edge between two such stays
   std::vector<double> shares;  ///< per vertex: of the forward bound that new faces around it may use; may be empty
-  std::vector<std::uint32_t> slots;  ///< per vertex: equal for those that are one vertex of the result (all pinned)
+  std::vector<std::uint32_t> slots;  ///< per vertex: equal for copies, those that are one vertex of the result
+  std::vector<bool> joined;          ///< per vertex: an edge of it lies on edges of other sheets; may be empty
   std::vector<glm::uvec3>
       wedges;                 ///< per triangle and corner: equal at a vertex where attributes are equal; may be empty
   bool on_reference = false;  ///< every triangle is one of the reference
@@ -85,7 +86,16 @@ class BoundedMesh {
   bool on_boundary(std::uint32_t vertex) const { return mesh_.is_boundary(handle(vertex)); }
   /// Whether vertices of the kernel are one vertex of the result: what one may do then depends on where the others are.
   bool has_copies() const { return !copies_.empty(); }
-  bool has_copies(std::uint32_t vertex) const { return copies_.contains(slots_[vertex]); }
+  /// Whether it has copies or an edge on edges of other sheets, so that a change there may be one of theirs too.
+  bool joined(std::uint32_t vertex) const { return joined_[vertex] != 0; }
+  /// The vertex and its copies; of the kernel, alive and at one place. Valid until the next change of one of them.
+  std::span<const std::uint32_t> copies(std::uint32_t vertex) const {
+    const auto found = copies_.find(slots_[vertex]);
+    if (found != copies_.end()) return found->second;
+    return {&merged_into_[vertex], 1};  // what is there was merged into itself
+  }
+  /// Equal for copies; the number of one of them.
+  std::uint32_t slot(std::uint32_t vertex) const { return slots_[vertex]; }
   /// Where corner `corner` of a triangle takes its attributes: an input corner as 3 * triangle + corner.
   std::uint32_t corner_source(std::uint32_t triangle, int corner) const { return corner_source_[triangle][corner]; }
 
@@ -105,7 +115,7 @@ class BoundedMesh {
   /// How the ends of an edge may become one vertex, by what each of them must keep.
   Merge merge(Edge e) const;
   /// Whether a vertex may move by itself.
-  bool movable(std::uint32_t vertex) const { return !subset_ && !pinned_[vertex] && !seam_[vertex]; }
+  bool movable(std::uint32_t vertex) const { return !subset_ && !pinned_[vertex] && !seam_[vertex] && !joined(vertex); }
 
   /// Carries out a change whose last try succeeded on this mesh as it is. What is to be proved later then is, by a
   /// DeferredProof.
@@ -119,6 +129,7 @@ class BoundedMesh {
   int rank(std::uint32_t vertex) const;
   void count_around(const glm::uvec3& triangle, std::int32_t change);
   bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
+  void merge_copies(const Change& change);
 
   OpenMesh::TriConnectivity mesh_;
   Bounds bounds_;
@@ -130,6 +141,7 @@ class BoundedMesh {
   std::vector<std::atomic<std::uint32_t>> faces_around_;  ///< atomic: regions share the vertices between them
   std::vector<std::uint8_t> moved_;                       ///< not bits, which threads would share
   std::vector<double> shares_;
+  std::vector<std::uint8_t> joined_;  ///< not bits, which threads would share
   std::vector<std::uint32_t> slots_;
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> copies_;  ///< by slot, where there are several
   std::vector<double> distance_, face_distance_;

@@ -50,12 +50,21 @@ bool Change::prepare_collapse(Halfedge h, const Spot& spot) {
   clear(Kind::collapse, spot);
   halfedge_ = h, vertex_ = mesh_->to(h);
   share_ = std::min(mesh_->share(vertex_), mesh_->share(mesh_->from(h)));
-  if (!link_condition(h) || !gather(h, spot.position)) return false;
-  if (!mesh_->wedges_.empty() && !wedges_fit(h)) return false;
-  if (!mesh_->copies_.empty() && !slots_fit(h)) return false;
-  const std::uint32_t v0 = mesh_->from(h);
-  for (Face& face : faces_) {
-    if (face.vertices[face.corner] == v0) face.vertices[face.corner] = vertex_;
+  collapses_.assign(1, h), carried_.clear();
+  if (mesh_->joined(mesh_->from(h)) && !gather_copies(h)) return false;
+  for (const Halfedge each : collapses_) {
+    if (!link_condition(each) || !gather(each, spot.position)) return false;
+    if (!mesh_->wedges_.empty() && !wedges_fit(each)) return false;
+  }
+  constexpr int kNoFace = -1;
+  for (const std::uint32_t v : carried_) {
+    gather_side(v, spot.position, glm::length(mesh_->positions_[v] - spot.position), kNoFace, kNoFace);
+  }
+  if (!mesh_->copies_.empty() && !slots_fit()) return false;
+  for (const Halfedge each : collapses_) {
+    for (Face& face : faces_) {
+      if (face.vertices[face.corner] == mesh_->from(each)) face.vertices[face.corner] = mesh_->to(each);
+    }
   }
   boundary_of_collapse();
   return true;
@@ -222,15 +231,63 @@ bool Change::wedges_fit(Halfedge h) {
   return true;
 }
 
-/// The link condition across cuts: the kernel holds copies of a cut vertex for different vertices, the result does not.
-/// No new edge may run beside one that there is between copies, nor a whole face (its three edges then all do).
-bool Change::slots_fit(Halfedge h) const {
-  const std::uint32_t v0 = mesh_->from(h), v1 = mesh_->to(h);
-  for (std::size_t i = 0; i < elements_.size(); ++i) {
-    const Face& face = faces_[i];
-    if (face.vertices[face.corner] != v0) continue;
-    const std::uint32_t a = face.vertices[(face.corner + 1) % 3], b = face.vertices[(face.corner + 2) % 3];
-    if (mesh_->joined_by_other(v1, a) || mesh_->joined_by_other(v1, b)) return false;
+/// Where several sheets meet in the vertex that vanishes. Where they meet along edges, each has to have the edge that
+/// is collapsed, so that the line of edges is shortened; where they only touch, the others are carried along.
+bool Change::gather_copies(Halfedge h) {
+  const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
+  const auto in_line = [&](Halfedge edge) { return mesh_->joined_by_other(mesh_->from(edge), mesh_->to(edge)); };
+  bool line = false;
+  collapses_.clear();
+  for (const std::uint32_t copy : mesh_->copies(mesh_->from(h))) {
+    const auto v = BoundedMesh::handle(copy);
+    std::size_t edges = 0;
+    for (const std::uint32_t end : mesh_->copies(vertex_)) {
+      const Halfedge edge = mesh.find_halfedge(v, BoundedMesh::handle(end));
+      if (!edge.is_valid()) continue;
+      if (edges++ > 0) return false;
+      for (const Halfedge other : collapses_) {
+        if (mesh_->to(other) == end) return false;
+      }
+      collapses_.push_back(edge);
+    }
+    if (edges == 0) carried_.push_back(copy);
+    if (!mesh.is_boundary(v)) continue;
+    // The kernel keeps the outgoing halfedge of a boundary vertex on the boundary.
+    const Halfedge next = mesh.halfedge_handle(v);
+    line = line || in_line(next) || in_line(mesh.prev_halfedge_handle(next));
+  }
+  return !line || (carried_.empty() && in_line(h));
+}
+
+/// The link condition of the result, in which copies are one vertex: what is next to both ends is next to the edge, and
+/// no face comes to lie on another.
+bool Change::slots_fit() {
+  const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
+  apexes_.clear();
+  for (const Halfedge edge : collapses_) {
+    for (const Halfedge side : {edge, mesh.opposite_halfedge_handle(edge)}) {
+      if (!mesh.is_boundary(side)) apexes_.push_back(mesh_->slot(mesh_->to(mesh.next_halfedge_handle(side))));
+    }
+  }
+  const auto is_apex = [&](std::uint32_t slot) {
+    return std::find(apexes_.begin(), apexes_.end(), slot) != apexes_.end();
+  };
+  around_.clear();
+  for (const std::uint32_t copy : mesh_->copies(vertex_)) {
+    for (const auto v : mesh.vv_range(BoundedMesh::handle(copy))) {
+      around_.push_back(mesh_->slot(static_cast<std::uint32_t>(v.idx())));
+    }
+  }
+  std::sort(around_.begin(), around_.end());
+  for (const Face& face : faces_) {
+    if (!face.moves) continue;
+    const std::uint32_t a = mesh_->slot(face.vertices[(face.corner + 1) % 3]),
+                        b = mesh_->slot(face.vertices[(face.corner + 2) % 3]);
+    if (face.vertices[face.corner] == vertex_) continue;
+    if (is_apex(a) && is_apex(b)) return false;
+    for (const std::uint32_t slot : {a, b}) {
+      if (!is_apex(slot) && std::binary_search(around_.begin(), around_.end(), slot)) return false;
+    }
   }
   return true;
 }

@@ -56,6 +56,8 @@ class Change {
   const std::vector<Coverage::Element>& elements() const { return elements_; }
   const std::vector<Face>& faces() const { return faces_; }  ///< parallel to elements()
   const std::vector<Coverage::Removed>& removed() const { return removed_; }
+  /// Of a collapse, the halfedges whose start merges into their end: one, or one in each sheet.
+  const std::vector<Halfedge>& collapses() const { return collapses_; }
   /// The vertex that a collapse leaves or that a relocation moves; none of a flip.
   std::optional<std::uint32_t> vertex() const { return kind_ == Kind::flip ? std::nullopt : std::optional(vertex_); }
   /// Parts of the reference's pieces that the series of tries has looked at.
@@ -81,7 +83,8 @@ class Change {
   bool link_condition(Halfedge h);
   bool gather(Halfedge h, const glm::dvec3& position);
   bool wedges_fit(Halfedge h);
-  bool slots_fit(Halfedge h) const;
+  bool gather_copies(Halfedge h);
+  bool slots_fit();
   bool folds_over() const;
   void gather_predecessors();
   bool is_large(const Coverage::Element& e) const;
@@ -97,6 +100,8 @@ class Change {
   Proof proof_;
   Kind kind_ = Kind::collapse;
   Halfedge halfedge_;
+  std::vector<Halfedge> collapses_;     ///< with the same edge of other sheets
+  std::vector<std::uint32_t> carried_;  ///< copies of the vertex that vanishes that have no such edge
   Edge edge_;
   std::uint32_t vertex_ = 0;  ///< the one that moves
   Spot spot_{};
@@ -108,6 +113,7 @@ class Change {
   std::vector<Coverage::Removed> boundary_removed_;
   std::vector<NewWedge> new_wedges_;
   std::vector<int> neighbours_;
+  std::vector<std::uint32_t> apexes_, around_;
   Predecessors predecessors_;
   Coverage::Trial backward_, boundary_backward_;
   double new_distance_ = 0;

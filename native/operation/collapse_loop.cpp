@@ -200,7 +200,8 @@ void CollapseLoop::carry_out(Tried& tried) {
   const std::uint32_t edge = tried.edge;
   if (tried.outcome == EdgeCollapse::Outcome::possible) {
     if (later_) later_->note(tried.attempt->change);
-    renew_around(collapse_.carry_out(*tried.attempt));
+    const std::uint32_t kept = collapse_.carry_out(*tried.attempt);
+    for (const std::uint32_t copy : mesh_.copies(kept)) renew_around(copy);
     give_back(std::move(tried.attempt));
   } else if (tried.outcome == EdgeCollapse::Outcome::refused) {
     note_refusal(tried);

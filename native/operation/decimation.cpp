@@ -118,7 +118,7 @@ class Decimation {
 
   void pin() {
     pinned_.resize(cut_.vertex_input.size());
-    for (std::size_t v = 0; v < pinned_.size(); ++v) pinned_[v] = cut_.cause[v] != CutCause::none;
+    for (std::size_t v = 0; v < pinned_.size(); ++v) pinned_[v] = cut_.cause[v] == CutCause::degenerate;
     if (options_.locked.empty()) return;
     for (std::size_t i = 0; i < vertices_.size(); ++i) {
       if (options_.locked[i] && cut_.input_vertex[i] != kNone) pin(cut_.input_vertex[i], "asked for");
@@ -181,6 +181,10 @@ class Decimation {
       if (boundary_->any()) {
         bounds.boundary_forward = &boundary_->forward();
         bounds.boundary_backward = &boundary_->backward();
+        // Edges that were cut count as boundary in the kernel, and are none.
+        for (std::uint32_t v = 0; v < cut_.cause.size(); ++v) {
+          if (cut_.cause[v] == CutCause::non_manifold) pin(v, "non-manifold");
+        }
       }
     }
     return bounds;
@@ -257,16 +261,22 @@ class Decimation {
     input.mates = std::move(cut_.mates);
     for (std::size_t v = 0; v < positions_.size(); ++v)
       input.spots.push_back({vertices_[cut_.vertex_input[v]], positions_[v]});
-    input.pinned = pinned_;
+    // What holds for a vertex holds for its copies.
+    const std::vector<std::uint32_t>& slots = cut_.output_slot;
+    std::vector<bool> pinned(positions_.size(), false);
+    for (std::size_t v = 0; v < positions_.size(); ++v) pinned[slots[v]] = pinned[slots[v]] || pinned_[v];
+    for (const std::uint32_t slot : slots) input.pinned.push_back(pinned[slot]);
     if (!options_.shares.empty()) {
-      input.shares.assign(positions_.size(), 1);
+      std::vector<double> shares(positions_.size(), 1);
       for (std::size_t i = 0; i < vertices_.size(); ++i) {
         if (cut_.input_vertex[i] == kNone) continue;
-        double& share = input.shares[cut_.input_vertex[i]];
+        double& share = shares[slots[cut_.input_vertex[i]]];
         share = std::min(share, options_.shares[i]);
       }
+      for (const std::uint32_t slot : slots) input.shares.push_back(shares[slot]);
     }
-    input.slots = cut_.output_slot;
+    for (const CutCause cause : cut_.cause) input.joined.push_back(cause == CutCause::non_manifold);
+    input.slots = slots;
     if (!options_.wedges.empty()) {
       // Labels name wedges at one input vertex; vertices welded from several hold those of all of them.
       std::unordered_map<std::uint64_t, std::uint32_t> dense;
@@ -304,7 +314,7 @@ class Decimation {
     // Result vertices in the order of the input vertices that they continue.
     std::vector<std::uint32_t> order;
     std::vector<std::uint32_t> used(positions_.size(), kNone);
-    const auto slot = [&](std::uint32_t v) { return cut_.output_slot[mesh.survivor(v)]; };
+    const auto slot = [&](std::uint32_t v) { return mesh.slot(mesh.survivor(v)); };
     // Corner k of a result triangle, in the order of the input triangle that it continues.
     const auto corner = [&](std::uint32_t input, std::uint32_t t, int k) {
       return slot(t == kNone ? cut_.input_vertex[triangles_[input][k]] : mesh.triangle(t)[own_corner(t, k)]);
@@ -401,13 +411,12 @@ class Decimation {
     repair(cut_.degenerate_on_edge, "degenerate", "degenerate faces on an edge of another face dropped");
     repair(cut_.aside.size(), "kept_degenerate", "degenerate faces kept as they are");
     repair(cut_.welded, "welded", "vertices at exactly the position of another joined to it");
-    repair(cut_.cut_edges, "cut", "non-manifold edges held in place");
+    repair(cut_.cut_edges, "cut", "non-manifold edges, which collapse along themselves alone");
     repair(cut_.reversed_count, "misoriented", "faces against their neighbours' orientation, kept so");
     std::size_t unused = 0;
     for (const std::uint32_t v : cut_.input_vertex) unused += v == kNone;
     repair(unused, "unused", "vertices that no face uses are not part of the result");
     for (const CutCause cause : cut_.cause) {
-      if (cause == CutCause::non_manifold) ++result_.locked["non-manifold"];
       if (cause == CutCause::degenerate) ++result_.locked["degenerate face"];
     }
   }

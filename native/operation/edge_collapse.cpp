@@ -82,11 +82,18 @@ std::optional<EdgeCollapse::Plan> EdgeCollapse::plan(Edge e) const {
   auto [freedom, h] = mesh_.merge(e);
   if (freedom == Freedom::none) return std::nullopt;
   if (freedom == Freedom::anywhere) return free_plan(h);
-  const Quadric q = quadrics_[mesh_.from(h)] + quadrics_[mesh_.to(h)];
+  const Quadric q = quadric_of_copies(mesh_.from(h)) + quadric_of_copies(mesh_.to(h));
   const double cost0 = q(mesh_.position(mesh_.from(h))), cost1 = q(mesh_.position(mesh_.to(h)));
   const bool keep0 = freedom == Freedom::either_way && cost0 < cost1;
   if (keep0) h = mesh_.connectivity().opposite_halfedge_handle(h);
   return Plan{h, mesh_.position(mesh_.to(h)), keep0 ? cost0 : cost1, freedom};
+}
+
+Quadric EdgeCollapse::quadric_of_copies(std::uint32_t vertex) const {
+  if (!mesh_.joined(vertex)) return quadrics_[vertex];
+  Quadric sum;
+  for (const std::uint32_t copy : mesh_.copies(vertex)) sum += quadrics_[copy];
+  return sum;
 }
 
 double EdgeCollapse::cost(std::uint32_t edge) const {
@@ -143,10 +150,10 @@ EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) c
 }
 
 std::uint32_t EdgeCollapse::carry_out(Attempt& a) {
-  const std::uint32_t v0 = mesh_.from(a.halfedge), v1 = mesh_.to(a.halfedge);
+  for (const Halfedge h : a.change.collapses()) quadrics_[mesh_.to(h)] += quadrics_[mesh_.from(h)];
+  const std::uint32_t kept = mesh_.to(a.halfedge);
   mesh_.apply(a.change);
-  quadrics_[v1] += quadrics_[v0];
-  return v1;
+  return kept;
 }
 
 }  // namespace tolvol

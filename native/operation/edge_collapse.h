@@ -61,6 +61,7 @@ class EdgeCollapse {
   };
 
   void sum_quadrics();
+  Quadric quadric_of_copies(std::uint32_t vertex) const;
   std::optional<Plan> plan(Edge e) const;
   Plan free_plan(Halfedge h) const;
   Outcome search(Attempt& a, const glm::dvec3& best) const;

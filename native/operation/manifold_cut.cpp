@@ -285,13 +285,14 @@ class Cutter {
     for (Side s = 0; s < mate_.size(); ++s) {
       poll_at(s);
       const std::uint32_t v = corner_vertex_[s];
-      if (!tied.empty() && cut_.cause[v] == CutCause::none && tied.contains(welded(s)))
-        cut_.cause[v] = CutCause::degenerate;
       if (several[vertex(s)]) cut_.cause[v] = CutCause::non_manifold;
       if (is_cut_[s]) {
         cut_.cause[v] = CutCause::non_manifold;
         cut_.cause[corner_vertex_[next_corner(s)]] = CutCause::non_manifold;
       }
+    }
+    for (Side s = 0; s < mate_.size() && !tied.empty(); ++s) {
+      if (tied.contains(welded(s))) cut_.cause[corner_vertex_[s]] = CutCause::degenerate;
     }
     // Turned over, the last side of a triangle is its first.
     const auto turned = [&](Side s) { return flip_[s / 3] ? s - s % 3 + 2 - s % 3 : s; };

@@ -12,7 +12,8 @@
 
 namespace tolvol {
 
-/// What ties a vertex of the cut mesh down. Its copies are one vertex again in the result.
+/// Why a vertex of the cut mesh is tied to others, its copies, which are one vertex again in the result. Copies move
+/// and vanish together (non_manifold), or must neither move nor vanish (degenerate).
 enum class CutCause : std::uint8_t { none, non_manifold, degenerate };
 
 struct CutMesh {
@@ -24,7 +25,7 @@ struct CutMesh {
   std::vector<std::uint32_t> triangle_input;  ///< per triangle: the input triangle it is
   std::vector<bool> reversed;                 ///< per triangle: its corners 1 and 2 are swapped against the input
   std::vector<std::uint32_t> vertex_input;    ///< per vertex: the lowest input vertex it stands for
-  std::vector<CutCause> cause;                ///< per vertex: not none = must neither move nor vanish
+  std::vector<CutCause> cause;                ///< per vertex
   std::vector<glm::uvec2> boundary;           ///< open edges, in the direction of their triangle; edges cut are none
   // The way back.
   std::vector<std::uint32_t> output_slot;   ///< per vertex: vertices with equal slots are one vertex of the result

@@ -64,7 +64,7 @@ Regions regions(const BoundedMesh& mesh, std::size_t most, double first, Team& t
   for (std::uint32_t v = 0; v < out.of_vertex.size(); ++v) {
     if (connectivity.status(BoundedMesh::handle(v)).deleted()) continue;
     alive.push_back(v);
-    if (mesh.has_copies(v)) rim.push_back(v);
+    if (mesh.joined(v)) rim.push_back(v);
   }
   for (const Vertices vertices : pieces(mesh, alive, most, first, team)) {
     for (const std::uint32_t v : vertices) out.of_vertex[v] = out.count;

@@ -12,7 +12,7 @@ namespace tolvol {
 
 struct Regions {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
-  /// Per vertex: the region that it and all its neighbours belong to; kNone at the rim of one, and for what has copies.
+  /// Per vertex: the region that it and all its neighbours belong to; kNone at the rim of one, and for joined ones.
   /// As long as only edges of a region collapse, nothing that a collapse changes or looks at is changed by another's.
   std::vector<std::uint32_t> of_vertex;
   std::uint32_t count = 0;
