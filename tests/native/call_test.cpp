@@ -18,27 +18,12 @@
 #include "operation/deformation.h"
 #include "operation/guard.h"
 #include "operation/smoothing.h"
+#include "polls.h"
 #include "reference/parallel.h"
 #include "shapes.h"
 
 namespace tolvol {
 namespace {
-
-/// Polls of a call, counted; from the `last`-th on the call is asked to stop.
-struct Counted {
-  std::size_t polls = 0, last;
-  const Call call;
-
-  explicit Counted(std::size_t last_poll = static_cast<std::size_t>(-1))
-      : last(last_poll), call(nullptr, [this] { return ++polls >= last; }) {}
-};
-
-template <class Run>
-std::size_t polls_of(Run&& run) {
-  const Counted whole;
-  run();
-  return whole.polls;
-}
 
 const TriangleMesh& wavy() {
   static const TriangleMesh mesh = shapes::torus(40, 0.004);

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Polls of a call (reference/call.h), counted: a measure of its work that is the same on every machine.
+#pragma once
+
+#include <cstddef>
+
+#include "reference/call.h"
+
+namespace tolvol {
+
+/// From the `last`-th poll on the call is asked to stop.
+struct Counted {
+  std::size_t polls = 0, last;
+  const Call call;
+
+  explicit Counted(std::size_t last_poll = static_cast<std::size_t>(-1))
+      : last(last_poll), call(nullptr, [this] { return ++polls >= last; }) {}
+};
+
+template <class Run>
+std::size_t polls_of(Run&& run) {
+  const Counted whole;
+  run();
+  return whole.polls;
+}
+
+}  // namespace tolvol
