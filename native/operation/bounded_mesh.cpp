@@ -112,6 +112,21 @@ BoundedMesh::Merge BoundedMesh::merge(Edge e) const {
   return {Freedom::one_way, rank0 > rank1 ? mesh_.opposite_halfedge_handle(h) : h};
 }
 
+void BoundedMesh::keep_apart() {
+  if (kept_apart_) return;
+  kept_apart_ = true;
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+    if (!mesh_.status(handle(v)).deleted()) occupied_.add(stored_[v]);
+  }
+}
+
+void BoundedMesh::place(std::uint32_t vertex, const Spot& spot) {
+  if (kept_apart_) occupied_.remove(stored_[vertex]), occupied_.add(spot.stored);
+  moved_[vertex] = moved_[vertex] || spot.position != positions_[vertex];
+  positions_[vertex] = spot.position;
+  stored_[vertex] = spot.stored;
+}
+
 /// The vertex that vanishes becomes one with the one that stays: its copies that do not vanish are that one's from now
 /// on.
 void BoundedMesh::merge_copies(const Change& change) {
@@ -123,9 +138,7 @@ void BoundedMesh::merge_copies(const Change& change) {
   }
   for (const std::uint32_t v : change.carried_) {
     slots_[v] = kept;
-    moved_[v] = true;
-    positions_[v] = change.spot_.position;
-    stored_[v] = change.spot_.stored;
+    place(v, change.spot_);
     if (bounds_.forward) distance_[v] = change.new_distance_;
   }
   for (const std::uint32_t v : copies(change.vertex_)) joined_[v] = true;
@@ -161,15 +174,14 @@ void BoundedMesh::apply(Change& change) {
     for (const Halfedge h : change.collapses_) {
       const std::uint32_t merged = from(h), kept = to(h);
       merged_into_[merged] = kept;
+      if (kept_apart_) occupied_.remove(stored_[merged]);
       if (!shares_.empty()) shares_[kept] = std::min(shares_[kept], shares_[merged]);
       faces_around_[kept].fetch_add(faces_around_[merged].exchange(0, std::memory_order_relaxed),
                                     std::memory_order_relaxed);
       mesh_.collapse(h);
     }
   }
-  moved_[v] = moved_[v] || change.spot_.position != positions_[v];
-  positions_[v] = change.spot_.position;
-  stored_[v] = change.spot_.stored;
+  place(v, change.spot_);
   if (bounds_.forward) distance_[v] = change.new_distance_;
 }
 

@@ -14,6 +14,7 @@
 
 #include "check/certificate.h"
 #include "operation/coverage.h"
+#include "operation/occupied.h"
 #include "operation/ring_check.h"
 #include "reference/parallel.h"
 
@@ -117,6 +118,14 @@ class BoundedMesh {
   /// Whether a vertex may move by itself.
   bool movable(std::uint32_t vertex) const { return !subset_ && !pinned_[vertex] && !seam_[vertex] && !joined(vertex); }
 
+  /// From now on no change puts a vertex where another is: for one thread that applies changes. O(n).
+  void keep_apart();
+  /// Whether a vertex other than the two would be put where another is.
+  bool meets_another(const Spot& spot, std::uint32_t vertex, std::uint32_t other) const {
+    return kept_apart_ && spot.stored != stored_[vertex] && spot.stored != stored_[other] &&
+           occupied_.contains(spot.stored);
+  }
+
   /// Carries out a change whose last try succeeded on this mesh as it is. What is to be proved later then is, by a
   /// DeferredProof.
   void apply(Change& change);
@@ -130,6 +139,7 @@ class BoundedMesh {
   void count_around(const glm::uvec3& triangle, std::int32_t change);
   bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
   void merge_copies(const Change& change);
+  void place(std::uint32_t vertex, const Spot& spot);
 
   OpenMesh::TriConnectivity mesh_;
   Bounds bounds_;
@@ -147,6 +157,8 @@ class BoundedMesh {
   std::vector<double> distance_, face_distance_;
   std::vector<glm::uvec3> wedges_, corner_source_;
   mutable std::vector<std::uint32_t> merged_into_;
+  bool kept_apart_ = false;
+  Occupied occupied_;  ///< if so: by the vertices that are there
   std::atomic<std::size_t> triangle_count_ = 0;
 };
 

@@ -34,7 +34,17 @@ Change::Outcome Change::try_relocate(std::uint32_t vertex, const Spot& spot) {
 
 Change::Outcome Change::try_flip(Edge e) { return prepare_flip(e) ? check() : Outcome::impossible; }
 
+bool Change::meets_another() const {
+  if (kind_ == Kind::flip) return false;
+  const std::uint32_t other = kind_ == Kind::collapse ? mesh_->from(halfedge_) : vertex_;
+  return mesh_->meets_another(spot_, vertex_, other);
+}
+
 Change::Outcome Change::check() {
+  if (meets_another()) {
+    met_another_ = true;
+    return Outcome::refused;
+  }
   const bool kept =
       !folds_over() && (proof_ == Proof::later ? vertex_within() : within_bounds() && boundary_within_bounds());
   return kept ? Outcome::possible : Outcome::refused;

@@ -60,10 +60,13 @@ class Change {
   const std::vector<Halfedge>& collapses() const { return collapses_; }
   /// The vertex that a collapse leaves or that a relocation moves; none of a flip.
   std::optional<std::uint32_t> vertex() const { return kind_ == Kind::flip ? std::nullopt : std::optional(vertex_); }
+  /// Whether one of the series of tries was refused because another vertex is where its vertex would be, or would be
+  /// now: then it holds no longer than that vertex stays there.
+  bool met_another() const { return met_another_ || meets_another(); }
   /// Parts of the reference's pieces that the series of tries has looked at.
   std::size_t looked_at() const { return backward_.looked_at(); }
   /// Starts a series of tries around one place. What it finds depends on nothing before.
-  void begin() { suspect_ = 0, backward_.begin(), boundary_backward_.begin(); }
+  void begin() { suspect_ = 0, met_another_ = false, backward_.begin(), boundary_backward_.begin(); }
 
  private:
   friend class BoundedMesh;
@@ -85,6 +88,7 @@ class Change {
   bool wedges_fit(Halfedge h);
   bool gather_copies(Halfedge h);
   bool slots_fit();
+  bool meets_another() const;
   bool folds_over() const;
   void gather_predecessors();
   bool is_large(const Coverage::Element& e) const;
@@ -117,6 +121,7 @@ class Change {
   Predecessors predecessors_;
   Coverage::Trial backward_, boundary_backward_;
   double new_distance_ = 0;
+  bool met_another_ = false;
   std::size_t suspect_ =
       0;  ///< the face that failed last: of another try at the same place it is the likeliest to fail
 };

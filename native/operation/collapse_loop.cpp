@@ -114,7 +114,7 @@ void CollapseLoop::run(const Until& until, Progress* progress) {
 CollapseLoop::Tried* CollapseLoop::found(std::uint32_t edge) {
   if (!team_) return nullptr;
   Tried& tried = tried_[tried_of_[edge]];
-  if (tried.edge != edge) return nullptr;
+  if (tried.edge != edge || tried.met_another || (tried.attempt && tried.attempt->change.met_another())) return nullptr;
   const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
   return std::max(touched_[mesh_.from(h)], touched_[mesh_.to(h)]) <= tried.at ? &tried : nullptr;
 }
@@ -137,6 +137,7 @@ void CollapseLoop::try_now(Tried& tried) {
   std::unique_ptr<Attempt> attempt = take_attempt();
   collapse_.attempt(tried.edge, *attempt);
   tried.outcome = attempt->outcome, tried.looked_at = attempt->change.looked_at();
+  tried.met_another = attempt->change.met_another();
   if (tried.outcome == EdgeCollapse::Outcome::possible) {
     tried.attempt = std::move(attempt);
   } else {

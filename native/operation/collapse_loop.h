@@ -58,6 +58,7 @@ class CollapseLoop {
     std::uint32_t at = 0;  ///< of the collapses carried out
     EdgeCollapse::Outcome outcome = EdgeCollapse::Outcome::impossible;
     std::size_t looked_at = 0;         ///< parts of the reference's pieces
+    bool met_another = false;          ///< a vertex far away in the mesh, which may have gone
     std::unique_ptr<Attempt> attempt;  ///< where it is possible
   };
 

@@ -82,6 +82,7 @@ class Rounds {
   }
 
   void whole(std::size_t target) {
+    if (mesh_.bounds().forward) mesh_.keep_apart();
     price();
     CollapseLoop loop(shared_, team_);
     for (std::uint32_t e = 0; e < costs_.size(); ++e) {

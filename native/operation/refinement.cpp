@@ -87,7 +87,9 @@ bool Refinement::sweep(const Kind& kind, std::span<const std::uint32_t> steps, c
 /// What was found for the step at `place`, if that still holds; else it is tried, and with it those after it.
 Refinement::Attempt& Refinement::tried(const Kind& kind, std::span<const std::uint32_t> steps, std::size_t place) {
   const auto at = [&](std::size_t i) -> Attempt& { return attempts_[i % attempts_.size()]; };
-  const auto holds = [&](std::size_t i) { return at(i).place == i && (this->*kind.read)(steps[i]) <= at(i).at; };
+  const auto holds = [&](std::size_t i) {
+    return at(i).place == i && (this->*kind.read)(steps[i]) <= at(i).at && !at(i).change.met_another();
+  };
   if (holds(place)) return at(place);
   std::vector<std::size_t> batch;
   for (std::size_t i = place; i < std::min(place + attempts_.size(), steps.size()); ++i) {

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "operation/occupied.h"
+
+#include <gtest/gtest.h>
+
+#include "check/certificate.h"
+#include "operation/change.h"
+#include "operation/manifold_cut.h"
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+TEST(Occupied, HoldsAPlaceUntilTheLastHasLeftIt) {
+  Occupied occupied;
+  EXPECT_FALSE(occupied.contains({0, 1, 2}));
+  occupied.add({0, 1, 2}), occupied.add({-0.0, 1, 2});
+  EXPECT_TRUE(occupied.contains({0, 1, 2}));
+  EXPECT_FALSE(occupied.contains({0, 2, 1}));
+  occupied.remove({0, 1, 2});
+  EXPECT_TRUE(occupied.contains({0, 1, 2}));
+  occupied.remove({-0.0, 1, 2});
+  EXPECT_FALSE(occupied.contains({0, 1, 2}));
+}
+
+TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
+  // Two flat sheets, one close above the other: nothing but the other sheet's vertex is in the way.
+  constexpr unsigned kSide = 8;
+  constexpr std::uint32_t kMiddle = (kSide / 2) * (kSide + 1) + kSide / 2;
+  TriangleMesh lower = shapes::grid(kSide), upper;
+  for (dvec3& p : lower.vertices) p.z = 0;
+  upper = lower;
+  for (dvec3& p : upper.vertices) p.z = 0.001;
+  const std::uint32_t above = kMiddle + static_cast<std::uint32_t>(lower.vertices.size());
+  const TriangleMesh both = shapes::joined(lower, upper);
+
+  const Placement world(glm::dmat4(1), Storage::float64);
+  const ToleranceVolume volume(both.vertices, both.triangles, world, 0.05);
+  const Placement placement = world.in(volume.frame());
+  const double within = volume.frame_tolerance();
+  const TriangleCertificate certificate(volume.witnesses(), volume.grid(), volume.hierarchy(), within, within);
+  Team alone(1);
+  BoundedMeshInput input;
+  input.triangles = both.triangles;
+  input.mates = cut_to_manifold(both.vertices, both.triangles, alone).mates;
+  for (std::uint32_t v = 0; v < both.vertices.size(); ++v) {
+    input.spots.push_back({both.vertices[v], placement.frame(both.vertices[v])});
+    input.slots.push_back(v);
+  }
+  input.pinned.assign(both.vertices.size(), false);
+  input.store = [&](const dvec3& p) { return Spot{placement.store(p), p}; };
+  Bounds bounds;
+  bounds.forward = &certificate;
+  BoundedMesh mesh(std::move(input), bounds, alone);
+
+  const auto relocate = [&](const Spot& spot) {
+    Change change(mesh);
+    change.begin();
+    const Change::Outcome outcome = change.try_relocate(kMiddle, spot);
+    return std::pair(outcome, change.met_another());
+  };
+  const Spot taken = mesh.spot(above), here = mesh.spot(kMiddle);
+  EXPECT_EQ(relocate(taken), std::pair(Change::Outcome::possible, false)) << "as long as nothing keeps them apart";
+  mesh.keep_apart();
+  EXPECT_EQ(relocate(taken), std::pair(Change::Outcome::refused, true));
+  EXPECT_EQ(relocate(here), std::pair(Change::Outcome::possible, false)) << "where it is itself";
+
+  Change away(mesh);
+  away.begin();
+  const dvec3 aside = taken.position + dvec3(0.1 * within, 0, 0);
+  ASSERT_EQ(away.try_relocate(above, mesh.store(aside)), Change::Outcome::possible);
+  mesh.apply(away);
+  EXPECT_EQ(relocate(taken), std::pair(Change::Outcome::possible, false)) << "the place is free again";
+  EXPECT_EQ(relocate(mesh.spot(above)), std::pair(Change::Outcome::refused, true));
+}
+
+}  // namespace
