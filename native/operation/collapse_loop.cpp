@@ -47,6 +47,7 @@ CollapseLoop::CollapseLoop(Shared& shared, Team& team)
   tried_of_.assign(mesh_.connectivity().n_edges(), 0);
   touched_.assign(mesh_.connectivity().n_vertices(), 0);
   reserved_.assign(mesh_.connectivity().n_vertices(), 0);
+  surrounded_.assign(mesh_.connectivity().n_vertices(), 0);
 }
 
 bool CollapseLoop::deleted(std::uint32_t edge) const {
@@ -186,6 +187,8 @@ void CollapseLoop::reserve_around(std::uint32_t edge) {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
   const auto h = connectivity.halfedge_handle(BoundedMesh::edge(edge), 0);
   for (const std::uint32_t end : {mesh_.from(h), mesh_.to(h)}) {
+    // Edges that come one after another often share an end that has many neighbours.
+    if (std::exchange(surrounded_[end], batches_) == batches_) continue;
     for (const auto near : connectivity.vv_range(BoundedMesh::handle(end))) {
       reserved_[static_cast<std::size_t>(near.idx())] = batches_;
     }

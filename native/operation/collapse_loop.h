@@ -97,8 +97,9 @@ class CollapseLoop {
   std::size_t next_ = 0;                             ///< place in tried_ that is taken next, the longest taken
   std::uint32_t clock_ = 0;                          ///< collapses carried out
   std::vector<std::uint32_t> touched_;               ///< per vertex: when a face around it changed last,
-  std::vector<std::uint32_t> reserved_;  ///< and the last batch of tries in which one could change before its turn
-  std::uint32_t batches_ = 0;            ///< of tries, so far
+  std::vector<std::uint32_t> reserved_;    ///< and the last batch of tries in which one could change before its turn
+  std::vector<std::uint32_t> surrounded_;  ///< and the last one in which its neighbours were noted so
+  std::uint32_t batches_ = 0;              ///< of tries, so far
   /// Kept for their memory; the last given back is taken first, while it is in the cache.
   std::vector<std::unique_ptr<Attempt>> idle_;
   std::mutex idle_mutex_;  ///< guards idle_
