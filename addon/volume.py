@@ -212,7 +212,7 @@ def _stored_matrix(values):
 def built_of(ob):
     """The tolerance volume of the reference that is set, if it is in memory; cheap enough to draw."""
     tolerance = tolerance_length(ob.tolvol, snapshot_size(ob))
-    return _volumes.get((ob.tolvol.snapshot_fingerprint, reference_matrix(ob).tobytes(), tolerance))
+    return _volumes.built((ob.tolvol.snapshot_fingerprint, reference_matrix(ob).tobytes(), tolerance))
 
 
 def on_top(ob):
