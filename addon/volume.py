@@ -122,6 +122,7 @@ def set_reference(ob, surface):
     settings.snapshot_object = settings.reference_object if settings.reference_kind == "OBJECT" else None
     settings.snapshot_matrix = surface.matrix.ravel()
     settings.snapshot_fingerprint = surface.arrays.fingerprint()
+    _boxes.pop(settings.snapshot_fingerprint, None)  # a damaged snapshot may have had this fingerprint
     settings.tolerance_percent = settings.tolerance_percent  # no longer what the preferences say
     notify()
 
