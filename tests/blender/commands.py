@@ -55,6 +55,10 @@ class _Served:
         self._process.kill()
         raise subprocess.TimeoutExpired(script, PATIENCE)
 
+    def end(self):
+        self._link.close()
+        self._process.wait(PATIENCE)
+
 
 _served = None
 
@@ -74,6 +78,12 @@ def command(script, *arguments, before=None, alone=False):
             process.kill()
             raise
     return process.returncode, out, err
+
+
+def end_served():
+    """Ends the Blender that runs commands, if there is one."""
+    if _served is not None:
+        _served.end()
 
 
 def decimate(*arguments, **options):
