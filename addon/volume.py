@@ -122,6 +122,7 @@ def set_reference(ob, surface):
     settings.snapshot_object = settings.reference_object if settings.reference_kind == "OBJECT" else None
     settings.snapshot_matrix = surface.matrix.ravel()
     settings.snapshot_fingerprint = surface.arrays.fingerprint()
+    _boxes.pop(settings.snapshot_fingerprint, None)  # a damaged snapshot may have had this fingerprint
     settings.tolerance_percent = settings.tolerance_percent  # no longer what the preferences say
     notify()
 
@@ -212,7 +213,7 @@ def _stored_matrix(values):
 def built_of(ob):
     """The tolerance volume of the reference that is set, if it is in memory; cheap enough to draw."""
     tolerance = tolerance_length(ob.tolvol, snapshot_size(ob))
-    return _volumes.get((ob.tolvol.snapshot_fingerprint, reference_matrix(ob).tobytes(), tolerance))
+    return _volumes.built((ob.tolvol.snapshot_fingerprint, reference_matrix(ob).tobytes(), tolerance))
 
 
 def on_top(ob):

@@ -40,10 +40,10 @@ class VolumeCache:
                 self._changed.notify_all()
         return volume
 
-    def items(self):
-        """All (key, volume) as they are now."""
+    def built(self, key):
+        """The volume with this key if it is there, else None. It waits for no build, so that panels can ask for it."""
         with self._changed:
-            return list(self._volumes.items())
+            return self._volumes.get(key)
 
     def clear(self):
         with self._changed:

@@ -65,8 +65,9 @@ std::vector<double> shares(const Display& display, const py::object& vertices, c
 void bind_display(py::module_& module) {
   py::class_<Display>(
       module, "DisplayTree", py::module_local(),
-      "The triangles of a volume's reference in a tree of boxes, for shaders/surface_distance.glsl: the "
-      "distance of every pixel, to show a mesh by. Whatever the tolerance. Proves nothing.")
+      "The triangles of a volume's reference in a tree of boxes, with which shaders/surface_distance.glsl computes the "
+      "distance\n"
+      "of every pixel. The tree is the same for every tolerance. It serves to show a mesh and proves nothing.")
       .def(py::init(&make_display), py::arg("volume"), py::arg("progress") = py::none(),
            "Raises InvalidInput (more than 16,777,216 triangles), Cancelled. Cost: about 0.1 s for 270,000 triangles.")
       .def_property_readonly(
@@ -102,7 +103,8 @@ void bind_display(py::module_& module) {
            "len(edges) + 1\n"
            "numbers, from beyond the first to beyond the last; what is farther than all edges on either side is in the "
            "last. By one\n"
-           "sample a triangle and 65,536 more. About 0.3 s of one thread for 270,000 triangles.");
+           "sample a triangle and 65,536 more. Raises InvalidInput, Cancelled. About 0.3 s of one thread for 270,000 "
+           "triangles.");
 }
 
 }  // namespace tolvol::python

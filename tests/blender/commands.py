@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Running decimate.py and report.py as a person does, on files that the tests write."""
 
+import multiprocessing
 import re
 import subprocess
 from pathlib import Path
@@ -11,7 +12,9 @@ import numpy as np
 from addon import file_io, volume
 from scenes import add_object
 
-SCRIPTS = Path(__file__).resolve().parents[2] / "blender_scripts"
+FOLDER = Path(__file__).resolve().parent
+SCRIPTS = FOLDER.parents[1] / "blender_scripts"
+PATIENCE = 120  # seconds after which a command counts as stuck
 LINE = re.compile(
     r"([\d,]+) -> ([\d,]+) triangles(?: \((.*)\))?, tolerance ([\d.e-]+) % = ([\d.e-]+), result within ([\d.e+-]+) %, "
     r"reference within ([\d.e+-]+) % \(certified\), [\d.]+ s"
@@ -30,15 +33,57 @@ def running(script, *arguments, before=None):
     )
 
 
-def command(script, *arguments, **options):
-    """(exit code, stdout, stderr)."""
-    with running(script, *arguments, **options) as process:
+class _Served:
+    """A Blender that runs commands one after another."""
+
+    def __init__(self):
+        self._link, there = multiprocessing.Pipe()
+        served = FOLDER / "serve_commands.py", "--", str(there.fileno())
+        self._process = subprocess.Popen(
+            [bpy.app.binary_path, "--background", "--python", *served],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            pass_fds=[there.fileno()],
+        )
+        there.close()
+
+    def run(self, script, arguments):
+        self._link.send((str(SCRIPTS / script), [str(argument) for argument in arguments]))
+        if self._link.poll(PATIENCE):
+            return self._link.recv()
+        self._process.kill()
+        raise subprocess.TimeoutExpired(script, PATIENCE)
+
+    def end(self):
+        self._link.close()
+        self._process.wait(PATIENCE)
+
+
+_served = None
+
+
+def command(script, *arguments, before=None, alone=False):
+    """(exit code, stdout, stderr). `alone`: in a process of its own, as a person runs it; so it is with `before`."""
+    global _served
+    if not (before or alone):
+        one, _served = _served or _Served(), None  # another one, where this one fails
+        done = one.run(script, arguments)
+        _served = one
+        return done
+    with running(script, *arguments, before=before) as process:
         try:
-            out, err = process.communicate(timeout=120)
+            out, err = process.communicate(timeout=PATIENCE)
         except subprocess.TimeoutExpired:
             process.kill()
             raise
     return process.returncode, out, err
+
+
+def end_served():
+    """Ends the Blender that runs commands, if there is one."""
+    if _served is not None:
+        _served.end()
 
 
 def decimate(*arguments, **options):

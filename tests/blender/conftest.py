@@ -6,7 +6,7 @@ import pytest
 
 import addon
 from addon import native
-from commands import save
+from commands import end_served, save
 from scenes import torus_arrays
 
 
@@ -15,6 +15,7 @@ def _registered():
     assert native.module is not None, native.reason
     addon.register()
     yield
+    end_served()
     addon.unregister()
 
 

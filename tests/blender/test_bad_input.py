@@ -48,7 +48,7 @@ def test_bad_arguments(scan, tmp_path, arguments, words):
 
 
 def test_arguments_missing(tmp_path):
-    refused(decimate(), "no arguments")
+    refused(decimate(alone=True), "no arguments")
     refused(decimate("--tolerance", "1%"), "IN")
 
 

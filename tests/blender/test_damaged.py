@@ -50,3 +50,13 @@ def test_a_damaged_reference_has_to_be_set_anew(decimated):
         bpy.ops.tolvol.check()
     bpy.ops.tolvol.set_reference()
     assert bpy.ops.tolvol.check() == {"FINISHED"}
+
+
+def test_a_damaged_reference_is_replaced_by_the_mesh_it_was_taken_of():
+    ob = torus()
+    bpy.ops.tolvol.set_reference()
+    ob.tolvol.snapshot.clear_geometry()
+    volume._forget_all()
+    assert volume.stale_reason(ob) == "what the file holds of it is damaged"
+    bpy.ops.tolvol.set_reference()
+    assert volume.stale_reason(ob) is None and bpy.ops.tolvol.check() == {"FINISHED"}

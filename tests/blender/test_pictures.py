@@ -31,7 +31,7 @@ def marked(picture):
 
 def test_decimate_draws_its_result(scan, tmp_path):
     picture = tmp_path / "picture.png"
-    succeeded(decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", "--picture", picture))
+    succeeded(decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", "--picture", picture, alone=True))
     drawn = pixels(picture)
     assert drawn.shape[1] > drawn.shape[0] > 400 and marked(drawn) == 0
     assert len(np.unique(drawn.reshape(-1, 4), axis=0)) > 1000
@@ -63,7 +63,7 @@ def test_a_picture_needs_a_folder_and_a_png(scan, tmp_path):
 
 
 def test_figures_are_drawn_of_any_mesh(scan, tmp_path):
-    assert command("figures.py", scan, "--output", tmp_path, "--tolerance", "2%")[::2] == (0, "")
+    assert command("figures.py", scan, "--output", tmp_path, "--tolerance", "2%", alone=True)[::2] == (0, "")
     volume, distance = pixels(tmp_path / "volume.png"), pixels(tmp_path / "distance.png")
     for picture in (volume, distance):
         assert len(np.unique(picture.reshape(-1, 4), axis=0)) > 1000

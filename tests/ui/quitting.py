@@ -63,6 +63,18 @@ def start():
         globals()[sys.argv[sys.argv.index("--") + 1]]()
 
 
+def repeated(work):
+    """Goes on until it is cancelled: a slow machine may draw for longer than the work takes once."""
+
+    def again(progress):
+        while True:
+            outcome = work(progress)
+            if progress.cancelled:
+                return outcome
+
+    return again
+
+
 _ticks = iter(range(_MOST_TICKS))
 
 
@@ -76,6 +88,8 @@ def leave():
     return None
 
 
+run = job.Job._run
+job.Job._run = lambda self, work: run(self, repeated(work))
 addon.register()
 bpy.app.timers.register(start, first_interval=1.0)
 bpy.app.timers.register(leave, first_interval=1.0 + _TICK)

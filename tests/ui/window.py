@@ -118,12 +118,29 @@ def _find(copied, keys, across):
 
 
 def press(operator, across=0.33):
-    """Clicks the button of an operator in the sidebar."""
+    """Clicks the button of an operator in the sidebar, which is scrolled down for it where it has to be, and back."""
     place = yield from find(operator, across)
+    scrolled = place is None
+    if scrolled:
+        yield from scroll(_DOWN)
+        place = yield from find(operator, across)
     assert place is not None, f"no button for {operator}"
     yield 0.6  # until no tooltip is in the way
     click(*place)
     yield 0.3
+    if scrolled:
+        yield from scroll(_UP)
+
+
+_UP, _DOWN = 4, 5  # buttons of the mouse, as X numbers what a wheel does
+
+
+def scroll(button):
+    """Turns the wheel over the sidebar, as far as that goes."""
+    sidebar = region("UI")
+    middle = on_screen(sidebar, sidebar.width // 2, sidebar.height // 2)
+    xdotool("mousemove", *middle, "sleep", "0.1", "click", "--repeat", 30, "--delay", 20, button)
+    yield 0.5
 
 
 _first_view = {}

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs commands one after another in one Blender, whose start takes longer than most of them.
+
+The last argument is the file descriptor of a connection. (script, arguments) come in, (exit code, stdout, stderr) go out.
+"""
+
+import ctypes
+import multiprocessing.connection
+import os
+import runpy
+import sys
+import tempfile
+import traceback
+
+
+def flush():
+    """Python's text and that of Blender's own code, which the C library holds."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    ctypes.CDLL(None).fflush(None)
+
+
+def run(script, arguments):
+    """(exit code, stdout, stderr); no code of a script that does not end by sys.exit, as all of them must."""
+    sys.argv = ["blender", "--", *arguments]
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        flush()
+        os.dup2(out.fileno(), 1)
+        os.dup2(err.fileno(), 2)
+        code = None
+        try:
+            runpy.run_path(script, run_name="__main__")
+        except SystemExit as end:
+            code = end.code
+        except BaseException:
+            traceback.print_exc()
+        flush()
+        texts = []
+        for file in (out, err):
+            file.seek(0)
+            texts.append(file.read().decode())
+    return code, *texts
+
+
+link = multiprocessing.connection.Connection(int(sys.argv[-1]))
+try:
+    while True:
+        link.send(run(*link.recv()))
+except EOFError:  # the tests have ended
+    os._exit(0)
