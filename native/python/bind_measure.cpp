@@ -116,7 +116,7 @@ void bind_measure(py::module_& module) {
       "with the\n"
       "range that it is certainly in. Refined until the range of the mean is no wider than 0.1 % of the largest "
       "distance "
-      "or there\n"
+      "or than rounding, or there\n"
       "are half a million samples (four for each triangle where that is more). World coordinates, deterministic. Cost: "
       "2 "
       "to 10 us\n"
