@@ -358,7 +358,7 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
   }
   const Call call(options.progress);
   if (options.progress) options.progress->begin("averaging");
-  const PlacedPair pair(a, b);
+  const PlacedPair pair(a, b, PlacedPair::Target::whole);  // cut, a closed b would be open
   const double scale = pair.frame.scale();
   Cover cover(pair.a, pair.b, options);
   cover.measure();
