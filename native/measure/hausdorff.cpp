@@ -52,6 +52,9 @@ constexpr double kUpperMargin = 23 * kUnitRoundoff;  // derived above, like the 
 constexpr double kLowerMargin = 27 * kUnitRoundoff;
 // An interval or a piece shorter than this is rounding: no use in going on.
 constexpr double kNoise = 256 * kUnitRoundoff;
+// A piece whose middle corner is nearer to the segment between the other two counts as that segment. As much again,
+// in the error of the piece, is more than the rounding of this distance.
+constexpr double kFlat = 8 * kUnitRoundoff;
 // Triangles asked for a first lower bound.
 constexpr std::size_t kSeeds = 4096;
 // Pieces that see the same lower bound, and those of them that are handed to a thread at once.
@@ -265,8 +268,23 @@ class Search {
     return best;
   }
 
+  /// A piece that is as flat as rounding becomes the segment it is, whose parts do not overlap.
+  static Piece flattened(Piece piece) {
+    for (int i = 0; i < 3; ++i) {
+      dvec3 &p = piece.corner[i], &q = piece.corner[(i + 1) % 3], &middle = piece.corner[(i + 2) % 3];
+      if (middle == p || middle == q) return piece;
+      const double height = std::sqrt(closest_point(middle, p, q, q).distance_squared);
+      if (height > kFlat) continue;
+      piece.error += height + kFlat;
+      middle = q;
+      return piece;
+    }
+    return piece;
+  }
+
   /// None when the piece is too small.
-  Children split(const Piece& piece) const {
+  Children split(const Piece& whole) const {
+    const Piece piece = flattened(whole);
     const Parts parts = tolvol::split(piece.corner, corners(b_, piece.nearest));
     Children children{{piece, piece, piece}, parts.count};
     for (int i = 0; i < parts.count; ++i) {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 
+#include "reference/call.h"
 #include "reference/closest_point.h"
 #include "reference/errors.h"
 #include "shapes.h"
@@ -277,6 +278,39 @@ TEST(Hausdorff, TinyDistances) {
     EXPECT_GT(there.lower, noise);
     EXPECT_GT(back.lower, noise);
     EXPECT_LT(back.upper, 6 * noise);
+  }
+}
+
+/// The polls of a measurement on this thread, a measure of its work.
+std::size_t polls_of(const TriangleMesh& a, const TriangleMesh& b) {
+  std::size_t polls = 0;
+  const Call call(nullptr, [&] {
+    ++polls;
+    return false;
+  });
+  const HausdorffInterval h = hausdorff(a, b, {.threads = 1});
+  EXPECT_LE(h.upper - h.lower, std::max(0.001 * h.upper, 1e-13));
+  return polls;
+}
+
+// A segment under n equal peaks takes pieces in proportion to n, also where it is a triangle of three distinct corners.
+TEST(Hausdorff, OutlinesTakeWorkInProportion) {
+  for (const double turn : {0.0, 0.3}) {
+    for (const double middle : {0.0, 0.1}) {
+      std::array<std::size_t, 2> polls{};
+      for (const unsigned n : {250u, 1000u}) {
+        const auto at = [&](double x, double y) {
+          return dvec3(x * std::cos(turn) - y * std::sin(turn), x * std::sin(turn) + y * std::cos(turn), 0.3 * x);
+        };
+        TriangleMesh zigzag;
+        for (unsigned i = 0; i <= 2 * n; ++i) zigzag.vertices.push_back(at(i / (2.0 * n), i % 2));
+        for (unsigned i = 0; i < 2 * n; ++i) zigzag.triangles.emplace_back(i, i + 1, i);
+        const TriangleMesh base{{at(0, 0), at(1, 0), at(middle, 0)}, {{0, 1, 2}}};
+        polls[n == 1000] = polls_of(base, zigzag);
+      }
+      EXPECT_LT(polls[1], 6 * polls[0]) << turn << ' ' << middle;
+      EXPECT_LT(polls[1], 2000u) << turn << ' ' << middle;
+    }
   }
 }
 
