@@ -57,6 +57,8 @@ constexpr double kNoise = 256 * kUnitRoundoff;
 constexpr double kFlat = 8 * kUnitRoundoff;
 // Triangles asked for a first lower bound.
 constexpr std::size_t kSeeds = 4096;
+// A prime: its multiples modulo a smaller number visit each of the numbers below it once, far from the one before.
+constexpr std::size_t kSpread = 1'000'003;
 // Pieces that see the same lower bound, and those of them that are handed to a thread at once.
 constexpr std::size_t kChunk = 16384, kBlock = 64, kBatch = 512, kSmallBlock = 8;
 // The budget: an edge of b that crosses a triangle of a costs a few pieces, so that a subdivided copy needs about ten
@@ -129,22 +131,35 @@ class Search {
     if (options_.progress) options_.progress->update(fraction);
   }
 
-  /// A first lower bound from triangles spread over the mesh: the better it is, the more pieces end at once.
+  /// A first lower bound from triangles spread over the mesh: the better it is, the more pieces end at once. The first
+  /// few bound the searches of the others.
   void seed() {
     const std::size_t count = std::min(a_.triangles.size(), kSeeds);
-    std::vector<Sample> samples(count);
-    parallel_for(count, kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const auto triangle = std::uint32_t(i * a_.triangles.size() / count);
-        const std::array<dvec3, 3> p = corners(a_, triangle);
-        const Hierarchy::Nearest middle = hierarchy_.nearest((p[0] + p[1] + p[2]) / 3.0);
-        samples[i] = {middle.distance, (p[0] + p[1] + p[2]) / 3.0, 0, triangle};
-        for (const dvec3& corner : p) {
-          samples[i].improve({hierarchy_.nearest(corner, kInfinity, middle.triangle).distance, corner, 0, triangle});
+    for (std::size_t first = 0; first < count;) {
+      const std::size_t end_of_round = std::min(count, 8 * first + 8);
+      std::vector<Sample> samples(end_of_round - first);
+      parallel_for(samples.size(), kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          const std::size_t spread = (first + i) * kSpread % count;
+          const auto triangle = std::uint32_t(spread * a_.triangles.size() / count);
+          const std::array<dvec3, 3> p = corners(a_, triangle);
+          const dvec3 centroid = (p[0] + p[1] + p[2]) / 3.0;
+          const Hierarchy::Common middle = far_from(centroid, Hierarchy::kNone);
+          samples[i] = {middle.distance, centroid, 0, triangle};
+          for (const dvec3& corner : p) {
+            samples[i].improve({far_from(corner, middle.triangle).distance, corner, 0, triangle});
+          }
         }
-      }
-    });
-    learn(samples);
+      });
+      learn(samples);
+      first = end_of_round;
+    }
+  }
+
+  /// The triangle of b nearest to p, or any that shows that p does not raise the lower bound: where many triangles are
+  /// about as near, the search for the nearest looks at all of them.
+  Hierarchy::Common far_from(const dvec3& p, std::uint32_t hint) const {
+    return hierarchy_.common(std::array{p}, kInfinity, lower_ + kUpperMargin, hint);
   }
 
   void first_pass() {
@@ -224,8 +239,7 @@ class Search {
     for (const dvec3& corner : piece.corner) {
       if (std::sqrt(closest_point(corner, t[0], t[1], t[2]).distance_squared) <= std::max(lower_, best.distance))
         continue;
-      best.improve(
-          {hierarchy_.nearest(corner, kInfinity, common.triangle).distance, corner, piece.error, piece.triangle});
+      best.improve({far_from(corner, common.triangle).distance, corner, piece.error, piece.triangle});
     }
     return best;
   }

@@ -314,6 +314,22 @@ TEST(Hausdorff, OutlinesTakeWorkInProportion) {
   }
 }
 
+// All triangles of a fan meet in one point, and the boxes of most of them hold any point near the middle.
+TEST(Hausdorff, FansTakeLittleForEachTriangle) {
+  Random random(12);
+  const unsigned n = 6000;
+  TriangleMesh fan;
+  for (unsigned i = 0; i < n; ++i) {
+    const double angle = 2 * M_PI * i / n;
+    fan.vertices.emplace_back(std::cos(angle), 0.8 * std::sin(angle), 0.6 * std::sin(angle));
+    fan.triangles.emplace_back(i, (i + 1) % n, n);
+  }
+  fan.vertices.emplace_back(0, 0, 0);
+  TriangleMesh moved = fan;
+  for (unsigned i = 0; i < n; ++i) moved.vertices[i] += 1e-3 * random.point();
+  for (const auto& [a, b] : {std::pair{fan, fan}, {moved, fan}, {fan, moved}}) EXPECT_LT(polls_of(a, b), 1000u);
+}
+
 TEST(Hausdorff, BoundDecides) {
   Random random(5);
   TriangleMesh rough = sphere(40, 1);
