@@ -6,6 +6,10 @@
 // these are no longer random: the bounds are from the middle. Every statistic is one of a distribution by area: of the
 // distances at the points for the estimate, of the lower and of the upper bounds of the pieces for the ends of its
 // range.
+//
+// Rounding. The bounds of a piece hold it already, and leave more room between them than the sums of weighted bounds
+// err by. Weights are added in another order for each distribution, so that equal shares may differ in the last bits:
+// where the ends of a range depend on shares alone, kShareRounding is between them.
 #include "measure/deviation.h"
 
 #include <algorithm>
@@ -28,7 +32,9 @@ using glm::dvec3;
 constexpr double kPieces = 65536;        // at first; a spacing of about 0.4 % of the size of a scan
 constexpr std::size_t kBudget = 524288;  // pieces when it ends, or kBudgetPerTriangle for each triangle
 constexpr std::size_t kBudgetPerTriangle = 4;
-constexpr double kEnough = 0.001;                   // of the largest distance: the width of the range of the mean
+constexpr double kEnough = 0.001;               // of the largest distance: the width of the range of the mean
+constexpr double kNoise = 256 * kUnitRoundoff;  // a range of the mean that is no wider is rounding
+constexpr double kShareRounding = 32 * kUnitRoundoff;
 constexpr std::size_t kChunk = 16384, kBlock = 64;  // pieces between two looks at the progress; for one thread at once
 
 /// What a piece weighs in the averages, by the number of corners of the pieces.
@@ -140,8 +146,9 @@ class Distribution {
     return after == steps_.begin() ? 1 : 1 - (after - 1)->weight / steps_.back().weight;
   }
 
-  double percentile(double percent) const {
-    const auto at = std::lower_bound(steps_.begin(), steps_.end(), percent / 100 * steps_.back().weight,
+  double percentile(double percent, double share_error = 0) const {
+    const double share = percent / 100 + share_error;
+    const auto at = std::lower_bound(steps_.begin(), steps_.end(), share * steps_.back().weight,
                                      [](const Step& step, double weight) { return step.weight < weight; });
     return std::min(at, steps_.end() - 1)->value;
   }
@@ -245,7 +252,7 @@ class Cover {
       gap.add(piece.gap());
       largest = std::max(largest, piece.distance);
     }
-    const double enough = kEnough * largest * total_.value();
+    const double enough = std::max(kEnough * largest, kNoise) * total_.value();
     const std::size_t room = (budget_ - pieces_.size()) / 2;  // a piece leaves two or three
     if (gap.value() <= enough || room == 0) return false;
     // Those above the average that is wanted, the worst first where there is no room for all.
@@ -299,6 +306,13 @@ Estimate estimate(double value, double lower, double upper) {
   return {std::clamp(value, lower, upper), {lower, upper}};
 }
 
+/// All of the area and none of it are not sums, and stay as they are.
+Estimate estimated_share(double value, double lower, double upper) {
+  if (lower < 1) lower = std::max(0.0, lower - kShareRounding);
+  if (upper > 0) upper = std::min(1.0, upper + kShareRounding);
+  return estimate(value, lower, upper);
+}
+
 /// In the frame.
 Sides sides_of(const std::vector<Piece>& pieces) {
   Sum weight, mean, mean_lower, mean_upper, inside, inside_lower, inside_upper;
@@ -321,7 +335,8 @@ Sides sides_of(const std::vector<Piece>& pieces) {
   }
   const double whole = weight.value();
   sides.mean = estimate(mean.value() / whole, mean_lower.value() / whole, mean_upper.value() / whole);
-  sides.share_inside = estimate(inside.value() / whole, inside_lower.value() / whole, inside_upper.value() / whole);
+  sides.share_inside =
+      estimated_share(inside.value() / whole, inside_lower.value() / whole, inside_upper.value() / whole);
   return sides;
 }
 
@@ -343,7 +358,7 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
   }
   const Call call(options.progress);
   if (options.progress) options.progress->begin("averaging");
-  const PlacedPair pair(a, b);
+  const PlacedPair pair(a, b, PlacedPair::Target::whole);  // cut, a closed b would be open
   const double scale = pair.frame.scale();
   Cover cover(pair.a, pair.b, options);
   cover.measure();
@@ -376,11 +391,11 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
   const Distribution most(pieces, [](const Piece& piece) { return piece.bounds.value.upper; });
   for (const double bound : options.bounds) {
     const double t = bound * scale;
-    result.share_beyond.push_back({seen.share_beyond(t), {least.share_beyond(t), most.share_beyond(t)}});
+    result.share_beyond.push_back(estimated_share(seen.share_beyond(t), least.share_beyond(t), most.share_beyond(t)));
   }
   for (const double p : options.percentiles) {
-    result.percentiles.push_back(
-        {seen.percentile(p) / scale, {least.percentile(p) / scale, most.percentile(p) / scale}});
+    result.percentiles.push_back(estimate(seen.percentile(p) / scale, least.percentile(p, -kShareRounding) / scale,
+                                          most.percentile(p, kShareRounding) / scale));
   }
   if (cover.has_sides()) {
     Sides& sides = result.sides.emplace(sides_of(pieces));

@@ -45,15 +45,16 @@ struct Deviation {
 };
 
 /// Covers a with pieces of about 1/65,536 of its area, at least one for each triangle, and cuts the worst until the
-/// range of the mean is no wider than 0.1 % of the largest distance that was seen, or the pieces are half a million
-/// (four for each triangle where that is more). A piece gives the exact distance of one of its points to the estimates,
-/// and bounds on the distance over all of it (measure/distance_bounds.h) to the ranges. The points are fixed, equal
-/// input gives equal output, but as good as random: no estimate is off to one side, and the error of the mean is as a
-/// rule below twice `mean_error`, which is about 0.05 % of the largest distance between a scan and a copy within 0.1 %
-/// of its size, and less the farther they are apart. The ranges are certain but for rounding,
-/// 1e-12 of the size of the meshes (more only where nearly all the area is in needles); between surfaces nearer to each
-/// other than `spacing` they are wide. Where a has no area at all it is measured along the longest edges of its
-/// triangles instead, and where these have no length either all triangles count alike (spacing 0).
+/// range of the mean is no wider than 0.1 % of the largest distance that was seen or than rounding, 3e-14 of the size
+/// of both meshes together, or the pieces are half a million (four for each triangle where that is more). A piece gives
+/// the exact distance of one of its points to the estimates, and bounds on the distance over all of it
+/// (measure/distance_bounds.h) to the ranges. The points are fixed, equal input gives equal output, but as good as
+/// random: no estimate is off to one side, and the error of the mean is as a rule below twice `mean_error`, which is
+/// about 0.05 % of the largest distance between a scan and a copy within 0.1 % of its size, and less the farther they
+/// are apart. The ranges are certain but for rounding, 1e-12 of the size of the meshes (more only where nearly all the
+/// area is in needles), and no estimate is outside of its range; between surfaces nearer to each other than `spacing`
+/// they are wide. Where a has no area at all it is measured along the longest edges of its triangles instead, and where
+/// these have no length either all triangles count alike (spacing 0).
 ///
 /// b is closed when each of its edges has two faces that run along it in opposite directions. What is inside is told by
 /// its angle-weighted pseudonormals (reference/pseudonormals.h), turned round where its volume is negative: certain

@@ -11,10 +11,20 @@
 // - Below, where that is too many triangles, because the surfaces are far apart for their size: for x = sum w_i p_i and
 //   every y, |x - y|^2 = sum w_i |p_i - y|^2 - sum w_i |p_i - x|^2 (Lagrange), hence d(x)^2 >= sum w_i d(p_i)^2 -
 //   sum w_i |p_i - x|^2. For k corners the last term is at most r^2, and sum |p_i - c|^2 / (k + 1) on average.
+//
+// Rounding. u = 2^-53; every point has |x| <= 1. The distance from a point to the witness on T exceeds the true
+// distance to the mesh by nothing and falls short of the distance to T by at most 20 u (measure/hausdorff.cpp derives
+// it). A plane never takes its offset from a distance: a short difference has the direction of its rounding, and T may
+// reach far to the other side of a plane that is turned by it. The offset is the least over the corners of T, which
+// errs by 16 u whatever the direction is, and by 8 u more at a corner of the piece. Placing both meshes errs by 2 u,
+// the centroid and the mean of the corners by 4 u each. kRounding is above the sum, so that both ends lie outside of
+// it.
 #include "measure/distance_bounds.h"
 
 #include <algorithm>
 #include <cmath>
+
+#include "reference/frame.h"
 
 namespace tolvol {
 namespace {
@@ -27,23 +37,40 @@ constexpr int kMostTriangles = 64;
 // Of the distance: a piece that is so short is known well enough by one point, as nothing changes faster than one to
 // one.
 constexpr double kShort = 1e-4;
+constexpr double kRounding = 64 * kUnitRoundoff;  // derived above
+
+using Corners = std::array<dvec3, 3>;
+
+dvec3 direction(const dvec3& v) {
+  const double length = glm::length(v);
+  return length < 1e-150 ? dvec3(0) : v / length;  // the square of a shorter one has lost its bits
+}
+
+/// How far p is on the side that `normal`, of length 1 or 0, points to from all of t; below 0 where it is not.
+double gap(const dvec3& p, const Corners& t, const dvec3& normal) {
+  return std::min({glm::dot(normal, p - t[0]), glm::dot(normal, p - t[1]), glm::dot(normal, p - t[2])});
+}
+
+/// The normal of the plane that separates p from t best: of the one at `nearest`, the point of t nearest to p, and of
+/// the one parallel to t, which stays sharp where p is within rounding of t.
+dvec3 apart(const dvec3& p, const Corners& t, const dvec3& nearest) {
+  const dvec3 towards = direction(p - nearest);
+  const dvec3 face = direction(glm::cross(t[1] - t[0], t[2] - t[0]));
+  const dvec3 facing = glm::dot(face, p - t[0]) < 0 ? -face : face;
+  return gap(p, t, facing) > gap(p, t, towards) ? facing : towards;
+}
 
 /// At each corner of a piece the least value of linear functions as above, one for each triangle.
 class Below {
  public:
-  Below(const Simplex& piece, const dvec3& centroid, const dvec3& nearest)
-      : piece_(piece),
-        centroid_(centroid),
-        apart_(direction(centroid - nearest)),
-        least_(values(apart_, glm::distance(centroid, nearest))) {}
+  /// `nearest`: the point of t, the triangle nearest to the centroid, that is nearest to it.
+  Below(const Simplex& piece, const dvec3& centroid, const Corners& t, const dvec3& nearest)
+      : piece_(piece), centroid_(centroid), apart_(apart(centroid, t, nearest)), least_(values(t, apart_)) {}
 
-  void add(const std::array<dvec3, 3>& t) {
-    const double gap = std::min(
-        {glm::dot(apart_, centroid_ - t[0]), glm::dot(apart_, centroid_ - t[1]), glm::dot(apart_, centroid_ - t[2])});
-    const Values common = values(apart_, gap);
+  void add(const Corners& t) {
+    const Values common = values(t, apart_);
     if (loss(common) == 0) return;
-    const dvec3 r = centroid_ - closest_point(centroid_, t[0], t[1], t[2]).point;
-    const Values own = values(direction(r), glm::length(r));
+    const Values own = values(t, apart(centroid_, t, closest_point(centroid_, t[0], t[1], t[2]).point));
     const Values& better = loss(own) <= loss(common) ? own : common;
     for (int i = 0; i < piece_.corners; ++i) least_[i] = std::min(least_[i], better[i]);
   }
@@ -56,13 +83,9 @@ class Below {
   }
 
  private:
-  static dvec3 direction(const dvec3& v) {
-    const double length = glm::length(v);
-    return length > 0 ? v / length : dvec3(0);
-  }
-
-  /// Of the function that is `at_centroid` there and grows along the unit vector `normal`.
-  Values values(const dvec3& normal, double at_centroid) const {
+  /// Of the distance from the plane that touches t and has the unit vector `normal`.
+  Values values(const Corners& t, const dvec3& normal) const {
+    const double at_centroid = gap(centroid_, t, normal);
     Values result{};
     for (int i = 0; i < piece_.corners; ++i) {
       result[i] = at_centroid + glm::dot(normal, piece_.corner[i] - centroid_);
@@ -82,6 +105,16 @@ class Below {
   Values least_;
 };
 
+/// The ranges with what their arithmetic may be off by.
+DistanceBounds rounded_outwards(DistanceBounds bounds) {
+  const double square = kRounding * (2 * bounds.mean.upper + kRounding);
+  for (Range* range : {&bounds.value, &bounds.mean}) range->lower -= kRounding, range->upper += kRounding;
+  bounds.mean_square.lower -= square;
+  bounds.mean_square.upper += square;
+  for (Range* range : {&bounds.value, &bounds.mean, &bounds.mean_square}) range->lower = std::max(0.0, range->lower);
+  return bounds;
+}
+
 }  // namespace
 
 dvec3 Simplex::centroid() const {
@@ -94,7 +127,7 @@ DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, cons
                                std::uint32_t hint) {
   const auto triangle = [&](std::uint32_t i) {
     const glm::uvec3& t = b.triangles[i];
-    return std::array{b.vertices[t.x], b.vertices[t.y], b.vertices[t.z]};
+    return Corners{b.vertices[t.x], b.vertices[t.y], b.vertices[t.z]};
   };
   const dvec3 c = piece.centroid();
   const int k = piece.corners;
@@ -103,7 +136,7 @@ DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, cons
   const double d = nearest.distance;
   bounds.nearest = nearest.triangle;
 
-  const std::array<dvec3, 3> t = triangle(nearest.triangle);
+  const Corners t = triangle(nearest.triangle);
   double r = 0, spread = 0;
   for (int i = 0; i < k; ++i) {
     const double squared = closest_point(piece.corner[i], t[0], t[1], t[2]).distance_squared;
@@ -118,10 +151,10 @@ DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, cons
   if (r <= kShort * d) {
     bounds.value = bounds.mean = {d - r, d + r};
     bounds.mean_square = {(d - r) * (d - r), (d + r) * (d + r)};
-    return bounds;
+    return rounded_outwards(bounds);
   }
 
-  Below below(piece, c, nearest.point);
+  Below below(piece, c, t, nearest.point);
   int seen = 0;
   hierarchy.near(c, d + 2 * r, [&](std::uint32_t i) {
     if (++seen > kMostTriangles) return false;
@@ -146,7 +179,7 @@ DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, cons
     bounds.mean.lower = std::max(bounds.value.lower, bounds.mean_square.lower / bounds.value.upper);
   }
   bounds.mean_square.lower = std::max(bounds.mean_square.lower, bounds.mean.lower * bounds.mean.lower);
-  return bounds;
+  return rounded_outwards(bounds);
 }
 
 }  // namespace tolvol

@@ -26,10 +26,10 @@ struct DistanceBounds {
   Range value, mean, mean_square;  ///< of the distance over the piece
 };
 
-/// What holds of the distance from the points of `piece` to the mesh b of `hierarchy`, but for rounding. The ranges are
-/// narrower than the piece is long by one order: by the product of its length and the angle between the two surfaces
-/// near it. `hint`: a triangle of b that may be near, or Hierarchy::kNone; it does not change the result.
-/// Cost: 2 to 10 us.
+/// What holds of the distance from the points of `piece` to the mesh b of `hierarchy`, both in a frame where |x| <= 1:
+/// the ranges are widened by what rounding may have done to them, so that lower < upper. They are narrower than the
+/// piece is long by one order: by the product of its length and the angle between the two surfaces near it. `hint`: a
+/// triangle of b that may be near, or Hierarchy::kNone; it does not change the result. Cost: 2 to 10 us.
 DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, const Hierarchy& hierarchy,
                                std::uint32_t hint);
 

@@ -15,17 +15,18 @@
 // Rounding. u = 2^-53; every point has |x| <= 1 in the frame, so that a difference of two is at most 2 long. One
 // operation on the three coordinates of a vector (sum, difference, product with a number) errs by at most u times the
 // length of its result. Powers of two, by which frame and hierarchy scale, are exact.
-// - Placing a vertex errs by u, so the distance between the surfaces changes by at most 2 u.
+// - Placing a vertex of a errs by u, one of b that is cut off by 4 u (measure/near_part.h), so the distance between the
+//   surfaces changes by at most 5 u.
 // - The true pieces tile the triangle, so Piece::error, kSplitError for each split on the way, bounds how far their
 //   corners are from the stored ones.
 // - A witness a + v ab + w ac errs by 2 u (v + w) for the differences, as much for the products, and 2 u for the sums;
 //   v + w may exceed 1 by 2 u, which puts it 4 u outside: 10 u. Its distance, at most 2, has a relative error below
-//   4 u: 8 u. Together: true distance <= U + error + 20 u, kUpperMargin.
+//   4 u: 8 u. Together: true distance <= U + error + 23 u, kUpperMargin.
 // - For `lower` the nearest distance itself is not trusted, as a witness need not be the nearest point.
 //   certified_distance separates p from each triangle T near it by a plane: |p - x| >= v . (p - x) / |v| for all x in T
 //   and any v, least at a corner. The difference and the dot product err by 4 u |v| 2, |v| and the quotient by 4 u 2:
-//   16 u. The point p is off by the error of its piece, 3 u more for a centroid, and 2 u for placing. Together:
-//   kLowerMargin, 24 u.
+//   16 u. The point p is off by the error of its piece, 3 u more for a centroid, and 5 u for placing. Together:
+//   kLowerMargin, 27 u.
 #include "measure/hausdorff.h"
 
 #include <algorithm>
@@ -47,12 +48,17 @@ using glm::dvec3;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kGap = 0.001;                       // of upper: when the interval is narrow
-constexpr double kUpperMargin = 20 * kUnitRoundoff;  // derived above, like the next
-constexpr double kLowerMargin = 24 * kUnitRoundoff;
+constexpr double kUpperMargin = 23 * kUnitRoundoff;  // derived above, like the next
+constexpr double kLowerMargin = 27 * kUnitRoundoff;
 // An interval or a piece shorter than this is rounding: no use in going on.
 constexpr double kNoise = 256 * kUnitRoundoff;
+// A piece whose middle corner is nearer to the segment between the other two counts as that segment. As much again,
+// in the error of the piece, is more than the rounding of this distance.
+constexpr double kFlat = 8 * kUnitRoundoff;
 // Triangles asked for a first lower bound.
 constexpr std::size_t kSeeds = 4096;
+// A prime: its multiples modulo a smaller number visit each of the numbers below it once, far from the one before.
+constexpr std::size_t kSpread = 1'000'003;
 // Pieces that see the same lower bound, and those of them that are handed to a thread at once.
 constexpr std::size_t kChunk = 16384, kBlock = 64, kBatch = 512, kSmallBlock = 8;
 // The budget: an edge of b that crosses a triangle of a costs a few pieces, so that a subdivided copy needs about ten
@@ -125,22 +131,35 @@ class Search {
     if (options_.progress) options_.progress->update(fraction);
   }
 
-  /// A first lower bound from triangles spread over the mesh: the better it is, the more pieces end at once.
+  /// A first lower bound from triangles spread over the mesh: the better it is, the more pieces end at once. The first
+  /// few bound the searches of the others.
   void seed() {
     const std::size_t count = std::min(a_.triangles.size(), kSeeds);
-    std::vector<Sample> samples(count);
-    parallel_for(count, kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const auto triangle = std::uint32_t(i * a_.triangles.size() / count);
-        const std::array<dvec3, 3> p = corners(a_, triangle);
-        const Hierarchy::Nearest middle = hierarchy_.nearest((p[0] + p[1] + p[2]) / 3.0);
-        samples[i] = {middle.distance, (p[0] + p[1] + p[2]) / 3.0, 0, triangle};
-        for (const dvec3& corner : p) {
-          samples[i].improve({hierarchy_.nearest(corner, kInfinity, middle.triangle).distance, corner, 0, triangle});
+    for (std::size_t first = 0; first < count;) {
+      const std::size_t end_of_round = std::min(count, 8 * first + 8);
+      std::vector<Sample> samples(end_of_round - first);
+      parallel_for(samples.size(), kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          const std::size_t spread = (first + i) * kSpread % count;
+          const auto triangle = std::uint32_t(spread * a_.triangles.size() / count);
+          const std::array<dvec3, 3> p = corners(a_, triangle);
+          const dvec3 centroid = (p[0] + p[1] + p[2]) / 3.0;
+          const Hierarchy::Common middle = far_from(centroid, Hierarchy::kNone);
+          samples[i] = {middle.distance, centroid, 0, triangle};
+          for (const dvec3& corner : p) {
+            samples[i].improve({far_from(corner, middle.triangle).distance, corner, 0, triangle});
+          }
         }
-      }
-    });
-    learn(samples);
+      });
+      learn(samples);
+      first = end_of_round;
+    }
+  }
+
+  /// The triangle of b nearest to p, or any that shows that p does not raise the lower bound: where many triangles are
+  /// about as near, the search for the nearest looks at all of them.
+  Hierarchy::Common far_from(const dvec3& p, std::uint32_t hint) const {
+    return hierarchy_.common(std::array{p}, kInfinity, lower_ + kUpperMargin, hint);
   }
 
   void first_pass() {
@@ -220,8 +239,7 @@ class Search {
     for (const dvec3& corner : piece.corner) {
       if (std::sqrt(closest_point(corner, t[0], t[1], t[2]).distance_squared) <= std::max(lower_, best.distance))
         continue;
-      best.improve(
-          {hierarchy_.nearest(corner, kInfinity, common.triangle).distance, corner, piece.error, piece.triangle});
+      best.improve({far_from(corner, common.triangle).distance, corner, piece.error, piece.triangle});
     }
     return best;
   }
@@ -264,8 +282,23 @@ class Search {
     return best;
   }
 
+  /// A piece that is as flat as rounding becomes the segment it is, whose parts do not overlap.
+  static Piece flattened(Piece piece) {
+    for (int i = 0; i < 3; ++i) {
+      dvec3 &p = piece.corner[i], &q = piece.corner[(i + 1) % 3], &middle = piece.corner[(i + 2) % 3];
+      if (middle == p || middle == q) return piece;
+      const double height = std::sqrt(closest_point(middle, p, q, q).distance_squared);
+      if (height > kFlat) continue;
+      piece.error += height + kFlat;
+      middle = q;
+      return piece;
+    }
+    return piece;
+  }
+
   /// None when the piece is too small.
-  Children split(const Piece& piece) const {
+  Children split(const Piece& whole) const {
+    const Piece piece = flattened(whole);
     const Parts parts = tolvol::split(piece.corner, corners(b_, piece.nearest));
     Children children{{piece, piece, piece}, parts.count};
     for (int i = 0; i < parts.count; ++i) {
@@ -292,7 +325,7 @@ HausdorffInterval hausdorff(const TriangleMesh& a, const TriangleMesh& b, const 
   if (options.bound && !(*options.bound >= 0)) throw InvalidInput("bound is not a length of 0 or more");
   const Call call(options.progress);
   if (options.progress) options.progress->begin("measuring");
-  const PlacedPair pair(a, b);
+  const PlacedPair pair(a, b, PlacedPair::Target::near);
   const Frame& frame = pair.frame;
   Search search(pair.a, pair.b, options.bound ? *options.bound * frame.scale() : kInfinity, options);
   search.run();

@@ -30,8 +30,12 @@ struct HausdorffInterval {
 /// points they are), vertices that no triangle uses do not.
 ///
 /// Narrow means upper - lower <= 0.1 % of upper, or a distance that is rounding itself: identical or subdivided
-/// surfaces end with an upper of about 1e-15 of the size of both meshes together. Where that would need many millions
-/// of pieces the search stops with the interval it has, and so it does as soon as lower > bound: wider, but true.
+/// surfaces end with an upper of about 1e-15 of the size of both meshes together. Triangles of b that reach farther
+/// away than what is nearest to a can lie do not add to that size: at most a few hundred times the size of a and its
+/// distance from b counts, wherever their far corners are. The exceptions are triangles that pass a while all their
+/// corners are far away, or that open to more than about 170 degrees at the one near corner: they count as a whole.
+/// Where narrow would need many millions of pieces the search stops with the interval it has, and so it does as soon as
+/// lower > bound: wider, but true.
 ///
 /// Throws InvalidInput when a mesh is not valid (measure/placed_pair.h) or the bound is negative or not a number,
 /// Cancelled. Shares no code with the check of operations (check/), which it judges. Cost: below 1 us for each triangle

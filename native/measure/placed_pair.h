@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "measure/near_part.h"
 #include "reference/call.h"
 #include "reference/errors.h"
 #include "reference/frame.h"
@@ -15,22 +16,33 @@ struct PlacedPair {
   Frame frame;
   TriangleMesh a, b;
 
+  /// `near` leaves of b what can be nearest to a point of a (measure/near_part.h), `whole` all of it.
+  enum class Target { whole, near };
+
   /// The frame fits the vertices that triangles use; the others may lie anywhere. Throws InvalidInput when a mesh is
   /// not valid, or when both together are smaller than 1e-307.
-  PlacedPair(const TriangleMesh& world_a, const TriangleMesh& world_b) {
+  PlacedPair(const TriangleMesh& world_a, const TriangleMesh& world_b, Target target) {
+    for (const TriangleMesh* mesh : {&world_a, &world_b}) validate(mesh->vertices, mesh->triangles);
+    const NearPart part = target == Target::near ? near_part(world_a, world_b) : NearPart{world_b.triangles, {}};
     Box box;
-    for (const TriangleMesh* mesh : {&world_a, &world_b}) {
-      validate(mesh->vertices, mesh->triangles);
-      std::size_t turn = 0;
-      for (const glm::uvec3& t : mesh->triangles) {
+    std::size_t turn = 0;
+    const auto add = [&](const TriangleMesh& mesh, const std::vector<glm::uvec3>& triangles) {
+      for (const glm::uvec3& t : triangles) {
         poll_at(++turn);
-        for (int k = 0; k < 3; ++k) box.add(mesh->vertices[t[k]]);
+        for (int k = 0; k < 3; ++k) {
+          if (t[k] < mesh.vertices.size()) box.add(mesh.vertices[t[k]]);
+        }
       }
-    }
+    };
+    add(world_a, world_a.triangles);
+    add(world_b, part.triangles);
+    for (const NearPart::Cut& cut : part.cuts) box.add(cut.in(Frame(), world_b));
     frame = Frame(box);
     if (!std::isfinite(frame.scale())) throw InvalidInput("the meshes are smaller than 1e-307: scale them up");
     a = placed(world_a);
     b = placed(world_b);
+    b.triangles = part.triangles;
+    for (const NearPart::Cut& cut : part.cuts) b.vertices.push_back(cut.in(frame, world_b));
   }
 
  private:

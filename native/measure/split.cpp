@@ -61,6 +61,12 @@ Parts cut_along(const TriangleCorners& p, const TriangleCorners& t) {
   return {{{{p[i], on_j, on_k}, {on_j, p[j], on_k}, {on_k, p[j], p[k]}}}, 3};
 }
 
+/// The point that divides the segment from p to q best.
+dvec3 cut_of_segment(const dvec3& p, const dvec3& q, const TriangleCorners& t, bool coarse) {
+  const Parts parts = coarse ? Parts{} : cut_along({p, q, q}, t);
+  return parts.count > 0 ? parts.corners[0][1] : between(p, q, 0.5);
+}
+
 }  // namespace
 
 Parts split(const TriangleCorners& piece, const TriangleCorners& t) {
@@ -73,7 +79,14 @@ Parts split(const TriangleCorners& piece, const TriangleCorners& t) {
   }
   Parts parts;
   if (length[longest] <= kNoise) return parts;
-  if (length[longest] <= kCoarse * reach) parts = cut_along(piece, t);
+  const bool coarse = length[longest] > kCoarse * reach;
+  for (int i = 0; i < 3; ++i) {
+    if (length[i] > 0) continue;
+    // Divided as a triangle it would leave three parts, two of them over the same half, and so on with each.
+    const dvec3 &p = piece[i], &q = piece[(i + 2) % 3], at = cut_of_segment(p, q, t, coarse);
+    return {{{{p, at, at}, {at, q, q}}}, 2};
+  }
+  if (!coarse) parts = cut_along(piece, t);
   return parts.count > 0 ? parts : halves(piece, longest, 0.5);
 }
 

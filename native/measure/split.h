@@ -20,6 +20,7 @@ struct Parts {
 };
 
 /// Two or three parts of `piece`, which together are all of it, turned as it is; none when it is as small as rounding.
+/// Of a segment, two corners of which are equal, the two parts are segments that have one point in common.
 /// A piece that is long beside `t`, the triangle of the other surface nearest to it, is cut in two at the middle of its
 /// longest edge; otherwise along the edge of `t` that divides it best, by the plane through it perpendicular to `t`:
 /// the distance of what lies above `t` is largest at a corner. O(1).

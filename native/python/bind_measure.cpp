@@ -57,7 +57,8 @@ void bind_measure(py::module_& module) {
       "arithmetic. World\n"
       "coordinates. Refined until it decides against `bound`, and until upper - lower <= 1 % of upper. Cost: about 2 "
       "us a\n"
-      "triangle. Raises InvalidInput, Cancelled.");
+      "triangle. Corners of b that are far away neither widen the interval nor cost time. Raises InvalidInput, "
+      "Cancelled.");
 
   py::class_<Sides>(module, "Sides", py::module_local(), "The two sides of a closed surface; outside is above 0.")
       .def_property_readonly(
@@ -116,7 +117,7 @@ void bind_measure(py::module_& module) {
       "with the\n"
       "range that it is certainly in. Refined until the range of the mean is no wider than 0.1 % of the largest "
       "distance "
-      "or there\n"
+      "or than rounding, or there\n"
       "are half a million samples (four for each triangle where that is more). World coordinates, deterministic. Cost: "
       "2 "
       "to 10 us\n"

@@ -46,6 +46,36 @@ void expect(const Estimate& e, double truth, double error, const char* what = ""
   EXPECT_GE(e.range.upper, e.value) << what;
 }
 
+// Where all distances are rounding, and where many shares of the area are equal, the ends of a range do not change
+// places.
+TEST(Deviation, EveryRangeIsInOrder) {
+  std::mt19937 random(8);
+  std::normal_distribution<double> normal(0, 1);
+  const double bounds[] = {0, 1e-17, 0.25, 1}, percentiles[] = {0, 1, 25, 100.0 / 3, 50, 200.0 / 3, 75, 99, 100};
+  for (int round = 0; round < 24; ++round) {
+    TriangleMesh mesh = round % 3 == 0 ? shapes::box(2) : TriangleMesh{};
+    for (int i = 0; i < (round % 2 ? 1 : 3) && round % 3 != 0; ++i) {
+      const unsigned first = unsigned(mesh.vertices.size());
+      for (int k = 0; k < 3; ++k) mesh.vertices.emplace_back(normal(random), normal(random), normal(random));
+      mesh.triangles.push_back(glm::uvec3(first) + glm::uvec3(0, 2, 1));
+    }
+    TriangleMesh moved = mesh;
+    for (dvec3& p : moved.vertices) p += round % 4 < 2 ? dvec3(0) : dvec3(0.25, 0, round % 4 == 2 ? 0 : 1e-16);
+    const Deviation d = deviation(mesh, moved, {bounds, percentiles});
+    std::vector<Estimate> all{d.mean, d.rms};
+    all.insert(all.end(), d.share_beyond.begin(), d.share_beyond.end());
+    all.insert(all.end(), d.percentiles.begin(), d.percentiles.end());
+    if (d.sides) {
+      all.insert(all.end(), {d.sides->mean, d.sides->share_inside});
+      for (const Range& range : {d.sides->inside, d.sides->outside}) all.push_back({range.lower, range});
+    }
+    for (const Estimate& e : all) {
+      EXPECT_LE(e.range.lower, e.value) << round;
+      EXPECT_LE(e.value, e.range.upper) << round;
+    }
+  }
+}
+
 // Distance x over [0, 1]: mean 1/2, rms 1/sqrt 3, share beyond t is 1 - t, the p-th percentile is p.
 TEST(Deviation, LinearDistance) {
   const TriangleMesh floor{{{-9, -9, 0}, {9, -9, 0}, {9, 9, 0}, {-9, 9, 0}}, {{0, 1, 2}, {0, 2, 3}}};

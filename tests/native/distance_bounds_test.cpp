@@ -80,6 +80,27 @@ TEST(DistanceBounds, HoldWhateverThePiece) {
   }
 }
 
+// A piece that meets a triangle at one corner and is off by rounding at its centroid: the direction of so short a
+// difference is that of its rounding, and a plane across it would seem to keep the whole piece away.
+TEST(DistanceBounds, HoldWherePiecesNearlyTouch) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::normal_distribution<double> normal(0, 1);
+  for (int i = 0; i < 3000; ++i) {
+    TriangleMesh b{{}, {{0, 1, 2}}};
+    for (int k = 0; k < 3; ++k) b.vertices.push_back(0.3 * dvec3(normal(random), normal(random), normal(random)));
+    const auto& v = b.vertices;
+    const dvec3 up = glm::normalize(glm::cross(v[1] - v[0], v[2] - v[0]));
+    const double height = std::pow(10, -6 - 9 * uniform(random));
+    Simplex s{{v[0], v[1], v[2]}, 3};
+    for (dvec3& p : s.corner) p = glm::mix(p, (v[0] + v[1] + v[2]) / 3.0, 0.1);
+    const dvec3 touching = s.corner[i % 3];
+    for (dvec3& p : s.corner) p += p == touching ? dvec3(0) : height * uniform(random) * up;
+    const DistanceBounds bounds = distance_bounds(s, b, Hierarchy(b), Hierarchy::kNone);
+    EXPECT_LT(bounds.value.lower, 1e-15) << i << ' ' << height;
+  }
+}
+
 TEST(DistanceBounds, ExactOverAPlane) {
   const TriangleMesh plane = shapes::grid(4);  // many triangles, one plane
   const Hierarchy hierarchy(plane);

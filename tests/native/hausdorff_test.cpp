@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 
+#include "reference/call.h"
 #include "reference/closest_point.h"
 #include "reference/errors.h"
 #include "shapes.h"
@@ -278,6 +279,55 @@ TEST(Hausdorff, TinyDistances) {
     EXPECT_GT(back.lower, noise);
     EXPECT_LT(back.upper, 6 * noise);
   }
+}
+
+/// The polls of a measurement on this thread, a measure of its work.
+std::size_t polls_of(const TriangleMesh& a, const TriangleMesh& b) {
+  std::size_t polls = 0;
+  const Call call(nullptr, [&] {
+    ++polls;
+    return false;
+  });
+  const HausdorffInterval h = hausdorff(a, b, {.threads = 1});
+  EXPECT_LE(h.upper - h.lower, std::max(0.001 * h.upper, 1e-13));
+  return polls;
+}
+
+// A segment under n equal peaks takes pieces in proportion to n, also where it is a triangle of three distinct corners.
+TEST(Hausdorff, OutlinesTakeWorkInProportion) {
+  for (const double turn : {0.0, 0.3}) {
+    for (const double middle : {0.0, 0.1}) {
+      std::array<std::size_t, 2> polls{};
+      for (const unsigned n : {250u, 1000u}) {
+        const auto at = [&](double x, double y) {
+          return dvec3(x * std::cos(turn) - y * std::sin(turn), x * std::sin(turn) + y * std::cos(turn), 0.3 * x);
+        };
+        TriangleMesh zigzag;
+        for (unsigned i = 0; i <= 2 * n; ++i) zigzag.vertices.push_back(at(i / (2.0 * n), i % 2));
+        for (unsigned i = 0; i < 2 * n; ++i) zigzag.triangles.emplace_back(i, i + 1, i);
+        const TriangleMesh base{{at(0, 0), at(1, 0), at(middle, 0)}, {{0, 1, 2}}};
+        polls[n == 1000] = polls_of(base, zigzag);
+      }
+      EXPECT_LT(polls[1], 6 * polls[0]) << turn << ' ' << middle;
+      EXPECT_LT(polls[1], 2000u) << turn << ' ' << middle;
+    }
+  }
+}
+
+// All triangles of a fan meet in one point, and the boxes of most of them hold any point near the middle.
+TEST(Hausdorff, FansTakeLittleForEachTriangle) {
+  Random random(12);
+  const unsigned n = 6000;
+  TriangleMesh fan;
+  for (unsigned i = 0; i < n; ++i) {
+    const double angle = 2 * M_PI * i / n;
+    fan.vertices.emplace_back(std::cos(angle), 0.8 * std::sin(angle), 0.6 * std::sin(angle));
+    fan.triangles.emplace_back(i, (i + 1) % n, n);
+  }
+  fan.vertices.emplace_back(0, 0, 0);
+  TriangleMesh moved = fan;
+  for (unsigned i = 0; i < n; ++i) moved.vertices[i] += 1e-3 * random.point();
+  for (const auto& [a, b] : {std::pair{fan, fan}, {moved, fan}, {fan, moved}}) EXPECT_LT(polls_of(a, b), 1000u);
 }
 
 TEST(Hausdorff, BoundDecides) {

@@ -54,6 +54,25 @@ TEST(Split, CutsAlongTheEdges) {
   EXPECT_NEAR(above, 0.5, 1e-12);
 }
 
+// Whichever two corners are equal, and whether it is halved or cut.
+TEST(Split, SegmentsLeaveTwoThatDoNotOverlap) {
+  const dvec3 p(0, 0, 0.1), q(1, 0, 0.1);
+  const TriangleCorners beside{dvec3(0.3, -1, 0), dvec3(0.3, 1, 0), dvec3(9, 0, 0)}, tiny{p, p, p};
+  for (const auto& [t, at] : {std::pair{beside, 0.3}, {tiny, 0.5}}) {
+    for (const TriangleCorners& segment : {TriangleCorners{p, q, q}, {p, q, p}, {p, p, q}}) {
+      const Parts parts = split(segment, t);
+      ASSERT_EQ(parts.count, 2);
+      double sum = 0;
+      for (int k = 0; k < 2; ++k) {
+        const auto [left, right] = std::minmax({parts.corners[k][0].x, parts.corners[k][1].x, parts.corners[k][2].x});
+        EXPECT_NEAR(left == 0 ? right : left, at, 1e-15);
+        sum += right - left;
+      }
+      EXPECT_NEAR(sum, 1, 1e-15);
+    }
+  }
+}
+
 TEST(Split, LongPiecesAreHalvedAndTinyOnesLeft) {
   const TriangleCorners t{dvec3(0), dvec3(0.1, 0, 0), dvec3(0, 0.1, 0)};
   const Parts halves = split({dvec3(0), dvec3(1, 0, 0), dvec3(0, 0.5, 0)}, t);

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Let c be the middle of a box around a, r half its diagonal and y any vertex of b: no point of a is farther than
+// r + |c - y| from b, so that what is nearest to it is within R = 2 r + |c - y| of c. What a plane keeps farther away
+// than that is not needed.
+//
+// Rounding. All is decided in the frame of a. Placing a corner there errs by u times its size, and so do the dot
+// products with unit vectors, which are compared with R: kSlack times the size of the corner is more than both. R is
+// raised by 1e-6, which is more than its own rounding. A cut at any share between 0 and 1 is on the edge, so the share
+// needs no care.
+#include "measure/near_part.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <initializer_list>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "reference/call.h"
+#include "reference/closest_point.h"
+
+namespace tolvol {
+namespace {
+
+using glm::dvec3;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNear = 8, kCut = 32;  // in R: corners within it are near; how far from them far edges are cut
+constexpr double kSlack = 64 * kUnitRoundoff;
+
+/// Without the square of a huge number.
+double norm(const dvec3& v) {
+  const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  return largest > 0 && largest < kInfinity ? largest * glm::length(v / largest) : largest;
+}
+
+dvec3 direction(const dvec3& v) {
+  const double length = norm(v);
+  return length > 0 && length < kInfinity ? v / length : dvec3(0);
+}
+
+Box box_of(const TriangleMesh& mesh) {
+  Box box;
+  std::size_t turn = 0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    poll_at(++turn);
+    for (int k = 0; k < 3; ++k) box.add(mesh.vertices[t[k]]);
+  }
+  return box;
+}
+
+/// How far from the origin of the frame something in the box can be.
+double extent(const Box& box, const Frame& frame) {
+  return norm(glm::max(glm::abs(frame.from_world(box.lower)), glm::abs(frame.from_world(box.upper))));
+}
+
+class Cutter {
+ public:
+  Cutter(const TriangleMesh& b, const Frame& frame, double reach) : b_(b), frame_(frame), reach_(reach) {}
+
+  void add(const glm::uvec3& t) {
+    const std::array<dvec3, 3> p{at(t.x), at(t.y), at(t.z)};
+    std::array<bool, 3> near{};
+    int count = 0;
+    for (int k = 0; k < 3; ++k) count += near[k] = norm(p[k]) <= kNear * reach_;
+    if (count == 3) return keep(t);
+    if (count == 0) {
+      if (!beyond({p[0], p[1], p[2]})) keep(t);
+      return;
+    }
+    // From here on a is the only near corner, or c the only far one.
+    int first = 0;
+    while (count == 1 ? !near[first] : near[(first + 2) % 3]) ++first;
+    const std::uint32_t a = t[first], b = t[(first + 1) % 3], c = t[(first + 2) % 3];
+    const End on_c = cut(a, c), other = count == 1 ? cut(a, b) : cut(b, c);
+    if (on_c.share == 1 && other.share == 1) return keep(t);
+    const dvec3 far_b = count == 1 ? at(b) : other.point;
+    if (!beyond({on_c.point, other.point, far_b, at(c)})) return keep(t);
+    if (count == 1) return keep({a, vertex(other), vertex(on_c)});
+    const std::uint32_t v = vertex(other);
+    keep({a, b, v});
+    keep({a, v, vertex(on_c)});
+  }
+
+  NearPart part() && { return std::move(part_); }
+
+ private:
+  /// Where a triangle ends along one of its edges.
+  struct End {
+    std::uint32_t from, to;
+    double share;  ///< 1: at `to` itself
+    dvec3 point;
+  };
+
+  dvec3 at(std::uint32_t vertex) const { return frame_.from_world(b_.vertices[vertex]); }
+
+  void keep(const glm::uvec3& t) { part_.triangles.push_back(t); }
+
+  End cut(std::uint32_t from, std::uint32_t to) const {
+    const double length = norm(at(to) - at(from));
+    if (length <= kCut * reach_) return {from, to, 1, at(to)};
+    const NearPart::Cut cut{from, to, kCut * reach_ / length};
+    return {from, to, cut.share, cut.in(frame_, b_)};
+  }
+
+  /// Neighbours share the vertex.
+  std::uint32_t vertex(const End& end) {
+    if (end.share == 1) return end.to;
+    const auto next = std::uint32_t(b_.vertices.size() + part_.cuts.size());
+    const auto [place, added] = cut_at_.try_emplace({end.from, end.to}, next);
+    if (added) part_.cuts.push_back({end.from, end.to, end.share});
+    return place->second;
+  }
+
+  /// Whether the convex hull of the points is proved to be farther than `reach` from the origin.
+  bool beyond(std::initializer_list<dvec3> points) const {
+    const auto shown_by = [&](const dvec3& normal) {
+      return std::all_of(points.begin(), points.end(),
+                         [&](const dvec3& p) { return glm::dot(normal, p) > reach_ + kSlack * norm(p); });
+    };
+    const dvec3* const p = points.begin();
+    const dvec3 edge = direction(p[1] - p[0]);
+    const dvec3 across = p[0] - glm::dot(p[0], edge) * edge;  // from the origin to the line of the cut
+    if (shown_by(direction(p[0])) || shown_by(direction(across))) return true;
+    for (int k = 0; k < 3; ++k) {
+      dvec3 axis(0);
+      axis[k] = 1;
+      if (shown_by(axis) || shown_by(-axis)) return true;
+    }
+    return shown_by(direction(closest_point(dvec3(0), p[0], p[1], p[2]).point));
+  }
+
+  const TriangleMesh& b_;
+  const Frame& frame_;
+  double reach_;
+  NearPart part_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> cut_at_;
+};
+
+}  // namespace
+
+NearPart near_part(const TriangleMesh& a, const TriangleMesh& b) {
+  const Box box_a = box_of(a), box_b = box_of(b);
+  const Frame frame(box_a);
+  const double radius = extent(box_a, frame), span = extent(box_b, frame);
+  // Without a finite frame nothing can be proved.
+  if (span <= kNear * radius || !(span < kInfinity) || !std::isfinite(frame.scale())) return {b.triangles, {}};
+  double nearest = kInfinity;
+  std::size_t turn = 0;
+  for (const glm::uvec3& t : b.triangles) {
+    poll_at(++turn);
+    for (int k = 0; k < 3; ++k) nearest = std::min(nearest, norm(frame.from_world(b.vertices[t[k]])));
+  }
+  const double reach = (2 * radius + nearest) * (1 + 1e-6);
+  if (!(reach > 0) || span <= kNear * reach) return {b.triangles, {}};
+  Cutter cutter(b, frame, reach);
+  for (const glm::uvec3& t : b.triangles) {
+    poll_at(++turn);
+    cutter.add(t);
+  }
+  return std::move(cutter).part();
+}
+
+}  // namespace tolvol
