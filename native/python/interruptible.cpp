@@ -17,15 +17,13 @@ bool on_main_thread() {
 
 }  // namespace
 
-Interruptible::Interruptible(const Progress* progress) {
-  const bool main = on_main_thread();
-  release_.emplace();
-  call_.emplace(progress, main ? std::function<bool()>([this] { return handle_signals(); }) : nullptr);
-}
+Interruptible::Interruptible(const Progress* progress)
+    : call_(progress, on_main_thread() ? std::function<bool()>([this] { return handle_signals(); }) : nullptr),
+      released_(PyEval_SaveThread()) {}
 
+// pybind11's guard does the same, by code that may throw.
 Interruptible::~Interruptible() {
-  call_.reset();
-  release_.reset();
+  PyEval_RestoreThread(released_);
   if (type_) PyErr_Restore(type_, value_, traceback_);
 }
 

@@ -5,7 +5,6 @@
 #include <pybind11/pybind11.h>
 
 #include <chrono>
-#include <optional>
 
 #include "reference/call.h"
 
@@ -24,8 +23,8 @@ class Interruptible {
 
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   PyObject *type_ = nullptr, *value_ = nullptr, *traceback_ = nullptr;
-  std::optional<pybind11::gil_scoped_release> release_;
-  std::optional<Call> call_;
+  Call call_;
+  PyThreadState* const released_;  ///< begins when all else is there: nothing fails while the GIL is not held
 };
 
 }  // namespace tolvol::python
