@@ -33,7 +33,10 @@ class TOLVOL_OT_save_report(Comparison, bpy.types.Operator):
         if self.filepath:
             return super().invoke(context, event)
         self._browsing = True
-        folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path.home()
+        # The file's own folder may be gone by now.
+        folder = Path(bpy.data.filepath).parent
+        if not bpy.data.filepath or not folder.is_dir():
+            folder = Path.home()
         self.filepath = str(folder / f"{bpy.path.clean_name(context.active_object.name)} deviation.html")
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
