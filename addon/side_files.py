@@ -22,7 +22,7 @@ def written_with(place, extension):
 
 
 def read_with(path):
-    """The files on the disk that a mesh file names: materials, textures, buffers. None for a file that cannot be read."""
+    """The files on the disk that a mesh file names: materials, textures, buffers; [] where it cannot be read."""
     extension = Path(path).suffix.lower()
     if extension not in (".obj", *_GLTF):
         return []

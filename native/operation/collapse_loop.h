@@ -45,8 +45,7 @@ class CollapseLoop {
     double cost;
     std::size_t triangles;
   };
-  /// Collapses until then, or until no edge can. O(n log n) without bounds. Throws Cancelled,
-  /// between two collapses.
+  /// Collapses until then, or until no edge can. O(n log n) without bounds. Throws Cancelled, between two collapses.
   void run(const Until& until, Progress* progress);
 
  private:
@@ -92,14 +91,15 @@ class CollapseLoop {
   Team* team_ = nullptr;  ///< where there are others than the caller
   CollapseQueue queue_;
   std::vector<Tried> tried_;
-  std::vector<std::uint32_t> tried_of_;              ///< per edge: its place in tried_, if that names the edge
-  std::unordered_map<std::uint32_t, Crowd> crowds_;  ///< by vertex, of those where tries were refused
-  std::size_t next_ = 0;                             ///< place in tried_ that is taken next, the longest taken
-  std::uint32_t clock_ = 0;                          ///< collapses carried out
-  std::vector<std::uint32_t> touched_;               ///< per vertex: when a face around it changed last,
+  std::vector<std::uint32_t> tried_of_;    ///< per edge: its place in tried_, if that names the edge
+  std::size_t next_ = 0;                   ///< place in tried_ that is taken next, the longest taken
+  std::uint32_t clock_ = 0;                ///< collapses carried out
+  std::vector<std::uint32_t> touched_;     ///< per vertex: when a face around it changed last,
   std::vector<std::uint32_t> reserved_;    ///< and the last batch of tries in which one could change before its turn
   std::vector<std::uint32_t> surrounded_;  ///< and the last one in which its neighbours were noted so
   std::uint32_t batches_ = 0;              ///< of tries, so far
+  /// By vertex, of those with many faces around them where a try was refused.
+  std::unordered_map<std::uint32_t, Crowd> crowds_;
   /// Kept for their memory; the last given back is taken first, while it is in the cache.
   std::vector<std::unique_ptr<Attempt>> idle_;
   std::mutex idle_mutex_;  ///< guards idle_

@@ -16,8 +16,8 @@
 namespace tolvol {
 
 /// Until no edge can collapse or `target` triangles are left; with a target there are no rounds, because its order is
-/// that of the whole. O(n log n) without bounds. Throws Cancelled, and
-/// then leaves the mesh with what is proved, so that a caller who knows why may go on with it.
+/// that of the whole. O(n log n) without bounds. Throws Cancelled, and then leaves the mesh with what is proved, so
+/// that a caller who knows why may go on with it.
 void collapse_edges(BoundedMesh& mesh, std::size_t target, Team& team, Progress* progress);
 
 }  // namespace tolvol

@@ -5,6 +5,7 @@
 #include "operation/edge_collapse.h"
 
 #include <algorithm>
+#include <array>
 
 #include "reference/call.h"
 
@@ -123,24 +124,23 @@ void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
 }
 
 /// Other positions for a collapse whose best one fails: an end that costs nothing either, as on a plane, then fitted
-/// ones; where there is nothing to fit to, the ends and the middle.
+/// ones, then the ends that cost something; where there is nothing to fit to, the ends and the middle.
 EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) const {
   const Halfedge h = a.halfedge;
   const Spot s0 = mesh_.spot(mesh_.from(h)), s1 = mesh_.spot(mesh_.to(h));
   if (mesh_.bounds().forward) {
     const Quadric q = quadrics_[mesh_.from(h)] + quadrics_[mesh_.to(h)];
     const double nothing = length_cost(s0.position, s1.position);
-    for (const Spot& end : {s0, s1}) {
-      if (end.position == best || q(end.position) > nothing) continue;
-      if (a.change.try_collapse(h, end) == Outcome::possible) return Outcome::possible;
-    }
+    const auto possible_at_end = [&](bool that_costs) {
+      return std::ranges::any_of(std::array{s0, s1}, [&](const Spot& end) {
+        return end.position != best && (q(end.position) > nothing) == that_costs &&
+               a.change.try_collapse(h, end) == Outcome::possible;
+      });
+    };
+    if (possible_at_end(false)) return Outcome::possible;
     const Outcome fitted = a.fit.collapse(a.change, h, best, kHopeless);
     if (fitted != Outcome::refused) return fitted;
-    for (const Spot& end : {s0, s1}) {
-      if (end.position == best || !(q(end.position) > nothing)) continue;
-      if (a.change.try_collapse(h, end) == Outcome::possible) return Outcome::possible;
-    }
-    return Outcome::refused;
+    return possible_at_end(true) ? Outcome::possible : Outcome::refused;
   }
   for (const Spot& other : {s0, s1, mesh_.store((s0.position + s1.position) * 0.5)}) {
     const Outcome outcome = a.change.try_collapse(h, other);

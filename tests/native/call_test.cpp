@@ -139,9 +139,7 @@ TEST(Call, IsHeardInsideOneFace) {
 
 TEST(Call, IsHeardInsideOneSearch) {
   // From its centre all triangles of a sphere are equally far.
-  TriangleMesh ball = shapes::box(60);
-  for (glm::dvec3& p : ball.vertices) p = glm::normalize(p - 0.5);
-  const Hierarchy hierarchy(ball);
+  const Hierarchy hierarchy(shapes::sphere(60));
   EXPECT_GE(polls_of([&] { hierarchy.nearest(glm::dvec3(0)); }), 3u);
 }
 

@@ -24,6 +24,18 @@ inline DecimationResult run(const Case& c, const Options& options = {}) {
   return decimate(c.mesh.vertices, c.mesh.triangles, c.placement(), volume.get(), options);
 }
 
+/// Whatever the number of threads.
+inline void expect_same_bits(const Case& c, Options options, unsigned threads = 3) {
+  options.threads = 1;
+  const DecimationResult one = run(c, options);
+  options.threads = threads;
+  const DecimationResult several = run(c, options);
+  EXPECT_EQ(one.vertices, several.vertices);
+  EXPECT_EQ(one.triangles, several.triangles);
+  EXPECT_EQ(one.triangle_source, several.triangle_source);
+  EXPECT_EQ(one.source_weights, several.source_weights);
+}
+
 inline void expect_within(const Case& c, const DecimationResult& r, bool two_sided = true) {
   for (const dvec3& p : r.vertices) {
     if (c.storage == Storage::float32) {

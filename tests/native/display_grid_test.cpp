@@ -13,18 +13,6 @@ namespace {
 using namespace tolvol;
 using glm::dvec3;
 
-/// A sphere of radius 1 about the origin.
-TriangleMesh sphere(unsigned n) {
-  TriangleMesh mesh = shapes::box(n);
-  for (dvec3& p : mesh.vertices) p = glm::normalize(p - 0.5);
-  return mesh;
-}
-
-TriangleMesh turned(TriangleMesh mesh) {
-  for (glm::uvec3& t : mesh.triangles) std::swap(t.y, t.z);
-  return mesh;
-}
-
 DisplayGrid::Options with(double precision) { return {.precision = precision, .threads = 1}; }
 
 /// The distance at the node that is nearest to a place, in spacings.
@@ -34,7 +22,7 @@ float at(const DisplayGrid& display, const dvec3& p) {
 }
 
 TEST(DisplayGrid, DistancesAreThoseOfTheSurface) {
-  const DisplayGrid display(sphere(30), false, 0.1, with(4));
+  const DisplayGrid display(shapes::sphere(30), false, 0.1, with(4));
   const DistanceGrid& grid = display.grid;
   for (int z = 0; z < grid.nodes.z; ++z) {
     for (int y = 0; y < grid.nodes.y; ++y) {
@@ -50,7 +38,7 @@ TEST(DisplayGrid, DistancesAreThoseOfTheSurface) {
 TEST(DisplayGrid, InsideOfAClosedReferenceIsWhatItEnclosesHoweverItsFacesRun) {
   for (const double precision : {0.7, 4.0}) {
     for (const bool mirrored : {false, true}) {
-      for (const TriangleMesh& reference : {sphere(12), turned(sphere(12))}) {
+      for (const TriangleMesh& reference : {shapes::sphere(12), shapes::turned(shapes::sphere(12))}) {
         const DisplayGrid display(reference, mirrored, 0.2, with(precision));
         EXPECT_TRUE(display.closed);
         for (const double radius : {0.8, 1.2}) {
@@ -73,7 +61,7 @@ TEST(DisplayGrid, OfAnOpenReferenceTheFrontIsOutsideUnlessMirrored) {
 TEST(DisplayGrid, KeepsTheLimits) {
   const auto nodes = [](DisplayGrid::Options options) {
     options.threads = 1;
-    return DisplayGrid(sphere(4), false, 0.05, options).grid.nodes;
+    return DisplayGrid(shapes::sphere(4), false, 0.05, options).grid.nodes;
   };
   const glm::ivec3 free = nodes({}), narrow = nodes({.longest = 64}), few = nodes({.nodes = 50000});
   EXPECT_GT(free.x, 160);

@@ -15,20 +15,8 @@ namespace {
 using namespace tolvol;
 using glm::dvec3;
 
-/// A sphere of radius 1 about the origin.
-TriangleMesh sphere(unsigned n) {
-  TriangleMesh mesh = shapes::box(n);
-  for (dvec3& p : mesh.vertices) p = glm::normalize(p - 0.5);
-  return mesh;
-}
-
-TriangleMesh turned(TriangleMesh mesh) {
-  for (glm::uvec3& t : mesh.triangles) std::swap(t.y, t.z);
-  return mesh;
-}
-
 TEST(DisplayTree, DistancesAreThoseOfTheHierarchy) {
-  for (const TriangleMesh& reference : {sphere(9), shapes::grid(1), shapes::grid(7), shapes::box(1)}) {
+  for (const TriangleMesh& reference : {shapes::sphere(9), shapes::grid(1), shapes::grid(7), shapes::box(1)}) {
     const DisplayTree tree(reference, false);
     const Hierarchy hierarchy(reference);
     std::mt19937 engine(5);
@@ -43,7 +31,7 @@ TEST(DisplayTree, DistancesAreThoseOfTheHierarchy) {
 }
 
 TEST(DisplayTree, OnTheReferenceItIsNothing) {
-  const TriangleMesh reference = sphere(20);
+  const TriangleMesh reference = shapes::sphere(20);
   const DisplayTree tree(reference, false);
   std::mt19937 engine(6);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -55,7 +43,7 @@ TEST(DisplayTree, OnTheReferenceItIsNothing) {
 }
 
 TEST(DisplayTree, NodesHoldTheirHalvesAndLeavesAllTriangles) {
-  const TriangleMesh reference = sphere(9);
+  const TriangleMesh reference = shapes::sphere(9);
   const DisplayTree tree(reference, false);
   const std::size_t leaves = tree.nodes.size() / 2;
   EXPECT_EQ(tree.corners.size(), 3 * reference.triangles.size());
@@ -75,7 +63,7 @@ TEST(DisplayTree, NodesHoldTheirHalvesAndLeavesAllTriangles) {
 
 TEST(DisplayTree, InsideOfAClosedReferenceIsWhatItEnclosesHoweverItsFacesRun) {
   for (const bool mirrored : {false, true}) {
-    for (const TriangleMesh& reference : {sphere(12), turned(sphere(12))}) {
+    for (const TriangleMesh& reference : {shapes::sphere(12), shapes::turned(shapes::sphere(12))}) {
       const DisplayTree tree(reference, mirrored);
       EXPECT_TRUE(tree.closed);
       for (const double radius : {0.93, 1.05}) {
@@ -96,7 +84,7 @@ TEST(DisplayTree, OfAnOpenReferenceTheFrontIsOutsideUnlessMirrored) {
 TEST(DisplayTree, IsCancelled) {
   Progress progress;
   progress.cancel();
-  EXPECT_THROW(DisplayTree(sphere(40), false, &progress), Cancelled);
+  EXPECT_THROW(DisplayTree(shapes::sphere(40), false, &progress), Cancelled);
 }
 
 TEST(AreaShares, OfASlantedSquareAreThoseOfItsHeights) {
@@ -118,7 +106,7 @@ TEST(AreaShares, OfASlantedSquareAreThoseOfItsHeights) {
 }
 
 TEST(AreaShares, OfTheReferenceItselfNothingIsOutside) {
-  const TriangleMesh reference = sphere(20);
+  const TriangleMesh reference = shapes::sphere(20);
   const std::vector<double> edges{-1e-5, -5e-6, 0, 5e-6, 1e-5};
   const std::vector<double> shares =
       area_shares(DisplayTree(reference, false), reference.vertices, reference.triangles, edges, 2);

@@ -19,11 +19,7 @@ using Colour = std::array<int, 4>;
 constexpr double kEpsilon = 0.1;
 
 /// A sphere about the origin.
-TriangleMesh sphere(double radius, unsigned n = 48) {
-  TriangleMesh mesh = shapes::box(n);
-  for (dvec3& p : mesh.vertices) p = radius * glm::normalize(p - 0.5);
-  return mesh;
-}
+TriangleMesh sphere(double radius, unsigned n = 48) { return shapes::sphere(n, radius); }
 
 /// A square of side 2 about the origin, turned about the y axis.
 TriangleMesh square(double turn = 0, const dvec3& shift = dvec3(0)) {

@@ -97,6 +97,19 @@ inline TriangleMesh box(unsigned n) {
   return stored(mesh);
 }
 
+/// A closed sphere about the origin, of as many squares.
+inline TriangleMesh sphere(unsigned n, double radius = 1) {
+  TriangleMesh mesh = box(n);
+  for (glm::dvec3& p : mesh.vertices) p = radius * glm::normalize(p - 0.5);
+  return mesh;
+}
+
+/// The other way round.
+inline TriangleMesh turned(TriangleMesh mesh) {
+  for (glm::uvec3& t : mesh.triangles) std::swap(t.y, t.z);
+  return mesh;
+}
+
 /// Every triangle with vertices of its own.
 inline TriangleMesh soup(const TriangleMesh& mesh) {
   TriangleMesh result;

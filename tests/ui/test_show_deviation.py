@@ -6,7 +6,7 @@ import numpy as np
 
 import scenes
 from addon import native, overlay, verdict
-from test_panel import finished
+from test_panel import finished, monkey, suzanne
 from window import (
     centre,
     click,
@@ -159,12 +159,8 @@ def thin_sheets():
 
 def fine_monkey():
     """Open at the eyes, of 62,976 triangles."""
-    bpy.ops.mesh.primitive_monkey_add()
-    ob = bpy.context.object
-    ob.modifiers.new("subdivision", "SUBSURF").levels = 3
-    with bpy.context.temp_override(window=view()[0], area=view()[1], object=ob):
-        bpy.ops.object.modifier_apply(modifier="subdivision")
-    shown_as_magnitude(ob, 0.05)
+    monkey()
+    shown_as_magnitude(suzanne(), 0.05)
 
 
 def shown_as_magnitude(ob, percent):
