@@ -7,6 +7,9 @@
 // rounded once, so that the boxes can be float wherever the mesh lies; |x| <= 1 on the mesh. Boxes only decide what is
 // looked at; the distances themselves come from the scaled corners in double.
 //
+// A needle across the axes fills little of its box, and a search among many of them would look at most: where boxes
+// turned along the triangles are smaller by half, a node has these instead (reference/oriented_boxes).
+//
 // Margins. A box may be skipped only when none of its triangles can be within the bound, equality included (ties go to
 // the lower index). A local coordinate x has a relative error of at most 2^-53. Rounded to float and moved away
 // by 2.4e-7 |x| + 1e-37 (both the faces of the box and the two ends that stand for the point: 2^-24 for the rounding,
@@ -93,10 +96,11 @@ template void Hierarchy::box_distances(const Node&, const double (&)[3], const d
 struct Hierarchy::Build {
   Hierarchy& tree;
   std::vector<Key> keys;
-
   struct Range {
     std::uint32_t begin, end;
   };
+
+  std::vector<double> taken{};  // twice the area of the triangles sorted before a place: a rectangle around each
 
   /// Leaves the first of each set of triangles with exactly the same corners in the same order, and chains the others
   /// to it: a thousand copies would otherwise be a thousand ties to look at in every search.
@@ -158,6 +162,41 @@ struct Hierarchy::Build {
     return std::uint32_t(at - keys.begin());
   }
 
+  void sum_areas() {
+    taken.assign(1, 0);
+    for (std::size_t place = 0; place < tree.corners_.size(); ++place) {
+      poll_at(place);
+      const Corners& t = tree.corners_[place];
+      taken.push_back(taken.back() + glm::length(glm::cross(t[1] - t[0], t[2] - t[0])));
+    }
+  }
+
+  /// Gives the node, whose box is `whole`, oriented boxes where its boxes along the axes overlap or are empty for the
+  /// most part, and where oriented boxes are smaller by half.
+  void orient(std::uint32_t index, const FloatBox& whole, Range range, std::span<const Range> parts) {
+    constexpr double kLarge = 4, kSmaller = 0.5;
+    const auto half_area = [](double x, double y, double z) { return x * y + y * z + z * x; };
+    const double around =
+        half_area(whole.upper[0] - whole.lower[0], whole.upper[1] - whole.lower[1], whole.upper[2] - whole.lower[2]);
+    const Node& node = tree.nodes_[index];
+    double along_axes = 0;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      along_axes += half_area(node.upper[0][i] - node.lower[0][i], node.upper[1][i] - node.lower[1][i],
+                              node.upper[2][i] - node.lower[2][i]);
+    }
+    if (along_axes < kLarge * std::min(around, taken[range.end] - taken[range.begin])) return;
+    OrientedBoxes boxes;
+    double oriented = 0;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      const Corners* first = tree.corners_.data() + parts[i].begin;
+      oriented += boxes.fit(int(i), {first, parts[i].end - parts[i].begin}, tree.centre_);
+    }
+    if (oriented > kSmaller * along_axes) return;
+    tree.turned_.resize(tree.nodes_.size(), kNone);
+    tree.turned_[index] = std::uint32_t(tree.oriented_.size());
+    tree.oriented_.push_back(boxes);
+  }
+
   /// Makes the node of a range and those below it; returns its box. At most 95 deep, see walk_in.
   FloatBox make(Range range) {
     std::array<Range, kWidth> parts{range};
@@ -189,6 +228,7 @@ struct Hierarchy::Build {
       for (int k = 0; k < 3; ++k) node.lower[k][i] = box.lower[k], node.upper[k][i] = box.upper[k];
       whole.add(box);
     }
+    orient(std::uint32_t(index), whole, range, {parts.data(), std::size_t(count)});
     return whole;
   }
 };
@@ -235,7 +275,9 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh) {
     for (std::uint32_t i = index; i != kNone; i = twin(i)) place_[i] = place;
   }
   nodes_.reserve(build.keys.size() / 3 + 1);
+  build.sum_areas();
   build.make({0, std::uint32_t(build.keys.size())});
+  if (!turned_.empty()) turned_.resize(nodes_.size(), kNone);
 }
 
 glm::dvec3 Hierarchy::local(const glm::dvec3& p, bool& beyond_reach) const {

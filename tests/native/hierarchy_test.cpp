@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <thread>
 
@@ -80,6 +81,53 @@ TEST(Hierarchy, AgreesWithBruteForceBitForBit) {
     const Hierarchy::Nearest hinted = hierarchy.nearest(p, kInfinity, random.below(1500));
     ASSERT_EQ(hinted.triangle, expected.triangle);
     ASSERT_EQ(hinted.distance, expected.distance);
+  }
+}
+
+/// Needles from the middle to a rim whose points lie at two heights, or between two lines; turned out of the axes.
+TriangleMesh needles(unsigned count, bool around_a_point) {
+  const dvec3 x = glm::normalize(dvec3(0.6, 0.5, 0.4)), y = glm::normalize(glm::cross(x, {0.1, 0.2, 0.9}));
+  const dvec3 z = glm::cross(x, y);
+  TriangleMesh mesh;
+  for (unsigned i = 0; i < count; ++i) {
+    const double part = double(i) / count, angle = 2 * std::numbers::pi * part;
+    mesh.vertices.push_back(around_a_point ? std::cos(angle) * x + std::sin(angle) * y + 0.1 * (i % 2) * z : part * x);
+  }
+  mesh.vertices.push_back(around_a_point ? dvec3(0) : y);
+  for (unsigned i = 0; i < count; ++i) mesh.triangles.push_back({count, i, (i + 1) % count});
+  return mesh;
+}
+
+TEST(Hierarchy, AgreesWithBruteForceAmongNeedles) {
+  for (const bool around_a_point : {true, false}) {
+    const TriangleMesh mesh = needles(700, around_a_point);
+    const Hierarchy hierarchy(mesh);
+    Random random(20);
+    for (int i = 0; i < 1000; ++i) {
+      const double off = std::array{0.0, 1e-6, 1e-2, 1.0, 1e5}[i % 5];
+      const dvec3 p = mesh.vertices[random.below(701)] * (i % 7 / 6.0) + off * random.point();
+      const Hierarchy::Nearest expected = brute(mesh, p, kInfinity, all), found = hierarchy.nearest(p);
+      ASSERT_EQ(found.triangle, expected.triangle) << i;
+      ASSERT_EQ(found.distance, expected.distance);
+      ASSERT_EQ(hierarchy.nearest(p, expected.distance).triangle, expected.triangle);
+    }
+  }
+}
+
+// Boxes along the axes around needles in all directions overlap so much that a search looks at a third of them.
+TEST(Hierarchy, LooksAtFewOfManyNeedles) {
+  for (const bool around_a_point : {true, false}) {
+    const TriangleMesh mesh = needles(20000, around_a_point);
+    const Hierarchy hierarchy(mesh);
+    Random random(21);
+    std::size_t looked_at = 0;
+    for (int i = 0; i < 500; ++i) {
+      const glm::uvec3& t = mesh.triangles[random.below(20000)];
+      const dvec3 p = 0.3 * mesh.vertices[t.x] + 0.4 * mesh.vertices[t.y] + 0.3 * mesh.vertices[t.z];
+      hierarchy.near(p, 1e-5, [&](std::uint32_t) { ++looked_at; });
+      hierarchy.nearest_if(p, [&](std::uint32_t) { return ++looked_at > 0; });
+    }
+    EXPECT_LT(looked_at, 500u * 30) << around_a_point;
   }
 }
 
