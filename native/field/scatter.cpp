@@ -2,8 +2,9 @@
 // Based on the initial band of [Botsch04, §2]: each triangle writes exact distances to the nodes of its enlarged box,
 // the smallest stays. Here the box is enlarged by the whole band, so that no marching is needed and every value is
 // exact, and nodes are taken eight along x at once. Of a small triangle nearly all nodes in the band have a nearer one:
-// eight of them are passed over where a ball around it is too far to be nearest. Of a large triangle the runs of nodes
-// that its box or its plane keep out of the band are skipped.
+// eight of them are passed over where a ball around it is too far to be nearest. Of a large triangle only those nodes
+// of a row are looked at that are near its plane and near the part of it beside the row: the box of a needle across the
+// axes is nearly empty.
 #include "field/scatter.h"
 
 #include <algorithm>
@@ -22,12 +23,14 @@ constexpr int kLanes = DistanceGrid::kLanes;
 constexpr int kWide = 3 * kLanes;            // nodes: a longer row of a triangle's box is cut to what is in the band
 constexpr std::size_t kBetweenPolls = 1024;  // rows of nodes, and triangles
 constexpr double kSlack = 1e-5;              // of a distance: float32 rounds it by less
+constexpr double kBeyond = 1.001;            // bands: what is skipped of a row is farther than that
 using Floats = float __attribute__((vector_size(4 * kLanes)));
 using Masks = std::int32_t __attribute__((vector_size(4 * kLanes)));
 
 /// A triangle prepared for many nodes; everything relative to corner a.
 struct Prepared {
   glm::dvec3 a;
+  std::array<glm::dvec3, 3> corner;
   Box box;
   glm::vec3 ab, ac, bc;
   glm::vec3 gs, gt;  ///< gradients of the barycentric coordinates of b and c
@@ -52,13 +55,14 @@ Prepared prepare(const TriangleMesh& mesh, std::uint32_t id, double band) {
   r.radius = static_cast<float>(radius + kSlack * (band + radius));
   const glm::dvec3 ab = b - a, ac = c - a, bc = c - b, n = glm::cross(ab, ac);
   const double nn = glm::dot(n, n), ab2 = glm::dot(ab, ab), ac2 = glm::dot(ac, ac);
+  r.corner = {glm::dvec3(0), ab, ac};
   r.ab = ab, r.ac = ac, r.bc = bc;
   r.inverse_ab = safe_inverse(ab2), r.inverse_ac = safe_inverse(ac2), r.inverse_bc = safe_inverse(glm::dot(bc, bc));
   // A needle whose height float32 cannot hold is left to its edges: their distances are never too small.
   constexpr double kThinnestSine = 1e-4;
   if (nn > kThinnestSine * kThinnestSine * ab2 * ac2 && nn > 0) {
     r.gs = glm::cross(ac, n) / nn, r.gt = glm::cross(n, ab) / nn, r.normal = n / std::sqrt(nn);
-    r.slab = static_cast<float>(band * 1.001);
+    r.slab = static_cast<float>(band * kBeyond);
   } else {
     r.gs = r.gt = glm::vec3(std::numeric_limits<float>::quiet_NaN()),
     r.normal = glm::vec3(0);  // never compares as inside
@@ -86,6 +90,23 @@ TOLVOL_INLINE Floats edge_distance(Floats x, float y, float z, const glm::vec3& 
   return dx * dx + dy * dy + dz * dz;
 }
 
+/// The box of the part of the triangle whose coordinate k differs from `at` by no more than `reach`.
+TOLVOL_INLINE Box part_beside(const Prepared& t, int k, double at, double reach) {
+  Box part;
+  for (int i = 0; i < 3; ++i) {
+    const glm::dvec3 &p = t.corner[i], along = t.corner[(i + 1) % 3] - p;
+    double begin = 0, end = 1;
+    if (along[k] != 0) {
+      const double u = (at - reach - p[k]) / along[k], v = (at + reach - p[k]) / along[k];
+      begin = std::max(begin, std::min(u, v)), end = std::min(end, std::max(u, v));
+    } else if (std::abs(p[k] - at) > reach) {
+      continue;
+    }
+    if (begin <= end) part.add(p + along * begin), part.add(p + along * end);
+  }
+  return part;
+}
+
 /// One triangle over the nodes of its box in rows z0 <= z < z1.
 TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid, int z0, int z1) {
   const double h = grid.spacing;
@@ -104,11 +125,21 @@ TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid
 
   const glm::vec3 lower = t.box.lower - t.a, upper = t.box.upper - t.a;
   const glm::vec3 first = grid.origin - t.a;
+  const double reach = kBeyond * grid.band;
+  const bool is_wide = std::max(box_end - box_begin, yend - ybegin) >= kWide;
   std::size_t rows = 0;
   for (int z = zbegin; z <= zend; ++z) {
     const float pz = first.z + static_cast<float>(z) * hf;
     const float bz = std::max({0.0f, lower.z - pz, pz - upper.z});
-    for (int y = ybegin; y <= yend; ++y) {
+    Box layer;
+    int y = ybegin, ylast = yend;
+    if (is_wide) {
+      layer = part_beside(t, 2, pz, reach);
+      if (layer.empty()) continue;
+      y = std::max(y, static_cast<int>(std::floor((layer.lower.y - reach - first.y) / h)));
+      ylast = std::min(ylast, static_cast<int>(std::ceil((layer.upper.y + reach - first.y) / h)));
+    }
+    for (; y <= ylast; ++y) {
       if (++rows % kBetweenPolls == 0) poll();
       const float py = first.y + static_cast<float>(y) * hf;
       const float by = std::max({0.0f, lower.y - py, py - upper.y});
@@ -117,8 +148,11 @@ TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid
       const float plane = t.normal.y * py + t.normal.z * pz;
       int xbegin = box_begin, xend = box_end;
       if (xend - xbegin >= kWide) {
+        const Box part = part_beside(t, 1, py, reach);
+        if (part.empty()) continue;
         const float half = std::sqrt(room);
-        float xlow = lower.x - half, xhigh = upper.x + half;
+        float xlow = static_cast<float>(std::max(layer.lower.x, part.lower.x)) - half,
+              xhigh = static_cast<float>(std::min(layer.upper.x, part.upper.x)) + half;
         if (std::abs(t.normal.x) > 1e-3f) {
           const float middle = -plane / t.normal.x, reach = t.slab / std::abs(t.normal.x);
           xlow = std::max(xlow, middle - reach), xhigh = std::min(xhigh, middle + reach);
