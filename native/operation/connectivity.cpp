@@ -87,4 +87,60 @@ void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, std::s
   require_manifold(seen == sides);
 }
 
+void collapse(OpenMesh::TriConnectivity& mesh, OpenMesh::HalfedgeHandle h) {
+  using OpenMesh::HalfedgeHandle;
+  const HalfedgeHandle o = mesh.opposite_halfedge_handle(h);
+  const HalfedgeHandle hn = mesh.next_halfedge_handle(h), hp = mesh.prev_halfedge_handle(h);
+  const HalfedgeHandle on = mesh.next_halfedge_handle(o), op = mesh.prev_halfedge_handle(o);
+  const auto kept = mesh.to_vertex_handle(h), gone = mesh.from_vertex_handle(h);
+  const auto left = mesh.to_vertex_handle(hn), right = mesh.to_vertex_handle(on);
+  const bool has_left = mesh.face_handle(h).is_valid(), has_right = mesh.face_handle(o).is_valid();
+
+  // A vertex on the boundary names the one boundary halfedge that leaves it; any other names the one that the kernel's
+  // own collapse ends with.
+  const auto on_boundary = [&](auto vertex) { return mesh.is_boundary(mesh.halfedge_handle(vertex)); };
+  HalfedgeHandle out = on_boundary(kept)   ? mesh.halfedge_handle(kept)
+                       : on_boundary(gone) ? mesh.halfedge_handle(gone)
+                                           : mesh.opposite_halfedge_handle(op);
+  if (out == o) out = on;
+  if (has_left && out == mesh.opposite_halfedge_handle(hp)) out = hn;
+  if (has_left && !on_boundary(left)) mesh.set_halfedge_handle(left, mesh.opposite_halfedge_handle(hn));
+  if (has_right && (!on_boundary(right) || mesh.halfedge_handle(right) == mesh.opposite_halfedge_handle(on))) {
+    mesh.set_halfedge_handle(right, op);
+  }
+
+  HalfedgeHandle leaving = h;
+  do {
+    const HalfedgeHandle arriving = mesh.opposite_halfedge_handle(leaving);
+    mesh.set_vertex_handle(arriving, kept);
+    leaving = mesh.next_halfedge_handle(arriving);
+  } while (leaving != h);
+  mesh.set_next_halfedge_handle(hp, hn);
+  mesh.set_next_halfedge_handle(op, on);
+  const auto remove_edge = [&](HalfedgeHandle side) {
+    for (const HalfedgeHandle s : {side, mesh.opposite_halfedge_handle(side)}) mesh.status(s).set_deleted(true);
+    mesh.status(mesh.edge_handle(side)).set_deleted(true);
+  };
+  remove_edge(h);
+  mesh.set_isolated(gone);
+  mesh.status(gone).set_deleted(true);
+
+  // What is left of a triangle beside the edge are two sides between the same vertices: one of these edges goes.
+  const auto remove_triangle = [&](HalfedgeHandle goes, HalfedgeHandle stays) {
+    const auto triangle = mesh.face_handle(goes);
+    const HalfedgeHandle beyond = mesh.opposite_halfedge_handle(goes);
+    const auto other = mesh.face_handle(beyond);
+    mesh.set_next_halfedge_handle(stays, mesh.next_halfedge_handle(beyond));
+    mesh.set_next_halfedge_handle(mesh.prev_halfedge_handle(beyond), stays);
+    mesh.set_face_handle(stays, other);
+    if (other.is_valid() && mesh.halfedge_handle(other) == beyond) mesh.set_halfedge_handle(other, stays);
+    mesh.set_halfedge_handle(triangle, HalfedgeHandle());
+    mesh.status(triangle).set_deleted(true);
+    remove_edge(goes);
+  };
+  if (has_left) remove_triangle(hp, hn);
+  if (has_right) remove_triangle(on, op);
+  mesh.set_halfedge_handle(kept, out);
+}
+
 }  // namespace tolvol

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// OpenMesh's connectivity of all triangles of a mesh at once.
+/// OpenMesh's connectivity of all triangles of a mesh at once, and the collapse of an edge in it.
 #pragma once
 
 #include <OpenMesh/Core/Mesh/TriConnectivity.hh>
@@ -18,5 +18,9 @@ namespace tolvol {
 /// not one fan. O(n + m).
 void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, std::span<const std::uint32_t> mates,
              OpenMesh::TriConnectivity& mesh, Team& team);
+
+/// The same, down to every index, as mesh.collapse(h), without a walk around the vertex that stays: O(faces around the
+/// vertex that vanishes, the start of `h`). `mesh` has the status of everything, and mesh.is_collapse_ok(h) holds.
+void collapse(OpenMesh::TriConnectivity& mesh, OpenMesh::HalfedgeHandle h);
 
 }  // namespace tolvol

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <random>
 #include <stdexcept>
 #include <vector>
@@ -90,6 +91,43 @@ TEST(Connectivity, TrianglesInAnyOrderAndRaggedHoles) {
     expect_same(one_by_one(cut.vertex_input.size(), cut.triangles),
                 at_once(cut.vertex_input.size(), cut.triangles, cut.mates));
   }
+}
+
+// Until nothing is left to collapse, in any order: boundaries shrink to triangles, and bodies to tetrahedra.
+TEST(Connectivity, CollapsesAsTheKernelDoes) {
+  int collapses = 0;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    TriangleMesh mesh = seed % 3 == 0 ? shapes::torus(8) : seed % 3 == 1 ? shapes::grid(9) : shapes::box(4);
+    std::mt19937 engine(seed);
+    std::shuffle(mesh.triangles.begin(), mesh.triangles.end(), engine);
+    mesh.triangles.resize(mesh.triangles.size() * (2 + seed % 2) / 3);
+    Team team(1);
+    const CutMesh cut = cut_to_manifold(mesh.vertices, mesh.triangles, team);
+    TriConnectivity ours = at_once(cut.vertex_input.size(), cut.triangles, cut.mates);
+    ours.request_vertex_status(), ours.request_edge_status(), ours.request_face_status();
+    ours.request_halfedge_status();
+    TriConnectivity kernel = ours;
+    std::vector<int> order(ours.n_halfedges());
+    std::iota(order.begin(), order.end(), 0);
+    for (bool changed = true; changed;) {
+      changed = false;
+      std::shuffle(order.begin(), order.end(), engine);
+      for (const int i : order) {
+        const OpenMesh::HalfedgeHandle h(i);
+        if (kernel.status(kernel.edge_handle(h)).deleted() || !kernel.is_collapse_ok(h)) continue;
+        kernel.collapse(h);
+        collapse(ours, h);
+        ASSERT_NO_FATAL_FAILURE(expect_same(kernel, ours)) << "seed " << seed << ", halfedge " << i;
+        ++collapses;
+        changed = true;
+      }
+    }
+    for (const auto e : kernel.all_edges()) ASSERT_EQ(kernel.status(e).deleted(), ours.status(e).deleted());
+    for (const auto f : kernel.all_faces()) ASSERT_EQ(kernel.status(f).deleted(), ours.status(f).deleted());
+    for (const auto v : kernel.all_vertices()) ASSERT_EQ(kernel.status(v).deleted(), ours.status(v).deleted());
+    for (const auto h : kernel.all_halfedges()) ASSERT_EQ(kernel.status(h).deleted(), ours.status(h).deleted());
+  }
+  EXPECT_GT(collapses, 1000);
 }
 
 TEST(Connectivity, RefusesWhatIsNoOrientedManifold) {
