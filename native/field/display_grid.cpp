@@ -39,7 +39,10 @@ DisplayGrid::DisplayGrid(const TriangleMesh& reference, bool mirrored, double to
   grid.is_signed = true;
   const bool turned = closed ? enclosed_volume(reference) < 0 : mirrored;
   const float to_spacings = static_cast<float>((turned ? -1 : 1) / grid.spacing);
-  for (float& d : grid.distance) d *= to_spacings;
+  for (std::size_t i = 0; i < grid.distance.size(); ++i) {
+    poll_at(i);
+    grid.distance[i] *= to_spacings;
+  }
 }
 
 }  // namespace tolvol

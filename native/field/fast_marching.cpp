@@ -37,7 +37,7 @@ class Front {
         normals_(normals),
         grid_(grid),
         known_(known),
-        origin_(grid.triangle),
+        origin_(copied(grid.triangle)),
         strides_{1, grid.index(0, 1, 0), grid.index(0, 0, 1)} {
     for (int z = 0; z < grid.nodes.z; ++z) {
       for (int y = 0; y < grid.nodes.y; ++y) {
@@ -151,17 +151,20 @@ void fast_marching(const TriangleMesh& reference, DistanceGrid& grid, double sto
   grid.is_signed = true;
 
   if (progress) progress->begin("marching");
-  std::vector<std::uint8_t> known(grid.distance.size());
+  std::vector<std::uint8_t> known;
+  fill(known, grid.distance.size(), std::uint8_t{0});
   const float far = static_cast<float>(band);
   for (std::size_t i = 0; i < known.size(); ++i) {
+    poll_at(i);
     known[i] = grid.triangle[i] != DistanceGrid::kNone;
     if (!known[i]) grid.distance[i] = far;
   }
   Front(reference, normals, grid, known).march(stop, progress);
   for (std::size_t i = 0; i < known.size(); ++i) {
+    poll_at(i);
     if (!known[i]) grid.distance[i] = far;  // what the front had only touched
   }
-  spread_signs(grid, known, grid.distance);
+  spread_signs(grid, std::move(known), grid.distance);
 }
 
 }  // namespace tolvol

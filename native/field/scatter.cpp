@@ -220,7 +220,10 @@ TOLVOL_TARGET_AVX2 void splat_avx2(const TriangleMesh& mesh, DistanceGrid& grid,
 std::vector<int> slab_bounds(const TriangleMesh& mesh, const DistanceGrid& grid, unsigned slabs) {
   std::vector<int> bounds{0};
   std::vector<double> heights(mesh.triangles.size());
-  for (std::size_t i = 0; i < heights.size(); ++i) heights[i] = mesh.vertices[mesh.triangles[i].x].z;
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    poll_at(i);
+    heights[i] = mesh.vertices[mesh.triangles[i].x].z;
+  }
   auto begin = heights.begin();
   for (unsigned i = 1; i < slabs; ++i) {
     const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() * i / slabs);
@@ -239,10 +242,8 @@ std::vector<int> slab_bounds(const TriangleMesh& mesh, const DistanceGrid& grid,
 void scatter(const TriangleMesh& reference, DistanceGrid& grid, unsigned threads, Progress* progress) {
   if (progress) progress->begin("measuring distances");
   const std::size_t size = static_cast<std::size_t>(grid.pitch) * grid.nodes.y * grid.nodes.z;
-  poll();
-  grid.distance.assign(size, static_cast<float>(grid.band));
-  poll();
-  grid.triangle.assign(size, DistanceGrid::kNone);
+  fill(grid.distance, size, static_cast<float>(grid.band));
+  fill(grid.triangle, size, DistanceGrid::kNone);
   const auto kernel = simd_path() == Simd::avx2 ? splat_avx2 : splat_baseline;
   const std::vector<int> bounds = slab_bounds(reference, grid, thread_count(threads));
   parallel_for(bounds.size() - 1, 1, threads, [&](std::size_t slab, std::size_t) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "reference/call.h"
 #include "reference/parallel.h"
@@ -28,8 +29,7 @@ void sign_by_triangle(const TriangleMesh& reference, const Pseudonormals& normal
   });
 }
 
-void spread_signs(const DistanceGrid& grid, std::span<const std::uint8_t> known, std::span<float> distance) {
-  std::vector<std::uint8_t> reached(known.begin(), known.end());
+void spread_signs(const DistanceGrid& grid, std::vector<std::uint8_t> known, std::span<float> distance) {
   const std::size_t strides[] = {1, grid.index(0, 1, 0), grid.index(0, 0, 1)};
   // Sweeps towards +x, +y, +z and back: what is ahead of a known node is reached by the first, the rest by the second.
   for (const bool back : {false, true}) {
@@ -39,14 +39,14 @@ void spread_signs(const DistanceGrid& grid, std::span<const std::uint8_t> known,
         poll();
         for (int i = 0; i < grid.nodes.x; ++i) {
           const std::size_t node = grid.index(at(i, grid.nodes.x), at(j, grid.nodes.y), at(k, grid.nodes.z));
-          if (reached[node]) continue;
+          if (known[node]) continue;
           const bool has_before[] = {i > 0, j > 0, k > 0};
-          for (int axis = 0; axis < 3 && !reached[node]; ++axis) {
+          for (int axis = 0; axis < 3 && !known[node]; ++axis) {
             if (!has_before[axis]) continue;
             const std::size_t before = back ? node + strides[axis] : node - strides[axis];
-            if (!reached[before]) continue;
+            if (!known[before]) continue;
             distance[node] = std::copysign(distance[node], distance[before]);
-            reached[node] = 1;
+            known[node] = 1;
           }
         }
       }
@@ -55,19 +55,21 @@ void spread_signs(const DistanceGrid& grid, std::span<const std::uint8_t> known,
 }
 
 std::vector<float> signed_distance(const TriangleMesh& reference, const DistanceGrid& grid, unsigned threads) {
-  return grid.is_signed ? grid.distance : signed_distance(reference, Pseudonormals(reference), grid, threads);
+  return grid.is_signed ? copied(grid.distance) : signed_distance(reference, Pseudonormals(reference), grid, threads);
 }
 
 std::vector<float> signed_distance(const TriangleMesh& reference, const Pseudonormals& normals,
                                    const DistanceGrid& grid, unsigned threads) {
-  poll();
-  std::vector<float> result = grid.distance;
+  std::vector<float> result = copied(grid.distance);
   if (grid.is_signed) return result;
   sign_by_triangle(reference, normals, grid, result, threads);
-  std::vector<std::uint8_t> known(grid.triangle.size());
-  std::transform(grid.triangle.begin(), grid.triangle.end(), known.begin(),
-                 [](std::uint32_t id) { return id != DistanceGrid::kNone; });
-  spread_signs(grid, known, result);
+  std::vector<std::uint8_t> known;
+  fill(known, grid.triangle.size(), std::uint8_t{0});
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    poll_at(i);
+    known[i] = grid.triangle[i] != DistanceGrid::kNone;
+  }
+  spread_signs(grid, std::move(known), result);
   return result;
 }
 

@@ -27,6 +27,6 @@ void sign_by_triangle(const TriangleMesh& reference, const Pseudonormals& normal
 
 /// Gives every node for which `known` is zero the sign of a known one, in two sweeps over the grid: the right one as
 /// long as no two nodes beside each other, one of them unknown, have the surface between them.
-void spread_signs(const DistanceGrid& grid, std::span<const std::uint8_t> known, std::span<float> distance);
+void spread_signs(const DistanceGrid& grid, std::vector<std::uint8_t> known, std::span<float> distance);
 
 }  // namespace tolvol

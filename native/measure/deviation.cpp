@@ -248,7 +248,9 @@ class Cover {
     poll();
     Sum gap;
     double largest = 0;
-    for (const Piece& piece : pieces_) {
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      poll_at(i);
+      const Piece& piece = pieces_[i];
       gap.add(piece.gap());
       largest = std::max(largest, piece.distance);
     }
@@ -258,6 +260,7 @@ class Cover {
     // Those above the average that is wanted, the worst first where there is no room for all.
     std::vector<std::size_t> worst;
     for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      poll_at(i);
       if (pieces_[i].gap() * double(pieces_.size()) > enough) worst.push_back(i);
     }
     if (worst.size() > room) {
@@ -273,13 +276,21 @@ class Cover {
     std::vector<Piece> parts;
     for (const std::size_t i : worst) {
       const std::size_t before = parts.size();
+      poll_at(before);
       halve(pieces_[i], [&](const Simplex& part) { parts.push_back({part, measure_of(part), {}, 0, false}); });
       if (parts.size() > before) pieces_[i].weight = -1;
     }
     poll();
-    std::erase_if(pieces_, [](const Piece& piece) { return piece.weight < 0; });
+    std::size_t seen = 0;
+    std::erase_if(pieces_, [&](const Piece& piece) {
+      poll_at(++seen);
+      return piece.weight < 0;
+    });
     const std::size_t first = pieces_.size();
-    pieces_.insert(pieces_.end(), parts.begin(), parts.end());
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      poll_at(i);
+      pieces_.push_back(parts[i]);
+    }
     evaluate(first);
     return !parts.empty();
   }
@@ -405,6 +416,7 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
     }
   }
   for (const Piece& piece : pieces) {
+    poll_at(result.distances.size());
     result.distances.push_back(piece.signed_distance() / scale);
     result.weights.push_back(piece.weight / whole);
   }

@@ -82,7 +82,8 @@ Image Canvas::draw(const Resolution& r, int tile, const std::function<void(const
     if (progress) progress->update(static_cast<double>(i) / (tiles.x * tiles.y));
     const glm::ivec2 from = glm::ivec2(i % tiles.x, i / tiles.x) * side, count = glm::min(side, r.size - from);
     std::vector<std::uint8_t> drawn;
-    gl::run([&] {
+    gl::run([&, asked = Call::current()] {
+      const Call::Within within(asked);  // polls of the thread that draws are for this call
       if (tile_ != side * r.samples) {
         tile_ = glm::ivec2(0);
         framebuffer_ = gl::Framebuffer::with_colour(side.x * r.samples, side.y * r.samples);
@@ -91,7 +92,10 @@ Image Canvas::draw(const Resolution& r, int tile, const std::function<void(const
       framebuffer_.bind();
       const glm::ivec2 first = from * r.samples;
       glViewport(-first.x, -first.y, r.size.x * r.samples, r.size.y * r.samples);
+      // A tile that was cancelled left any of these set.
       glDisable(GL_BLEND);
+      glDisable(GL_POLYGON_OFFSET_LINE);
+      glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
       glDepthMask(GL_TRUE);
       glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
       glClearColor(0, 0, 0, 0);

@@ -3,9 +3,12 @@
 /// nothing, poll. Threads of a Team poll for the call they work for.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <functional>
 #include <thread>
+#include <vector>
 
 #include "reference/progress.h"
 
@@ -58,6 +61,34 @@ inline void poll() {
 /// For loops whose turns are too short for that: polls at every 4096th.
 inline void poll_at(std::size_t turn) {
   if (turn % 4096 == 0) poll();
+}
+
+/// Elements of a long array that are written between two polls: the system, too, takes its time to provide the memory.
+inline constexpr std::size_t kFilledAtOnce = std::size_t{1} << 20;
+
+/// As values.assign(count, value), with polls in between.
+template <class Value>
+void fill(std::vector<Value>& values, std::size_t count, const Value& value) {
+  values.clear();
+  values.reserve(count);
+  while (values.size() < count) {
+    poll();
+    values.resize(std::min(count, values.size() + kFilledAtOnce), value);
+  }
+}
+
+/// A copy of values, with polls in between.
+template <class Value>
+std::vector<Value> copied(const std::vector<Value>& values) {
+  std::vector<Value> copy;
+  copy.reserve(values.size());
+  while (copy.size() < values.size()) {
+    poll();
+    const auto from = values.begin() + static_cast<std::ptrdiff_t>(copy.size());
+    copy.insert(copy.end(), from,
+                from + static_cast<std::ptrdiff_t>(std::min(kFilledAtOnce, values.size() - copy.size())));
+  }
+  return copy;
 }
 
 }  // namespace tolvol
