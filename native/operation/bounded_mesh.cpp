@@ -178,7 +178,7 @@ void BoundedMesh::apply(Change& change) {
       if (!shares_.empty()) shares_[kept] = std::min(shares_[kept], shares_[merged]);
       faces_around_[kept].fetch_add(faces_around_[merged].exchange(0, std::memory_order_relaxed),
                                     std::memory_order_relaxed);
-      mesh_.collapse(h);
+      collapse(mesh_, h);
     }
   }
   place(v, change.spot_);
