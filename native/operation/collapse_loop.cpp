@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A rejected edge waits until its two-ring changes. Around a vertex with many faces every collapse would call back all
 // its edges, each try as costly as there are faces, which makes the cube of their number: there the edges wait until
-// an eighth of the faces has gone, and of those that come back only some are tried.
+// an eighth of the faces has gone, and of those that come back only some are tried. Around a vertex with a great many
+// faces, a collapse calls back no more than what is near the vertex that vanished, and the costs of the other edges,
+// which only rise while it stays where it is, are renewed when their turn comes.
 #include "operation/collapse_loop.h"
 
 #include <algorithm>
@@ -18,6 +20,7 @@ namespace {
 constexpr std::size_t kTrianglesPerAttempt = 12, kMostAttempts = 64;
 constexpr std::uint32_t kCrowded = 24;           // faces around a vertex: with more, tries are rationed,
 constexpr std::uint64_t kCrowdBudget = 1 << 15;  // to so many faces and parts of the reference's pieces looked at
+constexpr std::uint32_t kGreatMany = 512;        // faces around a vertex: with more, costs are renewed late
 
 }  // namespace
 
@@ -106,9 +109,21 @@ void CollapseLoop::run(const Until& until, Progress* progress) {
       shared_.refused[entry->edge].store(true, std::memory_order_relaxed);
       continue;
     }
+    if (const auto later = risen(*entry)) {
+      add(entry->edge, *later);
+      continue;
+    }
     Tried* const tried = found(entry->edge);
     carry_out(tried ? *tried : try_ahead(entry->edge));
   }
+}
+
+/// The cost of an edge that was not renewed when it rose.
+std::optional<double> CollapseLoop::risen(const CollapseQueue::Entry& entry) const {
+  const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(entry.edge), 0);
+  if (std::max(mesh_.faces_around(mesh_.from(h)), mesh_.faces_around(mesh_.to(h))) <= kGreatMany) return std::nullopt;
+  const double cost = collapse_.cost(entry.edge);
+  return cost > entry.cost ? std::optional(cost) : std::nullopt;
 }
 
 /// What was found for the edge, if that still holds.
@@ -204,8 +219,19 @@ void CollapseLoop::carry_out(Tried& tried) {
   const std::uint32_t edge = tried.edge;
   if (tried.outcome == EdgeCollapse::Outcome::possible) {
     if (later_) later_->note(tried.attempt->change);
+    const auto h = tried.attempt->halfedge;
+    const glm::dvec3 before = mesh_.position(mesh_.to(h));
+    ring_.clear();
+    for (const auto near : mesh_.connectivity().vv_range(BoundedMesh::handle(mesh_.from(h)))) {
+      ring_.push_back(static_cast<std::uint32_t>(near.idx()));
+    }
     const std::uint32_t kept = collapse_.carry_out(*tried.attempt);
-    for (const std::uint32_t copy : mesh_.copies(kept)) renew_around(copy);
+    const bool stayed = mesh_.position(kept) == before && !mesh_.joined(kept);
+    if (stayed && mesh_.faces_around(kept) > kGreatMany) {
+      renew_ring(kept);
+    } else {
+      for (const std::uint32_t copy : mesh_.copies(kept)) renew_around(copy);
+    }
     give_back(std::move(tried.attempt));
   } else if (tried.outcome == EdgeCollapse::Outcome::refused) {
     note_refusal(tried);
@@ -214,29 +240,49 @@ void CollapseLoop::carry_out(Tried& tried) {
   tried.edge = kNoEdge;
 }
 
+void CollapseLoop::touch(std::uint32_t vertex) {
+  if (team_) touched_[vertex] = clock_;
+}
+
+void CollapseLoop::renew(std::uint32_t edge) {
+  if (own(edge)) add(edge, collapse_.cost(edge));
+}
+
 /// After a collapse: the costs that it changes, and the edges that may now be possible.
 void CollapseLoop::renew_around(std::uint32_t vertex) {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
   const auto v = BoundedMesh::handle(vertex);
   ++clock_;
-  const auto touch = [&](std::uint32_t i) {
-    if (team_) touched_[i] = clock_;
-  };
-  const auto renew = [&](std::uint32_t e) {
-    if (own(e)) add(e, collapse_.cost(e));
-  };
   touch(vertex);
   for (const auto e : connectivity.ve_range(v)) renew(static_cast<std::uint32_t>(e.idx()));
-  for (const auto near : connectivity.vv_range(v)) {
-    touch(static_cast<std::uint32_t>(near.idx()));
-    if (!crowds_.empty() && !ready(static_cast<std::uint32_t>(near.idx()))) continue;
-    for (const auto e : connectivity.ve_range(near)) {
-      // At a rim it may be another region's too.
-      std::atomic<bool>& refused = shared_.refused[static_cast<std::size_t>(e.idx())];
-      if (!refused.load(std::memory_order_relaxed)) continue;
-      refused.store(false, std::memory_order_relaxed);
-      renew(static_cast<std::uint32_t>(e.idx()));
+  for (const auto near : connectivity.vv_range(v)) call_back(static_cast<std::uint32_t>(near.idx()));
+}
+
+/// The same near the vertex that vanished alone, whose neighbours are in ring_: `vertex` stayed where it was.
+void CollapseLoop::renew_ring(std::uint32_t vertex) {
+  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
+  ++clock_;
+  touch(vertex);
+  for (const std::uint32_t near : ring_) {
+    if (near == vertex) continue;
+    for (const auto h : connectivity.voh_range(BoundedMesh::handle(near))) {
+      if (mesh_.to(h) == vertex) renew(static_cast<std::uint32_t>(connectivity.edge_handle(h).idx()));
     }
+    call_back(near);
+  }
+}
+
+/// Edges of the vertex that were refused may now be possible. Those of a vertex with a great many faces are called back
+/// from their other ends.
+void CollapseLoop::call_back(std::uint32_t vertex) {
+  touch(vertex);
+  if (mesh_.faces_around(vertex) > kGreatMany || (!crowds_.empty() && !ready(vertex))) return;
+  for (const auto e : mesh_.connectivity().ve_range(BoundedMesh::handle(vertex))) {
+    // At a rim it may be another region's too.
+    std::atomic<bool>& refused = shared_.refused[static_cast<std::size_t>(e.idx())];
+    if (!refused.load(std::memory_order_relaxed)) continue;
+    refused.store(false, std::memory_order_relaxed);
+    renew(static_cast<std::uint32_t>(e.idx()));
   }
 }
 

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -80,7 +81,12 @@ class CollapseLoop {
   void carry_out(Tried& tried);
   std::unique_ptr<Attempt> take_attempt();
   void give_back(std::unique_ptr<Attempt> attempt);
+  std::optional<double> risen(const CollapseQueue::Entry& entry) const;
+  void touch(std::uint32_t vertex);
+  void renew(std::uint32_t edge);
   void renew_around(std::uint32_t vertex);
+  void renew_ring(std::uint32_t vertex);
+  void call_back(std::uint32_t vertex);
 
   Shared& shared_;
   EdgeCollapse& collapse_;
@@ -98,6 +104,7 @@ class CollapseLoop {
   std::vector<std::uint32_t> reserved_;    ///< and the last batch of tries in which one could change before its turn
   std::vector<std::uint32_t> surrounded_;  ///< and the last one in which its neighbours were noted so
   std::uint32_t batches_ = 0;              ///< of tries, so far
+  std::vector<std::uint32_t> ring_;        ///< neighbours of the vertex that vanished last
   /// By vertex, of those with many faces around them where a try was refused.
   std::unordered_map<std::uint32_t, Crowd> crowds_;
   /// Kept for their memory; the last given back is taken first, while it is in the cache.
