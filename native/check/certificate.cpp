@@ -119,7 +119,9 @@ bool TriangleCertificate::shows_outside(const glm::dvec3 (&corners)[3]) const {
   for (int i = 0; i < n; ++i) {
     for (int j = i == 0; i + j <= n && j < n; ++j) {  // all but the corners
       const glm::dvec3 p = a + static_cast<double>(i) * u + static_cast<double>(j) * v;
-      if (!(distance_bound(p) <= within_) && hierarchy_->nearest(p, within_).triangle == Hierarchy::kNone) return true;
+      // Any triangle within the bound will do.
+      if (!(distance_bound(p) <= within_) && hierarchy_->common({&p, 1}, within_, within_).triangle == Hierarchy::kNone)
+        return true;
     }
   }
   return false;
