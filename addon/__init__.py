@@ -18,9 +18,9 @@ for _name in [name for name in sys.modules if name.startswith(__name__ + ".")]:
     del sys.modules[_name]
     globals().pop(_name.removeprefix(__name__ + "."), None)
 
-from . import guard, job, native, operators, overlay, panels, preferences, properties, volume  # noqa: E402
+from . import guard, job, native, operators, overlay, panels, preferences, properties, reference  # noqa: E402
 
-_PARTS = (preferences, properties, volume, job, operators, guard, overlay, panels)
+_PARTS = (preferences, properties, reference, job, operators, guard, overlay, panels)
 
 
 def register():

@@ -5,7 +5,8 @@ import bpy
 import gpu
 from bpy.props import BoolProperty, FloatProperty, IntProperty
 
-from . import native, volume
+from . import native
+from .reference import snapshots
 
 # Percent of the size, where nobody chose anything else.
 TOLERANCE = 0.5
@@ -29,7 +30,7 @@ class TOLVOL_AP_preferences(bpy.types.AddonPreferences):
         description="The tolerance of objects for which none was chosen yet, in percent of the reference's size",
         default=TOLERANCE,
         **PERCENT,
-        update=lambda _preferences, _context: volume.notify(),
+        update=lambda _preferences, _context: snapshots.notify(),
     )
     threads: IntProperty(
         name="Threads",
@@ -43,7 +44,7 @@ class TOLVOL_AP_preferences(bpy.types.AddonPreferences):
         description="Let Show Deviation draw by the graphics driver. Turned off, the add-on does everything else as "
         "before; turned on again, it asks a driver anew that refused",
         default=True,
-        update=lambda _preferences, _context: volume.notify(),
+        update=lambda _preferences, _context: snapshots.notify(),
     )
 
     def draw(self, _context):

@@ -14,8 +14,9 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import preferences, volume
+from . import preferences
 from .operation_settings import decimate_settings, modifier_settings, smooth_settings
+from .reference import measurements, snapshots, tolerances
 
 TOLERANCE_UNITS = (
     ("PERCENT", "% of Size", "Percent of the longest diagonal of the reference's bounding box"),
@@ -170,26 +171,26 @@ class TOLVOL_PG_modifiers(bpy.types.PropertyGroup):
 
 
 def _changed(_settings, _context):
-    volume.notify()
+    snapshots.notify()
 
 
 def _percent_changed(settings, _context):
     settings.tolerance_percent_converted = ""
-    volume.notify()
+    snapshots.notify()
 
 
 def _length_changed(settings, _context):
     settings.tolerance_length_converted = ""
-    volume.notify()
+    snapshots.notify()
 
 
 def _unit_changed(settings, _context):
     """The tolerance stays what it is, in the other unit."""
-    mode, size = settings.tolerance_mode, volume.shown_size(settings.id_data)
+    mode, size = settings.tolerance_mode, measurements.shown_size(settings.id_data)
     if mode != (settings.tolerance_mode_before or "PERCENT") and size:
-        volume.convert_tolerance(settings, size, mode)
+        tolerances.convert_tolerance(settings, size, mode)
     settings.tolerance_mode_before = mode
-    volume.notify()
+    snapshots.notify()
 
 
 DEVIATION_KINDS = (
@@ -299,7 +300,7 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     @property
     def snapshot_size(self):
         """The length that is 100 %, in double, as the object is scaled now."""
-        return volume.snapshot_size(self.id_data)
+        return snapshots.snapshot_size(self.id_data)
 
     smooth: PointerProperty(type=TOLVOL_PG_smooth)
     modifiers: PointerProperty(type=TOLVOL_PG_modifiers)

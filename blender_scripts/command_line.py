@@ -20,8 +20,9 @@ import bpy
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import addon
-from addon import native, safe_files, side_files
+from addon import native
 from addon.errors import NotWritten, Refused
+from addon.files import safe_files, side_files
 from common import NOT_PROVED, NOT_WRITTEN, USAGE, Stop, in_units, length, require_folder, whole_number  # noqa: F401
 
 
@@ -30,7 +31,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, script, **options):
         super().__init__(
-            prog=f"blender --background --python blender_scripts/{script} --",
+            prog=f"blender --background --python {script} --",
             formatter_class=argparse.RawDescriptionHelpFormatter,
             allow_abbrev=False,
             **options,

@@ -18,7 +18,9 @@ from mathutils import Matrix, Vector
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import command_line as cli  # noqa: E402
 import models  # noqa: E402
-from addon import file_io, mesh_io, report  # noqa: E402
+from addon.files import file_io  # noqa: E402
+from addon.mesh import mesh_io  # noqa: E402
+from addon.proof import report  # noqa: E402
 
 WIDTH, HEIGHT = 1280, 640
 SAMPLES = 40  # one large light and an even sky leave so little noise that no denoiser is needed (Debian has none)
@@ -193,7 +195,8 @@ def captions(reference, result, numbers):
 
 def arguments():
     parser = cli.Parser(
-        "comparison_picture.py", description="Makes a picture of two meshes side by side, with their edges."
+        "blender_scripts/comparison_picture.py",
+        description="Makes a picture of two meshes side by side, with their edges.",
     )
     parser.add_argument("reference", metavar="REFERENCE")
     parser.add_argument("result", metavar="RESULT")

@@ -18,9 +18,13 @@ try:
 
     import command_line as cli
     import pictures
-    from addon import file_io, mesh_io, report, safe_files, side_files, units, volume
-    from addon.certify import certify
+    from addon import units
     from addon.errors import NOT_PROVED, NotWritten, Refused
+    from addon.files import file_io, safe_files, side_files
+    from addon.mesh import mesh_io
+    from addon.proof import report
+    from addon.proof.certify import certify
+    from addon.reference import snapshots
 except ImportError as error:  # left alone, Blender would end with exit code 0
     print(f"decimate.py: Blender's Python lacks something: {error}; install Debian's python3-numpy", file=sys.stderr)
     sys.exit(2)
@@ -37,7 +41,7 @@ none. Symbolic links are followed. OUT may be IN; no other file that is read is 
 
 
 def arguments():
-    parser = cli.Parser("decimate.py", description=_DESCRIPTION, epilog=_EPILOG)
+    parser = cli.Parser("blender_scripts/decimate.py", description=_DESCRIPTION, epilog=_EPILOG)
     parser.add_argument("input", metavar="IN", help="the mesh to decimate")
     parser.add_argument("output", metavar="OUT", help="where the result goes; the extension says in which format")
     parser.add_argument(
@@ -140,7 +144,7 @@ class Command:
         whole_input = {"file": self.options.input, **source.counts}
         names = [ob.name for ob in source.objects]
         reference_objects = self._pair(source.objects, reference_file)
-        references = [volume.surface_of(ob) for ob in reference_objects]
+        references = [snapshots.surface_of(ob) for ob in reference_objects]
         tolerance, size = self._tolerance(references)
         working = tolerance - file_io.rounding(self.exported, source.objects)
         if working <= 0:
@@ -193,14 +197,14 @@ class Command:
             )
         if len(by_name) == 1:
             return reference_file.objects
-        whole = volume.joined([volume.surface_of(ob) for ob in reference_file.objects]).arrays
+        whole = snapshots.joined([snapshots.surface_of(ob) for ob in reference_file.objects]).arrays
         joined = bpy.data.objects.new("reference", mesh_io.new_mesh("reference", whole.vertices, whole.triangles))
         bpy.context.collection.objects.link(joined)
         return [joined]
 
     def _tolerance(self, references):
         """(the tolerance, what 100 % is), for the whole file."""
-        size = volume.joined(references).size()
+        size = snapshots.joined(references).size()
         tolerance = cli.in_units(self.options.tolerance, size)
         if tolerance > size:
             raise cli.Stop(f"--tolerance: {tolerance:.6g} is more than the size of the reference, {size:.6g}")
@@ -254,7 +258,7 @@ class Command:
         written = self._export(source.objects)
         self._stage(f"wrote {self.exported.name} and read it back", start)
         start = time.perf_counter()
-        found = {ob.name: volume.surface_of(ob) for ob in written.objects}
+        found = {ob.name: snapshots.surface_of(ob) for ob in written.objects}
         if found.keys() == set(names):
             judged = [
                 self._certify(found[name], reference, tolerance, run["outside"]["faces"])
@@ -262,7 +266,7 @@ class Command:
             ]
         else:  # a format of one object
             kept = sum(run["outside"]["faces"] for run in runs)
-            judged = [self._certify(volume.joined(found.values()), volume.joined(references), tolerance, kept)]
+            judged = [self._certify(snapshots.joined(found.values()), snapshots.joined(references), tolerance, kept)]
         whole = self._summary(names, runs, judged, tolerance, size)
         whole["output"] = {"file": self.options.output, **written.counts}
         for kind, count in source.extras.items():
@@ -277,7 +281,7 @@ class Command:
             )
         if self.picture:
             start = time.perf_counter()
-            self._draw(volume.joined(found.values()), volume.joined(references), tolerance, size)
+            self._draw(snapshots.joined(found.values()), snapshots.joined(references), tolerance, size)
             self._stage(f"drew {self.options.picture}", start)
         return whole
 

@@ -12,7 +12,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import command_line as cli  # noqa: E402
-from addon import file_io, mesh_io  # noqa: E402
+from addon.files import file_io  # noqa: E402
+from addon.mesh import mesh_io  # noqa: E402
 
 LEVELS = {"suzanne": 3, "suzanne-4": 4}  # of subdivision: 62,976 and 251,904 triangles
 NOISE = 0.0005  # standard deviation along the normal, of the box's diagonal
@@ -54,7 +55,7 @@ def read(path):
 
 
 def arguments():
-    parser = cli.Parser("models.py", description="Writes a model to a file.")
+    parser = cli.Parser("blender_scripts/models.py", description="Writes a model to a file.")
     parser.add_argument("model", choices=LEVELS)
     parser.add_argument("output", metavar="OUT", help=".ply, .obj or .stl")
     return parser.parse()

@@ -13,7 +13,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 try:
     import command_line as cli
     import pictures
-    from addon import deviation, file_io, report, safe_files, volume
+    from addon.files import file_io, safe_files
+    from addon.proof import deviation, report
+    from addon.reference import snapshots
 except ImportError as error:  # left alone, Blender would end with exit code 0
     print(f"report.py: Blender's Python lacks something: {error}; install Debian's python3-numpy", file=sys.stderr)
     sys.exit(2)
@@ -43,7 +45,7 @@ def report_file(text):
 
 
 def arguments():
-    parser = cli.Parser("report.py", description=_DESCRIPTION, epilog=_EPILOG)
+    parser = cli.Parser("blender_scripts/report.py", description=_DESCRIPTION, epilog=_EPILOG)
     parser.add_argument("a", metavar="A", help=" ".join(file_io.EXTENSIONS))
     parser.add_argument("b", metavar="B")
     parser.add_argument(
@@ -85,7 +87,7 @@ def _report(options, staged):
     surfaces, files = [], []
     for path in (options.a, options.b):
         found = file_io.read_file(path)
-        surfaces.append(volume.joined([volume.surface_of(ob) for ob in found.objects]))
+        surfaces.append(snapshots.joined([snapshots.surface_of(ob) for ob in found.objects]))
         files.append({"file": path, **found.counts})
     size = surfaces[1].size()
     tolerance = cli.in_units(options.tolerance, size) if options.tolerance else None

@@ -5,7 +5,7 @@
 #include <OpenMesh/Tools/Decimater/DecimaterT.hh>
 #include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 #include <cstdlib>
-#include <tolvol/operation/ModToleranceT.hh>
+#include <tolvol/openmesh/ModToleranceT.hh>
 
 int main(int argc, char** argv) {
   using Mesh = OpenMesh::TriMesh_ArrayKernelT<>;

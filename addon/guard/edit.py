@@ -5,7 +5,7 @@ import bmesh
 import bpy
 import numpy as np
 
-from .. import mesh_io
+from ..mesh import mesh_io
 from . import watch
 
 watches = watch.Watches()

@@ -10,9 +10,11 @@ import time
 import bpy
 import numpy as np
 
-from .. import mesh_io, native, volume
-from ..certify import INSIDE
+from .. import native
 from ..errors import Refused
+from ..mesh import mesh_io
+from ..proof.certify import INSIDE
+from ..reference import volumes
 from . import watch
 
 watches = watch.Watches()
@@ -55,7 +57,7 @@ class LatticeWatch(watch.Preparing):
             self.reason = str(error)
             return
         self._options = {"to_world": matrix, "threads": threads}
-        self.begin(lambda progress: volume.native_volume(reference, tolerance, threads, progress))
+        self.begin(lambda progress: volumes.native_volume(reference, tolerance, threads, progress))
 
     def prepared(self, outcome):
         self._built = outcome

@@ -3,7 +3,7 @@
 
 import bpy
 
-from .. import mesh_io
+from ..mesh import mesh_io
 from . import watch
 
 watches = watch.Watches()

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from .. import mesh_io, native, preferences, volume
-from ..certify import INSIDE
+from .. import native, preferences
 from ..errors import Refused
 from ..job import Job
+from ..mesh import mesh_io
+from ..proof.certify import INSIDE
+from ..reference import snapshots, tolerances, volumes
 
 # What is ready sooner than this is waited for; Blender goes on meanwhile where it is not.
 _PATIENCE = 0.4
@@ -31,7 +33,7 @@ def blocked(ob):
     """Why the mesh of `ob` cannot be guarded now, whatever the mode, or None. Cheap enough to draw."""
     if native.module is None:
         return native.reason
-    if reason := volume.reference_missing(ob):
+    if reason := snapshots.reference_missing(ob):
         return reason
     if not ob.data.polygons:
         return f"{ob.name} has no faces"
@@ -46,7 +48,7 @@ def situation(ob):
         ob.data.as_pointer(),
         key.name if key else None,
         mesh_io.matrix_array(ob.matrix_world).tobytes(),
-        volume.tolerance_length(settings, settings.snapshot_size),
+        tolerances.tolerance_length(settings, settings.snapshot_size),
         (settings.snapshot.as_pointer(), settings.snapshot_fingerprint),
     )
 
@@ -129,8 +131,8 @@ class Preparing:
 
 def needed(ob):
     """(reference, tolerance, to_world, threads) for a guard of `ob`. Raises Refused and TolvolError."""
-    reference = volume.reference_of(ob)
-    tolerance = volume.tolerance_length(ob.tolvol, reference.size())
+    reference = snapshots.reference_of(ob)
+    tolerance = tolerances.tolerance_length(ob.tolvol, reference.size())
     return reference, tolerance, mesh_io.matrix_array(ob.matrix_world), preferences.threads(bpy.context)
 
 
@@ -152,7 +154,7 @@ class Watch(Preparing):
             return
 
         def work(progress):
-            built = volume.native_volume(reference, tolerance, threads, progress)
+            built = volumes.native_volume(reference, tolerance, threads, progress)
             options = {"to_world": matrix, "threads": threads, "progress": progress}
             guard = native.module.Guard(positions, faces.faces, built, outside="keep", **options)
             # A concave face may be inside as it is cut and outside as it might be: its corners stay where they are.

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Why an operator cannot run on an object, as text for the panel, the tooltip of the greyed button and scripts."""
 
-from .. import native, volume
+from .. import native
+from ..reference import snapshots
 
 _OBJECT_MODE = {"OBJECT"}
 
@@ -23,7 +24,7 @@ def reference_blocked(ob, modes=_OBJECT_MODE):
     """Why no reference can be set for `ob` now, or None."""
     if reason := object_blocked(ob, modes):
         return reason
-    source = volume.source_object(ob)
+    source = snapshots.source_object(ob)
     if source is None:
         return "Choose the reference object"
     if source.type != "MESH":
@@ -35,7 +36,7 @@ def reference_blocked(ob, modes=_OBJECT_MODE):
 
 def check_blocked(ob, modes=_OBJECT_MODE):
     """Why `ob` cannot be compared with its reference now, or None."""
-    if reason := object_blocked(ob, modes) or volume.reference_missing(ob):
+    if reason := object_blocked(ob, modes) or snapshots.reference_missing(ob):
         return reason
     if not ob.data.polygons:
         return f"{ob.name} has no faces"

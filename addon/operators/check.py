@@ -8,11 +8,14 @@ import bpy
 import numpy as np
 from bpy.props import IntProperty
 
-from .. import mesh_io, native, preferences, report, volume
-from ..certify import certify, outside
+from .. import native, preferences
 from ..job import JobOperator
-from ..measure import Interval
-from ..verdict import BEYOND, ONE_WAY, WITHIN, Verdict
+from ..mesh import mesh_io
+from ..proof import report
+from ..proof.certify import certify, outside
+from ..proof.measure import Interval
+from ..proof.verdict import BEYOND, ONE_WAY, WITHIN, Verdict
+from ..reference import measurements, snapshots, tolerances
 from .blocked import allowed, check_blocked
 
 
@@ -28,8 +31,8 @@ class Comparison(JobOperator):
     def prepare(self, context):
         context.view_layer.update()
         ob = self.ob
-        surface, reference = volume.surface_of(ob), volume.reference_of(ob)
-        tolerance = volume.tolerance_length(ob.tolvol, reference.size())
+        surface, reference = snapshots.surface_of(ob), snapshots.reference_of(ob)
+        tolerance = tolerances.tolerance_length(ob.tolvol, reference.size())
         threads = self.threads or preferences.threads(context)
         return functools.partial(self.compare, surface, reference, tolerance, threads)
 
@@ -55,7 +58,7 @@ and how much of the mesh is beyond the tolerance"""
 
     def finish(self, context, outcome):
         surface, certified, found = outcome
-        volume.remember(self.ob, surface, certified, found.tolerance, found.share_outside)
+        measurements.remember(self.ob, surface, certified, found.tolerance, found.share_outside)
         largest = report.percent(max(found.forward.upper, found.backward.upper), found.tolerance)
         if found.kind == WITHIN:
             self.report({"INFO"}, f"Within the tolerance both ways: at most {largest} of it, proved")

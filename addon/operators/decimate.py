@@ -10,12 +10,15 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
-from .. import measure, mesh_io, native, preferences, protect, report, transfer, volume
-from ..certify import certify
+from .. import native, preferences
 from ..errors import NotProved, Refused
 from ..job import JobOperator, run_all
+from ..mesh import mesh_io, protect, transfer
 from ..operation_settings import PROTECTED, decimate_settings
+from ..proof import measure, report
+from ..proof.certify import certify
 from ..properties import PLACEMENTS, automatic_placement, tolerance_settings
+from ..reference import measurements, snapshots, tolerances, volumes
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
 
@@ -118,16 +121,16 @@ the settings of the active one. A mesh without a reference becomes it"""
             tasks.append(self._task(context, ob))
         # Changing the unit in Adjust Last Operation changes nothing else.
         other = "PERCENT" if self.tolerance_mode == "LENGTH" else "LENGTH"
-        volume.convert_tolerance(self, tasks[0].reference.size(), other)
+        tolerances.convert_tolerance(self, tasks[0].reference.size(), other)
         return functools.partial(run_all, tasks)
 
     def _task(self, context, ob):
-        surface, reference = volume.surface_of(ob), volume.reference_of(ob)
+        surface, reference = snapshots.surface_of(ob), snapshots.reference_of(ob)
         task = _Task(
             ob.name,
             surface,
             reference,
-            volume.tolerance_length(self, reference.size()),
+            tolerances.tolerance_length(self, reference.size()),
             self._options(context, ob.data),
         )
         task.uvs = mesh_io.corner_uvs(ob.data)
@@ -156,9 +159,9 @@ the settings of the active one. A mesh without a reference becomes it"""
     def _keep(self, ob, reference, run, prefix):
         """What is remembered and said of one object."""
         if ob.tolvol.snapshot is None:
-            volume.set_reference(ob, reference)
+            snapshots.set_reference(ob, reference)
         shared.give(self, ob.tolvol, _SHARED if self.own_placements else {*_SHARED, "placement"})
-        volume.remember(ob, volume.surface_of(ob), run, run["tolerance"]["absolute"])
+        measurements.remember(ob, snapshots.surface_of(ob), run, run["tolerance"]["absolute"])
         ob.tolvol.last_run_of = ob.tolvol.measurement.fingerprint
         ob.tolvol.last_run = json.dumps(run)
         for warning in run["warnings"]:
@@ -210,7 +213,7 @@ class _Task:
     def run(self, progress):
         clock = [time.perf_counter()]
         threads = self.options["threads"]
-        built = volume.native_volume(self.reference, self.tolerance, threads, progress)
+        built = volumes.native_volume(self.reference, self.tolerance, threads, progress)
         clock.append(time.perf_counter())
         arrays, matrix = self.surface.arrays, self.surface.matrix
         wedges = None
@@ -229,7 +232,7 @@ class _Task:
         )
         result = transfer.Decimated.of(computed, arrays)
         clock.append(time.perf_counter())
-        decimated = volume.Surface(mesh_io.MeshArrays(result.vertices, result.triangles, None, None), matrix)
+        decimated = snapshots.Surface(mesh_io.MeshArrays(result.vertices, result.triangles, None, None), matrix)
         kept = computed.report["outside"]["faces"]
         certified = certify(decimated, self.reference, self.tolerance, kept, threads, progress)
         if kept:

@@ -5,12 +5,13 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
-from .. import mesh_io, native, preferences
+from .. import native, preferences
 from ..errors import Refused
 from ..job import JobOperator
-from ..motion import Motion
+from ..mesh import mesh_io
 from ..properties import DEFORM_MODES
 from .blocked import allowed, decimate_blocked
+from .motion import Motion
 
 
 class TOLVOL_OT_deform(JobOperator, bpy.types.Operator):

@@ -5,16 +5,20 @@ import bpy
 import numpy as np
 from bpy.props import FloatProperty, IntProperty, StringProperty
 
-from .. import fit, measure, mesh_io, preferences, report, volume
-from ..certify import certify
+from .. import preferences
 from ..errors import NotProved, Refused
-from ..evaluation import Evaluation, same_faces
 from ..job import JobOperator
-from ..mesh_io import column
-from ..motion import Motion
+from ..mesh import mesh_io
+from ..mesh.evaluation import Evaluation, same_faces
+from ..mesh.mesh_io import column
 from ..operation_settings import modifier_settings
+from ..proof import measure, report
+from ..proof.certify import certify
+from ..reference import measurements, snapshots, tolerances
+from . import fit
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
+from .motion import Motion
 
 FITTED = {"DECIMATE", "REMESH", "WELD"}
 _CHANGING = {
@@ -218,18 +222,18 @@ proved both ways, and apply it to the base mesh, which becomes the reference if 
         bpy.data.meshes.remove(before)
         mesh.name = name
         if ob.tolvol.snapshot is None:
-            volume.set_reference(ob, trial.reference)
-        volume.remember(ob, volume.surface_of(ob), certified, trial.tolerance)
+            snapshots.set_reference(ob, trial.reference)
+        measurements.remember(ob, snapshots.surface_of(ob), certified, trial.tolerance)
 
 
 class _Trial:
     """One object against its reference; what it returns to be done runs in the thread."""
 
     def __init__(self, ob, threads):
-        self.surface = volume.surface_of(ob)
-        self.reference = volume.reference_of(ob)
+        self.surface = snapshots.surface_of(ob)
+        self.reference = snapshots.reference_of(ob)
         self.size = self.reference.size()
-        self.tolerance = volume.tolerance_length(ob.tolvol, self.size)
+        self.tolerance = tolerances.tolerance_length(ob.tolvol, self.size)
         self._threads = threads
         self._pair = self.reference.world(), self.reference.arrays.triangles
         self._left = 0
@@ -246,7 +250,7 @@ class _Trial:
         def work(progress):
             if not len(arrays.triangles):
                 return np.inf
-            pair = volume.Surface(arrays, self.surface.matrix).world(), arrays.triangles
+            pair = snapshots.Surface(arrays, self.surface.matrix).world(), arrays.triangles
             deviation = 0.0
             for one, other in ((self._pair, pair), (pair, self._pair)):
                 found = measure.largest_distance(one, other, self.tolerance, self._threads, progress)
@@ -264,7 +268,7 @@ class _Trial:
         """Work: what certify() says of the mesh as it will be stored; NotProved unless it is within both ways."""
 
         def work(progress):
-            surface = volume.Surface(arrays, self.surface.matrix)
+            surface = snapshots.Surface(arrays, self.surface.matrix)
             found = certify(surface, self.reference, self.tolerance, 0, self._threads, progress)
             if max(found["forward"][1], found["backward"][1]) > self.tolerance:
                 ways = (report.percent(found[way][1], self.size) for way in ("forward", "backward"))

@@ -4,8 +4,8 @@
 import bpy
 from bpy.props import EnumProperty, FloatProperty
 
-from .. import volume
 from ..properties import TOLERANCE_UNITS
+from ..reference import measurements
 from ..units import length
 from .blocked import allowed, object_blocked
 
@@ -43,7 +43,7 @@ class TOLVOL_MT_tolerances(bpy.types.Menu):
     bl_description = "Common tolerances, each as a length and as a share of the size"
 
     def draw(self, context):
-        size = volume.shown_size(context.active_object)
+        size = measurements.shown_size(context.active_object)
         for mode, value in _PRESETS:
             choice = self.layout.operator("tolvol.set_tolerance", text=label(context, mode, value, size))
             choice.mode, choice.value = mode, value

@@ -5,14 +5,15 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, IntProperty
 
-from .. import preferences, volume
+from .. import preferences
 from ..job import JobOperator
+from ..reference import snapshots, tolerances, volumes
 from .blocked import allowed, reference_blocked
 
 
 def replace_label(ob):
     """What setting the reference does to one that is there; the label of the button, where that is so."""
-    source = volume.source_object(ob)
+    source = snapshots.source_object(ob)
     if source is None or source == ob:
         return "Replace Reference by This Mesh"
     return f"Replace Reference by {source.name}"
@@ -22,8 +23,10 @@ def loses_something(ob):
     """Whether setting the reference gives up a snapshot that is not what would be taken."""
     if ob.tolvol.snapshot is None:
         return False
-    surface = volume.surface_of(volume.source_object(ob))
-    same_place = surface.matrix.astype(np.float32).tobytes() == volume.reference_matrix(ob).astype(np.float32).tobytes()
+    surface = snapshots.surface_of(snapshots.source_object(ob))
+    same_place = (
+        surface.matrix.astype(np.float32).tobytes() == snapshots.reference_matrix(ob).astype(np.float32).tobytes()
+    )
     return not same_place or surface.arrays.fingerprint() != ob.tolvol.snapshot_fingerprint
 
 
@@ -71,18 +74,18 @@ reference that is set already is replaced, after a question where that loses any
     def prepare(self, context):
         context.view_layer.update()
         ob = self.ob
-        surface = volume.surface_of(volume.source_object(ob))
-        tolerance = volume.tolerance_length(ob.tolvol, surface.size())
+        surface = snapshots.surface_of(snapshots.source_object(ob))
+        tolerance = tolerances.tolerance_length(ob.tolvol, surface.size())
         threads = self.threads or preferences.threads(context)
 
         def work(progress):
-            return surface, volume.native_volume(surface, tolerance, threads, progress)
+            return surface, volumes.native_volume(surface, tolerance, threads, progress)
 
         return work
 
     def finish(self, context, outcome):
         surface, built = outcome
-        volume.set_reference(self.ob, surface)
+        snapshots.set_reference(self.ob, surface)
         self.report({"INFO"}, f"Reference set: {built.triangle_count:,} triangles, ready in {built.seconds:.2f} s")
 
 
@@ -99,5 +102,5 @@ class TOLVOL_OT_clear_reference(bpy.types.Operator):
         return ob is not None and ob.type == "MESH" and ob.library is None and ob.tolvol.snapshot is not None
 
     def execute(self, context):
-        volume.clear_reference(context.active_object)
+        snapshots.clear_reference(context.active_object)
         return {"FINISHED"}

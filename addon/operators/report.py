@@ -6,8 +6,9 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from .. import deviation, safe_files
 from ..errors import Refused
+from ..files import safe_files
+from ..proof import deviation
 from .check import Comparison
 
 # Shares of the tolerance that are reported as bands.

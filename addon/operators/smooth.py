@@ -7,13 +7,14 @@ import bpy
 import numpy as np
 from bpy.props import IntProperty
 
-from .. import mesh_io, native, preferences, protect
+from .. import native, preferences
 from ..errors import Refused
 from ..job import JobOperator, run_all
-from ..motion import Motion
+from ..mesh import mesh_io, protect
 from ..operation_settings import smooth_settings
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
+from .motion import Motion
 
 _MODES = {"OBJECT", "EDIT"}
 

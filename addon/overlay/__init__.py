@@ -10,8 +10,9 @@ import functools
 import bpy
 from bpy.app.handlers import persistent
 
-from .. import native, preferences, volume
+from .. import native, preferences
 from ..redraw import redraw_views
+from ..reference import snapshots
 from . import draw, field, legend, reasons, shaders, shares, work
 from .surface import Surface
 
@@ -113,10 +114,10 @@ def _note_frame(*_):
 
 
 def register():
-    volume.listeners.append(refresh)
+    snapshots.listeners.append(refresh)
 
 
 def unregister():
-    volume.listeners.remove(refresh)
+    snapshots.listeners.remove(refresh)
     _end()
     reasons.broken.clear()

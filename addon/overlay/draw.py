@@ -4,8 +4,9 @@
 import gpu
 import numpy as np
 
-from .. import mesh_io, volume
+from ..mesh import mesh_io
 from ..redraw import redraw_views
+from ..reference import measurements, tolerances
 from . import field, legend, reasons, shaders, shares
 
 _STRIPE = 12  # pixels from one stripe to the next
@@ -28,7 +29,7 @@ def _in_view(context, names):
 
 
 def _tolerance(ob):
-    return volume.tolerance_length(ob.tolvol, ob.tolvol.snapshot_size)
+    return tolerances.tolerance_length(ob.tolvol, ob.tolvol.snapshot_size)
 
 
 def _signed(ob, tree):
@@ -120,7 +121,7 @@ def legend_of_one(context, shown):
 
 def note(ob):
     """What the colours are not. Sculpting is shown as it is stored, whatever deforms it afterwards."""
-    on_top, how = volume.on_top(ob), "with"
+    on_top, how = measurements.on_top(ob), "with"
     if ob.mode == "SCULPT":
         on_top, how = [name for name in on_top if name == "modifiers"], "without"
     return f"Shown {how} its {' and '.join(on_top)}, not proved" if on_top else "Shown, not proved"

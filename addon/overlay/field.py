@@ -8,8 +8,10 @@ import bpy
 import gpu
 import numpy as np
 
-from .. import mesh_io, native, preferences, volume
+from .. import native, preferences
 from ..errors import Refused
+from ..mesh import mesh_io
+from ..reference import measurements, snapshots, volumes
 from . import shaders, work
 
 # Of what a shader rounds a distance by: a smaller tolerance cannot be shown.
@@ -58,7 +60,9 @@ def field_of(ob, tolerance, changed):
     if reason := _failed.get(key):
         return None, reason
     own = ob.tolvol.snapshot_kind == "SELF"
-    if field is None or own and not volume.same_shape(field.placement, volume.reference_matrix(ob)):  # scaled since
+    if (
+        field is None or own and not measurements.same_shape(field.placement, snapshots.reference_matrix(ob))
+    ):  # scaled since
         work.later(
             ("field", key),
             0,
@@ -81,13 +85,13 @@ def _prepare(name, tolerance):
     if ob is None or ob.tolvol.snapshot is None:
         return None
     try:
-        reference = volume.reference_of(ob)
+        reference = snapshots.reference_of(ob)
     except Refused:
         return None
     threads = preferences.threads(bpy.context)
 
     def make(progress):
-        built = volume.native_volume(reference, tolerance, threads, progress)
+        built = volumes.native_volume(reference, tolerance, threads, progress)
         return Field(native.module.DisplayTree(built, progress), reference.matrix)
 
     return make

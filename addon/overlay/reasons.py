@@ -3,7 +3,8 @@
 
 import bpy
 
-from .. import preferences, volume
+from .. import preferences
+from ..reference import snapshots
 from . import field
 
 _MODES = {"OBJECT", "EDIT", "SCULPT"}
@@ -25,7 +26,7 @@ def hidden(ob):
     """Why the deviation of `ob` is not shown where it should be, or None."""
     if reason := off():
         return reason
-    if reason := volume.reference_missing(ob):
+    if reason := snapshots.reference_missing(ob):
         return reason
     if ob.mode not in _MODES:
         return "Shown in Object, Edit and Sculpt Mode"

@@ -4,7 +4,7 @@
 import gpu
 import numpy as np
 
-from .. import mesh_io
+from ..mesh import mesh_io
 
 
 class Surface:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from .. import report, volume
 from ..operators.decimate import draw_decimate_settings, draw_protect_settings, targets
+from ..proof import report
+from ..reference import measurements
 from .layout import SubPanel, say_blocked, text_lines
 
 
@@ -17,7 +18,7 @@ class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
         draw_decimate_settings(layout, ob.tolvol)
         count = len(targets(context))
         layout.operator("tolvol.decimate", text=f"Decimate {count} Objects" if count > 1 else "Decimate")
-        if ob.tolvol.last_run and ob.tolvol.last_run_of == volume.shown_fingerprint(ob):
+        if ob.tolvol.last_run and ob.tolvol.last_run_of == measurements.shown_fingerprint(ob):
             counts = report.remembered_counts(ob.tolvol.last_run)
             text_lines(
                 context,

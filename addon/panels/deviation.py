@@ -3,8 +3,9 @@
 
 import bpy
 
-from .. import overlay, report, verdict
+from .. import overlay
 from ..overlay import reasons
+from ..proof import report, verdict
 from ..units import length
 from .layout import AMBER, GREEN, GREY, RED, SubPanel, right, text_lines
 

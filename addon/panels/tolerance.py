@@ -3,8 +3,9 @@
 
 import bpy
 
-from .. import native, volume
+from .. import native
 from ..operators import blocked
+from ..reference import measurements, snapshots, tolerances, volumes
 from ..units import NO_BREAK, length
 from .layout import AMBER, GREEN, GREY, RED, Panel, right, text_lines
 
@@ -38,15 +39,15 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
         if settings.snapshot:
             row.operator("tolvol.clear_reference", text="", icon="X")
         _status(context, layout, ob)
-        if on_top := volume.on_top(ob):
+        if on_top := measurements.on_top(ob):
             text_lines(context, layout, f"Holds for the base mesh, without its {' and '.join(on_top)}", "INFO")
 
     @staticmethod
     def _other_form(context, ob):
-        size = volume.shown_size(ob)
+        size = measurements.shown_size(ob)
         if not size:
             return ""
-        tolerance = volume.tolerance_length(ob.tolvol, size)
+        tolerance = tolerances.tolerance_length(ob.tolvol, size)
         if ob.tolvol.tolerance_mode == "PERCENT":
             return f"= {length(context, tolerance)}"
         return f"= {100 * tolerance / size:.4g} % of size"
@@ -62,12 +63,12 @@ def _status(context, layout, ob):
     if settings.snapshot is None:
         why = None if reason else blocked.reference_blocked(ob)
         text_lines(context, layout, why or "No reference set", GREY)
-    elif stale := volume.stale_reason(ob):
+    elif stale := snapshots.stale_reason(ob):
         text_lines(context, layout, f"Out of date: {stale}", AMBER)
     else:
         triangles = len(settings.snapshot.polygons)
-        tolerance = length(context, volume.tolerance_length(settings, settings.snapshot_size))
-        built = volume.built_of(ob)
+        tolerance = length(context, tolerances.tolerance_length(settings, settings.snapshot_size))
+        built = volumes.built_of(ob)
         ready = f"ready in {built.seconds:.2f}{NO_BREAK}s, {_bytes(built.memory)}" if built else "computed when needed"
         text_lines(context, layout, f"{triangles:,} triangles, ±{tolerance}, {ready}", GREEN)
     # A reference that is set holds in every mode.

@@ -6,14 +6,14 @@
 #include <memory>
 #include <optional>
 
+#include "base/errors.h"
 #include "baselines/checked_ring.h"
 #include "baselines/module.h"
 #include "baselines/permission_ring.h"
 #include "baselines/vertex_samples.h"
 #include "check/methods.h"
-#include "operation/decimation.h"
+#include "decimation/decimation.h"
 #include "python/arrays.h"
-#include "reference/errors.h"
 
 namespace tolvol::baselines {
 namespace {
@@ -24,8 +24,8 @@ using Seconds = std::chrono::duration<double>;
 constexpr double kPermissionPrecision = 4;           // what Zelinka and Garland recommend
 constexpr std::optional<double> kCoarse = 1.0 / 16;  // of a volume that nobody asks
 
-/// A rival and what it needs, built within a time of its own.
-struct Rival {
+/// A baseline and what it needs, built within a time of its own.
+struct Baseline {
   std::unique_ptr<PermissionGrid> grid;
   std::unique_ptr<ToleranceCheck> check;
   std::unique_ptr<RingCheck> ring;
@@ -39,22 +39,22 @@ std::size_t asked_memory(const std::string& method, const DistanceGrid& grid) {
   return method == "occlusion_query" ? nodes * sizeof(float) : grid.memory();
 }
 
-Rival make_rival(const std::string& method, const ToleranceVolume& volume, std::optional<double> precision,
-                 unsigned threads) {
-  Rival rival;
+Baseline make_baseline(const std::string& method, const ToleranceVolume& volume, std::optional<double> precision,
+                       unsigned threads) {
+  Baseline baseline;
   if (method == "permission_grid") {
-    rival.grid = std::make_unique<PermissionGrid>(volume.reference(), volume.frame_tolerance(),
-                                                  precision.value_or(kPermissionPrecision), threads);
-    rival.ring = std::make_unique<PermissionRing>(*rival.grid);
-    rival.memory = rival.grid->memory();
+    baseline.grid = std::make_unique<PermissionGrid>(volume.reference(), volume.frame_tolerance(),
+                                                     precision.value_or(kPermissionPrecision), threads);
+    baseline.ring = std::make_unique<PermissionRing>(*baseline.grid);
+    baseline.memory = baseline.grid->memory();
   } else if (method == "vertex_samples") {
-    rival.ring = std::make_unique<VertexSamples>(volume.frame_tolerance());
+    baseline.ring = std::make_unique<VertexSamples>(volume.frame_tolerance());
   } else {
-    rival.check = make_check(method, volume);
-    rival.ring = std::make_unique<CheckedRing>(*rival.check);
-    rival.memory = asked_memory(method, volume.grid());
+    baseline.check = make_check(method, volume);
+    baseline.ring = std::make_unique<CheckedRing>(*baseline.check);
+    baseline.memory = asked_memory(method, volume.grid());
   }
-  return rival;
+  return baseline;
 }
 
 py::tuple decimate_by(const py::object& vertices, const py::object& triangles, double tolerance,
@@ -73,18 +73,18 @@ py::tuple decimate_by(const py::object& vertices, const py::object& triangles, d
   std::size_t memory = 0;
   {
     const py::gil_scoped_release release;
-    // A rival that does not ask the volume does not wait for it: only its frame is used.
+    // A baseline that does not ask the volume does not wait for it: only its frame is used.
     const bool asks_volume = method != "permission_grid" && method != "vertex_samples";
     auto start = std::chrono::steady_clock::now();
     const ToleranceVolume volume(v.values, t, placed, tolerance,
                                  {asks_volume ? precision : kCoarse, options.threads, nullptr});
     if (!asks_volume) start = std::chrono::steady_clock::now();
-    const Rival rival = make_rival(method, volume, precision, options.threads);
+    const Baseline baseline = make_baseline(method, volume, precision, options.threads);
     const auto built = std::chrono::steady_clock::now();
-    options.rival = rival.ring.get();
+    options.baseline = baseline.ring.get();
     result = decimate(v.values, t, placed, &volume, options);
     field = built - start, decimation = std::chrono::steady_clock::now() - built;
-    memory = rival.memory;
+    memory = baseline.memory;
   }
   py::dict report;
   report["method"] = result.method, report["renderer"] = result.renderer;

@@ -2,8 +2,8 @@
 /// Any ToleranceCheck as the judge of a decimation's collapses: the ring's new faces, and nothing else, must be inside.
 #pragma once
 
+#include "check/ring_check.h"
 #include "check/tolerance_check.h"
-#include "operation/ring_check.h"
 
 namespace tolvol::baselines {
 

@@ -2,7 +2,7 @@
 #include "baselines/module.h"
 
 PYBIND11_MODULE(tolvol_baselines, module) {
-  module.doc() = "Rival methods in the same process, for benchmarks only.";
+  module.doc() = "Other methods in the same process, for benchmarks only.";
   tolvol::baselines::bind_decimation(module);
   tolvol::baselines::bind_openmesh(module);
   tolvol::baselines::bind_permission_grid(module);

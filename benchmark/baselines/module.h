@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// One function per rival; each adds its functions to the module.
+/// One function per baseline; each adds its functions to the module.
 #pragma once
 
 #include <pybind11/pybind11.h>

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <sstream>
 
+#include "base/errors.h"
+#include "base/parallel.h"
 #include "field/scatter.h"
-#include "reference/errors.h"
-#include "reference/parallel.h"
 
 namespace tolvol::baselines {
 

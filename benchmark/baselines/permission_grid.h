@@ -6,13 +6,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "reference/triangle_mesh.h"
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol::baselines {
 
 class PermissionGrid {
  public:
-  /// Cells of edge tolerance / precision over the box of a valid mesh (reference/triangle_mesh.h) enlarged by the
+  /// Cells of edge tolerance / precision over the box of a valid mesh (geometry/triangle_mesh.h) enlarged by the
   /// tolerance, all in the mesh's units. A cell is permitted when it lies completely inside the volume: when its centre
   /// is within the tolerance less half of the cell's diagonal. Throws InvalidInput unless tolerance and precision are
   /// positive and some cell can be permitted (precision > sqrt(3) / 2), ResourceLimit above kBudget. O(cells), in

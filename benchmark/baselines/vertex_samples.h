@@ -10,7 +10,7 @@
 
 #include <optional>
 
-#include "operation/ring_check.h"
+#include "check/ring_check.h"
 
 namespace tolvol::baselines {
 

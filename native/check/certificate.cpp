@@ -9,12 +9,12 @@
 #include <array>
 #include <cmath>
 
+#include "base/call.h"
+#include "base/errors.h"
+#include "base/parallel.h"
 #include "check/part.h"
 #include "check/segment_cover.h"
-#include "reference/call.h"
-#include "reference/closest_point.h"
-#include "reference/errors.h"
-#include "reference/parallel.h"
+#include "geometry/closest_point.h"
 
 namespace tolvol {
 namespace {

@@ -11,9 +11,9 @@
 #include <numeric>
 #include <utility>
 
+#include "base/call.h"
+#include "base/errors.h"
 #include "gl/context.h"
-#include "reference/call.h"
-#include "reference/errors.h"
 
 namespace tolvol {
 namespace {

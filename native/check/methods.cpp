@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "check/methods.h"
 
+#include "base/errors.h"
 #include "check/certificate.h"
-#include "reference/errors.h"
 #ifdef TOLVOL_GL
 #include "check/gl_certificate.h"
 #include "check/occlusion_query.h"

@@ -19,10 +19,10 @@
 #include <limits>
 #include <sstream>
 
+#include "base/errors.h"
+#include "base/parallel.h"
 #include "check/witness.h"
 #include "gl/context.h"
-#include "reference/errors.h"
-#include "reference/parallel.h"
 
 namespace tolvol {
 namespace {

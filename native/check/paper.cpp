@@ -7,8 +7,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "base/errors.h"
 #include "gl/context.h"
-#include "reference/errors.h"
 
 namespace tolvol {
 namespace {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include "reference/call.h"
-#include "reference/closest_point.h"
+#include "base/call.h"
+#include "geometry/closest_point.h"
 
 namespace tolvol {
 namespace {

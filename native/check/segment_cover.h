@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "check/witness.h"
-#include "reference/hierarchy.h"
+#include "geometry/hierarchy.h"
 
 namespace tolvol {
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "reference/call.h"
-#include "reference/errors.h"
+#include "base/call.h"
+#include "base/errors.h"
 
 namespace tolvol {
 

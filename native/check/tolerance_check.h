@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "base/progress.h"
 #include "check/tolerance_volume.h"
-#include "reference/progress.h"
 
 namespace tolvol {
 

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <sstream>
 
+#include "base/call.h"
+#include "base/errors.h"
+#include "base/parallel.h"
 #include "field/fast_marching.h"
 #include "field/scatter.h"
 #include "field/signs.h"
-#include "reference/call.h"
-#include "reference/errors.h"
-#include "reference/parallel.h"
 
 namespace tolvol {
 namespace {

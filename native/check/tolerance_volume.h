@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "base/progress.h"
 #include "check/witness.h"
 #include "field/distance_grid.h"
-#include "reference/frame.h"
-#include "reference/hierarchy.h"
-#include "reference/progress.h"
+#include "geometry/frame.h"
+#include "geometry/hierarchy.h"
 
 namespace tolvol {
 

@@ -6,8 +6,8 @@
 
 #include <cstdint>
 
-#include "reference/call.h"
-#include "reference/simd.h"
+#include "base/call.h"
+#include "base/simd.h"
 
 namespace tolvol {
 namespace {

@@ -6,8 +6,8 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "reference/frame.h"
-#include "reference/triangle_mesh.h"
+#include "geometry/frame.h"
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol {
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/call.h"
 #include "field/scatter.h"
 #include "field/signs.h"
-#include "reference/call.h"
-#include "reference/pseudonormals.h"
+#include "geometry/pseudonormals.h"
 
 namespace tolvol {
 namespace {

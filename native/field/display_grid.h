@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "base/progress.h"
 #include "field/distance_grid.h"
-#include "reference/progress.h"
 
 namespace tolvol {
 

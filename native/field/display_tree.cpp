@@ -6,11 +6,11 @@
 #include <cmath>
 #include <numeric>
 
-#include "reference/call.h"
-#include "reference/closest_point.h"
-#include "reference/errors.h"
-#include "reference/parallel.h"
-#include "reference/pseudonormals.h"
+#include "base/call.h"
+#include "base/errors.h"
+#include "base/parallel.h"
+#include "geometry/closest_point.h"
+#include "geometry/pseudonormals.h"
 
 namespace tolvol {
 namespace {

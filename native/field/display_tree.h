@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "reference/progress.h"
-#include "reference/triangle_mesh.h"
+#include "base/progress.h"
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol {
 

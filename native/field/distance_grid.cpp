@@ -6,7 +6,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "reference/errors.h"
+#include "base/errors.h"
 
 namespace tolvol {
 namespace {

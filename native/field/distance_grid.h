@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "reference/triangle_mesh.h"
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol {
 

@@ -7,7 +7,7 @@
 #include <sstream>
 #include <vector>
 
-#include "reference/errors.h"
+#include "base/errors.h"
 
 namespace tolvol {
 namespace {

@@ -5,7 +5,7 @@
 // surface
 //   are: to a node farther away than its triangle's box was enlarged another triangle, whose box does not reach it, may
 //   be nearer. So every initial value is exact, and scatter() with a band of one cell is this phase.
-// - Normals at edges are pseudonormals, not interpolated (reference/pseudonormals.h).
+// - Normals at edges are pseudonormals, not interpolated (geometry/pseudonormals.h).
 // - Open and closed meshes are marched alike, without a sign. On a closed mesh it is that of the node from which the
 // front
 //   came: the surface is between known nodes only. On others it is estimated as in the initial phase, against the
@@ -19,9 +19,9 @@
 #include <limits>
 #include <utility>
 
+#include "base/call.h"
 #include "field/scatter.h"
 #include "field/signs.h"
-#include "reference/call.h"
 
 namespace tolvol {
 namespace {

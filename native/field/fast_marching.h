@@ -2,8 +2,8 @@
 /// Signed distances by fast marching: the field of the paper [Botsch04, §2], kept beside scatter() for comparison.
 #pragma once
 
+#include "base/progress.h"
 #include "field/distance_grid.h"
-#include "reference/progress.h"
 
 namespace tolvol {
 

@@ -12,9 +12,9 @@
 #include <atomic>
 #include <cmath>
 
-#include "reference/call.h"
-#include "reference/parallel.h"
-#include "reference/simd.h"
+#include "base/call.h"
+#include "base/parallel.h"
+#include "base/simd.h"
 
 namespace tolvol {
 namespace {

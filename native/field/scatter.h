@@ -2,8 +2,8 @@
 /// Exact distances and closest triangles at the nodes of a grid, in the band that the reference's triangles reach.
 #pragma once
 
+#include "base/progress.h"
 #include "field/distance_grid.h"
-#include "reference/progress.h"
 
 namespace tolvol {
 

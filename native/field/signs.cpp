@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include "reference/call.h"
-#include "reference/parallel.h"
+#include "base/call.h"
+#include "base/parallel.h"
 
 namespace tolvol {
 

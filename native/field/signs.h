@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "field/distance_grid.h"
-#include "reference/pseudonormals.h"
+#include "geometry/pseudonormals.h"
 
 namespace tolvol {
 

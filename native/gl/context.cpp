@@ -19,7 +19,7 @@
 #include <thread>
 #include <vector>
 
-#include "reference/errors.h"
+#include "base/errors.h"
 
 namespace tolvol::gl {
 namespace {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <memory>
 
+#include "base/errors.h"
 #include "gl/context.h"
 #include "gl/shaders.h"
-#include "reference/errors.h"
 
 namespace tolvol::gl {
 

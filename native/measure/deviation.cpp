@@ -18,11 +18,11 @@
 #include <numeric>
 #include <sstream>
 
+#include "base/call.h"
+#include "base/parallel.h"
+#include "geometry/pseudonormals.h"
 #include "measure/placed_pair.h"
 #include "measure/split.h"
-#include "reference/call.h"
-#include "reference/parallel.h"
-#include "reference/pseudonormals.h"
 
 namespace tolvol {
 namespace {

@@ -7,9 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "base/progress.h"
+#include "geometry/triangle_mesh.h"
 #include "measure/distance_bounds.h"
-#include "reference/progress.h"
-#include "reference/triangle_mesh.h"
 
 namespace tolvol {
 
@@ -57,10 +57,10 @@ struct Deviation {
 /// these have no length either all triangles count alike (spacing 0).
 ///
 /// b is closed when each of its edges has two faces that run along it in opposite directions. What is inside is told by
-/// its angle-weighted pseudonormals (reference/pseudonormals.h), turned round where its volume is negative: certain
+/// its angle-weighted pseudonormals (geometry/pseudonormals.h), turned round where its volume is negative: certain
 /// unless b intersects itself.
 ///
-/// Throws InvalidInput when a mesh is not valid (reference/triangle_mesh.h), a bound is not a length of 0 or more or a
+/// Throws InvalidInput when a mesh is not valid (geometry/triangle_mesh.h), a bound is not a length of 0 or more or a
 /// percentile is not one, Cancelled. Cost: 2 to 10 us and 200 bytes a piece.
 Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const DeviationOptions& options = {});
 

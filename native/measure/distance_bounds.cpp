@@ -24,7 +24,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "reference/frame.h"
+#include "geometry/frame.h"
 
 namespace tolvol {
 namespace {

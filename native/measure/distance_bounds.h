@@ -5,7 +5,7 @@
 #include <array>
 #include <glm/glm.hpp>
 
-#include "reference/hierarchy.h"
+#include "geometry/hierarchy.h"
 
 namespace tolvol {
 

@@ -35,11 +35,11 @@
 #include <limits>
 #include <vector>
 
+#include "base/call.h"
+#include "base/parallel.h"
+#include "geometry/hierarchy.h"
 #include "measure/placed_pair.h"
 #include "measure/split.h"
-#include "reference/call.h"
-#include "reference/hierarchy.h"
-#include "reference/parallel.h"
 
 namespace tolvol {
 namespace {

@@ -6,8 +6,8 @@
 #include <glm/glm.hpp>
 #include <optional>
 
-#include "reference/progress.h"
-#include "reference/triangle_mesh.h"
+#include "base/progress.h"
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol {
 

@@ -17,8 +17,8 @@
 #include <map>
 #include <utility>
 
-#include "reference/call.h"
-#include "reference/closest_point.h"
+#include "base/call.h"
+#include "geometry/closest_point.h"
 
 namespace tolvol {
 namespace {

@@ -7,8 +7,8 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "reference/frame.h"
-#include "reference/triangle_mesh.h"
+#include "geometry/frame.h"
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol {
 
@@ -18,7 +18,7 @@ struct NearPart {
     std::uint32_t from, to;
     double share;
 
-    /// Errs by at most 4 u (reference/frame.h) in a frame where |x| <= 1 at the result and at `from`.
+    /// Errs by at most 4 u (geometry/frame.h) in a frame where |x| <= 1 at the result and at `from`.
     glm::dvec3 in(const Frame& frame, const TriangleMesh& mesh) const {
       const glm::dvec3 &p = mesh.vertices[from], &q = mesh.vertices[to];
       return frame.from_world(p) + share * ((q - p) * frame.scale());

@@ -4,11 +4,11 @@
 
 #include <cmath>
 
+#include "base/call.h"
+#include "base/errors.h"
+#include "geometry/frame.h"
+#include "geometry/triangle_mesh.h"
 #include "measure/near_part.h"
-#include "reference/call.h"
-#include "reference/errors.h"
-#include "reference/frame.h"
-#include "reference/triangle_mesh.h"
 
 namespace tolvol {
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <glm/glm.hpp>
 
-#include "reference/frame.h"
+#include "geometry/frame.h"
 
 namespace tolvol {
 

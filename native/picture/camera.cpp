@@ -5,7 +5,7 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "reference/errors.h"
+#include "base/errors.h"
 
 namespace tolvol {
 namespace {

@@ -5,8 +5,8 @@
 #include <glm/glm.hpp>
 #include <span>
 
-#include "reference/frame.h"
-#include "reference/triangle_mesh.h"
+#include "geometry/frame.h"
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol {
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <sstream>
 
+#include "base/call.h"
+#include "base/errors.h"
+#include "base/parallel.h"
 #include "gl/context.h"
-#include "reference/call.h"
-#include "reference/errors.h"
-#include "reference/parallel.h"
 
 namespace tolvol {
 namespace {

@@ -7,9 +7,9 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "base/progress.h"
 #include "gl/objects.h"
 #include "picture/transfer.h"
-#include "reference/progress.h"
 
 namespace tolvol {
 

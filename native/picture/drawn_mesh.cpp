@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "reference/call.h"
-#include "reference/errors.h"
+#include "base/call.h"
+#include "base/errors.h"
 
 namespace tolvol {
 namespace {

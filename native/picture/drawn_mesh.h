@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "geometry/frame.h"
 #include "gl/objects.h"
 #include "picture/picture_field.h"
-#include "reference/frame.h"
 
 namespace tolvol {
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "picture/picture_field.h"
 
+#include "base/call.h"
 #include "field/display_grid.h"
 #include "gl/context.h"
-#include "reference/call.h"
 
 namespace tolvol {
 

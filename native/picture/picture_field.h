@@ -6,9 +6,9 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <optional>
 
+#include "base/progress.h"
 #include "field/distance_texture.h"
-#include "reference/progress.h"
-#include "reference/triangle_mesh.h"
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol {
 

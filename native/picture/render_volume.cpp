@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
+#include "base/errors.h"
+#include "base/parallel.h"
 #include "gl/context.h"
-#include "reference/errors.h"
-#include "reference/parallel.h"
 
 namespace tolvol {
 namespace {

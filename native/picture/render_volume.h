@@ -4,11 +4,11 @@
 
 #include <optional>
 
+#include "geometry/hierarchy.h"
 #include "picture/camera.h"
 #include "picture/canvas.h"
 #include "picture/drawn_mesh.h"
 #include "picture/picture_field.h"
-#include "reference/hierarchy.h"
 
 namespace tolvol {
 

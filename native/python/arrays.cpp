@@ -4,7 +4,7 @@
 #include <limits>
 #include <sstream>
 
-#include "reference/errors.h"
+#include "base/errors.h"
 
 namespace tolvol::python {
 namespace {

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "reference/errors.h"
-#include "reference/frame.h"
+#include "base/errors.h"
+#include "geometry/frame.h"
 
 namespace tolvol::python {
 

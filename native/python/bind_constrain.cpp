@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <mutex>
 
-#include "operation/constrain.h"
-#include "operation/guard.h"
+#include "base/errors.h"
+#include "motion/constrain.h"
+#include "motion/guard.h"
 #include "python/arrays.h"
 #include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
-#include "reference/errors.h"
 
 namespace tolvol::python {
 namespace {

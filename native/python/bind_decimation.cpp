@@ -3,13 +3,13 @@
 
 #include <chrono>
 
-#include "operation/decimation.h"
-#include "operation/wedges.h"
+#include "base/errors.h"
+#include "decimation/decimation.h"
 #include "python/arrays.h"
 #include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
-#include "reference/errors.h"
+#include "topology/wedges.h"
 
 namespace tolvol::python {
 namespace {

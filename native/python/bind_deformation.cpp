@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <chrono>
 
-#include "operation/deformation.h"
+#include "base/errors.h"
+#include "motion/deformation.h"
 #include "python/arrays.h"
 #include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
-#include "reference/errors.h"
 
 namespace tolvol::python {
 namespace {

@@ -3,12 +3,12 @@
 
 #include <cmath>
 
+#include "base/errors.h"
 #include "field/display_tree.h"
 #include "python/arrays.h"
 #include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
-#include "reference/errors.h"
 
 namespace tolvol::python {
 namespace {

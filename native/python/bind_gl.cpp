@@ -2,8 +2,8 @@
 #ifdef TOLVOL_GL
 #include "gl/context.h"
 #endif
+#include "base/errors.h"
 #include "python/module.h"
-#include "reference/errors.h"
 
 namespace tolvol::python {
 namespace {

@@ -3,13 +3,13 @@
 
 #include <algorithm>
 
+#include "base/errors.h"
 #include "picture/camera.h"
 #include "picture/transfer.h"
 #include "python/arrays.h"
 #include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
-#include "reference/errors.h"
 #ifdef TOLVOL_GL
 #include "picture/render_distance.h"
 #include "picture/render_volume.h"

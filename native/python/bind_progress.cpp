@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "base/progress.h"
 #include "python/module.h"
-#include "reference/progress.h"
 
 namespace tolvol::python {
 

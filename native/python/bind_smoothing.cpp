@@ -3,12 +3,12 @@
 
 #include <chrono>
 
-#include "operation/smoothing.h"
+#include "base/errors.h"
+#include "motion/smoothing.h"
 #include "python/arrays.h"
 #include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
-#include "reference/errors.h"
 
 namespace tolvol::python {
 namespace {

@@ -4,13 +4,13 @@
 #include <chrono>
 #include <cmath>
 
+#include "base/errors.h"
+#include "base/parallel.h"
 #include "check/tolerance_volume.h"
 #include "python/arrays.h"
 #include "python/interruptible.h"
 #include "python/module.h"
 #include "python/volume.h"
-#include "reference/errors.h"
-#include "reference/parallel.h"
 
 namespace tolvol::python {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "reference/errors.h"
+#include "base/errors.h"
 
 #include "python/module.h"
 

@@ -6,7 +6,7 @@
 
 #include <chrono>
 
-#include "reference/call.h"
+#include "base/call.h"
 
 namespace tolvol::python {
 

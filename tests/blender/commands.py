@@ -9,11 +9,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from addon import file_io, volume
+from addon.files import file_io
+from addon.reference import snapshots
 from scenes import add_object
 
 FOLDER = Path(__file__).resolve().parent
 SCRIPTS = FOLDER.parents[1] / "blender_scripts"
+BENCHMARK, FIGURES = FOLDER.parents[1] / "benchmark", FOLDER.parents[1] / "docs" / "figures"
 PATIENCE = 120  # seconds after which a command counts as stuck
 LINE = re.compile(
     r"([\d,]+) -> ([\d,]+) triangles(?: \((.*)\))?, tolerance ([\d.e-]+) % = ([\d.e-]+), result within ([\d.e+-]+) %, "
@@ -101,7 +103,7 @@ def save(path, *meshes):
 def world(path):
     """(vertices, triangles) of all objects of a file."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    surface = volume.joined([volume.surface_of(ob) for ob in file_io.read_file(path).objects])
+    surface = snapshots.joined([snapshots.surface_of(ob) for ob in file_io.read_file(path).objects])
     return surface.world(), surface.arrays.triangles
 
 

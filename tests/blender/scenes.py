@@ -6,7 +6,7 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from addon import mesh_io
+from addon.mesh import mesh_io
 
 
 def add_object(name, vertices, faces, matrix=None):

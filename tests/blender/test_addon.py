@@ -195,10 +195,10 @@ assert bpy.context.preferences.addons['tolerance_volumes'].preferences.threads =
 with open('/proc/self/maps') as mapped:
     libraries = [line for line in mapped if 'OpenMesh' in line]
 assert all('/tolvol_' in line for line in libraries), libraries  # that of the package, not the system's
-old = sys.modules['tolerance_volumes.volume']
+old = sys.modules['tolerance_volumes.reference']
 installed = install({str(second)!r})
 assert installed.bl_info['version'] == (0, 2, 0)
-assert sys.modules['tolerance_volumes.volume'] is not old
+assert sys.modules['tolerance_volumes.reference'] is not old
 {DECIMATE}
 bpy.ops.preferences.addon_disable(module='tolerance_volumes')
 assert not hasattr(bpy.types.Object, 'tolvol')

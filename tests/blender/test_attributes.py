@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import mesh_io
-from addon.mesh_io import column
+from addon.mesh import mesh_io
+from addon.mesh.mesh_io import column
 from scenes import activate, sheet, torus
 
 KINDS = {

@@ -8,7 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import file_io, native
+from addon import native
+from addon.files import file_io
 from commands import SCRIPTS, command, decimate, save, succeeded, world
 from scenes import assert_within, sheet_arrays, torus_arrays
 
@@ -180,7 +181,7 @@ def test_help():
 PATCH = f"""
 import sys
 sys.path.insert(0, {str(SCRIPTS.parent)!r})
-from addon import file_io
+from addon.files import file_io
 write = file_io.write_file
 def spoiled(path, objects, folder):
     {{}}; write(path, objects, folder)
@@ -205,7 +206,7 @@ def test_a_bug_exits_with_1_and_its_traceback(scan, tmp_path):
 
 
 def test_a_bug_inside_the_operator_is_a_bug(scan, tmp_path):
-    spoil = PATCH.format("pass") + "from addon import transfer; transfer.Writing = None"
+    spoil = PATCH.format("pass") + "from addon.mesh import transfer; transfer.Writing = None"
     code, _, err = decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", before=spoil)
     assert code == 1 and "TypeError" in err
 

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from commands import command, save
+from commands import BENCHMARK, command, save
 from scenes import torus_arrays
 
 
@@ -15,7 +15,9 @@ def written(tmp_path_factory):
     save(folder / "ring.ply", ("ring", *torus_arrays()))
     page, figures = folder / "page.md", folder / "figures.json"
     page.write_text("# A page\n")
-    done = command("comparison.py", folder / "ring.ply", "--tolerance", "8%,5%", "--write", page, "--json", figures)
+    done = command(
+        BENCHMARK / "comparison.py", folder / "ring.ply", "--tolerance", "8%,5%", "--write", page, "--json", figures
+    )
     assert done[0] == 0, done
     return done[1], page, json.loads(figures.read_text())
 
@@ -43,7 +45,15 @@ def test_table_is_replaced_and_the_page_kept(written):
     folder = page.parent
     page.write_text(first + "After.\n")
     done = command(
-        "comparison.py", folder / "ring.ply", "--tolerance", "8%", "--methods", "grid", "--write", page, alone=True
+        BENCHMARK / "comparison.py",
+        folder / "ring.ply",
+        "--tolerance",
+        "8%",
+        "--methods",
+        "grid",
+        "--write",
+        page,
+        alone=True,
     )
     assert done[0] == 0, done
     second = page.read_text()
@@ -62,5 +72,5 @@ def test_table_is_replaced_and_the_page_kept(written):
     ],
 )
 def test_bad_arguments(arguments, word):
-    code, _, err = command("comparison.py", *arguments)
+    code, _, err = command(BENCHMARK / "comparison.py", *arguments)
     assert code == 2 and word in err and len(err.splitlines()) == 1

@@ -7,7 +7,9 @@ import math
 import bpy
 import pytest
 
-from addon import report, volume
+from addon import reference
+from addon.proof import report
+from addon.reference import measurements, snapshots
 from scenes import torus
 
 
@@ -15,7 +17,7 @@ from scenes import torus
 def decimated():
     ob = torus()
     bpy.ops.tolvol.decimate()
-    assert report.remembered_counts(ob.tolvol.last_run) and volume.measurement_of(ob)
+    assert report.remembered_counts(ob.tolvol.last_run) and measurements.measurement_of(ob)
     return ob
 
 
@@ -38,14 +40,14 @@ def test_a_damaged_run_is_no_run(decimated):
 @pytest.mark.parametrize("name", ["tolerance", "forward", "backward"])
 def test_a_damaged_measurement_is_none(decimated, name, value):
     setattr(decimated.tolvol.measurement, name, value)
-    assert volume.measurement_of(decimated) is None
+    assert measurements.measurement_of(decimated) is None
 
 
 def test_a_damaged_reference_has_to_be_set_anew(decimated):
     decimated.tolvol.snapshot.clear_geometry()
-    volume._forget_all()
-    assert volume.shown_size(decimated) is None
-    assert volume.stale_reason(decimated) == "what the file holds of it is damaged"
+    reference.forget_all()
+    assert measurements.shown_size(decimated) is None
+    assert snapshots.stale_reason(decimated) == "what the file holds of it is damaged"
     with pytest.raises(RuntimeError, match="damaged"):
         bpy.ops.tolvol.check()
     bpy.ops.tolvol.set_reference()
@@ -56,7 +58,7 @@ def test_a_damaged_reference_is_replaced_by_the_mesh_it_was_taken_of():
     ob = torus()
     bpy.ops.tolvol.set_reference()
     ob.tolvol.snapshot.clear_geometry()
-    volume._forget_all()
-    assert volume.stale_reason(ob) == "what the file holds of it is damaged"
+    reference.forget_all()
+    assert snapshots.stale_reason(ob) == "what the file holds of it is damaged"
     bpy.ops.tolvol.set_reference()
-    assert volume.stale_reason(ob) is None and bpy.ops.tolvol.check() == {"FINISHED"}
+    assert snapshots.stale_reason(ob) is None and bpy.ops.tolvol.check() == {"FINISHED"}

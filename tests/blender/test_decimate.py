@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import mesh_io, native, verdict, volume
+from addon import native
+from addon.mesh import mesh_io
+from addon.proof import verdict
+from addon.reference import snapshots, tolerances, volumes
 from scenes import activate, assert_within, link, sampled_distance, sheet, torus, world_triangles
 
 PERCENT = 1.0
@@ -253,11 +256,11 @@ def test_tolerance_larger_than_the_reference_is_refused():
 def test_volume_is_built_once_for_equal_content():
     ob = torus()
     bpy.ops.tolvol.set_reference()
-    reference = volume.reference_of(ob)
-    tolerance = volume.tolerance_length(ob.tolvol, reference.size())
-    first = volume.native_volume(reference, tolerance)
-    assert volume.native_volume(volume.reference_of(ob), tolerance) is first
-    assert volume.native_volume(reference, tolerance * 1.5) is not first
+    reference = snapshots.reference_of(ob)
+    tolerance = tolerances.tolerance_length(ob.tolvol, reference.size())
+    first = volumes.native_volume(reference, tolerance)
+    assert volumes.native_volume(snapshots.reference_of(ob), tolerance) is first
+    assert volumes.native_volume(reference, tolerance * 1.5) is not first
     ob.rotation_euler.x = 0.3
     bpy.context.view_layer.update()
-    assert volume.native_volume(volume.reference_of(ob), tolerance) is not first
+    assert volumes.native_volume(snapshots.reference_of(ob), tolerance) is not first

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import mesh_io, native, report, transfer
-from addon.mesh_io import column
+from addon import native
+from addon.mesh import mesh_io, transfer
+from addon.mesh.mesh_io import column
+from addon.proof import report
 from scenes import activate, sheet, torus, world_triangles
 
 PERCENT = 1.0

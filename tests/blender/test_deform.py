@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import mesh_io, native, verdict, volume
+from addon import native
+from addon.mesh import mesh_io
 from addon.operators.deform import native_lattice
+from addon.proof import verdict
+from addon.reference import measurements
 from scenes import activate, add_object, assert_within, link, sheet, torus, world_triangles
 
 PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, 2, 0.5, 1))
@@ -114,7 +117,7 @@ def test_stays_within_the_tolerance_in_the_world(matrix, mode):
     judged = native.module.hausdorff(*stored, *reference, bound=tolerance)
     assert judged.upper <= tolerance * (1 + 1e-6)
     assert_within(stored, reference, tolerance, both_ways=False)
-    measured = volume.measurement_of(ob)
+    measured = measurements.measurement_of(ob)
     assert verdict.of(ob).forward_within and judged.lower <= measured.forward
     assert np.array_equal(mesh_io.read_mesh(ob.tolvol.snapshot).triangles, reference[1])
     assert ob.tolvol.lattice == lattice and ob.tolvol.deform_mode == mode
@@ -156,7 +159,7 @@ def test_quads_that_blender_cuts_along_their_other_diagonal_stay_within():
     stored = world_triangles(ob)
     assert not np.array_equal(stored[1], before[1])
     judged = native.module.hausdorff(*stored, *before)
-    measured = volume.measurement_of(ob)
+    measured = measurements.measurement_of(ob)
     assert judged.lower <= measured.forward <= judged.upper * 1.02
 
 

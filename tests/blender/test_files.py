@@ -12,8 +12,8 @@ import time
 import bpy
 import pytest
 
-from addon import file_io, safe_files
 from addon.errors import NotWritten, Refused
+from addon.files import file_io, safe_files
 from commands import READS_GLTF, SCRIPTS, command, decimate, running, save, succeeded, world
 from scenes import sheet, sheet_arrays
 
@@ -31,7 +31,7 @@ os.replace = failing
 FULL_DISK = f"""
 import resource, signal, sys
 sys.path.insert(0, {str(SCRIPTS.parent)!r})
-from addon import file_io
+from addon.files import file_io
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 write = file_io.write_file
 def limited(*arguments):
@@ -312,7 +312,7 @@ HANGS = f"""
 import signal, sys
 signal.signal({{number}}, signal.SIG_DFL)  # whoever runs the tests in the background has it ignored
 sys.path.insert(0, {str(SCRIPTS.parent)!r})
-from addon import file_io
+from addon.files import file_io
 def hang(*_):
     import hashlib
     open({{sign!r}}, "w").close()

@@ -11,8 +11,9 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import file_check, native, side_files
+from addon import native
 from addon.errors import Refused
+from addon.files import file_check, side_files
 from commands import READS_GLTF, command, decimate, save, succeeded, world
 from scenes import assert_within, torus_arrays
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import guard, mesh_io, native
+from addon import guard, native
+from addon.mesh import mesh_io
 from scenes import activate, add_object, sheet, sheet_arrays, world_triangles
 
 TOLERANCE = 0.02

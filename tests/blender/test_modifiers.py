@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import fit, mesh_io, native, verdict, volume
-from addon.evaluation import Evaluation
-from addon.mesh_io import column
+from addon import native
+from addon.mesh import mesh_io
+from addon.mesh.evaluation import Evaluation
+from addon.mesh.mesh_io import column
+from addon.operators import fit
+from addon.proof import verdict
+from addon.reference import snapshots
 from scenes import activate, add_object, link, torus, world_triangles
 
 PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, 2, 0.5, 1))
@@ -68,7 +72,7 @@ KEEPING = {
 def test_keeps_the_tolerance_and_goes_as_far(kind, matrix):
     ob = modified(kind, matrix, KEEPING[kind])
     reference, before, wished = world_triangles(ob), coordinates(ob), evaluated(ob)
-    tolerance = 0.01 * volume.surface_of(ob).size()
+    tolerance = 0.01 * snapshots.surface_of(ob).size()
     beyond = native.module.hausdorff(mesh_io.to_world(wished, np.array(ob.matrix_world)), reference[1], *reference)
     assert beyond.lower > 1.1 * tolerance
     assert bpy.ops.tolvol.apply_modifier(modifier=kind) == {"FINISHED"}
@@ -113,7 +117,7 @@ def test_acts_on_the_base_mesh_without_other_modifiers_keys_and_animation():
 
 def test_new_object_leaves_this_one_alone():
     ob = modified("SMOOTH", PLACED, {"iterations": 30})
-    before, reference, tolerance = coordinates(ob), world_triangles(ob), 0.01 * volume.surface_of(ob).size()
+    before, reference, tolerance = coordinates(ob), world_triangles(ob), 0.01 * snapshots.surface_of(ob).size()
     bpy.ops.tolvol.apply_modifier(result="OBJECT")
     new = bpy.context.active_object
     assert new != ob and new.select_get() and not ob.select_get() and new.data != ob.data
@@ -126,7 +130,7 @@ def test_new_object_leaves_this_one_alone():
 
 def test_shape_key_holds_the_result_and_the_base_stays():
     ob = modified("SMOOTH", settings={"iterations": 30})
-    before, reference, tolerance = coordinates(ob), world_triangles(ob), 0.01 * volume.surface_of(ob).size()
+    before, reference, tolerance = coordinates(ob), world_triangles(ob), 0.01 * snapshots.surface_of(ob).size()
     bpy.ops.tolvol.apply_modifier(result="SHAPE_KEY")
     assert np.array_equal(coordinates(ob), before) and not ob.modifiers
     basis, key = ob.data.shape_keys.key_blocks
@@ -184,7 +188,7 @@ def test_what_cannot_be_applied_is_refused():
 def test_fitted_is_within_both_ways_and_much_smaller(kind, settings, matrix):
     ob = modified(kind, matrix, settings)
     mesh, reference = ob.data.name, world_triangles(ob)
-    tolerance = 0.02 * volume.surface_of(ob).size()
+    tolerance = 0.02 * snapshots.surface_of(ob).size()
     ob.tolvol.tolerance_percent = 2
     assert bpy.ops.tolvol.fit_modifier() == {"FINISHED"}
     stored = world_triangles(ob)
@@ -197,7 +201,7 @@ def test_fitted_is_within_both_ways_and_much_smaller(kind, settings, matrix):
 
 def test_within_3_percent_of_the_best_of_200_certified_settings():
     ob = modified("DECIMATE")
-    reference, tolerance = world_triangles(ob), 0.01 * volume.surface_of(ob).size()
+    reference, tolerance = world_triangles(ob), 0.01 * snapshots.surface_of(ob).size()
     best = len(reference[1])
     with Evaluation(ob, "DECIMATE") as evaluation:
         for ratio in np.geomspace(4 / best, 1, 200):

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import mesh_io
+from addon.mesh import mesh_io
 from scenes import activate, add_object, assert_within, sheet_arrays, torus, torus_arrays, world_triangles
 
 

@@ -7,9 +7,12 @@ import pytest
 from mathutils import Matrix
 
 import addon
-from addon import mesh_io, native, overlay, preferences, report, verdict, volume
+from addon import native, overlay, preferences
+from addon.mesh import mesh_io
 from addon.operators import blocked, presets, reference
 from addon.overlay import draw, reasons
+from addon.proof import report, verdict
+from addon.reference import measurements, snapshots, tolerances, volumes
 from scenes import activate, add_object, link, sheet, torus, world_triangles
 
 OPERATORS = (bpy.ops.tolvol.set_reference, bpy.ops.tolvol.check, bpy.ops.tolvol.select_outside, bpy.ops.tolvol.decimate)
@@ -53,12 +56,12 @@ def test_own_reference_is_carried_along_moved_and_scaled():
     bpy.ops.tolvol.set_reference()
     ob.matrix_world = Matrix.Translation((3, 1, 2)) @ Matrix.Rotation(1.1, 4, (1, 1, 0)) @ Matrix.Diagonal((1, 2, 1, 1))
     bpy.context.view_layer.update()
-    assert volume.stale_reason(ob) is None
+    assert snapshots.stale_reason(ob) is None
     bpy.ops.tolvol.check()
     assert ob.tolvol.measurement.forward <= 1e-5 and ob.tolvol.measurement.backward <= 1e-5
     ob.scale.x *= 1.5
     bpy.context.view_layer.update()
-    assert volume.stale_reason(ob) is None and verdict.of(ob) is None
+    assert snapshots.stale_reason(ob) is None and verdict.of(ob) is None
     bpy.ops.tolvol.check()
     assert verdict.of(ob).forward.upper <= 1e-5 and verdict.of(ob).backward.upper <= 1e-5
 
@@ -71,7 +74,7 @@ def test_a_scaled_object_keeps_its_original_as_the_reference():
     before = verdict.of(ob)
     ob.scale = (10, 10, 10)
     bpy.context.view_layer.update()
-    reference = volume.reference_of(ob)
+    reference = snapshots.reference_of(ob)
     assert reference.arrays.fingerprint() == original.fingerprint()
     assert ob.tolvol.snapshot_size == reference.size()
     bpy.ops.tolvol.check()
@@ -102,13 +105,13 @@ def test_choosing_another_reference_makes_it_stale():
     ob = torus()
     bpy.ops.tolvol.set_reference()
     ob.tolvol.reference_kind = "OBJECT"
-    assert volume.stale_reason(ob) == "another one was chosen"
+    assert snapshots.stale_reason(ob) == "another one was chosen"
     assert not bpy.ops.tolvol.set_reference.poll()  # which object?
     ob.tolvol.reference_object = other
     bpy.ops.tolvol.set_reference()
-    assert volume.stale_reason(ob) is None
+    assert snapshots.stale_reason(ob) is None
     ob.tolvol.reference_object = torus("third")
-    assert volume.stale_reason(ob) == "another object was chosen"
+    assert snapshots.stale_reason(ob) == "another object was chosen"
 
 
 def test_reference_object_cannot_be_the_object_itself_or_no_mesh():
@@ -144,7 +147,7 @@ def test_check_measures_both_ways_and_the_share_outside():
     # A quarter of the sheet is 0.1 up, and half of the slope (0.1 wide) to it.
     area = 2 * 2 * 0.75 - 2 * 0.1 + 2 * np.hypot(0.1, 0.1) + 2 * 2 * 0.25
     assert measured.share_outside == pytest.approx((2 * 2 * 0.25 + np.hypot(0.1, 0.1)) / area, abs=0.01)
-    assert volume.measurement_of(ob) is not None
+    assert measurements.measurement_of(ob) is not None
     ob.tolvol.tolerance_length = 0.2
     bpy.ops.tolvol.check()
     assert verdict.of(ob).forward_within and verdict.of(ob).backward_within
@@ -156,21 +159,21 @@ def test_measurement_is_dropped_when_mesh_place_or_reference_change():
     ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", other
     bpy.ops.tolvol.set_reference()
     bpy.ops.tolvol.check()
-    assert volume.measurement_of(ob) is not None
+    assert measurements.measurement_of(ob) is not None
     ob.location.x = 1
     bpy.context.view_layer.update()
-    assert volume.measurement_of(ob) is None
+    assert measurements.measurement_of(ob) is None
     ob.location.x = 0
     bpy.context.view_layer.update()
-    assert volume.measurement_of(ob) is not None
+    assert measurements.measurement_of(ob) is not None
     ob.data.vertices[5].co.z += 0.01
     ob.data.update()
     bpy.context.view_layer.update()
-    assert volume.measurement_of(ob) is None
+    assert measurements.measurement_of(ob) is None
     bpy.ops.tolvol.check()
-    assert volume.measurement_of(ob) is not None
+    assert measurements.measurement_of(ob) is not None
     bpy.ops.tolvol.set_reference()
-    assert volume.measurement_of(ob) is None
+    assert measurements.measurement_of(ob) is None
 
 
 def test_nothing_is_known_of_a_mesh_that_is_being_edited():
@@ -179,9 +182,9 @@ def test_nothing_is_known_of_a_mesh_that_is_being_edited():
     bpy.ops.tolvol.check()
     for mode in ("EDIT", "SCULPT"):
         bpy.ops.object.mode_set(mode=mode)
-        assert volume.measurement_of(ob) is None
+        assert measurements.measurement_of(ob) is None
         bpy.ops.object.mode_set(mode="OBJECT")
-        assert volume.measurement_of(ob) is not None
+        assert measurements.measurement_of(ob) is not None
 
 
 def test_own_measurement_moves_along():
@@ -189,7 +192,7 @@ def test_own_measurement_moves_along():
     bpy.ops.tolvol.decimate(tolerance_percent=1)
     ob.rotation_euler.x = 1
     bpy.context.view_layer.update()
-    assert volume.measurement_of(ob) is not None
+    assert measurements.measurement_of(ob) is not None
 
 
 def test_select_outside_selects_those_faces_in_edit_mode():
@@ -237,7 +240,7 @@ def test_verdicts_agree_about_what_float32_cannot_tell_from_the_tolerance():
     ob.tolvol.tolerance_length = 0.3
     ob.tolvol.tolerance_length = 0.1
     ob.tolvol.tolerance_length_converted = repr(height * (1 + 1e-9))  # as converted from a percentage
-    assert volume.tolerance_length(ob.tolvol, 1.0) > height
+    assert tolerances.tolerance_length(ob.tolvol, 1.0) > height
     assert verdict.of(ob).kind == verdict.WITHIN, "of what was measured, before it is measured again"
     bpy.ops.tolvol.check()
     assert verdict.of(ob).kind == verdict.WITHIN
@@ -358,7 +361,7 @@ def test_a_reference_that_is_no_mesh_is_refused():
     ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", curve
     with pytest.raises(RuntimeError, match="wire is no mesh: Object > Convert > Mesh"):
         bpy.ops.tolvol.set_reference()
-    assert volume.shown_size(ob) is None
+    assert measurements.shown_size(ob) is None
 
 
 # What becomes of objects ---------------------------------------------------------------------------------------------
@@ -374,20 +377,20 @@ def referenced(name="torus"):
 
 def test_volume_in_memory_is_that_of_the_tolerance():
     ob = referenced()
-    built = volume.built_of(ob)
+    built = volumes.built_of(ob)
     assert built.tolerance == pytest.approx(0.01 * ob.tolvol.snapshot_size, rel=1e-6) and built.memory > 0
     ob.tolvol.tolerance_percent = 2
-    assert volume.built_of(ob) is None
+    assert volumes.built_of(ob) is None
     bpy.ops.tolvol.check()
     bpy.ops.tolvol.decimate()
-    assert volume.built_of(ob).tolerance == pytest.approx(2 * built.tolerance)
+    assert volumes.built_of(ob).tolerance == pytest.approx(2 * built.tolerance)
 
 
 def test_renaming_changes_nothing():
     ob = referenced()
     ob.name, ob.data.name, ob.tolvol.snapshot.name = "other", "mesh", "moved"
     bpy.context.view_layer.update()
-    assert volume.measurement_of(ob) is not None and volume.stale_reason(ob) is None
+    assert measurements.measurement_of(ob) is not None and snapshots.stale_reason(ob) is None
     assert bpy.ops.tolvol.check() == {"FINISHED"}
 
 
@@ -395,14 +398,16 @@ def test_duplicates_share_a_reference_until_one_gets_another():
     ob = referenced()
     bpy.ops.object.duplicate()
     twin = bpy.context.object
-    assert twin is not ob and twin.tolvol.snapshot is ob.tolvol.snapshot and volume.measurement_of(twin) is not None
+    assert (
+        twin is not ob and twin.tolvol.snapshot is ob.tolvol.snapshot and measurements.measurement_of(twin) is not None
+    )
     before = mesh_io.read_mesh(ob.tolvol.snapshot).fingerprint()
     bpy.ops.tolvol.set_reference()
-    assert twin.tolvol.snapshot is not ob.tolvol.snapshot and volume.measurement_of(twin) is None
+    assert twin.tolvol.snapshot is not ob.tolvol.snapshot and measurements.measurement_of(twin) is None
     assert mesh_io.read_mesh(ob.tolvol.snapshot).fingerprint() == before
     bpy.data.objects.remove(twin)
     activate(ob)
-    assert volume.measurement_of(ob) is not None and bpy.ops.tolvol.check() == {"FINISHED"}
+    assert measurements.measurement_of(ob) is not None and bpy.ops.tolvol.check() == {"FINISHED"}
 
 
 def test_reference_outlives_the_object_it_was_taken_of():
@@ -411,21 +416,21 @@ def test_reference_outlives_the_object_it_was_taken_of():
     ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", other
     bpy.ops.tolvol.set_reference()
     bpy.data.objects.remove(other)
-    assert volume.shown_size(ob) == ob.tolvol.snapshot_size
+    assert measurements.shown_size(ob) == ob.tolvol.snapshot_size
     assert bpy.ops.tolvol.check() == {"FINISHED"}
     bpy.ops.tolvol.clear_reference()
-    assert blocked.reference_blocked(ob) == "Choose the reference object" and volume.shown_size(ob) is None
+    assert blocked.reference_blocked(ob) == "Choose the reference object" and measurements.shown_size(ob) is None
 
 
 def test_another_mesh_on_the_object_is_noticed():
     ob = referenced()
     ob.data = torus("other", seed=2).data
     bpy.context.view_layer.update()
-    assert volume.measurement_of(ob) is None
+    assert measurements.measurement_of(ob) is None
 
 
 def assert_whole(ob):
-    assert volume.stale_reason(ob) is None and verdict.of(ob).forward_within
+    assert snapshots.stale_reason(ob) is None and verdict.of(ob).forward_within
     assert len(ob.tolvol.snapshot.vertices) == 48 * 24 and ob.tolvol.tolerance_percent == 1
     assert bpy.ops.tolvol.check() == {"FINISHED"} and bpy.ops.tolvol.decimate.poll()
 
@@ -436,7 +441,7 @@ def test_saved_loaded_and_appended(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
     ob = bpy.data.objects["torus"]
-    assert volume.built_of(ob) is None
+    assert volumes.built_of(ob) is None
     assert_whole(ob)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     with bpy.data.libraries.load(path) as (_, there):
@@ -560,13 +565,13 @@ def test_tolerance_begins_as_the_preferences_say_and_stays_once_a_reference_is_s
 
 def test_presets_are_shown_as_length_and_share():
     ob = torus()
-    size = volume.shown_size(ob)
+    size = measurements.shown_size(ob)
     assert bpy.ops.tolvol.set_tolerance(mode="LENGTH", value=0.05) == {"FINISHED"}
-    assert volume.tolerance_length(ob.tolvol, size) == 0.05
+    assert tolerances.tolerance_length(ob.tolvol, size) == 0.05
     said = presets.label(bpy.context, "LENGTH", 0.05, size).replace("\u00a0", " ")
     assert said == f"0.05 in file units:  5 cm,  {5 / size:.3g} % of size"
     bpy.ops.tolvol.set_tolerance(mode="PERCENT", value=0.1)
-    assert volume.tolerance_length(ob.tolvol, size) == 0.001 * size
+    assert tolerances.tolerance_length(ob.tolvol, size) == 0.001 * size
     assert presets.label(bpy.context, "PERCENT", 0.1, None) == "0.1 % of size"
 
 
@@ -606,31 +611,33 @@ def test_what_the_module_refuses_is_said_in_the_panels_words():
 def test_percent_that_was_typed_is_the_percent_that_is_used():
     ob = torus()
     ob.tolvol.tolerance_percent = 0.1  # not a float32
-    assert volume.tolerance_length(ob.tolvol, 1.0) == 0.1 / 100
+    assert tolerances.tolerance_length(ob.tolvol, 1.0) == 0.1 / 100
 
 
 def test_changing_the_unit_keeps_the_tolerance():
     ob = torus()
     ob.scale = (0.1, 0.1, 0.1)
     bpy.context.view_layer.update()
-    size = volume.shown_size(ob)
+    size = measurements.shown_size(ob)
     ob.tolvol.tolerance_percent = 0.3
     wanted = 0.3 / 100 * size
     ob.tolvol.tolerance_mode = "LENGTH"
-    assert volume.tolerance_length(ob.tolvol, size) == wanted and ob.tolvol.tolerance_length == pytest.approx(wanted)
+    assert tolerances.tolerance_length(ob.tolvol, size) == wanted and ob.tolvol.tolerance_length == pytest.approx(
+        wanted
+    )
     ob.tolvol.tolerance_mode = "PERCENT"
-    assert volume.tolerance_length(ob.tolvol, size) == wanted and ob.tolvol.tolerance_percent == pytest.approx(0.3)
+    assert tolerances.tolerance_length(ob.tolvol, size) == wanted and ob.tolvol.tolerance_percent == pytest.approx(0.3)
     bpy.ops.tolvol.decimate()
     assert verdict.of(ob).kind == verdict.WITHIN
     # The operator, in Adjust Last Operation, has both forms of what it used.
     ob.tolvol.tolerance_mode = "LENGTH"
     assert verdict.of(ob).kind == verdict.WITHIN and verdict.of(ob).tolerance == wanted
     ob.tolvol.tolerance_length = 0.05
-    assert volume.tolerance_length(ob.tolvol, size) == 0.05
+    assert tolerances.tolerance_length(ob.tolvol, size) == 0.05
     ob.tolvol.tolerance_mode = "LENGTH"
-    assert volume.tolerance_length(ob.tolvol, size) == 0.05, "not converted again"
+    assert tolerances.tolerance_length(ob.tolvol, size) == 0.05, "not converted again"
     ob.tolvol.tolerance_mode = "PERCENT"
-    assert volume.tolerance_length(ob.tolvol, size) == pytest.approx(0.05, rel=1e-15)
+    assert tolerances.tolerance_length(ob.tolvol, size) == pytest.approx(0.05, rel=1e-15)
 
 
 def test_a_quarter_of_a_metre():
@@ -659,7 +666,7 @@ def test_a_length_typed_in_a_unit_of_the_scene_is_that_length():
         units.system, units.scale_length = system, scale
         scale_as_stored = 1.0 if system == "NONE" else units.scale_length
         settings.tolerance_length = wanted if system == "NONE" else metres / scale_as_stored  # as Blender reads a field
-        assert volume.tolerance_length(settings, 1.0) == pytest.approx(wanted, rel=1e-15), (system, scale, metres)
+        assert tolerances.tolerance_length(settings, 1.0) == pytest.approx(wanted, rel=1e-15), (system, scale, metres)
     units.system, units.scale_length = "METRIC", 0.001
     settings.tolerance_length = 0.123456789  # dragged
-    assert np.float32(volume.tolerance_length(settings, 1.0)) == np.float32(0.123456789)
+    assert np.float32(tolerances.tolerance_length(settings, 1.0)) == np.float32(0.123456789)

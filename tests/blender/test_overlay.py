@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import addon
-from addon import overlay, preferences, volume
+from addon import overlay, preferences
 from addon.overlay import field, legend, reasons, shares, surface, work
+from addon.reference import snapshots
 from scenes import add_object, sheet, torus
 
 
@@ -29,7 +30,7 @@ def test_on_after_set_reference_and_without_a_window_neither_drawn_nor_a_crash()
 
 def test_every_change_of_a_reference_is_told_and_the_listener_leaves_with_the_addon():
     told = []
-    volume.listeners.append(lambda: told.append(True))
+    snapshots.listeners.append(lambda: told.append(True))
     try:
 
         def tells(change):
@@ -47,11 +48,11 @@ def test_every_change_of_a_reference_is_told_and_the_listener_leaves_with_the_ad
         assert tells(bpy.ops.tolvol.clear_reference)
         assert tells(lambda: bpy.ops.wm.read_factory_settings(use_empty=True))
     finally:
-        volume.listeners.pop()
-    assert overlay.refresh in volume.listeners
+        snapshots.listeners.pop()
+    assert overlay.refresh in snapshots.listeners
     addon.unregister()
     try:
-        assert overlay.refresh not in volume.listeners
+        assert overlay.refresh not in snapshots.listeners
     finally:
         addon.register()
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from addon import native
-from commands import command, decimate, succeeded
+from commands import FIGURES, command, decimate, succeeded
 
 pytestmark = pytest.mark.usefixtures("gl")
 
@@ -63,9 +63,9 @@ def test_a_picture_needs_a_folder_and_a_png(scan, tmp_path):
 
 
 def test_figures_are_drawn_of_any_mesh(scan, tmp_path):
-    assert command("figures.py", scan, "--output", tmp_path, "--tolerance", "2%", alone=True)[::2] == (0, "")
+    assert command(FIGURES / "figures.py", scan, "--output", tmp_path, "--tolerance", "2%", alone=True)[::2] == (0, "")
     volume, distance = pixels(tmp_path / "volume.png"), pixels(tmp_path / "distance.png")
     for picture in (volume, distance):
         assert len(np.unique(picture.reshape(-1, 4), axis=0)) > 1000
-    code, _, error = command("figures.py", scan, "--output", tmp_path / "nowhere")
+    code, _, error = command(FIGURES / "figures.py", scan, "--output", tmp_path / "nowhere")
     assert code == 2 and "does not exist" in error

@@ -12,7 +12,9 @@ import bpy
 import numpy as np
 import pytest
 
-from addon import deviation, mesh_io, volume
+from addon.mesh import mesh_io
+from addon.proof import deviation
+from addon.reference import snapshots
 from commands import command, save
 from scenes import activate, add_object, sheet, sheet_arrays, torus, torus_arrays
 
@@ -20,7 +22,7 @@ PNG = b"\x89PNG\r\n\x1a\n not looked at"
 
 
 def surface(vertices, faces, name="part"):
-    return volume.surface_of(add_object(name, vertices, faces))
+    return snapshots.surface_of(add_object(name, vertices, faces))
 
 
 def step(height=0.1, start=0.15):

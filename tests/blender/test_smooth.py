@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon import mesh_io, native, verdict, volume
-from addon.mesh_io import column
+from addon import native
+from addon.mesh import mesh_io
+from addon.mesh.mesh_io import column
+from addon.proof import verdict
+from addon.reference import measurements
 from scenes import add_object, sheet, torus, world_triangles
 
 PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, 2, 0.5, 1))
@@ -49,7 +52,7 @@ def test_stays_within_the_tolerance_in_the_world(matrix):
     judged = native.module.hausdorff(*stored, *reference, bound=tolerance)
     assert 0.9 * tolerance < judged.upper <= tolerance
     assert roughness(ob) < 0.8 * rough
-    measured = volume.measurement_of(ob)
+    measured = measurements.measurement_of(ob)
     assert verdict.of(ob).forward_within and judged.lower <= measured.forward
     assert np.array_equal(mesh_io.read_mesh(ob.tolvol.snapshot).triangles, reference[1])
     assert ob.tolvol.smooth.iterations == 60 and ob.tolvol.smooth.method == "LAPLACIAN"

@@ -6,7 +6,8 @@ import threading
 
 import pytest
 
-from addon import native, volume
+from addon import native, reference
+from addon.reference import snapshots, volumes
 from scenes import torus
 
 PATIENCE = 60  # seconds after which a thread counts as stuck
@@ -28,7 +29,7 @@ def builds(monkeypatch):
         return build(*arguments, **options)
 
     monkeypatch.setattr(native.module, "ToleranceVolume", built)
-    volume._forget_all()
+    reference.forget_all()
     return Builds
 
 
@@ -41,7 +42,7 @@ class Asking(threading.Thread):
 
     def run(self):
         try:
-            self.volume = volume.native_volume(self.surface, self.tolerance, 1, self.progress)
+            self.volume = volumes.native_volume(self.surface, self.tolerance, 1, self.progress)
         except Exception as error:
             self.error = error
 
@@ -52,14 +53,14 @@ class Asking(threading.Thread):
 
 def test_a_panel_is_drawn_while_jobs_add_and_drop_volumes(monkeypatch):
     ob = torus(around=12, across=6)
-    surface = volume.surface_of(ob)
-    volume.set_reference(ob, surface)
-    monkeypatch.setattr(volume.native.module, "ToleranceVolume", lambda *_, **__: type("Volume", (), {"memory": 1}))
+    surface = snapshots.surface_of(ob)
+    snapshots.set_reference(ob, surface)
+    monkeypatch.setattr(native.module, "ToleranceVolume", lambda *_, **__: type("Volume", (), {"memory": 1}))
     going = threading.Event()
 
     def add():
         for i in range(1_000):
-            volume.native_volume(surface, 1 + i)
+            volumes.native_volume(surface, 1 + i)
         going.set()
 
     interval = sys.getswitchinterval()
@@ -68,15 +69,15 @@ def test_a_panel_is_drawn_while_jobs_add_and_drop_volumes(monkeypatch):
     try:
         thread.start()
         while not going.is_set():
-            volume.built_of(ob)
+            volumes.built_of(ob)
     finally:
         sys.setswitchinterval(interval)
         thread.join(PATIENCE)
-        volume._forget_all()
+        reference.forget_all()
 
 
 def test_two_jobs_that_need_one_volume_build_it_once(builds):
-    surface = volume.surface_of(torus(around=12, across=6))
+    surface = snapshots.surface_of(torus(around=12, across=6))
     jobs = [Asking(surface, 0.1) for _ in range(2)]
     jobs[1].join(0.3)  # the second one has come to where it builds, or waits
     builds.go.set()
@@ -85,7 +86,7 @@ def test_two_jobs_that_need_one_volume_build_it_once(builds):
 
 
 def test_a_job_that_waits_for_anothers_volume_can_be_cancelled(builds):
-    surface = volume.surface_of(torus(around=12, across=6))
+    surface = snapshots.surface_of(torus(around=12, across=6))
     first, second = Asking(surface, 0.1), Asking(surface, 0.1)
     second.join(0.3)
     second.progress.cancel()
@@ -95,7 +96,7 @@ def test_a_job_that_waits_for_anothers_volume_can_be_cancelled(builds):
 
 
 def test_a_volume_that_failed_is_built_by_the_job_that_waited_for_it(builds):
-    surface = volume.surface_of(torus(around=12, across=6))
+    surface = snapshots.surface_of(torus(around=12, across=6))
 
     def fail_once():
         if builds.begun == 1:

@@ -11,14 +11,14 @@
 #include <vector>
 
 #include "check/certificate.h"
+#include "decimation/decimation.h"
 #include "field/display_grid.h"
 #include "measure/deviation.h"
 #include "measure/hausdorff.h"
-#include "operation/constrain.h"
-#include "operation/decimation.h"
-#include "operation/deformation.h"
-#include "operation/guard.h"
-#include "operation/smoothing.h"
+#include "motion/constrain.h"
+#include "motion/deformation.h"
+#include "motion/guard.h"
+#include "motion/smoothing.h"
 #include "shapes.h"
 
 namespace {

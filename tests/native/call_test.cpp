@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "reference/call.h"
+#include "base/call.h"
 
 #include <gtest/gtest.h>
 
@@ -8,19 +8,19 @@
 #include <optional>
 #include <vector>
 
+#include "base/parallel.h"
 #include "check/certificate.h"
+#include "decimation/decimation.h"
 #include "field/display_grid.h"
 #include "field/scatter.h"
 #include "field/signs.h"
 #include "measure/deviation.h"
 #include "measure/hausdorff.h"
-#include "operation/constrain.h"
-#include "operation/decimation.h"
-#include "operation/deformation.h"
-#include "operation/guard.h"
-#include "operation/smoothing.h"
+#include "motion/constrain.h"
+#include "motion/deformation.h"
+#include "motion/guard.h"
+#include "motion/smoothing.h"
 #include "polls.h"
-#include "reference/parallel.h"
 #include "shapes.h"
 
 namespace tolvol {

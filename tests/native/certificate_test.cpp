@@ -8,10 +8,10 @@
 #include <numeric>
 #include <random>
 
+#include "base/errors.h"
+#include "base/simd.h"
 #include "many.h"
 #include "measure/hausdorff.h"
-#include "reference/errors.h"
-#include "reference/simd.h"
 #include "shapes.h"
 
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "reference/closest_point.h"
+#include "geometry/closest_point.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "operation/collapse_queue.h"
+#include "decimation/collapse_queue.h"
 
 #include <gtest/gtest.h>
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Meshes large enough to be cut into regions.
-#include "operation/collapse_rounds.h"
+#include "decimation/collapse_rounds.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "base/errors.h"
 #include "decimation_cases.h"
-#include "operation/wedges.h"
-#include "reference/errors.h"
 #include "shapes.h"
+#include "topology/wedges.h"
 
 namespace {
 

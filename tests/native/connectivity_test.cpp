@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "operation/connectivity.h"
+#include "topology/connectivity.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "operation/manifold_cut.h"
 #include "shapes.h"
+#include "topology/manifold_cut.h"
 
 namespace {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What is stored is judged by measure/hausdorff.h and once more by the certificate, whole.
-#include "operation/constrain.h"
+#include "motion/constrain.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 #include <cstring>
 #include <memory>
 
+#include "base/errors.h"
 #include "check/certificate.h"
 #include "measure/hausdorff.h"
 #include "placed_mesh.h"
-#include "reference/errors.h"
 #include "shapes.h"
 
 namespace {

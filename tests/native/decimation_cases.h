@@ -7,8 +7,8 @@
 #include <cmath>
 #include <vector>
 
+#include "decimation/decimation.h"
 #include "measure/hausdorff.h"
-#include "operation/decimation.h"
 #include "placed_mesh.h"
 #include "shapes.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Every result is judged by measure/hausdorff.h on what is stored.
-#include "operation/decimation.h"
+#include "decimation/decimation.h"
 
 #include <gtest/gtest.h>
 
@@ -9,12 +9,12 @@
 #include <memory>
 #include <set>
 
+#include "base/errors.h"
+#include "base/simd.h"
 #include "decimation_cases.h"
 #include "measure/hausdorff.h"
-#include "operation/wedges.h"
-#include "reference/errors.h"
-#include "reference/simd.h"
 #include "shapes.h"
+#include "topology/wedges.h"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "operation/deferred_proof.h"
+#include "decimation/deferred_proof.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 #include <optional>
 
 #include "check/certificate.h"
+#include "decimation/collapse_loop.h"
 #include "measure/hausdorff.h"
-#include "operation/collapse_loop.h"
-#include "operation/manifold_cut.h"
 #include "shapes.h"
+#include "topology/manifold_cut.h"
 
 namespace {
 

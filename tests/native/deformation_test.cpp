@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Every result with a volume is judged by measure/hausdorff.h on what is stored.
-#include "operation/deformation.h"
+#include "motion/deformation.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 
+#include "base/errors.h"
 #include "measure/hausdorff.h"
-#include "reference/errors.h"
 #include "shapes.h"
 
 namespace {

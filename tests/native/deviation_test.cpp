@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "reference/errors.h"
+#include "base/errors.h"
 #include "shapes.h"
 
 namespace {

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <random>
 
-#include "reference/hierarchy.h"
+#include "geometry/hierarchy.h"
 #include "shapes.h"
 
 namespace {

@@ -5,10 +5,10 @@
 
 #include <algorithm>
 
+#include "base/errors.h"
+#include "base/simd.h"
 #include "field/scatter.h"
-#include "reference/closest_point.h"
-#include "reference/errors.h"
-#include "reference/simd.h"
+#include "geometry/closest_point.h"
 #include "shapes.h"
 
 namespace {

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "base/errors.h"
 #include "field/scatter.h"
 #include "gl_fixture.h"
-#include "reference/errors.h"
 #include "shapes.h"
 
 namespace {

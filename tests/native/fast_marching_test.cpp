@@ -5,10 +5,10 @@
 
 #include <algorithm>
 
+#include "base/errors.h"
+#include "base/simd.h"
 #include "field/scatter.h"
 #include "field/signs.h"
-#include "reference/errors.h"
-#include "reference/simd.h"
 #include "shapes.h"
 
 namespace {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "reference/frame.h"
+#include "geometry/frame.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 
-#include "reference/errors.h"
+#include "base/errors.h"
 #include "shapes.h"
 
 namespace {

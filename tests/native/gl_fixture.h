@@ -7,9 +7,9 @@
 
 #include <cstdlib>
 
+#include "base/errors.h"
 #include "gl/context.h"
 #include "gl/objects.h"
-#include "reference/errors.h"
 
 inline void require_gl() {
   try {

@@ -6,8 +6,8 @@
 #include <thread>
 #include <vector>
 
+#include "base/errors.h"
 #include "gl_fixture.h"
-#include "reference/errors.h"
 
 namespace {
 

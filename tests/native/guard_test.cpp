@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Judged by measure/hausdorff.h on the float32 positions that the caller holds.
-#include "operation/guard.h"
+#include "motion/guard.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 #include <optional>
 #include <utility>
 
+#include "base/errors.h"
 #include "measure/hausdorff.h"
-#include "reference/errors.h"
 #include "shapes.h"
 
 namespace {

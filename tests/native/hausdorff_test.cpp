@@ -8,9 +8,9 @@
 #include <cmath>
 #include <random>
 
-#include "reference/call.h"
-#include "reference/closest_point.h"
-#include "reference/errors.h"
+#include "base/call.h"
+#include "base/errors.h"
+#include "geometry/closest_point.h"
 #include "shapes.h"
 
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "reference/hierarchy.h"
+#include "geometry/hierarchy.h"
 
 #include <gtest/gtest.h>
 

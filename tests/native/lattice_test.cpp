@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Against the definitions: Bernstein polynomials by binomials, basis functions by the recursion of Cox and de Boor.
-#include "operation/lattice.h"
+#include "motion/lattice.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "reference/errors.h"
+#include "base/errors.h"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "operation/manifold_cut.h"
+#include "topology/manifold_cut.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // ModToleranceT in OpenMesh's own decimaters, judged by measure/hausdorff.h on the mesh as OpenMesh stores it.
-#include "operation/ModToleranceT.hh"
+#include "openmesh/ModToleranceT.hh"
 
 #include <gtest/gtest.h>
 

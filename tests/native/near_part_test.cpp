@@ -6,9 +6,9 @@
 #include <cmath>
 #include <random>
 
+#include "geometry/closest_point.h"
+#include "geometry/hierarchy.h"
 #include "measure/hausdorff.h"
-#include "reference/closest_point.h"
-#include "reference/hierarchy.h"
 #include "shapes.h"
 
 namespace {

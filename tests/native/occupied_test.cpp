@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "operation/occupied.h"
+#include "decimation/occupied.h"
 
 #include <gtest/gtest.h>
 
 #include "check/certificate.h"
-#include "operation/change.h"
-#include "operation/manifold_cut.h"
+#include "decimation/change.h"
 #include "shapes.h"
+#include "topology/manifold_cut.h"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "reference/oriented_boxes.h"
+#include "geometry/oriented_boxes.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "reference/closest_point.h"
+#include "geometry/closest_point.h"
 
 namespace {
 

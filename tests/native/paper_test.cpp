@@ -6,10 +6,10 @@
 
 #include <algorithm>
 
+#include "base/errors.h"
 #include "candidates.h"
 #include "check/methods.h"
 #include "gl_fixture.h"
-#include "reference/errors.h"
 
 namespace {
 

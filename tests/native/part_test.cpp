@@ -9,7 +9,7 @@
 #include <random>
 
 #include "check/witness.h"
-#include "reference/closest_point.h"
+#include "geometry/closest_point.h"
 
 namespace tolvol {
 namespace {

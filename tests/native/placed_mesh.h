@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "check/tolerance_volume.h"
-#include "reference/frame.h"
+#include "geometry/frame.h"
 
 namespace tolvol {
 

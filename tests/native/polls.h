@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Polls of a call (reference/call.h), counted: a measure of its work that is the same on every machine.
+/// Polls of a call (base/call.h), counted: a measure of its work that is the same on every machine.
 #pragma once
 
 #include <cstddef>
 
-#include "reference/call.h"
+#include "base/call.h"
 
 namespace tolvol {
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "operation/position_fit.h"
+#include "decimation/position_fit.h"
 
 #include <gtest/gtest.h>
 
 #include <optional>
 
 #include "check/certificate.h"
-#include "operation/manifold_cut.h"
 #include "shapes.h"
+#include "topology/manifold_cut.h"
 
 namespace {
 

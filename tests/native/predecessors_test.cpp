@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "operation/predecessors.h"
+#include "decimation/predecessors.h"
 
 #include <gtest/gtest.h>
 

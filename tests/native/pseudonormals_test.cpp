@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "reference/pseudonormals.h"
+#include "geometry/pseudonormals.h"
 
 #include <gtest/gtest.h>
 
-#include "reference/hierarchy.h"
+#include "geometry/hierarchy.h"
 #include "shapes.h"
 
 namespace {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "operation/refinement.h"
+#include "decimation/refinement.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "base/errors.h"
 #include "decimation_cases.h"
-#include "operation/wedges.h"
-#include "reference/errors.h"
+#include "topology/wedges.h"
 
 namespace {
 

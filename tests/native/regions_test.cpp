@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "operation/regions.h"
+#include "decimation/regions.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <set>
 
-#include "operation/bounded_mesh.h"
-#include "operation/manifold_cut.h"
+#include "decimation/bounded_mesh.h"
 #include "shapes.h"
+#include "topology/manifold_cut.h"
 
 namespace {
 

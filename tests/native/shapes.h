@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "reference/frame.h"
-#include "reference/triangle_mesh.h"
+#include "geometry/frame.h"
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol::shapes {
 

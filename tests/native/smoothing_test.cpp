@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Judged by measure/hausdorff.h on what is stored; the operators against direct formulas.
-#include "operation/smoothing.h"
+#include "motion/smoothing.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include <cstring>
 #include <memory>
 
+#include "base/errors.h"
 #include "check/certificate.h"
 #include "measure/hausdorff.h"
-#include "reference/errors.h"
 #include "shapes.h"
 
 namespace {

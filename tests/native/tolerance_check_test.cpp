@@ -7,9 +7,9 @@
 
 #include <memory>
 
+#include "base/errors.h"
 #include "candidates.h"
 #include "check/methods.h"
-#include "reference/errors.h"
 #ifdef TOLVOL_GL
 #include "gl_fixture.h"
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "reference/triangle_mesh.h"
+#include "geometry/triangle_mesh.h"
 
 #include <gtest/gtest.h>
 

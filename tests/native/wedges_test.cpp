@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "operation/wedges.h"
+#include "topology/wedges.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <random>
 
-#include "reference/simd.h"
+#include "base/simd.h"
 
 namespace {
 

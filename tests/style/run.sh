@@ -35,6 +35,30 @@ licence() {
   [ -z "$without" ] || { echo "no licence line in: $without" && return 1; }
 }
 
+rooms() {
+  # What the files of each room in native/ may include besides their own. The linker does not see all of it: what links
+  # two rooms links a call from one to the other.
+  crossing=$(while read -r room others; do
+    grep -rnE '#include "[a-z]+/' "native/$room" |
+      grep -vE "#include \"($(echo "$room $others" | tr ' ' '|'))/"
+  done <<EOF
+base
+geometry base
+gl base
+field base geometry gl
+check base geometry gl field
+topology base geometry
+decimation base geometry field check topology
+motion base geometry field check topology
+measure base geometry
+picture base geometry gl field
+openmesh base geometry field check
+python base geometry gl field check topology decimation motion measure picture
+EOF
+  )
+  [ -z "$crossing" ] || { echo "these may not be included here:" && echo "$crossing" && return 1; }
+}
+
 clang_format() {
   find native benchmark examples tests/native \( -name '*.h' -o -name '*.hh' -o -name '*.cpp' \) -print0 |
     xargs -0 clang-format --dry-run -Werror
@@ -65,10 +89,11 @@ assert len(result.triangles) < 1000
 }
 
 check licence
+check rooms
 check clang_format
 check ruff
 check clang_tidy
 check pip_install
 
 [ -z "$failed" ] || { echo "style: failed:$failed" && exit 1; }
-echo "style: licence lines, clang-format, ruff, clang-tidy and pip install are in order"
+echo "style: licence lines, rooms, clang-format, ruff, clang-tidy and pip install are in order"

@@ -15,7 +15,8 @@ bpy.context.preferences.view.use_save_prompt = False
 bpy.context.preferences.system.viewport_aa = "OFF"
 
 import addon  # noqa: E402
-from addon import job, volume  # noqa: E402
+from addon import job  # noqa: E402
+from addon.reference import snapshots  # noqa: E402
 from window import window_context  # noqa: E402
 
 _TICK = 0.05
@@ -47,7 +48,7 @@ def fitting():
 
 def guarding():
     ob = mesh(707)
-    volume.set_reference(ob, volume.surface_of(ob))
+    snapshots.set_reference(ob, snapshots.surface_of(ob))
     ob.tolvol.guard.sculpting = True
     bpy.ops.object.mode_set(mode="SCULPT")
 
@@ -55,7 +56,7 @@ def guarding():
 def showing():
     ob = mesh(400)
     ob.tolvol.show_deviation = True
-    volume.set_reference(ob, volume.surface_of(ob))
+    snapshots.set_reference(ob, snapshots.surface_of(ob))
 
 
 def start():

@@ -9,7 +9,8 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Euler
 
 import scenes
-from addon import guard, mesh_io, native, panels
+from addon import guard, native, panels
+from addon.mesh import mesh_io
 from addon.panels.guard import TOLVOL_PT_guard
 from test_panel import finished
 from window import centre, click, key, on_screen, open_tab, region, reset, screenshot, view, window_context, xdotool

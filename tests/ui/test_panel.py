@@ -7,8 +7,11 @@ import bpy
 import numpy as np
 
 import scenes
-from addon import job, mesh_io, native, verdict, volume
+from addon import job, native, reference
+from addon.mesh import mesh_io
 from addon.panels import decimate
+from addon.proof import verdict
+from addon.reference import measurements, tolerances
 from window import (
     centre,
     click,
@@ -100,7 +103,7 @@ def test_tolerance_from_the_presets_and_decimation_by_menu_search():
     screenshot("presets")
     xdotool("key", "Down", "sleep", "0.1", "key", "Return")
     yield from finished(lambda: ob.tolvol.tolerance_mode == "LENGTH")
-    assert volume.tolerance_length(ob.tolvol, 1) == 0.05
+    assert tolerances.tolerance_length(ob.tolvol, 1) == 0.05
     xdotool("mousemove", *centre())
     yield
     key("F3")
@@ -200,7 +203,7 @@ def test_reference_check_and_select_outside():
     suzanne().data.update()
     yield 0.5
     yield from press("tolvol.check")
-    yield from finished(lambda: volume.measurement_of(suzanne()) is not None)
+    yield from finished(lambda: measurements.measurement_of(suzanne()) is not None)
     yield 1.0
     screenshot("8 checked")
     measured = suzanne().tolvol.measurement
@@ -267,7 +270,7 @@ def test_a_damaged_file_breaks_no_panel():
         view()[1].tag_redraw()
         yield from finished(lambda: any("damaged" in text for text in said))
         suzanne().tolvol.snapshot.clear_geometry()
-        volume._forget_all()
+        reference.forget_all()
         view()[1].tag_redraw()
         yield 1.0
         screenshot("damaged")
@@ -349,5 +352,5 @@ def test_a_length_typed_in_millimetres():
     yield from finished(lambda: abs(ob.tolvol.tolerance_length - 0.5) < 1e-3)
     yield 0.5
     screenshot("17 typed")
-    assert volume.tolerance_length(ob.tolvol, 1) == 0.5, ob.tolvol.tolerance_length
+    assert tolerances.tolerance_length(ob.tolvol, 1) == 0.5, ob.tolvol.tolerance_length
     units.scale_length, units.length_unit = 1.0, "METERS"

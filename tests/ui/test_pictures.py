@@ -5,7 +5,9 @@ import bpy
 import numpy as np
 from mathutils import Euler, Vector
 
-from addon import guard, verdict, volume
+from addon import guard
+from addon.proof import verdict
+from addon.reference import measurements
 from test_guard import all_panels, only_guard_panel
 from test_panel import finished
 from test_show_deviation import sides, solid_monkey, stroke, surface, the_object, to_mode
@@ -69,7 +71,7 @@ def test_pictures_for_the_documentation():
     from_the_front()
     space.overlay.show_wireframes = True
     begin("decimate")
-    yield from finished(lambda: volume.measurement_of(the_object()) is not None)
+    yield from finished(lambda: measurements.measurement_of(the_object()) is not None)
     yield from settled()
     picture("panel")
     found = verdict.of(the_object())

@@ -5,7 +5,8 @@ import bpy
 import numpy as np
 
 import scenes
-from addon import native, overlay, verdict
+from addon import native, overlay
+from addon.proof import verdict
 from test_panel import finished, monkey, suzanne
 from window import (
     centre,

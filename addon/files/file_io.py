@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Mesh files read and written by Blender's own importers and exporters, in the file's coordinates: no axis is turned."""
+
+import contextlib
+import ctypes
+import functools
+import os
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..errors import Refused
+from ..mesh import mesh_io
+from . import file_check, gltf_check
+
+_GLTF = (".gltf", ".glb")
+EXTENSIONS = (".obj", ".ply", ".stl", *_GLTF)
+
+# Blender's glTF reader turns the file's (x, y, z) to (x, -z, y); this turns it back, without rounding.
+_AXES = "axes of the file"
+_TURN_BACK = Matrix(((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, 0), (0, 0, 0, 1)))
+
+# OBJ text has six decimals. A coordinate below 16 comes back at most 1e-6 away (half a unit of the last decimal, then
+# float32 again), one beyond 16 as it was.
+_OBJ_STEP = 1e-6
+
+
+class MeshFile:
+    """The mesh objects of a file, now in the scene, and what its reader left out.
+
+    extras: how many there are in the file of what is no mesh, such as {"skins": 1}.
+    """
+
+    def __init__(self, path, objects, repairs, extras):
+        self.path = path
+        self.objects = objects
+        self.repairs = repairs
+        self.extras = extras
+
+    @functools.cached_property
+    def counts(self):
+        """Vertices and triangles as Blender holds them when this is first asked."""
+        vertices = sum(len(ob.data.vertices) for ob in self.objects)
+        return {
+            "vertices": vertices,
+            "triangles": sum(len(mesh_io.read_mesh(ob.data).triangles) for ob in self.objects),
+        }
+
+
+def extension_of(path):
+    """Raises Refused, listing what there is, for any other."""
+    extension = Path(path).suffix.lower()
+    if extension not in EXTENSIONS:
+        raise Refused(f"{path}: unknown extension {extension or '(none)'}; there are {' '.join(EXTENSIONS)}")
+    if extension in _GLTF and bpy.app.version < (4, 0) and "bool" not in vars(np):
+        raise Refused(
+            f"{path}: glTF cannot be read by Blender {bpy.app.version_string} with NumPy {np.__version__}; "
+            "use .ply, .obj or .stl, or a newer Blender"
+        )
+    return extension
+
+
+def read_file(path):
+    """Adds the meshes of a file to the scene. Raises Refused, naming the file, when it is not whole."""
+    extension = extension_of(path)
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise Refused(f"{path}: {error.strerror}") from None
+    try:
+        declared = file_check.check(extension, data, Path(path).parent)
+    except Refused as error:
+        raise Refused(f"{path}: {error}") from None
+    before = set(bpy.data.objects)
+    try:
+        with quiet():
+            _import(extension, str(path), b"\ng " in data)
+            if extension in _GLTF:
+                _turn_back([ob for ob in bpy.data.objects if ob not in before])
+            # Exporters and matrices see the new objects only after this.
+            bpy.context.view_layer.update()
+    except RuntimeError as error:
+        raise Refused(f"{path}: Blender cannot read it: {str(error).strip().splitlines()[-1]}") from None
+    added = [ob for ob in bpy.data.objects if ob not in before and not _is_bone_shape(ob)]
+    objects = [ob for ob in added if ob.type == "MESH" and ob.data.polygons]
+    if not objects:
+        raise Refused(f"{path}: it has no faces")
+    for ob in objects:
+        ob.name = ob.name.replace(" ", "_")  # as the OBJ exporter would write it
+    dropped = declared - sum(len(ob.data.polygons) for ob in objects)
+    repairs = []
+    if dropped > 0:
+        message = f"{dropped:,} faces that repeat a corner or another face left out when {Path(path).name} was read"
+        repairs.append({"kind": "unreadable", "count": dropped, "message": message})
+    return MeshFile(path, objects, repairs, gltf_check.extras(data) if extension in _GLTF else {})
+
+
+def write_file(path, objects, textures_beside):
+    """Exports mesh objects as they are, without modifiers.
+
+    Where a format writes side files they name textures in the folder `textures_beside` relative to it, others by their
+    full path. Raises OSError, as far as Blender's exporters say what the system refused.
+    """
+    with quiet():
+        bpy.context.view_layer.update()
+        bpy.ops.object.select_all(action="DESELECT")
+        for ob in objects:
+            ob.select_set(True)
+        try:
+            _export(Path(path).suffix.lower(), str(path), objects)
+        except RuntimeError as error:
+            if refused := re.search(r"\[Errno (\d+)\]", str(error)):
+                raise OSError(int(refused[1]), os.strerror(int(refused[1]))) from None
+            raise
+    for material in Path(path).parent.glob("*.mtl"):
+        text = material.read_text(errors="surrogateescape")
+        folder = str(Path(textures_beside).resolve()) + os.sep
+        material.write_text(text.replace(f" {folder}", " "), errors="surrogateescape")
+
+
+def rounding(path, objects):
+    """How far from its place in the world a vertex may be found in the file, at most."""
+    extension = Path(path).suffix.lower()
+    step = _OBJ_STEP if extension == ".obj" else 0.0
+    for ob in objects:
+        matrix = mesh_io.matrix_array(ob.matrix_world)
+        if not np.array_equal(matrix, np.eye(4)):  # the exporter maps it to the world, or takes it apart, in float32
+            reach = np.abs(mesh_io.column(ob.data.vertices, "co", 3)).max(0, initial=0.0)
+            largest = (np.abs(matrix[:3, :3]) @ reach + np.abs(matrix[:3, 3])).max()
+            step = max(step, _OBJ_STEP * (extension == ".obj") + 4 * float(np.finfo(np.float32).eps) * largest)
+    return step * 3**0.5
+
+
+def _is_bone_shape(ob):
+    """Whether the glTF reader made it, to draw bones with."""
+    return any(collection.name.startswith("glTF_not_exported") for collection in ob.users_collection)
+
+
+def _turn_back(objects):
+    """Puts what a glTF file brought below an object that stands for the file's axes."""
+    axes = bpy.data.objects.new(_AXES, None)
+    bpy.context.collection.objects.link(axes)
+    for ob in objects:
+        if ob.parent is None:
+            ob.parent, ob.matrix_parent_inverse = axes, _TURN_BACK
+
+
+@contextlib.contextmanager
+def _as_imported():
+    """Meanwhile nothing is turned back; whether anything was."""
+    turned = [(ob, ob.parent) for ob in bpy.data.objects if ob.parent and ob.parent.name.startswith(_AXES)]
+    try:
+        for ob, _ in turned:
+            ob.parent = None
+        bpy.context.view_layer.update()
+        yield bool(turned)
+    finally:
+        for ob, axes in turned:
+            ob.parent, ob.matrix_parent_inverse = axes, _TURN_BACK
+        bpy.context.view_layer.update()
+
+
+def _import(extension, path, groups):
+    operators = dir(bpy.ops.wm)
+    if extension == ".obj":
+        bpy.ops.wm.obj_import(
+            filepath=path, forward_axis="Y", up_axis="Z", validate_meshes=True, import_vertex_groups=groups
+        )
+    elif extension == ".ply" and "ply_import" in operators:
+        bpy.ops.wm.ply_import(filepath=path, forward_axis="Y", up_axis="Z", merge_verts=False)
+    elif extension == ".ply":
+        bpy.ops.import_mesh.ply(filepath=path)
+    elif extension == ".stl" and "stl_import" in operators:
+        bpy.ops.wm.stl_import(filepath=path, forward_axis="Y", up_axis="Z", use_mesh_validate=True)
+    elif extension == ".stl":
+        bpy.ops.import_mesh.stl(filepath=path, axis_forward="Y", axis_up="Z")
+    else:
+        bpy.ops.import_scene.gltf(filepath=path, import_pack_images=False)  # packed they would forget their folder
+
+
+def _export(extension, path, objects):
+    operators = dir(bpy.ops.wm)
+    meshes = [ob.data for ob in objects]
+    if extension == ".obj":
+        bpy.ops.wm.obj_export(
+            filepath=path,
+            forward_axis="Y",
+            up_axis="Z",
+            export_selected_objects=True,
+            apply_modifiers=False,
+            export_uv=any(mesh.uv_layers for mesh in meshes),
+            export_normals=any(mesh.has_custom_normals for mesh in meshes),
+            export_colors=any(mesh.color_attributes for mesh in meshes),
+            export_materials=any(mesh.materials for mesh in meshes),
+            export_smooth_groups=True,
+            export_vertex_groups=any(ob.vertex_groups for ob in objects),
+            path_mode="ABSOLUTE",
+        )
+    elif extension == ".ply" and "ply_export" in operators:
+        bpy.ops.wm.ply_export(
+            filepath=path,
+            forward_axis="Y",
+            up_axis="Z",
+            export_selected_objects=True,
+            apply_modifiers=False,
+            export_normals=False,
+            export_uv=any(mesh.uv_layers for mesh in meshes),
+        )
+    elif extension == ".ply":
+        bpy.ops.export_mesh.ply(
+            filepath=path,
+            use_selection=True,
+            use_mesh_modifiers=False,
+            use_normals=False,
+            axis_forward="Y",
+            axis_up="Z",
+        )
+    elif extension == ".stl" and "stl_export" in operators:
+        bpy.ops.wm.stl_export(
+            filepath=path, forward_axis="Y", up_axis="Z", export_selected_objects=True, apply_modifiers=False
+        )
+    elif extension == ".stl":
+        bpy.ops.export_mesh.stl(
+            filepath=path, use_selection=True, use_mesh_modifiers=False, axis_forward="Y", axis_up="Z"
+        )
+    else:
+        form = "GLB" if extension == ".glb" else "GLTF_SEPARATE"
+        with _as_imported() as turned:
+            bpy.ops.export_scene.gltf(
+                filepath=path, export_format=form, use_selection=True, export_apply=False, export_yup=turned
+            )
+
+
+@contextlib.contextmanager
+def quiet():
+    """Keeps what Blender itself prints off stdout and stderr, whose lines belong to the command."""
+    # What the C library still holds must come out on the right side of the change.
+    flush = ctypes.CDLL(None).fflush if sys.platform != "win32" else lambda _: None
+
+    def flush_all():
+        sys.stdout.flush()
+        sys.stderr.flush()
+        flush(None)
+
+    flush_all()
+    kept = [os.dup(descriptor) for descriptor in (1, 2)]
+    try:
+        with tempfile.TemporaryFile() as sink:
+            os.dup2(sink.fileno(), 1)
+            os.dup2(sink.fileno(), 2)
+            try:
+                yield
+            finally:
+                flush_all()
+                os.dup2(kept[0], 1)
+                os.dup2(kept[1], 2)
+    finally:
+        for descriptor in kept:
+            os.close(descriptor)

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which vertices of a mesh an operation may touch, and how much: selection, marked edges, symmetry planes, weights."""
+
+import bpy
+import numpy as np
+
+from ..errors import Refused
+from . import mesh_io
+from .mesh_io import column
+
+# A vertex lies on a symmetry plane within this share of the mesh's extent: what float32 and modelling by hand leave.
+_ON_PLANE = 1e-5
+
+
+def unselected(ob):
+    """(n,) bool: vertices of faces that are not selected."""
+    mesh = ob.data
+    selected = column(mesh.polygons, "select", 1, bool)
+    if not selected.any():
+        raise Refused(f"No face of {ob.name} is selected: select some in Edit Mode")
+    vertices = np.zeros(len(mesh.vertices), bool)
+    corners = np.repeat(selected, column(mesh.polygons, "loop_total", 1, np.int32))
+    vertices[column(mesh.loops, "vertex_index", 1, np.int32)[~corners]] = True
+    return vertices
+
+
+def unselected_vertices(ob):
+    """(n,) bool: vertices that are not selected."""
+    return ~column(ob.data.vertices, "select", 1, bool)
+
+
+def on_edges(mesh, kinds):
+    """(n,) bool: vertices of the edges of these kinds, named as in operation_settings.PROTECTED."""
+    chosen = np.zeros(len(mesh.edges), bool)
+    for kind in kinds:
+        chosen |= _EDGES[kind](mesh)
+    vertices = np.zeros(len(mesh.vertices), bool)
+    vertices[column(mesh.edges, "vertices", 2, np.int32)[chosen]] = True
+    return vertices
+
+
+def on_planes(mesh, axes):
+    """(n,) bool: vertices where a coordinate is 0; axes: of "X", "Y" and "Z"."""
+    coordinates = np.abs(column(mesh.vertices, "co", 3))
+    near = coordinates <= _ON_PLANE * coordinates.max(initial=0.0)
+    return near[:, ["XYZ".index(axis) for axis in axes]].any(1)
+
+
+def group_weights(ob, name, invert):
+    """(n,) float64 of a vertex group, or None without a name."""
+    if not name:
+        return None
+    group = ob.vertex_groups.get(name)
+    if group is None:
+        raise Refused(f"{ob.name} has no vertex group {name}")
+    weights = np.zeros(len(ob.data.vertices))
+    for i, vertex in enumerate(ob.data.vertices):
+        for element in vertex.groups:
+            if element.group == group.index:
+                weights[i] = element.weight
+    return 1 - weights if invert else weights
+
+
+def _boundary(mesh):
+    return np.bincount(column(mesh.loops, "edge_index", 1, np.int32), minlength=len(mesh.edges)) == 1
+
+
+def _creases(mesh):
+    if "crease" in bpy.types.MeshEdge.bl_rna.properties:
+        return column(mesh.edges, "crease") > 0
+    found = mesh.attributes.get("crease_edge")  # newer Blenders
+    return column(found.data, "value") > 0 if found else np.zeros(len(mesh.edges), bool)
+
+
+def _material_borders(mesh):
+    sizes = column(mesh.polygons, "loop_total", 1, np.int32)
+    return _differ(mesh, np.repeat(column(mesh.polygons, "material_index", 1, np.int32), sizes)[:, None])
+
+
+def _island_borders(mesh):
+    uvs = mesh_io.corner_uvs(mesh)
+    if uvs is None:
+        return np.zeros(len(mesh.edges), bool)
+    # A corner stands for the edge to the next one: the values at its lower vertex, then those at the other.
+    starts, sizes = (column(mesh.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total"))
+    following = np.arange(1, len(mesh.loops) + 1)
+    following[starts + sizes - 1] = starts
+    vertices = column(mesh.loops, "vertex_index", 1, np.int32)
+    swapped = (vertices > vertices[following])[:, None]
+    ends = np.where(swapped, uvs[following], uvs), np.where(swapped, uvs, uvs[following])
+    return _differ(mesh, np.hstack(ends))
+
+
+def _differ(mesh, values):
+    """(edges,) bool: edges whose corners do not all have the same; values: (corners, width)."""
+    edges = column(mesh.loops, "edge_index", 1, np.int32)
+    first = np.zeros(len(mesh.edges), np.int64)
+    first[edges] = np.arange(len(edges))
+    other = (values != values[first[edges]]).any(1)
+    found = np.zeros(len(mesh.edges), bool)
+    found[edges[other]] = True
+    return found
+
+
+_EDGES = {
+    "BOUNDARY": _boundary,
+    "SHARP": lambda mesh: column(mesh.edges, "use_edge_sharp", 1, bool),
+    "SEAM": lambda mesh: column(mesh.edges, "use_seam", 1, bool),
+    "CREASE": _creases,
+    "MATERIAL": _material_borders,
+    "UV": _island_borders,
+}

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The same decimation with different methods deciding what is within the tolerance: triangles, time, memory, what was kept.
+
+blender --background --python benchmark/comparison.py -- [MESH...] [--tolerance 1%,0.3%,0.1%] [--write FILE.md]
+    [--methods NAME,...] [--json FILE] [--threads N]
+
+MESH: .obj, .ply, .stl, or a model of blender_scripts/models.py; suzanne by default. Every method runs in the product's own
+loop, so that the method alone differs. `time / QEM`: building what it asks and decimating, over the loop without any check
+down to the same count; best of three turns, or one where it takes over 20 s. Distances are certified upper ends, in
+tolerances. --write puts the table between its two comment lines in a Markdown file.
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+FOLDER = Path(__file__).resolve().parent
+sys.path[:0] = [str(FOLDER), str(FOLDER.parent / "blender_scripts")]
+import command_line as cli  # noqa: E402
+import models  # noqa: E402
+import tables  # noqa: E402
+from addon.native import module as tolvol  # noqa: E402
+from common import machine  # noqa: E402
+from decimation import Stopwatch  # noqa: E402
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "build" / "release" / "python"))
+
+REPEATS, LONG = 3, 20  # turns, but one alone of what takes more than so many seconds
+COARSE = 0.5  # nodes per tolerance
+FINER = (8, 16)  # cells per tolerance that are tried for a result equal to the certificate's,
+EQUAL = 1.1  # which is one with at most so many times the triangles
+
+
+class Method:
+    """One way to decide: `run(vertices, triangles, tolerance, threads)` gives vertices, triangles, bytes of its grid, and
+    nodes or cells per tolerance."""
+
+    def __init__(self, name, promise, run):
+        self.name, self.promise, self.run = name, promise, run
+
+
+def certified(two_sided, precision=None):
+    def run(vertices, triangles, tolerance, threads):
+        volume = tolvol.ToleranceVolume(vertices, triangles, tolerance, precision=precision, threads=threads)
+        result = tolvol.decimate(vertices, triangles, volume, two_sided=two_sided, threads=threads)
+        distances = volume.grid()[0]
+        # Beside each distance stands a triangle of the same size.
+        memory = 2 * distances.strides[0] * distances.shape[0]
+        return result.vertices, result.triangles, memory, volume.precision
+
+    return run
+
+
+def baseline(method, precision=None, placement="optimal"):
+    def run(vertices, triangles, tolerance, threads):
+        import tolvol_baselines  # built with the tests, never shipped
+
+        result = tolvol_baselines.decimate(vertices, triangles, tolerance, method, precision, placement, threads)
+        return result[0], result[1], result[2]["memory"], precision
+
+    return run
+
+
+METHODS = {
+    "both": Method("certificate, both ways", "both", certified(True)),
+    "one": Method("certificate, one way", "forward", certified(False)),
+    "coarse": Method("certificate, one way, coarse grid", "forward", certified(False, COARSE)),
+    "grid": Method("permission grid [19]", "forward", baseline("permission_grid", 4)),
+    "paper": Method("check as published", "none", baseline("paper_half_h", 1.1)),
+    "query": Method("occlusion query, proved", "forward", baseline("occlusion_query", 4)),
+    "samples": Method("vertex samples [11]", "none", baseline("vertex_samples", placement="subset")),
+}
+
+
+def equal_grid(enough, *case):
+    """The entry of the coarsest finer permission grid that leaves at most `enough` triangles; None: none that fits does."""
+    for precision in FINER:
+        try:
+            entry = measure(
+                Method(f"{METHODS['grid'].name}, finer", "forward", baseline("permission_grid", precision)), *case
+            )
+        except RuntimeError:  # over the grid's memory limit
+            return None
+        if entry["triangles"] <= enough:
+            return entry
+    return None
+
+
+def measure(method, vertices, triangles, tolerance, threads):
+    def unbounded(count):
+        return tolvol.decimate(vertices, triangles, None, target_triangles=count)
+
+    timed = Stopwatch()
+    for turn in range(REPEATS):
+        if turn and timed.seconds["bounded"] > LONG:
+            break
+        points, faces, memory, precision = timed("bounded", method.run, vertices, triangles, tolerance, threads)
+        timed("unbounded", unbounded, len(faces))
+    reference, stored = (vertices.astype(np.float64), triangles), (points.astype(np.float64), faces)
+
+    def farthest(a, b, promised):
+        return tolvol.hausdorff(*a, *b, bound=tolerance if promised else None, threads=threads).upper / tolerance
+
+    return {
+        "method": method.name,
+        "promise": method.promise,
+        "precision": precision,
+        "triangles": len(faces),
+        "seconds": timed.seconds["bounded"],
+        "ratio": timed.seconds["bounded"] / timed.seconds["unbounded"],
+        "memory": memory,
+        "forward": farthest(stored, reference, method.promise != "none"),
+        "backward": farthest(reference, stored, method.promise == "both"),
+    }
+
+
+def compare(names, *case):
+    """An entry for each of the methods whose grid fits."""
+    entries = {}
+    for name in names:
+        if name == "coarse" and "one" in entries and entries["one"]["precision"] <= COARSE:
+            continue  # the grid was as coarse already
+        try:
+            entries[name] = measure(METHODS[name], *case)
+        except RuntimeError as error:
+            print(f"{METHODS[name].name}: {error}", flush=True)
+        if name == "grid" and "one" in entries:
+            finer = equal_grid(EQUAL * entries["one"]["triangles"], *case)
+            if finer:
+                entries["finer"] = finer
+    return list(entries.values())
+
+
+def kept(entry):
+    """Whether what the method promises holds."""
+    return (entry["promise"] == "none" or entry["forward"] <= 1) and (
+        entry["promise"] != "both" or entry["backward"] <= 1
+    )
+
+
+def distance(value, promised):
+    return f"**{value:.3f}**" if promised else f"{value:.3f}"
+
+
+def row(entry):
+    precision = f"{entry['precision']:g}" if entry["precision"] else ""
+    memory = f"{entry['memory'] / 1e6:,.2f} MB" if entry["memory"] else ""
+    return [
+        entry["method"],
+        precision,
+        f"{entry['triangles']:,}",
+        f"{entry['ratio']:.2f}",
+        memory,
+        distance(entry["forward"], entry["promise"] != "none"),
+        distance(entry["backward"], entry["promise"] == "both"),
+    ]
+
+
+HEADS = ["Method", "per ε", "Triangles", "Time / QEM", "Grid", "Result → reference", "Reference → result"]
+
+
+def mesh_of(word):
+    if word in models.LEVELS:
+        return models.arrays(models.build(word))
+    return models.read(word)
+
+
+def percentages(text):
+    return [cli.length(part) for part in text.split(",")]
+
+
+def method_names(text):
+    for name in text.split(","):
+        if name not in METHODS:
+            raise argparse.ArgumentTypeError(f"{name!r} is no method; there are: {', '.join(METHODS)}")
+    return text.split(",")
+
+
+def arguments():
+    parser = cli.Parser(
+        "benchmark/comparison.py", description=__doc__.split("\n\n")[0], epilog=__doc__.split("\n\n")[2]
+    )
+    parser.add_argument("mesh", nargs="*", metavar="MESH", default=["suzanne"], help="a file, or a model's name")
+    parser.add_argument(
+        "--tolerance", type=percentages, default="1%,0.3%,0.1%", metavar="T,...", help="default: %(default)s"
+    )
+    parser.add_argument(
+        "--methods", type=method_names, default=",".join(METHODS), metavar="NAME,...", help="default: all, %(default)s"
+    )
+    parser.add_argument("--write", metavar="FILE.md", help="put the table there")
+    parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
+    return parser.parse()
+
+
+def main(options):
+    for option in ("write", "json"):
+        if getattr(options, option):
+            cli.require_folder(getattr(options, option), f"--{option}")
+    figures, rows = {"machine": machine(), "meshes": []}, []
+    for word in options.mesh:
+        vertices, triangles = mesh_of(word)
+        for wanted in options.tolerance:
+            size = tolvol.size(vertices, triangles)
+            tolerance = cli.in_units(wanted, size)
+            entries = compare(options.methods, vertices, triangles, tolerance, options.threads)
+            title = f"{Path(word).stem}, {len(triangles):,} triangles, ε = {100 * tolerance / size:g} %"
+            figures["meshes"].append({"mesh": word, "tolerance": tolerance, "size": size, "methods": entries})
+            rows.append([f"***{title}***"] + [""] * (len(HEADS) - 1))
+            rows += [row(entry) for entry in entries]
+            print(title, *(" | ".join(row(entry)) for entry in entries), sep="\n", flush=True)
+    if options.json:
+        Path(options.json).write_text(json.dumps(figures, indent=1) + "\n")
+    if options.write:
+        tables.write(options.write, "comparison", tables.table(HEADS, rows, "l" + "r" * (len(HEADS) - 1)))
+    return 0 if all(kept(entry) for mesh in figures["meshes"] for entry in mesh["methods"]) else cli.NOT_PROVED
+
+
+if __name__ == "__main__":
+    cli.run(__file__, arguments, main)

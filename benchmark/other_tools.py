@@ -1,0 +1,378 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Other people's decimation asked for the same tolerance on the same meshes, and judged by the same certified distances.
+
+/usr/bin/python3 benchmark/other_tools.py MESH... [--tolerance 1% --tolerance 0.1%] [--only NAME...] [--again]
+    [--write FILE.md] [--table NAME] [--picture FILE.png] [--json FILE]
+
+MESH: .obj, .ply or .stl, or scan: one made here, with the noise of a range camera (benchmark/scan.py). The tools are in
+benchmark/tool_calls.py, each with what its documentation says; in the versions of benchmark/other_tools.txt they are
+installed from PyPI into build/other_tools/venv, and CGAL's is built where libcgal-dev is installed.
+Each runs in a process of its own: seconds are those of its call alone, the best of three where one takes less than 5 s.
+Then its parameter is searched for the fewest triangles that keep both directions, unless one call takes more than 20 s.
+Results are kept in build/other_tools/results and taken from there the next time; --again measures anew.
+"""
+
+import argparse
+import hashlib
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blender_scripts"))
+import tables  # noqa: E402
+import tool_calls  # noqa: E402
+from common import USAGE, Stop, in_units, length, machine, require_folder, whole_number  # noqa: E402
+from scan import scan  # noqa: E402
+from tool_calls import CGAL_PROGRAM, ROOT, TOOLS  # noqa: E402
+from tool_page import draw, row, text, title  # noqa: E402
+from tool_worker import Worker  # noqa: E402
+
+sys.path.insert(0, os.environ.get("TOLVOL_PYTHON_PATH", str(ROOT / "build" / "release" / "python")))
+try:
+    import tolvol
+except ImportError as error:
+    sys.exit(f"other_tools.py: the module tolvol does not load ({error}): run sh setup.sh --tests")
+
+HERE = Path(__file__).resolve().parent
+BUILD = ROOT / "build" / "other_tools"
+PYTHON = BUILD / "venv" / "bin" / "python"
+PINS = HERE / "other_tools.txt"
+CGAL_SOURCE = HERE / "other_tools_cgal.cpp"
+CGAL_HEADER = Path("/usr/include/CGAL/version.h")
+
+REPEATS, QUICK = 3, 5  # calls of what takes less than so many seconds
+SEARCH_CALLS = 16  # of a tool while its parameter is searched,
+SEARCH_QUICK = 20  # which is not done when one takes more than so many seconds,
+SEARCH_LIMIT = 60  # and one that takes longer than that counts as not kept
+NEAR = 1.01  # a bracket so narrow is not bisected any more
+
+FORMATS = (".obj", ".ply", ".stl")
+SCAN = "scan"  # in place of a file
+
+
+@dataclass
+class Mesh:
+    name: str
+    vertices: np.ndarray
+    triangles: np.ndarray
+    size: float
+
+    def digest(self):
+        return digest(self.vertices.tobytes() + self.triangles.tobytes())
+
+
+def digest(data):
+    return hashlib.sha256(data).hexdigest()[:8]
+
+
+# ---- the tools' own ground
+
+
+def set_up(names):
+    """The virtual environment, anew when the pins have changed, and CGAL's program."""
+    if not PYTHON.exists() or not same_text(PINS, BUILD / "venv" / PINS.name):
+        print("other_tools: a virtual environment, some minutes", flush=True)
+        shutil.rmtree(BUILD / "venv", ignore_errors=True)
+        quietly(sys.executable, "-m", "venv", BUILD / "venv")
+        quietly(PYTHON, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement", PINS)
+        shutil.copy(PINS, BUILD / "venv")
+    if "cgal" in names and CGAL_HEADER.exists() and newer(CGAL_SOURCE, CGAL_PROGRAM):
+        print("other_tools: CGAL's program, half a minute", flush=True)
+        # As CGAL's own releases are built; rounding by the processor's mode is what its intervals rely on.
+        options = ["-std=c++17", "-O3", "-DNDEBUG", "-frounding-math"]
+        quietly("g++", *options, CGAL_SOURCE, "-o", CGAL_PROGRAM, "-lgmp", "-lmpfr")
+
+
+def same_text(a, b):
+    return b.exists() and a.read_text() == b.read_text()
+
+
+def newer(source, product):
+    return not product.exists() or source.stat().st_mtime > product.stat().st_mtime
+
+
+def quietly(*command):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    if done.returncode:
+        said = (done.stderr or done.stdout).strip().splitlines()
+        raise Stop(f"{Path(command[0]).name} failed: {said[-1] if said else f'exit code {done.returncode}'}")
+
+
+def versions():
+    """Of each package; None for CGAL where it is not installed."""
+    found = dict(re.findall(r"^([a-z0-9]+)==(\S+)$", PINS.read_text(), re.M))
+    header = CGAL_HEADER.read_text() if CGAL_HEADER.exists() else ""
+    number = re.search(r"#define CGAL_VERSION (\S+)", header)
+    return {**found, "cgal": number and number[1], "tolvol": tolvol.__version__}
+
+
+def read_mesh(path, folder):
+    if path == SCAN:
+        vertices, triangles = scan()
+        return Mesh(SCAN, vertices, triangles, tolvol.size(vertices, triangles))
+    arrays = folder / "vertices.npy", folder / "triangles.npy"
+    done = subprocess.run([PYTHON, tool_calls.__file__, "read", path, *arrays], capture_output=True, text=True)
+    if done.returncode:
+        raise Stop(f"{path}: {done.stderr.strip().splitlines()[-1]}")
+    vertices, triangles = (np.load(file) for file in arrays)
+    if not len(triangles):
+        raise Stop(f"{path}: no triangles")
+    return Mesh(Path(path).stem, vertices, triangles, tolvol.size(vertices, triangles))
+
+
+# ---- judging and searching
+
+
+def interval(a, b, tolerance):
+    """[lower, upper] of the largest distance of a point of a to b, in tolerances: decided, and narrow where it is beyond."""
+    found = tolvol.hausdorff(*a, *b, bound=tolerance)
+    if found.upper > tolerance:
+        found = tolvol.hausdorff(*a, *b)
+    return [found.lower / tolerance, found.upper / tolerance]
+
+
+def directions(mesh, answer):
+    """(a, b) of both ways between what a tool returned and the mesh: the distance is of a's points to b."""
+    reference = mesh.vertices.astype(np.float64), mesh.triangles
+    result = answer["vertices"], answer["triangles"]
+    return {"forward": (result, reference), "backward": (reference, result)}
+
+
+def judge(mesh, tolerance, answer):
+    """The certified distances of what a tool returned: {"forward", "backward"}."""
+    return {way: interval(*pair, tolerance) for way, pair in directions(mesh, answer).items()}
+
+
+def keeps_both(mesh, tolerance, answer):
+    pairs = directions(mesh, answer).values()
+    return all(tolvol.hausdorff(*a, *b, bound=tolerance).upper <= tolerance for a, b in pairs)
+
+
+def search(start, count, calls=SEARCH_CALLS):
+    """(parameter, triangles) with the fewest triangles, or None. `count(parameter)`: the triangles, None where not kept.
+
+    From `start` on in growing steps until one parameter is kept and a larger one is not, then bisected on a logarithmic scale.
+    What a larger parameter does is not always worse: the calls that are left try some above.
+    """
+    found = {}
+
+    def ask(parameter):
+        found[parameter] = count(parameter)
+        return found[parameter] is not None
+
+    low = high = None
+    parameter, step = start, 2.0
+    while len(found) < calls and (low is None or high is None):
+        if ask(parameter):
+            low, parameter = parameter, parameter * step
+        else:
+            high, parameter = parameter, parameter / step
+        step *= step
+        if not 1e-300 < parameter < 1e300:
+            break
+    while low and high and len(found) < calls and high / low > NEAR:
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if ask(middle) else (low, middle)
+    above = 1.0
+    while low and len(found) < calls:
+        above += 0.05
+        ask(low * above)
+    return min(((n, x) for x, n in found.items() if n is not None), default=(None, None))[::-1] if low else None
+
+
+def measure(name, mesh, tolerance, threads, limit):
+    """What a tool leaves when it is asked for the tolerance, and the fewest found."""
+    tool = TOOLS[name]
+    entry = {}
+    with tempfile.TemporaryDirectory() as folder:
+        worker = Worker(PYTHON, name, mesh, threads, folder)
+        try:
+            answer = worker.ask("run", tolerance, limit)
+            if "failure" in answer:
+                return {"failure": answer["failure"]}
+            entry["seconds"] = answer["seconds"]
+            entry["triangles"] = len(answer["triangles"])
+            for _ in range(REPEATS - 1):
+                if entry["seconds"] < QUICK:
+                    again = worker.ask("run", tolerance, limit)
+                    entry["seconds"] = min(entry["seconds"], again.get("seconds", math.inf))
+            if entry["triangles"]:
+                try:
+                    entry |= judge(mesh, tolerance, answer)
+                except tolvol.TolvolError as error:
+                    return {**entry, "failure": f"no mesh: {error}"}
+            quick = tool.search is not tool.run or entry["seconds"] <= SEARCH_QUICK
+            if tool.search and quick:
+                entry["search"] = fewest(tool, worker, mesh, tolerance, entry, min(limit, SEARCH_LIMIT))
+        finally:
+            worker.end()
+    return entry
+
+
+def fewest(tool, worker, mesh, tolerance, entry, limit):
+    """{"seconds": of all, and where one is kept: "triangles", "parameter", "call": the seconds of its one call}."""
+    calls = {}
+
+    def count(parameter):
+        answer = worker.ask("search", parameter, limit)
+        if "failure" in answer or not len(answer["triangles"]):
+            return None
+        calls[parameter] = answer["seconds"]
+        try:
+            return len(answer["triangles"]) if keeps_both(mesh, tolerance, answer) else None
+        except tolvol.TolvolError:
+            return None
+
+    started = time.perf_counter()
+    start = len(mesh.triangles) / max(4, entry["triangles"]) if tool.by_ratio else tolerance
+    best = search(start, count)
+    found = {"seconds": time.perf_counter() - started}
+    if best:
+        found |= {"parameter": best[0], "triangles": best[1], "call": calls[best[0]]}
+    return found
+
+
+def remembered(path, again, work):
+    """The result of work(), from the file where it is there."""
+    if path.exists() and not again:
+        return json.loads(path.read_text())
+    entry = work()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(entry, indent=1) + "\n")
+    return entry
+
+
+def compare(mesh, tolerance, options, numbers):
+    """An entry for each tool."""
+    entries = {}
+    for name in options.only:
+        number = numbers[TOOLS[name].package]
+        if number is None:
+            entries[name] = {"failure": "libcgal-dev is not installed"}
+        else:
+            percent = 100 * tolerance / mesh.size
+            if TOOLS[name].package == "tolvol":  # its number stays while it is worked on
+                number += "-" + digest(Path(tolvol.__file__).read_bytes())
+            label = f"{mesh.name}-{mesh.digest()}-{percent:.6g}-{options.threads}-{options.limit}-{name}-{number}.json"
+            entries[name] = remembered(
+                BUILD / "results" / label,
+                options.again,
+                lambda name=name: measure(name, mesh, tolerance, options.threads, options.limit),
+            )
+        print(" | ".join(row(name, entries[name])), flush=True)
+    return entries
+
+
+# ---- the command
+
+
+def percentage_or_length(word):
+    value, percent = length(word)
+    if percent and value > 100:
+        raise argparse.ArgumentTypeError(f"{word!r} is more than the mesh itself")
+    return value, percent
+
+
+def arguments(words):
+    first, _, *rest = __doc__.split("\n\n")
+    parser = argparse.ArgumentParser(
+        prog="other_tools.py",
+        description=first,
+        epilog=rest[0],
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("mesh", nargs="+", metavar="MESH", help=", ".join([*FORMATS, SCAN]))
+    parser.add_argument(
+        "--tolerance",
+        action="append",
+        type=percentage_or_length,
+        metavar="T",
+        help="N%% of size (1%%), or a length; may be repeated; default: 1%% and 0.1%%",
+    )
+    parser.add_argument("--only", nargs="+", choices=TOOLS, default=list(TOOLS), metavar="NAME", help=", ".join(TOOLS))
+    parser.add_argument("--again", action="store_true", help="measure what is remembered as well")
+    parser.add_argument("--write", metavar="FILE.md", help="put the table there")
+    parser.add_argument(
+        "--table", default="other tools", metavar="NAME", help="its name in FILE.md, default: %(default)s"
+    )
+    parser.add_argument("--picture", metavar="FILE.png", help="draw triangles against seconds there")
+    parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    parser.add_argument(
+        "--limit", type=whole_number(1), default=300, metavar="S", help="seconds for a call, default: %(default)s"
+    )
+    parser.add_argument(
+        "--threads",
+        type=whole_number(1),
+        default=len(os.sched_getaffinity(0)),
+        metavar="N",
+        help="cores for each tool, default: all, %(default)s",
+    )
+    parser.error = refuse
+    options = parser.parse_args(words)
+    options.tolerance = options.tolerance or [(1.0, True), (0.1, True)]
+    return options
+
+
+def refuse(message):
+    raise Stop(f"{message}; see --help")
+
+
+def main(options):
+    for path in options.mesh:
+        if path == SCAN:
+            continue
+        if not Path(path).is_file():
+            raise Stop(f"{path}: no such file")
+        if Path(path).suffix.lower() not in FORMATS:
+            raise Stop(f"{path}: not one of {', '.join(FORMATS)}")
+    for option in ("write", "picture", "json"):
+        if getattr(options, option):
+            require_folder(getattr(options, option), f"--{option}")
+
+    set_up(options.only)
+    numbers = versions()
+    figures = {"machine": machine(), "threads": options.threads, "versions": numbers, "cases": []}
+    for path in options.mesh:
+        with tempfile.TemporaryDirectory() as folder:
+            mesh = read_mesh(path, Path(folder))
+        for wanted in options.tolerance:
+            tolerance = in_units(wanted, mesh.size)
+            if tolerance > mesh.size:
+                raise Stop(f"--tolerance {tolerance:g}: {path} is only {mesh.size:g} large")
+            case = {
+                "mesh": mesh.name,
+                "triangles": len(mesh.triangles),
+                "size": mesh.size,
+                "tolerance": tolerance,
+                "percent": float(f"{100 * tolerance / mesh.size:.6g}"),
+            }
+            print(title(case), flush=True)
+            case["tools"] = compare(mesh, tolerance, options, numbers)
+            figures["cases"].append(case)
+    if options.json:
+        Path(options.json).write_text(json.dumps(figures, indent=1) + "\n")
+    if options.write:
+        tables.write(options.write, options.table, text(figures))
+    if options.picture:
+        draw(figures["cases"], options.picture)
+    return 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(arguments(sys.argv[1:])))
+    except Stop as stop:
+        print(f"other_tools.py: {stop}", file=sys.stderr)
+        sys.exit(USAGE)

@@ -1,0 +1,383 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tools that benchmark/other_tools.py compares, one function each; and the process that runs one of them.
+
+Each function takes vertices (n, 3) float32, triangles (m, 3) int32, its parameter and the number of threads, and returns
+vertices, triangles and the seconds of the tool's own call: conversion of arrays is not counted where the tool permits.
+Of each, what its documentation says about the parameter is quoted.
+
+tool_calls.py read IN VERTICES.npy TRIANGLES.npy     a mesh file, points at the same place made one
+tool_calls.py serve TOOL VERTICES.npy TRIANGLES.npy THREADS     a parameter a line on stdin, answers in JSON on stdout
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+CGAL_PROGRAM = ROOT / "build" / "other_tools" / "cgal"
+HAUSDORFF_STEPS = 16  # bisections of PyMeshLab's number of triangles
+
+
+def timed(call, *arguments, **named):
+    started = time.perf_counter()
+    result = call(*arguments, **named)
+    return result, time.perf_counter() - started
+
+
+def tolerance_volumes(**options):
+    """`tolvol.decimate`: the volume and the decimation, both ways."""
+
+    def run(vertices, triangles, tolerance, threads):
+        sys.path.insert(0, os.environ.get("TOLVOL_PYTHON_PATH", str(ROOT / "build" / "release" / "python")))
+        import tolvol
+
+        def work():
+            volume = tolvol.ToleranceVolume(vertices, triangles, tolerance, threads=threads)
+            return tolvol.decimate(vertices, triangles, volume, threads=threads, **options)
+
+        result, seconds = timed(work)
+        return result.vertices, result.triangles, seconds
+
+    return run
+
+
+def on_one_thread(run):
+    return lambda vertices, triangles, parameter, threads: run(vertices, triangles, parameter, 1)
+
+
+def meshlib(**settings):
+    """DecimateSettings::maxError: "stop the decimation as soon as the estimated distance deviation from the original mesh is
+    more than this value". In one part: several in parallel leave more where it is searched."""
+
+    def run(vertices, triangles, error, threads):
+        from meshlib import mrmeshnumpy, mrmeshpy
+
+        mesh = mrmeshnumpy.meshFromFacesVerts(triangles, vertices)
+        options = mrmeshpy.DecimateSettings()
+        options.maxError = error
+        options.packMesh = True
+        for name, value in settings.items():
+            setattr(options, name, value)
+        _, seconds = timed(mrmeshpy.decimateMesh, mesh, options)
+        return mrmeshnumpy.getNumpyVerts(mesh), mrmeshnumpy.getNumpyFaces(mesh.topology), seconds
+
+    return run
+
+
+def meshoptimizer(vertices, triangles, error, threads):
+    """meshopt_simplify with meshopt_SimplifyErrorAbsolute: "treat error limit and resulting error as absolute instead of
+    relative to mesh extents"."""
+    import meshoptimizer
+
+    left = np.zeros(triangles.size, np.uint32)
+    indices = triangles.astype(np.uint32).ravel()
+    count, seconds = timed(
+        meshoptimizer.simplify,
+        left,
+        indices,
+        vertices,
+        target_index_count=0,
+        target_error=error,
+        options=meshoptimizer.SIMPLIFY_ERROR_ABSOLUTE,
+    )
+    return vertices, left[:count].reshape(-1, 3), seconds
+
+
+def through_vtk(vertices, triangles, decimater):
+    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+
+    points, cells, mesh = vtkPoints(), vtkCellArray(), vtkPolyData()
+    points.SetData(numpy_to_vtk(vertices, deep=True))
+    cells.SetData(3, numpy_to_vtk(triangles.ravel(), deep=True))
+    mesh.SetPoints(points)
+    mesh.SetPolys(cells)
+    decimater.SetInputData(mesh)
+    _, seconds = timed(decimater.Update)
+    result = decimater.GetOutput()
+    if not result.GetNumberOfPolys():
+        return vertices, triangles[:0], seconds
+    corners = vtk_to_numpy(result.GetPolys().GetConnectivityArray())
+    return vtk_to_numpy(result.GetPoints().GetData()), corners.reshape(-1, 3), seconds
+
+
+def vtk_quadric(vertices, triangles, error, threads):
+    """vtkQuadricDecimation::SetMaximumError: "Maximum allowed absolute error for stopping criteria"."""
+    from vtkmodules.vtkFiltersCore import vtkQuadricDecimation
+
+    decimater = vtkQuadricDecimation()
+    decimater.SetTargetReduction(1)
+    decimater.SetMaximumError(error)
+    return through_vtk(vertices, triangles, decimater)
+
+
+def vtk_pro(vertices, triangles, error, threads):
+    """vtkDecimatePro::SetAccumulateError: "a global error bounds, and the ivar MaximumError becomes a global bounds on mesh
+    error". With the topology kept: else it tears the mesh apart to go on, and is farther away."""
+    from vtkmodules.vtkFiltersCore import vtkDecimatePro
+
+    decimater = vtkDecimatePro()
+    decimater.SetTargetReduction(1)
+    decimater.PreserveTopologyOn()
+    decimater.AccumulateErrorOn()
+    decimater.SetErrorIsAbsolute(1)
+    decimater.SetAbsoluteError(error)
+    return through_vtk(vertices, triangles, decimater)
+
+
+def open3d(vertices, triangles, error, threads):
+    """simplify_quadric_decimation(maximum_error): "The maximum error where a vertex is allowed to be merged"."""
+    import open3d
+
+    geometry, utility = open3d.geometry, open3d.utility
+    mesh = geometry.TriangleMesh(utility.Vector3dVector(vertices.astype(np.float64)), utility.Vector3iVector(triangles))
+    result, seconds = timed(mesh.simplify_quadric_decimation, 0, maximum_error=error)
+    return np.asarray(result.vertices), np.asarray(result.triangles), seconds
+
+
+class MeshLab:
+    """meshing_decimation_quadric_edge_collapse has no error to ask for, only a number of triangles (targetfacenum)."""
+
+    def __init__(self, vertices, triangles):
+        import pymeshlab
+
+        self.lab = pymeshlab
+        self.reference = pymeshlab.Mesh(vertices.astype(np.float64), triangles)
+
+    def decimated(self, count):
+        meshes = self.lab.MeshSet()
+        meshes.add_mesh(self.reference)
+        meshes.meshing_decimation_quadric_edge_collapse(targetfacenum=count)
+        mesh = meshes.current_mesh()
+        mesh.compact()
+        return mesh.vertex_matrix(), mesh.face_matrix()
+
+    def distance(self, vertices, triangles):
+        """get_hausdorff_distance, both ways, the larger: of the vertices, and of as many points of the faces as the reference
+        has vertices."""
+        meshes = self.lab.MeshSet()
+        meshes.add_mesh(self.lab.Mesh(vertices, triangles))
+        meshes.add_mesh(self.reference)
+        options = {"samplevert": True, "sampleface": True, "samplenum": self.reference.vertex_number()}
+        options["maxdist"] = self.lab.PercentageValue(100)
+        return max(meshes.get_hausdorff_distance(sampledmesh=a, targetmesh=1 - a, **options)["max"] for a in (0, 1))
+
+
+def pymeshlab_by_distance(vertices, triangles, tolerance, threads):
+    """The number of triangles halved, and bisected from the first that is too far away on, by MeshLab's own distance; all of
+    that is timed."""
+    lab = MeshLab(vertices, triangles)
+
+    def work():
+        low, high, best = 0, len(triangles), (vertices, triangles)
+        for _ in range(HAUSDORFF_STEPS):
+            count = (low + high) // 2
+            if not low < count < high:
+                break
+            result = lab.decimated(count)
+            if lab.distance(*result) <= tolerance:
+                high, best = count, result
+            else:
+                low = count
+        return best
+
+    (points, corners), seconds = timed(work)
+    return points, corners, seconds
+
+
+def pymeshlab_by_count(vertices, triangles, ratio, threads):
+    """targetfacenum: so many times fewer triangles."""
+    lab = MeshLab(vertices, triangles)
+    (points, corners), seconds = timed(lab.decimated, max(4, round(len(triangles) / ratio)))
+    return points, corners, seconds
+
+
+def pyfqmr(vertices, triangles, epsilon, threads):
+    """simplify_mesh_lossless(epsilon): "Maximal error after which a vertex is not deleted"; its page prefers it to the other
+    call when quality is the aim."""
+    import pyfqmr
+
+    simplifier = pyfqmr.Simplify()
+    simplifier.setMesh(vertices.astype(np.float64), triangles)
+    _, seconds = timed(simplifier.simplify_mesh_lossless, epsilon=epsilon, max_iterations=9999, verbose=False)
+    points, faces, _ = simplifier.getMesh()
+    return points, faces, seconds
+
+
+def manifold3d(vertices, triangles, tolerance, threads):
+    """Manifold.simplify(tolerance): "all surfaces will have moved by less than tolerance"."""
+    import manifold3d
+
+    solid = manifold3d.Manifold(manifold3d.Mesh(vertices, triangles.astype(np.uint32)))
+    if solid.status() != manifold3d.Error.NoError:
+        raise ValueError(f"refused: {solid.status().name}")
+
+    def work():
+        result = solid.simplify(tolerance)
+        result.num_tri()  # evaluates it
+        return result
+
+    result, seconds = timed(work)
+    mesh = result.to_mesh()
+    return mesh.vert_properties, mesh.tri_verts, seconds
+
+
+def openmesh(vertices, triangles, tolerance, threads):
+    """ModHausdorffT::set_tolerance: "set max error tolerance"; ModQuadricT gives the order, as the Decimater's page has it: one
+    module with priorities, the others binary."""
+    import openmesh
+
+    mesh = openmesh.TriMesh(vertices.astype(np.float64), triangles)
+    decimater = openmesh.TriMeshDecimater(mesh)
+    quadric, hausdorff = openmesh.TriMeshModQuadricHandle(), openmesh.TriMeshModHausdorffHandle()
+    decimater.add(quadric)
+    decimater.add(hausdorff)
+    decimater.module(quadric).unset_max_err()
+    decimater.module(hausdorff).set_tolerance(tolerance)
+
+    def work():
+        decimater.initialize()
+        decimater.decimate()
+
+    _, seconds = timed(work)
+    mesh.garbage_collection()
+    return mesh.points(), mesh.face_vertex_indices(), seconds
+
+
+def pytetwild(**settings):
+    """tetrahedralize(epsilon): "Envelop size, specifying the maximum distance of the output surface from the input surface,
+    relative to the bounding box size"; coarsen: "Coarsen the output as much as possible". The surface of its tetrahedra."""
+
+    def run(vertices, triangles, tolerance, threads):
+        import pytetwild
+
+        diagonal = np.linalg.norm(np.ptp(vertices[np.unique(triangles)].astype(np.float64), axis=0))
+        (points, cells), seconds = timed(
+            pytetwild.tetrahedralize,
+            vertices.astype(np.float64),
+            triangles,
+            epsilon=tolerance / diagonal,
+            num_threads=threads,
+            coarsen=True,
+            **settings,
+        )
+        faces = cells[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
+        _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+        return points, faces[first[count == 1]], seconds
+
+    return run
+
+
+def cgal(vertices, triangles, distance, threads):
+    """Polyhedral_envelope_filter: "dist is the parameter given to the polyhedral envelope", as in edge_collapse_envelope.cpp."""
+    source, target = Path("in.bin"), Path("out.bin")
+    with source.open("wb") as file:
+        np.array([len(vertices), len(triangles)], np.int64).tofile(file)
+        vertices.astype(np.float64).tofile(file)
+        triangles.tofile(file)
+    done = subprocess.run([CGAL_PROGRAM, source, target, repr(distance)], capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(done.stderr.strip().splitlines()[-1] if done.stderr else f"exit code {done.returncode}")
+    with target.open("rb") as file:
+        points, faces = np.fromfile(file, np.int64, 2)
+        return (
+            np.fromfile(file, np.float64, 3 * points).reshape(-1, 3),
+            np.fromfile(file, np.int32, 3 * faces).reshape(-1, 3),
+            float(done.stdout),
+        )
+
+
+@dataclass
+class Tool:
+    """`run` is asked for the tolerance as a length. `search`: what is called when its parameter is searched, from the tolerance
+    on; None where there is nothing to search."""
+
+    title: str
+    package: str  # on PyPI, or tolvol, or cgal
+    run: Callable
+    search: Callable | None = None
+    by_ratio: bool = False  # the parameter of `search` is by how many times there are fewer triangles
+
+
+def searched(title, package, run):
+    return Tool(title, package, run, run)
+
+
+FAST, THOROUGH = tolerance_volumes(), tolerance_volumes(effort="thorough")
+SUBSET = tolerance_volumes(placement="subset")
+WEIGHTED = {
+    "angleWeightedDistToPlane": True,
+    "stabilizer": 0,
+}  # both documented for surfaces that are curved everywhere
+
+TOOLS = {
+    "ours": Tool("**Tolerance Volumes**", "tolvol", FAST),
+    "ours-1": Tool("**Tolerance Volumes**, one thread", "tolvol", on_one_thread(FAST)),
+    "thorough": Tool("**Tolerance Volumes**, thorough", "tolvol", THOROUGH),
+    "thorough-1": Tool("**Tolerance Volumes**, thorough, one thread", "tolvol", on_one_thread(THOROUGH)),
+    "subset": Tool("**Tolerance Volumes**, vertices of the input alone", "tolvol", SUBSET),
+    "cgal": searched("CGAL, polyhedral envelope", "cgal", cgal),
+    "manifold3d": searched("Manifold, simplify", "manifold3d", manifold3d),
+    "meshlib": searched("MeshLib", "meshlib", meshlib()),
+    "meshlib-weighted": searched("MeshLib, weighted by angles", "meshlib", meshlib(**WEIGHTED)),
+    "meshoptimizer": searched("meshoptimizer", "meshoptimizer", meshoptimizer),
+    "open3d": searched("Open3D", "open3d", open3d),
+    "openmesh": searched("OpenMesh, ModHausdorff", "openmesh", openmesh),
+    "pyfqmr": searched("pyfqmr, lossless", "pyfqmr", pyfqmr),
+    "pymeshlab": Tool("PyMeshLab, bisected", "pymeshlab", pymeshlab_by_distance, pymeshlab_by_count, by_ratio=True),
+    "pytetwild": searched("pytetwild, coarsened", "pytetwild", pytetwild()),
+    "pytetwild-long": searched("pytetwild, edges of any length", "pytetwild", pytetwild(edge_length_fac=1.0)),
+    "vtk-pro": searched("VTK, vtkDecimatePro", "vtk", vtk_pro),
+    "vtk-quadric": searched("VTK, vtkQuadricDecimation", "vtk", vtk_quadric),
+}
+
+
+def merged(vertices, triangles):
+    """Points at the same place made one; triangles that are none left out, and points that no triangle has."""
+    points, first = np.unique(np.asarray(vertices, np.float32), axis=0, return_inverse=True)
+    corners = first.ravel()[triangles]
+    a, b, c = corners.T
+    corners = corners[(a != b) & (b != c) & (c != a)]
+    used, corners = np.unique(corners, return_inverse=True)
+    return points[used], corners.reshape(-1, 3).astype(np.int32)
+
+
+def read(source, vertices, triangles):
+    import trimesh
+
+    mesh = trimesh.load_mesh(source, process=False)
+    points, corners = merged(mesh.vertices, mesh.faces)
+    np.save(vertices, points)
+    np.save(triangles, corners)
+
+
+def serve(name, vertices, triangles, threads):
+    """Answers until stdin ends. A line is JSON: {"what": "run" or "search", "parameter": x}; the mesh goes to result_*.npy."""
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # what the tools print goes elsewhere
+    tool = TOOLS[name]
+    vertices, triangles = np.load(vertices), np.load(triangles)
+    for line in sys.stdin:
+        asked = json.loads(line)
+        try:
+            points, corners, seconds = getattr(tool, asked["what"])(
+                vertices, triangles, asked["parameter"], int(threads)
+            )
+            np.save("result_vertices.npy", np.asarray(points, np.float64))
+            np.save("result_triangles.npy", np.asarray(corners, np.int32))
+            answer = {"seconds": seconds}
+        except Exception as error:  # a row says so
+            answer = {"failure": " ".join(str(error).split()) or type(error).__name__}
+        print(json.dumps(answer), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    {"read": read, "serve": serve}[sys.argv[1]](*sys.argv[2:])

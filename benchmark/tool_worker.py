@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A process in which one tool works on one mesh, so that it can crash, hang or leak on its own."""
+
+import contextlib
+import json
+import os
+import select
+import signal
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+import tool_calls
+
+
+class Worker:
+    """`python`: one that has the tool's package. It is started when it is asked, and again after it was ended."""
+
+    def __init__(self, python, name, mesh, threads, folder):
+        self.folder = Path(folder)
+        np.save(self.folder / "vertices.npy", mesh.vertices)
+        np.save(self.folder / "triangles.npy", mesh.triangles)
+        self.command = [python, tool_calls.__file__, "serve", name, "vertices.npy", "triangles.npy", str(threads)]
+        self.threads = threads
+        self.process = None
+
+    def start(self):
+        cores = sorted(os.sched_getaffinity(0))[: self.threads]
+        self.process = subprocess.Popen(
+            self.command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=(self.folder / "log.txt").open("w"),
+            text=True,
+            cwd=self.folder,
+            env={**os.environ, "OMP_NUM_THREADS": str(self.threads)},
+            start_new_session=True,  # so that its own processes end with it
+            preexec_fn=lambda: os.sched_setaffinity(0, cores),
+        )
+
+    def ask(self, what, parameter, limit):
+        """{"seconds", "vertices", "triangles"}, or {"failure"}."""
+        if not self.process:
+            self.start()
+        try:
+            self.process.stdin.write(json.dumps({"what": what, "parameter": parameter}) + "\n")
+            self.process.stdin.flush()
+            ready = select.select([self.process.stdout], [], [], limit)[0]
+            answer = json.loads(self.process.stdout.readline()) if ready else None
+        except (BrokenPipeError, json.JSONDecodeError):
+            code = self.end()
+            return {"failure": f"crashed ({signal.Signals(-code).name if code < 0 else f'exit code {code}'})"}
+        if answer is None:
+            self.end()
+            return {"failure": f"did not end in {limit} s"}
+        if "failure" not in answer:
+            answer["vertices"] = np.load(self.folder / "result_vertices.npy")
+            answer["triangles"] = np.load(self.folder / "result_triangles.npy")
+        return answer
+
+    def end(self):
+        """The exit code: its own where it has ended by itself."""
+        if not self.process:
+            return 0
+        with contextlib.suppress(BrokenPipeError):
+            self.process.stdin.close()  # which ends one that waits
+        try:
+            code = self.process.wait(1)
+        except subprocess.TimeoutExpired:
+            os.killpg(self.process.pid, signal.SIGKILL)
+            code = self.process.wait()
+        self.process.stdout.close()
+        self.process = None
+        return code

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pictures of docs/pictures that show what the tolerance volume is and what it keeps, on any mesh.
+
+blender --background --python docs/figures/figures.py -- [MESH] [--output FOLDER] [--tolerance 1%]
+
+volume.png: the tolerance volume around MESH, half of it cut away. distance.png: MESH decimated within the tolerance, and to
+as many triangles by Blender's own Decimate modifier, coloured by the distance to MESH. Without MESH: Blender's monkey, and
+error.png as well, the error of distance fields against their spacing, which takes minutes and needs `sh setup.sh --tests`.
+"""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import bpy
+
+FOLDER = Path(__file__).resolve().parent
+sys.path[:0] = [str(FOLDER), str(FOLDER.parents[1] / "blender_scripts")]
+import command_line as cli  # noqa: E402
+import error_plot  # noqa: E402
+import models  # noqa: E402
+import pictures  # noqa: E402
+from addon.mesh import mesh_io  # noqa: E402
+from addon.native import module as tolvol  # noqa: E402
+
+PICTURES = Path(__file__).resolve().parents[2] / "docs" / "pictures"
+VOLUME_TOLERANCE = 0.04  # of the size: so large that it can be seen
+VOLUME_SIZE = (760, 640)
+PANEL = (372, 324)
+HEADING = 64
+LEGEND = 190
+
+
+def by_modifier(vertices, triangles, count):
+    """What Blender's Decimate modifier makes of a mesh: at most `count` triangles."""
+    ob = bpy.data.objects.new("modifier", mesh_io.new_mesh("modifier", vertices, triangles))
+    bpy.context.scene.collection.objects.link(ob)
+    modifier = ob.modifiers.new("decimate", "DECIMATE")
+    modifier.ratio = count / len(triangles)
+    evaluated = ob.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    return models.arrays(bpy.data.objects.new("decimated", bpy.data.meshes.new_from_object(evaluated)))
+
+
+def draw_volume(path, mesh, like):
+    vertices, triangles = mesh
+    volume = tolvol.ToleranceVolume(*mesh, VOLUME_TOLERANCE * tolvol.size(*mesh))
+    view = pictures.camera(*mesh, VOLUME_SIZE, like, volume.tolerance)
+    middle = (vertices[triangles].max((0, 1)) + vertices[triangles].min((0, 1))) / 2
+    page = pictures.Page(VOLUME_SIZE[0] + LEGEND, VOLUME_SIZE[1])
+    page.image(0, 0, tolvol.render_volume(volume, view, VOLUME_SIZE, cut=(middle, (1, 0, 0)), samples=3))
+    page.text(VOLUME_SIZE[0], pictures.MARGIN, "All points within ε\nof the reference", 12)
+    # What is cut open is beyond the mesh, so that the section begins at it.
+    bar = VOLUME_SIZE[0], 90, VOLUME_SIZE[1] - 110
+    page.legend(*bar, "signed", volume.tolerance, volume.size, lowest=0, outside=False)
+    page.save(path, step=3)
+
+
+def draw_distances(path, mesh, tolerance, like):
+    volume = tolvol.ToleranceVolume(*mesh, tolerance)
+    result = tolvol.decimate(*mesh, volume)
+    within = result.vertices, result.triangles
+    regardless = by_modifier(*mesh, len(result.triangles))
+    view = pictures.camera(*mesh, PANEL, like)
+    page = pictures.Page(2 * PANEL[0] + LEGEND, HEADING + 2 * PANEL[1])
+    for column, (surface, name) in enumerate(
+        ((within, "within the tolerance"), (regardless, "Blender's Decimate modifier"))
+    ):
+        x = column * PANEL[0]
+        farthest = tolvol.hausdorff(*surface, *mesh).upper / volume.tolerance
+        page.text(x + PANEL[0] / 2, 14, f"{len(surface[1]):,} triangles, {name}", 12, ha="center")
+        page.text(
+            x + PANEL[0] / 2,
+            38,
+            f"every point within {farthest:.2f} ε of the reference",
+            9,
+            pictures.FAINT,
+            ha="center",
+        )
+        for row, transfer in enumerate(("signed", "magnitude")):
+            pixels = tolvol.render_distance(*surface, volume, view, PANEL, transfer, edges=True, samples=3)
+            page.image(x, HEADING + row * PANEL[1], pixels)
+    for row, transfer in enumerate(("signed", "magnitude")):
+        page.legend(2 * PANEL[0], HEADING + 20 + row * PANEL[1], PANEL[1] - 40, transfer, volume.tolerance, volume.size)
+    page.save(path, step=3)
+
+
+def arguments():
+    parser = cli.Parser(
+        "docs/figures/figures.py", description="Makes the pictures of the tolerance volume and of distances."
+    )
+    parser.add_argument("mesh", nargs="?", metavar="MESH", help=".obj, .ply or .stl")
+    parser.add_argument("--output", default=PICTURES, metavar="FOLDER", help="where to (default: docs/pictures)")
+    parser.add_argument(
+        "--tolerance", default=(1.0, True), type=cli.length, metavar="T", help="N%% of size, or a length"
+    )
+    return parser.parse(may_be_empty=True)
+
+
+def main(options):
+    volume, distance, error = (Path(options.output) / name for name in ("volume.png", "distance.png", "error.png"))
+    pictures.require("--output", volume)
+    if not options.mesh and not importlib.util.find_spec("tolvol_baselines"):
+        raise cli.Stop("error.png needs tolvol_baselines: sh setup.sh --tests builds it; or name a MESH")
+    mesh = models.read(options.mesh) if options.mesh else models.arrays(models.build("suzanne"))
+    like = options.mesh or ""
+    draw_volume(volume, mesh, like)
+    draw_distances(distance, mesh, cli.in_units(options.tolerance, tolvol.size(*mesh)), like)
+    if not options.mesh:
+        error_plot.draw(error)
+    return 0
+
+
+if __name__ == "__main__":
+    cli.run(__file__, arguments, main)

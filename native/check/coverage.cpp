@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Most changes are settled without looking at a piece: if all pieces of an element are within e of it and its points
+// move by at most m, they are within e + m of what it becomes (the same barycentric combination is the witness). Only
+// when e + m passes the tolerance are the pieces measured again, which usually brings e down.
+#include "check/coverage.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/call.h"
+
+namespace tolvol {
+namespace {
+
+constexpr double kWorthCutting = 0.25;  // of the tolerance
+constexpr double kFloor = 0.1;          // of the tolerance: a shorter piece is not split further
+// Pieces that splitting may add before a change is refused; and those that assign() splits of one triangle.
+constexpr std::size_t kBudget = 1 << 12;
+constexpr std::size_t kBudgetOfPiece = 4;  // so many more for each piece that a change places
+constexpr std::size_t kMany = 64;          // candidates: of more, a piece looks at the nearest ones alone
+
+constexpr std::size_t kBetweenPolls = 64;  // parts of pieces, each of which may look at kMany candidates
+
+constexpr std::uint32_t kNeverWhole = 1u << 31;  // in split_into_: some of the triangle is out of reach
+
+FourPoints with_centre(const Part& part) {
+  const auto& [a, b, c] = part.corners;
+  FourPoints points;
+  points.set(a, b, c, (a + b + c) * (1.0 / 3));
+  return points;
+}
+
+TriangleMesh mesh_of(std::span<const Coverage::Element> elements) {
+  TriangleMesh mesh;
+  for (const Coverage::Element& e : elements) {
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    mesh.triangles.emplace_back(first, first + 1, first + 2);
+    for (const glm::dvec3& corner : e.corners) mesh.vertices.push_back(corner);
+  }
+  return mesh;
+}
+
+}  // namespace
+
+Coverage::Coverage(const TriangleMesh& reference, double within, std::size_t element_count)
+    : reference_(&reference),
+      within_(within),
+      within2_(within * within),
+      lists_(element_count),
+      split_into_(reference.triangles.size()) {}
+
+Part Coverage::whole(std::uint32_t triangle) const {
+  const glm::uvec3 t = reference_->triangles[triangle];
+  return {{reference_->vertices[t.x], reference_->vertices[t.y], reference_->vertices[t.z]}, 0, triangle};
+}
+
+void Coverage::own(std::uint32_t element, std::uint32_t triangle) { lists_[element].pieces.push_back(whole(triangle)); }
+
+bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids,
+                      double provable, std::vector<std::uint32_t>& nearest) {
+  bool all = true;
+  std::vector<Part> stack{whole(triangle)};
+  std::size_t looked = 0;
+  std::uint32_t hint = Hierarchy::kNone;
+  while (!stack.empty()) {
+    poll();
+    const Part piece = stack.back();
+    stack.pop_back();
+    const auto& c = piece.corners;
+    const Hierarchy::Common common = hierarchy.common(c, provable, -1, hint);
+    if (common.triangle != Hierarchy::kNone) {
+      hint = common.triangle;
+      const std::uint32_t element = ids[common.triangle];
+      if (element == kNone) continue;
+      List& list = lists_[element];
+      list.distance = std::max(list.distance, common.distance);
+      list.pieces.push_back(piece);
+      if (piece.cuts > 0) ++split_into_[triangle];
+      continue;
+    }
+    const glm::dvec3 centre = (c[0] + c[1] + c[2]) * (1.0 / 3);
+    const Hierarchy::Nearest closest = hierarchy.nearest(centre, std::numeric_limits<double>::infinity(), hint);
+    const double radius =
+        std::sqrt(std::max({glm::dot(c[0] - centre, c[0] - centre), glm::dot(c[1] - centre, c[1] - centre),
+                            glm::dot(c[2] - centre, c[2] - centre)}));
+    const bool finest =
+        longest_squared(piece) <= kFloor * kFloor * within2_ || piece.cuts == kMostCuts || ++looked > kBudget;
+    if (closest.distance > provable + radius || finest) {
+      nearest.push_back(closest.triangle);
+      all = false;
+      split_into_[triangle] |= kNeverWhole;
+    } else {
+      split(piece, stack);
+    }
+  }
+  return all;
+}
+
+void Coverage::sample(std::uint32_t element, std::size_t stride, std::vector<Sample>& out) const {
+  const std::vector<Part>& pieces = lists_[element].pieces;
+  for (std::size_t i = 0; i < pieces.size(); i += stride) {
+    const auto& [a, b, c] = pieces[i].corners;
+    out.push_back({(a + b + c) * (1.0 / 3), 0.5 * glm::length(glm::cross(b - a, c - a))});
+  }
+}
+
+bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const {
+  trial.stack_.assign(1, whole);
+  trial.budget_ += kBudgetOfPiece;
+  while (!trial.stack_.empty()) {
+    if (trial.stack_.size() > 1 && trial.budget_-- == 0) return false;
+    if (++trial.looked_at_ % kBetweenPolls == 0) poll();
+    const Part piece = trial.stack_.back();
+    trial.stack_.pop_back();
+    const FourPoints points = with_centre(piece);
+    double centre2 = std::numeric_limits<double>::infinity();
+    std::uint32_t below = first;
+    const auto covered_by = [&](std::uint32_t i) {
+      double d2[4];
+      witness_distances(trial.candidates_[i].witness, points, d2);
+      if (d2[3] < centre2) centre2 = d2[3], below = i;
+      // Written so that NaN is not covered.
+      if (d2[0] <= within2_ && d2[1] <= within2_ && d2[2] <= within2_) {
+        trial.candidates_[i].distance =
+            std::max(trial.candidates_[i].distance, std::sqrt(std::max({d2[0], d2[1], d2[2]})));
+        trial.moved_.push_back({piece, i});
+        trial.last_ = i;
+        return true;
+      }
+      return false;
+    };
+    // The element that took the last piece is as likely as the one that follows from the change.
+    const std::uint32_t second = trial.last_;
+    if (covered_by(first) || (second != first && covered_by(second))) continue;
+    bool covered = false;
+    if (trial.hierarchy_) {
+      const glm::dvec3 centre(points.x[3], points.y[3], points.z[3]);
+      const Hierarchy::Nearest nearest = trial.hierarchy_->nearest(centre, within_, below);
+      covered = nearest.triangle != Hierarchy::kNone && covered_by(nearest.triangle);
+    } else {
+      for (std::uint32_t i = 0; i < trial.candidates_.size() && !covered; ++i) {
+        if (i != first && i != second) covered = covered_by(i);
+      }
+    }
+    if (covered) continue;
+    if (!(centre2 <= within2_) || longest_squared(piece) <= kFloor * kFloor * within2_ || piece.cuts == kMostCuts) {
+      return false;
+    }
+    if (!cut(piece, trial.candidates_[below].witness, kWorthCutting * within_, trial.stack_))
+      split(piece, trial.stack_);
+  }
+  return true;
+}
+
+bool Coverage::try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial) const {
+  trial.candidates_.clear();
+  trial.heirlooms_.clear();
+  trial.moved_.clear();
+  trial.last_ = 0;
+  trial.hierarchy_.reset();
+  trial.budget_ = kBudget;
+  bool settled = true;
+  for (const Element& e : elements) {
+    const List& list = lists_[e.id];
+    const double distance = list.pieces.empty() ? 0 : list.distance + e.moved;
+    const bool keeps = distance <= within_;
+    settled &= keeps;
+    trial.candidates_.push_back({e.id, {}, keeps ? distance : 0, !keeps});
+  }
+  for (const Removed& r : removed) {
+    const List& list = lists_[r.id];
+    const double distance = list.distance + r.moved;
+    const bool whole = list.pieces.empty() || distance <= within_;
+    settled &= whole;
+    if (whole && !list.pieces.empty())
+      trial.candidates_[r.heir].distance = std::max(trial.candidates_[r.heir].distance, distance);
+    trial.heirlooms_.push_back({r.id, r.heir, whole});
+  }
+  if (settled) return true;
+  for (std::size_t i = 0; i < elements.size(); ++i) {
+    trial.candidates_[i].witness = {elements[i].corners[0], elements[i].corners[1], elements[i].corners[2]};
+  }
+  if (elements.size() > kMany) trial.hierarchy_.emplace(mesh_of(elements));
+  thread_local std::vector<std::uint32_t> gathered;  // per triangle of the reference, all 0 between calls
+  if (gathered.size() < split_into_.size()) gathered.resize(split_into_.size(), 0);
+  const auto for_each_split = [&](auto&& call) {
+    trial.for_each_replaced(lists_, [&](const Part& piece) {
+      if (piece.cuts > 0) call(gathered[piece.of]);
+    });
+  };
+  // However the search ends, the next one finds no marks.
+  const struct Clear {
+    const decltype(for_each_split)& each;
+    ~Clear() {
+      each([](std::uint32_t& count) { count = 0; });
+    }
+  } clear{for_each_split};
+  for_each_split([](std::uint32_t& count) { ++count; });
+  return place_all(trial, gathered);
+}
+
+/// Places the pieces of what is replaced. `gathered`: how many there are of each triangle that was split.
+bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) const {
+  constexpr std::uint32_t kPlaced = 0xFFFFFFFFu;
+  const auto place_list = [&](const std::vector<Part>& pieces, std::uint32_t first) {
+    return std::all_of(pieces.begin(), pieces.end(), [&](const Part& piece) {
+      if (piece.cuts == 0) return place(piece, first, trial);
+      std::uint32_t& count = gathered[piece.of];
+      if (count == kPlaced) return true;
+      if (count != split_into_[piece.of].load(std::memory_order_relaxed)) return place(piece, first, trial);
+      count = kPlaced;
+      return place(whole(piece.of), first, trial);
+    });
+  };
+  // What loses its element is the likeliest to fail.
+  for (const Trial::Heirloom& h : trial.heirlooms_) {
+    if (!h.whole && !place_list(lists_[h.id].pieces, h.heir)) return false;
+  }
+  const auto count = static_cast<std::uint32_t>(trial.candidates_.size());
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const std::uint32_t i = (trial.suspect_ + k) % count;
+    if (!trial.candidates_[i].replaced) continue;
+    if (!place_list(lists_[trial.candidates_[i].id].pieces, i)) {
+      trial.suspect_ = i;
+      return false;
+    }
+  }
+  return true;
+}
+
+void Coverage::commit(const Trial& trial) {
+  // Up before down: no count is ever less than the pieces that there are.
+  for (const Moved& m : trial.moved_) {
+    if (m.piece.cuts > 0) split_into_[m.piece.of].fetch_add(1, std::memory_order_relaxed);
+  }
+  trial.for_each_replaced(lists_, [&](const Part& piece) {
+    if (piece.cuts > 0) split_into_[piece.of].fetch_sub(1, std::memory_order_relaxed);
+  });
+  for (const Trial::Candidate& c : trial.candidates_) {
+    if (c.replaced) lists_[c.id].pieces.clear();
+    lists_[c.id].distance = c.distance;
+  }
+  for (const Trial::Heirloom& h : trial.heirlooms_) {
+    // Not clear(): the element is gone, and so goes its memory.
+    const std::vector<Part> pieces = std::exchange(lists_[h.id].pieces, {});
+    std::vector<Part>& to = lists_[trial.candidates_[h.heir].id].pieces;
+    if (h.whole) to.insert(to.end(), pieces.begin(), pieces.end());
+  }
+  for (const Moved& m : trial.moved_) lists_[trial.candidates_[m.element].id].pieces.push_back(m.piece);
+}
+
+}  // namespace tolvol

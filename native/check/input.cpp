@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "check/input.h"
+
+#include <sstream>
+
+#include "base/errors.h"
+
+namespace tolvol {
+
+std::optional<std::string> storage_warning(const ToleranceVolume& volume, const Placement& placement,
+                                           std::span<const glm::dvec3> stored) {
+  const double share = placement.storage_step(stored) / volume.frame_tolerance();
+  std::ostringstream text;
+  text << "at these coordinates the stored type rounds positions by up to " << 100 * share << " % of the tolerance; "
+       << "move the mesh nearer to its origin or take a larger tolerance";
+  if (share > 0.5) throw InvalidInput(text.str());
+  if (share > 0.01) return text.str();
+  return std::nullopt;
+}
+
+void refuse_outside(std::size_t count, std::uint32_t first) {
+  std::ostringstream text;
+  text << count << " faces are not within the tolerance of the reference, the first is face " << first
+       << "; take a larger tolerance, set the reference anew, or keep them (outside=\"keep\")";
+  throw InvalidInput(text.str());
+}
+
+}  // namespace tolvol

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Connectivity by OpenMesh; faces keep their input's indices, deleted ones are only marked.
+#include "decimation/bounded_mesh.h"
+
+#include <algorithm>
+
+#include "base/call.h"
+#include "decimation/change.h"
+#include "topology/connectivity.h"
+
+namespace tolvol {
+
+BoundedMesh::BoundedMesh(BoundedMeshInput input, const Bounds& bounds, Team& team)
+    : bounds_(bounds),
+      subset_(input.subset),
+      store_(std::move(input.store)),
+      triangles_(std::move(input.triangles)),
+      pinned_(std::move(input.pinned)),
+      shares_(std::move(input.shares)),
+      joined_(input.joined.begin(), input.joined.end()),
+      slots_(std::move(input.slots)),
+      wedges_(std::move(input.wedges)) {
+  for (const Spot& s : input.spots) positions_.push_back(s.position), stored_.push_back(s.stored);
+  build(input.on_reference, input.mates, team);
+}
+
+void BoundedMesh::build(bool on_reference, std::span<const std::uint32_t> mates, Team& team) {
+  mesh_.request_vertex_status();
+  mesh_.request_edge_status();
+  mesh_.request_halfedge_status();
+  mesh_.request_face_status();
+  const std::size_t n = positions_.size(), m = triangles_.size();
+  connect(n, triangles_, mates, mesh_, team);
+  triangle_count_ = m;
+  joined_.resize(n, false);
+  for (std::uint32_t v = 0; v < n; ++v) {
+    if (slots_[v] == v) continue;
+    copies_.try_emplace(slots_[v], 1, slots_[v]).first->second.push_back(v);
+    joined_[v] = joined_[slots_[v]] = true;
+  }
+  faces_around_ = std::vector<std::atomic<std::uint32_t>>(n);
+  for (const glm::uvec3& t : triangles_) count_around(t, 1);
+  moved_.assign(n, false);
+  seam_.assign(n, false);
+  merged_into_.resize(n);
+  for (std::uint32_t i = 0; i < n; ++i) merged_into_[i] = i;
+  corner_source_.resize(m);
+  for (std::uint32_t i = 0; i < m; ++i) corner_source_[i] = {3 * i, 3 * i + 1, 3 * i + 2};
+  if (!wedges_.empty()) {
+    std::vector<std::uint32_t> first(n, Coverage::kNone);
+    for (std::size_t i = 0; i < m; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        std::uint32_t& wedge = first[triangles_[i][k]];
+        if (wedge == Coverage::kNone) wedge = wedges_[i][k];
+        if (wedge != wedges_[i][k]) seam_[triangles_[i][k]] = true;
+      }
+    }
+  }
+  distance_.assign(n, 0);
+  if (bounds_.forward) {
+    for (std::size_t i = 0; i < n && !on_reference; ++i) {
+      poll_at(i);
+      distance_[i] = bounds_.forward->distance_bound(positions_[i]);
+    }
+    face_distance_.assign(m, on_reference ? 0 : TriangleCertificate::kUnproved);
+  }
+}
+
+/// Adds to the counts at the corners of a triangle.
+void BoundedMesh::count_around(const glm::uvec3& triangle, std::int32_t change) {
+  for (int k = 0; k < 3; ++k) {
+    faces_around_[triangle[k]].fetch_add(static_cast<std::uint32_t>(change), std::memory_order_relaxed);
+  }
+}
+
+std::uint32_t BoundedMesh::survivor(std::uint32_t v) const {
+  while (merged_into_[v] != v) v = merged_into_[v] = merged_into_[merged_into_[v]];
+  return v;
+}
+
+/// Whether an edge joins the two in the result, be it between copies of them.
+bool BoundedMesh::joined_by_other(std::uint32_t a, std::uint32_t b) const {
+  for (const std::uint32_t x : copies(a)) {
+    for (const std::uint32_t y : copies(b)) {
+      if ((x != a || y != b) && mesh_.find_halfedge(handle(x), handle(y)).is_valid()) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+/// A vertex of higher rank can only be the one that stays.
+int BoundedMesh::rank(std::uint32_t vertex) const {
+  if (pinned_[vertex]) return 5;
+  return joined(vertex) ? 4 : (seam_[vertex] ? 2 : 0) + (on_boundary(vertex) ? 1 : 0);
+}
+
+BoundedMesh::Merge BoundedMesh::merge(Edge e) const {
+  const Halfedge h = mesh_.halfedge_handle(e, 0);
+  const std::uint32_t v0 = from(h), v1 = to(h);
+  const int rank0 = rank(v0), rank1 = rank(v1);
+  if ((pinned_[v0] && pinned_[v1]) || slots_[v0] == slots_[v1]) return {Freedom::none, h};
+  // Where sheets touch in a point, that point may slide along the boundary of one.
+  if (joined(v0) != joined(v1) && !pinned_[v0] && !pinned_[v1] && wedges_.empty() && mesh_.is_boundary(e)) {
+    return {Freedom::either_way, h};
+  }
+  // A boundary vertex never leaves the boundary, not even for a vertex that must stay.
+  if (rank0 > rank1 && on_boundary(v1) && !on_boundary(v0)) return {Freedom::none, h};
+  if (rank1 > rank0 && on_boundary(v0) && !on_boundary(v1)) return {Freedom::none, h};
+  if (rank0 == rank1) return {movable(v0) ? Freedom::anywhere : Freedom::either_way, h};
+  return {Freedom::one_way, rank0 > rank1 ? mesh_.opposite_halfedge_handle(h) : h};
+}
+
+void BoundedMesh::keep_apart() {
+  if (kept_apart_) return;
+  kept_apart_ = true;
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+    if (!mesh_.status(handle(v)).deleted()) occupied_.add(stored_[v]);
+  }
+}
+
+void BoundedMesh::place(std::uint32_t vertex, const Spot& spot) {
+  if (kept_apart_) occupied_.remove(stored_[vertex]), occupied_.add(spot.stored);
+  moved_[vertex] = moved_[vertex] || spot.position != positions_[vertex];
+  positions_[vertex] = spot.position;
+  stored_[vertex] = spot.stored;
+}
+
+/// The vertex that vanishes becomes one with the one that stays: its copies that do not vanish are that one's from now
+/// on.
+void BoundedMesh::merge_copies(const Change& change) {
+  const std::uint32_t merged = slots_[from(change.halfedge_)], kept = slots_[change.vertex_];
+  copies_.erase(merged);
+  if (!change.carried_.empty()) {
+    std::vector<std::uint32_t>& all = copies_.try_emplace(kept, 1, change.vertex_).first->second;
+    all.insert(all.end(), change.carried_.begin(), change.carried_.end());
+  }
+  for (const std::uint32_t v : change.carried_) {
+    slots_[v] = kept;
+    place(v, change.spot_);
+    if (bounds_.forward) distance_[v] = change.new_distance_;
+  }
+  for (const std::uint32_t v : copies(change.vertex_)) joined_[v] = true;
+}
+
+void BoundedMesh::apply(Change& change) {
+  const bool proved = change.proof_ == Change::Proof::now;
+  if (bounds_.baseline) bounds_.baseline->commit();
+  if (bounds_.backward && proved) bounds_.backward->commit(change.backward_);
+  if (!change.boundary_elements_.empty()) bounds_.boundary_backward->commit(change.boundary_backward_);
+  for (const Change::NewWedge& n : change.new_wedges_) {
+    wedges_[n.triangle][n.corner] = n.gained.wedge;
+    corner_source_[n.triangle][n.corner] = n.gained.source;
+  }
+  const bool is_flip = change.kind_ == Change::Kind::flip;
+  for (std::size_t i = 0; i < change.faces_.size(); ++i) {
+    const Change::Face& face = change.faces_[i];
+    const std::uint32_t id = change.elements_[i].id;
+    const glm::uvec3 triangle(face.vertices[0], face.vertices[1], face.vertices[2]);
+    if (is_flip) count_around(triangles_[id], -1), count_around(triangle, 1);
+    triangles_[id] = triangle;
+    if (bounds_.forward && proved) face_distance_[id] = face.distance;
+  }
+  if (is_flip) {
+    mesh_.flip(change.edge_);
+    return;
+  }
+  const std::uint32_t v = change.vertex_;
+  if (change.kind_ == Change::Kind::collapse) {
+    for (const Coverage::Removed& r : change.removed_) count_around(triangles_[r.id], -1);
+    triangle_count_ -= change.removed_.size();
+    if (joined(from(change.halfedge_))) merge_copies(change);
+    for (const Halfedge h : change.collapses_) {
+      const std::uint32_t merged = from(h), kept = to(h);
+      merged_into_[merged] = kept;
+      if (kept_apart_) occupied_.remove(stored_[merged]);
+      if (!shares_.empty()) shares_[kept] = std::min(shares_[kept], shares_[merged]);
+      faces_around_[kept].fetch_add(faces_around_[merged].exchange(0, std::memory_order_relaxed),
+                                    std::memory_order_relaxed);
+      collapse(mesh_, h);
+    }
+  }
+  place(v, change.spot_);
+  if (bounds_.forward) distance_[v] = change.new_distance_;
+}
+
+}  // namespace tolvol

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The mesh that a decimation works on: connectivity, positions, and what every face is known to be within. Lives in
+/// the volume's frame; knows nothing of files, transforms or reports. It changes by applying a Change.
+#pragma once
+
+#include <OpenMesh/Core/Mesh/TriConnectivity.hh>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <glm/glm.hpp>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "base/parallel.h"
+#include "check/certificate.h"
+#include "check/coverage.h"
+#include "check/ring_check.h"
+#include "decimation/occupied.h"
+
+namespace tolvol {
+
+class Change;
+
+/// What every change must keep; a null pointer is a promise not asked for.
+struct Bounds {
+  const TriangleCertificate* forward = nullptr;
+  Coverage* backward = nullptr;
+  const TriangleCertificate* boundary_forward = nullptr;  ///< on the reference's boundary edges
+  Coverage* boundary_backward = nullptr;                  ///< elements are boundary edges, named by their first vertex
+  RingCheck* baseline = nullptr;                          ///< asked in place of all of them
+};
+
+/// A position as it is stored, and in the frame: always mapped from what is stored.
+struct Spot {
+  glm::dvec3 stored, position;
+};
+
+struct BoundedMeshInput {
+  std::vector<glm::uvec3> triangles;  ///< an oriented manifold with boundary
+  std::vector<std::uint32_t> mates;   ///< as those of a CutMesh
+  std::vector<Spot> spots;            ///< of the vertices
+  std::vector<bool> pinned;           ///< per vertex: neither moves nor vanishes, and an edge between two such stays
+  std::vector<double> shares;  ///< per vertex: of the forward bound that new faces around it may use; may be empty
+  std::vector<std::uint32_t> slots;  ///< per vertex: equal for copies, those that are one vertex of the result
+  std::vector<bool> joined;          ///< per vertex: an edge of it lies on edges of other sheets; may be empty
+  std::vector<glm::uvec3>
+      wedges;                 ///< per triangle and corner: equal at a vertex where attributes are equal; may be empty
+  bool on_reference = false;  ///< every triangle is one of the reference
+  bool subset = false;        ///< every surviving vertex keeps its position
+  /// Rounds a position in the frame to what can be stored.
+  std::function<Spot(const glm::dvec3&)> store;
+};
+
+class BoundedMesh {
+ public:
+  using Vertex = OpenMesh::VertexHandle;
+  using Halfedge = OpenMesh::HalfedgeHandle;
+  using Edge = OpenMesh::EdgeHandle;
+  using Face = OpenMesh::FaceHandle;
+
+  BoundedMesh(BoundedMeshInput input, const Bounds& bounds, Team& team);
+
+  const OpenMesh::TriConnectivity& connectivity() const { return mesh_; }
+  const Bounds& bounds() const { return bounds_; }
+  std::size_t triangle_count() const { return triangle_count_; }
+  bool alive(std::uint32_t triangle) const { return !mesh_.status(face(triangle)).deleted(); }
+  /// The vertex that a vertex was merged into (itself when it survives).
+  std::uint32_t survivor(std::uint32_t vertex) const;
+  const glm::uvec3& triangle(std::uint32_t triangle) const { return triangles_[triangle]; }
+  const glm::dvec3& position(std::uint32_t vertex) const { return positions_[vertex]; }
+  const glm::dvec3& stored(std::uint32_t vertex) const { return stored_[vertex]; }
+  Spot spot(std::uint32_t vertex) const { return {stored_[vertex], positions_[vertex]}; }
+  Spot store(const glm::dvec3& position) const { return store_(position); }
+  /// Whether the vertex left its original position.
+  bool moved(std::uint32_t vertex) const { return moved_[vertex] != 0; }
+  /// Upper bounds on the distance to the reference, where there is a forward bound to keep: of a vertex, and of all
+  /// points of a face (infinite where none is known).
+  double distance(std::uint32_t vertex) const { return distance_[vertex]; }
+  double face_distance(std::uint32_t triangle) const { return face_distance_[triangle]; }
+  /// Of the forward bound, what new faces around the vertex may use.
+  double share(std::uint32_t vertex) const { return shares_.empty() ? 1 : shares_[vertex]; }
+  /// How many faces have the vertex as a corner.
+  std::uint32_t faces_around(std::uint32_t vertex) const {
+    return faces_around_[vertex].load(std::memory_order_relaxed);
+  }
+  bool on_boundary(std::uint32_t vertex) const { return mesh_.is_boundary(handle(vertex)); }
+  /// Whether vertices of the kernel are one vertex of the result: what one may do then depends on where the others are.
+  bool has_copies() const { return !copies_.empty(); }
+  /// Whether it has copies or an edge on edges of other sheets, so that a change there may be one of theirs too.
+  bool joined(std::uint32_t vertex) const { return joined_[vertex] != 0; }
+  /// The vertex and its copies; of the kernel, alive and at one place. Valid until the next change of one of them.
+  std::span<const std::uint32_t> copies(std::uint32_t vertex) const {
+    const auto found = copies_.find(slots_[vertex]);
+    if (found != copies_.end()) return found->second;
+    return {&merged_into_[vertex], 1};  // what is there was merged into itself
+  }
+  /// Equal for copies; the number of one of them.
+  std::uint32_t slot(std::uint32_t vertex) const { return slots_[vertex]; }
+  /// Where corner `corner` of a triangle takes its attributes: an input corner as 3 * triangle + corner.
+  std::uint32_t corner_source(std::uint32_t triangle, int corner) const { return corner_source_[triangle][corner]; }
+
+  std::uint32_t from(Halfedge h) const { return static_cast<std::uint32_t>(mesh_.from_vertex_handle(h).idx()); }
+  std::uint32_t to(Halfedge h) const { return static_cast<std::uint32_t>(mesh_.to_vertex_handle(h).idx()); }
+  static Vertex handle(std::uint32_t vertex) { return Vertex(static_cast<int>(vertex)); }
+  static Face face(std::uint32_t triangle) { return Face(static_cast<int>(triangle)); }
+  static Edge edge(std::uint32_t edge) { return Edge(static_cast<int>(edge)); }
+
+  /// none: the edge stays. one_way: the start of `halfedge` may merge into its end, which stays where it is.
+  /// either_way: or the other way around. anywhere: the end may also go to any position.
+  enum class Freedom { none, one_way, either_way, anywhere };
+  struct Merge {
+    Freedom freedom;
+    Halfedge halfedge;
+  };
+  /// How the ends of an edge may become one vertex, by what each of them must keep.
+  Merge merge(Edge e) const;
+  /// Whether a vertex may move by itself.
+  bool movable(std::uint32_t vertex) const { return !subset_ && !pinned_[vertex] && !seam_[vertex] && !joined(vertex); }
+
+  /// From now on no change puts a vertex where another is: for one thread that applies changes. O(n).
+  void keep_apart();
+  /// Whether a vertex other than the two would be put where another is.
+  bool meets_another(const Spot& spot, std::uint32_t vertex, std::uint32_t other) const {
+    return kept_apart_ && spot.stored != stored_[vertex] && spot.stored != stored_[other] &&
+           occupied_.contains(spot.stored);
+  }
+
+  /// Carries out a change whose last try succeeded on this mesh as it is. What is to be proved later then is, by a
+  /// DeferredProof.
+  void apply(Change& change);
+
+ private:
+  friend class Change;
+  friend class DeferredProof;
+
+  void build(bool on_reference, std::span<const std::uint32_t> mates, Team& team);
+  int rank(std::uint32_t vertex) const;
+  void count_around(const glm::uvec3& triangle, std::int32_t change);
+  bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
+  void merge_copies(const Change& change);
+  void place(std::uint32_t vertex, const Spot& spot);
+
+  OpenMesh::TriConnectivity mesh_;
+  Bounds bounds_;
+  bool subset_;
+  std::function<Spot(const glm::dvec3&)> store_;
+  std::vector<glm::uvec3> triangles_;
+  std::vector<glm::dvec3> positions_, stored_;
+  std::vector<bool> pinned_, seam_;
+  std::vector<std::atomic<std::uint32_t>> faces_around_;  ///< atomic: regions share the vertices between them
+  std::vector<std::uint8_t> moved_;                       ///< not bits, which threads would share
+  std::vector<double> shares_;
+  std::vector<std::uint8_t> joined_;  ///< not bits, which threads would share
+  std::vector<std::uint32_t> slots_;
+  std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> copies_;  ///< by slot, where there are several
+  std::vector<double> distance_, face_distance_;
+  std::vector<glm::uvec3> wedges_, corner_source_;
+  mutable std::vector<std::uint32_t> merged_into_;
+  bool kept_apart_ = false;
+  Occupied occupied_;  ///< if so: by the vertices that are there
+  std::atomic<std::size_t> triangle_count_ = 0;
+};
+
+}  // namespace tolvol

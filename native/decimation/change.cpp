@@ -1,0 +1,451 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The link condition is that of OpenMesh's is_collapse_ok(), which marks vertices as it goes and so cannot serve two
+// threads.
+#include "decimation/change.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tolvol {
+namespace {
+
+constexpr double kFoldCosine = 0.2;  // a face's normal turns by less than acos of this
+
+double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
+
+bool turns_too_far(const glm::dvec3& before, const glm::dvec3& after) {
+  const double before2 = squared_length(before), after2 = squared_length(after), cosine = glm::dot(before, after);
+  if (!(before2 > 0)) return false;  // a degenerate face has no side to keep
+  return !(cosine > 0 && cosine * cosine >= kFoldCosine * kFoldCosine * before2 * after2);
+}
+
+}  // namespace
+
+Change::Outcome Change::try_collapse(Halfedge h, const Spot& spot) {
+  if (!std::isfinite(glm::dot(spot.position, glm::dvec3(1)))) return Outcome::refused;  // beyond the stored type
+  return prepare_collapse(h, spot) ? check() : Outcome::impossible;
+}
+
+Change::Outcome Change::try_relocate(std::uint32_t vertex, const Spot& spot) {
+  if (!std::isfinite(glm::dot(spot.position, glm::dvec3(1)))) return Outcome::refused;
+  return prepare_relocate(vertex, spot) ? check() : Outcome::impossible;
+}
+
+Change::Outcome Change::try_flip(Edge e) { return prepare_flip(e) ? check() : Outcome::impossible; }
+
+bool Change::meets_another() const {
+  if (kind_ == Kind::flip) return false;
+  const std::uint32_t other = kind_ == Kind::collapse ? mesh_->from(halfedge_) : vertex_;
+  return mesh_->meets_another(spot_, vertex_, other);
+}
+
+Change::Outcome Change::check() {
+  if (meets_another()) {
+    met_another_ = true;
+    return Outcome::refused;
+  }
+  const bool kept =
+      !folds_over() && (proof_ == Proof::later ? vertex_within() : within_bounds() && boundary_within_bounds());
+  return kept ? Outcome::possible : Outcome::refused;
+}
+
+void Change::clear(Kind kind, const Spot& spot) {
+  kind_ = kind, spot_ = spot, share_ = 1;
+  elements_.clear(), faces_.clear(), removed_.clear(), new_wedges_.clear();
+  boundary_elements_.clear(), boundary_removed_.clear();
+}
+
+bool Change::prepare_collapse(Halfedge h, const Spot& spot) {
+  clear(Kind::collapse, spot);
+  halfedge_ = h, vertex_ = mesh_->to(h);
+  share_ = std::min(mesh_->share(vertex_), mesh_->share(mesh_->from(h)));
+  collapses_.assign(1, h), carried_.clear();
+  if (mesh_->joined(mesh_->from(h)) && !gather_copies(h)) return false;
+  for (const Halfedge each : collapses_) {
+    if (!link_condition(each) || !gather(each, spot.position)) return false;
+    if (!mesh_->wedges_.empty() && !wedges_fit(each)) return false;
+  }
+  constexpr int kNoFace = -1;
+  for (const std::uint32_t v : carried_) {
+    gather_side(v, spot.position, glm::length(mesh_->positions_[v] - spot.position), kNoFace, kNoFace);
+  }
+  if (!mesh_->copies_.empty() && !slots_fit()) return false;
+  for (const Halfedge each : collapses_) {
+    for (Face& face : faces_) {
+      if (face.vertices[face.corner] == mesh_->from(each)) face.vertices[face.corner] = mesh_->to(each);
+    }
+  }
+  boundary_of_collapse();
+  return true;
+}
+
+bool Change::prepare_relocate(std::uint32_t vertex, const Spot& spot) {
+  clear(Kind::relocate, spot);
+  vertex_ = vertex, share_ = mesh_->share(vertex);
+  constexpr int kNoFace = -1;
+  gather_side(vertex, spot.position, glm::length(mesh_->positions_[vertex] - spot.position), kNoFace, kNoFace);
+  boundary_of_relocation();
+  return true;
+}
+
+bool Change::prepare_flip(Edge e) {
+  clear(Kind::flip, {});
+  edge_ = e;
+  const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
+  if (mesh.is_boundary(e) || !mesh.is_flip_ok(e)) return false;
+  const Halfedge h = mesh.halfedge_handle(e, 0), o = mesh.halfedge_handle(e, 1);
+  // The faces (b, a, c) and (a, b, d) become (b, d, c) and (a, c, d); the kernel keeps their names that way around.
+  const std::uint32_t a = mesh_->to(h), b = mesh_->to(o), c = mesh_->to(mesh.next_halfedge_handle(h)),
+                      d = mesh_->to(mesh.next_halfedge_handle(o));
+  if (mesh_->pinned_[a] && mesh_->pinned_[b]) return false;
+  if (!mesh_->copies_.empty() && mesh_->joined_by_other(c, d)) return false;
+  const std::uint32_t first = static_cast<std::uint32_t>(mesh.face_handle(h).idx()),
+                      second = static_cast<std::uint32_t>(mesh.face_handle(o).idx());
+  constexpr double kAnywhere = std::numeric_limits<double>::infinity();  // no point of a face is carried along
+  const auto add = [&](std::uint32_t id, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+    const auto& p = mesh_->positions_;
+    elements_.push_back({id, {p[x], p[y], p[z]}, kAnywhere});
+    faces_.push_back({false, 0, p[x], {x, y, z}, 0});
+  };
+  add(first, b, d, c), add(second, a, c, d);
+  if (mesh_->wedges_.empty()) return true;
+  const auto corner = [&](std::uint32_t f, std::uint32_t v) {
+    const glm::uvec3& t = mesh_->triangles_[f];
+    const int k = t.x == v ? 0 : t.y == v ? 1 : 2;
+    return Corner{mesh_->wedges_[f][k], mesh_->corner_source_[f][k]};
+  };
+  if (corner(first, a).wedge != corner(second, a).wedge || corner(first, b).wedge != corner(second, b).wedge) {
+    return false;
+  }
+  new_wedges_ = {{first, 0, corner(first, b)},   {first, 1, corner(second, d)}, {first, 2, corner(first, c)},
+                 {second, 0, corner(second, a)}, {second, 1, corner(first, c)}, {second, 2, corner(second, d)}};
+  return true;
+}
+
+bool Change::link_condition(Halfedge h) {
+  const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
+  const auto v0 = mesh.from_vertex_handle(h), v1 = mesh.to_vertex_handle(h);
+  if (mesh.status(mesh.edge_handle(h)).deleted() || mesh.status(v0).deleted() || mesh.status(v1).deleted())
+    return false;
+  const Halfedge o = mesh.opposite_halfedge_handle(h);
+  int apex[2] = {-1, -1};
+  for (const Halfedge side : {h, o}) {
+    if (mesh.is_boundary(side)) continue;
+    const Halfedge next = mesh.next_halfedge_handle(side), last = mesh.next_halfedge_handle(next);
+    apex[side == o] = mesh.to_vertex_handle(next).idx();
+    // A face that hangs on its edge alone would leave that edge bare.
+    if (mesh.is_boundary(mesh.opposite_halfedge_handle(next)) && mesh.is_boundary(mesh.opposite_halfedge_handle(last)))
+      return false;
+  }
+  if (apex[0] == apex[1]) return false;
+  neighbours_.clear();
+  for (const auto v : mesh.vv_range(v1)) neighbours_.push_back(v.idx());
+  for (const auto v : mesh.vv_range(v0)) {
+    if (v.idx() == apex[0] || v.idx() == apex[1]) continue;
+    if (std::find(neighbours_.begin(), neighbours_.end(), v.idx()) != neighbours_.end()) return false;
+  }
+  // Two places of a boundary may not be joined across the inside.
+  return !(mesh.is_boundary(v0) && mesh.is_boundary(v1) && !mesh.is_boundary(h) && !mesh.is_boundary(o));
+}
+
+/// Adds the faces around a vertex as they are once it is at `position`.
+void Change::gather_side(std::uint32_t vertex, const glm::dvec3& position, double moved, int skip0, int skip1) {
+  const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
+  const auto& positions = mesh_->positions_;
+  const Halfedge start = mesh.halfedge_handle(BoundedMesh::handle(vertex));
+  Halfedge at = start;
+  do {
+    const int f = mesh.face_handle(at).idx();
+    if (f >= 0 && f != skip0 && f != skip1) {
+      const glm::uvec3& t = mesh_->triangles_[static_cast<std::size_t>(f)];
+      const int corner = t.x == vertex ? 0 : t.y == vertex ? 1 : 2;
+      Coverage::Element element{static_cast<std::uint32_t>(f), {positions[t.x], positions[t.y], positions[t.z]}, moved};
+      element.corners[corner] = position;
+      elements_.push_back(element);
+      faces_.push_back({true, corner, positions[vertex], {t.x, t.y, t.z}, 0});
+    }
+    at = mesh.next_halfedge_handle(mesh.opposite_halfedge_handle(at));
+  } while (at != start);
+}
+
+bool Change::gather(Halfedge h, const glm::dvec3& position) {
+  const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
+  const std::uint32_t v0 = mesh_->from(h), v1 = mesh_->to(h);
+  const double moved0 = glm::length(mesh_->positions_[v0] - position),
+               moved1 = glm::length(mesh_->positions_[v1] - position);
+  const int skip0 = mesh.face_handle(h).idx(), skip1 = mesh.opposite_face_handle(h).idx();
+  gather_side(v0, position, moved0, skip0, skip1);
+  const std::size_t of_v0 = elements_.size();
+  // Faces around the kept vertex do not change when it stays where it is.
+  if (moved1 > 0) gather_side(v1, position, moved1, skip0, skip1);
+
+  const Halfedge o = mesh.opposite_halfedge_handle(h);
+  std::uint32_t apex[2] = {Coverage::kNone, Coverage::kNone};
+  for (int side = 0; side < 2; ++side) {
+    const Halfedge edge = side == 0 ? h : o;
+    const int f = mesh.face_handle(edge).idx();
+    if (f < 0) continue;
+    apex[side] = mesh_->to(mesh.next_halfedge_handle(edge));
+    // The two other edges of the removed face: the one at v0 first, because the faces around v0 always are in the ring.
+    Halfedge at_v0 = mesh.next_halfedge_handle(edge), at_v1 = mesh.prev_halfedge_handle(edge);
+    if (side == 0) std::swap(at_v0, at_v1);
+    int heir = mesh.opposite_face_handle(at_v0).idx();
+    if (heir < 0) heir = mesh.opposite_face_handle(at_v1).idx();
+    if (heir < 0) return false;
+    std::size_t place = 0;
+    while (place < elements_.size() && elements_[place].id != static_cast<std::uint32_t>(heir)) ++place;
+    if (place == elements_.size()) {
+      const glm::uvec3& t = mesh_->triangles_[static_cast<std::size_t>(heir)];
+      elements_.push_back({static_cast<std::uint32_t>(heir),
+                           {mesh_->positions_[t.x], mesh_->positions_[t.y], mesh_->positions_[t.z]},
+                           0});
+      faces_.push_back({false, 0, mesh_->positions_[t.x], {t.x, t.y, t.z}, 0});
+    }
+    removed_.push_back({static_cast<std::uint32_t>(f), static_cast<std::uint32_t>(place), std::max(moved0, moved1)});
+  }
+  // The last closed shape, a tetrahedron, is kept: two coinciding faces would be left of it.
+  return !(of_v0 == 1 && apex[0] != Coverage::kNone && apex[1] != Coverage::kNone &&
+           mesh.valence(BoundedMesh::handle(v1)) == 3 && !mesh_->on_boundary(v1));
+}
+
+bool Change::wedges_fit(Halfedge h) {
+  const std::uint32_t v0 = mesh_->from(h), v1 = mesh_->to(h);
+  const auto corner_of = [&](std::uint32_t f, std::uint32_t v) {
+    return mesh_->triangles_[f].x == v ? 0 : mesh_->triangles_[f].y == v ? 1 : 2;
+  };
+  struct Side {
+    std::uint32_t lost;  ///< the wedge at v0
+    Corner gained;       ///< what takes its place at v1
+  };
+  std::array<Side, 2> sides{};
+  std::size_t count = 0;
+  for (const Halfedge side : {h, mesh_->mesh_.opposite_halfedge_handle(h)}) {
+    const int face = mesh_->mesh_.face_handle(side).idx();
+    if (face < 0) continue;
+    const std::uint32_t f = static_cast<std::uint32_t>(face);
+    const int c0 = corner_of(f, v0), c1 = corner_of(f, v1);
+    sides[count++] = {mesh_->wedges_[f][c0], {mesh_->wedges_[f][c1], mesh_->corner_source_[f][c1]}};
+  }
+  // One wedge at v0 would have to become two at v1.
+  if (count == 2 && sides[0].lost == sides[1].lost && sides[0].gained.wedge != sides[1].gained.wedge) return false;
+  for (std::size_t i = 0; i < elements_.size(); ++i) {
+    const Face& face = faces_[i];
+    if (face.vertices[face.corner] != v0) continue;
+    const std::uint32_t f = elements_[i].id, wedge = mesh_->wedges_[f][face.corner];
+    const auto side = std::find_if(sides.begin(), sides.begin() + static_cast<std::ptrdiff_t>(count),
+                                   [&](const Side& s) { return s.lost == wedge; });
+    if (side == sides.begin() + static_cast<std::ptrdiff_t>(count)) return false;
+    new_wedges_.push_back({f, face.corner, side->gained});
+  }
+  return true;
+}
+
+/// Where several sheets meet in the vertex that vanishes. Where they meet along edges, each has to have the edge that
+/// is collapsed, so that the line of edges is shortened; where they only touch, the others are carried along.
+bool Change::gather_copies(Halfedge h) {
+  const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
+  const auto in_line = [&](Halfedge edge) { return mesh_->joined_by_other(mesh_->from(edge), mesh_->to(edge)); };
+  bool line = false;
+  collapses_.clear();
+  for (const std::uint32_t copy : mesh_->copies(mesh_->from(h))) {
+    const auto v = BoundedMesh::handle(copy);
+    std::size_t edges = 0;
+    for (const std::uint32_t end : mesh_->copies(vertex_)) {
+      const Halfedge edge = mesh.find_halfedge(v, BoundedMesh::handle(end));
+      if (!edge.is_valid()) continue;
+      if (edges++ > 0) return false;
+      for (const Halfedge other : collapses_) {
+        if (mesh_->to(other) == end) return false;
+      }
+      collapses_.push_back(edge);
+    }
+    if (edges == 0) carried_.push_back(copy);
+    if (!mesh.is_boundary(v)) continue;
+    // The kernel keeps the outgoing halfedge of a boundary vertex on the boundary.
+    const Halfedge next = mesh.halfedge_handle(v);
+    line = line || in_line(next) || in_line(mesh.prev_halfedge_handle(next));
+  }
+  return !line || (carried_.empty() && in_line(h));
+}
+
+/// The link condition of the result, in which copies are one vertex: what is next to both ends is next to the edge, and
+/// no face comes to lie on another.
+bool Change::slots_fit() {
+  const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
+  apexes_.clear();
+  for (const Halfedge edge : collapses_) {
+    for (const Halfedge side : {edge, mesh.opposite_halfedge_handle(edge)}) {
+      if (!mesh.is_boundary(side)) apexes_.push_back(mesh_->slot(mesh_->to(mesh.next_halfedge_handle(side))));
+    }
+  }
+  const auto is_apex = [&](std::uint32_t slot) {
+    return std::find(apexes_.begin(), apexes_.end(), slot) != apexes_.end();
+  };
+  around_.clear();
+  for (const std::uint32_t copy : mesh_->copies(vertex_)) {
+    for (const auto v : mesh.vv_range(BoundedMesh::handle(copy))) {
+      around_.push_back(mesh_->slot(static_cast<std::uint32_t>(v.idx())));
+    }
+  }
+  std::sort(around_.begin(), around_.end());
+  for (const Face& face : faces_) {
+    if (!face.moves) continue;
+    const std::uint32_t a = mesh_->slot(face.vertices[(face.corner + 1) % 3]),
+                        b = mesh_->slot(face.vertices[(face.corner + 2) % 3]);
+    if (face.vertices[face.corner] == vertex_) continue;
+    if (is_apex(a) && is_apex(b)) return false;
+    for (const std::uint32_t slot : {a, b}) {
+      if (!is_apex(slot) && std::binary_search(around_.begin(), around_.end(), slot)) return false;
+    }
+  }
+  return true;
+}
+
+bool Change::folds_over() const {
+  if (kind_ == Kind::flip) {
+    const auto normal = [&](std::uint32_t face) {
+      const glm::uvec3& t = mesh_->triangles_[face];
+      const auto& p = mesh_->positions_;
+      return glm::cross(p[t.y] - p[t.x], p[t.z] - p[t.x]);
+    };
+    const glm::dvec3 before = normal(elements_[0].id) + normal(elements_[1].id);
+    return std::any_of(elements_.begin(), elements_.end(), [&](const Coverage::Element& e) {
+      return turns_too_far(before, glm::cross(e.corners[1] - e.corners[0], e.corners[2] - e.corners[0]));
+    });
+  }
+  for (std::size_t i = 0; i < elements_.size(); ++i) {
+    const auto& c = elements_[i].corners;
+    const Face& face = faces_[i];
+    // With the moving corner as apex, both normals share the opposite edge.
+    const glm::dvec3 &a = c[(face.corner + 1) % 3], &b = c[(face.corner + 2) % 3];
+    if (turns_too_far(glm::cross(b - a, face.before - a), glm::cross(b - a, c[face.corner] - a))) return true;
+  }
+  return false;
+}
+
+/// Of the forward bound that the points of a face may use.
+double Change::share(const Face& face) const {
+  double least = share_;
+  for (const std::uint32_t v : face.vertices) least = std::min(least, mesh_->share(v));
+  return least;
+}
+
+void Change::gather_predecessors() {
+  const auto add = [&](std::uint32_t id) {
+    const glm::uvec3& t = mesh_->triangles_[id];
+    const auto& p = mesh_->positions_;
+    predecessors_.add(p[t.x], p[t.y], p[t.z], mesh_->face_distance_[id]);
+  };
+  for (const Coverage::Element& e : elements_) add(e.id);
+  for (const Coverage::Removed& r : removed_) add(r.id);
+}
+
+/// Whether a face is likely to lie near many triangles of the reference.
+bool Change::is_large(const Coverage::Element& e) const {
+  constexpr double kLarge = 8;  // times the tolerance
+  const double limit = kLarge * mesh_->bounds().forward->within();
+  return longest_squared({{e.corners[0], e.corners[1], e.corners[2]}}) > limit * limit;
+}
+
+bool Change::vertex_within() {
+  const TriangleCertificate& forward = *mesh_->bounds().forward;
+  new_distance_ = forward.distance_bound(spot_.position);
+  return new_distance_ <= share_ * forward.within();
+}
+
+/// Whether a point of a large face is outside: before anything is proved in vain.
+bool Change::shows_outside() {
+  for (std::size_t k = 0; k < elements_.size(); ++k) {
+    const std::size_t i = (suspect_ + k) % elements_.size();
+    const Coverage::Element& element = elements_[i];
+    if (element.moved == 0 || !is_large(element)) continue;
+    if (mesh_->bounds().forward->narrowed(share(faces_[i])).shows_outside(element.corners)) {
+      suspect_ = i;
+      return true;
+    }
+  }
+  return false;
+}
+
+bool Change::faces_within() {
+  const auto& distance = mesh_->distance_;
+  predecessors_.clear();
+  for (std::size_t k = 0; k < elements_.size(); ++k) {
+    const std::size_t i = (suspect_ + k) % elements_.size();
+    const Coverage::Element& element = elements_[i];
+    Face& face = faces_[i];
+    const TriangleCertificate forward = mesh_->bounds().forward->narrowed(share(face));
+    // No point of the face moves farther than its moving corner.
+    face.distance = mesh_->face_distance_[element.id] + element.moved;
+    if (element.moved == 0 || face.distance <= forward.within()) continue;
+    if (is_large(element)) {
+      if (predecessors_.empty()) gather_predecessors();
+      face.distance = predecessors_.bound(element.corners, forward.within());
+      if (face.distance <= forward.within()) continue;
+    }
+    glm::dvec3 corners(distance[face.vertices[0]], distance[face.vertices[1]], distance[face.vertices[2]]);
+    if (kind_ != Kind::flip) corners[face.corner] = new_distance_;
+    face.distance = forward.bound_with_room(element.corners, corners);
+    if (face.distance == TriangleCertificate::kUnproved) {
+      suspect_ = i;
+      return false;
+    }
+  }
+  return true;
+}
+
+/// In the order of what the answers cost.
+bool Change::within_bounds() {
+  const Bounds& bounds = mesh_->bounds();
+  if (bounds.baseline) return bounds.baseline->accepts(elements_, removed_);
+  if (bounds.forward && ((kind_ != Kind::flip && !vertex_within()) || shows_outside())) return false;
+  if (bounds.backward && !bounds.backward->try_change(elements_, removed_, backward_)) return false;
+  return !bounds.forward || faces_within();
+}
+
+void Change::boundary_of_collapse() {
+  if (!mesh_->bounds().boundary_backward) return;
+  const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
+  Halfedge edge = halfedge_;
+  if (!mesh.is_boundary(edge)) edge = mesh.opposite_halfedge_handle(halfedge_);
+  if (!mesh.is_boundary(edge)) return;
+  // The boundary runs a -> s -> t -> c; s and t merge into one.
+  const Halfedge previous = mesh.prev_halfedge_handle(edge), next = mesh.next_halfedge_handle(edge);
+  const std::uint32_t a = mesh_->from(previous), s = mesh_->from(edge), t = mesh_->to(edge), c = mesh_->to(next);
+  const auto& positions = mesh_->positions_;
+  const glm::dvec3& p = spot_.position;
+  const double moved_s = glm::length(positions[s] - p), moved_t = glm::length(positions[t] - p);
+  boundary_elements_.push_back({a, {positions[a], p, p}, moved_s});
+  if (vertex_ == t) {
+    boundary_elements_.push_back({t, {p, positions[c], positions[c]}, moved_t});
+    boundary_removed_.push_back({s, 1, std::max(moved_s, moved_t)});
+  } else {
+    boundary_elements_.push_back({s, {p, positions[c], positions[c]}, std::max(moved_s, moved_t)});
+    boundary_removed_.push_back({t, 1, moved_t});
+  }
+}
+
+void Change::boundary_of_relocation() {
+  if (!mesh_->bounds().boundary_backward || !mesh_->on_boundary(vertex_)) return;
+  const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
+  // The kernel keeps the outgoing halfedge of a boundary vertex on the boundary.
+  const Halfedge next = mesh.halfedge_handle(BoundedMesh::handle(vertex_)), previous = mesh.prev_halfedge_handle(next);
+  const std::uint32_t a = mesh_->from(previous), c = mesh_->to(next);
+  const glm::dvec3 &p = spot_.position, &pa = mesh_->positions_[a], &pc = mesh_->positions_[c];
+  const double moved = glm::length(mesh_->positions_[vertex_] - p);
+  boundary_elements_ = {{a, {pa, p, p}, moved}, {vertex_, {p, pc, pc}, moved}};
+}
+
+bool Change::boundary_within_bounds() {
+  if (boundary_elements_.empty()) return true;
+  const Bounds& bounds = mesh_->bounds();
+  const glm::dvec3 unknown(std::numeric_limits<double>::infinity());
+  for (const Coverage::Element& e : boundary_elements_) {
+    if (e.moved > 0 && bounds.boundary_forward->bound(e.corners, unknown) == TriangleCertificate::kUnproved)
+      return false;
+  }
+  return bounds.boundary_backward->try_change(boundary_elements_, boundary_removed_, boundary_backward_);
+}
+
+}  // namespace tolvol

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A rejected edge waits until its two-ring changes. Around a vertex with many faces every collapse would call back all
+// its edges, each try as costly as there are faces, which makes the cube of their number: there the edges wait until
+// an eighth of the faces has gone, and of those that come back only some are tried. Around a vertex with a great many
+// faces, a collapse calls back no more than what is near the vertex that vanished, and the costs of the other edges,
+// which only rise while it stays where it is, are renewed when their turn comes.
+#include "decimation/collapse_loop.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "base/call.h"
+
+namespace tolvol {
+namespace {
+
+// Edges looked at to be tried at once: one for so many triangles, because collapses come in each other's way, and at
+// most so many.
+constexpr std::size_t kTrianglesPerAttempt = 12, kMostAttempts = 64;
+constexpr std::uint32_t kCrowded = 24;           // faces around a vertex: with more, tries are rationed,
+constexpr std::uint64_t kCrowdBudget = 1 << 15;  // to so many faces and parts of the reference's pieces looked at
+constexpr std::uint32_t kGreatMany = 512;        // faces around a vertex: with more, costs are renewed late
+
+}  // namespace
+
+CollapseLoop::Shared::Shared(EdgeCollapse& c)
+    : collapse(c),
+      before(c.mesh().triangle_count()),
+      stamps(c.mesh().connectivity().n_edges(), 0),
+      refused(stamps.size()) {}
+
+CollapseLoop::CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t region, DeferredProof* later)
+    : shared_(shared),
+      collapse_(shared.collapse),
+      mesh_(collapse_.mesh()),
+      regions_(&regions),
+      region_(region),
+      later_(later),
+      queue_(shared.stamps),
+      tried_(1) {}
+
+CollapseLoop::CollapseLoop(Shared& shared, Team& team)
+    : shared_(shared), collapse_(shared.collapse), mesh_(collapse_.mesh()), queue_(shared.stamps), tried_(1) {
+  // Copies are looked up beyond the faces around an edge.
+  if (team.alone() || mesh_.has_copies()) return;
+  team_ = &team;
+  // Those of the last time, too, may still be waiting for their turn.
+  tried_.resize(2 * kMostAttempts);
+  tried_of_.assign(mesh_.connectivity().n_edges(), 0);
+  touched_.assign(mesh_.connectivity().n_vertices(), 0);
+  reserved_.assign(mesh_.connectivity().n_vertices(), 0);
+  surrounded_.assign(mesh_.connectivity().n_vertices(), 0);
+}
+
+bool CollapseLoop::deleted(std::uint32_t edge) const {
+  return mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted();
+}
+
+/// Whether an end of the edge had its share of tries.
+bool CollapseLoop::rationed(std::uint32_t edge) const {
+  if (crowds_.empty()) return false;
+  const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
+  return std::ranges::any_of(std::array{mesh_.from(h), mesh_.to(h)}, [&](std::uint32_t end) {
+    const auto found = crowds_.find(end);
+    return found != crowds_.end() && found->second.work >= kCrowdBudget;
+  });
+}
+
+void CollapseLoop::note_refusal(const Tried& tried) {
+  const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(tried.edge), 0);
+  for (const std::uint32_t end : {mesh_.from(h), mesh_.to(h)}) {
+    const std::uint32_t faces = mesh_.faces_around(end);
+    if (faces > kCrowded) crowds_.try_emplace(end, Crowd{faces, 0}).first->second.work += faces + tried.looked_at;
+  }
+}
+
+/// Whether edges of the vertex that were refused may be tried again, after a face around it has changed.
+bool CollapseLoop::ready(std::uint32_t vertex) {
+  const auto found = crowds_.find(vertex);
+  if (found == crowds_.end()) return true;
+  const std::uint32_t faces = mesh_.faces_around(vertex), before = found->second.faces;
+  if (faces > before - before / 8 && faces < before + before / 8) return false;
+  crowds_.erase(found);
+  return true;
+}
+
+bool CollapseLoop::own(std::uint32_t edge) const { return !regions_ || regions_->of_edge(mesh_, edge) == region_; }
+
+void CollapseLoop::add(std::uint32_t edge, double cost) {
+  if (cost < EdgeCollapse::kNever) {
+    queue_.push(edge, cost);
+  } else {
+    queue_.drop(edge);
+  }
+}
+
+void CollapseLoop::run(const Until& until, Progress* progress) {
+  for (std::size_t left; (left = mesh_.triangle_count()) > until.triangles;) {
+    poll();
+    if (progress) {
+      progress->set_count(left);
+      progress->update(static_cast<double>(shared_.before - left) / static_cast<double>(shared_.before));
+    }
+    const auto entry = queue_.pop();
+    if (!entry || entry->cost >= until.cost) break;
+    if (deleted(entry->edge)) continue;
+    if (rationed(entry->edge)) {
+      shared_.refused[entry->edge].store(true, std::memory_order_relaxed);
+      continue;
+    }
+    if (const auto later = risen(*entry)) {
+      add(entry->edge, *later);
+      continue;
+    }
+    Tried* const tried = found(entry->edge);
+    carry_out(tried ? *tried : try_ahead(entry->edge));
+  }
+}
+
+/// The cost of an edge that was not renewed when it rose.
+std::optional<double> CollapseLoop::risen(const CollapseQueue::Entry& entry) const {
+  const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(entry.edge), 0);
+  if (std::max(mesh_.faces_around(mesh_.from(h)), mesh_.faces_around(mesh_.to(h))) <= kGreatMany) return std::nullopt;
+  const double cost = collapse_.cost(entry.edge);
+  return cost > entry.cost ? std::optional(cost) : std::nullopt;
+}
+
+/// What was found for the edge, if that still holds.
+CollapseLoop::Tried* CollapseLoop::found(std::uint32_t edge) {
+  if (!team_) return nullptr;
+  Tried& tried = tried_[tried_of_[edge]];
+  if (tried.edge != edge || tried.met_another || (tried.attempt && tried.attempt->change.met_another())) return nullptr;
+  const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
+  return std::max(touched_[mesh_.from(h)], touched_[mesh_.to(h)]) <= tried.at ? &tried : nullptr;
+}
+
+std::unique_ptr<CollapseLoop::Attempt> CollapseLoop::take_attempt() {
+  const std::lock_guard lock(idle_mutex_);
+  if (idle_.empty()) return std::make_unique<Attempt>(mesh_, later_ ? Change::Proof::later : Change::Proof::now);
+  std::unique_ptr<Attempt> last = std::move(idle_.back());
+  idle_.pop_back();
+  return last;
+}
+
+void CollapseLoop::give_back(std::unique_ptr<Attempt> attempt) {
+  if (!attempt) return;
+  const std::lock_guard lock(idle_mutex_);
+  idle_.push_back(std::move(attempt));
+}
+
+void CollapseLoop::try_now(Tried& tried) {
+  std::unique_ptr<Attempt> attempt = take_attempt();
+  collapse_.attempt(tried.edge, *attempt);
+  tried.outcome = attempt->outcome, tried.looked_at = attempt->change.looked_at();
+  tried.met_another = attempt->change.met_another();
+  if (tried.outcome == EdgeCollapse::Outcome::possible) {
+    tried.attempt = std::move(attempt);
+  } else {
+    give_back(std::move(attempt));
+  }
+}
+
+/// Tries the edge and, with several threads, those that would come next.
+CollapseLoop::Tried& CollapseLoop::try_ahead(std::uint32_t edge) {
+  if (!team_) {
+    tried_[0].edge = edge;
+    try_now(tried_[0]);
+    return tried_[0];
+  }
+  const auto take = [&](std::uint32_t e) -> Tried& {
+    tried_of_[e] = static_cast<std::uint32_t>(next_);
+    Tried& tried = tried_[next_];
+    next_ = (next_ + 1) % tried_.size();
+    give_back(std::move(tried.attempt));  // of what was void before its turn came
+    tried = {};
+    tried.edge = e, tried.at = clock_;
+    return tried;
+  };
+  Tried& first = take(edge);
+  const std::size_t most = std::clamp<std::size_t>(mesh_.triangle_count() / kTrianglesPerAttempt, 1, kMostAttempts);
+  std::vector<Tried*> batch{&first};
+  std::vector<CollapseQueue::Entry> ahead;
+  ++batches_;
+  reserve_around(edge);
+  while (ahead.size() + 1 < most) {
+    const auto entry = queue_.pop();
+    if (!entry) break;
+    if (deleted(entry->edge)) continue;
+    ahead.push_back(*entry);
+    const Tried* const tried = found(entry->edge);
+    if (!tried && !reserved(entry->edge)) batch.push_back(&take(entry->edge));
+    if (!tried || tried->outcome == EdgeCollapse::Outcome::possible) reserve_around(entry->edge);
+  }
+  for (const CollapseQueue::Entry& entry : ahead) queue_.push(entry.edge, entry.cost);
+  team_->run(batch.size(), 1, [&](std::size_t i, std::size_t) { try_now(*batch[i]); });
+  return first;
+}
+
+/// Once the edge is collapsed, nothing holds that was found for edges of the vertices around it.
+void CollapseLoop::reserve_around(std::uint32_t edge) {
+  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
+  const auto h = connectivity.halfedge_handle(BoundedMesh::edge(edge), 0);
+  for (const std::uint32_t end : {mesh_.from(h), mesh_.to(h)}) {
+    // Edges that come one after another often share an end that has many neighbours.
+    if (std::exchange(surrounded_[end], batches_) == batches_) continue;
+    for (const auto near : connectivity.vv_range(BoundedMesh::handle(end))) {
+      reserved_[static_cast<std::size_t>(near.idx())] = batches_;
+    }
+  }
+}
+
+bool CollapseLoop::reserved(std::uint32_t edge) const {
+  const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
+  return reserved_[mesh_.from(h)] == batches_ || reserved_[mesh_.to(h)] == batches_;
+}
+
+void CollapseLoop::carry_out(Tried& tried) {
+  const std::uint32_t edge = tried.edge;
+  if (tried.outcome == EdgeCollapse::Outcome::possible) {
+    if (later_) later_->note(tried.attempt->change);
+    const auto h = tried.attempt->halfedge;
+    const glm::dvec3 before = mesh_.position(mesh_.to(h));
+    ring_.clear();
+    for (const auto near : mesh_.connectivity().vv_range(BoundedMesh::handle(mesh_.from(h)))) {
+      ring_.push_back(static_cast<std::uint32_t>(near.idx()));
+    }
+    const std::uint32_t kept = collapse_.carry_out(*tried.attempt);
+    const bool stayed = mesh_.position(kept) == before && !mesh_.joined(kept);
+    if (stayed && mesh_.faces_around(kept) > kGreatMany) {
+      renew_ring(kept);
+    } else {
+      for (const std::uint32_t copy : mesh_.copies(kept)) renew_around(copy);
+    }
+    give_back(std::move(tried.attempt));
+  } else if (tried.outcome == EdgeCollapse::Outcome::refused) {
+    note_refusal(tried);
+    if (!later_) shared_.refused[edge].store(true, std::memory_order_relaxed);
+  }
+  tried.edge = kNoEdge;
+}
+
+void CollapseLoop::touch(std::uint32_t vertex) {
+  if (team_) touched_[vertex] = clock_;
+}
+
+void CollapseLoop::renew(std::uint32_t edge) {
+  if (own(edge)) add(edge, collapse_.cost(edge));
+}
+
+/// After a collapse: the costs that it changes, and the edges that may now be possible.
+void CollapseLoop::renew_around(std::uint32_t vertex) {
+  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
+  const auto v = BoundedMesh::handle(vertex);
+  ++clock_;
+  touch(vertex);
+  for (const auto e : connectivity.ve_range(v)) renew(static_cast<std::uint32_t>(e.idx()));
+  for (const auto near : connectivity.vv_range(v)) call_back(static_cast<std::uint32_t>(near.idx()));
+}
+
+/// The same near the vertex that vanished alone, whose neighbours are in ring_: `vertex` stayed where it was.
+void CollapseLoop::renew_ring(std::uint32_t vertex) {
+  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
+  ++clock_;
+  touch(vertex);
+  for (const std::uint32_t near : ring_) {
+    if (near == vertex) continue;
+    for (const auto h : connectivity.voh_range(BoundedMesh::handle(near))) {
+      if (mesh_.to(h) == vertex) renew(static_cast<std::uint32_t>(connectivity.edge_handle(h).idx()));
+    }
+    call_back(near);
+  }
+}
+
+/// Edges of the vertex that were refused may now be possible. Those of a vertex with a great many faces are called back
+/// from their other ends.
+void CollapseLoop::call_back(std::uint32_t vertex) {
+  touch(vertex);
+  if (mesh_.faces_around(vertex) > kGreatMany || (!crowds_.empty() && !ready(vertex))) return;
+  for (const auto e : mesh_.connectivity().ve_range(BoundedMesh::handle(vertex))) {
+    // At a rim it may be another region's too.
+    std::atomic<bool>& refused = shared_.refused[static_cast<std::size_t>(e.idx())];
+    if (!refused.load(std::memory_order_relaxed)) continue;
+    refused.store(false, std::memory_order_relaxed);
+    renew(static_cast<std::uint32_t>(e.idx()));
+  }
+}
+
+}  // namespace tolvol

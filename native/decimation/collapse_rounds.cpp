@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// In a round each region goes up to the same cost, so that the order is nearly that of one loop over all; the counts
+// that it leads to are higher or lower by up to four per cent, in the mean about the same.
+#include "decimation/collapse_rounds.h"
+
+#include <algorithm>
+#include <atomic>
+#include <iterator>
+#include <vector>
+
+#include "base/call.h"
+#include "base/parallel.h"
+#include "decimation/collapse_loop.h"
+#include "decimation/deferred_proof.h"
+#include "decimation/edge_collapse.h"
+#include "decimation/regions.h"
+
+namespace tolvol {
+namespace {
+
+constexpr std::size_t kMostVertices = 4096;   // of a region
+constexpr std::size_t kLeastRegions = 12;     // for as many threads
+constexpr std::size_t kLeastVertices = 1024;  // a mesh of fewer is not cut: rims would be much of it
+constexpr double kRoundShare = 0.9;           // of the edges that the first of a round may collapse
+constexpr double kLeastGain = 0.1;            // of the triangles: after a round that removes fewer there is no other
+constexpr double kMostTakenBack = 0.25;       // of the regions: after such a round each collapse is proved at once
+/// Of the fourth power of the tolerance, which has the costs' unit: up to here hardly a collapse is refused, and while
+/// regions are worked on on trust their rounds go on.
+constexpr double kTrustedCost = 1;
+
+class Rounds {
+ public:
+  Rounds(BoundedMesh& mesh, Team& team, Progress* progress)
+      : mesh_(mesh),
+        team_(team),
+        collapse_(mesh),
+        shared_(collapse_),
+        costs_(mesh.connectivity().n_edges()),
+        places_(mesh.bounds().forward ? mesh.connectivity().n_faces() : 0),
+        progress_(progress) {
+    if (progress) progress->begin("decimating");
+  }
+
+  void by_regions() {
+    bool on_trust = mesh_.bounds().forward;
+    for (int round = 0;; ++round) {
+      const std::size_t triangles = mesh_.triangle_count(), vertices = triangles / 2;
+      if (vertices < kLeastVertices) return;
+      price();
+      const double limit = std::max(cost_at(kRoundShare), on_trust ? trusted_cost() : 0);
+      // Every other time the rims come to lie elsewhere.
+      const Regions parts =
+          regions(mesh_, std::min(kMostVertices, vertices / kLeastRegions), round % 2 == 0 ? 0.5 : 0.35, team_);
+      const std::vector<Members> members = members_of(parts);
+      std::atomic<std::size_t> taken_back = 0;
+      team_.run(parts.count, 1, [&](std::size_t i, std::size_t) {
+        const auto work = [&](DeferredProof* later) {
+          CollapseLoop loop(shared_, parts, static_cast<std::uint32_t>(i), later);
+          for (const std::uint32_t e : members[i].edges) loop.add(e, costs_[e]);
+          loop.run({limit, 0}, progress_);
+        };
+        if (on_trust) {
+          DeferredProof later(collapse_, mesh_, members[i].vertices, members[i].faces, places_);
+          if (later.possible()) {
+            try {
+              work(&later);
+              if (later.holds()) return;
+            } catch (const Cancelled&) {
+              later.take_back();
+              throw;
+            }
+            later.take_back();
+            ++taken_back;
+          }
+        }
+        work(nullptr);
+      });
+      on_trust = on_trust && static_cast<double>(taken_back) <= kMostTakenBack * static_cast<double>(parts.count);
+      const double left = static_cast<double>(mesh_.triangle_count()) / static_cast<double>(triangles);
+      if (left > 1 - kLeastGain) return;
+    }
+  }
+
+  void whole(std::size_t target) {
+    if (mesh_.bounds().forward) mesh_.keep_apart();
+    price();
+    CollapseLoop loop(shared_, team_);
+    for (std::uint32_t e = 0; e < costs_.size(); ++e) {
+      poll_at(e);
+      loop.add(e, costs_[e]);
+    }
+    loop.run({EdgeCollapse::kNever, target}, progress_);
+  }
+
+ private:
+  /// Costs of the edges that may be collapsed now.
+  void price() {
+    constexpr std::size_t kBlock = 1024;
+    team_.run(costs_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+      for (std::uint32_t e = static_cast<std::uint32_t>(begin); e < end; ++e) {
+        const bool waits = shared_.refused[e] || mesh_.connectivity().status(BoundedMesh::edge(e)).deleted();
+        costs_[e] = waits ? EdgeCollapse::kNever : collapse_.cost(e);
+      }
+    });
+  }
+
+  double cost_at(double share) const {
+    std::vector<double> finite;
+    std::copy_if(costs_.begin(), costs_.end(), std::back_inserter(finite),
+                 [](double cost) { return cost < EdgeCollapse::kNever; });
+    if (finite.empty()) return 0;
+    poll();
+    const auto at = finite.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(finite.size() - 1));
+    std::nth_element(finite.begin(), at, finite.end());
+    return *at;
+  }
+
+  double trusted_cost() const {
+    const double within = mesh_.bounds().forward->within();
+    return kTrustedCost * within * within * within * within;
+  }
+
+  struct Members {
+    std::vector<std::uint32_t> edges;  ///< that can collapse
+    std::vector<std::uint32_t> vertices;
+    std::vector<std::uint32_t> faces;  ///< around them
+  };
+
+  std::vector<Members> members_of(const Regions& parts) const {
+    std::vector<Members> out(parts.count);
+    for (std::uint32_t e = 0; e < costs_.size(); ++e) {
+      poll_at(e);
+      if (!(costs_[e] < EdgeCollapse::kNever)) continue;
+      const std::uint32_t part = parts.of_edge(mesh_, e);
+      if (part != Regions::kNone) out[part].edges.push_back(e);
+    }
+    for (std::uint32_t v = 0; v < parts.of_vertex.size(); ++v) {
+      if (parts.of_vertex[v] != Regions::kNone) out[parts.of_vertex[v]].vertices.push_back(v);
+    }
+    for (std::uint32_t f = 0; f < mesh_.connectivity().n_faces(); ++f) {
+      if (!mesh_.alive(f)) continue;
+      const glm::uvec3& t = mesh_.triangle(f);
+      const std::uint32_t part = std::min({parts.of_vertex[t.x], parts.of_vertex[t.y], parts.of_vertex[t.z]});
+      if (part != Regions::kNone) out[part].faces.push_back(f);
+    }
+    return out;
+  }
+
+  BoundedMesh& mesh_;
+  Team& team_;
+  EdgeCollapse collapse_;
+  CollapseLoop::Shared shared_;
+  std::vector<double> costs_;
+  std::vector<std::uint32_t> places_;  ///< per face, for the deferred proofs of the region that it is in
+  Progress* progress_;
+};
+
+}  // namespace
+
+void collapse_edges(BoundedMesh& mesh, std::size_t target, Team& team, Progress* progress) {
+  Rounds rounds(mesh, team, progress);
+  if (target == 0 && !mesh.bounds().baseline) rounds.by_regions();
+  rounds.whole(target);
+}
+
+}  // namespace tolvol

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Collapsing one edge: what it costs, where its vertex goes, whether the bounds hold, and carrying it out. Which
+/// edge's turn it is, others decide.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "decimation/bounded_mesh.h"
+#include "decimation/change.h"
+#include "decimation/position_fit.h"
+#include "decimation/quadric.h"
+
+namespace tolvol {
+
+class EdgeCollapse {
+ public:
+  using Halfedge = BoundedMesh::Halfedge;
+  using Edge = BoundedMesh::Edge;
+  using Outcome = Change::Outcome;
+
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+
+  /// Changes `mesh`, and keeps a reference to it.
+  explicit EdgeCollapse(BoundedMesh& mesh);
+
+  const BoundedMesh& mesh() const { return mesh_; }
+
+  /// The order in which edges are collapsed; kNever for one that stays. Reads faces around its ends.
+  double cost(std::uint32_t edge) const;
+
+  /// What came of trying an edge, and the scratch of it: not for two threads at once.
+  struct Attempt {
+    explicit Attempt(const BoundedMesh& mesh, Change::Proof proof = Change::Proof::now)
+        : change(mesh, proof), fit(mesh) {}
+    Outcome outcome = Outcome::impossible;
+    Halfedge halfedge;  ///< whose start would merge into its end
+    Change change;
+    PositionFit fit;
+  };
+  /// Reads faces around the edge's two ends, and nothing else of the mesh that changes.
+  void attempt(std::uint32_t edge, Attempt& a) const;
+  /// Carries out an attempt that is possible on the mesh as it is. Returns the vertex that stays.
+  std::uint32_t carry_out(Attempt& a);
+
+  const Quadric& quadric(std::uint32_t vertex) const { return quadrics_[vertex]; }
+  /// Where collapses are taken back.
+  void set_quadric(std::uint32_t vertex, const Quadric& quadric) { quadrics_[vertex] = quadric; }
+
+ private:
+  using Freedom = BoundedMesh::Freedom;
+  /// How an edge would be collapsed: the start of `halfedge` merges into its end, which goes to `position`.
+  struct Plan {
+    Halfedge halfedge;
+    glm::dvec3 position;
+    double cost;
+    Freedom freedom;
+  };
+
+  void sum_quadrics();
+  Quadric quadric_of_copies(std::uint32_t vertex) const;
+  std::optional<Plan> plan(Edge e) const;
+  Plan free_plan(Halfedge h) const;
+  Outcome search(Attempt& a, const glm::dvec3& best) const;
+
+  BoundedMesh& mesh_;
+  std::vector<Quadric> quadrics_;
+};
+
+}  // namespace tolvol

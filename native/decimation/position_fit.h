@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Where the moving vertex of a change would be best: near the reference with all faces around it, and the reference
+/// near to them, the largest deviations counting most. It steers a search and proves nothing.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "decimation/change.h"
+
+namespace tolvol {
+
+class PositionFit {
+ public:
+  /// Keeps a reference to `mesh`, which needs a forward bound.
+  explicit PositionFit(const BoundedMesh& mesh) : mesh_(&mesh) {}
+
+  /// Takes some of the pieces of the reference that the faces of a prepared change have to cover; good for any
+  /// position, and for the faces as they are now.
+  void gather(const Change& change);
+
+  struct Fit {
+    double energy;        ///< areas weighted by a high power of deviation over tolerance
+    double deviation;     ///< the largest of those looked at, over the tolerance; like the energy of where it was asked
+    glm::dvec3 position;  ///< lowers it, to first order
+  };
+  /// Of the faces as the change would leave them, its vertex at `position`. About 10 ns a face and piece. Where the
+  /// deviation is beyond `limit`, that is all that is found.
+  Fit fit(const Change& change, const glm::dvec3& position, double limit = std::numeric_limits<double>::infinity());
+  /// Tries a collapse, which `change` then holds, at fitted positions: from `start` a step for each of the limits,
+  /// until it is possible. With a deviation beyond the step's limit before it, over the tolerance, it is refused.
+  Change::Outcome collapse(Change& change, Change::Halfedge h, const glm::dvec3& start, std::span<const double> limits);
+  /// Energy of the same faces as they are.
+  double energy_now(const Change& change);
+
+ private:
+  struct Sums;
+  void prepare(const Change& change, bool changed);
+  void add_pieces(const Change& change, double limit, Sums& sums) const;
+  void add_faces(const Change& change, double limit, Sums& sums) const;
+
+  const BoundedMesh* mesh_;
+  std::vector<Coverage::Sample> samples_;
+  std::vector<WitnessTriangle> faces_;
+};
+
+}  // namespace tolvol

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// After the idea of alternating relocation, flips and collapses (H. Hoppe et al., "Mesh optimization", 1993), with the
+// certificates of both directions instead of an energy to decide what is allowed.
+#include "decimation/refinement.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "base/call.h"
+
+namespace tolvol {
+namespace {
+
+constexpr int kMoves = 4;        // of one vertex in a row
+constexpr int kHalvings = 3;     // of a step that does not lower the energy
+constexpr double kGain = 0.999;  // a step that lowers the energy less is not taken
+/// Steps of the fit from one start before a collapse is refused; with a deviation beyond this before a step, over the
+/// tolerance, hardly one succeeds: without these limits collapses take four times the time and find no more.
+constexpr double kHopeless[] = {2.5, 1.8, 1.5, 1.4, 1.3, 1.25, 1.2, 1.15};
+constexpr int kPatience = 3;       // rounds without a collapse before the end
+constexpr std::size_t kAhead = 8;  // steps tried at once by several threads: steps come in each other's way
+
+}  // namespace
+
+Refinement::Refinement(BoundedMesh& mesh, Team& team)
+    : mesh_(mesh),
+      team_(team),
+      changed_(mesh.connectivity().n_vertices(), 1),
+      touched_(mesh.connectivity().n_vertices(), 1),
+      relocated_(mesh.connectivity().n_vertices(), 0),
+      flipped_(mesh.connectivity().n_edges(), 0),
+      collapsed_(mesh.connectivity().n_edges(), 0) {
+  // Copies are looked up beyond the faces around a step.
+  const std::size_t count = team.alone() || mesh.has_copies() ? 1 : kAhead;
+  while (attempts_.size() < count) attempts_.emplace_back(mesh);
+}
+
+void Refinement::run(std::size_t target, const std::function<bool()>& expired, Progress* progress) {
+  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
+  std::vector<std::uint32_t> vertices, edges;
+  for (std::uint32_t v = 0; v < connectivity.n_vertices(); ++v) {
+    if (!connectivity.status(BoundedMesh::handle(v)).deleted() && !connectivity.is_isolated(BoundedMesh::handle(v)))
+      vertices.push_back(v);
+  }
+  for (std::uint32_t e = 0; e < connectivity.n_edges(); ++e) {
+    if (!connectivity.status(BoundedMesh::edge(e)).deleted()) edges.push_back(e);
+  }
+  const auto length2 = [&](std::uint32_t e) {
+    const Halfedge h = connectivity.halfedge_handle(BoundedMesh::edge(e), 0);
+    const glm::dvec3 d = mesh_.position(mesh_.from(h)) - mesh_.position(mesh_.to(h));
+    return glm::dot(d, d);
+  };
+  const auto go_on = [&] {
+    poll();
+    if (progress) {
+      progress->set_count(mesh_.triangle_count());
+      progress->update(0);
+    }
+    return mesh_.triangle_count() > target && !expired();
+  };
+  if (progress) progress->begin("refining");
+  for (int patience = kPatience; patience > 0; --patience) {
+    const std::size_t before = mesh_.triangle_count();
+    if (!sweep(kRelocation, vertices, go_on) || !sweep(kFlip, edges, go_on)) return;
+    std::vector<std::pair<double, std::uint32_t>> order;
+    for (const std::uint32_t e : edges) {
+      if (!connectivity.status(BoundedMesh::edge(e)).deleted()) order.emplace_back(length2(e), e);
+    }
+    std::sort(order.begin(), order.end());
+    edges.clear();
+    for (const auto& [length, e] : order) edges.push_back(e);
+    if (!sweep(kCollapse, edges, go_on)) return;
+    if (mesh_.triangle_count() < before) patience = kPatience + 1;
+  }
+}
+
+/// Tries all steps of a kind, in order. Returns whether it came to the end.
+bool Refinement::sweep(const Kind& kind, std::span<const std::uint32_t> steps, const std::function<bool()>& go_on) {
+  for (Attempt& a : attempts_) a.place = kNowhere;
+  for (std::size_t place = 0; place < steps.size(); ++place) {
+    if (!go_on()) return false;
+    if ((this->*kind.wanted)(steps[place])) (this->*kind.carry_out)(steps[place], tried(kind, steps, place));
+  }
+  return true;
+}
+
+/// What was found for the step at `place`, if that still holds; else it is tried, and with it those after it.
+Refinement::Attempt& Refinement::tried(const Kind& kind, std::span<const std::uint32_t> steps, std::size_t place) {
+  const auto at = [&](std::size_t i) -> Attempt& { return attempts_[i % attempts_.size()]; };
+  const auto holds = [&](std::size_t i) {
+    return at(i).place == i && (this->*kind.read)(steps[i]) <= at(i).at && !at(i).change.met_another();
+  };
+  if (holds(place)) return at(place);
+  std::vector<std::size_t> batch;
+  for (std::size_t i = place; i < std::min(place + attempts_.size(), steps.size()); ++i) {
+    if (!(this->*kind.wanted)(steps[i]) || holds(i)) continue;
+    at(i).place = i, at(i).at = clock_;
+    batch.push_back(i);
+  }
+  team_.run(batch.size(), 1, [&](std::size_t i, std::size_t) { (this->*kind.attempt)(steps[batch[i]], at(batch[i])); });
+  return at(place);
+}
+
+void Refinement::apply(Attempt& a) {
+  ++clock_;
+  for (const Change::Face& face : a.change.faces()) {
+    for (const std::uint32_t v : face.vertices) touched_[v] = changed_[v] = clock_;
+  }
+  mesh_.apply(a.change);
+  // A vertex that stays where it was has another share, distance and boundary, though its other faces are the same.
+  const std::optional<std::uint32_t> kept = a.change.vertex();
+  if (!kept) return;
+  changed_[*kept] = clock_;
+  for (const auto v : mesh_.connectivity().vv_range(BoundedMesh::handle(*kept))) {
+    changed_[static_cast<std::size_t>(v.idx())] = clock_;
+  }
+}
+
+bool Refinement::relocation_wanted(std::uint32_t vertex) const {
+  return !mesh_.connectivity().status(BoundedMesh::handle(vertex)).deleted() && mesh_.movable(vertex) &&
+         touched_[vertex] > relocated_[vertex];
+}
+
+void Refinement::try_relocation(std::uint32_t vertex, Attempt& a) const {
+  a.change.begin();
+  // Faces around a vertex that stays count as moving: the fit is for where it could go.
+  a.possible = a.change.prepare_relocate(vertex, mesh_.spot(vertex));
+  if (!a.possible) return;
+  a.fit.gather(a.change);
+  a.possible = find_move(vertex, a);
+}
+
+/// One step towards where the vertex fits best.
+bool Refinement::find_move(std::uint32_t vertex, Attempt& a) const {
+  const glm::dvec3 from = mesh_.position(vertex);
+  a.change.prepare_relocate(vertex, mesh_.spot(vertex));
+  const PositionFit::Fit now = a.fit.fit(a.change, from);
+  double step = 1;
+  for (int i = 0; i < kHalvings; ++i, step *= 0.5) {
+    const Spot spot = mesh_.store(from + step * (now.position - from));
+    if (!a.change.prepare_relocate(vertex, spot)) return false;
+    if (!(a.fit.fit(a.change, spot.position).energy < kGain * now.energy)) continue;
+    if (a.change.check() == Change::Outcome::possible) return true;
+  }
+  return false;
+}
+
+void Refinement::relocate(std::uint32_t vertex, Attempt& a) {
+  for (int moves = 1; a.possible; ++moves) {
+    apply(a);
+    a.possible = moves < kMoves && find_move(vertex, a);
+  }
+  relocated_[vertex] = clock_;
+}
+
+std::uint64_t Refinement::at_ends(const std::vector<std::uint64_t>& times, std::uint32_t edge) const {
+  const Halfedge h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
+  return std::max(times[mesh_.from(h)], times[mesh_.to(h)]);
+}
+
+/// Of the other diagonal as well: an edge may have come there.
+std::uint64_t Refinement::read_at_diagonals(std::uint32_t edge) const {
+  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
+  std::uint64_t last = read_at_ends(edge);
+  for (unsigned side = 0; side < 2; ++side) {
+    const Halfedge h = connectivity.halfedge_handle(BoundedMesh::edge(edge), side);
+    if (!connectivity.is_boundary(h)) last = std::max(last, changed_[mesh_.to(connectivity.next_halfedge_handle(h))]);
+  }
+  return last;
+}
+
+bool Refinement::flip_wanted(std::uint32_t edge) const {
+  return !mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted() && at_ends(touched_, edge) > flipped_[edge];
+}
+
+void Refinement::try_flip(std::uint32_t edge, Attempt& a) const {
+  a.change.begin();
+  a.possible = a.change.prepare_flip(BoundedMesh::edge(edge));
+  if (!a.possible) return;
+  a.fit.gather(a.change);
+  const double after = a.fit.fit(a.change, glm::dvec3(0)).energy;
+  const double before = a.fit.energy_now(a.change);
+  a.possible = after < kGain * before && a.change.check() == Change::Outcome::possible;
+}
+
+void Refinement::flip(std::uint32_t edge, Attempt& a) {
+  if (a.possible) apply(a);
+  flipped_[edge] = clock_;
+}
+
+bool Refinement::collapse_wanted(std::uint32_t edge) const {
+  return !mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted() && at_ends(touched_, edge) > collapsed_[edge];
+}
+
+void Refinement::try_collapse(std::uint32_t edge, Attempt& a) const {
+  constexpr auto kPossible = Change::Outcome::possible;
+  a.change.begin();
+  a.possible = false;
+  const auto [freedom, h] = mesh_.merge(BoundedMesh::edge(edge));
+  const Spot from = mesh_.spot(mesh_.from(h)), to = mesh_.spot(mesh_.to(h));
+  if (freedom == BoundedMesh::Freedom::anywhere) {
+    for (const glm::dvec3& start : {0.5 * (from.position + to.position), from.position, to.position}) {
+      a.possible = a.possible || a.fit.collapse(a.change, h, start, kHopeless) == kPossible;
+    }
+  } else if (freedom != BoundedMesh::Freedom::none) {
+    a.possible = a.change.try_collapse(h, to) == kPossible;
+    if (!a.possible && freedom == BoundedMesh::Freedom::either_way) {
+      a.possible = a.change.try_collapse(mesh_.connectivity().opposite_halfedge_handle(h), from) == kPossible;
+    }
+  }
+}
+
+void Refinement::collapse(std::uint32_t edge, Attempt& a) {
+  collapsed_[edge] = clock_;
+  if (a.possible) apply(a);
+}
+
+}  // namespace tolvol

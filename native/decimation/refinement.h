@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Fewer triangles after the collapse loop has ended: vertices move to where they fit best and edges are flipped, which
+/// makes room for further collapses, round after round until one brings nothing. Every step keeps the bounds.
+///
+/// Steps are tried in a fixed order. With several threads the next few are tried ahead, all at once; what was found is
+/// used when its turn comes, unless something that the try read has changed meanwhile: the result is the same for any
+/// number of threads.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "base/parallel.h"
+#include "base/progress.h"
+#include "decimation/bounded_mesh.h"
+#include "decimation/change.h"
+#include "decimation/position_fit.h"
+
+namespace tolvol {
+
+class Refinement {
+ public:
+  /// Changes `mesh`, which needs a forward bound, and keeps references to both.
+  Refinement(BoundedMesh& mesh, Team& team);
+
+  /// Until some rounds collapse nothing, `target` triangles are left, or `expired`, asked before every step, says so.
+  /// Throws Cancelled.
+  void run(std::size_t target, const std::function<bool()>& expired, Progress* progress);
+
+ private:
+  using Halfedge = BoundedMesh::Halfedge;
+
+  /// What came of trying a step, and the scratch of it.
+  struct Attempt {
+    explicit Attempt(const BoundedMesh& mesh) : change(mesh), fit(mesh) {}
+    Change change;
+    PositionFit fit;
+    bool possible = false;
+    std::size_t place = kNowhere;  ///< of the step in its order
+    std::uint64_t at = 0;          ///< of the clock
+  };
+  /// A kind of step, of a vertex or an edge each.
+  struct Kind {
+    /// When what a try reads changed last.
+    std::uint64_t (Refinement::*read)(std::uint32_t) const;
+    bool (Refinement::*wanted)(std::uint32_t) const;
+    void (Refinement::*attempt)(std::uint32_t, Attempt&) const;
+    void (Refinement::*carry_out)(std::uint32_t, Attempt&);
+  };
+  static constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
+
+  bool sweep(const Kind& kind, std::span<const std::uint32_t> steps, const std::function<bool()>& go_on);
+  Attempt& tried(const Kind& kind, std::span<const std::uint32_t> steps, std::size_t place);
+
+  std::uint64_t read_at(std::uint32_t vertex) const { return changed_[vertex]; }
+  bool relocation_wanted(std::uint32_t vertex) const;
+  void try_relocation(std::uint32_t vertex, Attempt& a) const;
+  bool find_move(std::uint32_t vertex, Attempt& a) const;
+  void relocate(std::uint32_t vertex, Attempt& a);
+
+  /// The later of an edge's two ends.
+  std::uint64_t at_ends(const std::vector<std::uint64_t>& times, std::uint32_t edge) const;
+  std::uint64_t read_at_ends(std::uint32_t edge) const { return at_ends(changed_, edge); }
+  std::uint64_t read_at_diagonals(std::uint32_t edge) const;
+  bool flip_wanted(std::uint32_t edge) const;
+  void try_flip(std::uint32_t edge, Attempt& a) const;
+  void flip(std::uint32_t edge, Attempt& a);
+
+  bool collapse_wanted(std::uint32_t edge) const;
+  void try_collapse(std::uint32_t edge, Attempt& a) const;
+  void collapse(std::uint32_t edge, Attempt& a);
+
+  void apply(Attempt& a);
+
+  static constexpr Kind kRelocation{&Refinement::read_at, &Refinement::relocation_wanted, &Refinement::try_relocation,
+                                    &Refinement::relocate};
+  static constexpr Kind kFlip{&Refinement::read_at_diagonals, &Refinement::flip_wanted, &Refinement::try_flip,
+                              &Refinement::flip};
+  static constexpr Kind kCollapse{&Refinement::read_at_ends, &Refinement::collapse_wanted, &Refinement::try_collapse,
+                                  &Refinement::collapse};
+
+  BoundedMesh& mesh_;
+  Team& team_;
+  std::vector<Attempt> attempts_;  ///< of the steps that come next, by place
+  // Steps are counted; what failed is not tried again until a face around it has changed since.
+  std::uint64_t clock_ = 1;
+  /// Per vertex: when a face around it changed last, or what is known of a vertex of one: what was found there no
+  /// longer holds, though a step that failed would fail again.
+  std::vector<std::uint64_t> changed_;
+  std::vector<std::uint64_t> touched_;                          ///< per vertex: when a face around it changed last
+  std::vector<std::uint64_t> relocated_, flipped_, collapsed_;  ///< per vertex, edge, edge: when it was tried last
+};
+
+}  // namespace tolvol

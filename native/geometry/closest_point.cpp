@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// After C. Ericson, Real-Time Collision Detection, 2005, §5.1.5 (walk the Voronoi regions of corners, edges, face),
+// which solves the normal equations of the plane: their error grows with the square of the aspect ratio. Three
+// deviations:
+// - a triangle lower than a tenth of its longest edge takes nearest_of_thin: the best of the three clamped edges and of
+// the
+//   foot in an orthogonal frame on the longest edge, whose error does not grow with the aspect ratio;
+// - the foot of a well-shaped triangle is improved by one step of iterative refinement;
+// - lengths outside 1e-60 .. 1e60 are scaled by a power of two first, because the fourth powers below would leave the
+// range.
+#include "geometry/closest_point.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace tolvol {
+namespace {
+
+constexpr double kThin = 0.01;  // squared height over squared longest edge
+constexpr double kSmallest = 1e-60, kLargest = 1e60;
+
+double largest(const glm::dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
+
+ClosestPoint at(const glm::dvec3& p, const glm::dvec3& q, const glm::dvec3& weights) {
+  const glm::dvec3 r = p - q;
+  return {q, weights, glm::dot(r, r)};
+}
+
+/// Weight of `b` at the point of the segment a, b that is nearest to p. A point when a equals b.
+double segment_weight(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) {
+  const glm::dvec3 ab = b - a;
+  const double length2 = glm::dot(ab, ab);
+  return length2 > 0 ? std::clamp(glm::dot(p - a, ab) / length2, 0.0, 1.0) : 0.0;
+}
+
+/// a + t (b - a), from the nearer end: exact at both.
+glm::dvec3 on_segment(const glm::dvec3& a, const glm::dvec3& b, double t) {
+  return t <= 0.5 ? a + t * (b - a) : b - (1 - t) * (b - a);
+}
+
+ClosestPoint nearest_of_thin(const glm::dvec3& p, const glm::dvec3 (&corner)[3]) {
+  ClosestPoint best{glm::dvec3(0), glm::dvec3(0), std::numeric_limits<double>::infinity()};
+  int base = 0;  // the longest edge runs from corner[base] to the next one
+  double longest2 = -1;
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3;
+    const glm::dvec3 edge = corner[j] - corner[i];
+    if (const double length2 = glm::dot(edge, edge); length2 > longest2) longest2 = length2, base = i;
+    const double t = segment_weight(p, corner[i], corner[j]);
+    glm::dvec3 weights(0);
+    weights[i] = 1 - t, weights[j] = t;
+    const ClosestPoint q = at(p, on_segment(corner[i], corner[j], t), weights);
+    if (q.distance_squared < best.distance_squared) best = q;
+  }
+  const int i = base, j = (base + 1) % 3, k = (base + 2) % 3;
+  const glm::dvec3 edge = corner[j] - corner[i];
+  glm::dvec3 height = corner[k] - corner[i];
+  double foot = 0;  // of corner k on the edge, as a share of it
+  if (longest2 > 0) {
+    for (int pass = 0; pass < 2; ++pass) {  // the second pass makes up for the cancellation in the first
+      const double s = glm::dot(height, edge) / longest2;
+      height -= s * edge;
+      foot += s;
+    }
+  }
+  const double height2 = glm::dot(height, height);
+  if (!(height2 > 0)) return best;
+  const double y = glm::dot(p - corner[i], height) / height2;
+  const double x = glm::dot(p - corner[i] - y * height, edge) / longest2;
+  glm::dvec3 weights(0);
+  weights[k] = y, weights[j] = x - y * foot, weights[i] = 1 - weights[j] - y;
+  if (weights.x < 0 || weights.y < 0 || weights.z < 0) return best;
+  const ClosestPoint q = at(p, corner[i] + weights[j] * edge + weights[k] * (corner[k] - corner[i]), weights);
+  return q.distance_squared < best.distance_squared ? q : best;
+}
+
+ClosestPoint nearest_in_range(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+  const glm::dvec3 ab = b - a, ac = c - a, bc = c - b, n = glm::cross(ab, ac);
+  const double ab2 = glm::dot(ab, ab), ac2 = glm::dot(ac, ac), n2 = glm::dot(n, n);
+  const double longest2 = std::max({ab2, ac2, glm::dot(bc, bc)});
+  if (!(n2 > kThin * longest2 * longest2)) return nearest_of_thin(p, {a, b, c});
+
+  const glm::dvec3 ap = p - a, bp = p - b, cp = p - c;
+  const double d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap);
+  if (d1 <= 0 && d2 <= 0) return at(p, a, {1, 0, 0});
+  const double d3 = glm::dot(ab, bp), d4 = glm::dot(ac, bp);
+  if (d3 >= 0 && d4 <= d3) return at(p, b, {0, 1, 0});
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
+    const double t = std::min(d1 / ab2, 1.0);
+    return at(p, on_segment(a, b, t), {1 - t, t, 0});
+  }
+  const double d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
+  if (d6 >= 0 && d5 <= d6) return at(p, c, {0, 0, 1});
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) {
+    const double t = std::min(d2 / ac2, 1.0);
+    return at(p, on_segment(a, c, t), {1 - t, 0, t});
+  }
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+    const double t = segment_weight(p, b, c);
+    return at(p, on_segment(b, c, t), {0, 1 - t, t});
+  }
+  double v = std::clamp(vb / n2, 0.0, 1.0), w = std::clamp(vc / n2, 0.0, 1 - v);
+  glm::dvec3 q = a + v * ab + w * ac;
+  const glm::dvec3 r = p - q;
+  const double e = glm::dot(ab, r), f = glm::dot(ac, r), g = glm::dot(ab, ac);
+  const double v1 = v + (ac2 * e - g * f) / n2, w1 = w + (ab2 * f - g * e) / n2;
+  if (v1 >= 0 && w1 >= 0 && v1 + w1 <= 1) {
+    v = v1, w = w1;
+    q = a + v * ab + w * ac;
+  }
+  return at(p, q, {1 - v - w, v, w});
+}
+
+}  // namespace
+
+ClosestPoint closest_point(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+  const double length = std::max({largest(p - a), largest(b - a), largest(c - a)});
+  if (length >= kSmallest && length <= kLargest) return nearest_in_range(p, a, b, c);
+  // Half of each first: a difference of the whole may overflow.
+  const double half = std::max({largest(0.5 * p - 0.5 * a), largest(0.5 * b - 0.5 * a), largest(0.5 * c - 0.5 * a)});
+  if (half == 0) return at(p, a, {1, 0, 0});
+  if (!std::isfinite(half)) return {a, {1, 0, 0}, std::numeric_limits<double>::quiet_NaN()};
+  const int exponent = std::ilogb(half);
+  auto shifted = [](const glm::dvec3& x, int by) {
+    return glm::dvec3(std::ldexp(x.x, by), std::ldexp(x.y, by), std::ldexp(x.z, by));
+  };
+  ClosestPoint q =
+      nearest_in_range(shifted(p, -exponent), shifted(a, -exponent), shifted(b, -exponent), shifted(c, -exponent));
+  q.point = shifted(q.point, exponent);
+  q.distance_squared = std::ldexp(q.distance_squared, 2 * exponent);
+  return q;
+}
+
+}  // namespace tolvol

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "geometry/frame.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/errors.h"
+
+namespace tolvol {
+
+double rounded_to_float32(double x) {
+  const volatile float rounded = static_cast<float>(x);
+  return rounded;
+}
+
+glm::dvec3 rounded_to_float32(const glm::dvec3& p) {
+  return {rounded_to_float32(p.x), rounded_to_float32(p.y), rounded_to_float32(p.z)};
+}
+
+Frame::Frame(const Box& world) {
+  if (world.empty()) return;
+  centre_ = world.lower * 0.5 + world.upper * 0.5;
+  const glm::dvec3 half = world.upper * 0.5 - world.lower * 0.5;
+  const double largest = std::max({half.x, half.y, half.z});
+  if (!(largest > 0)) return;
+  // Normalise by the largest side first: the square of a huge or tiny half diagonal would leave the range of double.
+  const double radius = largest * glm::length(half / largest);
+  int exponent = 0;
+  std::frexp(radius, &exponent);
+  scale_ = std::ldexp(1.0, -exponent);
+}
+
+Placement::Placement(const glm::dmat4& to_world, Storage storage, const Frame& frame)
+    : to_world_(to_world), storage_(storage), mirrors_(false), frame_(frame) {
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 4; ++row) {
+      if (!std::isfinite(to_world[column][row])) throw InvalidInput("to_world has a value that is not finite");
+    }
+    if (to_world[column][3] != (column == 3 ? 1.0 : 0.0)) {
+      throw InvalidInput("to_world is not affine: its last row must be 0 0 0 1");
+    }
+  }
+  // Columns of length one first: the determinant of a matrix of tiny scales would underflow.
+  glm::dmat3 linear(to_world);
+  glm::dvec3 lengths{0};
+  for (int column = 0; column < 3; ++column) {
+    const glm::dvec3 c = linear[column];
+    const double largest = std::max({std::abs(c.x), std::abs(c.y), std::abs(c.z)});
+    if (largest > 0) lengths[column] = largest * glm::length(c / largest);
+    if (!(lengths[column] > 0)) throw InvalidInput("to_world is singular: an axis is scaled to zero; give it a scale");
+    linear[column] /= lengths[column];
+  }
+  const double determinant = glm::determinant(linear);
+  mirrors_ = determinant < 0;
+  if (std::abs(determinant) < 1e-12) {
+    throw InvalidInput("to_world is singular: it flattens the mesh; give every axis a scale");
+  }
+  glm::dmat3 inverse = glm::inverse(linear);
+  for (int column = 0; column < 3; ++column) {
+    for (int row = 0; row < 3; ++row) inverse[column][row] /= lengths[row];
+  }
+  to_local_ = glm::dmat4(inverse);
+}
+
+Placement Placement::in(const Frame& frame) const {
+  Placement copy = *this;
+  copy.frame_ = frame;
+  return copy;
+}
+
+glm::dvec3 Placement::world(const glm::dvec3& stored) const {
+  glm::dvec3 result;
+  for (int row = 0; row < 3; ++row) {
+    result[row] =
+        to_world_[0][row] * stored.x + to_world_[1][row] * stored.y + to_world_[2][row] * stored.z + to_world_[3][row];
+  }
+  return result;
+}
+
+std::vector<glm::dvec3> Placement::frame(std::span<const glm::dvec3> stored) const {
+  std::vector<glm::dvec3> result(stored.size());
+  for (std::size_t i = 0; i < stored.size(); ++i) result[i] = frame(stored[i]);
+  return result;
+}
+
+glm::dvec3 Placement::store(const glm::dvec3& in_frame) const {
+  const glm::dvec3 local = glm::dmat3(to_local_) * (frame_.to_world(in_frame) - glm::dvec3(to_world_[3]));
+  return storage_ == Storage::float32 ? rounded_to_float32(local) : local;
+}
+
+double Placement::mapping_error(std::span<const glm::dvec3> stored) const {
+  glm::dvec3 extent{0};
+  for (const glm::dvec3& p : stored) extent = glm::max(extent, glm::abs(p));
+  double largest = 0;
+  for (int row = 0; row < 3; ++row) {
+    largest = std::max(largest, std::abs(to_world_[0][row]) * extent.x + std::abs(to_world_[1][row]) * extent.y +
+                                    std::abs(to_world_[2][row]) * extent.z + std::abs(to_world_[3][row]));
+  }
+  // A row is three products and three sums, hence an error of at most 4u (1 + 4u) times the sum of magnitudes; taking
+  // the centre off adds one more u of at most twice that magnitude; scaling by a power of two adds none. Six u a
+  // coordinate, times sqrt(3) for the length.
+  return 11 * kUnitRoundoff * largest * frame_.scale();
+}
+
+double Placement::storage_step(std::span<const glm::dvec3> stored) const {
+  // A position is off by half a unit in the last place a coordinate; store()'s own arithmetic by less than
+  // mapping_error() over the condition of the matrix, which only matters for float64 and is covered by its factor.
+  const double half_ulp = storage_ == Storage::float32 ? 0x1p-24 : 8 * kUnitRoundoff;
+  glm::dvec3 extent{0};
+  for (const glm::dvec3& p : stored) extent = glm::max(extent, glm::abs(p));
+  double step = 0;
+  for (int row = 0; row < 3; ++row) {
+    const double coordinate =
+        half_ulp * (std::abs(to_world_[0][row]) * extent.x + std::abs(to_world_[1][row]) * extent.y +
+                    std::abs(to_world_[2][row]) * extent.z);
+    step += coordinate * coordinate;
+  }
+  return std::sqrt(step) * frame_.scale();
+}
+
+double reference_size(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> triangles,
+                      const glm::dmat4& to_world) {
+  const std::vector<bool> used = used_vertices(stored.size(), triangles);
+  Box box;
+  for (std::size_t i = 0; i < stored.size(); ++i) {
+    if (used[i]) box.add(stored[i]);
+  }
+  const glm::dvec3 side = box.upper - box.lower;
+  const glm::dmat3 linear(to_world);
+  double longest = 0;
+  for (const glm::dvec3 sign :
+       {glm::dvec3(1, 1, 1), glm::dvec3(1, 1, -1), glm::dvec3(1, -1, 1), glm::dvec3(-1, 1, 1)}) {
+    const glm::dvec3 diagonal = linear * (side * sign);
+    longest = std::max(longest, std::hypot(diagonal.x, diagonal.y, diagonal.z));
+  }
+  if (!(longest > 0)) throw InvalidInput("all vertices are at one point: the mesh has no size");
+  return longest;
+}
+
+}  // namespace tolvol

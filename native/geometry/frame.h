@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// From coordinates as they are stored (float32 or float64, local, with a 4x4 matrix) to the frame in which everything
+/// is decided, and back: the frame is the world, centred on the reference and scaled by a power of two to a size of
+/// about 1, so that neither a far origin nor a tiny or huge scale costs accuracy.
+#pragma once
+
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "geometry/triangle_mesh.h"
+
+namespace tolvol {
+
+/// Unit roundoff of double precision.
+inline constexpr double kUnitRoundoff = 0x1p-53;
+
+class Frame {
+ public:
+  Frame() = default;
+  /// Centred on a box of the world, its half diagonal scaled into (1/2, 1] (a point: scale 1). Exact: a power of two.
+  explicit Frame(const Box& world);
+
+  glm::dvec3 from_world(const glm::dvec3& p) const { return (p - centre_) * scale_; }
+  glm::dvec3 to_world(const glm::dvec3& p) const { return p / scale_ + centre_; }
+  /// Frame length of a world length of 1.
+  double scale() const { return scale_; }
+
+ private:
+  glm::dvec3 centre_{0};
+  double scale_ = 1;
+};
+
+enum class Storage { float32, float64 };
+
+/// The float32 nearest to x. A plain cast there and back is not enough: GCC 12 drops the pair when it vectorises a loop
+/// or a constructor of several.
+double rounded_to_float32(double x);
+glm::dvec3 rounded_to_float32(const glm::dvec3& p);
+
+/// Where one array of vertices lives.
+class Placement {
+ public:
+  /// Throws InvalidInput unless `to_world` is finite, affine and invertible.
+  Placement(const glm::dmat4& to_world, Storage storage, const Frame& frame = {});
+
+  /// The same array seen from another frame.
+  Placement in(const Frame& frame) const;
+
+  glm::dvec3 world(const glm::dvec3& stored) const;
+  glm::dvec3 frame(const glm::dvec3& stored) const { return frame_.from_world(world(stored)); }
+  std::vector<glm::dvec3> frame(std::span<const glm::dvec3> stored) const;
+
+  /// The stored value nearest to a position in the frame: rounded to the stored type. Map it back before judging it.
+  glm::dvec3 store(const glm::dvec3& in_frame) const;
+
+  /// Bound, in frame lengths, on the difference between frame() and exact arithmetic, over the given points.
+  double mapping_error(std::span<const glm::dvec3> stored) const;
+  /// Bound, in frame lengths, on how far store() moves a point whose stored coordinates are no larger than these.
+  double storage_step(std::span<const glm::dvec3> stored) const;
+
+  /// Whether `to_world` turns the faces' front to their back.
+  bool mirrors() const { return mirrors_; }
+  const glm::dmat4& to_world() const { return to_world_; }
+  Storage storage() const { return storage_; }
+
+ private:
+  glm::dmat4 to_world_;
+  glm::dmat4 to_local_;
+  Storage storage_;
+  bool mirrors_;
+  Frame frame_;
+};
+
+/// What 100 % means: the longest of the four diagonals of the local bounding box of the used vertices, after
+/// `to_world`. Throws InvalidInput when it is zero (all vertices at one point).
+double reference_size(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> triangles,
+                      const glm::dmat4& to_world);
+
+}  // namespace tolvol

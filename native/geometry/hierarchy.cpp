@@ -1,0 +1,355 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Tree after C. Lauterbach et al., Fast BVH Construction on GPUs, 2009 (sort by Morton code, split where the highest
+// bit changes), collapsed to eight children a node whose boxes are tested together, after I. Wald, C. Benthin, S.
+// Boulos, Getting Rid of Packets, 2008. A triangle is a child like any other: there are no leaf lists.
+//
+// Coordinates. "Scaled" is the mesh times a power of two: exact. "Local" is scaled minus the centre, each coordinate
+// rounded once, so that the boxes can be float wherever the mesh lies; |x| <= 1 on the mesh. Boxes only decide what is
+// looked at; the distances themselves come from the scaled corners in double.
+//
+// A needle across the axes fills little of its box, and a search among many of them would look at most: where boxes
+// turned along the triangles are smaller by half, a node has these instead (geometry/oriented_boxes).
+//
+// Margins. A box may be skipped only when none of its triangles can be within the bound, equality included (ties go to
+// the lower index). A local coordinate x has a relative error of at most 2^-53. Rounded to float and moved away
+// by 2.4e-7 |x| + 1e-37 (both the faces of the box and the two ends that stand for the point: 2^-24 for the rounding,
+// one more for the movement, below 4 * 2^-24 = 2.38e-7), the difference of the two is at most the true one, before its
+// own rounding of 2^-24. The square of the box distance thus exceeds the true one by less than 6 roundings of
+// 2^-24, 3.6e-7, and the bound is raised by 1e-6 before it becomes a float (one rounding more, and the difference
+// between a computed distance and the true one, 1e-15). 1e-37 covers underflow, also where the processor flushes
+// subnormal numbers to zero. Points beyond kFloatReach half sizes are compared in double: there the spread of 2^-24
+// would exceed details of the mesh. The relative error of a squared box distance is then below 16 * 2^-53, against
+// 1e-13. Points beyond kReach are moved towards the centre to that distance R for the search. Of two points of the mesh
+// (half size 1) the nearer one as seen from there is nearer to the point itself too, up to 2 / R, which is below one
+// rounding of the distance, R or more.
+#include "geometry/hierarchy.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace tolvol {
+namespace {
+
+struct Key {
+  std::uint64_t code;
+  std::uint32_t triangle;
+};
+
+/// Least significant digit first: stable, so equal codes stay in the order of their index.
+void radix_sort(std::vector<Key>& keys) {
+  constexpr int kBits = 11;
+  std::vector<Key> other(keys.size());
+  for (int shift = 0; shift < 63; shift += kBits) {
+    std::array<std::uint32_t, (1 << kBits) + 1> start{};
+    auto digit = [&](const Key& key) { return key.code >> shift & ((1 << kBits) - 1); };
+    poll();
+    for (const Key& key : keys) ++start[digit(key) + 1];
+    for (int i = 0; i < 1 << kBits; ++i) start[i + 1] += start[i];
+    poll();
+    for (const Key& key : keys) other[start[digit(key)]++] = key;
+    keys.swap(other);
+  }
+}
+
+/// The lowest 21 bits of x, two zeros between them.
+std::uint64_t spread_bits(std::uint64_t x) {
+  x &= 0x1FFFFF;
+  x = (x | x << 32) & 0x1F00000000FFFF;
+  x = (x | x << 16) & 0x1F0000FF0000FF;
+  x = (x | x << 8) & 0x100F00F00F00F00F;
+  x = (x | x << 4) & 0x10C30C30C30C30C3;
+  return (x | x << 2) & 0x1249249249249249;
+}
+
+struct FloatBox {
+  float lower[3] = {HUGE_VALF, HUGE_VALF, HUGE_VALF}, upper[3] = {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF};
+
+  void add(const FloatBox& box) {
+    for (int k = 0; k < 3; ++k) {
+      lower[k] = std::min(lower[k], box.lower[k]);
+      upper[k] = std::max(upper[k], box.upper[k]);
+    }
+  }
+};
+
+float spread(float x) { return std::abs(x) * 2.4e-7f + 1e-37f; }
+
+}  // namespace
+
+template <class Real>
+void Hierarchy::box_distances(const Node& node, const Real (&from)[3], const Real (&to)[3], Real (&squared)[kWidth]) {
+  const auto outside = [](Real below, Real above) {
+    const Real larger = below > above ? below : above;
+    return larger > 0 ? larger : Real(0);
+  };
+  for (int c = 0; c < kWidth; ++c) {
+    const Real x = outside(Real(node.lower[0][c]) - to[0], from[0] - Real(node.upper[0][c]));
+    const Real y = outside(Real(node.lower[1][c]) - to[1], from[1] - Real(node.upper[1][c]));
+    const Real z = outside(Real(node.lower[2][c]) - to[2], from[2] - Real(node.upper[2][c]));
+    squared[c] = x * x + y * y + z * z;
+  }
+}
+template void Hierarchy::box_distances(const Node&, const float (&)[3], const float (&)[3], float (&)[kWidth]);
+template void Hierarchy::box_distances(const Node&, const double (&)[3], const double (&)[3], double (&)[kWidth]);
+
+struct Hierarchy::Build {
+  Hierarchy& tree;
+  std::vector<Key> keys;
+  struct Range {
+    std::uint32_t begin, end;
+  };
+
+  std::vector<double> taken{};  // twice the area of the triangles sorted before a place: a rectangle around each
+
+  /// Leaves the first of each set of triangles with exactly the same corners in the same order, and chains the others
+  /// to it: a thousand copies would otherwise be a thousand ties to look at in every search.
+  void join_twins(const TriangleMesh& mesh) {
+    const auto corner = [&](const Key& key, int k) -> const glm::dvec3& {
+      return mesh.vertices[mesh.triangles[key.triangle][k]];
+    };
+    std::size_t compared = 0;
+    const auto order = [&](const Key& x, const Key& y) {  // -1, 0, 1
+      poll_at(++compared);
+      for (int i = 0; i < 9; ++i) {
+        const double u = corner(x, i / 3)[i % 3], v = corner(y, i / 3)[i % 3];
+        if (u != v) return u < v ? -1 : 1;
+      }
+      return 0;
+    };
+    std::size_t kept = 0;
+    std::uint32_t last = kNone;
+    for (std::size_t begin = 0, end; begin < keys.size(); begin = end) {
+      for (end = begin + 1; end < keys.size() && keys[end].code == keys[begin].code;) ++end;
+      if (end - begin > 1) {
+        std::sort(keys.begin() + begin, keys.begin() + end, [&](const Key& x, const Key& y) {
+          const int o = order(x, y);
+          return o != 0 ? o < 0 : x.triangle < y.triangle;
+        });
+      }
+      for (std::size_t i = begin; i < end; ++i) {
+        if (i > begin && order(keys[i - 1], keys[i]) == 0) {
+          if (tree.twin_.empty()) tree.twin_.assign(mesh.triangles.size(), kNone);
+          tree.twin_[last] = keys[i].triangle;
+        } else {
+          keys[kept++] = keys[i];
+        }
+        last = keys[i].triangle;
+      }
+    }
+    keys.resize(kept);
+  }
+
+  FloatBox triangle_box(std::uint32_t place) const {
+    const Corners& t = tree.corners_[place];
+    FloatBox box;
+    for (int k = 0; k < 3; ++k) {
+      const float lower = float(std::min({t[0][k], t[1][k], t[2][k]}) - tree.centre_[k]);
+      const float upper = float(std::max({t[0][k], t[1][k], t[2][k]}) - tree.centre_[k]);
+      box.lower[k] = lower - spread(lower);
+      box.upper[k] = upper + spread(upper);
+    }
+    return box;
+  }
+
+  /// Where the highest bit that differs within the range changes; the middle when all codes are equal.
+  std::uint32_t split(Range range) const {
+    const std::uint64_t first = keys[range.begin].code, last = keys[range.end - 1].code;
+    if (first == last) return range.begin + (range.end - range.begin) / 2;
+    const std::uint64_t high = last & ~((std::bit_floor(first ^ last)) - 1);
+    const auto at = std::partition_point(keys.begin() + range.begin, keys.begin() + range.end,
+                                         [&](const Key& key) { return key.code < high; });
+    return std::uint32_t(at - keys.begin());
+  }
+
+  void sum_areas() {
+    taken.assign(1, 0);
+    for (std::size_t place = 0; place < tree.corners_.size(); ++place) {
+      poll_at(place);
+      const Corners& t = tree.corners_[place];
+      taken.push_back(taken.back() + glm::length(glm::cross(t[1] - t[0], t[2] - t[0])));
+    }
+  }
+
+  /// Gives the node, whose box is `whole`, oriented boxes where its boxes along the axes overlap or are empty for the
+  /// most part, and where oriented boxes are smaller by half.
+  void orient(std::uint32_t index, const FloatBox& whole, Range range, std::span<const Range> parts) {
+    constexpr double kLarge = 4, kSmaller = 0.5;
+    const auto half_area = [](double x, double y, double z) { return x * y + y * z + z * x; };
+    const double around =
+        half_area(whole.upper[0] - whole.lower[0], whole.upper[1] - whole.lower[1], whole.upper[2] - whole.lower[2]);
+    const Node& node = tree.nodes_[index];
+    double along_axes = 0;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      along_axes += half_area(node.upper[0][i] - node.lower[0][i], node.upper[1][i] - node.lower[1][i],
+                              node.upper[2][i] - node.lower[2][i]);
+    }
+    if (along_axes < kLarge * std::min(around, taken[range.end] - taken[range.begin])) return;
+    OrientedBoxes boxes;
+    double oriented = 0;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      const Corners* first = tree.corners_.data() + parts[i].begin;
+      oriented += boxes.fit(int(i), {first, parts[i].end - parts[i].begin}, tree.centre_);
+    }
+    if (oriented > kSmaller * along_axes) return;
+    tree.turned_.resize(tree.nodes_.size(), kNone);
+    tree.turned_[index] = std::uint32_t(tree.oriented_.size());
+    tree.oriented_.push_back(boxes);
+  }
+
+  /// Makes the node of a range and those below it; returns its box. At most 95 deep, see walk_in.
+  FloatBox make(Range range) {
+    std::array<Range, kWidth> parts{range};
+    int count = 1;
+    while (count < kWidth) {
+      int largest = 0;
+      for (int i = 1; i < count; ++i) {
+        if (parts[i].end - parts[i].begin > parts[largest].end - parts[largest].begin) largest = i;
+      }
+      if (parts[largest].end - parts[largest].begin < 2) break;
+      const std::uint32_t middle = split(parts[largest]);
+      parts[count++] = {middle, parts[largest].end};
+      parts[largest].end = middle;
+    }
+    const std::size_t index = tree.nodes_.size();
+    poll_at(index);
+    tree.nodes_.emplace_back();
+    FloatBox whole;
+    for (int i = 0; i < kWidth; ++i) {
+      FloatBox box;
+      std::uint32_t child = kTriangle;  // never followed when empty: its box lies infinitely far
+      if (i < count) {
+        const bool is_triangle = parts[i].end - parts[i].begin == 1;
+        child = is_triangle ? kTriangle | parts[i].begin : std::uint32_t(tree.nodes_.size());
+        box = is_triangle ? triangle_box(parts[i].begin) : make(parts[i]);
+      }
+      Node& node = tree.nodes_[index];
+      node.child[i] = child;
+      for (int k = 0; k < 3; ++k) node.lower[k][i] = box.lower[k], node.upper[k][i] = box.upper[k];
+      whole.add(box);
+    }
+    orient(std::uint32_t(index), whole, range, {parts.data(), std::size_t(count)});
+    return whole;
+  }
+};
+
+Hierarchy::Hierarchy(const TriangleMesh& mesh) {
+  Box box;
+  for (const glm::uvec3& t : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) box.add(mesh.vertices[t[k]]);
+  }
+  if (box.empty()) return;
+  const glm::dvec3 half = 0.5 * box.upper - 0.5 * box.lower;
+  const double size = std::max({half.x, half.y, half.z});
+  // A point in space (size 0) is as large as its coordinates, so that these do not overflow.
+  const glm::dvec3 far = glm::max(glm::abs(box.lower), glm::abs(box.upper));
+  const double unit = size > 0 ? size : std::max({far.x, far.y, far.z});
+  scale_ = unit > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(unit) + 1, -1000, 1000)) : 1;
+  centre_ = 0.5 * scaled(box.upper) + 0.5 * scaled(box.lower);
+
+  const std::size_t count = mesh.triangles.size();
+  Build build{*this, std::vector<Key>(count)};
+  place_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    poll_at(i);
+    const glm::uvec3& t = mesh.triangles[i];
+    const glm::dvec3 &a = mesh.vertices[t.x], &b = mesh.vertices[t.y], &c = mesh.vertices[t.z];
+    const glm::dvec3 middle =
+        0.5 * scaled(glm::min(a, glm::min(b, c))) + 0.5 * scaled(glm::max(a, glm::max(b, c))) - centre_;
+    std::uint64_t code = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double cell = (middle[k] + 1) * 0x1p20;
+      code |= spread_bits(std::uint64_t(std::clamp(cell, 0.0, double(0x1FFFFF)))) << k;
+    }
+    build.keys[i] = {code, std::uint32_t(i)};
+  }
+  radix_sort(build.keys);
+  build.join_twins(mesh);
+  corners_.resize(build.keys.size());
+  triangle_.resize(build.keys.size());
+  for (std::uint32_t place = 0; place < build.keys.size(); ++place) {
+    poll_at(place);
+    const std::uint32_t index = build.keys[place].triangle;
+    triangle_[place] = index;
+    for (int k = 0; k < 3; ++k) corners_[place][k] = scaled(mesh.vertices[mesh.triangles[index][k]]);
+    for (std::uint32_t i = index; i != kNone; i = twin(i)) place_[i] = place;
+  }
+  nodes_.reserve(build.keys.size() / 3 + 1);
+  build.sum_areas();
+  build.make({0, std::uint32_t(build.keys.size())});
+  if (!turned_.empty()) turned_.resize(nodes_.size(), kNone);
+}
+
+glm::dvec3 Hierarchy::local(const glm::dvec3& p, bool& beyond_reach) const {
+  const glm::dvec3 at = scaled(p) - centre_;
+  const double farthest = std::max({std::abs(at.x), std::abs(at.y), std::abs(at.z)});
+  if (farthest <= kReach) return at;
+  beyond_reach = true;
+  const glm::dvec3 towards =
+      0.5 * p - 0.5 * (centre_ / scale_);  // halves: p or the difference may be near the largest double
+  return towards * (kReach / std::max({std::abs(towards.x), std::abs(towards.y), std::abs(towards.z)}));
+}
+
+Hierarchy::Nearest Hierarchy::seen_from(const glm::dvec3& p, std::uint32_t triangle) const {
+  // From far away the mesh is small, and it is p that must not overflow.
+  const double far = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z), std::numeric_limits<double>::min()});
+  const double scale = std::min(scale_, std::ldexp(1.0, -std::clamp(std::ilogb(far), -1000, 1000)));
+  const double ratio = scale / scale_;
+  const Corners& t = corners_[place_[triangle]];
+  return unscaled(triangle, closest_point(p * scale, t[0] * ratio, t[1] * ratio, t[2] * ratio), scale);
+}
+
+template <int Count>
+Hierarchy::Common Hierarchy::common_of(std::span<const glm::dvec3> points, double radius, double enough,
+                                       std::uint32_t hint) const {
+  std::array<glm::dvec3, Count> at, q;
+  for (int i = 0; i < Count; ++i) {
+    bool beyond_reach = false;
+    at[i] = local(points[i], beyond_reach);
+    q[i] = scaled(points[i]);
+    if (!beyond_reach) continue;
+    Common common{nearest(points[i]).triangle, 0};
+    for (const glm::dvec3& p : points) {
+      common.distance = std::max(common.distance, seen_from(p, common.triangle).distance);
+    }
+    return common.distance <= radius ? common : Common{};
+  }
+  std::uint32_t best = kNone;
+  double best_squared = std::numeric_limits<double>::infinity();
+  double bound = radius * scale_ * (radius * scale_) * (1 + 1e-12);
+  const double enough_squared = enough < 0 ? -1 : enough * scale_ * (enough * scale_);
+  auto attempt = [&](std::uint32_t place) {
+    const Corners& t = corners_[place];
+    double squared = 0;
+    for (int i = 0; i < Count; ++i) {
+      squared = std::max(squared, closest_point(q[i], t[0], t[1], t[2]).distance_squared);
+      if (squared > best_squared) return;
+    }
+    if (squared == best_squared && best != kNone && triangle_[place] > triangle_[best]) return;
+    best = place;
+    best_squared = squared;
+    bound = squared <= enough_squared ? -1 : std::min(bound, squared);  // -1: nothing is worth looking at any more
+  };
+  if (hint < place_.size()) attempt(place_[hint]);
+  if (bound >= 0) walk<Count>(at, bound, attempt);
+  if (best == kNone) return {};
+  const double distance = std::sqrt(best_squared) / scale_;
+  return distance <= radius ? Common{triangle_[best], distance} : Common{};
+}
+
+Hierarchy::Common Hierarchy::common(std::span<const glm::dvec3> points, double radius, double enough,
+                                    std::uint32_t hint) const {
+  if (triangle_.empty() || points.empty()) return {};
+  switch (points.size()) {
+    case 1:
+      return common_of<1>(points, radius, enough, hint);
+    case 2:
+      return common_of<2>(points, radius, enough, hint);
+    case 3:
+      return common_of<3>(points, radius, enough, hint);
+    default:
+      return common_of<4>(points, radius, enough, hint);
+  }
+}
+
+}  // namespace tolvol

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "motion/constrain.h"
+
+#include "base/call.h"
+#include "base/errors.h"
+#include "check/input.h"
+
+namespace tolvol {
+
+ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const glm::dvec3> after,
+                          std::span<const std::uint32_t> faces, int corners, const Placement& placement,
+                          const ToleranceVolume& volume, const ConstrainOptions& options) {
+  if (before.size() != after.size()) {
+    throw InvalidInput("before has " + std::to_string(before.size()) + " vertices and after " +
+                       std::to_string(after.size()) + "; both must be the same ones");
+  }
+  const Call call(options.progress);
+  PullBack pull_back(volume, placement, faces, corners, before.size(), options.threads);
+  const MovingMesh::Start start = pull_back.start(before, options.progress);
+  ConstrainResult result;
+  result.outside_faces = start.outside.size();
+  if (!start.outside.empty()) result.first_outside = start.outside.front();
+  if (!start.outside.empty() && options.outside == ConstrainOptions::Outside::error) {
+    refuse_outside(start.outside.size(), start.outside.front());
+  }
+  if (start.warning) result.warnings.push_back(*start.warning);
+  const Certificate certificate(volume);
+  result.method = certificate.method(), result.renderer = certificate.renderer();
+
+  std::vector<std::uint32_t> moved;
+  std::vector<glm::dvec3> from, to;
+  for (std::uint32_t v = 0; v < before.size(); ++v) {
+    if (before[v] == after[v]) continue;
+    moved.push_back(v), from.push_back(before[v]), to.push_back(after[v]);
+  }
+  if (options.progress) options.progress->begin("pulling back");
+  const PullBack::Moving moving = pull_back.moving(std::move(moved));
+  const PullBack::Result ends = pull_back.move(moving, from, to, options.mode, options.progress);
+  result.vertices.assign(after.begin(), after.end());
+  result.factors.assign(before.size(), 1);
+  result.held_back = ends.held_back;
+  for (std::size_t i = 0; i < moving.vertices.size(); ++i) {
+    result.vertices[moving.vertices[i]] = ends.reached[i];
+    result.factors[moving.vertices[i]] = ends.factors[i];
+  }
+  return result;
+}
+
+}  // namespace tolvol

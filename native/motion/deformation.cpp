@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The paper asks one global query about the deformed mesh and blocks what does not pass. So does this, by the
+// certificate; for what does not pass it looks for the share of the way that does, or has vertices pulled back.
+#include "motion/deformation.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "base/call.h"
+#include "base/errors.h"
+#include "base/parallel.h"
+#include "check/certificate.h"
+#include "check/input.h"
+#include "motion/constrain.h"
+
+namespace tolvol {
+namespace {
+
+/// Of the way: the permitted fraction is known to a thousandth of it.
+constexpr int kHalvings = 10;
+
+constexpr std::size_t kBlock = 1024;
+
+using Mode = DeformationOptions::Mode;
+
+class Deformation {
+ public:
+  Deformation(std::span<const glm::dvec3> vertices, std::span<const std::uint32_t> faces, int corners,
+              const Placement& placement, const ToleranceVolume* volume, const LatticeDeformation& lattice,
+              const DeformationOptions& options)
+      : before_(vertices),
+        faces_(faces),
+        corners_(static_cast<std::size_t>(corners)),
+        placement_(volume ? placement.in(volume->frame()) : placement),
+        volume_(volume),
+        lattice_(lattice),
+        options_(options) {
+    if (volume) certificate_.emplace(*volume);
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+      if (std::isfinite(glm::dot(vertices[i], glm::dvec3(1)))) continue;
+      throw InvalidInput("vertex " + std::to_string(i) + " is not finite");
+    }
+    if (corners < 1 || corners > 4 || faces.size() % corners_ != 0) {
+      throw InvalidInput("a face must have 1 to 4 corners, and all faces the same number");
+    }
+    if (volume && faces.empty()) throw InvalidInput("there are no faces to keep within the tolerance");
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      if (faces[i] < vertices.size()) continue;
+      throw InvalidInput("face " + std::to_string(i / corners_) + " uses vertex " + std::to_string(faces[i]) +
+                         ", but there are only " + std::to_string(vertices.size()));
+    }
+  }
+
+  DeformationResult run() {
+    carry();
+    if (volume_) {
+      bound();
+    } else {
+      result_.vertices = after_;
+    }
+    const Placement world = placement_.in({});
+    for (std::size_t i = 0; i < before_.size(); ++i) {
+      if (result_.vertices[i] == before_[i]) continue;
+      ++result_.moved;
+      const double motion = glm::length(world.world(result_.vertices[i]) - world.world(before_[i]));
+      result_.largest_motion = std::max(result_.largest_motion, motion);
+    }
+    return std::move(result_);
+  }
+
+ private:
+  void carry() {
+    if (options_.progress) options_.progress->begin("deforming");
+    const Placement world = placement_.in({});
+    after_.assign(before_.begin(), before_.end());
+    std::atomic<std::size_t> outside{0};
+    parallel_for(after_.size(), kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
+      if (options_.progress) options_.progress->update(static_cast<double>(begin) / static_cast<double>(after_.size()));
+      for (std::size_t i = begin; i < end; ++i) {
+        const glm::dvec3 p = world.world(before_[i]);
+        const std::optional<glm::dvec3> displacement = lattice_.displacement(p);
+        if (!displacement) ++outside;
+        // Mapping to the world and back would round even where nothing moves.
+        if (!displacement || *displacement == glm::dvec3(0)) continue;
+        after_[i] = world.store(p + *displacement);
+        if (!std::isfinite(glm::dot(after_[i], glm::dvec3(1)))) {
+          throw InvalidInput("the lattice carries vertex " + std::to_string(i) + " too far to be stored");
+        }
+      }
+    });
+    result_.outside_lattice = outside;
+  }
+
+  void bound() {
+    result_.method = certificate_->method(), result_.renderer = certificate_->renderer();
+    warn_of_rounding();
+    if (options_.outside == DeformationOptions::Outside::keep) keep_outside();
+    std::vector<std::uint32_t> failing = leaving(after_);
+    if (failing.empty()) {
+      result_.vertices = after_;
+    } else {
+      result_.leaving = {failing.size(), failing.front()};
+      options_.mode == Mode::pull_back ? pull_back() : search(std::move(failing));
+    }
+    for (std::size_t i = 0; i < after_.size(); ++i) result_.held_back += result_.vertices[i] != after_[i];
+  }
+
+  void warn_of_rounding() {
+    for (const std::span<const glm::dvec3> stored : {before_, std::span<const glm::dvec3>(after_)}) {
+      const std::optional<std::string> warning = storage_warning(*volume_, placement_, stored);
+      if (warning && result_.warnings.empty()) result_.warnings.push_back(*warning);
+    }
+  }
+
+  /// What is outside to begin with stays as it is, and is asked about no more.
+  void keep_outside() {
+    const std::vector<std::uint32_t> outside = not_inside(before_, faces_);
+    if (outside.empty()) return;
+    result_.outside = {outside.size(), outside.front()};
+    kept_.assign(faces_.size() / corners_, false);
+    for (const std::uint32_t face : outside) {
+      kept_[face] = true;
+      for (const std::uint32_t v : corners_of(face)) {
+        result_.held_back += after_[v] != before_[v];
+        after_[v] = before_[v];
+      }
+    }
+  }
+
+  void pull_back() {
+    result_.permitted_fraction = std::nullopt;
+    ConstrainOptions options;
+    if (options_.outside == DeformationOptions::Outside::keep) options.outside = ConstrainOptions::Outside::keep;
+    options.threads = options_.threads, options.progress = options_.progress;
+    result_.vertices =
+        constrain(before_, after_, faces_, static_cast<int>(corners_), placement_, *volume_, options).vertices;
+  }
+
+  void search(std::vector<std::uint32_t> failing) {
+    if (options_.outside == DeformationOptions::Outside::error) {
+      const std::vector<std::uint32_t> outside = not_inside(before_, faces_);
+      if (!outside.empty()) refuse_outside(outside.size(), outside.front());
+    }
+    result_.vertices.assign(before_.begin(), before_.end());
+    std::vector<glm::dvec3> permitted = result_.vertices;
+    double inside = 0, outside = 1;
+    for (int halving = 0; halving < kHalvings; ++halving) {
+      const double middle = 0.5 * (inside + outside);
+      std::vector<glm::dvec3> state = at(middle);
+      // What failed farther out is likeliest to fail here, and is asked first.
+      std::vector<std::uint32_t> still = not_inside(state, only(failing));
+      if (still.empty()) {
+        still = leaving(state);
+      } else {
+        for (std::uint32_t& i : still) i = failing[i];
+      }
+      if (still.empty()) {
+        inside = middle;
+        permitted = std::move(state);
+      } else {
+        outside = middle;
+        failing = std::move(still);
+      }
+    }
+    result_.permitted_fraction = inside;
+    if (options_.mode == Mode::farthest) result_.vertices = std::move(permitted);
+  }
+
+  /// The stored state at a share of the way.
+  std::vector<glm::dvec3> at(double share) const {
+    std::vector<glm::dvec3> state(before_.begin(), before_.end());
+    for (std::size_t i = 0; i < state.size(); ++i) {
+      if (after_[i] == before_[i]) continue;
+      const glm::dvec3 p = before_[i] + share * (after_[i] - before_[i]);
+      state[i] = placement_.storage() == Storage::float32 ? rounded_to_float32(p) : p;
+    }
+    return state;
+  }
+
+  std::span<const std::uint32_t> corners_of(std::uint32_t face) const {
+    return faces_.subspan(std::size_t{face} * corners_, corners_);
+  }
+
+  std::vector<std::uint32_t> only(const std::vector<std::uint32_t>& faces) const {
+    std::vector<std::uint32_t> result;
+    result.reserve(faces.size() * corners_);
+    for (const std::uint32_t face : faces) {
+      const std::span<const std::uint32_t> corners = corners_of(face);
+      result.insert(result.end(), corners.begin(), corners.end());
+    }
+    return result;
+  }
+
+  /// Which of the faces are not certified to be inside, ascending.
+  std::vector<std::uint32_t> not_inside(std::span<const glm::dvec3> stored,
+                                        std::span<const std::uint32_t> faces) const {
+    std::vector<glm::dvec3> points(stored.size());
+    parallel_for(points.size(), kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) points[i] = placement_.frame(stored[i]);
+    });
+    const std::vector<Verdict> verdicts =
+        certificate_->check({points, faces, static_cast<int>(corners_), placement_.mapping_error(stored)},
+                            {options_.threads, options_.progress});
+    std::vector<std::uint32_t> result;
+    for (std::uint32_t i = 0; i < verdicts.size(); ++i) {
+      if (verdicts[i] != Verdict::inside) result.push_back(i);
+    }
+    return result;
+  }
+
+  /// Those of all faces, but for the ones that are kept as they are.
+  std::vector<std::uint32_t> leaving(std::span<const glm::dvec3> stored) const {
+    std::vector<std::uint32_t> result = not_inside(stored, faces_);
+    if (!kept_.empty()) std::erase_if(result, [&](std::uint32_t face) { return kept_[face]; });
+    return result;
+  }
+
+  std::span<const glm::dvec3> before_;
+  std::span<const std::uint32_t> faces_;
+  std::size_t corners_;
+  Placement placement_;
+  const ToleranceVolume* volume_;
+  const LatticeDeformation& lattice_;
+  const DeformationOptions& options_;
+  std::optional<Certificate> certificate_;
+  std::vector<glm::dvec3> after_;
+  std::vector<bool> kept_;  // per face; empty: none is
+  DeformationResult result_;
+};
+
+}  // namespace
+
+DeformationResult deform(std::span<const glm::dvec3> vertices, std::span<const std::uint32_t> faces, int corners,
+                         const Placement& placement, const ToleranceVolume* volume, const LatticeDeformation& lattice,
+                         const DeformationOptions& options) {
+  const Call call(options.progress);
+  return Deformation(vertices, faces, corners, placement, volume, lattice, options).run();
+}
+
+}  // namespace tolvol

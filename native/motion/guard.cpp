@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "motion/guard.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "base/call.h"
+#include "base/errors.h"
+#include "base/parallel.h"
+#include "check/input.h"
+
+namespace tolvol {
+namespace {
+
+constexpr std::size_t kChunk = 64;            // vertices compared at once; most chunks are as they were
+constexpr std::size_t kBlock = 256 * kChunk;  // vertices for one thread
+
+glm::dvec3 at(std::span<const float> positions, std::size_t vertex) {
+  return {positions[3 * vertex], positions[3 * vertex + 1], positions[3 * vertex + 2]};
+}
+
+}  // namespace
+
+Guard::Guard(std::span<const float> positions, std::vector<std::uint32_t> faces, int corners,
+             const glm::dmat4& to_world, const ToleranceVolume& volume, const Options& options)
+    : faces_(std::move(faces)),
+      last_(positions.size()),
+      options_(options),
+      pull_back_(volume, Placement(to_world, Storage::float32), faces_, corners, positions.size() / 3,
+                 options.threads) {
+  begin(positions, options.progress);
+}
+
+void Guard::require_size(std::span<const float> positions) const {
+  if (positions.size() == last_.size()) return;
+  throw InvalidInput("the guard is for " + std::to_string(last_.size() / 3) + " vertices, not " +
+                     std::to_string(positions.size() / 3) + "; make a new one when vertices come or go");
+}
+
+void Guard::begin(std::span<const float> positions, Progress* progress) {
+  const Call call(progress);
+  std::vector<glm::dvec3> stored(positions.size() / 3);
+  for (std::size_t v = 0; v < stored.size(); ++v) stored[v] = at(positions, v);
+  MovingMesh::Start start = pull_back_.start(stored, progress);
+  if (!start.outside.empty() && options_.outside == ConstrainOptions::Outside::error) {
+    refuse_outside(start.outside.size(), start.outside.front());
+  }
+  outside_ = std::move(start.outside);
+  warning_ = std::move(start.warning);
+  last_.assign(positions.begin(), positions.end());
+}
+
+void Guard::reset(std::span<const float> positions, Progress* progress) {
+  require_size(positions);
+  interrupted_ = true;
+  begin(positions, progress);
+  interrupted_ = false;
+}
+
+/// Vertices of which any bit is not as in the state, ascending.
+std::vector<std::uint32_t> Guard::changed(std::span<const float> positions) const {
+  const std::size_t count = vertex_count();
+  const auto differ = [&](std::size_t begin, std::size_t end) {
+    return std::memcmp(&positions[3 * begin], &last_[3 * begin], 3 * (end - begin) * sizeof(float)) != 0;
+  };
+  std::vector<std::vector<std::uint32_t>> found((count + kBlock - 1) / kBlock);
+  parallel_for(count, kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t chunk = begin; chunk < end; chunk += kChunk) {
+      const std::size_t chunk_end = std::min(chunk + kChunk, end);
+      if (!differ(chunk, chunk_end)) continue;
+      for (std::size_t v = chunk; v < chunk_end; ++v) {
+        if (differ(v, v + 1)) found[begin / kBlock].push_back(static_cast<std::uint32_t>(v));
+      }
+    }
+  });
+  std::vector<std::uint32_t> result;
+  for (const std::vector<std::uint32_t>& part : found) result.insert(result.end(), part.begin(), part.end());
+  return result;
+}
+
+Guard::Correction Guard::constrain(std::span<const float> positions) {
+  require_size(positions);
+  if (interrupted_) begin(std::vector<float>(last_), nullptr);
+  interrupted_ = true;
+  const PullBack::Moving moving = pull_back_.moving(changed(positions));
+  std::vector<glm::dvec3> before, after;
+  for (const std::uint32_t v : moving.vertices) before.push_back(at(last_, v)), after.push_back(at(positions, v));
+  const PullBack::Result ends = pull_back_.move(moving, before, after, PullBack::Mode::settle, nullptr);
+  Correction correction;
+  for (std::size_t i = 0; i < moving.vertices.size(); ++i) {
+    if (ends.factors[i] >= 1) continue;
+    correction.vertices.push_back(moving.vertices[i]);
+    for (int k = 0; k < 3; ++k) correction.positions.push_back(static_cast<float>(ends.reached[i][k]));
+  }
+  // From here on nothing throws.
+  for (std::size_t i = 0; i < moving.vertices.size(); ++i) {
+    for (int k = 0; k < 3; ++k) last_[3 * moving.vertices[i] + k] = static_cast<float>(ends.reached[i][k]);
+  }
+  interrupted_ = false;
+  return correction;
+}
+
+}  // namespace tolvol

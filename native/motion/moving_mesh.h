@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// A mesh inside a tolerance volume whose vertices are tried at other places: which faces would be inside there?
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "check/certificate.h"
+#include "check/tolerance_volume.h"
+#include "geometry/frame.h"
+
+namespace tolvol {
+
+/// Holds a state, all of it inside, and a trial beside it, at first equal. Positions are in the frame.
+class MovingMesh {
+ public:
+  static constexpr double kUnknown = std::numeric_limits<double>::infinity();
+
+  /// What is known of the way from a place to the reference: the distance is kUnknown until it is asked for, and huge,
+  /// with no triangle, far beyond the tolerance.
+  using Near = TriangleCertificate::Near;
+
+  struct Start {
+    std::vector<std::uint32_t> outside;  ///< faces that are not proved inside, ascending: their vertices never move
+    std::optional<std::string> warning;  ///< of storage_warning()
+  };
+
+  /// `faces`: `corners` (1 to 4) indices a face, as in Pieces. Keeps references to `volume` and `faces`. Throws
+  /// InvalidInput for an index that is not below `vertex_count`. O(n + m).
+  MovingMesh(const ToleranceVolume& volume, const Placement& placement, std::span<const std::uint32_t> faces,
+             int corners, std::size_t vertex_count, unsigned threads);
+
+  /// Takes the stored positions as state and trial. Throws InvalidInput for a position that is not finite, and where
+  /// the stored type cannot hold the tolerance. About 1 us a vertex; nothing for faces of the reference itself.
+  Start start(std::span<const glm::dvec3> stored, Progress* progress);
+
+  /// Tries all these vertices at stored positions; those that may not move stay. Throws InvalidInput, changing nothing,
+  /// for the first position that is not finite.
+  void try_all(std::span<const std::uint32_t> vertices, std::span<const glm::dvec3> before,
+               std::span<const glm::dvec3> after);
+  /// `near`: what is known there.
+  void try_at(std::uint32_t vertex, const glm::dvec3& at, const Near& near);
+  void take_back(std::uint32_t vertex) { trial_[vertex] = state_[vertex], step_[vertex] = 0; }
+  /// Which of these faces are not inside on trial. Every face must be asked about after the last change to a corner.
+  /// Settled ones cost about 10 ns each, those near the tolerance 0.1 us to many.
+  std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Progress* progress);
+  /// Tries the vertex there if all faces around it are inside then; returns whether. Different threads may ask for
+  /// vertices that share no face. The distances of all corners must be known: measure(). `blame`: the place in the
+  /// ring of the face that is asked first, set to that of the face that refused.
+  bool try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint32_t& blame);
+  void measure(std::span<const std::uint32_t> faces, Progress* progress);
+  /// Makes the trial of these the state. `faces`: all around them.
+  void accept(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces);
+
+  const glm::dvec3& state(std::uint32_t vertex) const { return state_[vertex].at; }
+  /// From now on, keeps in mind where vertices were refused: 64 bytes a vertex, for those who push the same ones
+  /// against the limit again and again. It saves searches and changes no answer.
+  void remember_refusals() { refusals_.resize(state_.size()); }
+  /// The distance itself where the grid's guess leaves little room.
+  Near near(const glm::dvec3& at) const;
+  /// The same of a place where a vertex is tried, on its wish or a little ahead of where it is.
+  enum class Trial { wish, ahead };
+  Near near(std::uint32_t vertex, const glm::dvec3& at, Trial trial);
+  /// Whether that is the distance itself, and not a guess or nothing.
+  bool is_exact(const Near& near) const {
+    return near.distance != kUnknown && !certificates_.front().leaves_room(near.distance);
+  }
+  const Near& near_state(std::uint32_t vertex) const { return state_[vertex].near; }
+  const Near& near_trial(std::uint32_t vertex) const { return trial_[vertex].near; }
+  double step(std::uint32_t vertex) const { return step_[vertex]; }  ///< length from state to trial
+  bool frozen(std::uint32_t vertex) const { return frozen_[vertex]; }
+  bool any_frozen() const { return any_frozen_; }
+  double within() const { return within_; }  ///< the provable distance less a headroom
+  const ToleranceVolume& volume() const { return *volume_; }
+  const Placement& placement() const { return placement_; }
+  unsigned threads() const { return threads_; }
+
+  std::span<const std::uint32_t> corners_of(std::uint32_t face) const {
+    return faces_.subspan(std::size_t{face} * corners_, corners_);
+  }
+  std::span<const std::uint32_t> ring(std::uint32_t vertex) const {
+    return std::span(ring_).subspan(ring_start_[vertex], ring_start_[vertex + 1] - ring_start_[vertex]);
+  }
+  /// Each once.
+  std::vector<std::uint32_t> faces_around(std::span<const std::uint32_t> vertices);
+
+ private:
+  struct Spot {
+    glm::dvec3 at;
+    Near near;  ///< the distance is kFar far beyond the tolerance
+  };
+
+  /// No point of the reference is within the tolerance of any place nearer to `at` than `margin`.
+  struct Refusal {
+    glm::dvec3 at{0};
+    double margin = 0;
+  };
+
+  // This and kUnknown prove nothing when they are taken for upper bounds.
+  static constexpr double kFar = std::numeric_limits<double>::max();
+  static constexpr double kUnproved = TriangleCertificate::kUnproved;
+
+  void make_rings(std::size_t vertex_count);
+  void set_trial(std::uint32_t vertex, const Spot& spot);
+  bool is_own(std::uint32_t face) const;
+  double reach_by_motion(std::uint32_t face) const;
+  template <class Bound>
+  double over_triangulations(std::uint32_t face, Bound&& bound) const;
+  double reach_by_certificate(std::uint32_t face) const;
+
+  const ToleranceVolume* volume_;
+  Placement placement_;
+  std::span<const std::uint32_t> faces_;
+  std::size_t corners_;
+  unsigned threads_;
+  std::vector<std::uint32_t> ring_start_, ring_;  // vertex -> its faces
+  std::vector<bool> frozen_;
+  bool any_frozen_ = false;
+  double provable_ = 0, within_ = 0;               // what the certificate decides by, and what of it is used
+  std::vector<TriangleCertificate> certificates_;  // for the two; none before start()
+  std::vector<Spot> state_, trial_;
+  std::vector<double> step_;
+  std::vector<std::array<Refusal, 2>> refusals_;  // per vertex and Trial, the last; none unless remembered
+  std::vector<double> reach_, trial_reach_;       // per face: no point of it is farther from the reference
+  std::vector<std::uint64_t> seen_;               // per face: when faces_around() last met it,
+  std::uint64_t now_ = 0;                         // ... in calls
+};
+
+}  // namespace tolvol

@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Three steps. (1) Where all have their wish, faces that fail send their vertices back to where they were, in rounds,
+// until none fails: this is the paper's reset [Botsch04, §5], but with all vertices moving at once, as the faces of the
+// result have to be inside in the state that results and not each for itself. (2) Those vertices start again from as
+// far as they would be inside alone, and go back by shares in rounds while faces fail, at the worst to step (1). (3)
+// One after the other, they go forward again as far as the faces around them let them; vertices that share no face are
+// taken at the same time, a colour of them after the other, so that the result does not depend on threads.
+#include "motion/pull_back.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "base/parallel.h"
+
+namespace tolvol {
+namespace {
+
+constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+
+constexpr double kRise = 1.0 / 64;  // what no factor can rise by in the end
+constexpr double kShrink = 0.5;     // of a factor, in each round in which a face of the vertex fails
+/// Of the provable distance: where vertices are put first, as pieces of a quarter of the tolerance prove a face there.
+constexpr double kComfort = 0.97;
+/// Of the same, in Mode::settle: who got there stays, unless kLast of the tolerance more does not lead outside.
+constexpr double kSettled = 0.965, kLast = 0.04;
+constexpr int kCrossings = 8;       // tries to find where a vertex leaves the volume; a plane takes one
+constexpr double kClose = 0.002;    // of the provable distance: near enough to that place
+constexpr std::size_t kBlock = 32;  // vertices, for work of some us each
+
+}  // namespace
+
+PullBack::PullBack(const ToleranceVolume& volume, const Placement& placement, std::span<const std::uint32_t> faces,
+                   int corners, std::size_t vertex_count, unsigned threads)
+    : mesh_(volume, placement, faces, corners, vertex_count, threads), held_index_(vertex_count, kNone) {}
+
+MovingMesh::Start PullBack::start(std::span<const glm::dvec3> stored, Progress* progress) {
+  held_index_.assign(stored.size(), kNone);
+  return mesh_.start(stored, progress);
+}
+
+PullBack::Moving PullBack::moving(std::vector<std::uint32_t> vertices) {
+  Moving result{std::move(vertices), {}};
+  result.faces = mesh_.faces_around(result.vertices);
+  return result;
+}
+
+PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3> before,
+                                std::span<const glm::dvec3> after, Mode mode, Progress* progress) {
+  const std::vector<std::uint32_t>& vertices = moving.vertices;
+  mesh_.try_all(vertices, before, after);
+  Result result{std::vector<double>(vertices.size(), 1), {after.begin(), after.end()}, 0};
+  if (mode == Mode::settle) mesh_.remember_refusals();
+  std::vector<std::uint32_t> failed = mesh_.failing(moving.faces, progress);
+  if (!failed.empty()) {
+    std::vector<Held> held = hold(moving, before, after, std::move(failed), progress);
+    if (mode != Mode::reset) {
+      pull(held, mode, progress);
+      if (mode != Mode::halve) let_go(held, mode, progress);
+    }
+    for (const Held& h : held) {
+      const auto place = std::lower_bound(vertices.begin(), vertices.end(), h.vertex) - vertices.begin();
+      result.factors[place] = h.factor;
+      result.reached[place] = stored_at(h, h.factor);
+      result.held_back += h.factor < 1;
+      held_index_[h.vertex] = kNone;
+    }
+  }
+  for (std::size_t i = 0; mesh_.any_frozen() && i < vertices.size(); ++i) {
+    if (!mesh_.frozen(vertices[i])) continue;
+    result.factors[i] = 0, result.reached[i] = before[i];
+    ++result.held_back;
+  }
+  mesh_.accept(vertices, moving.faces);
+  return result;
+}
+
+/// Step (1). Ends, because a face that fails has a corner away from the state, in which it did not fail.
+std::vector<PullBack::Held> PullBack::hold(const Moving& moving, std::span<const glm::dvec3> before,
+                                           std::span<const glm::dvec3> after, std::vector<std::uint32_t> failed,
+                                           Progress* progress) {
+  std::vector<Held> held;
+  std::vector<std::uint32_t> back;
+  for (; !failed.empty(); failed = mesh_.failing(mesh_.faces_around(back), progress)) {
+    back.clear();
+    for (const std::uint32_t f : failed) {
+      for (const std::uint32_t v : mesh_.corners_of(f)) {
+        if (mesh_.step(v) == 0) continue;
+        const auto place =
+            std::lower_bound(moving.vertices.begin(), moving.vertices.end(), v) - moving.vertices.begin();
+        held.push_back({v, before[place], after[place], mesh_.near_trial(v), mesh_.step(v)});
+        mesh_.take_back(v);
+        back.push_back(v);
+      }
+    }
+  }
+  std::sort(held.begin(), held.end(), [](const Held& a, const Held& b) { return a.vertex < b.vertex; });
+  for (std::uint32_t i = 0; i < held.size(); ++i) held_index_[held[i].vertex] = i;
+  return held;
+}
+
+glm::dvec3 PullBack::stored_at(const Held& held, double factor) const {
+  if (factor >= 1) return held.after;
+  if (factor <= 0) return held.before;
+  const glm::dvec3 p = held.before + factor * (held.after - held.before);
+  return mesh_.placement().storage() == Storage::float32 ? rounded_to_float32(p) : p;
+}
+
+void PullBack::place(Held& held, const Along& along) {
+  held.factor = along.factor;
+  mesh_.try_at(held.vertex, mesh_.placement().frame(stored_at(held, along.factor)), along.near);
+}
+
+/// Where the vertex itself is about `target` from the reference, at the most, between a place where it is nearer and
+/// one where it is farther: false position, in which an end that stays twice counts half (Illinois).
+PullBack::Along PullBack::crossing(const Held& held, double target, Along inner, Along outer) const {
+  const double close = kClose * mesh_.within(), aim = target - close / 2;
+  double inner_excess = inner.near.distance - aim, outer_excess = outer.near.distance - aim;
+  bool was_outside = false;
+  for (int i = 0; i < kCrossings && inner.near.distance < target - close; ++i) {
+    const double factor = inner.factor + (outer.factor - inner.factor) * inner_excess / (inner_excess - outer_excess);
+    const Along next = along(held, factor, inner.near.triangle);
+    const bool outside = !(next.near.distance <= target), stays_twice = i > 0 && was_outside == outside;
+    (outside ? outer : inner) = next;
+    (outside ? outer_excess : inner_excess) = next.near.distance - aim;
+    if (stays_twice) (outside ? inner_excess : outer_excess) /= 2;
+    was_outside = outside;
+  }
+  return inner;
+}
+
+/// A place on the way, and the distance there however far it is.
+PullBack::Along PullBack::along(const Held& held, double factor, std::uint32_t hint) const {
+  const glm::dvec3 at = mesh_.placement().frame(stored_at(held, factor));
+  if (hint == Hierarchy::kNone) hint = mesh_.volume().grid().triangle_near(at);
+  const Hierarchy::Nearest nearest =
+      mesh_.volume().hierarchy().nearest(at, std::numeric_limits<double>::infinity(), hint);
+  return {factor, {nearest.distance, nearest.triangle}};
+}
+
+/// Finds where the vertex leaves the volume if nothing else held it, and puts it a little before that.
+void PullBack::release(Held& held, Mode mode) {
+  const double within = mesh_.within();
+  if (held.wish.distance <= within) {
+    held.limit = 1;
+    return place(held, {1, held.wish});
+  }
+  // A wish at the end of the world tells nothing: all of the volume is in this box.
+  const double box = 1 + 2 * mesh_.volume().frame_tolerance();
+  const glm::dvec3 from = mesh_.state(held.vertex), way = mesh_.placement().frame(held.after) - from;
+  double exit = 1;
+  for (int k = 0; k < 3; ++k) {
+    if (way[k] != 0) exit = std::min(exit, std::max(0.0, (std::copysign(box, way[k]) - from[k]) / way[k]));
+  }
+  Along start{0, mesh_.near_state(held.vertex)};
+  if (!mesh_.is_exact(start.near)) start = along(held, 0, start.near.triangle);
+  Along inner = start;
+  held.limit = 0;
+  const double comfort = mode == Mode::settle ? kSettled : kComfort;
+  if (mode == Mode::settle && !(start.near.distance < kSettled * within)) {
+    const double factor = std::min(kLast * within / held.length, exit);
+    const glm::dvec3 ahead = mesh_.placement().frame(stored_at(held, factor));
+    inner = {factor, mesh_.near(held.vertex, ahead, MovingMesh::Trial::ahead)};
+    if (inner.near.distance > within) return place(held, start);
+  }
+  const bool known = exit == 1 && held.wish.triangle != Hierarchy::kNone;
+  const Along outer = known ? Along{1, held.wish} : along(held, exit, inner.near.triangle);
+  Along end = start;
+  if (inner.near.distance < comfort * within) end = crossing(held, kComfort * within, inner, outer);
+  if (mode == Mode::settle && end.factor > 0) {
+    held.limit = end.factor;
+  } else if (mode != Mode::halve && inner.near.distance < within) {
+    held.limit = crossing(held, within, end.factor > 0 ? end : inner, outer).factor;
+  }
+  place(held, end);
+}
+
+/// Step (2).
+void PullBack::pull(std::vector<Held>& held, Mode mode, Progress* progress) {
+  parallel_for(held.size(), kBlock, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) release(held[i], mode);
+  });
+  std::vector<std::uint32_t> changed;
+  for (const Held& h : held) {
+    if (h.factor > 0) changed.push_back(h.vertex);
+  }
+  for (;;) {
+    const std::vector<std::uint32_t> failed = mesh_.failing(mesh_.faces_around(changed), progress);
+    if (failed.empty()) return;
+    changed.clear();
+    for (const std::uint32_t f : failed) {
+      for (const std::uint32_t v : mesh_.corners_of(f)) {
+        if (held_index_[v] != kNone && held[held_index_[v]].factor > 0) changed.push_back(v);
+      }
+    }
+    if (changed.empty()) throw std::logic_error("a state that was inside no longer is");
+    std::sort(changed.begin(), changed.end());
+    changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
+    for (const std::uint32_t v : changed) {
+      Held& h = held[held_index_[v]];
+      h.factor *= kShrink;
+      if (h.factor < little(h)) h.factor = 0;
+      h.factor > 0 ? place(h, {h.factor, {}}) : mesh_.take_back(v);
+    }
+  }
+}
+
+template <class Visit>
+void PullBack::held_around(std::uint32_t vertex, Visit&& visit) const {
+  for (const std::uint32_t f : mesh_.ring(vertex)) {
+    for (const std::uint32_t v : mesh_.corners_of(f)) {
+      if (v != vertex && held_index_[v] != kNone) visit(held_index_[v]);
+    }
+  }
+}
+
+/// Greedy, in the order of the vertices: no two of a colour share a face. Returns how many colours there are.
+std::uint32_t PullBack::colour(std::vector<Held>& held) const {
+  std::vector<std::uint32_t> taken;  // by colour: the last vertex that has a neighbour of it
+  for (std::uint32_t i = 0; i < held.size(); ++i) {
+    held_around(held[i].vertex, [&](std::uint32_t other) {
+      if (other < i) taken[held[other].colour] = i;
+    });
+    std::uint32_t& colour = held[i].colour;
+    colour = 0;
+    while (colour < taken.size() && taken[colour] == i) ++colour;
+    if (colour == taken.size()) taken.push_back(kNone);
+  }
+  return static_cast<std::uint32_t>(taken.size());
+}
+
+/// Step (3). Ends, because from its second turn on a vertex goes forward by kRise or not at all.
+void PullBack::let_go(std::vector<Held>& held, Mode mode, Progress* progress) {
+  const auto settled = [&](const Held& h) { return h.factor >= (mode == Mode::settle ? h.limit : 1); };
+  std::vector<std::uint32_t> around;
+  std::vector<std::vector<std::uint32_t>> due(colour(held));
+  for (std::uint32_t i = 0; i < held.size(); ++i) {
+    if (settled(held[i])) continue;
+    due[held[i].colour].push_back(i);
+    around.push_back(held[i].vertex);
+  }
+  mesh_.measure(mesh_.faces_around(around), progress);
+  std::vector<bool> is_due(held.size(), true), searched(held.size(), false);
+  std::vector<std::uint8_t> raised;
+  for (bool any = true; any;) {
+    any = false;
+    for (std::vector<std::uint32_t>& list : due) {
+      const std::vector<std::uint32_t> turn = std::exchange(list, {});
+      any = any || !turn.empty();
+      raised.assign(turn.size(), 0);
+      parallel_for(turn.size(), kBlock, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
+        if (progress) progress->update(progress->fraction());
+        for (std::size_t i = begin; i < end; ++i) {
+          Held& h = held[turn[i]];
+          const double factor = h.factor;
+          raise(h, mode, !searched[turn[i]]);
+          raised[i] = h.factor > factor;
+        }
+      });
+      for (const std::uint32_t i : turn) is_due[i] = false, searched[i] = true;
+      for (std::size_t i = 0; i < turn.size(); ++i) {
+        if (!raised[i]) continue;
+        held_around(held[turn[i]].vertex, [&](std::uint32_t other) {
+          if (is_due[other] || settled(held[other])) return;
+          is_due[other] = true;
+          due[held[other].colour].push_back(other);
+        });
+      }
+    }
+  }
+}
+
+bool PullBack::attempt(Held& held, double factor) {
+  if (!mesh_.try_alone(held.vertex, mesh_.placement().frame(stored_at(held, factor)), held.blame)) return false;
+  held.factor = factor;
+  return true;
+}
+
+/// The share of the motion that is as long as what is beyond kComfort.
+double PullBack::little(const Held& held) const { return (1 - kComfort) * mesh_.within() / held.length; }
+
+void PullBack::raise(Held& held, Mode mode, bool search) {
+  const double step = mode == Mode::settle ? std::max(kRise, little(held)) : kRise;
+  const double grain = std::min(step, little(held));
+  while (held.factor < 1) {
+    if (held.limit >= 1 && attempt(held, 1)) return;
+    if (search) {
+      // A vertex that nothing holds back but its own limit ends just below it.
+      double lower = held.factor, upper = std::min(1.0, held.limit), next = upper - grain / 2;
+      while (upper - lower > grain) {
+        (attempt(held, next) ? lower : upper) = next;
+        next = (lower + upper) / 2;
+      }
+    }
+    if (!attempt(held, std::min(1.0, held.factor + step))) return;
+    search = true;
+  }
+}
+
+}  // namespace tolvol

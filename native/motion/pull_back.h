@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Keeps a moving mesh inside a tolerance volume: vertices of faces that would leave it are pulled back along their
+/// motion. What constrain(), Guard and smooth() share; the state is kept from one motion to the next.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "motion/moving_mesh.h"
+
+namespace tolvol {
+
+class PullBack {
+ public:
+  enum class Mode {
+    pull_back,  ///< as far as the tolerance lets each vertex go: none can rise by 1/64 of its motion alone
+    settle,     ///< the same but for the last 4 % of the tolerance, which take most of the time
+    halve,      ///< factors are halved until all faces are inside: quick, for steps that are repeated
+    reset,      ///< all the way back or not at all, the one step back of [Botsch04, §5]
+  };
+
+  /// A set of vertices that move together, ascending, and the faces that touch one of them.
+  struct Moving {
+    std::vector<std::uint32_t> vertices, faces;
+  };
+
+  struct Result {
+    std::vector<double> factors;      ///< for each moving vertex: the share of its motion, 0 to 1
+    std::vector<glm::dvec3> reached;  ///< for each moving vertex: the stored position there
+    std::size_t held_back = 0;        ///< factors below 1
+  };
+
+  /// As MovingMesh.
+  PullBack(const ToleranceVolume& volume, const Placement& placement, std::span<const std::uint32_t> faces, int corners,
+           std::size_t vertex_count, unsigned threads);
+  /// As MovingMesh::start().
+  MovingMesh::Start start(std::span<const glm::dvec3> stored, Progress* progress);
+
+  Moving moving(std::vector<std::uint32_t> vertices);
+
+  /// Moves each vertex from `before`, its stored position now, towards `after`, and makes where it ends the new state.
+  /// All faces of the new state are inside; see constrain.h for what else holds of the factors. Throws InvalidInput,
+  /// changing nothing, for a wish that is not finite. After Cancelled only start() may be called. Settled faces cost
+  /// about 10 ns each, those near the tolerance about 1 us a try.
+  Result move(const Moving& moving, std::span<const glm::dvec3> before, std::span<const glm::dvec3> after, Mode mode,
+              Progress* progress);
+
+ private:
+  /// A vertex that cannot simply have its wish.
+  struct Held {
+    std::uint32_t vertex;
+    glm::dvec3 before, after;  ///< stored
+    MovingMesh::Near wish;     ///< at `after`
+    double length;             ///< of the motion, in the frame
+    double factor = 0;
+    /// About where the vertex itself leaves the volume, 1 only if it does not; in Mode::settle as far as it is to go.
+    double limit = 1;
+    std::uint32_t blame = 0;  ///< place in the vertex's ring of the face that refused last
+    std::uint32_t colour = 0;
+  };
+
+  /// A place on the way of a vertex.
+  struct Along {
+    double factor;
+    MovingMesh::Near near;
+  };
+
+  glm::dvec3 stored_at(const Held& held, double factor) const;
+  void place(Held& held, const Along& along);
+  std::vector<Held> hold(const Moving& moving, std::span<const glm::dvec3> before, std::span<const glm::dvec3> after,
+                         std::vector<std::uint32_t> failed, Progress* progress);
+  Along along(const Held& held, double factor, std::uint32_t hint) const;
+  Along crossing(const Held& held, double target, Along inner, Along outer) const;
+  void release(Held& held, Mode mode);
+  void pull(std::vector<Held>& held, Mode mode, Progress* progress);
+  void let_go(std::vector<Held>& held, Mode mode, Progress* progress);
+  std::uint32_t colour(std::vector<Held>& held) const;
+  template <class Visit>
+  void held_around(std::uint32_t vertex, Visit&& visit) const;
+  double little(const Held& held) const;
+  void raise(Held& held, Mode mode, bool search);
+  bool attempt(Held& held, double factor);
+
+  MovingMesh mesh_;
+  std::vector<std::uint32_t> held_index_;  // per vertex: its place among the held ones, kNone
+};
+
+}  // namespace tolvol

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Laplacian and bilaplacian smoothing, within a tolerance volume or without.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "motion/constrain.h"
+
+namespace tolvol {
+
+struct SmoothingOptions {
+  enum class Operator { laplacian, bilaplacian };
+  enum class Weights { uniform, cotangent };
+  enum class Boundary {
+    fixed,
+    along,  ///< boundary vertices are smoothed along the boundary; its corners and branches stay
+  };
+
+  unsigned iterations = 10;
+  Operator kind = Operator::bilaplacian;
+  Weights weights = Weights::cotangent;
+  Boundary boundary = Boundary::fixed;
+  std::span<const bool> locked = {};      ///< per vertex, may be empty: stays where it is
+  std::span<const double> strength = {};  ///< per vertex, may be empty: 0 to 1, of a full step
+  bool reset =
+      false;  ///< a vertex that would leave the tolerance stays for this iteration, instead of being pulled back
+  ConstrainOptions::Outside outside = ConstrainOptions::Outside::error;  ///< keep: vertices of such faces stay
+  unsigned threads = 0;                                                  ///< 0: one per core; never changes the result
+  Progress* progress = nullptr;
+};
+
+struct SmoothingResult {
+  std::vector<glm::dvec3> vertices;    ///< stored
+  std::vector<std::size_t> held_back;  ///< for each iteration: vertices that did not go all the way
+  double largest_motion = 0;           ///< world units, from the input to the result
+  std::size_t welded = 0;              ///< vertices treated as one with an earlier one at the same place
+  std::size_t fixed_boundary = 0;      ///< vertices that stay because they are on the boundary,
+  std::size_t fixed_non_manifold = 0;  ///< ... because an edge there has more than two faces
+  std::size_t outside_faces = 0;       ///< faces of the input that are not within the tolerance, kept as they are
+  std::optional<std::uint32_t> first_outside;
+  std::string method, renderer;  ///< of the check; empty without a volume
+  std::vector<std::string> warnings;
+};
+
+/// A step of a vertex is half the umbrella vector (the weighted mean of its neighbours less itself), or, bilaplacian,
+/// less a quarter of the umbrella vector of these vectors: the largest at which no component of a shape overshoots. All
+/// new positions are computed from the old ones and then go as far as the tolerance lets them (PullBack), so that every
+/// iteration ends inside. `volume` null: without bound, and bit for bit what a volume that holds nothing back gives.
+///
+/// Throws InvalidInput for a bad mesh or bad arrays, naming the first offender, and like constrain(); Cancelled. About
+/// 0.3 us an iteration and vertex, and some us for each that is held back. [M. Desbrun, M. Meyer, P. Schröder, A. H.
+/// Barr, Implicit Fairing of Irregular Meshes using Diffusion and Curvature Flow, 1999], [Botsch04, §5].
+SmoothingResult smooth(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
+                       const Placement& placement, const ToleranceVolume* volume, const SmoothingOptions& options);
+
+}  // namespace tolvol

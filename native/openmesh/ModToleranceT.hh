@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// A module for OpenMesh's decimaters that keeps the mesh within a tolerance of a reference, certified. For other
+/// people's programs: the header of tolvol::openmesh, in the style of OpenMesh's own modules.
+#pragma once
+
+#include <OpenMesh/Tools/Decimater/ModBaseT.hh>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "base/errors.h"
+#include "check/certificate.h"
+#include "check/tolerance_volume.h"
+
+namespace tolvol {
+
+/// How an OpenMesh mesh stores its points: as they are, in the world.
+template <class Mesh>
+Placement placement_of(const Mesh&) {
+  constexpr bool kSingle = std::is_same_v<typename Mesh::Scalar, float>;
+  return Placement(glm::dmat4(1), kSingle ? Storage::float32 : Storage::float64);
+}
+
+template <class Point>
+glm::dvec3 to_dvec3(const Point& p) {
+  return {p[0], p[1], p[2]};
+}
+
+/// All points within `tolerance`, in the mesh's units, of a triangle mesh as it is now. Throws what ToleranceVolume
+/// throws.
+template <class Mesh>
+ToleranceVolume volume_of(const Mesh& mesh, double tolerance) {
+  std::vector<glm::dvec3> vertices;
+  for (const auto v : mesh.all_vertices()) vertices.push_back(to_dvec3(mesh.point(v)));
+  std::vector<glm::uvec3> triangles;
+  for (const auto f : mesh.faces()) {
+    glm::uvec3& t = triangles.emplace_back();
+    int k = 0;
+    for (const auto v : mesh.fv_range(f)) t[k++] = static_cast<unsigned>(v.idx());
+  }
+  return ToleranceVolume(vertices, triangles, placement_of(mesh), tolerance);
+}
+
+/// Binary: forbids every half-edge collapse after which a face would not be proved to be within the tolerance of the
+/// reference. So every point of the result is within it; the reference may be farther from the result, for which
+/// tolvol::decimate has two_sided. Any number of runs, with other modules and other changes between them that are
+/// checked too, keep the one tolerance as long as they use the same volume. About 1 us a collapse asked about.
+template <class MeshT>
+class ModToleranceT : public OpenMesh::Decimater::ModBaseT<MeshT> {
+ public:
+  DECIMATING_MODULE(ModToleranceT, MeshT, Tolerance);
+
+  explicit ModToleranceT(MeshT& mesh) : Base(mesh, true) {}
+
+  /// Keeps a reference to `volume`. To be called before the decimater's initialize().
+  void set_volume(const ToleranceVolume& volume) { volume_ = &volume; }
+
+  /// Throws InvalidInput without a volume, for a mesh with faces that are not within the tolerance, and where the mesh
+  /// is too far from its origin for the tolerance.
+  void initialize() override;
+  float collapse_priority(const CollapseInfo& collapse) override;
+  /// From now on within this share, 0 to 1, of the tolerance; faces that are farther already stay.
+  void set_error_tolerance_factor(double factor) override;
+
+ private:
+  void set_certificate();
+
+  const ToleranceVolume* volume_ = nullptr;
+  std::optional<Placement> placement_;
+  double mapping_error_ = 0;
+  std::optional<TriangleCertificate> certificate_;
+};
+
+template <class MeshT>
+void ModToleranceT<MeshT>::initialize() {
+  if (!volume_) throw InvalidInput("ModToleranceT needs a volume: call set_volume() before initialize()");
+  const Mesh& mesh = Base::mesh();
+  placement_ = placement_of(mesh).in(volume_->frame());
+  std::vector<glm::dvec3> points;
+  std::vector<std::uint32_t> indices, faces;
+  for (const auto v : mesh.all_vertices()) points.push_back(to_dvec3(mesh.point(v)));
+  for (const auto f : mesh.faces()) {
+    faces.push_back(static_cast<std::uint32_t>(f.idx()));
+    for (const auto v : mesh.fv_range(f)) indices.push_back(static_cast<std::uint32_t>(v.idx()));
+  }
+  mapping_error_ = placement_->mapping_error(points);
+  const std::vector<Verdict> verdicts =
+      Certificate(*volume_).check({placement_->frame(points), indices, 3, mapping_error_}, {});
+  for (std::size_t i = 0; i < verdicts.size(); ++i) {
+    if (verdicts[i] == Verdict::inside) continue;
+    throw InvalidInput("face " + std::to_string(faces[i]) + " is not within the tolerance of the reference; " +
+                       "take a larger tolerance, or the volume of this mesh");
+  }
+  set_certificate();
+}
+
+template <class MeshT>
+void ModToleranceT<MeshT>::set_certificate() {
+  const double within = volume_->provable(mapping_error_) * (1 - kHeadroom) * Base::error_tolerance_factor_;
+  certificate_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within,
+                       volume_->refutable(mapping_error_));
+}
+
+template <class MeshT>
+float ModToleranceT<MeshT>::collapse_priority(const CollapseInfo& collapse) {
+  const Mesh& mesh = Base::mesh();
+  const auto in_frame = [&](auto vertex) { return placement_->frame(to_dvec3(mesh.point(vertex))); };
+  const glm::dvec3 kept = in_frame(collapse.v1), unknown(TriangleCertificate::kUnproved);
+  for (const auto h : mesh.voh_range(collapse.v0)) {
+    const auto face = mesh.face_handle(h);
+    if (!face.is_valid() || face == collapse.fl || face == collapse.fr) continue;
+    const glm::dvec3 corners[3] = {kept, in_frame(mesh.to_vertex_handle(h)),
+                                   in_frame(mesh.to_vertex_handle(mesh.next_halfedge_handle(h)))};
+    if (certificate_->bound(corners, unknown) == TriangleCertificate::kUnproved) return Base::ILLEGAL_COLLAPSE;
+  }
+  return Base::LEGAL_COLLAPSE;
+}
+
+template <class MeshT>
+void ModToleranceT<MeshT>::set_error_tolerance_factor(double factor) {
+  Base::set_error_tolerance_factor(factor);
+  if (certificate_) set_certificate();
+}
+
+}  // namespace tolvol

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Sorting what a mesh has few of at each vertex: sides, triangles.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include "base/call.h"
+#include "base/parallel.h"
+
+namespace tolvol {
+
+/// Puts things in the order of what `before` compares, which must begin with first(thing), a number below `groups`: one
+/// pass by that, and short sorts of those that share it, because a mesh has few sides or triangles that do. Each thread
+/// looks at all things and places those of a range of groups, about as many as the others.
+template <class T, class First, class Before>
+void sort_by(std::vector<T>& things, std::size_t groups, Team& team, First&& first, Before&& before) {
+  if (things.size() < 2) return;
+  const std::size_t ranges = team.size();
+  std::vector<std::size_t> border(ranges + 1);
+  for (std::size_t i = 0; i <= ranges; ++i) border[i] = groups * i / ranges;
+  const auto in_ranges = [&](auto&& body) {
+    team.run(ranges, 1, [&](std::size_t i, std::size_t) { body(border[i], border[i + 1]); });
+  };
+  std::vector<std::uint32_t> end(groups + 1, 0);
+  in_ranges([&](std::size_t lower, std::size_t upper) {
+    for (const T& t : things) {
+      if (const std::size_t group = first(t); lower <= group && group < upper) ++end[group + 1];
+    }
+  });
+  std::partial_sum(end.begin(), end.end(), end.begin());
+  for (std::size_t i = 1; i < ranges; ++i) {
+    const auto share = static_cast<std::uint32_t>(things.size() * i / ranges);
+    border[i] = static_cast<std::size_t>(std::lower_bound(end.begin(), end.end() - 1, share) - end.begin());
+  }
+  std::vector<T> sorted(things.size());
+  in_ranges([&](std::size_t lower, std::size_t upper) {
+    if (lower == upper) return;  // end[lower] is another's
+    const auto at = [&](std::uint32_t i) { return sorted.begin() + static_cast<std::ptrdiff_t>(i); };
+    std::uint32_t begin = end[lower];
+    for (const T& t : things) {
+      if (const std::size_t group = first(t); lower <= group && group < upper) sorted[end[group]++] = t;
+    }
+    for (std::size_t group = lower; group < upper; begin = end[group++]) {
+      poll_at(group);
+      std::sort(at(begin), at(end[group]), before);
+    }
+  });
+  things.swap(sorted);
+}
+
+}  // namespace tolvol

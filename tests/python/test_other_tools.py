@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""benchmark/other_tools.py as far as it needs nothing of PyPI: search, judge, rows, bad usage, processes that fail."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import meshes
+
+BENCHMARK = Path(__file__).resolve().parents[2] / "benchmark"
+sys.path[:0] = [str(BENCHMARK), str(BENCHMARK.parent / "blender_scripts")]
+import other_tools  # noqa: E402
+import tool_calls  # noqa: E402
+import tool_page  # noqa: E402
+import tool_worker  # noqa: E402
+
+
+def torus():
+    vertices, triangles = meshes.torus(noise=0.004)
+    vertices = vertices.astype(np.float32)
+    return other_tools.Mesh("torus", vertices, triangles, other_tools.tolvol.size(vertices, triangles))
+
+
+def falling(edge):
+    """A tool whose result is kept up to the parameter `edge`, with fewer triangles the larger it is."""
+    return lambda x: 1000 / x if x <= edge else None
+
+
+@pytest.mark.parametrize("edge", [1e-9, 0.03, 1.0, 77.0, 1e8])
+def test_search_finds_the_edge_of_what_is_kept_from_far_away(edge):
+    parameter, _ = other_tools.search(1.0, falling(edge), calls=30)
+    assert edge / 1.02 <= parameter <= edge
+
+
+def test_search_asks_no_more_often_than_it_may():
+    asked = []
+    other_tools.search(1.0, lambda x: asked.append(x) or (5 if x < 0.3 else None), calls=9)
+    assert len(asked) == len(set(asked)) == 9
+
+
+def test_search_finds_fewer_beyond_a_parameter_that_is_not_kept():
+    def count(x):
+        return round(1000 / x) if x <= 1 or 1.15 < x < 1.3 else None
+
+    parameter, triangles = other_tools.search(1.0, count)
+    assert 1.15 < parameter < 1.3 and triangles == round(1000 / parameter)
+
+
+def test_search_prefers_the_fewest_to_the_largest_parameter():
+    parameter, triangles = other_tools.search(1.0, lambda x: round(100 * (1 + abs(x - 2))) if x < 5 else None)
+    assert parameter == 2 and triangles == 100
+
+
+@pytest.mark.parametrize("verdict", [None, 4])
+def test_search_ends_where_nothing_or_everything_is_kept(verdict):
+    found = other_tools.search(1.0, lambda x: verdict)
+    assert found is None if verdict is None else found[1] == 4
+
+
+@pytest.mark.parametrize(
+    "forward, backward, expected",
+    [(1.0, 0.5, "both"), (0.9, 1.001, "forward"), (1.2, 0.7, "backward"), (3, 4, "no"), (None, None, "no")],
+)
+def test_row_says_what_was_kept(forward, backward, expected):
+    intervals = {"forward": forward, "backward": backward}
+    entry = {"triangles": 1234, "seconds": 0.5}
+    entry |= {way: [0.99 * upper, upper] for way, upper in intervals.items() if upper is not None}
+    cells = tool_page.row("meshlib", entry)
+    assert len(cells) == len(tool_page.HEADS)
+    assert cells[1] == "1,234" and cells[5] == expected
+    assert cells[3].startswith("**") == (forward is not None and forward <= 1)
+
+
+def test_row_of_a_search_and_of_a_failure():
+    entry = {"triangles": 0, "seconds": 30.0, "search": {"seconds": 81.2, "triangles": 5006}}
+    assert tool_page.row("openmesh", entry)[-2:] == ["5,006", "81"]
+    assert tool_page.row("openmesh", {**entry, "search": {"seconds": 81.2}})[-2:] == ["none", "81"]
+    cells = tool_page.row("cgal", {"failure": "did not end in 300 s"})
+    assert len(cells) == len(tool_page.HEADS) and cells[1] == "did not end in 300 s"
+
+
+def test_judge_sees_both_directions():
+    mesh, tolerance = torus(), 0.05
+    half = {"vertices": mesh.vertices.astype(np.float64), "triangles": mesh.triangles[: len(mesh.triangles) // 4]}
+    entry = other_tools.judge(mesh, tolerance, half)
+    assert tool_page.kept(entry) == "forward" and entry["backward"][0] > 1
+    assert entry["backward"][1] <= 1.02 * entry["backward"][0]
+    assert not other_tools.keeps_both(mesh, tolerance, half)
+    whole = {**half, "triangles": mesh.triangles}
+    assert tool_page.kept(other_tools.judge(mesh, tolerance, whole)) == "both" and other_tools.keeps_both(
+        mesh, tolerance, whole
+    )
+
+
+def test_merged_makes_a_surface_of_a_soup():
+    vertices, triangles = meshes.torus()
+    soup = vertices[triangles].reshape(-1, 3)
+    corners = np.arange(len(soup)).reshape(-1, 3)
+    points, faces = tool_calls.merged(np.concatenate([soup, [[9, 9, 9]]]), np.concatenate([corners, [[0, 0, 1]]]))
+    assert len(points) == len(vertices) and len(faces) == len(triangles)
+    assert points.dtype == np.float32 and faces.dtype == np.int32
+
+
+def test_scan_is_open_noisy_and_the_same_every_time(tmp_path):
+    mesh = other_tools.read_mesh("scan", tmp_path)
+    vertices, triangles = mesh.vertices, mesh.triangles
+    assert (vertices.dtype, triangles.dtype) == (np.float32, np.int32) and len(triangles) > 100_000
+    assert np.array_equal(np.unique(triangles), np.arange(len(vertices)))
+    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), 1)
+    uses = np.unique(edges, axis=0, return_counts=True)[1]
+    assert uses.max() == 2 and (uses == 1).sum() > 1000
+    again = other_tools.read_mesh("scan", tmp_path)
+    assert mesh.digest() == again.digest()
+    result = other_tools.tolvol.decimate(
+        vertices, triangles, other_tools.tolvol.ToleranceVolume(vertices, triangles, 0.04)
+    )
+    assert len(result.triangles) < 0.01 * len(triangles)
+
+
+def worker(tmp_path, name="ours"):
+    """By this Python, which has the module under test alone."""
+    return tool_worker.Worker(sys.executable, name, torus(), 1, tmp_path)
+
+
+def test_worker_answers_again_and_again(tmp_path):
+    one, tolerance = worker(tmp_path), 0.04
+    for _ in range(2):
+        answer = one.ask("run", tolerance, 60)
+        assert answer["seconds"] > 0 and other_tools.keeps_both(torus(), tolerance, answer)
+    assert one.end() == 0
+
+
+def test_worker_says_why_there_is_no_result(tmp_path):
+    one = worker(tmp_path)
+    assert "tolerance" in one.ask("run", -1, 60)["failure"]
+    assert "triangles" in one.ask("run", 0.04, 60), "it goes on after that"
+    assert one.ask("run", 1e-5, 0.01) == {"failure": "did not end in 0.01 s"}
+    assert "triangles" in one.ask("run", 0.04, 60), "it starts again after that"
+    one.process.kill()
+    one.process.wait()
+    assert one.ask("run", 0.04, 60) == {"failure": "crashed (SIGKILL)"}
+
+
+def test_results_are_remembered_until_they_are_wanted_anew(tmp_path):
+    path, numbers = tmp_path / "results" / "one.json", iter((1, 2))
+    assert [other_tools.remembered(path, again, lambda: next(numbers)) for again in (False, False, True)] == [1, 1, 2]
+
+
+@pytest.mark.parametrize(
+    "words, message",
+    [
+        ([], "MESH"),
+        (["missing.ply"], "missing.ply: no such file"),
+        (["notes.txt"], "not one of .obj, .ply, .stl"),
+        (["mesh.ply", "--tolerance", "0%"], "not a finite number above 0"),
+        (["mesh.ply", "--tolerance", "101%"], "'101%' is more than the mesh itself"),
+        (["mesh.ply", "--tolerance", "small"], "neither a length nor a percentage"),
+        (["mesh.ply", "--only", "nobody"], "nobody"),
+        (["mesh.ply", "--limit", "0"], "0 is less than 1"),
+        (["mesh.ply", "--write", "nowhere/page.md"], "nowhere does not exist"),
+    ],
+)
+def test_bad_usage_is_one_line(words, message, tmp_path):
+    for name in ("mesh.ply", "notes.txt"):
+        (tmp_path / name).touch()
+    done = subprocess.run(
+        [sys.executable, BENCHMARK / "other_tools.py", *words], capture_output=True, text=True, cwd=tmp_path
+    )
+    assert done.returncode == 2 and done.stdout == ""
+    assert message in done.stderr and len(done.stderr.splitlines()) == 1
