@@ -12,6 +12,7 @@
 #include "base/call.h"
 #include "base/errors.h"
 #include "base/parallel.h"
+#include "check/near_triangles.h"
 #include "check/part.h"
 #include "check/segment_cover.h"
 #include "geometry/closest_point.h"
@@ -140,14 +141,16 @@ inline double TriangleCertificate::bound_by_corners(const glm::dvec3 (&corners)[
 template <bool kProve>
 Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::uvec3& near, double& farthest) const {
   thread_local std::vector<Part> queue;
+  thread_local NearTriangles around;
   queue.assign(1, {{corners[0], corners[1], corners[2]}});
+  around.begin(*reference_, *hierarchy_, kProve ? std::max(beyond_, within_) : within_);
   Verdict result = Verdict::inside;
   double farthest2 = 0;  // over the parts proved so far
   std::uint32_t hint = near.x;
   for (std::size_t next = 0; next < queue.size(); ++next) {
     if (next == (kProve ? kBudget : kQuickBudget)) return Verdict::unproved;
     if ((next + 1) % kBetweenPolls == 0) poll();
-    const Part part = queue[next];
+    Part part = queue[next];
     const auto& [a, b, c] = part.corners;
     const glm::dvec3 centre = (a + b + c) * (1.0 / 3);
     FourPoints points;
@@ -191,9 +194,9 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
     }
     if (!(centre2 <= within2_) || longest2 < kExact * kExact * within2_) {
       if (hint == Hierarchy::kNone) hint = guess;
-      const Hierarchy::Nearest nearest = hierarchy_->nearest(centre, kProve ? beyond_ : within_, hint);
-      if (nearest.triangle == Hierarchy::kNone) return Verdict::outside;
-      hint = exact = nearest.triangle;
+      const std::uint32_t nearest = around.nearest(part, centre, kProve ? beyond_ : within_, hint);
+      if (nearest == Hierarchy::kNone) return Verdict::outside;
+      hint = exact = nearest;
       if (covered_by(exact)) continue;
       // Without a proof to look for, a centre outside ends it.
       if (!kProve && !(centre2 <= within2_)) return Verdict::unproved;
@@ -215,8 +218,10 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       if (cut_along(below)) continue;
       // Among slivers the triangle below the centre may be one that no node of the grid names.
       if (exact == Hierarchy::kNone) {
-        exact = hierarchy_->nearest(centre, within_, below).triangle;
-        if (exact != below && (covered_by(exact) || cut_along(exact))) continue;
+        exact = around.nearest(part, centre, within_, below);
+        // None: by rounding, where the centre is as far as it may be.
+        const bool is_another = exact != below && exact != Hierarchy::kNone;
+        if (is_another && (covered_by(exact) || cut_along(exact))) continue;
       }
     }
     split(part, queue);

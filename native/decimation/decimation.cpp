@@ -121,8 +121,27 @@ class Decimation {
     pinned_.resize(cut_.vertex_input.size());
     for (std::size_t v = 0; v < pinned_.size(); ++v) pinned_[v] = cut_.cause[v] == CutCause::degenerate;
     if (options_.locked.empty()) return;
-    for (std::size_t i = 0; i < vertices_.size(); ++i) {
-      if (options_.locked[i] && cut_.input_vertex[i] != kNone) pin(cut_.input_vertex[i], "asked for");
+    for_holders([&](std::uint32_t of_input, std::uint32_t vertex) {
+      if (options_.locked[of_input]) pin(vertex, "asked for");
+    });
+  }
+
+  /// visit(input vertex, vertex of the manifold) for all that hold an input vertex: the one it became, and those at its
+  /// place of a face that stands in for one that was dropped.
+  template <class Visit>
+  void for_holders(Visit&& visit) const {
+    for (std::uint32_t i = 0; i < vertices_.size(); ++i) {
+      if (cut_.input_vertex[i] != kNone) visit(i, cut_.input_vertex[i]);
+    }
+    for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
+      const std::uint32_t held_by = cut_.stand_in[t];
+      if (held_by == t || held_by == kNone) continue;
+      for (int k = 0; k < 9; ++k) {
+        const std::uint32_t dropped = triangles_[t][k / 3], held = triangles_[held_by][k % 3];
+        if (vertices_[dropped] == vertices_[held] && cut_.input_vertex[held] != kNone) {
+          visit(dropped, cut_.input_vertex[held]);
+        }
+      }
     }
   }
 
@@ -269,11 +288,10 @@ class Decimation {
     for (const std::uint32_t slot : slots) input.pinned.push_back(pinned[slot]);
     if (!options_.shares.empty()) {
       std::vector<double> shares(positions_.size(), 1);
-      for (std::size_t i = 0; i < vertices_.size(); ++i) {
-        if (cut_.input_vertex[i] == kNone) continue;
-        double& share = shares[slots[cut_.input_vertex[i]]];
-        share = std::min(share, options_.shares[i]);
-      }
+      for_holders([&](std::uint32_t of_input, std::uint32_t vertex) {
+        double& share = shares[slots[vertex]];
+        share = std::min(share, options_.shares[of_input]);
+      });
       for (const std::uint32_t slot : slots) input.shares.push_back(shares[slot]);
     }
     for (const CutCause cause : cut_.cause) input.joined.push_back(cause == CutCause::non_manifold);

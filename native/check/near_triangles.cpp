@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "check/near_triangles.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "geometry/closest_point.h"
+
+namespace tolvol {
+namespace {
+
+constexpr std::size_t kSearches = 8;        // most pieces of a fine mesh need fewer, and would not gain by a list
+constexpr std::size_t kLongest = 256;       // triangles in a list; a part with more has its own parts try again
+constexpr std::size_t kMostKept = 1 << 22;  // in all lists of a piece, 16 MiB; then parts keep the list they inherit
+/// Of distances in a frame: more than a thousand times what rounding costs here, and in the hierarchy, whose corners
+/// are not those of the witnesses to the last bit. Where the answer is nearer than this to another, the hierarchy gives
+/// it.
+constexpr double kRounding = 0x1p-40;
+constexpr double kNothing = std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+void NearTriangles::begin(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, double radius) {
+  triangles_ = &triangles, hierarchy_ = &hierarchy, radius_ = radius;
+  searches_ = 0, too_far_ = kNothing;
+  pool_.clear();
+  lists_.assign(1, {0, 0});
+}
+
+std::uint32_t NearTriangles::nearest(Part& part, const glm::dvec3& centre, double radius, std::uint32_t hint) {
+  if (part.of != 0) {
+    narrow(part, centre);
+  } else if (searches_ < kSearches || !gather(part, centre)) {
+    return search(centre, radius, hint);
+  }
+  if (best_ == Hierarchy::kNone) return Hierarchy::kNone;
+  const double best = std::sqrt(best2_);
+  if (std::abs(best - radius) < kRounding || std::sqrt(second2_) - best < kRounding) {
+    return search(centre, radius, hint);
+  }
+  return best <= radius ? best_ : Hierarchy::kNone;
+}
+
+std::uint32_t NearTriangles::search(const glm::dvec3& centre, double radius, std::uint32_t hint) {
+  ++searches_;
+  return hierarchy_->nearest(centre, radius, hint).triangle;
+}
+
+/// Whatever is within the radius of some point of the part is within this of its centre.
+double NearTriangles::reach(const Part& part, const glm::dvec3& centre) const {
+  double farthest2 = 0;
+  for (const glm::dvec3& corner : part.corners) {
+    farthest2 = std::max(farthest2, glm::dot(corner - centre, corner - centre));
+  }
+  return radius_ + std::sqrt(farthest2) + kRounding;
+}
+
+void NearTriangles::look_at(std::uint32_t triangle, const glm::dvec3& centre, double reach2) {
+  const WitnessTriangle& t = (*triangles_)[triangle];
+  const double squared = closest_point(centre, t.a, t.a + t.ab, t.a + t.ac).distance_squared;
+  if (squared > reach2) return;
+  pool_.push_back(triangle);
+  if (squared < best2_) {
+    second2_ = best2_, best2_ = squared, best_ = triangle;
+  } else {
+    second2_ = std::min(second2_, squared);
+  }
+}
+
+/// Makes a list from the hierarchy; false where it would be too long, or was for a part that was hardly larger.
+bool NearTriangles::gather(Part& part, const glm::dvec3& centre) {
+  const double reach = this->reach(part, centre), reach2 = reach * reach;
+  const std::size_t begin = pool_.size();
+  if (!(2 * reach <= too_far_) || begin >= kMostKept) return false;
+  best2_ = second2_ = kNothing, best_ = Hierarchy::kNone;
+  hierarchy_->near(centre, reach, [&](std::uint32_t triangle) {
+    look_at(triangle, centre, reach2);
+    return pool_.size() - begin <= kLongest;
+  });
+  if (pool_.size() - begin > kLongest) {
+    pool_.resize(begin);
+    too_far_ = reach;
+    return false;
+  }
+  part.of = static_cast<std::uint32_t>(lists_.size());
+  lists_.push_back({begin, pool_.size()});
+  return true;
+}
+
+/// Makes a list from the one that the part has.
+void NearTriangles::narrow(Part& part, const glm::dvec3& centre) {
+  const double reach = this->reach(part, centre), reach2 = reach * reach;
+  const List from = lists_[part.of];
+  const std::size_t begin = pool_.size(), length = from.end - from.begin;
+  best2_ = second2_ = kNothing, best_ = Hierarchy::kNone;
+  for (std::size_t i = from.begin; i < from.end; ++i) look_at(pool_[i], centre, reach2);
+  if (pool_.size() - begin == length || pool_.size() > kMostKept) {
+    pool_.resize(begin);
+    return;
+  }
+  part.of = static_cast<std::uint32_t>(lists_.size());
+  lists_.push_back({begin, pool_.size()});
+}
+
+}  // namespace tolvol
