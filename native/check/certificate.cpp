@@ -20,7 +20,8 @@
 namespace tolvol {
 namespace {
 
-constexpr double kFloor = 0.02;                // of the tolerance: a piece this short is not split further
+constexpr double kFloor = 1e-4;                // of the tolerance: a part this short is not split further: the headroom
+constexpr double kQuickFloor = 0.02;           // and where the answer is only one of many tries
 constexpr double kWorthCutting = 0.25;         // of the tolerance
 constexpr std::size_t kBudget = 1 << 20;       // parts looked at before a piece is left unproved,
 constexpr std::size_t kQuickBudget = 1 << 13;  // and where the answer is only one of many tries
@@ -202,7 +203,8 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       if (!kProve && !(centre2 <= within2_)) return Verdict::unproved;
     }
     // Written so that NaN ends here.
-    if (!(longest2 > kFloor * kFloor * within2_) || part.cuts == kMostCuts) {
+    constexpr double kShortest = kProve ? kFloor : kQuickFloor;
+    if (!(longest2 > kShortest * kShortest * within2_) || part.cuts == kMostCuts) {
       if (!kProve) return Verdict::unproved;
       result = Verdict::unproved;
       continue;

@@ -124,7 +124,8 @@ void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
 }
 
 /// Other positions for a collapse whose best one fails: an end that costs nothing either, as on a plane, then fitted
-/// ones, then the ends that cost something; where there is nothing to fit to, the ends and the middle.
+/// ones, then the ends that cost something; where there is nothing to fit to, the ends and the middle. Where the best
+/// one costs nothing, a position off the planes would spoil them for the collapses to come: the edge waits instead.
 EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) const {
   const Halfedge h = a.halfedge;
   const Spot s0 = mesh_.spot(mesh_.from(h)), s1 = mesh_.spot(mesh_.to(h));
@@ -138,6 +139,7 @@ EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) c
       });
     };
     if (possible_at_end(false)) return Outcome::possible;
+    if (q(best) <= nothing) return Outcome::refused;
     const Outcome fitted = a.fit.collapse(a.change, h, best, kHopeless);
     if (fitted != Outcome::refused) return fitted;
     return possible_at_end(true) ? Outcome::possible : Outcome::refused;

@@ -412,6 +412,20 @@ TEST(Decimation, LargePlatesBecomeTwoTriangles) {
   }
 }
 
+// Where a collapse along a side has to wait, a corner must not leave its place for it.
+TEST(Decimation, LargeBoxesBecomeTwelveTriangles) {
+  TriangleMesh mesh = shapes::box(64);
+  for (glm::dvec3& v : mesh.vertices) v *= glm::dvec3(0.52, 0.95, 0.15);
+  for (const auto vertices : {DecimationOptions::Vertices::optimal, DecimationOptions::Vertices::subset}) {
+    const Case c{shapes::stored(mesh), glm::dmat4(1), Storage::float32, 0.1};
+    DecimationOptions options;
+    options.vertices = vertices;
+    const DecimationResult r = run(c, options);
+    expect_within(c, r);
+    EXPECT_EQ(r.triangles.size(), 12u);
+  }
+}
+
 TEST(Decimation, RoundingToFloatDoesNotKeepAPlateInPieces) {
   // Turned, a plate of float32 is flat up to a two-thousandth of this tolerance.
   Case c{shapes::grid(128), glm::dmat4(1), Storage::float32, 0.1};

@@ -202,3 +202,13 @@ def test_a_hundred_thousand_threads_are_as_good_as_those_there_are():
     vertices, triangles = meshes.torus(24, 12)
     volume = tolvol.ToleranceVolume(vertices, triangles, 0.05, threads=100_000)
     assert tolvol.hausdorff(vertices, triangles, vertices, triangles, threads=100_000).upper < volume.tolerance
+
+
+@pytest.mark.parametrize(("distance", "verdict"), [(0.999, INSIDE), (1.001, OUTSIDE)])
+def test_a_piece_near_the_limit_where_the_nearest_triangle_changes_within_it(distance, verdict):
+    """Two faces that cross like an X, and a piece above the crossing: no edge says where to cut it."""
+    corners = [[-4, -9, -4], [4, -9, 4], [0, 20, 0], [4, -9, -4], [-4, -9, 4], [0, 20, 0]]
+    volume = tolvol.ToleranceVolume(np.array(corners, float), np.array([[0, 1, 2], [3, 4, 5]], np.int32), 1.0)
+    height = distance * np.sqrt(2)
+    piece = np.array([[-0.4, -0.5, height], [0.4, -0.5, height], [0.1, 0.6, height]])
+    assert volume.check(piece, np.array([[0, 1, 2]], np.int32)).verdict[0] == verdict
