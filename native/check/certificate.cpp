@@ -21,7 +21,7 @@ namespace tolvol {
 namespace {
 
 constexpr double kFloor = 1e-4;                // of the tolerance: a part this short is not split further: the headroom
-constexpr double kQuickFloor = 0.02;           // and where the answer is only one of many tries
+constexpr double kQuickFloor = 0.02;           // and in a quick search
 constexpr double kWorthCutting = 0.25;         // of the tolerance
 constexpr std::size_t kBudget = 1 << 20;       // parts looked at before a piece is left unproved,
 constexpr std::size_t kQuickBudget = 1 << 13;  // and where the answer is only one of many tries
@@ -139,8 +139,9 @@ inline double TriangleCertificate::bound_by_corners(const glm::dvec3 (&corners)[
 }
 
 /// Sets `farthest` where the verdict is inside.
-template <bool kProve>
+template <TriangleCertificate::Search kSearch>
 Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::uvec3& near, double& farthest) const {
+  constexpr bool kProve = kSearch == Search::verdict;
   thread_local std::vector<Part> queue;
   thread_local NearTriangles around;
   queue.assign(1, {{corners[0], corners[1], corners[2]}});
@@ -203,7 +204,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       if (!kProve && !(centre2 <= within2_)) return Verdict::unproved;
     }
     // Written so that NaN ends here.
-    constexpr double kShortest = kProve ? kFloor : kQuickFloor;
+    constexpr double kShortest = kSearch == Search::quick ? kQuickFloor : kFloor;
     if (!(longest2 > kShortest * kShortest * within2_) || part.cuts == kMostCuts) {
       if (!kProve) return Verdict::unproved;
       result = Verdict::unproved;
@@ -234,15 +235,21 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
 
 double TriangleCertificate::bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
                                   const glm::uvec3& near) const {
+  return bound_by<Search::quick>(corners, bounds, near);
+}
+
+template <TriangleCertificate::Search kSearch>
+double TriangleCertificate::bound_by(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
+                                     const glm::uvec3& near) const {
   double farthest = bound_by_corners(corners, bounds);
   if (farthest != kUnproved) return farthest;
-  return search<false>(corners, near, farthest) == Verdict::inside ? farthest : kUnproved;
+  return search<kSearch>(corners, near, farthest) == Verdict::inside ? farthest : kUnproved;
 }
 
 double TriangleCertificate::bound_in_any_order(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
                                                const glm::uvec3& near) const {
   const Ordered ordered(corners, near);
-  return bound(ordered.corners, bounds, ordered.near);
+  return bound_by<Search::fine>(ordered.corners, bounds, ordered.near);
 }
 
 double TriangleCertificate::bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
@@ -255,7 +262,7 @@ Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::
   if (bound_by_corners(corners, bounds) != kUnproved) return Verdict::inside;
   const Ordered ordered(corners, near);
   double farthest = 0;
-  const Verdict found = search<true>(ordered.corners, ordered.near, farthest);
+  const Verdict found = search<Search::verdict>(ordered.corners, ordered.near, farthest);
   const auto& [a, b, c] = ordered.corners;
   if (found != Verdict::unproved || b != c) return found;
   return covers_segment(*reference_, *hierarchy_, a, b, within_) ? Verdict::inside : Verdict::unproved;

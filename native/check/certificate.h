@@ -57,7 +57,8 @@ class TriangleCertificate {
   /// take its place may use. Up to twice the cost where there is none.
   double bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
 
-  /// The same where the order of the corners makes no difference. What has a bound here has the verdict inside.
+  /// The same where the order of the corners makes no difference, by a longer search. What has a bound here has the
+  /// verdict inside.
   double bound_in_any_order(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
                             const glm::uvec3& near = glm::uvec3(Hierarchy::kNone)) const;
 
@@ -95,8 +96,14 @@ class TriangleCertificate {
   }
 
  private:
+  /// How far a search goes. quick: for one of many tries. fine: as far as a verdict in nearly all cases, so that hardly
+  /// anything is refused that has the verdict inside. verdict: as far as there is any sense in, or to a point outside.
+  enum class Search { quick, fine, verdict };
+
   double bound_by_corners(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
-  template <bool kProve>
+  template <Search kSearch>
+  double bound_by(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& near) const;
+  template <Search kSearch>
   Verdict search(const glm::dvec3 (&corners)[3], const glm::uvec3& near, double& farthest) const;
 
   const std::vector<WitnessTriangle>* reference_;
