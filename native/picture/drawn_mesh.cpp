@@ -59,8 +59,9 @@ void MeshBuffers::draw() const {
   for (GLsizei first = 0; first < count_; first += kDrawnAtOnce) {
     poll();
     const std::size_t offset = static_cast<std::size_t>(first) * sizeof(GLuint);
-    glDrawElements(GL_TRIANGLES, std::min(kDrawnAtOnce, count_ - first), GL_UNSIGNED_INT,
-                   reinterpret_cast<const void*>(offset));
+    // GL takes an offset into a buffer as a pointer.
+    const void* const start = reinterpret_cast<const void*>(offset);  // NOLINT(performance-no-int-to-ptr)
+    glDrawElements(GL_TRIANGLES, std::min(kDrawnAtOnce, count_ - first), GL_UNSIGNED_INT, start);
     if (count_ > kDrawnAtOnce) glFinish();
   }
 }
