@@ -20,8 +20,9 @@
 namespace tolvol {
 namespace {
 
-constexpr double kFloor = 1e-4;                // of the tolerance: a part this short is not split further: the headroom
-constexpr double kQuickFloor = 0.02;           // and in a quick search
+// Parts this short are not split further, in tolerances. What operations leave unused is enough for shorter ones.
+constexpr double kFloor = kHeadroom;
+constexpr double kQuickFloor = 0.02;           // the same in a quick search
 constexpr double kWorthCutting = 0.25;         // of the tolerance
 constexpr std::size_t kBudget = 1 << 20;       // parts looked at before a piece is left unproved,
 constexpr std::size_t kQuickBudget = 1 << 13;  // and where the answer is only one of many tries
@@ -145,7 +146,8 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
   thread_local std::vector<Part> queue;
   thread_local NearTriangles around;
   queue.assign(1, {{corners[0], corners[1], corners[2]}});
-  around.begin(*reference_, *hierarchy_, kProve ? std::max(beyond_, within_) : within_);
+  const double radius = kProve ? beyond_ : within_;
+  around.begin(*reference_, *hierarchy_, radius);
   Verdict result = Verdict::inside;
   double farthest2 = 0;  // over the parts proved so far
   std::uint32_t hint = near.x;
@@ -196,7 +198,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
     }
     if (!(centre2 <= within2_) || longest2 < kExact * kExact * within2_) {
       if (hint == Hierarchy::kNone) hint = guess;
-      const std::uint32_t nearest = around.nearest(part, centre, kProve ? beyond_ : within_, hint);
+      const std::uint32_t nearest = around.nearest(part, centre, radius, hint);
       if (nearest == Hierarchy::kNone) return Verdict::outside;
       hint = exact = nearest;
       if (covered_by(exact)) continue;
@@ -298,19 +300,8 @@ std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& opt
         const glm::dvec3 bounds(nearest[ia].distance, nearest[ib].distance, nearest[ic].distance);
         return certificate.verdict({pieces.points[ia], pieces.points[ib], pieces.points[ic]}, bounds, near);
       };
-      switch (pieces.corners) {
-        case 1:
-          verdicts[i] = triangle(0, 0, 0);
-          break;
-        case 2:
-          verdicts[i] = triangle(0, 1, 1);
-          break;
-        case 3:
-          verdicts[i] = triangle(0, 1, 2);
-          break;
-        default:
-          verdicts[i] = std::min({triangle(0, 1, 2), triangle(0, 2, 3), triangle(0, 1, 3), triangle(1, 2, 3)});
-      }
+      verdicts[i] = Verdict::inside;
+      for (const auto& [a, b, c] : triangles_of(pieces.corners)) verdicts[i] = std::min(verdicts[i], triangle(a, b, c));
     }
   });
   poll();  // a call that was cancelled at its end has no verdicts, either

@@ -48,26 +48,16 @@ void require_room(std::size_t bytes, const char* what) {
   throw ResourceLimit(text.str());
 }
 
-using Corners = std::array<std::uint8_t, 3>;
-
-/// The triangles of a piece, as its corners' numbers.
-std::span<const Corners> triangles_of(int corners) {
-  static constexpr Corners kPoint[] = {{0, 0, 0}}, kSegment[] = {{0, 1, 1}}, kTriangle[] = {{0, 1, 2}},
-                           kQuad[] = {{0, 1, 2}, {0, 2, 3}, {0, 1, 3}, {1, 2, 3}};
-  static constexpr std::span<const Corners> kTriangles[] = {kPoint, kSegment, kTriangle, kQuad};
-  return kTriangles[corners - 1];
-}
-
 /// Nine coordinates a triangle of the pieces from `begin` on.
 std::vector<float> corners_to_send(const Pieces& pieces, std::size_t begin, std::size_t count, double magnitude,
                                    unsigned threads) {
-  const std::span<const Corners> triangles = triangles_of(pieces.corners);
+  const std::span<const PieceTriangle> triangles = triangles_of(pieces.corners);
   std::vector<float> result(9 * count * triangles.size());
   constexpr std::size_t kBlock = 4096;
   parallel_for(count, kBlock, threads, [&](std::size_t first, std::size_t last) {
     float* to = result.data() + 9 * first * triangles.size();
     for (std::size_t i = begin + first; i < begin + last; ++i) {
-      for (const Corners& triangle : triangles) {
+      for (const PieceTriangle& triangle : triangles) {
         for (const std::uint8_t corner : triangle) {
           const glm::dvec3& p = pieces.points[pieces.indices[i * static_cast<std::size_t>(pieces.corners) + corner]];
           for (int k = 0; k < 3; ++k) {

@@ -133,20 +133,10 @@ bool LatticeCheck::add_piece(const Pieces& pieces, std::size_t piece, std::uint3
   const double per_spacing = 1 / grid.spacing;
   const std::size_t corners = static_cast<std::size_t>(pieces.corners);
   const std::span<const std::uint32_t> corner = pieces.indices.subspan(piece * corners, corners);
-  const auto add = [&](int a, int b, int c) {
-    const auto in_grid = [&](int k) { return (pieces.points[corner[k]] - grid.origin) * per_spacing; };
-    return add_parts({in_grid(a), in_grid(b), in_grid(c)}, slot, parts);
-  };
-  switch (corners) {
-    case 1:
-      return add(0, 0, 0);
-    case 2:
-      return add(0, 1, 1);
-    case 3:
-      return add(0, 1, 2);
-    default:
-      return add(0, 1, 2) && add(0, 2, 3) && add(0, 1, 3) && add(1, 2, 3);
-  }
+  const auto in_grid = [&](int k) { return (pieces.points[corner[k]] - grid.origin) * per_spacing; };
+  return std::ranges::all_of(triangles_of(pieces.corners), [&](const PieceTriangle& t) {
+    return add_parts({in_grid(t[0]), in_grid(t[1]), in_grid(t[2])}, slot, parts);
+  });
 }
 
 void LatticeCheck::draw(const Batch& batch, float bound, bool queries, std::vector<Sum>& sums) const {

@@ -20,6 +20,13 @@ bool finite(const glm::dvec3& p) { return std::isfinite(p.x) && std::isfinite(p.
 
 }  // namespace
 
+std::span<const PieceTriangle> triangles_of(int corners) {
+  static constexpr PieceTriangle kPoint[] = {{0, 0, 0}}, kSegment[] = {{0, 1, 1}}, kTriangle[] = {{0, 1, 2}},
+                                 kQuad[] = {{0, 1, 2}, {0, 2, 3}, {0, 1, 3}, {1, 2, 3}};
+  static constexpr std::span<const PieceTriangle> kTriangles[] = {kPoint, kSegment, kTriangle, kQuad};
+  return kTriangles[corners - 1];
+}
+
 PlacedPoints::PlacedPoints(std::span<const glm::dvec3> stored, const Placement& placement,
                            const ToleranceVolume& volume) {
   const Frame& frame = volume.frame();

@@ -2,6 +2,7 @@
 /// The question every operation asks: are these pieces within the tolerance?
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
@@ -29,6 +30,13 @@ struct Pieces {
 
   std::size_t size() const { return indices.size() / static_cast<std::size_t>(corners); }
 };
+
+/// The places of a triangle's corners among the corners of its piece.
+using PieceTriangle = std::array<std::uint8_t, 3>;
+
+/// The triangles that a piece of 1 to 4 corners is checked as: a point and a segment as degenerate triangles, a quad as
+/// the four triangles of both of its triangulations.
+std::span<const PieceTriangle> triangles_of(int corners);
 
 /// Points as they are stored, placed in the frame of a volume for a check.
 struct PlacedPoints {

@@ -222,8 +222,11 @@ void CollapseLoop::carry_out(Tried& tried) {
     const auto h = tried.attempt->halfedge;
     const glm::dvec3 before = mesh_.position(mesh_.to(h));
     ring_.clear();
-    for (const auto near : mesh_.connectivity().vv_range(BoundedMesh::handle(mesh_.from(h)))) {
-      ring_.push_back(static_cast<std::uint32_t>(near.idx()));
+    // The kept vertex has at most so many faces afterwards.
+    if (mesh_.faces_around(mesh_.from(h)) + mesh_.faces_around(mesh_.to(h)) > kGreatMany) {
+      for (const auto near : mesh_.connectivity().vv_range(BoundedMesh::handle(mesh_.from(h)))) {
+        ring_.push_back(static_cast<std::uint32_t>(near.idx()));
+      }
     }
     const std::uint32_t kept = collapse_.carry_out(*tried.attempt);
     const bool stayed = mesh_.position(kept) == before && !mesh_.joined(kept);
@@ -265,9 +268,8 @@ void CollapseLoop::renew_ring(std::uint32_t vertex) {
   touch(vertex);
   for (const std::uint32_t near : ring_) {
     if (near == vertex) continue;
-    for (const auto h : connectivity.voh_range(BoundedMesh::handle(near))) {
-      if (mesh_.to(h) == vertex) renew(static_cast<std::uint32_t>(connectivity.edge_handle(h).idx()));
-    }
+    const auto h = connectivity.find_halfedge(BoundedMesh::handle(near), BoundedMesh::handle(vertex));
+    if (h.is_valid()) renew(static_cast<std::uint32_t>(connectivity.edge_handle(h).idx()));
     call_back(near);
   }
 }

@@ -163,6 +163,7 @@ struct Hierarchy::Build {
   }
 
   void sum_areas() {
+    taken.reserve(tree.corners_.size() + 1);
     taken.assign(1, 0);
     for (std::size_t place = 0; place < tree.corners_.size(); ++place) {
       poll_at(place);

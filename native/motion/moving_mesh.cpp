@@ -227,27 +227,16 @@ template <class Bound>
 double MovingMesh::over_triangulations(std::uint32_t face, Bound&& bound) const {
   const auto corner = corners_of(face);
   const std::vector<Spot>& spots = trial_;
-  const auto triangle = [&](int a, int b, int c) {
+  double largest = 0;
+  for (const auto& [a, b, c] : triangles_of(static_cast<int>(corners_))) {
     const Spot &p = spots[corner[a]], &q = spots[corner[b]], &r = spots[corner[c]];
     const glm::dvec3 corners[3] = {p.at, q.at, r.at};
-    return bound(corners, glm::dvec3(p.near.distance, q.near.distance, r.near.distance),
-                 glm::uvec3(p.near.triangle, q.near.triangle, r.near.triangle));
-  };
-  switch (corners_) {
-    case 1:
-      return triangle(0, 0, 0);
-    case 2:
-      return triangle(0, 1, 1);
-    case 3:
-      return triangle(0, 1, 2);
-    default: {
-      double largest = 0;
-      for (const glm::ivec3& t : {glm::ivec3(0, 1, 2), glm::ivec3(0, 2, 3), glm::ivec3(0, 1, 3), glm::ivec3(1, 2, 3)}) {
-        if (largest != kUnproved) largest = std::max(largest, triangle(t.x, t.y, t.z));
-      }
-      return largest;
-    }
+    const double bounded = bound(corners, glm::dvec3(p.near.distance, q.near.distance, r.near.distance),
+                                 glm::uvec3(p.near.triangle, q.near.triangle, r.near.triangle));
+    if (bounded == kUnproved) return kUnproved;
+    largest = std::max(largest, bounded);
   }
+  return largest;
 }
 
 double MovingMesh::reach_by_certificate(std::uint32_t face) const {

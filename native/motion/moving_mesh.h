@@ -13,6 +13,7 @@
 
 #include "base/progress.h"
 #include "check/certificate.h"
+#include "check/tolerance_check.h"
 #include "check/tolerance_volume.h"
 #include "geometry/frame.h"
 

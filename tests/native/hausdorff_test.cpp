@@ -18,15 +18,6 @@ namespace {
 using namespace tolvol;
 using glm::dvec3;
 
-struct Random {
-  std::mt19937 engine;
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> uniform;
-  explicit Random(unsigned seed) : engine(seed) {}
-  dvec3 point() { return {normal(engine), normal(engine), normal(engine)}; }
-  double share() { return uniform(engine); }
-};
-
 /// Longitude and latitude.
 TriangleMesh sphere(unsigned n, double radius) {
   return shapes::squares(n, [&](const dvec3& p) {
@@ -51,7 +42,7 @@ TriangleMesh box(double half) {
   return mesh;
 }
 
-TriangleMesh soup(Random& random, int triangles, double size) {
+TriangleMesh soup(shapes::Random& random, int triangles, double size) {
   TriangleMesh mesh;
   for (int i = 0; i < triangles; ++i) {
     const dvec3 centre = random.point();
@@ -124,7 +115,7 @@ long double exact_distance(const Long& p, const Long& a, const Long& b, const Lo
 
 // From one triangle to another the distance is largest at a corner: known to more digits than a double has.
 TEST(Hausdorff, RoundingIsInside) {
-  Random random(7);
+  shapes::Random random(7);
   for (int round = 0; round < 5000; ++round) {
     const dvec3 offset = 100.0 * random.point();
     TriangleMesh a{{}, {{0, 1, 2}}}, b = a;
@@ -187,7 +178,7 @@ TEST(Hausdorff, IsDirected) {
 
 // Small enough for the truth by sampling: it lies between the largest sample and that plus the spacing.
 TEST(Hausdorff, RandomMeshesAgainstSamples) {
-  Random random(1);
+  shapes::Random random(1);
   for (int round = 0; round < 40; ++round) {
     const double size = std::pow(10.0, -round % 3);
     const TriangleMesh a = soup(random, 3, size), b = soup(random, 1 + round % 9, 1);
@@ -210,7 +201,7 @@ TEST(Hausdorff, RandomMeshesAgainstSamples) {
 }
 
 TEST(Hausdorff, NeedlesAndDegenerateTriangles) {
-  Random random(2);
+  shapes::Random random(2);
   for (int round = 0; round < 60; ++round) {
     TriangleMesh a, b;
     for (TriangleMesh* mesh : {&a, &b}) {
@@ -252,7 +243,7 @@ TEST(Hausdorff, DegenerateTrianglesCount) {
 }
 
 TEST(Hausdorff, NoDistanceEndsAtRounding) {
-  Random random(3);
+  shapes::Random random(3);
   TriangleMesh rough = sphere(60, 1);
   for (dvec3& p : rough.vertices) p += 0.01 * random.point();
   const TriangleMesh fine = subdivided(rough);
@@ -268,7 +259,7 @@ TEST(Hausdorff, NoDistanceEndsAtRounding) {
 
 // The interval keeps its width where the distance is far smaller than the triangles: float32 rounding, for one.
 TEST(Hausdorff, TinyDistances) {
-  Random random(4);
+  shapes::Random random(4);
   for (const double noise : {1e-4, 1e-7, 1e-10}) {
     const TriangleMesh plate =
         shapes::squares(1, [](const dvec3& p) { return dvec3(p.x, p.y, 0.3 * p.x - 0.7 * p.y); });
@@ -316,7 +307,7 @@ TEST(Hausdorff, OutlinesTakeWorkInProportion) {
 
 // All triangles of a fan meet in one point, and the boxes of most of them hold any point near the middle.
 TEST(Hausdorff, FansTakeLittleForEachTriangle) {
-  Random random(12);
+  shapes::Random random(12);
   const unsigned n = 6000;
   TriangleMesh fan;
   for (unsigned i = 0; i < n; ++i) {
@@ -331,7 +322,7 @@ TEST(Hausdorff, FansTakeLittleForEachTriangle) {
 }
 
 TEST(Hausdorff, BoundDecides) {
-  Random random(5);
+  shapes::Random random(5);
   TriangleMesh rough = sphere(40, 1);
   for (dvec3& p : rough.vertices) p += 0.02 * random.point();
   for (const auto& [a, b] : {std::pair{sphere(17, 1), rough}, {rough, sphere(17, 1)}}) {
@@ -364,7 +355,7 @@ TEST(Hausdorff, BoundDecides) {
 }
 
 TEST(Hausdorff, SameForAnyNumberOfThreads) {
-  Random random(6);
+  shapes::Random random(6);
   TriangleMesh rough = sphere(50, 1);
   for (dvec3& p : rough.vertices) p += 0.02 * random.point();
   const TriangleMesh coarse = sphere(8, 1);

@@ -10,6 +10,8 @@
 #include <random>
 #include <thread>
 
+#include "shapes.h"
+
 namespace {
 
 using namespace tolvol;
@@ -17,17 +19,9 @@ using glm::dvec3;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-struct Random {
-  std::mt19937 engine;
-  std::normal_distribution<double> normal;
-  explicit Random(unsigned seed) : engine(seed) {}
-  dvec3 point() { return {normal(engine), normal(engine), normal(engine)}; }
-  unsigned below(unsigned n) { return std::uniform_int_distribution<unsigned>(0, n - 1)(engine); }
-};
-
 /// Triangles of all sizes: some as large as the whole, most small, a part degenerate.
 TriangleMesh soup(unsigned seed, unsigned triangles, double scale = 1, dvec3 offset = dvec3(0)) {
-  Random random(seed);
+  shapes::Random random(seed);
   TriangleMesh mesh;
   for (unsigned i = 0; i < triangles; ++i) {
     const double size = std::pow(10.0, -double(random.below(4)));
@@ -67,7 +61,7 @@ TEST(Hierarchy, AgreesWithBruteForceBitForBit) {
   const TriangleMesh mesh = soup(1, 1500);
   const Hierarchy hierarchy(mesh);
   ASSERT_EQ(hierarchy.size(), 1500u);
-  Random random(2);
+  shapes::Random random(2);
   for (int i = 0; i < 2000; ++i) {
     // from the surface, from close by, from the outside, from afar, from so far that the search is made in doubles
     const double off = std::array{0.0, 1e-3, 1.0, 30.0, 1e5}[i % 5];
@@ -102,7 +96,7 @@ TEST(Hierarchy, AgreesWithBruteForceAmongNeedles) {
   for (const bool around_a_point : {true, false}) {
     const TriangleMesh mesh = needles(700, around_a_point);
     const Hierarchy hierarchy(mesh);
-    Random random(20);
+    shapes::Random random(20);
     for (int i = 0; i < 1000; ++i) {
       const double off = std::array{0.0, 1e-6, 1e-2, 1.0, 1e5}[i % 5];
       const dvec3 p = mesh.vertices[random.below(701)] * (i % 7 / 6.0) + off * random.point();
@@ -119,7 +113,7 @@ TEST(Hierarchy, LooksAtFewOfManyNeedles) {
   for (const bool around_a_point : {true, false}) {
     const TriangleMesh mesh = needles(20000, around_a_point);
     const Hierarchy hierarchy(mesh);
-    Random random(21);
+    shapes::Random random(21);
     std::size_t looked_at = 0;
     for (int i = 0; i < 500; ++i) {
       const glm::uvec3& t = mesh.triangles[random.below(20000)];
@@ -133,7 +127,7 @@ TEST(Hierarchy, LooksAtFewOfManyNeedles) {
 
 // All triangles around a vertex are at distance 0 from it, and boxes rounded the wrong way would lose some.
 TEST(Hierarchy, AgreesAtSharedVertices) {
-  Random random(19);
+  shapes::Random random(19);
   TriangleMesh mesh;
   for (int i = 0; i < 400; ++i) mesh.vertices.push_back(random.point());
   for (int i = 0; i < 1500; ++i) mesh.triangles.push_back({random.below(400), random.below(400), random.below(400)});
@@ -148,7 +142,7 @@ TEST(Hierarchy, AgreesAtSharedVertices) {
 TEST(Hierarchy, RadiusIsInclusive) {
   const TriangleMesh mesh = soup(3, 800);
   const Hierarchy hierarchy(mesh);
-  Random random(4);
+  shapes::Random random(4);
   int beyond = 0;
   for (int i = 0; i < 1000; ++i) {
     const dvec3 p = 2.0 * random.point();
@@ -167,7 +161,7 @@ TEST(Hierarchy, RadiusIsInclusive) {
 TEST(Hierarchy, NearestAmongTheAccepted) {
   const TriangleMesh mesh = soup(5, 700);
   const Hierarchy hierarchy(mesh);
-  Random random(6);
+  shapes::Random random(6);
   for (int i = 0; i < 600; ++i) {
     const unsigned rest = random.below(7);
     const auto accept = [&](std::uint32_t t) { return t % 7 == rest; };
@@ -182,7 +176,7 @@ TEST(Hierarchy, NearestAmongTheAccepted) {
 TEST(Hierarchy, CommonTriangleOfSeveralPoints) {
   const TriangleMesh mesh = soup(7, 600);
   const Hierarchy hierarchy(mesh);
-  Random random(8);
+  shapes::Random random(8);
   for (int i = 0; i < 1200; ++i) {
     const dvec3 centre = random.point() * std::array{1.0, 1.0, 1e3}[i % 3];
     const double spread = std::array{1e-3, 1e-1, 1.0, 10.0}[i % 4];
@@ -224,7 +218,7 @@ TEST(Hierarchy, NearVisitsAllWithinTheRadius) {
   TriangleMesh mesh = soup(17, 500);
   for (unsigned i = 0; i < 500; i += 5) mesh.triangles.push_back(mesh.triangles[i]);
   const Hierarchy hierarchy(mesh);
-  Random random(18);
+  shapes::Random random(18);
   for (int i = 0; i < 200; ++i) {
     const dvec3 p = random.point() * (i % 10 == 0 ? 1e9 : 1.0);
     const double radius = 0.3 * random.below(5) + (i % 10 == 0 ? 2e9 : 0.0);
@@ -262,7 +256,7 @@ TEST(Hierarchy, HeapsOfEqualTriangles) {
   mesh.triangles.assign(300000, {3, 3, 3});
   const Hierarchy points(mesh);
   for (int i = 0; i < 100000; ++i) ASSERT_EQ(points.nearest({5, 5, 6}).distance, 1);
-  Random random(9);
+  shapes::Random random(9);
   for (int i = 0; i < 300000; ++i) {
     mesh.vertices.push_back(random.point());
     const unsigned n = unsigned(mesh.vertices.size());
@@ -285,7 +279,7 @@ TEST(Hierarchy, AnyScaleAndAnyPlace) {
     const TriangleMesh mesh = soup(10, 400, scale, offset * dvec3(1, -1, 0.5));
     const TriangleMesh unit = soup(10, 400, 1, offset / scale * dvec3(1, -1, 0.5));
     const Hierarchy hierarchy(mesh), reference(unit);
-    Random random(11);
+    shapes::Random random(11);
     for (int i = 0; i < 100; ++i) {
       const dvec3 off = random.point() * (i % 2 ? 1.0 : 1e-2);
       const unsigned vertex = random.below(1200);
@@ -303,7 +297,7 @@ TEST(Hierarchy, AnyScaleAndAnyPlace) {
 TEST(Hierarchy, PointsFarAway) {
   const TriangleMesh mesh = soup(12, 20000);
   const Hierarchy hierarchy(mesh);
-  Random random(13);
+  shapes::Random random(13);
   for (const double far : {1e2, 1e7, 1e9, 1e12, 1e30, 1e155, 1e300}) {
     for (int i = 0; i < 20; ++i) {
       const dvec3 p = far * random.point();
@@ -327,7 +321,7 @@ TEST(Hierarchy, ManyThreadsGetTheSameAnswers) {
   std::vector<std::thread> threads;
   for (auto& answer : answers) {
     threads.emplace_back([&] {
-      Random random(16);
+      shapes::Random random(16);
       for (int i = 0; i < 2000; ++i) answer.push_back(hierarchy.nearest(random.point()).triangle);
     });
   }

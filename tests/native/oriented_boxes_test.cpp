@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "geometry/closest_point.h"
+#include "shapes.h"
 
 namespace {
 
@@ -16,15 +17,8 @@ using namespace tolvol;
 using glm::dvec3;
 using Corners = OrientedBoxes::Corners;
 
-struct Random {
-  std::mt19937 engine;
-  std::normal_distribution<double> normal;
-  explicit Random(unsigned seed) : engine(seed) {}
-  dvec3 point() { return {normal(engine), normal(engine), normal(engine)}; }
-};
-
 /// Needles of any width down to none around a line, a point among them.
-std::vector<Corners> needles(Random& random, double width) {
+std::vector<Corners> needles(shapes::Random& random, double width) {
   const dvec3 along = glm::normalize(random.point());
   std::vector<Corners> triangles;
   for (int i = 0; i < 6; ++i) {
@@ -38,7 +32,7 @@ std::vector<Corners> needles(Random& random, double width) {
 
 // A box that is a little too far away would hide the nearest triangle.
 TEST(OrientedBoxes, AreNeverFartherThanTheirTriangles) {
-  Random random(1);
+  shapes::Random random(1);
   for (const double width : {0.3, 1e-3, 1e-7, 1e-12, 1e-17, 0.0}) {
     for (int round = 0; round < 50; ++round) {
       const std::vector<Corners> triangles = needles(random, width);
@@ -66,7 +60,7 @@ TEST(OrientedBoxes, AreNeverFartherThanTheirTriangles) {
 }
 
 TEST(OrientedBoxes, LieCloselyAroundNeedles) {
-  Random random(2);
+  shapes::Random random(2);
   for (int round = 0; round < 50; ++round) {
     const dvec3 along = glm::normalize(random.point()), across = glm::normalize(glm::cross(along, random.point()));
     std::vector<Corners> triangles;

@@ -15,6 +15,18 @@ namespace tolvol::shapes {
 
 using glm::dvec3;
 
+/// Numbers that follow from the seed alone.
+struct Random {
+  explicit Random(unsigned seed) : engine(seed) {}
+  dvec3 point() { return {normal(engine), normal(engine), normal(engine)}; }  ///< normally distributed around 0
+  double share() { return uniform(engine); }                                  ///< in [0, 1)
+  unsigned below(unsigned n) { return std::uniform_int_distribution<unsigned>(0, n - 1)(engine); }
+
+  std::mt19937 engine;
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+};
+
 /// Rounded to float32, as Blender would store it.
 inline TriangleMesh stored(TriangleMesh mesh) {
   for (dvec3& p : mesh.vertices) p = rounded_to_float32(p);

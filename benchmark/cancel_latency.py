@@ -3,7 +3,7 @@
 """How long calls go on after they are cancelled at random moments: for each call the longest of all rounds, by the clock and by
 the processor.
 
-/usr/bin/python3 tests/python/cancel_latency.py [FILE.npz...] [--only CALL...] [--tolerance PERCENT...] [--rounds N]
+/usr/bin/python3 benchmark/cancel_latency.py [FILE.npz...] [--only CALL...] [--tolerance PERCENT...] [--rounds N]
     [--threads N]
 
 FILE.npz holds a mesh, as arrays `vertices` (n, 3) and `triangles` (m, 3). Without a file a torus of 240,000 triangles is made.
@@ -21,8 +21,9 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, os.environ.get("TOLVOL_PYTHON_PATH", str(ROOT / "build/release/python")))
+sys.path.insert(0, str(ROOT / "tests/python"))
 import tolvol  # noqa: E402
 
 import meshes  # noqa: E402
