@@ -17,7 +17,7 @@ uniform vec3 origin;  // of the grid
 uniform float spacing;
 uniform ivec3 nodes;
 uniform int pitch;
-uniform float within2;  // the squared distance up to which a witness proves
+uniform float limit2;  // the squared distance up to which a witness proves
 uniform float shortest;  // a part this short is not split further
 uniform int tries;       // nodes asked for a triangle, 1 to 8, the nearest first
 uniform int budget;      // parts looked at
@@ -38,7 +38,7 @@ bool covers(uint triangle, mat3 part) {
                        vec3(reference_ac[i], reference_ac[i + 1], reference_ac[i + 2]));
   for (int corner = 0; corner < 3; ++corner) {
     precise vec3 x = part[corner] - a;
-    if (!(squared_distance_to_witness(x, t) <= within2)) return false;
+    if (!(squared_distance_to_witness(x, t) <= limit2)) return false;
   }
   return true;
 }

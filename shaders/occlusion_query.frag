@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Whether the lattice point of this pixel is inside. A pixel that is not of the lattice is not.
+/// Whether the sample of this pixel is inside. A pixel that stands for no sample is not.
 uniform sampler3D distances;  // frame lengths, never too small
 uniform float bound;          // of the interpolated distance
 uniform float bound_near;     // of the distance by way of one node
@@ -10,7 +10,7 @@ uniform int around = 8;       // nodes; no constant, because a loop that is unro
 bool sample_counts() {
   const vec2 pixel = vec2(ivec2(gl_FragCoord.xy) & (cell - 1));
   if (pixel.x + pixel.y > uintBitsToFloat(corner_n.w)) return false;
-  precise const vec3 point = uintBitsToFloat(corner_n.xyz) + (pixel.x * uintBitsToFloat(edge1_slot.xyz) +
+  precise const vec3 point = uintBitsToFloat(corner_n.xyz) + (pixel.x * uintBitsToFloat(edge1_counter.xyz) +
                                                               pixel.y * uintBitsToFloat(edge2_unused.xyz));
   // The distance changes by no more than the way: near the reference one node is often enough. Nearest first.
   const ivec3 low = ivec3(point), first = ivec3(point + 0.5) - low;

@@ -6,7 +6,7 @@
     tests/fuzz.py --seed 1 --case 17          one of them again
     tests/fuzz.py --file FILE.npz             one that was found and made small
 
-Results are judged by tolvol.hausdorff, by CGAL where it is installed, and by what the docstrings promise; each call has a
+Results are judged by tolvol.hausdorff, by CGAL, and by what the docstrings promise; each call has a
 limit of time. A finding is made small, printed, and stored under build/fuzz. Exit code 1 when there was one. Needs NumPy
 and what setup.sh --tests builds."""
 
@@ -80,7 +80,7 @@ def main():
     if options.case is not None:
         return one(watchdog, draw.case_of(options.seed, options.case), options)
     if not judges.CGAL.exists():
-        print(f"without CGAL: {judges.CGAL} is not built")
+        sys.exit(f"fuzz: the judge {judges.CGAL} is not built; run sh setup.sh --tests")
     outcomes, operations, findings, number = Counter(), Counter(), Counter(), options.first
     end = time.monotonic() + 60 * options.minutes
     while time.monotonic() < end:

@@ -65,9 +65,9 @@ py::tuple decimate_by(const py::object& vertices, const py::object& triangles, d
   if (placement != "optimal" && placement != "subset")
     throw InvalidInput("placement must be \"optimal\" or \"subset\"");
   DecimationOptions options;
-  if (placement == "subset") options.vertices = DecimationOptions::Vertices::subset;
+  if (placement == "subset") options.placement = DecimationOptions::Placement::subset;
   options.threads = python::to_threads(threads);
-  const Placement placed(glm::dmat4(1), v.storage);
+  const StoredSpace space(glm::dmat4(1), v.storage);
   DecimationResult result;
   Seconds field, decimation;
   std::size_t memory = 0;
@@ -76,13 +76,13 @@ py::tuple decimate_by(const py::object& vertices, const py::object& triangles, d
     // A baseline that does not ask the volume does not wait for it: only its frame is used.
     const bool asks_volume = method != "permission_grid" && method != "vertex_samples";
     auto start = std::chrono::steady_clock::now();
-    const ToleranceVolume volume(v.values, t, placed, tolerance,
+    const ToleranceVolume volume(v.values, t, space, tolerance,
                                  {asks_volume ? precision : kCoarse, options.threads, nullptr});
     if (!asks_volume) start = std::chrono::steady_clock::now();
     const Baseline baseline = make_baseline(method, volume, precision, options.threads);
     const auto built = std::chrono::steady_clock::now();
     options.baseline = baseline.ring.get();
-    result = decimate(v.values, t, placed, &volume, options);
+    result = decimate(v.values, t, space, &volume, options);
     field = built - start, decimation = std::chrono::steady_clock::now() - built;
     memory = baseline.memory;
   }

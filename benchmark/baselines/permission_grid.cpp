@@ -14,8 +14,8 @@ namespace tolvol::baselines {
 
 PermissionGrid::PermissionGrid(const TriangleMesh& reference, double tolerance, double precision, unsigned threads)
     : spacing_(tolerance / precision) {
-  const double within = tolerance - std::sqrt(0.75) * spacing_;
-  if (!(tolerance > 0 && precision > 0 && within > 0 && std::isfinite(tolerance) && std::isfinite(precision))) {
+  const double limit = tolerance - std::sqrt(0.75) * spacing_;
+  if (!(tolerance > 0 && precision > 0 && limit > 0 && std::isfinite(tolerance) && std::isfinite(precision))) {
     throw InvalidInput("a permission grid needs a positive tolerance and a precision above 0.87");
   }
   Box box;
@@ -52,7 +52,7 @@ PermissionGrid::PermissionGrid(const TriangleMesh& reference, double tolerance, 
     for (int z = 0; z < grid.nodes.z; ++z) {
       for (int y = 0; y < cells_.y; ++y) {
         for (int x = 0; x < cells_.x; ++x) {
-          if (grid.distance[grid.index(x, y, z)] <= within) bits_[byte_of({x, y, begin + z})] |= 1 << (x % 8);
+          if (grid.distance[grid.index(x, y, z)] <= limit) bits_[byte_of({x, y, begin + z})] |= 1 << (x % 8);
         }
       }
     }

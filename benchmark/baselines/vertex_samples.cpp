@@ -14,7 +14,7 @@ void VertexSamples::begin(const TriangleMesh& mesh, double) {
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t v = mesh.triangles[t][k];
-      if (!placed[v]) samples_->own(t, v);
+      if (!placed[v]) samples_->set_witness(t, v);
       placed[v] = true;
     }
   }

@@ -4,7 +4,7 @@
 /// collapse must find a new one for those of the faces it changes. The rest of the reference, and the result's own
 /// points, may be farther: the triangles between the vertices are never looked at.
 ///
-/// As the paper has it, it runs with half-edge collapses (DecimationOptions::Vertices::subset) and keeps the removed
+/// As the paper has it, it runs with half-edge collapses (DecimationOptions::Placement::subset) and keeps the removed
 /// vertices alone; here surviving ones have a face, too, which costs nothing (their distance is 0) and lets them move.
 #pragma once
 

@@ -8,7 +8,7 @@
 
 namespace tolvol {
 
-enum class Simd { baseline, avx2 };
+enum class Simd { portable, avx2 };
 
 #if defined(__x86_64__)
 #define TOLVOL_HAS_AVX2 1
@@ -23,7 +23,7 @@ inline Simd best_simd() {
 #if TOLVOL_HAS_AVX2
   if (__builtin_cpu_supports("avx2")) return Simd::avx2;
 #endif
-  return Simd::baseline;
+  return Simd::portable;
 }
 
 /// The path in use, process-wide. Tests set it to force each; nothing else does.

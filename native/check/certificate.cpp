@@ -44,32 +44,32 @@ bool comes_first(const glm::dvec3& p, const glm::dvec3& q) {
 
 /// The corners in an order that follows from their positions alone, a segment as (a, b, b).
 struct Ordered {
-  Ordered(const glm::dvec3 (&from)[3], const glm::uvec3& near_from) {
+  Ordered(const glm::dvec3 (&from)[3], const glm::uvec3& hints_from) {
     const int second = comes_first(from[1], from[0]), third = comes_first(from[2], from[0]),
               last = comes_first(from[2], from[1]);
     const int place[3] = {second + third, 1 - second + last, 2 - third - last};
-    for (int i = 0; i < 3; ++i) corners[place[i]] = from[i], near[place[i]] = near_from[i];
-    if (corners[0] == corners[1]) corners[1] = corners[2], near[1] = near[2];
+    for (int i = 0; i < 3; ++i) corners[place[i]] = from[i], hints[place[i]] = hints_from[i];
+    if (corners[0] == corners[1]) corners[1] = corners[2], hints[1] = hints[2];
   }
   glm::dvec3 corners[3];
-  glm::uvec3 near;
+  glm::uvec3 hints;
 };
 
 }  // namespace
 
 TriangleCertificate::TriangleCertificate(const std::vector<WitnessTriangle>& reference, const DistanceGrid& grid,
-                                         const Hierarchy& hierarchy, double within, double beyond)
+                                         const Hierarchy& hierarchy, double limit, double beyond)
     : reference_(&reference),
       grid_(&grid),
       hierarchy_(&hierarchy),
-      within_(within),
-      within2_(within * within),
+      limit_(limit),
+      limit2_(limit * limit),
       beyond_(beyond) {}
 
 double TriangleCertificate::distance_bound(const glm::dvec3& p) const {
   const std::uint32_t triangle = grid_->triangle_near(p);
   if (triangle == DistanceGrid::kNone) {
-    return grid_->contains(p) ? hierarchy_->nearest(p, within_).distance : std::numeric_limits<double>::infinity();
+    return grid_->contains(p) ? hierarchy_->nearest(p, limit_).distance : std::numeric_limits<double>::infinity();
   }
   FourPoints points;
   points.set(p, p, p, p);
@@ -78,19 +78,19 @@ double TriangleCertificate::distance_bound(const glm::dvec3& p) const {
   return std::sqrt(d2[0]);
 }
 
-bool TriangleCertificate::leaves_room(double distance) const { return distance <= kRoom * within_; }
+bool TriangleCertificate::leaves_room(double distance) const { return distance <= kRoom * limit_; }
 
-TriangleCertificate::Near TriangleCertificate::nearest(const glm::dvec3& p, double radius) const {
+TriangleCertificate::PointBound TriangleCertificate::nearest(const glm::dvec3& p, double radius) const {
   const std::uint32_t guess = grid_->triangle_near(p);
   if (guess != DistanceGrid::kNone) {
     const double distance = distance_bound(p);
     if (leaves_room(distance)) return {distance, guess};
   }
   const Hierarchy::Nearest found = hierarchy_->nearest(p, radius, guess);
-  return found.triangle == Hierarchy::kNone ? Near{} : Near{found.distance, found.triangle};
+  return found.triangle == Hierarchy::kNone ? PointBound{} : PointBound{found.distance, found.triangle};
 }
 
-std::optional<glm::dvec3> TriangleCertificate::near(const glm::dvec3& p) const {
+std::optional<glm::dvec3> TriangleCertificate::nearby_point(const glm::dvec3& p) const {
   constexpr double kNear = 0.3;  // of the tolerance: a point this near is near enough
   std::optional<glm::dvec3> nearest;
   double nearest2 = std::numeric_limits<double>::infinity();
@@ -98,7 +98,7 @@ std::optional<glm::dvec3> TriangleCertificate::near(const glm::dvec3& p) const {
   int count = 0;
   const glm::dvec3 cell = (p - grid_->origin) * (1 / grid_->spacing), low = glm::floor(cell);
   const glm::ivec3 first(glm::greaterThan(cell - low, glm::dvec3(0.5)));  // the nearest node of the eight
-  for (int i = 0; i < 8 && nearest2 > kNear * kNear * within2_; ++i) {
+  for (int i = 0; i < 8 && nearest2 > kNear * kNear * limit2_; ++i) {
     const glm::ivec3 node = glm::ivec3(low) + (first ^ glm::ivec3(i & 1, (i >> 1) & 1, i >> 2));
     if (glm::any(glm::lessThan(node, glm::ivec3(0))) || glm::any(glm::greaterThanEqual(node, grid_->nodes))) continue;
     const std::uint32_t triangle = grid_->triangle[grid_->index(node.x, node.y, node.z)];
@@ -116,14 +116,14 @@ std::optional<glm::dvec3> TriangleCertificate::near(const glm::dvec3& p) const {
 bool TriangleCertificate::shows_outside(const glm::dvec3 (&corners)[3]) const {
   const auto& [a, b, c] = corners;
   const double longest = std::sqrt(std::max({squared_length(b - a), squared_length(c - b), squared_length(a - c)}));
-  const double wanted = std::min(longest / (kProbeSpacing * within_), static_cast<double>(kMostProbes));
+  const double wanted = std::min(longest / (kProbeSpacing * limit_), static_cast<double>(kMostProbes));
   const int n = std::max(2, static_cast<int>(wanted));
   const glm::dvec3 u = (b - a) * (1.0 / n), v = (c - a) * (1.0 / n);
   for (int i = 0; i < n; ++i) {
     for (int j = i == 0; i + j <= n && j < n; ++j) {  // all but the corners
       const glm::dvec3 p = a + static_cast<double>(i) * u + static_cast<double>(j) * v;
       // Any triangle within the bound will do.
-      if (!(distance_bound(p) <= within_) && hierarchy_->common({&p, 1}, within_, within_).triangle == Hierarchy::kNone)
+      if (!(distance_bound(p) <= limit_) && hierarchy_->common({&p, 1}, limit_, limit_).triangle == Hierarchy::kNone)
         return true;
     }
   }
@@ -134,23 +134,23 @@ bool TriangleCertificate::shows_outside(const glm::dvec3 (&corners)[3]) const {
 inline double TriangleCertificate::bound_by_corners(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
   const auto& [a, b, c] = corners;
   // Every point of a triangle is within L / sqrt(3) of a corner, L its longest edge.
-  const double corner = std::max({bounds.x, bounds.y, bounds.z}), room = within_ - corner;
+  const double corner = std::max({bounds.x, bounds.y, bounds.z}), room = limit_ - corner;
   const double longest2 = std::max({squared_length(b - a), squared_length(c - b), squared_length(a - c)});
   return room > 0 && longest2 <= 3 * room * room ? corner + std::sqrt(longest2 * (1.0 / 3)) : kUnproved;
 }
 
 /// Sets `farthest` where the verdict is inside.
 template <TriangleCertificate::Search kSearch>
-Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::uvec3& near, double& farthest) const {
+Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::uvec3& hints, double& farthest) const {
   constexpr bool kProve = kSearch == Search::verdict;
   thread_local std::vector<Part> queue;
   thread_local NearTriangles around;
   queue.assign(1, {{corners[0], corners[1], corners[2]}});
-  const double radius = kProve ? beyond_ : within_;
+  const double radius = kProve ? beyond_ : limit_;
   around.begin(*reference_, *hierarchy_, radius);
   Verdict result = Verdict::inside;
   double farthest2 = 0;  // over the parts proved so far
-  std::uint32_t hint = near.x;
+  std::uint32_t hint = hints.x;
   for (std::size_t next = 0; next < queue.size(); ++next) {
     if (next == (kProve ? kBudget : kQuickBudget)) return Verdict::unproved;
     if ((next + 1) % kBetweenPolls == 0) poll();
@@ -174,18 +174,18 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       witness_distances((*reference_)[triangle], points, d2);
       if (d2[3] < centre2) centre2 = d2[3], below = triangle;
       // Written so that NaN is not covered.
-      if (d2[0] <= within2_ && d2[1] <= within2_ && d2[2] <= within2_) {
+      if (d2[0] <= limit2_ && d2[1] <= limit2_ && d2[2] <= limit2_) {
         farthest2 = std::max({farthest2, d2[0], d2[1], d2[2]});
         return true;
       }
       return false;
     };
     const std::uint32_t guess = grid_->triangle_near(centre);
-    if (covered_by(near.x) || covered_by(near.y) || covered_by(near.z) || covered_by(guess)) continue;
+    if (covered_by(hints.x) || covered_by(hints.y) || covered_by(hints.z) || covered_by(guess)) continue;
 
     const double longest2 = longest_squared(part);
-    const bool seems_outside = !(centre2 <= within2_);
-    if (guess != DistanceGrid::kNone && (seems_outside || longest2 < kSmall * kSmall * within2_)) {
+    const bool seems_outside = !(centre2 <= limit2_);
+    if (guess != DistanceGrid::kNone && (seems_outside || longest2 < kSmall * kSmall * limit2_)) {
       const glm::dvec3 cell = glm::floor((centre - grid_->origin) * (1 / grid_->spacing));
       bool found = false;
       for (int i = 0; i < 8 && !found; ++i) {
@@ -196,34 +196,34 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       }
       if (found) continue;
     }
-    if (!(centre2 <= within2_) || longest2 < kExact * kExact * within2_) {
+    if (!(centre2 <= limit2_) || longest2 < kExact * kExact * limit2_) {
       if (hint == Hierarchy::kNone) hint = guess;
       const std::uint32_t nearest = around.nearest(part, centre, radius, hint);
       if (nearest == Hierarchy::kNone) return Verdict::outside;
       hint = exact = nearest;
       if (covered_by(exact)) continue;
       // Without a proof to look for, a centre outside ends it.
-      if (!kProve && !(centre2 <= within2_)) return Verdict::unproved;
+      if (!kProve && !(centre2 <= limit2_)) return Verdict::unproved;
     }
     // Written so that NaN ends here.
     constexpr double kShortest = kSearch == Search::quick ? kQuickFloor : kFloor;
-    if (!(longest2 > kShortest * kShortest * within2_) || part.cuts == kMostCuts) {
+    if (!(longest2 > kShortest * kShortest * limit2_) || part.cuts == kMostCuts) {
       if (!kProve) return Verdict::unproved;
       result = Verdict::unproved;
       continue;
     }
     const auto cut_along = [&](std::uint32_t triangle) {
-      return cut(part, (*reference_)[triangle], kWorthCutting * within_, queue);
+      return cut(part, (*reference_)[triangle], kWorthCutting * limit_, queue);
     };
     const WitnessTriangle& t = (*reference_)[below];
     // Among triangles smaller than the tolerance a cut along an edge of one brings a long part no nearer to its end.
     const bool long_over_small =
-        longest2 > kLong * kLong * within2_ && std::max(squared_length(t.ab), squared_length(t.ac)) <= within2_;
+        longest2 > kLong * kLong * limit2_ && std::max(squared_length(t.ab), squared_length(t.ac)) <= limit2_;
     if (!long_over_small) {
       if (cut_along(below)) continue;
       // Among slivers the triangle below the centre may be one that no node of the grid names.
       if (exact == Hierarchy::kNone) {
-        exact = around.nearest(part, centre, within_, below);
+        exact = around.nearest(part, centre, limit_, below);
         // None: by rounding, where the centre is as far as it may be.
         const bool is_another = exact != below && exact != Hierarchy::kNone;
         if (is_another && (covered_by(exact) || cut_along(exact))) continue;
@@ -236,22 +236,22 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
 }
 
 double TriangleCertificate::bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                                  const glm::uvec3& near) const {
-  return bound_by<Search::quick>(corners, bounds, near);
+                                  const glm::uvec3& hints) const {
+  return bound_by<Search::quick>(corners, bounds, hints);
 }
 
 template <TriangleCertificate::Search kSearch>
 double TriangleCertificate::bound_by(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                                     const glm::uvec3& near) const {
+                                     const glm::uvec3& hints) const {
   double farthest = bound_by_corners(corners, bounds);
   if (farthest != kUnproved) return farthest;
-  return search<kSearch>(corners, near, farthest) == Verdict::inside ? farthest : kUnproved;
+  return search<kSearch>(corners, hints, farthest) == Verdict::inside ? farthest : kUnproved;
 }
 
 double TriangleCertificate::bound_in_any_order(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                                               const glm::uvec3& near) const {
-  const Ordered ordered(corners, near);
-  return bound_by<Search::fine>(ordered.corners, bounds, ordered.near);
+                                               const glm::uvec3& hints) const {
+  const Ordered ordered(corners, hints);
+  return bound_by<Search::fine>(ordered.corners, bounds, ordered.hints);
 }
 
 double TriangleCertificate::bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
@@ -260,27 +260,27 @@ double TriangleCertificate::bound_with_room(const glm::dvec3 (&corners)[3], cons
 }
 
 Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                                     const glm::uvec3& near) const {
+                                     const glm::uvec3& hints) const {
   if (bound_by_corners(corners, bounds) != kUnproved) return Verdict::inside;
-  const Ordered ordered(corners, near);
+  const Ordered ordered(corners, hints);
   double farthest = 0;
-  const Verdict found = search<Search::verdict>(ordered.corners, ordered.near, farthest);
+  const Verdict found = search<Search::verdict>(ordered.corners, ordered.hints, farthest);
   const auto& [a, b, c] = ordered.corners;
   if (found != Verdict::unproved || b != c) return found;
-  return covers_segment(*reference_, *hierarchy_, a, b, within_) ? Verdict::inside : Verdict::unproved;
+  return covers_segment(*reference_, *hierarchy_, a, b, limit_) ? Verdict::inside : Verdict::unproved;
 }
 
 std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& options) const {
   const Call call(options.progress);
   require_valid(pieces);
-  const double within = volume_->provable(pieces.mapping_error), beyond = volume_->refutable(pieces.mapping_error);
-  const TriangleCertificate certificate(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within, beyond);
+  const double limit = volume_->provable(pieces.mapping_error), beyond = volume_->refutable(pieces.mapping_error);
+  const TriangleCertificate certificate(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), limit, beyond);
   if (options.progress) options.progress->begin("checking");
 
   // The used points first: their distances settle most faces, inside (short edges) or outside, and are shared.
   std::vector<bool> used(pieces.points.size(), false);
   for (const std::uint32_t i : pieces.indices) used[i] = true;
-  std::vector<TriangleCertificate::Near> nearest(pieces.points.size());
+  std::vector<TriangleCertificate::PointBound> nearest(pieces.points.size());
   constexpr std::size_t kBlock = 128;
   parallel_for(nearest.size(), kBlock, options.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
@@ -295,10 +295,10 @@ std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& opt
       const std::span<const std::uint32_t> corner = pieces.indices.subspan(i * pieces.corners, pieces.corners);
       const auto triangle = [&](int a, int b, int c) {
         const std::uint32_t ia = corner[a], ib = corner[b], ic = corner[c];
-        const glm::uvec3 near(nearest[ia].triangle, nearest[ib].triangle, nearest[ic].triangle);
-        if (glm::any(glm::equal(near, glm::uvec3(Hierarchy::kNone)))) return Verdict::outside;
+        const glm::uvec3 hints(nearest[ia].triangle, nearest[ib].triangle, nearest[ic].triangle);
+        if (glm::any(glm::equal(hints, glm::uvec3(Hierarchy::kNone)))) return Verdict::outside;
         const glm::dvec3 bounds(nearest[ia].distance, nearest[ib].distance, nearest[ic].distance);
-        return certificate.verdict({pieces.points[ia], pieces.points[ib], pieces.points[ic]}, bounds, near);
+        return certificate.verdict({pieces.points[ia], pieces.points[ib], pieces.points[ic]}, bounds, hints);
       };
       verdicts[i] = Verdict::inside;
       for (const auto& [a, b, c] : triangles_of(pieces.corners)) verdicts[i] = std::min(verdicts[i], triangle(a, b, c));

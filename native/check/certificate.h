@@ -40,59 +40,59 @@ class Certificate final : public ToleranceCheck {
 /// The certificate for the inner loop of an operation: one triangle at a time, all thresholds fixed.
 class TriangleCertificate {
  public:
-  /// `within`: the provable distance, see ToleranceVolume::provable(); `beyond`: the refutable one. In the frame.
+  /// `limit`: the provable distance, see ToleranceVolume::provable(); `beyond`: the refutable one. In the frame.
   /// Keeps references to the rest. A grid without nodes leaves everything to the hierarchy.
   TriangleCertificate(const std::vector<WitnessTriangle>& reference, const DistanceGrid& grid,
-                      const Hierarchy& hierarchy, double within, double beyond);
+                      const Hierarchy& hierarchy, double limit, double beyond);
 
   static constexpr double kUnproved = std::numeric_limits<double>::infinity();
 
-  /// An upper bound, at most within(), on the distance of any point of the triangle to the reference; kUnproved where
+  /// An upper bound, at most limit(), on the distance of any point of the triangle to the reference; kUnproved where
   /// no proof was found. `bounds`: upper bounds on the corners' distances (from witnesses, never field values);
-  /// infinity where none is known. `near`: triangles of the reference that may be near all of it, tried first.
+  /// infinity where none is known. `hints`: triangles of the reference that may be near all of it, tried first.
   double bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-               const glm::uvec3& near = glm::uvec3(Hierarchy::kNone)) const;
+               const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone)) const;
 
-  /// The same, but one that leaves some of within() where there is such a one: what a triangle has left, those that
+  /// The same, but one that leaves some of limit() where there is such a one: what a triangle has left, those that
   /// take its place may use. Up to twice the cost where there is none.
   double bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
 
   /// The same where the order of the corners makes no difference, by a longer search. What has a bound here has the
   /// verdict inside.
   double bound_in_any_order(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                            const glm::uvec3& near = glm::uvec3(Hierarchy::kNone)) const;
+                            const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone)) const;
 
   /// Whether there is a proof, in any order of the corners, and if not, whether a point outside proves that there is
   /// none. The reference has the size of a frame, see witness_error().
   Verdict verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                  const glm::uvec3& near = glm::uvec3(Hierarchy::kNone)) const;
+                  const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone)) const;
 
-  struct Near {
+  struct PointBound {
     double distance = kUnproved;                ///< upper bound
     std::uint32_t triangle = Hierarchy::kNone;  ///< of the reference, that it is to
   };
-  /// The grid's guess where that leaves some of within(), or else the nearest triangle within the radius, if any. A
+  /// The grid's guess where it is well below limit(), or else the nearest triangle within the radius, if any. A
   /// proof of faces around p needs no more, and what starts from this does not depend on how p came to be there.
-  Near nearest(const glm::dvec3& p, double radius) const;
+  PointBound nearest(const glm::dvec3& p, double radius) const;
   /// Whether nearest() takes a guess of this distance.
   bool leaves_room(double distance) const;
 
   /// An upper bound on the distance of p to the reference, from the grid's guess, or from a search where the grid has
-  /// none; infinity when p is not within().
+  /// none; infinity when that exceeds limit().
   double distance_bound(const glm::dvec3& p) const;
 
-  /// Whether one of at most 42 points of the triangle is not within(): a hundredth of what a proof for a large triangle
-  /// takes, and finds most of those that have none.
+  /// Whether one of at most 42 points of the triangle is farther than limit(): a hundredth of what a proof for a large
+  /// triangle takes, and finds most of those that have none.
   bool shows_outside(const glm::dvec3 (&corners)[3]) const;
 
-  /// A point of the reference near p, where that is far seldom not the nearest: of the triangles that the
-  /// nodes around p name.
-  std::optional<glm::dvec3> near(const glm::dvec3& p) const;
+  /// The point of the reference that is nearest to p among the triangles that the grid's nodes around p name. Where the
+  /// reference is far from p, it may have a nearer point; that is rare.
+  std::optional<glm::dvec3> nearby_point(const glm::dvec3& p) const;
 
-  double within() const { return within_; }
+  double limit() const { return limit_; }
   /// The same with `share`, 0 to 1, of the provable distance.
   TriangleCertificate narrowed(double share) const {
-    return {*reference_, *grid_, *hierarchy_, share * within_, beyond_};
+    return {*reference_, *grid_, *hierarchy_, share * limit_, beyond_};
   }
 
  private:
@@ -102,14 +102,14 @@ class TriangleCertificate {
 
   double bound_by_corners(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
   template <Search kSearch>
-  double bound_by(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& near) const;
+  double bound_by(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& hints) const;
   template <Search kSearch>
-  Verdict search(const glm::dvec3 (&corners)[3], const glm::uvec3& near, double& farthest) const;
+  Verdict search(const glm::dvec3 (&corners)[3], const glm::uvec3& hints, double& farthest) const;
 
   const std::vector<WitnessTriangle>* reference_;
   const DistanceGrid* grid_;
   const Hierarchy* hierarchy_;
-  double within_, within2_, beyond_;
+  double limit_, limit2_, beyond_;
 };
 
 }  // namespace tolvol

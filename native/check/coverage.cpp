@@ -43,10 +43,10 @@ TriangleMesh mesh_of(std::span<const Coverage::Element> elements) {
 
 }  // namespace
 
-Coverage::Coverage(const TriangleMesh& reference, double within, std::size_t element_count)
+Coverage::Coverage(const TriangleMesh& reference, double limit, std::size_t element_count)
     : reference_(&reference),
-      within_(within),
-      within2_(within * within),
+      limit_(limit),
+      limit2_(limit * limit),
       lists_(element_count),
       split_into_(reference.triangles.size()) {}
 
@@ -55,10 +55,12 @@ Part Coverage::whole(std::uint32_t triangle) const {
   return {{reference_->vertices[t.x], reference_->vertices[t.y], reference_->vertices[t.z]}, 0, triangle};
 }
 
-void Coverage::own(std::uint32_t element, std::uint32_t triangle) { lists_[element].pieces.push_back(whole(triangle)); }
+void Coverage::set_witness(std::uint32_t element, std::uint32_t triangle) {
+  lists_[element].pieces.push_back(whole(triangle));
+}
 
-bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids,
-                      double provable, std::vector<std::uint32_t>& nearest) {
+bool Coverage::find_witnesses(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids,
+                              double provable, std::vector<std::uint32_t>& nearest) {
   bool all = true;
   std::vector<Part> stack{whole(triangle)};
   std::size_t looked = 0;
@@ -85,7 +87,7 @@ bool Coverage::assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::s
         std::sqrt(std::max({glm::dot(c[0] - centre, c[0] - centre), glm::dot(c[1] - centre, c[1] - centre),
                             glm::dot(c[2] - centre, c[2] - centre)}));
     const bool finest =
-        longest_squared(piece) <= kFloor * kFloor * within2_ || piece.cuts == kMostCuts || ++looked > kBudget;
+        longest_squared(piece) <= kFloor * kFloor * limit2_ || piece.cuts == kMostCuts || ++looked > kBudget;
     if (closest.distance > provable + radius || finest) {
       nearest.push_back(closest.triangle);
       all = false;
@@ -121,7 +123,7 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
       witness_distances(trial.candidates_[i].witness, points, d2);
       if (d2[3] < centre2) centre2 = d2[3], below = i;
       // Written so that NaN is not covered.
-      if (d2[0] <= within2_ && d2[1] <= within2_ && d2[2] <= within2_) {
+      if (d2[0] <= limit2_ && d2[1] <= limit2_ && d2[2] <= limit2_) {
         trial.candidates_[i].distance =
             std::max(trial.candidates_[i].distance, std::sqrt(std::max({d2[0], d2[1], d2[2]})));
         trial.moved_.push_back({piece, i});
@@ -136,7 +138,7 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
     bool covered = false;
     if (trial.hierarchy_) {
       const glm::dvec3 centre(points.x[3], points.y[3], points.z[3]);
-      const Hierarchy::Nearest nearest = trial.hierarchy_->nearest(centre, within_, below);
+      const Hierarchy::Nearest nearest = trial.hierarchy_->nearest(centre, limit_, below);
       covered = nearest.triangle != Hierarchy::kNone && covered_by(nearest.triangle);
     } else {
       for (std::uint32_t i = 0; i < trial.candidates_.size() && !covered; ++i) {
@@ -144,18 +146,17 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
       }
     }
     if (covered) continue;
-    if (!(centre2 <= within2_) || longest_squared(piece) <= kFloor * kFloor * within2_ || piece.cuts == kMostCuts) {
+    if (!(centre2 <= limit2_) || longest_squared(piece) <= kFloor * kFloor * limit2_ || piece.cuts == kMostCuts) {
       return false;
     }
-    if (!cut(piece, trial.candidates_[below].witness, kWorthCutting * within_, trial.stack_))
-      split(piece, trial.stack_);
+    if (!cut(piece, trial.candidates_[below].witness, kWorthCutting * limit_, trial.stack_)) split(piece, trial.stack_);
   }
   return true;
 }
 
 bool Coverage::try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial) const {
   trial.candidates_.clear();
-  trial.heirlooms_.clear();
+  trial.removed_lists_.clear();
   trial.moved_.clear();
   trial.last_ = 0;
   trial.hierarchy_.reset();
@@ -164,18 +165,18 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   for (const Element& e : elements) {
     const List& list = lists_[e.id];
     const double distance = list.pieces.empty() ? 0 : list.distance + e.moved;
-    const bool keeps = distance <= within_;
+    const bool keeps = distance <= limit_;
     settled &= keeps;
     trial.candidates_.push_back({e.id, {}, keeps ? distance : 0, !keeps});
   }
   for (const Removed& r : removed) {
     const List& list = lists_[r.id];
     const double distance = list.distance + r.moved;
-    const bool whole = list.pieces.empty() || distance <= within_;
+    const bool whole = list.pieces.empty() || distance <= limit_;
     settled &= whole;
     if (whole && !list.pieces.empty())
-      trial.candidates_[r.heir].distance = std::max(trial.candidates_[r.heir].distance, distance);
-    trial.heirlooms_.push_back({r.id, r.heir, whole});
+      trial.candidates_[r.successor].distance = std::max(trial.candidates_[r.successor].distance, distance);
+    trial.removed_lists_.push_back({r.id, r.successor, whole});
   }
   if (settled) return true;
   for (std::size_t i = 0; i < elements.size(); ++i) {
@@ -214,15 +215,15 @@ bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) con
     });
   };
   // What loses its element is the likeliest to fail.
-  for (const Trial::Heirloom& h : trial.heirlooms_) {
-    if (!h.whole && !place_list(lists_[h.id].pieces, h.heir)) return false;
+  for (const Trial::RemovedList& h : trial.removed_lists_) {
+    if (!h.whole && !place_list(lists_[h.id].pieces, h.successor)) return false;
   }
   const auto count = static_cast<std::uint32_t>(trial.candidates_.size());
   for (std::uint32_t k = 0; k < count; ++k) {
-    const std::uint32_t i = (trial.suspect_ + k) % count;
+    const std::uint32_t i = (trial.failed_last_ + k) % count;
     if (!trial.candidates_[i].replaced) continue;
     if (!place_list(lists_[trial.candidates_[i].id].pieces, i)) {
-      trial.suspect_ = i;
+      trial.failed_last_ = i;
       return false;
     }
   }
@@ -241,10 +242,10 @@ void Coverage::commit(const Trial& trial) {
     if (c.replaced) lists_[c.id].pieces.clear();
     lists_[c.id].distance = c.distance;
   }
-  for (const Trial::Heirloom& h : trial.heirlooms_) {
+  for (const Trial::RemovedList& h : trial.removed_lists_) {
     // Not clear(): the element is gone, and so goes its memory.
     const std::vector<Part> pieces = std::exchange(lists_[h.id].pieces, {});
-    std::vector<Part>& to = lists_[trial.candidates_[h.heir].id].pieces;
+    std::vector<Part>& to = lists_[trial.candidates_[h.successor].id].pieces;
     if (h.whole) to.insert(to.end(), pieces.begin(), pieces.end());
   }
   for (const Moved& m : trial.moved_) lists_[trial.candidates_[m.element].id].pieces.push_back(m.piece);

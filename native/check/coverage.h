@@ -33,25 +33,25 @@ class Coverage {
     glm::dvec3 corners[3];
     double moved;
   };
-  /// An element that the change removes: its points end up in the element at place `heir`, having moved by at most
+  /// An element that the change removes: its points end up in the element at place `successor`, having moved by at most
   /// `moved`.
   struct Removed {
     std::uint32_t id;
-    std::uint32_t heir;
+    std::uint32_t successor;
     double moved;
   };
 
-  /// `within`: the provable distance. Keeps a reference to `reference`.
-  Coverage(const TriangleMesh& reference, double within, std::size_t element_count);
+  /// `limit`: the provable distance. Keeps a reference to `reference`.
+  Coverage(const TriangleMesh& reference, double limit, std::size_t element_count);
 
   /// A triangle of the reference that is the element itself.
-  void own(std::uint32_t element, std::uint32_t triangle);
+  void set_witness(std::uint32_t element, std::uint32_t triangle);
 
   /// Finds witnesses for a triangle of the reference among the triangles of a hierarchy; `ids[i]` is the element that
   /// triangle i there is, kNone for one that never changes. Pieces farther than `provable` from all of them count no
   /// further; the nearest triangles are added to `nearest`. Returns whether all of it is covered.
-  bool assign(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids, double provable,
-              std::vector<std::uint32_t>& nearest);
+  bool find_witnesses(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids,
+                      double provable, std::vector<std::uint32_t>& nearest);
 
   /// Points that stand for the pieces of an element, every `stride`-th of them.
   struct Sample {
@@ -82,7 +82,7 @@ class Coverage {
   bool place(const Part& whole, std::uint32_t first, Trial& trial) const;
 
   const TriangleMesh* reference_;
-  double within_, within2_;
+  double limit_, limit2_;
   std::vector<List> lists_;
   /// Per triangle of the reference: the pieces that it was split into, none while it is whole. A count changes while
   /// others read it, yet never looks as if a piece that is elsewhere did not exist.
@@ -93,7 +93,7 @@ class Coverage {
 class Coverage::Trial {
  public:
   /// Starts a series of tries around one place: what they find depends on nothing before.
-  void begin() { suspect_ = 0, looked_at_ = 0; }
+  void begin() { failed_last_ = 0, looked_at_ = 0; }
   /// Parts of pieces that the series has looked at.
   std::size_t looked_at() const { return looked_at_; }
 
@@ -105,14 +105,14 @@ class Coverage::Trial {
     double distance;
     bool replaced;  ///< its own pieces were looked at one by one
   };
-  struct Heirloom {
-    std::uint32_t id, heir;
+  struct RemovedList {
+    std::uint32_t id, successor;
     bool whole;  ///< passed on as it is
   };
   /// Calls call(piece) for all pieces that the change places anew.
   template <class Call>
   void for_each_replaced(const std::vector<List>& lists, Call&& call) const {
-    for (const Heirloom& h : heirlooms_) {
+    for (const RemovedList& h : removed_lists_) {
       if (!h.whole) std::for_each(lists[h.id].pieces.begin(), lists[h.id].pieces.end(), call);
     }
     for (const Candidate& c : candidates_) {
@@ -121,14 +121,14 @@ class Coverage::Trial {
   }
 
   std::vector<Candidate> candidates_;
-  std::vector<Heirloom> heirlooms_;
+  std::vector<RemovedList> removed_lists_;
   std::vector<Moved> moved_;
   std::vector<Part> stack_;
   std::optional<Hierarchy> hierarchy_;  ///< of the candidates, where there are too many to look at each
   std::size_t budget_ = 0;              ///< pieces that this change may still add
   std::size_t looked_at_ = 0;
-  std::uint32_t last_ = 0;     ///< the candidate that took the last piece
-  std::uint32_t suspect_ = 0;  ///< the one whose pieces failed last: tried first, to be refused soon
+  std::uint32_t last_ = 0;         ///< the candidate that took the last piece
+  std::uint32_t failed_last_ = 0;  ///< the one whose pieces failed last: tried first, to be refused soon
 };
 
 }  // namespace tolvol

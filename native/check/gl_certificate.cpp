@@ -29,9 +29,9 @@ constexpr double kShortest = 1.0 / 16;      // of the tolerance: a part this sho
 constexpr GLuint kGroup = 64;               // local_size_x of certificate.comp
 constexpr float kFar = 16;                  // a coordinate far from any reference, whose are below 1, and tolerance
 
-/// A squared distance in floating point, at most this, is of a distance of at most `within`: the two sums, the squares
+/// A squared distance in floating point, at most this, is of a distance of at most `limit`: the two sums, the squares
 /// and this number's own rounding each change it by a factor of at most 1 + 2^-23, and there is room for twice as many.
-float threshold(double within) { return static_cast<float>(within * within * (1 - 0x1p-20)); }
+float threshold(double limit) { return static_cast<float>(limit * limit * (1 - 0x1p-20)); }
 
 struct CertificateProgram : gl::Program {
   CertificateProgram() : Program({{GL_COMPUTE_SHADER, {"witness.glsl", "split.glsl", "certificate.comp"}}}) {}
@@ -101,9 +101,9 @@ std::vector<Verdict> GlCertificate::check(const Pieces& pieces, const Options& o
   require_valid(pieces);
   std::vector<Verdict> verdicts(pieces.size(), Verdict::unproved);
   const double tolerance = volume_->frame_tolerance(), magnitude = 1 + 2 * tolerance;
-  const double within = volume_->provable(pieces.mapping_error) - float_error(magnitude);
+  const double limit = volume_->provable(pieces.mapping_error) - float_error(magnitude);
   if (options.progress) options.progress->begin("checking");
-  if (!(within > 0.5 * tolerance) || pieces.size() == 0) return verdicts;
+  if (!(limit > 0.5 * tolerance) || pieces.size() == 0) return verdicts;
 
   const std::size_t per_piece = triangles_of(pieces.corners).size(), per_batch = kBatch / per_piece,
                     most = std::min(pieces.size(), per_batch) * per_piece;
@@ -124,8 +124,8 @@ std::vector<Verdict> GlCertificate::check(const Pieces& pieces, const Options& o
     program.set("spacing", static_cast<float>(grid.spacing));
     program.set("nodes", grid.nodes);
     program.set("pitch", grid.pitch);
-    program.set("within2", threshold(within));
-    program.set("shortest", static_cast<float>(kShortest * within));
+    program.set("limit2", threshold(limit));
+    program.set("shortest", static_cast<float>(kShortest * limit));
     program.set("tries", tries);
     program.set("budget", budget);
     const gl::Buffer* const bindings[] = {&corners, &open_candidates, &results, &nodes_, &a_, &ab_, &ac_};

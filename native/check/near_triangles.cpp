@@ -74,7 +74,7 @@ bool NearTriangles::gather(Part& part, const glm::dvec3& centre) {
   const std::size_t begin = pool_.size();
   if (!(2 * reach <= too_far_) || begin >= kMostKept) return false;
   best2_ = second2_ = kNothing, best_ = Hierarchy::kNone;
-  hierarchy_->near(centre, reach, [&](std::uint32_t triangle) {
+  hierarchy_->for_each_within(centre, reach, [&](std::uint32_t triangle) {
     look_at(triangle, centre, reach2);
     return pool_.size() - begin <= kLongest;
   });

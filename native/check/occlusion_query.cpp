@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Based on [Botsch04, §4] and deviates from it where that is not conservative. The paper's triangle of edge n leaves
-// out the candidate's corners, and a small one draws no pixel at all: here the pixels are a lattice that includes them.
+// out the candidate's corners, and a small one draws no pixel at all: here the pixels are samples that include them.
 // The paper counts pixels outside, so that one that is missing is good: here the good ones are counted. The paper
 // interpolates in hardware, signed, in 8 bits: here in the shader, unsigned, in float32. Candidates larger than a cell
 // of the framebuffer are cut, because what a framebuffer cuts off nobody misses.
 //
-// Why a candidate is inside when D(x) <= eps' at every lattice point x, D the interpolated distance. Let d be the
-// distance to the reference; it changes by no more than the way. A point p of the candidate is in one of the lattice's
-// triangles, no edge of which is longer than h, hence within h / sqrt(3) of a lattice point x. D(x) is a mean of values
-// of at least d(v_i) >= d(x) - |x - v_i| at the eight nodes v_i around x, with weights of which x is the mean of the
-// nodes; the mean of |x - v_i| is at most the root of the mean of its square, sum over the axes of h^2 t (1 - t) <=
-// (3/4) h^2. So d(p) <= D(x) + (sqrt(3)/2) h + h / sqrt(3). By way of the nearest node v alone it is d(p) <= d(v) +
-// |x - v| + h / sqrt(3); that is tried first.
+// Why a candidate is inside when D(x) <= eps' at every sample x, D the interpolated distance. Let d be the
+// distance to the reference; it changes by no more than the way. A point p of the candidate is in one of the
+// triangles between the samples, no edge of which is longer than h, hence within h / sqrt(3) of a sample x. D(x) is a
+// mean of values of at least d(v_i) >= d(x) - |x - v_i| at the eight nodes v_i around x, with weights of which x is the
+// mean of the nodes; the mean of |x - v_i| is at most the root of the mean of its square, sum over the axes of h^2 t (1
+// - t) <= (3/4) h^2. So d(p) <= D(x) + (sqrt(3)/2) h + h / sqrt(3). By way of the nearest node v alone it is d(p) <=
+// d(v) + |x - v| + h / sqrt(3); that is tried first.
 #include "check/occlusion_query.h"
 
 #include <algorithm>
@@ -27,7 +27,7 @@
 namespace tolvol {
 namespace {
 
-constexpr float kMargin = 1.5f;      // half way between the last lattice point and the next pixel
+constexpr float kMargin = 1.5f;      // half way between the last sample and the next pixel
 constexpr double kLargestPart = 62;  // subdivisions: with the margin it fits a cell of 64 pixels
 
 constexpr double kInterpolationLoss = 0.8660254037844387;  // spacings that interpolation may lose
@@ -62,7 +62,7 @@ std::vector<float> upper_bounds(const ToleranceVolume& volume) {
 
 }  // namespace
 
-OcclusionQuery::OcclusionQuery(const ToleranceVolume& volume) : LatticeCheck(volume, kMargin) {
+OcclusionQuery::OcclusionQuery(const ToleranceVolume& volume) : SampledCheck(volume, kMargin) {
   bound(0);  // throws before any work when the grid is too coarse
   const std::vector<float> bounds = upper_bounds(volume);
   gl::run([&] {
@@ -96,7 +96,8 @@ float OcclusionQuery::bound(double mapping_error) const {
   return rounded_down(bound);
 }
 
-bool OcclusionQuery::add_parts(const Corners& corners, std::uint32_t slot, std::vector<Part>& parts) const {
+bool OcclusionQuery::add_triangle_samples(const Corners& corners, std::uint32_t counter,
+                                          std::vector<SampledTriangle>& triangles) const {
   // A cell away from the grid's border no rounding leads out of it; and there nothing is within the tolerance.
   const glm::dvec3 last = glm::dvec3(volume().grid().nodes) - 2.0;
   for (const glm::dvec3& p : corners) {
@@ -115,9 +116,9 @@ bool OcclusionQuery::add_parts(const Corners& corners, std::uint32_t slot, std::
   for (int i = 0; i < count; ++i) {
     for (int j = 0; i + j < count; ++j) {
       const glm::dvec3 corner = corners[0] + static_cast<double>(i) * step1 + static_cast<double>(j) * step2;
-      parts.push_back({corner, n, edge1, slot, edge2, 0});
+      triangles.push_back({corner, n, edge1, counter, edge2, 0});
       // Between this one and the next on the diagonal lies one that points the other way.
-      if (i + j + 1 < count) parts.push_back({corner + step1 + step2, n, -edge1, slot, -edge2, 0});
+      if (i + j + 1 < count) triangles.push_back({corner + step1 + step2, n, -edge1, counter, -edge2, 0});
     }
   }
   return true;
@@ -132,7 +133,7 @@ void OcclusionQuery::use(const gl::Program& program, float bound) const {
   program.set("spacing2", std::nextafter(static_cast<float>(h * h), 1.0f));
 }
 
-const LatticeCheck::Programs& OcclusionQuery::programs() const {
+const SampledCheck::Programs& OcclusionQuery::programs() const {
   struct Own : Programs {
     Own() : Programs("occlusion_query.frag") {}
   };

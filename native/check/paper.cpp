@@ -19,7 +19,7 @@ constexpr float kCorner = 16;
 
 }  // namespace
 
-Paper::Paper(const ToleranceVolume& volume, Margin margin) : LatticeCheck(volume, 0), margin_(margin) {
+Paper::Paper(const ToleranceVolume& volume, Margin margin) : SampledCheck(volume, 0), margin_(margin) {
   bound(0);  // throws before any work when the grid is too coarse
   const std::vector<float> distances = volume.signed_distance();
   gl::run([&] {
@@ -46,7 +46,8 @@ float Paper::bound(double) const {
   return static_cast<float>(bound);
 }
 
-bool Paper::add_parts(const Corners& corners, std::uint32_t slot, std::vector<Part>& parts) const {
+bool Paper::add_triangle_samples(const Corners& corners, std::uint32_t counter,
+                                 std::vector<SampledTriangle>& triangles) const {
   const glm::dvec3 along = corners[1] - corners[0], across = corners[2] - corners[0];
   const glm::dvec3 third = across - along;
   const double longest =
@@ -62,11 +63,12 @@ bool Paper::add_parts(const Corners& corners, std::uint32_t slot, std::vector<Pa
       const glm::dvec3& p = corners[k];
       const glm::dvec3 beyond = glm::max(-p, p - last);
       if (std::max({beyond.x, beyond.y, beyond.z}) <= kCorner + 1) continue;
-      parts.push_back({p, kCorner, (corners[(k + 1) % 3] - p) / steps, slot, (corners[(k + 2) % 3] - p) / steps, 0});
+      triangles.push_back(
+          {p, kCorner, (corners[(k + 1) % 3] - p) / steps, counter, (corners[(k + 2) % 3] - p) / steps, 0});
       return true;
     }
   }
-  parts.push_back({corners[0], static_cast<float>(l), along / steps, slot, across / steps, 0});
+  triangles.push_back({corners[0], static_cast<float>(l), along / steps, counter, across / steps, 0});
   return true;
 }
 
@@ -79,7 +81,7 @@ void Paper::use(const gl::Program& program, float bound) const {
   program.set("offset", texture_->offset());
 }
 
-const LatticeCheck::Programs& Paper::programs() const {
+const SampledCheck::Programs& Paper::programs() const {
   struct Own : Programs {
     Own() : Programs("paper.frag") {}
   };

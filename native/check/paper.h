@@ -10,12 +10,12 @@
 
 #include <optional>
 
-#include "check/lattice_check.h"
+#include "check/sampled_check.h"
 #include "field/distance_texture.h"
 
 namespace tolvol {
 
-class Paper final : public LatticeCheck {
+class Paper final : public SampledCheck {
  public:
   /// What the interpolation may under-estimate, taken off the tolerance: (sqrt(3)/2) h, or the h/2 that "turned out to
   /// be sufficient".
@@ -29,7 +29,8 @@ class Paper final : public LatticeCheck {
 
  private:
   float bound(double mapping_error) const override;
-  bool add_parts(const Corners& corners, std::uint32_t slot, std::vector<Part>& parts) const override;
+  bool add_triangle_samples(const Corners& corners, std::uint32_t counter,
+                            std::vector<SampledTriangle>& triangles) const override;
   void use(const gl::Program& program, float bound) const override;
   const Programs& programs() const override;
   Verdict verdict(std::uint64_t counted, std::uint64_t points) const override;

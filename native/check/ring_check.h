@@ -15,7 +15,7 @@ class RingCheck {
   virtual ~RingCheck() = default;
 
   /// Once, before the first question: the mesh that is decimated, in the volume's frame. Its triangles are the elements
-  /// of the questions. `mapping_error`: Placement::mapping_error() of all that the questions may be about.
+  /// of the questions. `mapping_error`: StoredSpace::mapping_error() of all that the questions may be about.
   virtual void begin(const TriangleMesh& mesh, double mapping_error) = 0;
   /// Whether the collapse that would leave `faces` (those with moved > 0 change) of the ring, and remove `removed`, may
   /// be carried out.

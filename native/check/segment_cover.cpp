@@ -17,20 +17,20 @@ constexpr int kHalvings = 60;  // of an interval: its end is known as well as do
 }  // namespace
 
 bool covers_segment(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, const glm::dvec3& a,
-                    const glm::dvec3& b, double within) {
-  const double limit = within + kCoverShare * witness_error(1 + 2 * within), limit2 = limit * limit;
+                    const glm::dvec3& b, double limit) {
+  const double reach = limit + kCoverShare * witness_error(1 + 2 * limit), reach2 = reach * reach;
   // From the nearer end, which errs less and is exact at both.
   const auto at = [&](double t) { return t <= 0.5 ? a + t * (b - a) : b + (1 - t) * (a - b); };
   const auto covered = [&](const WitnessTriangle& triangle, double t) {
     return closest_point(at(t), triangle.a, triangle.a + triangle.ab, triangle.a + triangle.ac).distance_squared <=
-           limit2;
+           reach2;
   };
   double begin = 0;
   for (std::size_t interval = 0; interval < kMostIntervals; ++interval) {
     if (interval % 64 == 0) poll();
     double end = -1;
     // The search compares distances by themselves: a little more, so that it passes over no triangle that counts.
-    hierarchy.near(at(begin), limit * (1 + 1e-12), [&](std::uint32_t i) {
+    hierarchy.for_each_within(at(begin), reach * (1 + 1e-12), [&](std::uint32_t i) {
       const WitnessTriangle& triangle = triangles[i];
       if ((end >= 0 && !covered(triangle, end)) || !covered(triangle, begin)) return true;
       if (covered(triangle, 1)) {

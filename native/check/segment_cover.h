@@ -19,13 +19,13 @@ namespace tolvol {
 /// rest of the 192 u is for the error of the distances looked at here.
 inline constexpr double kCoverShare = 0.75;
 
-/// Whether every point of the segment from a to b is within the tolerance of one of the triangles, `within` being the
+/// Whether every point of the segment from a to b is within the tolerance of one of the triangles, `limit` being the
 /// provable distance (ToleranceVolume::provable). True wherever parts of any larger piece of the frame prove it, as
 /// long as these were at most 2^20. `hierarchy`: of the triangles. The distance to a triangle is convex along the
 /// segment, so each covers one interval; of those that cover a point, the one that reaches farthest is followed to its
 /// end, and so on. No more intervals than those of any other cover; each costs about 0.1 us for each triangle near its
 /// beginning.
 bool covers_segment(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, const glm::dvec3& a,
-                    const glm::dvec3& b, double within);
+                    const glm::dvec3& b, double limit);
 
 }  // namespace tolvol

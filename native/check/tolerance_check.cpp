@@ -27,10 +27,10 @@ std::span<const PieceTriangle> triangles_of(int corners) {
   return kTriangles[corners - 1];
 }
 
-PlacedPoints::PlacedPoints(std::span<const glm::dvec3> stored, const Placement& placement,
+PlacedPoints::PlacedPoints(std::span<const glm::dvec3> stored, const StoredSpace& space,
                            const ToleranceVolume& volume) {
   const Frame& frame = volume.frame();
-  const Placement world = placement.in(Frame()), placed = placement.in(frame);
+  const StoredSpace world = space.in(Frame()), placed = space.in(frame);
   const glm::dvec3 centre = frame.to_world(glm::dvec3(0));
   points.reserve(stored.size());
   std::vector<glm::dvec3> near;

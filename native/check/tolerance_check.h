@@ -26,7 +26,7 @@ struct Pieces {
   std::span<const glm::dvec3> points;
   std::span<const std::uint32_t> indices;  ///< `corners` a piece
   int corners = 3;                         ///< 1 point, 2 segment, 3 triangle, 4 quad in both of its triangulations
-  double mapping_error = 0;                ///< Placement::mapping_error() of the points
+  double mapping_error = 0;                ///< StoredSpace::mapping_error() of the points
 
   std::size_t size() const { return indices.size() / static_cast<std::size_t>(corners); }
 };
@@ -43,7 +43,7 @@ struct PlacedPoints {
   /// Throws InvalidInput, naming the first offender, for a point that is not finite, and for one of which double
   /// precision cannot tell under its matrix where it is. Points that are certainly farther away than any tolerance are
   /// drawn near to where they are still outside, so that what mapping costs them is not charged to the others.
-  PlacedPoints(std::span<const glm::dvec3> stored, const Placement& placement, const ToleranceVolume& volume);
+  PlacedPoints(std::span<const glm::dvec3> stored, const StoredSpace& space, const ToleranceVolume& volume);
 
   std::vector<glm::dvec3> points;
   double mapping_error;  ///< of all but those

@@ -36,24 +36,24 @@ auto in_the_world(const TriangleMesh& reference, bool mirrored, Use&& use) {
 }  // namespace
 
 ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
-                                 const Placement& placement, double tolerance, const Options& options)
-    : tolerance_(tolerance), field_(options.field), mirrored_(placement.mirrors()) {
+                                 const StoredSpace& space, double tolerance, const Options& options)
+    : tolerance_(tolerance), field_(options.field), mirrored_(space.mirrors()) {
   const Call call(options.progress);
   validate(vertices, triangles);
-  size_ = reference_size(vertices, triangles, placement.to_world());
+  diagonal_ = longest_diagonal(vertices, triangles, space.to_world());
   if (!(tolerance > 0) || !std::isfinite(tolerance)) {
     throw InvalidInput("the tolerance must be a positive length");
   }
-  if (tolerance > size_) {
+  if (tolerance > diagonal_) {
     std::ostringstream text;
-    text << "the tolerance " << tolerance << " is larger than the reference, whose size is " << size_;
+    text << "the tolerance " << tolerance << " is larger than the reference, whose size is " << diagonal_;
     throw InvalidInput(text.str());
   }
   const std::vector<glm::dvec3> used = used_only(vertices, triangles);
   Box world;
-  for (const glm::dvec3& p : used) world.add(placement.world(p));
+  for (const glm::dvec3& p : used) world.add(space.world(p));
   frame_ = Frame(world);
-  const Placement placed = placement.in(frame_);
+  const StoredSpace placed = space.in(frame_);
   mapping_error_ = placed.mapping_error(used);
   provable(0);  // throws before any work when the tolerance cannot be held
   reference_.vertices = placed.frame(vertices);

@@ -35,11 +35,11 @@ class ToleranceVolume {
   /// `tolerance` in world units. Throws InvalidInput for a bad mesh or for a tolerance that is not finite and positive,
   /// that is larger than the reference, or that double precision cannot hold at this distance from the origin;
   /// ResourceLimit for a precision whose grid does not fit. O(m log m + nodes in the band).
-  ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
-                  const Placement& placement, double tolerance, const Options& options);
-  ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
-                  const Placement& placement, double tolerance)
-      : ToleranceVolume(vertices, triangles, placement, tolerance, Options()) {}
+  ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
+                  double tolerance, const Options& options);
+  ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
+                  double tolerance)
+      : ToleranceVolume(vertices, triangles, space, tolerance, Options()) {}
 
   ToleranceVolume(const ToleranceVolume&) = delete;
   ToleranceVolume& operator=(const ToleranceVolume&) = delete;
@@ -55,7 +55,7 @@ class ToleranceVolume {
 
   double tolerance() const { return tolerance_; }  ///< world units
   double frame_tolerance() const { return tolerance_ * frame_.scale(); }
-  double size() const { return size_; }  ///< world units; what 100 % means
+  double diagonal() const { return diagonal_; }  ///< longest_diagonal() of the reference: world units, what 100 % means
   Field field() const { return field_; }
   double precision() const { return frame_tolerance() / grid_.spacing; }
   std::size_t memory() const;  ///< bytes held
@@ -74,7 +74,7 @@ class ToleranceVolume {
   std::optional<Hierarchy> hierarchy_;
   DistanceGrid grid_;
   double tolerance_;
-  double size_;
+  double diagonal_;
   double mapping_error_;
   Field field_;
   bool mirrored_;

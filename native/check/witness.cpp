@@ -60,7 +60,7 @@ TOLVOL_INLINE void distances(const WitnessTriangle& t, const FourPoints& p, doub
   __builtin_memcpy(out, &best, sizeof best);
 }
 
-void distances_baseline(const WitnessTriangle& t, const FourPoints& p, double out[4]) { distances(t, p, out); }
+void distances_portable(const WitnessTriangle& t, const FourPoints& p, double out[4]) { distances(t, p, out); }
 TOLVOL_TARGET_AVX2 void distances_avx2(const WitnessTriangle& t, const FourPoints& p, double out[4]) {
   distances(t, p, out);
 }
@@ -93,7 +93,7 @@ void witness_distances(const WitnessTriangle& triangle, const FourPoints& points
   if (simd_path().load(std::memory_order_relaxed) == Simd::avx2) {
     distances_avx2(triangle, points, out);
   } else {
-    distances_baseline(triangle, points, out);
+    distances_portable(triangle, points, out);
   }
 }
 

@@ -8,7 +8,7 @@
 namespace tolvol {
 
 BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh,
-                               std::span<const glm::dvec3> positions, bool mesh_is_reference, double within,
+                               std::span<const glm::dvec3> positions, bool mesh_is_reference, double limit,
                                double provable, Team& team) {
   if (mesh.boundary.empty()) return;
   if (mesh_is_reference) {
@@ -30,8 +30,8 @@ BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mes
   }
   witnesses_ = prepare_witnesses(reference_);
   hierarchy_.emplace(reference_);
-  forward_.emplace(witnesses_, no_grid_, *hierarchy_, within, within);
-  backward_.emplace(reference_, within, positions.size());
+  forward_.emplace(witnesses_, no_grid_, *hierarchy_, limit, limit);
+  backward_.emplace(reference_, limit, positions.size());
 
   const TriangleCertificate start(witnesses_, no_grid_, *hierarchy_, provable, provable);
   const glm::dvec3 unknown(std::numeric_limits<double>::infinity());
@@ -48,11 +48,11 @@ BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mes
       uncertified_.push_back(b);
     }
   }
-  const Hierarchy near(elements);
+  const Hierarchy of_mesh(elements);
   std::vector<std::uint32_t> nearest;
   for (std::uint32_t i = 0; i < reference_.triangles.size(); ++i) {
     poll_at(i);
-    backward_->assign(i, near, ids, provable, nearest);
+    backward_->find_witnesses(i, of_mesh, ids, provable, nearest);
   }
   for (const std::uint32_t t : nearest) {
     uncertified_.push_back(elements.triangles[t].x);

@@ -16,9 +16,9 @@ namespace tolvol {
 
 class BoundaryBounds {
  public:
-  /// `within`: what collapses must keep; `provable`: what counts as near at the start.
+  /// `limit`: what collapses must keep; `provable`: what counts as near at the start.
   BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh, std::span<const glm::dvec3> positions,
-                 bool mesh_is_reference, double within, double provable, Team& team);
+                 bool mesh_is_reference, double limit, double provable, Team& team);
   BoundaryBounds(const BoundaryBounds&) = delete;
   BoundaryBounds& operator=(const BoundaryBounds&) = delete;
 

@@ -20,7 +20,7 @@ BoundedMesh::BoundedMesh(BoundedMeshInput input, const Bounds& bounds, Team& tea
       joined_(input.joined.begin(), input.joined.end()),
       slots_(std::move(input.slots)),
       wedges_(std::move(input.wedges)) {
-  for (const Spot& s : input.spots) positions_.push_back(s.position), stored_.push_back(s.stored);
+  for (const VertexPosition& s : input.positions) positions_.push_back(s.position), stored_.push_back(s.stored);
   build(input.on_reference, input.mates, team);
 }
 
@@ -40,7 +40,7 @@ void BoundedMesh::build(bool on_reference, std::span<const std::uint32_t> mates,
   }
   faces_around_ = std::vector<std::atomic<std::uint32_t>>(n);
   for (const glm::uvec3& t : triangles_) count_around(t, 1);
-  moved_.assign(n, false);
+  left_original_.assign(n, false);
   seam_.assign(n, false);
   merged_into_.resize(n);
   for (std::uint32_t i = 0; i < n; ++i) merged_into_[i] = i;
@@ -120,11 +120,11 @@ void BoundedMesh::keep_apart() {
   }
 }
 
-void BoundedMesh::place(std::uint32_t vertex, const Spot& spot) {
-  if (kept_apart_) occupied_.remove(stored_[vertex]), occupied_.add(spot.stored);
-  moved_[vertex] = moved_[vertex] || spot.position != positions_[vertex];
-  positions_[vertex] = spot.position;
-  stored_[vertex] = spot.stored;
+void BoundedMesh::place(std::uint32_t vertex, const VertexPosition& target) {
+  if (kept_apart_) occupied_.remove(stored_[vertex]), occupied_.add(target.stored);
+  left_original_[vertex] = left_original_[vertex] || target.position != positions_[vertex];
+  positions_[vertex] = target.position;
+  stored_[vertex] = target.stored;
 }
 
 /// The vertex that vanishes becomes one with the one that stays: its copies that do not vanish are that one's from now
@@ -138,7 +138,7 @@ void BoundedMesh::merge_copies(const Change& change) {
   }
   for (const std::uint32_t v : change.carried_) {
     slots_[v] = kept;
-    place(v, change.spot_);
+    place(v, change.position_);
     if (bounds_.forward) distance_[v] = change.new_distance_;
   }
   for (const std::uint32_t v : copies(change.vertex_)) joined_[v] = true;
@@ -181,7 +181,7 @@ void BoundedMesh::apply(Change& change) {
       collapse(mesh_, h);
     }
   }
-  place(v, change.spot_);
+  place(v, change.position_);
   if (bounds_.forward) distance_[v] = change.new_distance_;
 }
 

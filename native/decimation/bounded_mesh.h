@@ -32,15 +32,15 @@ struct Bounds {
 };
 
 /// A position as it is stored, and in the frame: always mapped from what is stored.
-struct Spot {
+struct VertexPosition {
   glm::dvec3 stored, position;
 };
 
 struct BoundedMeshInput {
-  std::vector<glm::uvec3> triangles;  ///< an oriented manifold with boundary
-  std::vector<std::uint32_t> mates;   ///< as those of a CutMesh
-  std::vector<Spot> spots;            ///< of the vertices
-  std::vector<bool> pinned;           ///< per vertex: neither moves nor vanishes, and an edge between two such stays
+  std::vector<glm::uvec3> triangles;      ///< an oriented manifold with boundary
+  std::vector<std::uint32_t> mates;       ///< as those of a CutMesh
+  std::vector<VertexPosition> positions;  ///< of the vertices
+  std::vector<bool> pinned;    ///< per vertex: neither moves nor vanishes, and an edge between two such stays
   std::vector<double> shares;  ///< per vertex: of the forward bound that new faces around it may use; may be empty
   std::vector<std::uint32_t> slots;  ///< per vertex: equal for copies, those that are one vertex of the result
   std::vector<bool> joined;          ///< per vertex: an edge of it lies on edges of other sheets; may be empty
@@ -49,7 +49,7 @@ struct BoundedMeshInput {
   bool on_reference = false;  ///< every triangle is one of the reference
   bool subset = false;        ///< every surviving vertex keeps its position
   /// Rounds a position in the frame to what can be stored.
-  std::function<Spot(const glm::dvec3&)> store;
+  std::function<VertexPosition(const glm::dvec3&)> store;
 };
 
 class BoundedMesh {
@@ -70,10 +70,10 @@ class BoundedMesh {
   const glm::uvec3& triangle(std::uint32_t triangle) const { return triangles_[triangle]; }
   const glm::dvec3& position(std::uint32_t vertex) const { return positions_[vertex]; }
   const glm::dvec3& stored(std::uint32_t vertex) const { return stored_[vertex]; }
-  Spot spot(std::uint32_t vertex) const { return {stored_[vertex], positions_[vertex]}; }
-  Spot store(const glm::dvec3& position) const { return store_(position); }
+  VertexPosition vertex_position(std::uint32_t vertex) const { return {stored_[vertex], positions_[vertex]}; }
+  VertexPosition store(const glm::dvec3& position) const { return store_(position); }
   /// Whether the vertex left its original position.
-  bool moved(std::uint32_t vertex) const { return moved_[vertex] != 0; }
+  bool left_original(std::uint32_t vertex) const { return left_original_[vertex] != 0; }
   /// Upper bounds on the distance to the reference, where there is a forward bound to keep: of a vertex, and of all
   /// points of a face (infinite where none is known).
   double distance(std::uint32_t vertex) const { return distance_[vertex]; }
@@ -121,9 +121,9 @@ class BoundedMesh {
   /// From now on no change puts a vertex where another is: for one thread that applies changes. O(n).
   void keep_apart();
   /// Whether a vertex other than the two would be put where another is.
-  bool meets_another(const Spot& spot, std::uint32_t vertex, std::uint32_t other) const {
-    return kept_apart_ && spot.stored != stored_[vertex] && spot.stored != stored_[other] &&
-           occupied_.contains(spot.stored);
+  bool meets_another(const VertexPosition& target, std::uint32_t vertex, std::uint32_t other) const {
+    return kept_apart_ && target.stored != stored_[vertex] && target.stored != stored_[other] &&
+           occupied_.contains(target.stored);
   }
 
   /// Carries out a change whose last try succeeded on this mesh as it is. What is to be proved later then is, by a
@@ -139,17 +139,17 @@ class BoundedMesh {
   void count_around(const glm::uvec3& triangle, std::int32_t change);
   bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
   void merge_copies(const Change& change);
-  void place(std::uint32_t vertex, const Spot& spot);
+  void place(std::uint32_t vertex, const VertexPosition& target);
 
   OpenMesh::TriConnectivity mesh_;
   Bounds bounds_;
   bool subset_;
-  std::function<Spot(const glm::dvec3&)> store_;
+  std::function<VertexPosition(const glm::dvec3&)> store_;
   std::vector<glm::uvec3> triangles_;
   std::vector<glm::dvec3> positions_, stored_;
   std::vector<bool> pinned_, seam_;
   std::vector<std::atomic<std::uint32_t>> faces_around_;  ///< atomic: regions share the vertices between them
-  std::vector<std::uint8_t> moved_;                       ///< not bits, which threads would share
+  std::vector<std::uint8_t> left_original_;               ///< not bits, which threads would share
   std::vector<double> shares_;
   std::vector<std::uint8_t> joined_;  ///< not bits, which threads would share
   std::vector<std::uint32_t> slots_;

@@ -22,14 +22,14 @@ bool turns_too_far(const glm::dvec3& before, const glm::dvec3& after) {
 
 }  // namespace
 
-Change::Outcome Change::try_collapse(Halfedge h, const Spot& spot) {
-  if (!std::isfinite(glm::dot(spot.position, glm::dvec3(1)))) return Outcome::refused;  // beyond the stored type
-  return prepare_collapse(h, spot) ? check() : Outcome::impossible;
+Change::Outcome Change::try_collapse(Halfedge h, const VertexPosition& target) {
+  if (!std::isfinite(glm::dot(target.position, glm::dvec3(1)))) return Outcome::refused;  // beyond the stored type
+  return prepare_collapse(h, target) ? check() : Outcome::impossible;
 }
 
-Change::Outcome Change::try_relocate(std::uint32_t vertex, const Spot& spot) {
-  if (!std::isfinite(glm::dot(spot.position, glm::dvec3(1)))) return Outcome::refused;
-  return prepare_relocate(vertex, spot) ? check() : Outcome::impossible;
+Change::Outcome Change::try_relocate(std::uint32_t vertex, const VertexPosition& target) {
+  if (!std::isfinite(glm::dot(target.position, glm::dvec3(1)))) return Outcome::refused;
+  return prepare_relocate(vertex, target) ? check() : Outcome::impossible;
 }
 
 Change::Outcome Change::try_flip(Edge e) { return prepare_flip(e) ? check() : Outcome::impossible; }
@@ -37,7 +37,7 @@ Change::Outcome Change::try_flip(Edge e) { return prepare_flip(e) ? check() : Ou
 bool Change::meets_another() const {
   if (kind_ == Kind::flip) return false;
   const std::uint32_t other = kind_ == Kind::collapse ? mesh_->from(halfedge_) : vertex_;
-  return mesh_->meets_another(spot_, vertex_, other);
+  return mesh_->meets_another(position_, vertex_, other);
 }
 
 Change::Outcome Change::check() {
@@ -46,29 +46,29 @@ Change::Outcome Change::check() {
     return Outcome::refused;
   }
   const bool kept =
-      !folds_over() && (proof_ == Proof::later ? vertex_within() : within_bounds() && boundary_within_bounds());
+      !folds_over() && (proof_ == Proof::later ? vertex_is_inside() : keeps_bounds() && boundary_is_inside());
   return kept ? Outcome::possible : Outcome::refused;
 }
 
-void Change::clear(Kind kind, const Spot& spot) {
-  kind_ = kind, spot_ = spot, share_ = 1;
+void Change::clear(Kind kind, const VertexPosition& target) {
+  kind_ = kind, position_ = target, share_ = 1;
   elements_.clear(), faces_.clear(), removed_.clear(), new_wedges_.clear();
   boundary_elements_.clear(), boundary_removed_.clear();
 }
 
-bool Change::prepare_collapse(Halfedge h, const Spot& spot) {
-  clear(Kind::collapse, spot);
+bool Change::prepare_collapse(Halfedge h, const VertexPosition& target) {
+  clear(Kind::collapse, target);
   halfedge_ = h, vertex_ = mesh_->to(h);
   share_ = std::min(mesh_->share(vertex_), mesh_->share(mesh_->from(h)));
   collapses_.assign(1, h), carried_.clear();
   if (mesh_->joined(mesh_->from(h)) && !gather_copies(h)) return false;
   for (const Halfedge each : collapses_) {
-    if (!link_condition(each) || !gather(each, spot.position)) return false;
+    if (!link_condition(each) || !gather(each, target.position)) return false;
     if (!mesh_->wedges_.empty() && !wedges_fit(each)) return false;
   }
   constexpr int kNoFace = -1;
   for (const std::uint32_t v : carried_) {
-    gather_side(v, spot.position, glm::length(mesh_->positions_[v] - spot.position), kNoFace, kNoFace);
+    gather_side(v, target.position, glm::length(mesh_->positions_[v] - target.position), kNoFace, kNoFace);
   }
   if (!mesh_->copies_.empty() && !slots_fit()) return false;
   for (const Halfedge each : collapses_) {
@@ -80,11 +80,11 @@ bool Change::prepare_collapse(Halfedge h, const Spot& spot) {
   return true;
 }
 
-bool Change::prepare_relocate(std::uint32_t vertex, const Spot& spot) {
-  clear(Kind::relocate, spot);
+bool Change::prepare_relocate(std::uint32_t vertex, const VertexPosition& target) {
+  clear(Kind::relocate, target);
   vertex_ = vertex, share_ = mesh_->share(vertex);
   constexpr int kNoFace = -1;
-  gather_side(vertex, spot.position, glm::length(mesh_->positions_[vertex] - spot.position), kNoFace, kNoFace);
+  gather_side(vertex, target.position, glm::length(mesh_->positions_[vertex] - target.position), kNoFace, kNoFace);
   boundary_of_relocation();
   return true;
 }
@@ -190,14 +190,14 @@ bool Change::gather(Halfedge h, const glm::dvec3& position) {
     // The two other edges of the removed face: the one at v0 first, because the faces around v0 always are in the ring.
     Halfedge at_v0 = mesh.next_halfedge_handle(edge), at_v1 = mesh.prev_halfedge_handle(edge);
     if (side == 0) std::swap(at_v0, at_v1);
-    int heir = mesh.opposite_face_handle(at_v0).idx();
-    if (heir < 0) heir = mesh.opposite_face_handle(at_v1).idx();
-    if (heir < 0) return false;
+    int successor = mesh.opposite_face_handle(at_v0).idx();
+    if (successor < 0) successor = mesh.opposite_face_handle(at_v1).idx();
+    if (successor < 0) return false;
     std::size_t place = 0;
-    while (place < elements_.size() && elements_[place].id != static_cast<std::uint32_t>(heir)) ++place;
+    while (place < elements_.size() && elements_[place].id != static_cast<std::uint32_t>(successor)) ++place;
     if (place == elements_.size()) {
-      const glm::uvec3& t = mesh_->triangles_[static_cast<std::size_t>(heir)];
-      elements_.push_back({static_cast<std::uint32_t>(heir),
+      const glm::uvec3& t = mesh_->triangles_[static_cast<std::size_t>(successor)];
+      elements_.push_back({static_cast<std::uint32_t>(successor),
                            {mesh_->positions_[t.x], mesh_->positions_[t.y], mesh_->positions_[t.z]},
                            0});
       faces_.push_back({false, 0, mesh_->positions_[t.x], {t.x, t.y, t.z}, 0});
@@ -331,11 +331,11 @@ double Change::share(const Face& face) const {
   return least;
 }
 
-void Change::gather_predecessors() {
+void Change::gather_replaced_faces() {
   const auto add = [&](std::uint32_t id) {
     const glm::uvec3& t = mesh_->triangles_[id];
     const auto& p = mesh_->positions_;
-    predecessors_.add(p[t.x], p[t.y], p[t.z], mesh_->face_distance_[id]);
+    replaced_faces_.add(p[t.x], p[t.y], p[t.z], mesh_->face_distance_[id]);
   };
   for (const Coverage::Element& e : elements_) add(e.id);
   for (const Coverage::Removed& r : removed_) add(r.id);
@@ -344,51 +344,51 @@ void Change::gather_predecessors() {
 /// Whether a face is likely to lie near many triangles of the reference.
 bool Change::is_large(const Coverage::Element& e) const {
   constexpr double kLarge = 8;  // times the tolerance
-  const double limit = kLarge * mesh_->bounds().forward->within();
-  return longest_squared({{e.corners[0], e.corners[1], e.corners[2]}}) > limit * limit;
+  const double large = kLarge * mesh_->bounds().forward->limit();
+  return longest_squared({{e.corners[0], e.corners[1], e.corners[2]}}) > large * large;
 }
 
-bool Change::vertex_within() {
+bool Change::vertex_is_inside() {
   const TriangleCertificate& forward = *mesh_->bounds().forward;
-  new_distance_ = forward.distance_bound(spot_.position);
-  return new_distance_ <= share_ * forward.within();
+  new_distance_ = forward.distance_bound(position_.position);
+  return new_distance_ <= share_ * forward.limit();
 }
 
 /// Whether a point of a large face is outside: before anything is proved in vain.
 bool Change::shows_outside() {
   for (std::size_t k = 0; k < elements_.size(); ++k) {
-    const std::size_t i = (suspect_ + k) % elements_.size();
+    const std::size_t i = (failed_last_ + k) % elements_.size();
     const Coverage::Element& element = elements_[i];
     if (element.moved == 0 || !is_large(element)) continue;
     if (mesh_->bounds().forward->narrowed(share(faces_[i])).shows_outside(element.corners)) {
-      suspect_ = i;
+      failed_last_ = i;
       return true;
     }
   }
   return false;
 }
 
-bool Change::faces_within() {
+bool Change::faces_are_inside() {
   const auto& distance = mesh_->distance_;
-  predecessors_.clear();
+  replaced_faces_.clear();
   for (std::size_t k = 0; k < elements_.size(); ++k) {
-    const std::size_t i = (suspect_ + k) % elements_.size();
+    const std::size_t i = (failed_last_ + k) % elements_.size();
     const Coverage::Element& element = elements_[i];
     Face& face = faces_[i];
     const TriangleCertificate forward = mesh_->bounds().forward->narrowed(share(face));
     // No point of the face moves farther than its moving corner.
     face.distance = mesh_->face_distance_[element.id] + element.moved;
-    if (element.moved == 0 || face.distance <= forward.within()) continue;
+    if (element.moved == 0 || face.distance <= forward.limit()) continue;
     if (is_large(element)) {
-      if (predecessors_.empty()) gather_predecessors();
-      face.distance = predecessors_.bound(element.corners, forward.within());
-      if (face.distance <= forward.within()) continue;
+      if (replaced_faces_.empty()) gather_replaced_faces();
+      face.distance = replaced_faces_.bound(element.corners, forward.limit());
+      if (face.distance <= forward.limit()) continue;
     }
     glm::dvec3 corners(distance[face.vertices[0]], distance[face.vertices[1]], distance[face.vertices[2]]);
     if (kind_ != Kind::flip) corners[face.corner] = new_distance_;
     face.distance = forward.bound_with_room(element.corners, corners);
     if (face.distance == TriangleCertificate::kUnproved) {
-      suspect_ = i;
+      failed_last_ = i;
       return false;
     }
   }
@@ -396,12 +396,12 @@ bool Change::faces_within() {
 }
 
 /// In the order of what the answers cost.
-bool Change::within_bounds() {
+bool Change::keeps_bounds() {
   const Bounds& bounds = mesh_->bounds();
   if (bounds.baseline) return bounds.baseline->accepts(elements_, removed_);
-  if (bounds.forward && ((kind_ != Kind::flip && !vertex_within()) || shows_outside())) return false;
+  if (bounds.forward && ((kind_ != Kind::flip && !vertex_is_inside()) || shows_outside())) return false;
   if (bounds.backward && !bounds.backward->try_change(elements_, removed_, backward_)) return false;
-  return !bounds.forward || faces_within();
+  return !bounds.forward || faces_are_inside();
 }
 
 void Change::boundary_of_collapse() {
@@ -414,7 +414,7 @@ void Change::boundary_of_collapse() {
   const Halfedge previous = mesh.prev_halfedge_handle(edge), next = mesh.next_halfedge_handle(edge);
   const std::uint32_t a = mesh_->from(previous), s = mesh_->from(edge), t = mesh_->to(edge), c = mesh_->to(next);
   const auto& positions = mesh_->positions_;
-  const glm::dvec3& p = spot_.position;
+  const glm::dvec3& p = position_.position;
   const double moved_s = glm::length(positions[s] - p), moved_t = glm::length(positions[t] - p);
   boundary_elements_.push_back({a, {positions[a], p, p}, moved_s});
   if (vertex_ == t) {
@@ -432,12 +432,12 @@ void Change::boundary_of_relocation() {
   // The kernel keeps the outgoing halfedge of a boundary vertex on the boundary.
   const Halfedge next = mesh.halfedge_handle(BoundedMesh::handle(vertex_)), previous = mesh.prev_halfedge_handle(next);
   const std::uint32_t a = mesh_->from(previous), c = mesh_->to(next);
-  const glm::dvec3 &p = spot_.position, &pa = mesh_->positions_[a], &pc = mesh_->positions_[c];
+  const glm::dvec3 &p = position_.position, &pa = mesh_->positions_[a], &pc = mesh_->positions_[c];
   const double moved = glm::length(mesh_->positions_[vertex_] - p);
   boundary_elements_ = {{a, {pa, p, p}, moved}, {vertex_, {p, pc, pc}, moved}};
 }
 
-bool Change::boundary_within_bounds() {
+bool Change::boundary_is_inside() {
   if (boundary_elements_.empty()) return true;
   const Bounds& bounds = mesh_->bounds();
   const glm::dvec3 unknown(std::numeric_limits<double>::infinity());

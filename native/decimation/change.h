@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "decimation/bounded_mesh.h"
-#include "decimation/predecessors.h"
+#include "decimation/replaced_faces.h"
 
 namespace tolvol {
 
@@ -38,17 +38,17 @@ class Change {
   /// Keeps a reference to `mesh`.
   explicit Change(const BoundedMesh& mesh, Proof proof = Proof::now) : mesh_(&mesh), proof_(proof) {}
 
-  /// The start of `h` merges into its end, which goes to `spot`.
-  Outcome try_collapse(Halfedge h, const Spot& spot);
+  /// The start of `h` merges into its end, which goes to `target`.
+  Outcome try_collapse(Halfedge h, const VertexPosition& target);
   /// A vertex moves.
-  Outcome try_relocate(std::uint32_t vertex, const Spot& spot);
+  Outcome try_relocate(std::uint32_t vertex, const VertexPosition& target);
   /// The edge of two faces becomes the other diagonal.
   Outcome try_flip(Edge e);
 
   // The steps of the above, for a search that wants to see the faces before it pays for the bounds. Each prepares the
   // faces and says whether the change is possible at all; check() then asks for the bounds.
-  bool prepare_collapse(Halfedge h, const Spot& spot);
-  bool prepare_relocate(std::uint32_t vertex, const Spot& spot);
+  bool prepare_collapse(Halfedge h, const VertexPosition& target);
+  bool prepare_relocate(std::uint32_t vertex, const VertexPosition& target);
   bool prepare_flip(Edge e);
   Outcome check();
 
@@ -66,7 +66,7 @@ class Change {
   /// Parts of the reference's pieces that the series of tries has looked at.
   std::size_t looked_at() const { return backward_.looked_at(); }
   /// Starts a series of tries around one place. What it finds depends on nothing before.
-  void begin() { suspect_ = 0, met_another_ = false, backward_.begin(), boundary_backward_.begin(); }
+  void begin() { failed_last_ = 0, met_another_ = false, backward_.begin(), boundary_backward_.begin(); }
 
  private:
   friend class BoundedMesh;
@@ -80,7 +80,7 @@ class Change {
     Corner gained;
   };
 
-  void clear(Kind kind, const Spot& spot);
+  void clear(Kind kind, const VertexPosition& target);
   double share(const Face& face) const;
   void gather_side(std::uint32_t vertex, const glm::dvec3& position, double moved, int skip0, int skip1);
   bool link_condition(Halfedge h);
@@ -90,13 +90,13 @@ class Change {
   bool slots_fit();
   bool meets_another() const;
   bool folds_over() const;
-  void gather_predecessors();
+  void gather_replaced_faces();
   bool is_large(const Coverage::Element& e) const;
-  bool vertex_within();
+  bool vertex_is_inside();
   bool shows_outside();
-  bool faces_within();
-  bool within_bounds();
-  bool boundary_within_bounds();
+  bool faces_are_inside();
+  bool keeps_bounds();
+  bool boundary_is_inside();
   void boundary_of_collapse();
   void boundary_of_relocation();
 
@@ -108,7 +108,7 @@ class Change {
   std::vector<std::uint32_t> carried_;  ///< copies of the vertex that vanishes that have no such edge
   Edge edge_;
   std::uint32_t vertex_ = 0;  ///< the one that moves
-  Spot spot_{};
+  VertexPosition position_{};
   double share_ = 1;  ///< of the forward bound, at the vertex that moves
   std::vector<Coverage::Element> elements_;
   std::vector<Face> faces_;
@@ -118,11 +118,11 @@ class Change {
   std::vector<NewWedge> new_wedges_;
   std::vector<int> neighbours_;
   std::vector<std::uint32_t> apexes_, around_;
-  Predecessors predecessors_;
+  ReplacedFaces replaced_faces_;
   Coverage::Trial backward_, boundary_backward_;
   double new_distance_ = 0;
   bool met_another_ = false;
-  std::size_t suspect_ =
+  std::size_t failed_last_ =
       0;  ///< the face that failed last: of another try at the same place it is the likeliest to fail
 };
 

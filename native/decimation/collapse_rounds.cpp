@@ -116,8 +116,8 @@ class Rounds {
   }
 
   double trusted_cost() const {
-    const double within = mesh_.bounds().forward->within();
-    return kTrustedCost * within * within * within * within;
+    const double limit = mesh_.bounds().forward->limit();
+    return kTrustedCost * limit * limit * limit * limit;
   }
 
   struct Members {

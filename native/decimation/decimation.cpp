@@ -13,7 +13,7 @@
 #include "base/errors.h"
 #include "base/parallel.h"
 #include "check/certificate.h"
-#include "check/input.h"
+#include "check/input_checks.h"
 #include "decimation/boundary.h"
 #include "decimation/collapse_rounds.h"
 #include "decimation/refinement.h"
@@ -27,13 +27,13 @@ constexpr std::uint32_t kNone = CutMesh::kNone;
 
 class Decimation {
  public:
-  Decimation(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const Placement& placement,
+  Decimation(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
              const ToleranceVolume* volume, const DecimationOptions& options)
       : vertices_(vertices),
         triangles_(triangles),
         volume_(volume),
         options_(options),
-        placement_(placement),
+        space_(space),
         // A baseline answers one question after another.
         team_(options.baseline ? 1 : std::min(thread_count(options.threads), kMostThreads)) {
     validate(vertices, triangles);
@@ -54,14 +54,13 @@ class Decimation {
     if (!options.wedges.empty() && options.wedges.size() != 3 * triangles.size()) {
       throw InvalidInput("wedges must have one label for each corner of each triangle");
     }
-    placement_ = placement.in(volume ? volume->frame() : own_frame());
+    space_ = space.in(volume ? volume->frame() : own_frame());
   }
 
   DecimationResult run() {
     cut_ = cut_to_manifold(vertices_, triangles_, team_);
     positions_.resize(cut_.vertex_input.size());
-    for (std::size_t v = 0; v < positions_.size(); ++v)
-      positions_[v] = placement_.frame(vertices_[cut_.vertex_input[v]]);
+    for (std::size_t v = 0; v < positions_.size(); ++v) positions_[v] = space_.frame(vertices_[cut_.vertex_input[v]]);
     pin();
     if (std::none_of(cut_.triangles.begin(), cut_.triangles.end(), [&](const glm::uvec3& t) {
           return glm::cross(positions_[t.y] - positions_[t.x], positions_[t.z] - positions_[t.x]) != glm::dvec3(0);
@@ -113,7 +112,7 @@ class Decimation {
 
   Frame own_frame() const {
     Box world;
-    for (const glm::dvec3& p : vertices_) world.add(placement_.world(p));
+    for (const glm::dvec3& p : vertices_) world.add(space_.world(p));
     return Frame(world);
   }
 
@@ -155,7 +154,7 @@ class Decimation {
     if (reference.vertices.size() != vertices_.size() || reference.triangles.size() != triangles_.size()) return false;
     if (!std::equal(triangles_.begin(), triangles_.end(), reference.triangles.begin())) return false;
     for (std::size_t i = 0; i < vertices_.size(); ++i) {
-      if (placement_.frame(vertices_[i]) != reference.vertices[i]) return false;
+      if (space_.frame(vertices_[i]) != reference.vertices[i]) return false;
     }
     return true;
   }
@@ -163,15 +162,14 @@ class Decimation {
   Bounds set_bounds() {
     std::vector<glm::dvec3> used;
     for (const std::uint32_t i : cut_.vertex_input) used.push_back(vertices_[i]);
-    if (const auto warning = storage_warning(*volume_, placement_, used)) result_.warnings.push_back(*warning);
+    if (const auto warning = storage_warning(*volume_, space_, used)) result_.warnings.push_back(*warning);
     // Vertices may end up anywhere in the volume.
     const double reach = 1 + volume_->frame_tolerance();
     for (int corner = 0; corner < 8; ++corner) {
-      used.push_back(
-          placement_.store(reach * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1)));
+      used.push_back(space_.store(reach * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1)));
     }
-    const double mapping_error = placement_.mapping_error(used);
-    const double provable = volume_->provable(mapping_error), within = provable * (1 - kHeadroom);
+    const double mapping_error = space_.mapping_error(used);
+    const double provable = volume_->provable(mapping_error), limit = provable * (1 - kHeadroom);
     Bounds bounds;
     if (options_.baseline) {
       options_.baseline->begin({positions_, cut_.triangles}, mapping_error);
@@ -188,15 +186,15 @@ class Decimation {
     }
     if (!identical_) certify_input(certificate, mapping_error);
 
-    forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within,
+    forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), limit,
                      volume_->refutable(mapping_error));
     bounds.forward = &*forward_;
     if (options_.two_sided) {
-      backward_.emplace(volume_->reference(), within, cut_.triangles.size());
+      backward_.emplace(volume_->reference(), limit, cut_.triangles.size());
       cover(provable);
       bounds.backward = &*backward_;
     } else {
-      boundary_.emplace(*volume_, cut_, positions_, identical_, within, provable, team_);
+      boundary_.emplace(*volume_, cut_, positions_, identical_, limit, provable, team_);
       for (const std::uint32_t v : boundary_->uncertified()) pin(v, "boundary not near the reference's boundary");
       if (boundary_->any()) {
         bounds.boundary_forward = &boundary_->forward();
@@ -211,7 +209,7 @@ class Decimation {
   }
 
   void certify_input(const Certificate& certificate, double mapping_error) {
-    const std::vector<glm::dvec3> in_frame = placement_.frame(vertices_);
+    const std::vector<glm::dvec3> in_frame = space_.frame(vertices_);
     std::vector<std::uint32_t> indices;
     indices.reserve(3 * triangles_.size());
     for (const glm::uvec3& t : triangles_) indices.insert(indices.end(), {t.x, t.y, t.z});
@@ -233,7 +231,7 @@ class Decimation {
     if (identical_) {
       for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
         const std::uint32_t element = element_of_[cut_.stand_in[i]];
-        if (element != kNone) backward_->own(element, i);  // what is set aside never changes and covers itself
+        if (element != kNone) backward_->set_witness(element, i);  // what is set aside never changes and covers itself
       }
       return;
     }
@@ -254,7 +252,7 @@ class Decimation {
     for (std::uint32_t i = 0; i < count; ++i) {
       poll_at(i);
       if (options_.progress) options_.progress->update(static_cast<double>(i) / static_cast<double>(count));
-      if (!backward_->assign(i, hierarchy, ids, provable, nearest) && uncovered++ == 0) first = i;
+      if (!backward_->find_witnesses(i, hierarchy, ids, provable, nearest) && uncovered++ == 0) first = i;
     }
     if (uncovered && options_.outside == DecimationOptions::Outside::error) {
       std::ostringstream text;
@@ -280,7 +278,7 @@ class Decimation {
     input.triangles = cut_.triangles;
     input.mates = std::move(cut_.mates);
     for (std::size_t v = 0; v < positions_.size(); ++v)
-      input.spots.push_back({vertices_[cut_.vertex_input[v]], positions_[v]});
+      input.positions.push_back({vertices_[cut_.vertex_input[v]], positions_[v]});
     // What holds for a vertex holds for its copies.
     const std::vector<std::uint32_t>& slots = cut_.output_slot;
     std::vector<bool> pinned(positions_.size(), false);
@@ -312,10 +310,10 @@ class Decimation {
       islands_ = island_labels(cut_.triangles, input.wedges);
     }
     input.on_reference = identical_;
-    input.subset = options_.vertices == DecimationOptions::Vertices::subset;
+    input.subset = options_.placement == DecimationOptions::Placement::subset;
     input.store = [this](const glm::dvec3& p) {
-      const glm::dvec3 stored = placement_.store(p);
-      return Spot{stored, placement_.frame(stored)};
+      const glm::dvec3 stored = space_.store(p);
+      return VertexPosition{stored, space_.frame(stored)};
     };
     return input;
   }
@@ -393,7 +391,7 @@ class Decimation {
         const std::uint32_t t = kept_[i];
         const int corner = own_corner(t, k);
         const std::uint32_t v = mesh.triangle(t)[corner];
-        if (!mesh.moved(v)) {
+        if (!mesh.left_original(v)) {
           const std::uint32_t source = islands_.empty() ? any_corner[v] : mesh.corner_source(t, corner);
           const std::uint32_t original = input_corner(source / 3, static_cast<int>(source % 3));
           triangle[k] = original / 3;
@@ -445,7 +443,7 @@ class Decimation {
   const ToleranceVolume* volume_;
   const DecimationOptions& options_;
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  Placement placement_;
+  StoredSpace space_;
   Team team_;
 
   CutMesh cut_;
@@ -464,9 +462,9 @@ class Decimation {
 }  // namespace
 
 DecimationResult decimate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
-                          const Placement& placement, const ToleranceVolume* volume, const DecimationOptions& options) {
+                          const StoredSpace& space, const ToleranceVolume* volume, const DecimationOptions& options) {
   const Call call(options.progress);
-  return Decimation(vertices, triangles, placement, volume, options).run();
+  return Decimation(vertices, triangles, space, volume, options).run();
 }
 
 }  // namespace tolvol

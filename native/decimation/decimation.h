@@ -16,12 +16,12 @@
 namespace tolvol {
 
 struct DecimationOptions {
-  enum class Vertices { optimal, subset };
+  enum class Placement { optimal, subset };
   enum class Outside { error, keep };
   enum class Effort { fast, thorough };
 
-  Vertices vertices =
-      Vertices::optimal;             ///< optimal: fewest triangles; subset: every surviving vertex is an original one
+  /// optimal: fewest triangles; subset: every surviving vertex is an original one.
+  Placement placement = Placement::optimal;
   bool two_sided = true;             ///< also keep the whole reference within the tolerance of the result
   Effort effort = Effort::fast;      ///< thorough: then moves vertices and flips edges to collapse more
   double max_seconds = 0;            ///< it stops there with what is proved by then; 0: no limit
@@ -67,6 +67,6 @@ struct DecimationResult {
 /// Throws InvalidInput for a bad mesh, for input that is outside its reference (unless Outside::keep), and where the
 /// stored type cannot hold the tolerance; Cancelled. About 3 us a triangle.
 DecimationResult decimate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
-                          const Placement& placement, const ToleranceVolume* volume, const DecimationOptions& options);
+                          const StoredSpace& space, const ToleranceVolume* volume, const DecimationOptions& options);
 
 }  // namespace tolvol

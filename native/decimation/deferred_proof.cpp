@@ -17,14 +17,15 @@ DeferredProof::DeferredProof(EdgeCollapse& collapse, BoundedMesh& mesh, std::spa
       faces_(faces),
       places_(places),
       changed_(faces.size()),
-      heirs_(faces.size()) {
-  for (std::uint32_t i = 0; i < faces.size(); ++i) places_[faces[i]] = heirs_[i] = i;
+      successors_(faces.size()) {
+  for (std::uint32_t i = 0; i < faces.size(); ++i) places_[faces[i]] = successors_[i] = i;
   for (const std::uint32_t v : vertices) save_vertex(v);
   for (const std::uint32_t f : faces) save_face(f);
 }
 
 void DeferredProof::save_vertex(std::uint32_t v) {
-  saved_vertices_.push_back({mesh_.spot(v), collapse_.quadric(v), mesh_.distance_[v], mesh_.share(v), mesh_.moved(v)});
+  saved_vertices_.push_back(
+      {mesh_.vertex_position(v), collapse_.quadric(v), mesh_.distance_[v], mesh_.share(v), mesh_.left_original(v)});
 }
 
 void DeferredProof::save_face(std::uint32_t f) {
@@ -47,7 +48,8 @@ void DeferredProof::note(const Change& change) {
   for (const Coverage::Element& e : change.elements()) {
     if (e.moved > 0) changed_[places_[e.id]] = true;
   }
-  for (const Coverage::Removed& r : change.removed()) heirs_[places_[r.id]] = places_[change.elements()[r.heir].id];
+  for (const Coverage::Removed& r : change.removed())
+    successors_[places_[r.id]] = places_[change.elements()[r.successor].id];
 }
 
 bool DeferredProof::holds() {
@@ -76,8 +78,8 @@ bool DeferredProof::faces_hold() {
   return true;
 }
 
-std::uint32_t DeferredProof::heir(std::uint32_t place) const {
-  while (heirs_[place] != place) place = heirs_[place];
+std::uint32_t DeferredProof::successor(std::uint32_t place) const {
+  while (successors_[place] != place) place = successors_[place];
   return place;
 }
 
@@ -91,7 +93,7 @@ bool DeferredProof::pieces_hold() {
         {faces_[i], {mesh_.position(t.x), mesh_.position(t.y), mesh_.position(t.z)}, changed_[i] ? kAnywhere : 0});
   }
   for (std::uint32_t i = 0; i < faces_.size(); ++i) {
-    if (heirs_[i] != i) removed.push_back({faces_[i], rank_[heir(i)], kAnywhere});
+    if (successors_[i] != i) removed.push_back({faces_[i], rank_[successor(i)], kAnywhere});
   }
   Coverage::Trial trial;
   if (!mesh_.bounds().backward->try_change(elements, removed, trial)) return false;
@@ -131,10 +133,10 @@ void DeferredProof::take_back() {
     const std::uint32_t v = vertices_[i];
     const SavedVertex& s = saved_vertices_[i];
     kernel.status(BoundedMesh::handle(v)).set_deleted(false);
-    mesh_.positions_[v] = s.spot.position, mesh_.stored_[v] = s.spot.stored;
+    mesh_.positions_[v] = s.position.position, mesh_.stored_[v] = s.position.stored;
     mesh_.distance_[v] = s.distance;
     if (!mesh_.shares_.empty()) mesh_.shares_[v] = s.share;
-    mesh_.moved_[v] = s.moved;
+    mesh_.left_original_[v] = s.left_original;
     mesh_.merged_into_[v] = v;
     collapse_.set_quadric(v, s.quadric);
   }

@@ -38,10 +38,10 @@ class DeferredProof {
  private:
   using Kernel = OpenMesh::TriConnectivity;
   struct SavedVertex {
-    Spot spot;
+    VertexPosition position;
     Quadric quadric;
     double distance, share;
-    bool moved;
+    bool left_original;
   };
   struct SavedFace {
     glm::uvec3 triangle, wedges, corner_source;
@@ -59,7 +59,7 @@ class DeferredProof {
 
   void save_vertex(std::uint32_t vertex);
   void save_face(std::uint32_t face);
-  std::uint32_t heir(std::uint32_t place) const;
+  std::uint32_t successor(std::uint32_t place) const;
   bool faces_hold();
   bool pieces_hold();
 
@@ -72,10 +72,10 @@ class DeferredProof {
   std::vector<SavedFace> saved_faces_;
   std::vector<SavedHalfedge> saved_halfedges_;
   std::vector<SavedAnchor> saved_anchors_;
-  std::vector<std::uint8_t> changed_;  ///< per face
-  std::vector<std::uint32_t> heirs_;   ///< per face: the place of the one that it was removed for, or its own
-  std::vector<std::uint32_t> alive_;   ///< places of the faces that are left,
-  std::vector<std::uint32_t> rank_;    ///< and per place, if it is one of them, where it stands among them
+  std::vector<std::uint8_t> changed_;      ///< per face
+  std::vector<std::uint32_t> successors_;  ///< per face: the place of the one that it was removed for, or its own
+  std::vector<std::uint32_t> alive_;       ///< places of the faces that are left,
+  std::vector<std::uint32_t> rank_;        ///< and per place, if it is one of them, where it stands among them
 };
 
 }  // namespace tolvol

@@ -16,7 +16,7 @@ constexpr double kBoundaryWeight = 10;  // of a boundary edge's plane, times its
 constexpr double kReach = 2;            // a minimiser is trusted within this many edge lengths of the edge's middle
 /// Steps of the fit before a collapse is refused; with a deviation beyond this before a step, over the tolerance,
 /// hardly one in fifty still succeeds.
-constexpr double kHopeless[] = {1.4, 1.2, 1.12};
+constexpr double kGiveUpAbove[] = {1.4, 1.2, 1.12};
 /// Where many collapses cost nothing, on a plate, short edges go first: a weight of the fourth power of the length,
 /// which has the quadrics' unit. Without it one vertex would sweep along a row and leave needles behind.
 constexpr double kLengthWeight = 1e-6;
@@ -110,11 +110,11 @@ void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
   a.change.begin();
   a.halfedge = p->halfedge;
   const Halfedge h = a.halfedge;
-  a.outcome =
-      a.change.try_collapse(h, p->freedom == Freedom::anywhere ? mesh_.store(p->position) : mesh_.spot(mesh_.to(h)));
+  a.outcome = a.change.try_collapse(
+      h, p->freedom == Freedom::anywhere ? mesh_.store(p->position) : mesh_.vertex_position(mesh_.to(h)));
   if (a.outcome != Outcome::possible && p->freedom == Freedom::either_way) {
     const Halfedge other = mesh_.connectivity().opposite_halfedge_handle(h);
-    const Outcome second = a.change.try_collapse(other, mesh_.spot(mesh_.from(h)));
+    const Outcome second = a.change.try_collapse(other, mesh_.vertex_position(mesh_.from(h)));
     if (second == Outcome::possible) a.halfedge = other;
     a.outcome = std::max(a.outcome, second);
   } else if (a.outcome == Outcome::refused && p->freedom == Freedom::anywhere &&
@@ -128,23 +128,23 @@ void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
 /// one costs nothing, a position off the planes would spoil them for the collapses to come: the edge waits instead.
 EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) const {
   const Halfedge h = a.halfedge;
-  const Spot s0 = mesh_.spot(mesh_.from(h)), s1 = mesh_.spot(mesh_.to(h));
+  const VertexPosition s0 = mesh_.vertex_position(mesh_.from(h)), s1 = mesh_.vertex_position(mesh_.to(h));
   if (mesh_.bounds().forward) {
     const Quadric q = quadrics_[mesh_.from(h)] + quadrics_[mesh_.to(h)];
     const double nothing = length_cost(s0.position, s1.position);
     const auto possible_at_end = [&](bool that_costs) {
-      return std::ranges::any_of(std::array{s0, s1}, [&](const Spot& end) {
+      return std::ranges::any_of(std::array{s0, s1}, [&](const VertexPosition& end) {
         return end.position != best && (q(end.position) > nothing) == that_costs &&
                a.change.try_collapse(h, end) == Outcome::possible;
       });
     };
     if (possible_at_end(false)) return Outcome::possible;
     if (q(best) <= nothing) return Outcome::refused;
-    const Outcome fitted = a.fit.collapse(a.change, h, best, kHopeless);
+    const Outcome fitted = a.fit.collapse(a.change, h, best, kGiveUpAbove);
     if (fitted != Outcome::refused) return fitted;
     return possible_at_end(true) ? Outcome::possible : Outcome::refused;
   }
-  for (const Spot& other : {s0, s1, mesh_.store((s0.position + s1.position) * 0.5)}) {
+  for (const VertexPosition& other : {s0, s1, mesh_.store((s0.position + s1.position) * 0.5)}) {
     const Outcome outcome = a.change.try_collapse(h, other);
     if (outcome != Outcome::refused) return outcome;
   }

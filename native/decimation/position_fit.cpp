@@ -65,8 +65,8 @@ void PositionFit::prepare(const Change& change, bool changed) {
 }
 
 /// Ends at the first deviation beyond the limit, as add_faces() does.
-void PositionFit::add_pieces(const Change& change, double limit, Sums& sums) const {
-  for (std::size_t first = 0; first < samples_.size() && sums.deviation() <= limit; first += 4) {
+void PositionFit::add_pieces(const Change& change, double hopeless, Sums& sums) const {
+  for (std::size_t first = 0; first < samples_.size() && sums.deviation() <= hopeless; first += 4) {
     const auto at = [&](std::size_t k) { return std::min(first + k, samples_.size() - 1); };
     if (first % kBetweenPolls == 0) poll();
     FourPoints points;
@@ -91,8 +91,8 @@ void PositionFit::add_pieces(const Change& change, double limit, Sums& sums) con
   }
 }
 
-void PositionFit::add_faces(const Change& change, double limit, Sums& sums) const {
-  for (std::size_t i = 0; i < faces_.size() && sums.deviation() <= limit; ++i) {
+void PositionFit::add_faces(const Change& change, double hopeless, Sums& sums) const {
+  for (std::size_t i = 0; i < faces_.size() && sums.deviation() <= hopeless; ++i) {
     const WitnessTriangle& t = faces_[i];
     const glm::dvec3 corners[3] = {t.a, t.a + t.ab, t.a + t.ac};
     const Change::Face& face = change.faces()[i];
@@ -101,36 +101,36 @@ void PositionFit::add_faces(const Change& change, double limit, Sums& sums) cons
     const double area = 0.5 * kFaceShare * glm::length(glm::cross(t.ab, t.ac));
     for (const auto& [beta, along] : kFacePoints) {
       const glm::dvec3 x = beta * p + (1 - beta) * (along * b + (1 - along) * a);
-      if (const auto q = mesh_->bounds().forward->near(x)) sums.add(*q - x, area, face.moves ? beta : 0);
+      if (const auto q = mesh_->bounds().forward->nearby_point(x)) sums.add(*q - x, area, face.moves ? beta : 0);
     }
   }
 }
 
-PositionFit::Fit PositionFit::fit(const Change& change, const glm::dvec3& position, double limit) {
-  const double within = mesh_->bounds().forward->within();
-  Sums sums{1 / (within * within)};
+PositionFit::Fit PositionFit::fit(const Change& change, const glm::dvec3& position, double hopeless) {
+  const double limit = mesh_->bounds().forward->limit();
+  Sums sums{1 / (limit * limit)};
   prepare(change, true);
-  add_pieces(change, limit, sums);
-  add_faces(change, limit, sums);
+  add_pieces(change, hopeless, sums);
+  add_faces(change, hopeless, sums);
   const double trace = sums.m[0][0] + sums.m[1][1] + sums.m[2][2];
   const double deviation = sums.deviation();
-  if (!(trace > 0) || deviation > limit) return {sums.energy, deviation, position};
+  if (!(trace > 0) || deviation > hopeless) return {sums.energy, deviation, position};
   for (int i = 0; i < 3; ++i) sums.m[i][i] += kDamping * trace;
   glm::dvec3 step = glm::inverse(sums.m) * sums.g;
   const double length = glm::length(step);
-  if (length > within) step *= within / length;
+  if (length > limit) step *= limit / length;
   return {sums.energy, deviation, position + step};
 }
 
 Change::Outcome PositionFit::collapse(Change& change, Change::Halfedge h, const glm::dvec3& start,
-                                      std::span<const double> limits) {
+                                      std::span<const double> give_up_above) {
   glm::dvec3 position = start;
   bool first = true;
-  for (const double limit : limits) {
+  for (const double hopeless : give_up_above) {
     if (!change.prepare_collapse(h, mesh_->store(position))) return Change::Outcome::impossible;
     if (std::exchange(first, false)) gather(change);
-    const Fit found = fit(change, position, limit);
-    if (found.deviation > limit) break;
+    const Fit found = fit(change, position, hopeless);
+    if (found.deviation > hopeless) break;
     position = found.position;
     const Change::Outcome outcome = change.try_collapse(h, mesh_->store(position));
     if (outcome != Change::Outcome::refused) return outcome;
@@ -139,8 +139,8 @@ Change::Outcome PositionFit::collapse(Change& change, Change::Halfedge h, const 
 }
 
 double PositionFit::energy_now(const Change& change) {
-  const double within = mesh_->bounds().forward->within();
-  Sums sums{1 / (within * within)};
+  const double limit = mesh_->bounds().forward->limit();
+  Sums sums{1 / (limit * limit)};
   prepare(change, false);
   constexpr double kAll = std::numeric_limits<double>::infinity();
   add_pieces(change, kAll, sums);

@@ -28,19 +28,20 @@ class PositionFit {
     glm::dvec3 position;  ///< lowers it, to first order
   };
   /// Of the faces as the change would leave them, its vertex at `position`. About 10 ns a face and piece. Where the
-  /// deviation is beyond `limit`, that is all that is found.
-  Fit fit(const Change& change, const glm::dvec3& position, double limit = std::numeric_limits<double>::infinity());
+  /// deviation is beyond `hopeless`, that is all that is found.
+  Fit fit(const Change& change, const glm::dvec3& position, double hopeless = std::numeric_limits<double>::infinity());
   /// Tries a collapse, which `change` then holds, at fitted positions: from `start` a step for each of the limits,
   /// until it is possible. With a deviation beyond the step's limit before it, over the tolerance, it is refused.
-  Change::Outcome collapse(Change& change, Change::Halfedge h, const glm::dvec3& start, std::span<const double> limits);
+  Change::Outcome collapse(Change& change, Change::Halfedge h, const glm::dvec3& start,
+                           std::span<const double> give_up_above);
   /// Energy of the same faces as they are.
   double energy_now(const Change& change);
 
  private:
   struct Sums;
   void prepare(const Change& change, bool changed);
-  void add_pieces(const Change& change, double limit, Sums& sums) const;
-  void add_faces(const Change& change, double limit, Sums& sums) const;
+  void add_pieces(const Change& change, double hopeless, Sums& sums) const;
+  void add_faces(const Change& change, double hopeless, Sums& sums) const;
 
   const BoundedMesh* mesh_;
   std::vector<Coverage::Sample> samples_;

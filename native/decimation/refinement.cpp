@@ -16,7 +16,7 @@ constexpr int kHalvings = 3;     // of a step that does not lower the energy
 constexpr double kGain = 0.999;  // a step that lowers the energy less is not taken
 /// Steps of the fit from one start before a collapse is refused; with a deviation beyond this before a step, over the
 /// tolerance, hardly one succeeds: without these limits collapses take four times the time and find no more.
-constexpr double kHopeless[] = {2.5, 1.8, 1.5, 1.4, 1.3, 1.25, 1.2, 1.15};
+constexpr double kGiveUpAbove[] = {2.5, 1.8, 1.5, 1.4, 1.3, 1.25, 1.2, 1.15};
 constexpr int kPatience = 3;       // rounds without a collapse before the end
 constexpr std::size_t kAhead = 8;  // steps tried at once by several threads: steps come in each other's way
 
@@ -124,7 +124,7 @@ bool Refinement::relocation_wanted(std::uint32_t vertex) const {
 void Refinement::try_relocation(std::uint32_t vertex, Attempt& a) const {
   a.change.begin();
   // Faces around a vertex that stays count as moving: the fit is for where it could go.
-  a.possible = a.change.prepare_relocate(vertex, mesh_.spot(vertex));
+  a.possible = a.change.prepare_relocate(vertex, mesh_.vertex_position(vertex));
   if (!a.possible) return;
   a.fit.gather(a.change);
   a.possible = find_move(vertex, a);
@@ -133,13 +133,13 @@ void Refinement::try_relocation(std::uint32_t vertex, Attempt& a) const {
 /// One step towards where the vertex fits best.
 bool Refinement::find_move(std::uint32_t vertex, Attempt& a) const {
   const glm::dvec3 from = mesh_.position(vertex);
-  a.change.prepare_relocate(vertex, mesh_.spot(vertex));
+  a.change.prepare_relocate(vertex, mesh_.vertex_position(vertex));
   const PositionFit::Fit now = a.fit.fit(a.change, from);
   double step = 1;
   for (int i = 0; i < kHalvings; ++i, step *= 0.5) {
-    const Spot spot = mesh_.store(from + step * (now.position - from));
-    if (!a.change.prepare_relocate(vertex, spot)) return false;
-    if (!(a.fit.fit(a.change, spot.position).energy < kGain * now.energy)) continue;
+    const VertexPosition target = mesh_.store(from + step * (now.position - from));
+    if (!a.change.prepare_relocate(vertex, target)) return false;
+    if (!(a.fit.fit(a.change, target.position).energy < kGain * now.energy)) continue;
     if (a.change.check() == Change::Outcome::possible) return true;
   }
   return false;
@@ -197,10 +197,10 @@ void Refinement::try_collapse(std::uint32_t edge, Attempt& a) const {
   a.change.begin();
   a.possible = false;
   const auto [freedom, h] = mesh_.merge(BoundedMesh::edge(edge));
-  const Spot from = mesh_.spot(mesh_.from(h)), to = mesh_.spot(mesh_.to(h));
+  const VertexPosition from = mesh_.vertex_position(mesh_.from(h)), to = mesh_.vertex_position(mesh_.to(h));
   if (freedom == BoundedMesh::Freedom::anywhere) {
     for (const glm::dvec3& start : {0.5 * (from.position + to.position), from.position, to.position}) {
-      a.possible = a.possible || a.fit.collapse(a.change, h, start, kHopeless) == kPossible;
+      a.possible = a.possible || a.fit.collapse(a.change, h, start, kGiveUpAbove) == kPossible;
     }
   } else if (freedom != BoundedMesh::Freedom::none) {
     a.possible = a.change.try_collapse(h, to) == kPossible;

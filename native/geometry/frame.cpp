@@ -30,7 +30,7 @@ Frame::Frame(const Box& world) {
   scale_ = std::ldexp(1.0, -exponent);
 }
 
-Placement::Placement(const glm::dmat4& to_world, Storage storage, const Frame& frame)
+StoredSpace::StoredSpace(const glm::dmat4& to_world, Storage storage, const Frame& frame)
     : to_world_(to_world), storage_(storage), mirrors_(false), frame_(frame) {
   for (int column = 0; column < 4; ++column) {
     for (int row = 0; row < 4; ++row) {
@@ -62,13 +62,13 @@ Placement::Placement(const glm::dmat4& to_world, Storage storage, const Frame& f
   to_local_ = glm::dmat4(inverse);
 }
 
-Placement Placement::in(const Frame& frame) const {
-  Placement copy = *this;
+StoredSpace StoredSpace::in(const Frame& frame) const {
+  StoredSpace copy = *this;
   copy.frame_ = frame;
   return copy;
 }
 
-glm::dvec3 Placement::world(const glm::dvec3& stored) const {
+glm::dvec3 StoredSpace::world(const glm::dvec3& stored) const {
   glm::dvec3 result;
   for (int row = 0; row < 3; ++row) {
     result[row] =
@@ -77,18 +77,18 @@ glm::dvec3 Placement::world(const glm::dvec3& stored) const {
   return result;
 }
 
-std::vector<glm::dvec3> Placement::frame(std::span<const glm::dvec3> stored) const {
+std::vector<glm::dvec3> StoredSpace::frame(std::span<const glm::dvec3> stored) const {
   std::vector<glm::dvec3> result(stored.size());
   for (std::size_t i = 0; i < stored.size(); ++i) result[i] = frame(stored[i]);
   return result;
 }
 
-glm::dvec3 Placement::store(const glm::dvec3& in_frame) const {
+glm::dvec3 StoredSpace::store(const glm::dvec3& in_frame) const {
   const glm::dvec3 local = glm::dmat3(to_local_) * (frame_.to_world(in_frame) - glm::dvec3(to_world_[3]));
   return storage_ == Storage::float32 ? rounded_to_float32(local) : local;
 }
 
-double Placement::mapping_error(std::span<const glm::dvec3> stored) const {
+double StoredSpace::mapping_error(std::span<const glm::dvec3> stored) const {
   glm::dvec3 extent{0};
   for (const glm::dvec3& p : stored) extent = glm::max(extent, glm::abs(p));
   double largest = 0;
@@ -102,7 +102,7 @@ double Placement::mapping_error(std::span<const glm::dvec3> stored) const {
   return 11 * kUnitRoundoff * largest * frame_.scale();
 }
 
-double Placement::storage_step(std::span<const glm::dvec3> stored) const {
+double StoredSpace::storage_step(std::span<const glm::dvec3> stored) const {
   // A position is off by half a unit in the last place a coordinate; store()'s own arithmetic by less than
   // mapping_error() over the condition of the matrix, which only matters for float64 and is covered by its factor.
   const double half_ulp = storage_ == Storage::float32 ? 0x1p-24 : 8 * kUnitRoundoff;
@@ -118,8 +118,8 @@ double Placement::storage_step(std::span<const glm::dvec3> stored) const {
   return std::sqrt(step) * frame_.scale();
 }
 
-double reference_size(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> triangles,
-                      const glm::dmat4& to_world) {
+double longest_diagonal(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> triangles,
+                        const glm::dmat4& to_world) {
   const std::vector<bool> used = used_vertices(stored.size(), triangles);
   Box box;
   for (std::size_t i = 0; i < stored.size(); ++i) {

@@ -39,13 +39,13 @@ double rounded_to_float32(double x);
 glm::dvec3 rounded_to_float32(const glm::dvec3& p);
 
 /// Where one array of vertices lives.
-class Placement {
+class StoredSpace {
  public:
   /// Throws InvalidInput unless `to_world` is finite, affine and invertible.
-  Placement(const glm::dmat4& to_world, Storage storage, const Frame& frame = {});
+  StoredSpace(const glm::dmat4& to_world, Storage storage, const Frame& frame = {});
 
   /// The same array seen from another frame.
-  Placement in(const Frame& frame) const;
+  StoredSpace in(const Frame& frame) const;
 
   glm::dvec3 world(const glm::dvec3& stored) const;
   glm::dvec3 frame(const glm::dvec3& stored) const { return frame_.from_world(world(stored)); }
@@ -74,7 +74,7 @@ class Placement {
 
 /// What 100 % means: the longest of the four diagonals of the local bounding box of the used vertices, after
 /// `to_world`. Throws InvalidInput when it is zero (all vertices at one point).
-double reference_size(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> triangles,
-                      const glm::dmat4& to_world);
+double longest_diagonal(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> triangles,
+                        const glm::dmat4& to_world);
 
 }  // namespace tolvol

@@ -67,7 +67,7 @@ class Hierarchy {
   /// visit(index) for every triangle within `radius` (inclusive) of p, and for some that are not: those whose box is.
   /// A visit that returns false is the last one; it may also return nothing.
   template <class Visit>
-  void near(const glm::dvec3& p, double radius, Visit&& visit) const;
+  void for_each_within(const glm::dvec3& p, double radius, Visit&& visit) const;
 
   std::size_t size() const { return place_.size(); }
 
@@ -150,7 +150,7 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
 }
 
 template <class Visit>
-void Hierarchy::near(const glm::dvec3& p, double radius, Visit&& visit) const {
+void Hierarchy::for_each_within(const glm::dvec3& p, double radius, Visit&& visit) const {
   const auto goes_on = [&](std::uint32_t triangle) {
     if constexpr (std::is_same_v<decltype(visit(triangle)), bool>) {
       return visit(triangle);

@@ -6,7 +6,7 @@
 
 namespace tolvol::gl {
 
-/// By file name, as in "lattice.vert"; without a #version line. Throws std::logic_error for a name that is not there.
+/// By file name, as in "samples.vert"; without a #version line. Throws std::logic_error for a name that is not there.
 std::string_view shader_source(std::string_view file);
 
 }  // namespace tolvol::gl

@@ -156,7 +156,7 @@ DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, cons
 
   Below below(piece, c, t, nearest.point);
   int seen = 0;
-  hierarchy.near(c, d + 2 * r, [&](std::uint32_t i) {
+  hierarchy.for_each_within(c, d + 2 * r, [&](std::uint32_t i) {
     if (++seen > kMostTriangles) return false;
     below.add(triangle(i));
     return true;

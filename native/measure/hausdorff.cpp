@@ -254,7 +254,8 @@ class Search {
 
   double certified_distance(const dvec3& p) const {
     double bound = hierarchy_.nearest(p).distance;
-    hierarchy_.near(p, bound, [&](std::uint32_t i) { bound = std::min(bound, separation(p, corners(b_, i), bound)); });
+    hierarchy_.for_each_within(p, bound,
+                               [&](std::uint32_t i) { bound = std::min(bound, separation(p, corners(b_, i), bound)); });
     return bound;
   }
 

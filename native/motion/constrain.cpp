@@ -3,19 +3,19 @@
 
 #include "base/call.h"
 #include "base/errors.h"
-#include "check/input.h"
+#include "check/input_checks.h"
 
 namespace tolvol {
 
 ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const glm::dvec3> after,
-                          std::span<const std::uint32_t> faces, int corners, const Placement& placement,
+                          std::span<const std::uint32_t> faces, int corners, const StoredSpace& space,
                           const ToleranceVolume& volume, const ConstrainOptions& options) {
   if (before.size() != after.size()) {
     throw InvalidInput("before has " + std::to_string(before.size()) + " vertices and after " +
                        std::to_string(after.size()) + "; both must be the same ones");
   }
   const Call call(options.progress);
-  PullBack pull_back(volume, placement, faces, corners, before.size(), options.threads);
+  PullBack pull_back(volume, space, faces, corners, before.size(), options.threads);
   const MovingMesh::Start start = pull_back.start(before, options.progress);
   ConstrainResult result;
   result.outside_faces = start.outside.size();

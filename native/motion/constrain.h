@@ -45,7 +45,7 @@ struct ConstrainResult {
 /// Outside::keep) and where the stored type cannot hold the tolerance; Cancelled. About 1 us a vertex to certify
 /// `before`; then see PullBack::move.
 ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const glm::dvec3> after,
-                          std::span<const std::uint32_t> faces, int corners, const Placement& placement,
+                          std::span<const std::uint32_t> faces, int corners, const StoredSpace& space,
                           const ToleranceVolume& volume, const ConstrainOptions& options = {});
 
 }  // namespace tolvol

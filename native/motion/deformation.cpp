@@ -11,7 +11,7 @@
 #include "base/errors.h"
 #include "base/parallel.h"
 #include "check/certificate.h"
-#include "check/input.h"
+#include "check/input_checks.h"
 #include "motion/constrain.h"
 
 namespace tolvol {
@@ -27,12 +27,12 @@ using Mode = DeformationOptions::Mode;
 class Deformation {
  public:
   Deformation(std::span<const glm::dvec3> vertices, std::span<const std::uint32_t> faces, int corners,
-              const Placement& placement, const ToleranceVolume* volume, const LatticeDeformation& lattice,
+              const StoredSpace& space, const ToleranceVolume* volume, const LatticeDeformation& lattice,
               const DeformationOptions& options)
       : before_(vertices),
         faces_(faces),
         corners_(static_cast<std::size_t>(corners)),
-        placement_(volume ? placement.in(volume->frame()) : placement),
+        space_(volume ? space.in(volume->frame()) : space),
         volume_(volume),
         lattice_(lattice),
         options_(options) {
@@ -59,7 +59,7 @@ class Deformation {
     } else {
       result_.vertices = after_;
     }
-    const Placement world = placement_.in({});
+    const StoredSpace world = space_.in({});
     for (std::size_t i = 0; i < before_.size(); ++i) {
       if (result_.vertices[i] == before_[i]) continue;
       ++result_.moved;
@@ -72,7 +72,7 @@ class Deformation {
  private:
   void carry() {
     if (options_.progress) options_.progress->begin("deforming");
-    const Placement world = placement_.in({});
+    const StoredSpace world = space_.in({});
     after_.assign(before_.begin(), before_.end());
     std::atomic<std::size_t> outside{0};
     parallel_for(after_.size(), kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
@@ -108,7 +108,7 @@ class Deformation {
 
   void warn_of_rounding() {
     for (const std::span<const glm::dvec3> stored : {before_, std::span<const glm::dvec3>(after_)}) {
-      const std::optional<std::string> warning = storage_warning(*volume_, placement_, stored);
+      const std::optional<std::string> warning = storage_warning(*volume_, space_, stored);
       if (warning && result_.warnings.empty()) result_.warnings.push_back(*warning);
     }
   }
@@ -134,7 +134,7 @@ class Deformation {
     if (options_.outside == DeformationOptions::Outside::keep) options.outside = ConstrainOptions::Outside::keep;
     options.threads = options_.threads, options.progress = options_.progress;
     result_.vertices =
-        constrain(before_, after_, faces_, static_cast<int>(corners_), placement_, *volume_, options).vertices;
+        constrain(before_, after_, faces_, static_cast<int>(corners_), space_, *volume_, options).vertices;
   }
 
   void search(std::vector<std::uint32_t> failing) {
@@ -173,7 +173,7 @@ class Deformation {
     for (std::size_t i = 0; i < state.size(); ++i) {
       if (after_[i] == before_[i]) continue;
       const glm::dvec3 p = before_[i] + share * (after_[i] - before_[i]);
-      state[i] = placement_.storage() == Storage::float32 ? rounded_to_float32(p) : p;
+      state[i] = space_.storage() == Storage::float32 ? rounded_to_float32(p) : p;
     }
     return state;
   }
@@ -197,10 +197,10 @@ class Deformation {
                                         std::span<const std::uint32_t> faces) const {
     std::vector<glm::dvec3> points(stored.size());
     parallel_for(points.size(), kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) points[i] = placement_.frame(stored[i]);
+      for (std::size_t i = begin; i < end; ++i) points[i] = space_.frame(stored[i]);
     });
     const std::vector<Verdict> verdicts =
-        certificate_->check({points, faces, static_cast<int>(corners_), placement_.mapping_error(stored)},
+        certificate_->check({points, faces, static_cast<int>(corners_), space_.mapping_error(stored)},
                             {options_.threads, options_.progress});
     std::vector<std::uint32_t> result;
     for (std::uint32_t i = 0; i < verdicts.size(); ++i) {
@@ -219,7 +219,7 @@ class Deformation {
   std::span<const glm::dvec3> before_;
   std::span<const std::uint32_t> faces_;
   std::size_t corners_;
-  Placement placement_;
+  StoredSpace space_;
   const ToleranceVolume* volume_;
   const LatticeDeformation& lattice_;
   const DeformationOptions& options_;
@@ -232,10 +232,10 @@ class Deformation {
 }  // namespace
 
 DeformationResult deform(std::span<const glm::dvec3> vertices, std::span<const std::uint32_t> faces, int corners,
-                         const Placement& placement, const ToleranceVolume* volume, const LatticeDeformation& lattice,
+                         const StoredSpace& space, const ToleranceVolume* volume, const LatticeDeformation& lattice,
                          const DeformationOptions& options) {
   const Call call(options.progress);
-  return Deformation(vertices, faces, corners, placement, volume, lattice, options).run();
+  return Deformation(vertices, faces, corners, space, volume, lattice, options).run();
 }
 
 }  // namespace tolvol

@@ -58,7 +58,7 @@ struct DeformationResult {
 /// tolerance; Cancelled. About 0.4 us a vertex, and with a volume one check; when that fails some twelve, or
 /// constrain().
 DeformationResult deform(std::span<const glm::dvec3> vertices, std::span<const std::uint32_t> faces, int corners,
-                         const Placement& placement, const ToleranceVolume* volume, const LatticeDeformation& lattice,
+                         const StoredSpace& space, const ToleranceVolume* volume, const LatticeDeformation& lattice,
                          const DeformationOptions& options);
 
 }  // namespace tolvol

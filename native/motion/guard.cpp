@@ -7,7 +7,7 @@
 #include "base/call.h"
 #include "base/errors.h"
 #include "base/parallel.h"
-#include "check/input.h"
+#include "check/input_checks.h"
 
 namespace tolvol {
 namespace {
@@ -26,7 +26,7 @@ Guard::Guard(std::span<const float> positions, std::vector<std::uint32_t> faces,
     : faces_(std::move(faces)),
       last_(positions.size()),
       options_(options),
-      pull_back_(volume, Placement(to_world, Storage::float32), faces_, corners, positions.size() / 3,
+      pull_back_(volume, StoredSpace(to_world, Storage::float32), faces_, corners, positions.size() / 3,
                  options.threads) {
   begin(positions, options.progress);
 }

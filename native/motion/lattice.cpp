@@ -28,7 +28,7 @@ constexpr double kKnotGap = 1e-9;
 /// Newton's method takes four; halving alone would end after as many as a double has bits.
 constexpr int kSteps = 64;
 
-Placement domain_placement(const glm::dmat4& domain) {
+StoredSpace domain_space(const glm::dmat4& domain) {
   try {
     return {domain, Storage::float64};
   } catch (const InvalidInput&) {
@@ -112,13 +112,13 @@ std::vector<double> clamped_knots(const std::string& name, unsigned size, unsign
 
 std::vector<glm::dvec3> rest_points(const glm::uvec3& size, const glm::dmat4& domain) {
   for (int axis = 0; axis < 3; ++axis) check_size(kAxisNames[axis], size[axis]);
-  const Placement placement = domain_placement(domain);
+  const StoredSpace space = domain_space(domain);
   const glm::dvec3 last = glm::dvec3(size) - 1.0;
   std::vector<glm::dvec3> result;
   result.reserve(std::size_t{size.x} * size.y * size.z);
   for (unsigned i = 0; i < size.x; ++i) {
     for (unsigned j = 0; j < size.y; ++j) {
-      for (unsigned k = 0; k < size.z; ++k) result.push_back(placement.world(glm::dvec3(i, j, k) / last));
+      for (unsigned k = 0; k < size.z; ++k) result.push_back(space.world(glm::dvec3(i, j, k) / last));
     }
   }
   return result;
@@ -204,7 +204,7 @@ LatticeAxis::Support LatticeAxis::at(double x) const {
 
 LatticeDeformation::LatticeDeformation(const Lattice& lattice)
     : size_(lattice.size),
-      domain_(domain_placement(lattice.domain)),
+      domain_(domain_space(lattice.domain)),
       axes_{LatticeAxis(kAxisNames[0], lattice.size.x, lattice.degree.x, lattice.knots[0]),
             LatticeAxis(kAxisNames[1], lattice.size.y, lattice.degree.y, lattice.knots[1]),
             LatticeAxis(kAxisNames[2], lattice.size.z, lattice.degree.z, lattice.knots[2])} {

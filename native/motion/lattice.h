@@ -73,7 +73,7 @@ class LatticeDeformation {
 
  private:
   glm::uvec3 size_;
-  Placement domain_;
+  StoredSpace domain_;
   std::array<LatticeAxis, 3> axes_;
   std::vector<glm::dvec4> moved_;  // per point: its motion times its weight, and the weight
   std::vector<glm::dvec4> rest_;   // per point: its place in the box times its weight; empty when all weights are equal

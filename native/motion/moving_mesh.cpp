@@ -12,7 +12,7 @@
 #include "base/call.h"
 #include "base/errors.h"
 #include "base/parallel.h"
-#include "check/input.h"
+#include "check/input_checks.h"
 
 namespace tolvol {
 namespace {
@@ -72,10 +72,10 @@ std::vector<std::uint32_t> chosen(std::span<const std::uint32_t> from, std::span
 
 }  // namespace
 
-MovingMesh::MovingMesh(const ToleranceVolume& volume, const Placement& placement, std::span<const std::uint32_t> faces,
+MovingMesh::MovingMesh(const ToleranceVolume& volume, const StoredSpace& space, std::span<const std::uint32_t> faces,
                        int corners, std::size_t vertex_count, unsigned threads)
     : volume_(&volume),
-      placement_(placement.in(volume.frame())),
+      space_(space.in(volume.frame())),
       faces_(faces),
       corners_(static_cast<std::size_t>(corners)),
       threads_(threads) {
@@ -116,27 +116,26 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress
     if (!finite(stored[v])) refuse("vertex", v, stored[v], "is not finite");
     if (!ring(v).empty()) extremes.push_back(stored[v]);
   }
-  Start result{{}, storage_warning(*volume_, placement_, extremes)};
+  Start result{{}, storage_warning(*volume_, space_, extremes)};
   // Vertices may end up anywhere in the volume. The error grows no faster than the distance, so that twice the volume
   // leaves no room for a point that only seems to be in it.
   const double reach = 2 * (1 + volume_->frame_tolerance());
   for (int corner = 0; corner < 8; ++corner) {
-    extremes.push_back(
-        placement_.store(reach * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1)));
+    extremes.push_back(space_.store(reach * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1)));
   }
-  const double mapping_error = placement_.mapping_error(extremes);
+  const double mapping_error = space_.mapping_error(extremes);
   provable_ = volume_->provable(mapping_error);
-  within_ = provable_ * (1 - kHeadroom);
+  limit_ = provable_ * (1 - kHeadroom);
   certificates_.clear();
-  for (const double within : {provable_, within_}) {
-    certificates_.emplace_back(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within,
+  for (const double limit : {provable_, limit_}) {
+    certificates_.emplace_back(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), limit,
                                volume_->refutable(mapping_error));
   }
 
   state_.resize(stored.size());
   if (progress) progress->begin("checking");
   const std::size_t offender = first_of(stored.size(), threads_, [&](std::size_t v) {
-    state_[v] = {placement_.frame(stored[v]), {}};
+    state_[v] = {space_.frame(stored[v]), {}};
     return !finite(state_[v].at) && !ring(static_cast<std::uint32_t>(v)).empty();
   });
   if (offender < stored.size()) {
@@ -194,23 +193,23 @@ std::vector<std::uint32_t> MovingMesh::faces_around(std::span<const std::uint32_
   return faces;
 }
 
-MovingMesh::Near MovingMesh::near(const glm::dvec3& at) const {
+MovingMesh::PointBound MovingMesh::bound_at(const glm::dvec3& at) const {
   const double box = 1 + 2 * volume_->frame_tolerance();
   // Written so that NaN is outside.
   if (!(std::abs(at.x) <= box && std::abs(at.y) <= box && std::abs(at.z) <= box)) return {kFar};
-  const Near found = certificates_.front().nearest(at, kKnown * provable_);
-  return found.triangle == Hierarchy::kNone ? Near{kFar} : found;
+  const PointBound found = certificates_.front().nearest(at, kKnown * provable_);
+  return found.triangle == Hierarchy::kNone ? PointBound{kFar} : found;
 }
 
-MovingMesh::Near MovingMesh::near(std::uint32_t vertex, const glm::dvec3& at, Trial trial) {
-  if (refusals_.empty()) return near(at);
+MovingMesh::PointBound MovingMesh::bound_at(std::uint32_t vertex, const glm::dvec3& at, Aim aim) {
+  if (refusals_.empty()) return bound_at(at);
   std::array<Refusal, 2>& known = refusals_[vertex];
   for (const Refusal& r : known) {
     if (glm::length(at - r.at) < r.margin) return {kFar};
   }
-  const Near found = near(at);
+  const PointBound found = bound_at(at);
   const double room = std::min(found.distance, kKnown * provable_) - provable_;
-  if (room > 0) known[static_cast<std::size_t>(trial)] = {at, room - kRounding};
+  if (room > 0) known[static_cast<std::size_t>(aim)] = {at, room - kRounding};
   return found;
 }
 
@@ -219,20 +218,20 @@ double MovingMesh::reach_by_motion(std::uint32_t face) const {
   for (const std::uint32_t v : corners_of(face)) step = std::max(step, step_[v]);
   if (step == 0) return reach_[face];
   const double reach = (reach_[face] + step) * (1 + kInflate);
-  return reach <= kEasy * within_ ? reach : kUnproved;
+  return reach <= kEasy * limit_ ? reach : kUnproved;
 }
 
 /// The largest of bound(corners, distances, triangles near them) over the triangles that the face may consist of.
 template <class Bound>
 double MovingMesh::over_triangulations(std::uint32_t face, Bound&& bound) const {
   const auto corner = corners_of(face);
-  const std::vector<Spot>& spots = trial_;
+  const std::vector<VertexState>& states = trial_;
   double largest = 0;
   for (const auto& [a, b, c] : triangles_of(static_cast<int>(corners_))) {
-    const Spot &p = spots[corner[a]], &q = spots[corner[b]], &r = spots[corner[c]];
+    const VertexState &p = states[corner[a]], &q = states[corner[b]], &r = states[corner[c]];
     const glm::dvec3 corners[3] = {p.at, q.at, r.at};
-    const double bounded = bound(corners, glm::dvec3(p.near.distance, q.near.distance, r.near.distance),
-                                 glm::uvec3(p.near.triangle, q.near.triangle, r.near.triangle));
+    const double bounded = bound(corners, glm::dvec3(p.bound.distance, q.bound.distance, r.bound.distance),
+                                 glm::uvec3(p.bound.triangle, q.bound.triangle, r.bound.triangle));
     if (bounded == kUnproved) return kUnproved;
     largest = std::max(largest, bounded);
   }
@@ -241,14 +240,14 @@ double MovingMesh::over_triangulations(std::uint32_t face, Bound&& bound) const 
 
 double MovingMesh::reach_by_certificate(std::uint32_t face) const {
   for (const std::uint32_t v : corners_of(face)) {
-    if (trial_[v].near.distance > within_) return kUnproved;
+    if (trial_[v].bound.distance > limit_) return kUnproved;
   }
   // First as Certificate decides, so that it proves the face again; then the headroom.
   double reach = kUnproved;
   for (const TriangleCertificate& certificate : certificates_) {
     reach =
         over_triangulations(face, [&](const auto&... triangle) { return certificate.bound_in_any_order(triangle...); });
-    if (reach <= within_ || reach == kUnproved) break;
+    if (reach <= limit_ || reach == kUnproved) break;
   }
   return reach;
 }
@@ -257,16 +256,16 @@ void MovingMesh::measure(std::span<const std::uint32_t> faces, Progress* progres
   std::vector<std::uint32_t> unknown;
   for (const std::uint32_t f : faces) {
     for (const std::uint32_t v : corners_of(f)) {
-      if (trial_[v].near.distance != kUnknown) continue;
-      trial_[v].near.distance = kFar;  // once each
+      if (trial_[v].bound.distance != kUnknown) continue;
+      trial_[v].bound.distance = kFar;  // once each
       unknown.push_back(v);
     }
   }
   parallel_for(unknown.size(), kSmallBlock, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(progress->fraction());
     for (std::size_t i = begin; i < end; ++i) {
-      Spot& spot = trial_[unknown[i]];
-      spot.near = near(unknown[i], spot.at, Trial::wish);
+      VertexState& state = trial_[unknown[i]];
+      state.bound = bound_at(unknown[i], state.at, Aim::wish);
     }
   });
 }
@@ -293,7 +292,7 @@ void MovingMesh::try_all(std::span<const std::uint32_t> vertices, std::span<cons
   const std::size_t offender = first_of(vertices.size(), threads_, [&](std::size_t i) {
     const std::uint32_t v = vertices[i];
     if (frozen_[v]) return !finite(after[i]);
-    try_at(v, placement_.frame(after[i]), {});
+    try_at(v, space_.frame(after[i]), {});
     return !finite(after[i] - before[i]) || !finite(trial_[v].at) || !std::isfinite(step_[v]);
   });
   if (offender == vertices.size()) return;
@@ -302,22 +301,22 @@ void MovingMesh::try_all(std::span<const std::uint32_t> vertices, std::span<cons
          finite(after[offender]) ? "is too far away for double precision" : "is not finite");
 }
 
-void MovingMesh::try_at(std::uint32_t vertex, const glm::dvec3& at, const Near& near) {
+void MovingMesh::try_at(std::uint32_t vertex, const glm::dvec3& at, const PointBound& bound) {
   // What is known of a place must not depend on how one got there: a guess would do for a shorter distance.
-  set_trial(vertex, {at, certificates_.front().leaves_room(near.distance) ? Near{} : near});
+  set_trial(vertex, {at, certificates_.front().leaves_room(bound.distance) ? PointBound{} : bound});
 }
 
-void MovingMesh::set_trial(std::uint32_t vertex, const Spot& spot) {
-  trial_[vertex] = spot;
-  step_[vertex] = glm::length(spot.at - state_[vertex].at);
+void MovingMesh::set_trial(std::uint32_t vertex, const VertexState& state) {
+  trial_[vertex] = state;
+  step_[vertex] = glm::length(state.at - state_[vertex].at);
 }
 
 bool MovingMesh::try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint32_t& blame) {
-  const Spot from = trial_[vertex];
+  const VertexState from = trial_[vertex];
   if (at == from.at) return true;
-  const Near there = near(vertex, at, Trial::ahead);
+  const PointBound there = bound_at(vertex, at, Aim::ahead);
   const double step = step_[vertex];
-  if (there.distance > within_) return false;
+  if (there.distance > limit_) return false;
   set_trial(vertex, {at, there});
   const auto faces = ring(vertex);
   thread_local std::vector<double> reach;

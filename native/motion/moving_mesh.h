@@ -26,7 +26,7 @@ class MovingMesh {
 
   /// What is known of the way from a place to the reference: the distance is kUnknown until it is asked for, and huge,
   /// with no triangle, far beyond the tolerance.
-  using Near = TriangleCertificate::Near;
+  using PointBound = TriangleCertificate::PointBound;
 
   struct Start {
     std::vector<std::uint32_t> outside;  ///< faces that are not proved inside, ascending: their vertices never move
@@ -35,8 +35,8 @@ class MovingMesh {
 
   /// `faces`: `corners` (1 to 4) indices a face, as in Pieces. Keeps references to `volume` and `faces`. Throws
   /// InvalidInput for an index that is not below `vertex_count`. O(n + m).
-  MovingMesh(const ToleranceVolume& volume, const Placement& placement, std::span<const std::uint32_t> faces,
-             int corners, std::size_t vertex_count, unsigned threads);
+  MovingMesh(const ToleranceVolume& volume, const StoredSpace& space, std::span<const std::uint32_t> faces, int corners,
+             std::size_t vertex_count, unsigned threads);
 
   /// Takes the stored positions as state and trial. Throws InvalidInput for a position that is not finite, and where
   /// the stored type cannot hold the tolerance. About 1 us a vertex; nothing for faces of the reference itself.
@@ -46,8 +46,8 @@ class MovingMesh {
   /// for the first position that is not finite.
   void try_all(std::span<const std::uint32_t> vertices, std::span<const glm::dvec3> before,
                std::span<const glm::dvec3> after);
-  /// `near`: what is known there.
-  void try_at(std::uint32_t vertex, const glm::dvec3& at, const Near& near);
+  /// `bound`: what is known there.
+  void try_at(std::uint32_t vertex, const glm::dvec3& at, const PointBound& bound);
   void take_back(std::uint32_t vertex) { trial_[vertex] = state_[vertex], step_[vertex] = 0; }
   /// Which of these faces are not inside on trial. Every face must be asked about after the last change to a corner.
   /// Settled ones cost about 10 ns each, those near the tolerance 0.1 us to many.
@@ -65,22 +65,22 @@ class MovingMesh {
   /// against the limit again and again. It saves searches and changes no answer.
   void remember_refusals() { refusals_.resize(state_.size()); }
   /// The distance itself where the grid's guess leaves little room.
-  Near near(const glm::dvec3& at) const;
+  PointBound bound_at(const glm::dvec3& at) const;
   /// The same of a place where a vertex is tried, on its wish or a little ahead of where it is.
-  enum class Trial { wish, ahead };
-  Near near(std::uint32_t vertex, const glm::dvec3& at, Trial trial);
+  enum class Aim { wish, ahead };
+  PointBound bound_at(std::uint32_t vertex, const glm::dvec3& at, Aim aim);
   /// Whether that is the distance itself, and not a guess or nothing.
-  bool is_exact(const Near& near) const {
-    return near.distance != kUnknown && !certificates_.front().leaves_room(near.distance);
+  bool is_exact(const PointBound& bound) const {
+    return bound.distance != kUnknown && !certificates_.front().leaves_room(bound.distance);
   }
-  const Near& near_state(std::uint32_t vertex) const { return state_[vertex].near; }
-  const Near& near_trial(std::uint32_t vertex) const { return trial_[vertex].near; }
+  const PointBound& bound_of_state(std::uint32_t vertex) const { return state_[vertex].bound; }
+  const PointBound& bound_of_trial(std::uint32_t vertex) const { return trial_[vertex].bound; }
   double step(std::uint32_t vertex) const { return step_[vertex]; }  ///< length from state to trial
   bool frozen(std::uint32_t vertex) const { return frozen_[vertex]; }
   bool any_frozen() const { return any_frozen_; }
-  double within() const { return within_; }  ///< the provable distance less a headroom
+  double limit() const { return limit_; }  ///< the provable distance less a headroom
   const ToleranceVolume& volume() const { return *volume_; }
-  const Placement& placement() const { return placement_; }
+  const StoredSpace& space() const { return space_; }
   unsigned threads() const { return threads_; }
 
   std::span<const std::uint32_t> corners_of(std::uint32_t face) const {
@@ -93,9 +93,9 @@ class MovingMesh {
   std::vector<std::uint32_t> faces_around(std::span<const std::uint32_t> vertices);
 
  private:
-  struct Spot {
+  struct VertexState {
     glm::dvec3 at;
-    Near near;  ///< the distance is kFar far beyond the tolerance
+    PointBound bound;  ///< the distance is kFar far beyond the tolerance
   };
 
   /// No point of the reference is within the tolerance of any place nearer to `at` than `margin`.
@@ -109,7 +109,7 @@ class MovingMesh {
   static constexpr double kUnproved = TriangleCertificate::kUnproved;
 
   void make_rings(std::size_t vertex_count);
-  void set_trial(std::uint32_t vertex, const Spot& spot);
+  void set_trial(std::uint32_t vertex, const VertexState& state);
   bool is_own(std::uint32_t face) const;
   double reach_by_motion(std::uint32_t face) const;
   template <class Bound>
@@ -117,16 +117,16 @@ class MovingMesh {
   double reach_by_certificate(std::uint32_t face) const;
 
   const ToleranceVolume* volume_;
-  Placement placement_;
+  StoredSpace space_;
   std::span<const std::uint32_t> faces_;
   std::size_t corners_;
   unsigned threads_;
   std::vector<std::uint32_t> ring_start_, ring_;  // vertex -> its faces
   std::vector<bool> frozen_;
   bool any_frozen_ = false;
-  double provable_ = 0, within_ = 0;               // what the certificate decides by, and what of it is used
+  double provable_ = 0, limit_ = 0;                // what the certificate decides by, and what of it is used
   std::vector<TriangleCertificate> certificates_;  // for the two; none before start()
-  std::vector<Spot> state_, trial_;
+  std::vector<VertexState> state_, trial_;
   std::vector<double> step_;
   std::vector<std::array<Refusal, 2>> refusals_;  // per vertex and Trial, the last; none unless remembered
   std::vector<double> reach_, trial_reach_;       // per face: no point of it is farther from the reference

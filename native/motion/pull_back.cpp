@@ -31,9 +31,9 @@ constexpr std::size_t kBlock = 32;  // vertices, for work of some us each
 
 }  // namespace
 
-PullBack::PullBack(const ToleranceVolume& volume, const Placement& placement, std::span<const std::uint32_t> faces,
+PullBack::PullBack(const ToleranceVolume& volume, const StoredSpace& space, std::span<const std::uint32_t> faces,
                    int corners, std::size_t vertex_count, unsigned threads)
-    : mesh_(volume, placement, faces, corners, vertex_count, threads), held_index_(vertex_count, kNone) {}
+    : mesh_(volume, space, faces, corners, vertex_count, threads), held_index_(vertex_count, kNone) {}
 
 MovingMesh::Start PullBack::start(std::span<const glm::dvec3> stored, Progress* progress) {
   held_index_.assign(stored.size(), kNone);
@@ -89,7 +89,7 @@ std::vector<PullBack::Held> PullBack::hold(const Moving& moving, std::span<const
         if (mesh_.step(v) == 0) continue;
         const auto place =
             std::lower_bound(moving.vertices.begin(), moving.vertices.end(), v) - moving.vertices.begin();
-        held.push_back({v, before[place], after[place], mesh_.near_trial(v), mesh_.step(v)});
+        held.push_back({v, before[place], after[place], mesh_.bound_of_trial(v), mesh_.step(v)});
         mesh_.take_back(v);
         back.push_back(v);
       }
@@ -104,26 +104,26 @@ glm::dvec3 PullBack::stored_at(const Held& held, double factor) const {
   if (factor >= 1) return held.after;
   if (factor <= 0) return held.before;
   const glm::dvec3 p = held.before + factor * (held.after - held.before);
-  return mesh_.placement().storage() == Storage::float32 ? rounded_to_float32(p) : p;
+  return mesh_.space().storage() == Storage::float32 ? rounded_to_float32(p) : p;
 }
 
 void PullBack::place(Held& held, const Along& along) {
   held.factor = along.factor;
-  mesh_.try_at(held.vertex, mesh_.placement().frame(stored_at(held, along.factor)), along.near);
+  mesh_.try_at(held.vertex, mesh_.space().frame(stored_at(held, along.factor)), along.bound);
 }
 
 /// Where the vertex itself is about `target` from the reference, at the most, between a place where it is nearer and
 /// one where it is farther: false position, in which an end that stays twice counts half (Illinois).
 PullBack::Along PullBack::crossing(const Held& held, double target, Along inner, Along outer) const {
-  const double close = kClose * mesh_.within(), aim = target - close / 2;
-  double inner_excess = inner.near.distance - aim, outer_excess = outer.near.distance - aim;
+  const double close = kClose * mesh_.limit(), aim = target - close / 2;
+  double inner_excess = inner.bound.distance - aim, outer_excess = outer.bound.distance - aim;
   bool was_outside = false;
-  for (int i = 0; i < kCrossings && inner.near.distance < target - close; ++i) {
+  for (int i = 0; i < kCrossings && inner.bound.distance < target - close; ++i) {
     const double factor = inner.factor + (outer.factor - inner.factor) * inner_excess / (inner_excess - outer_excess);
-    const Along next = along(held, factor, inner.near.triangle);
-    const bool outside = !(next.near.distance <= target), stays_twice = i > 0 && was_outside == outside;
+    const Along next = along(held, factor, inner.bound.triangle);
+    const bool outside = !(next.bound.distance <= target), stays_twice = i > 0 && was_outside == outside;
     (outside ? outer : inner) = next;
-    (outside ? outer_excess : inner_excess) = next.near.distance - aim;
+    (outside ? outer_excess : inner_excess) = next.bound.distance - aim;
     if (stays_twice) (outside ? inner_excess : outer_excess) /= 2;
     was_outside = outside;
   }
@@ -132,7 +132,7 @@ PullBack::Along PullBack::crossing(const Held& held, double target, Along inner,
 
 /// A place on the way, and the distance there however far it is.
 PullBack::Along PullBack::along(const Held& held, double factor, std::uint32_t hint) const {
-  const glm::dvec3 at = mesh_.placement().frame(stored_at(held, factor));
+  const glm::dvec3 at = mesh_.space().frame(stored_at(held, factor));
   if (hint == Hierarchy::kNone) hint = mesh_.volume().grid().triangle_near(at);
   const Hierarchy::Nearest nearest =
       mesh_.volume().hierarchy().nearest(at, std::numeric_limits<double>::infinity(), hint);
@@ -141,37 +141,37 @@ PullBack::Along PullBack::along(const Held& held, double factor, std::uint32_t h
 
 /// Finds where the vertex leaves the volume if nothing else held it, and puts it a little before that.
 void PullBack::release(Held& held, Mode mode) {
-  const double within = mesh_.within();
-  if (held.wish.distance <= within) {
-    held.limit = 1;
+  const double limit = mesh_.limit();
+  if (held.wish.distance <= limit) {
+    held.largest_factor = 1;
     return place(held, {1, held.wish});
   }
   // A wish at the end of the world tells nothing: all of the volume is in this box.
   const double box = 1 + 2 * mesh_.volume().frame_tolerance();
-  const glm::dvec3 from = mesh_.state(held.vertex), way = mesh_.placement().frame(held.after) - from;
+  const glm::dvec3 from = mesh_.state(held.vertex), way = mesh_.space().frame(held.after) - from;
   double exit = 1;
   for (int k = 0; k < 3; ++k) {
     if (way[k] != 0) exit = std::min(exit, std::max(0.0, (std::copysign(box, way[k]) - from[k]) / way[k]));
   }
-  Along start{0, mesh_.near_state(held.vertex)};
-  if (!mesh_.is_exact(start.near)) start = along(held, 0, start.near.triangle);
+  Along start{0, mesh_.bound_of_state(held.vertex)};
+  if (!mesh_.is_exact(start.bound)) start = along(held, 0, start.bound.triangle);
   Along inner = start;
-  held.limit = 0;
+  held.largest_factor = 0;
   const double comfort = mode == Mode::settle ? kSettled : kComfort;
-  if (mode == Mode::settle && !(start.near.distance < kSettled * within)) {
-    const double factor = std::min(kLast * within / held.length, exit);
-    const glm::dvec3 ahead = mesh_.placement().frame(stored_at(held, factor));
-    inner = {factor, mesh_.near(held.vertex, ahead, MovingMesh::Trial::ahead)};
-    if (inner.near.distance > within) return place(held, start);
+  if (mode == Mode::settle && !(start.bound.distance < kSettled * limit)) {
+    const double factor = std::min(kLast * limit / held.length, exit);
+    const glm::dvec3 ahead = mesh_.space().frame(stored_at(held, factor));
+    inner = {factor, mesh_.bound_at(held.vertex, ahead, MovingMesh::Aim::ahead)};
+    if (inner.bound.distance > limit) return place(held, start);
   }
   const bool known = exit == 1 && held.wish.triangle != Hierarchy::kNone;
-  const Along outer = known ? Along{1, held.wish} : along(held, exit, inner.near.triangle);
+  const Along outer = known ? Along{1, held.wish} : along(held, exit, inner.bound.triangle);
   Along end = start;
-  if (inner.near.distance < comfort * within) end = crossing(held, kComfort * within, inner, outer);
+  if (inner.bound.distance < comfort * limit) end = crossing(held, kComfort * limit, inner, outer);
   if (mode == Mode::settle && end.factor > 0) {
-    held.limit = end.factor;
-  } else if (mode != Mode::halve && inner.near.distance < within) {
-    held.limit = crossing(held, within, end.factor > 0 ? end : inner, outer).factor;
+    held.largest_factor = end.factor;
+  } else if (mode != Mode::halve && inner.bound.distance < limit) {
+    held.largest_factor = crossing(held, limit, end.factor > 0 ? end : inner, outer).factor;
   }
   place(held, end);
 }
@@ -232,7 +232,7 @@ std::uint32_t PullBack::colour(std::vector<Held>& held) const {
 
 /// Step (3). Ends, because from its second turn on a vertex goes forward by kRise or not at all.
 void PullBack::let_go(std::vector<Held>& held, Mode mode, Progress* progress) {
-  const auto settled = [&](const Held& h) { return h.factor >= (mode == Mode::settle ? h.limit : 1); };
+  const auto settled = [&](const Held& h) { return h.factor >= (mode == Mode::settle ? h.largest_factor : 1); };
   std::vector<std::uint32_t> around;
   std::vector<std::vector<std::uint32_t>> due(colour(held));
   for (std::uint32_t i = 0; i < held.size(); ++i) {
@@ -272,22 +272,22 @@ void PullBack::let_go(std::vector<Held>& held, Mode mode, Progress* progress) {
 }
 
 bool PullBack::attempt(Held& held, double factor) {
-  if (!mesh_.try_alone(held.vertex, mesh_.placement().frame(stored_at(held, factor)), held.blame)) return false;
+  if (!mesh_.try_alone(held.vertex, mesh_.space().frame(stored_at(held, factor)), held.blame)) return false;
   held.factor = factor;
   return true;
 }
 
 /// The share of the motion that is as long as what is beyond kComfort.
-double PullBack::little(const Held& held) const { return (1 - kComfort) * mesh_.within() / held.length; }
+double PullBack::little(const Held& held) const { return (1 - kComfort) * mesh_.limit() / held.length; }
 
 void PullBack::raise(Held& held, Mode mode, bool search) {
   const double step = mode == Mode::settle ? std::max(kRise, little(held)) : kRise;
   const double grain = std::min(step, little(held));
   while (held.factor < 1) {
-    if (held.limit >= 1 && attempt(held, 1)) return;
+    if (held.largest_factor >= 1 && attempt(held, 1)) return;
     if (search) {
       // A vertex that nothing holds back but its own limit ends just below it.
-      double lower = held.factor, upper = std::min(1.0, held.limit), next = upper - grain / 2;
+      double lower = held.factor, upper = std::min(1.0, held.largest_factor), next = upper - grain / 2;
       while (upper - lower > grain) {
         (attempt(held, next) ? lower : upper) = next;
         next = (lower + upper) / 2;

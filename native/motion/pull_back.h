@@ -33,7 +33,7 @@ class PullBack {
   };
 
   /// As MovingMesh.
-  PullBack(const ToleranceVolume& volume, const Placement& placement, std::span<const std::uint32_t> faces, int corners,
+  PullBack(const ToleranceVolume& volume, const StoredSpace& space, std::span<const std::uint32_t> faces, int corners,
            std::size_t vertex_count, unsigned threads);
   /// As MovingMesh::start().
   MovingMesh::Start start(std::span<const glm::dvec3> stored, Progress* progress);
@@ -51,12 +51,12 @@ class PullBack {
   /// A vertex that cannot simply have its wish.
   struct Held {
     std::uint32_t vertex;
-    glm::dvec3 before, after;  ///< stored
-    MovingMesh::Near wish;     ///< at `after`
-    double length;             ///< of the motion, in the frame
+    glm::dvec3 before, after;     ///< stored
+    MovingMesh::PointBound wish;  ///< at `after`
+    double length;                ///< of the motion, in the frame
     double factor = 0;
     /// About where the vertex itself leaves the volume, 1 only if it does not; in Mode::settle as far as it is to go.
-    double limit = 1;
+    double largest_factor = 1;
     std::uint32_t blame = 0;  ///< place in the vertex's ring of the face that refused last
     std::uint32_t colour = 0;
   };
@@ -64,7 +64,7 @@ class PullBack {
   /// A place on the way of a vertex.
   struct Along {
     double factor;
-    MovingMesh::Near near;
+    MovingMesh::PointBound bound;
   };
 
   glm::dvec3 stored_at(const Held& held, double factor) const;

@@ -17,7 +17,7 @@
 #include "base/errors.h"
 #include "base/parallel.h"
 #include "check/certificate.h"
-#include "check/input.h"
+#include "check/input_checks.h"
 
 namespace tolvol {
 namespace {
@@ -28,10 +28,10 @@ constexpr std::size_t kBlock = 1024;
 
 class Smoothing {
  public:
-  Smoothing(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const Placement& placement,
+  Smoothing(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
             const ToleranceVolume* volume, const SmoothingOptions& options)
       : input_(vertices),
-        placement_(placement),
+        space_(space),
         volume_(volume),
         options_(options),
         positions_(vertices.begin(), vertices.end()) {
@@ -153,7 +153,7 @@ class Smoothing {
 
   void start_pull_back() {
     for (const glm::uvec3& t : triangles_) faces_.insert(faces_.end(), {t.x, t.y, t.z});
-    pull_back_ = std::make_unique<PullBack>(*volume_, placement_, faces_, 3, positions_.size(), options_.threads);
+    pull_back_ = std::make_unique<PullBack>(*volume_, space_, faces_, 3, positions_.size(), options_.threads);
     const MovingMesh::Start start = pull_back_->start(positions_, options_.progress);
     result_.outside_faces = start.outside.size();
     if (!start.outside.empty()) {
@@ -178,11 +178,11 @@ class Smoothing {
     });
   }
 
-  glm::dvec3 in_world(const glm::dvec3& direction) const { return glm::dmat3(placement_.to_world()) * direction; }
+  glm::dvec3 in_world(const glm::dvec3& direction) const { return glm::dmat3(space_.to_world()) * direction; }
 
   void measure_cotangents() {
     cotangents_.resize(3 * triangles_.size());
-    const glm::dmat3 linear(placement_.to_world());
+    const glm::dmat3 linear(space_.to_world());
     each(triangles_.size(), [&](std::uint32_t t) {
       const glm::dvec3 &a = positions_[triangles_[t].x], &b = positions_[triangles_[t].y],
                        &c = positions_[triangles_[t].z];
@@ -242,7 +242,7 @@ class Smoothing {
       }
       const glm::dvec3 to = positions_[v] + strength_[v] * step;
       before_[i] = positions_[v];
-      after_[i] = placement_.storage() == Storage::float32 ? rounded_to_float32(to) : to;
+      after_[i] = space_.storage() == Storage::float32 ? rounded_to_float32(to) : to;
     });
     std::size_t held_back = 0;
     if (pull_back_) {
@@ -270,7 +270,7 @@ class Smoothing {
   }
 
   std::span<const glm::dvec3> input_;
-  const Placement& placement_;
+  const StoredSpace& space_;
   const ToleranceVolume* volume_;
   const SmoothingOptions& options_;
   SmoothingResult result_;
@@ -291,9 +291,9 @@ class Smoothing {
 }  // namespace
 
 SmoothingResult smooth(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
-                       const Placement& placement, const ToleranceVolume* volume, const SmoothingOptions& options) {
+                       const StoredSpace& space, const ToleranceVolume* volume, const SmoothingOptions& options) {
   const Call call(options.progress);
-  return Smoothing(vertices, triangles, placement, volume, options).run();
+  return Smoothing(vertices, triangles, space, volume, options).run();
 }
 
 }  // namespace tolvol

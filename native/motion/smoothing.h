@@ -56,6 +56,6 @@ struct SmoothingResult {
 /// 0.3 us an iteration and vertex, and some us for each that is held back. [M. Desbrun, M. Meyer, P. Schröder, A. H.
 /// Barr, Implicit Fairing of Irregular Meshes using Diffusion and Curvature Flow, 1999], [Botsch04, §5].
 SmoothingResult smooth(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
-                       const Placement& placement, const ToleranceVolume* volume, const SmoothingOptions& options);
+                       const StoredSpace& space, const ToleranceVolume* volume, const SmoothingOptions& options);
 
 }  // namespace tolvol

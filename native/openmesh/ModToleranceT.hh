@@ -17,9 +17,9 @@ namespace tolvol {
 
 /// How an OpenMesh mesh stores its points: as they are, in the world.
 template <class Mesh>
-Placement placement_of(const Mesh&) {
+StoredSpace space_of(const Mesh&) {
   constexpr bool kSingle = std::is_same_v<typename Mesh::Scalar, float>;
-  return Placement(glm::dmat4(1), kSingle ? Storage::float32 : Storage::float64);
+  return StoredSpace(glm::dmat4(1), kSingle ? Storage::float32 : Storage::float64);
 }
 
 template <class Point>
@@ -39,7 +39,7 @@ ToleranceVolume volume_of(const Mesh& mesh, double tolerance) {
     int k = 0;
     for (const auto v : mesh.fv_range(f)) t[k++] = static_cast<unsigned>(v.idx());
   }
-  return ToleranceVolume(vertices, triangles, placement_of(mesh), tolerance);
+  return ToleranceVolume(vertices, triangles, space_of(mesh), tolerance);
 }
 
 /// Binary: forbids every half-edge collapse after which a face would not be proved to be within the tolerance of the
@@ -67,7 +67,7 @@ class ModToleranceT : public OpenMesh::Decimater::ModBaseT<MeshT> {
   void set_certificate();
 
   const ToleranceVolume* volume_ = nullptr;
-  std::optional<Placement> placement_;
+  std::optional<StoredSpace> space_;
   double mapping_error_ = 0;
   std::optional<TriangleCertificate> certificate_;
 };
@@ -76,7 +76,7 @@ template <class MeshT>
 void ModToleranceT<MeshT>::initialize() {
   if (!volume_) throw InvalidInput("ModToleranceT needs a volume: call set_volume() before initialize()");
   const Mesh& mesh = Base::mesh();
-  placement_ = placement_of(mesh).in(volume_->frame());
+  space_ = space_of(mesh).in(volume_->frame());
   std::vector<glm::dvec3> points;
   std::vector<std::uint32_t> indices, faces;
   for (const auto v : mesh.all_vertices()) points.push_back(to_dvec3(mesh.point(v)));
@@ -84,9 +84,9 @@ void ModToleranceT<MeshT>::initialize() {
     faces.push_back(static_cast<std::uint32_t>(f.idx()));
     for (const auto v : mesh.fv_range(f)) indices.push_back(static_cast<std::uint32_t>(v.idx()));
   }
-  mapping_error_ = placement_->mapping_error(points);
+  mapping_error_ = space_->mapping_error(points);
   const std::vector<Verdict> verdicts =
-      Certificate(*volume_).check({placement_->frame(points), indices, 3, mapping_error_}, {});
+      Certificate(*volume_).check({space_->frame(points), indices, 3, mapping_error_}, {});
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     if (verdicts[i] == Verdict::inside) continue;
     throw InvalidInput("face " + std::to_string(faces[i]) + " is not within the tolerance of the reference; " +
@@ -97,15 +97,15 @@ void ModToleranceT<MeshT>::initialize() {
 
 template <class MeshT>
 void ModToleranceT<MeshT>::set_certificate() {
-  const double within = volume_->provable(mapping_error_) * (1 - kHeadroom) * Base::error_tolerance_factor_;
-  certificate_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), within,
+  const double limit = volume_->provable(mapping_error_) * (1 - kHeadroom) * Base::error_tolerance_factor_;
+  certificate_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), limit,
                        volume_->refutable(mapping_error_));
 }
 
 template <class MeshT>
 float ModToleranceT<MeshT>::collapse_priority(const CollapseInfo& collapse) {
   const Mesh& mesh = Base::mesh();
-  const auto in_frame = [&](auto vertex) { return placement_->frame(to_dvec3(mesh.point(vertex))); };
+  const auto in_frame = [&](auto vertex) { return space_->frame(to_dvec3(mesh.point(vertex))); };
   const glm::dvec3 kept = in_frame(collapse.v1), unknown(TriangleCertificate::kUnproved);
   for (const auto h : mesh.voh_range(collapse.v0)) {
     const auto face = mesh.face_handle(h);

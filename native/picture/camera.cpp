@@ -59,7 +59,8 @@ Camera framing(std::span<const glm::dvec3> world, std::span<const glm::uvec3> tr
   if (!(how.aspect > 0 && std::isfinite(how.aspect))) {
     throw InvalidInput("the picture's width and height must be positive");
   }
-  if (!(how.room >= 0 && std::isfinite(how.room))) throw InvalidInput("the room around the mesh must not be negative");
+  if (!(how.margin >= 0 && std::isfinite(how.margin)))
+    throw InvalidInput("the margin around the mesh must not be negative");
   const Axes axes(-how.direction, how.up);
   const glm::dmat3 to_view = glm::transpose(glm::dmat3(axes.right, axes.above, axes.forward));
   const std::vector<bool> used = used_vertices(world.size(), triangles);
@@ -73,8 +74,8 @@ Camera framing(std::span<const glm::dvec3> world, std::span<const glm::uvec3> tr
   for (std::size_t i = 0; i < world.size(); ++i) {
     if (!used[i]) continue;
     const glm::dvec3 p = to_view * world[i] - centre;
-    const double z = p.z - how.room;
-    distance = std::max({distance, (std::abs(p.x) + how.room) / right - z, (std::abs(p.y) + how.room) / above - z});
+    const double z = p.z - how.margin;
+    distance = std::max({distance, (std::abs(p.x) + how.margin) / right - z, (std::abs(p.y) + how.margin) / above - z});
   }
   // A flat mesh seen edge on would have the eye within it.
   const glm::dvec3 extent = box.upper - box.lower;

@@ -27,7 +27,7 @@ struct Framing {
   glm::dvec3 up{0, 0, 1};
   double angle = 30;  ///< the height of the picture in degrees
   double aspect = 1;  ///< its width over its height
-  double room = 0;    ///< kept around the mesh, world units
+  double margin = 0;  ///< kept free around the mesh, world units
 };
 
 /// The camera that sees all used vertices of a mesh as large as the picture can show them. Throws InvalidInput like

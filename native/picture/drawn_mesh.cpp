@@ -21,7 +21,7 @@ void write_into(gl::Buffer& buffer, std::size_t bytes, const void* data) {
 
 }  // namespace
 
-DrawnMesh::DrawnMesh(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> t, const Placement& placement,
+DrawnMesh::DrawnMesh(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> t, const StoredSpace& space,
                      const PictureField& field)
     : triangles(t) {
   validate(stored, t);
@@ -31,7 +31,7 @@ DrawnMesh::DrawnMesh(std::span<const glm::dvec3> stored, std::span<const glm::uv
   for (std::size_t i = 0; i < stored.size(); ++i) {
     poll_at(i);
     if (!used[i]) continue;
-    const glm::dvec3 p = placement.frame(stored[i]);
+    const glm::dvec3 p = space.frame(stored[i]);
     nodes[i] = field.node(p);
     if (!(glm::dot(nodes[i], nodes[i]) < kReach * kReach)) {
       throw InvalidInput("vertex " + std::to_string(i) + " is too far from the reference to be drawn");

@@ -17,9 +17,9 @@ struct DrawnMesh {
   std::span<const glm::uvec3> triangles;
   Box box;  ///< of the used vertices, in the frame
 
-  /// `placement` leads to the field's frame. `triangles` must outlive this. Throws InvalidInput for a bad mesh (the
+  /// `space` leads to the field's frame. `triangles` must outlive this. Throws InvalidInput for a bad mesh (the
   /// first offender is named), also for one so far from the reference that float32 cannot draw it.
-  DrawnMesh(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> triangles, const Placement& placement,
+  DrawnMesh(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> triangles, const StoredSpace& space,
             const PictureField& field);
 };
 

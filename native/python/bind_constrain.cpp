@@ -40,7 +40,7 @@ Constrained constrain_arrays(const py::object& before, const py::object& after, 
   if (from.storage != to.storage) throw InvalidInput("before and after must have the same type");
   int corners = 3;
   const std::vector<std::uint32_t> indices = to_faces(faces, "faces", corners);
-  const Placement placement(to_matrix(to_world), from.storage);
+  const StoredSpace space(to_matrix(to_world), from.storage);
   ConstrainOptions options;
   options.mode = to_mode(mode);
   options.outside = to_outside(outside);
@@ -49,7 +49,7 @@ Constrained constrain_arrays(const py::object& before, const py::object& after, 
   ConstrainResult r;
   {
     const Interruptible call(progress);
-    r = constrain(from.values, to.values, indices, corners, placement, volume.native, options);
+    r = constrain(from.values, to.values, indices, corners, space, volume.native, options);
   }
   Constrained result{from_vertices(r.vertices, from.storage), from_vector<double>(r.factors), {}};
   py::dict kept;

@@ -65,10 +65,10 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
                        double max_seconds, int threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
-  const Placement placed(to_matrix(to_world), v.storage);
+  const StoredSpace space(to_matrix(to_world), v.storage);
   DecimationOptions options;
-  options.vertices = choose(placement, "placement", "optimal", DecimationOptions::Vertices::optimal, "subset",
-                            DecimationOptions::Vertices::subset);
+  options.placement = choose(placement, "placement", "optimal", DecimationOptions::Placement::optimal, "subset",
+                             DecimationOptions::Placement::subset);
   options.outside =
       choose(outside, "outside", "error", DecimationOptions::Outside::error, "keep", DecimationOptions::Outside::keep);
   options.effort = choose(effort, "effort", "fast", DecimationOptions::Effort::fast, "thorough",
@@ -101,7 +101,7 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
   {
     const Interruptible call(progress);
     const auto start = std::chrono::steady_clock::now();
-    r = decimate(v.values, t, placed, volume ? &volume->native : nullptr, options);
+    r = decimate(v.values, t, space, volume ? &volume->native : nullptr, options);
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
   Result result;

@@ -140,7 +140,7 @@ Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, c
   std::vector<std::uint32_t> faces;
   if (!triangles.is_none()) faces = to_faces(triangles, "triangles", corners);
   if (volume && triangles.is_none()) throw InvalidInput("with a volume triangles are needed, to be kept within it");
-  const Placement placed(to_matrix(to_world), v.storage);
+  const StoredSpace placed(to_matrix(to_world), v.storage);
   DeformationOptions options;
   options.mode = to_mode(mode);
   options.outside = to_outside(outside);

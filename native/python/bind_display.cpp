@@ -47,7 +47,7 @@ std::vector<double> shares(const Display& display, const py::object& vertices, c
                            std::vector<double> edges, const py::object& to_world, int threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
-  const Placement placement = Placement(to_matrix(to_world), v.storage).in(display.frame);
+  const StoredSpace space = StoredSpace(to_matrix(to_world), v.storage).in(display.frame);
   const unsigned count = to_threads(threads);
   const Interruptible call(progress);
   validate(v.values, t);
@@ -57,7 +57,7 @@ std::vector<double> shares(const Display& display, const py::object& vertices, c
       throw InvalidInput("edges must be finite and ascending");
     }
   }
-  return area_shares(display.native, placement.frame(v.values), t, edges, count);
+  return area_shares(display.native, space.frame(v.values), t, edges, count);
 }
 
 }  // namespace

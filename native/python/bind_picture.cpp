@@ -49,12 +49,12 @@ Camera make_camera(const Vector& eye, const Vector& target, const Vector& up, do
 double aspect(const Size& size) { return static_cast<double>(size[0]) / size[1]; }
 
 Camera frame_mesh(const py::object& vertices, const py::object& triangles, const Size& size, const Vector& direction,
-                  const Vector& up, double angle, double room, const py::object& to_world) {
+                  const Vector& up, double angle, double margin, const py::object& to_world) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   validate(v.values, t);
-  const Placement placement(to_matrix(to_world), v.storage);
-  return framing(placement.frame(v.values), t, {vector(direction), vector(up), angle, aspect(size), room});
+  const StoredSpace space(to_matrix(to_world), v.storage);
+  return framing(space.frame(v.values), t, {vector(direction), vector(up), angle, aspect(size), margin});
 }
 
 py::array_t<std::uint8_t> colours(const std::string& transfer) {
@@ -94,12 +94,12 @@ py::array_t<std::uint8_t> to_array(const Image& image) {
 }
 
 Camera camera_or_framing(const std::optional<Camera>& camera, const Vertices& v, const std::vector<glm::uvec3>& t,
-                         const Placement& placement, const Size& size, double room) {
+                         const StoredSpace& space, const Size& size, double margin) {
   if (camera) return *camera;
   validate(v.values, t);
   Framing how;
-  how.aspect = aspect(size), how.room = room;
-  return framing(placement.frame(v.values), t, how);
+  how.aspect = aspect(size), how.margin = margin;
+  return framing(space.frame(v.values), t, how);
 }
 
 py::array_t<std::uint8_t> render_distance(const py::object& vertices, const py::object& triangles, const Volume& volume,
@@ -108,18 +108,18 @@ py::array_t<std::uint8_t> render_distance(const py::object& vertices, const py::
                                           int samples, int threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
-  const Placement placement(to_matrix(to_world), v.storage);
+  const StoredSpace space(to_matrix(to_world), v.storage);
   const DistanceRenderer::Options options{to_transfer(transfer), edges, {{size[0], size[1]}, samples}, progress};
   const unsigned thread_count = to_threads(threads);
   Image image;
   {
     const Interruptible call(progress);
     require(options.resolution);
-    const Camera from = camera_or_framing(camera, v, t, placement, size, 0);
+    const Camera from = camera_or_framing(camera, v, t, space, size, 0);
     image = draw_picture(volume, thread_count, progress, [&](Pictures& pictures) {
       if (!pictures.distance) pictures.distance.emplace(pictures.field);
       const Frame& frame = volume.native.frame();
-      return pictures.distance->render({v.values, t, placement.in(frame), pictures.field}, from, frame, options);
+      return pictures.distance->render({v.values, t, space.in(frame), pictures.field}, from, frame, options);
     });
   }
   return to_array(image);
@@ -144,7 +144,7 @@ py::array_t<std::uint8_t> render_volume(const Volume& volume, const std::optiona
     v = to_vertices(vertices, "vertices");
     t = to_triangles(triangles, "triangles");
   }
-  const Placement placement(vertices.is_none() ? glm::dmat4(1) : to_matrix(to_world), v.storage);
+  const StoredSpace space(vertices.is_none() ? glm::dmat4(1) : to_matrix(to_world), v.storage);
   VolumeRenderer::Options options{std::nullopt, {{size[0], size[1]}, samples}, progress};
   if (cut) options.cut = {vector(cut->first), vector(cut->second)};
   const unsigned thread_count = to_threads(threads);
@@ -152,11 +152,11 @@ py::array_t<std::uint8_t> render_volume(const Volume& volume, const std::optiona
   {
     const Interruptible call(progress);
     require(options.resolution);
-    const Camera from = camera_or_framing(camera, v, t, placement, size, volume.native.tolerance());
+    const Camera from = camera_or_framing(camera, v, t, space, size, volume.native.tolerance());
     image = draw_picture(volume, thread_count, progress, [&](Pictures& pictures) {
       if (!pictures.volume) pictures.volume.emplace(pictures.field, volume.native.hierarchy(), thread_count);
       const Frame& frame = volume.native.frame();
-      return pictures.volume->render({v.values, t, placement.in(frame), pictures.field}, from, frame, options);
+      return pictures.volume->render({v.values, t, space.in(frame), pictures.field}, from, frame, options);
     });
   }
   return to_array(image);

@@ -33,7 +33,7 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
                        Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
-  const Placement placement(to_matrix(to_world), v.storage);
+  const StoredSpace space(to_matrix(to_world), v.storage);
   using Options = SmoothingOptions;
   Options options;
   if (iterations < 0 || iterations > std::numeric_limits<int>::max()) {
@@ -67,7 +67,7 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
   {
     const Interruptible call(progress);
     const auto start = std::chrono::steady_clock::now();
-    r = smooth(v.values, t, placement, volume ? &volume->native : nullptr, options);
+    r = smooth(v.values, t, space, volume ? &volume->native : nullptr, options);
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
   Smoothed result{from_vertices(r.vertices, v.storage), {}};

@@ -26,11 +26,11 @@ std::unique_ptr<Volume> make_volume(const py::object& vertices, const py::object
                                     const std::string& field, int threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
-  const Placement placement(to_matrix(to_world), v.storage);
+  const StoredSpace space(to_matrix(to_world), v.storage);
   const Interruptible call(progress);
   const auto start = std::chrono::steady_clock::now();
   auto volume = std::unique_ptr<Volume>(
-      new Volume{{v.values, t, placement, tolerance, {precision, to_threads(threads), progress, to_field(field)}},
+      new Volume{{v.values, t, space, tolerance, {precision, to_threads(threads), progress, to_field(field)}},
                  v.values.size(),
                  t.size()});
   volume->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -47,7 +47,7 @@ CheckResult check(const Volume& volume, const py::object& points, const py::obje
   const Vertices v = to_vertices(points, "points");
   int corners = 3;
   const std::vector<std::uint32_t> indices = to_faces(faces, "faces", corners);
-  const Placement placement(to_matrix(to_world), v.storage);
+  const StoredSpace space(to_matrix(to_world), v.storage);
   std::vector<std::int32_t> labels;
   if (!groups.is_none()) labels = to_labels(groups, "groups");
   const ToleranceCheck::Options options{to_threads(threads), progress};
@@ -55,7 +55,7 @@ CheckResult check(const Volume& volume, const py::object& points, const py::obje
   std::vector<Verdict> verdicts;
   {
     const Interruptible call(progress);
-    const PlacedPoints placed(v.values, placement, volume.native);
+    const PlacedPoints placed(v.values, space, volume.native);
     const Pieces pieces{placed.points, indices, corners, placed.mapping_error};
     by = volume.check(method);
     try {
@@ -69,16 +69,16 @@ CheckResult check(const Volume& volume, const py::object& points, const py::obje
 }
 
 /// Of point `i`, in world units; infinity where that is more than a double holds.
-double distance_to(const ToleranceVolume& volume, const Placement& placement, const glm::dvec3& stored, std::size_t i) {
+double distance_to(const ToleranceVolume& volume, const StoredSpace& space, const glm::dvec3& stored, std::size_t i) {
   const auto finite = [](const glm::dvec3& p) {
     return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
   };
   const Frame& frame = volume.frame();
-  const glm::dvec3 at = placement.frame(stored);
+  const glm::dvec3 at = space.frame(stored);
   if (finite(at)) return volume.hierarchy().nearest(at).distance / frame.scale();
   const std::string name = "point " + std::to_string(i);
   if (!finite(stored)) throw InvalidInput(name + " is not finite");
-  const glm::dvec3 world = placement.world(stored);
+  const glm::dvec3 world = space.world(stored);
   if (!finite(world)) throw InvalidInput(name + " is too far away for double precision under to_world");
   // So much farther than the reference is large that the reference is a point.
   const glm::dvec3 away = world - frame.to_world(glm::dvec3(0));
@@ -88,14 +88,14 @@ double distance_to(const ToleranceVolume& volume, const Placement& placement, co
 py::array_t<double> distance(const Volume& volume, const py::object& points, const py::object& to_world, int threads,
                              Progress* progress) {
   const Vertices v = to_vertices(points, "points");
-  const Placement placement = Placement(to_matrix(to_world), v.storage).in(volume.native.frame());
+  const StoredSpace space = StoredSpace(to_matrix(to_world), v.storage).in(volume.native.frame());
   std::vector<double> result(v.values.size());
   {
     const Interruptible call(progress);
     constexpr std::size_t kBlock = 256;
     parallel_for(result.size(), kBlock, to_threads(threads), [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        result[i] = distance_to(volume.native, placement, v.values[i], i);
+        result[i] = distance_to(volume.native, space, v.values[i], i);
       }
     });
   }
@@ -189,7 +189,7 @@ void bind_volume(py::module_& module) {
       .def_property_readonly(
           "tolerance", [](const Volume& v) { return v.native.tolerance(); }, "World units.")
       .def_property_readonly(
-          "size", [](const Volume& v) { return v.native.size(); },
+          "size", [](const Volume& v) { return v.native.diagonal(); },
           "What 100 % is, world units: the longest box diagonal of the reference.")
       .def_property_readonly(
           "precision", [](const Volume& v) { return v.native.precision(); }, "Grid nodes per tolerance.")
@@ -211,7 +211,7 @@ void bind_volume(py::module_& module) {
         const Vertices v = to_vertices(vertices, "vertices");
         const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
         validate(v.values, t);
-        return reference_size(v.values, t, Placement(to_matrix(to_world), v.storage).to_world());
+        return longest_diagonal(v.values, t, StoredSpace(to_matrix(to_world), v.storage).to_world());
       },
       py::arg("vertices"), py::arg("triangles"), py::arg("to_world") = py::none(),
       "What 100 % means, world units: the longest of the four diagonals of the local bounding box of the used "

@@ -61,7 +61,7 @@ void add(Numbers& numbers, const std::vector<dvec3>& points) {
   for (const dvec3& p : points) numbers.insert(numbers.end(), {p.x, p.y, p.z});
 }
 
-const Placement kStored(glm::dmat4(1), Storage::float32);
+const StoredSpace kStored(glm::dmat4(1), Storage::float32);
 
 struct Scene {
   TriangleMesh mesh = shapes::torus(10, 0.02);
@@ -129,7 +129,7 @@ TEST(Allocation, DecimationInEveryForm) {
     }
   }
   DecimationOptions options;
-  options.vertices = DecimationOptions::Vertices::subset, options.threads = 1;
+  options.placement = DecimationOptions::Placement::subset, options.threads = 1;
   EXPECT_GT(fail_allocations([&] { return scene.decimated(options); }, 0.1), 100);
   options.effort = DecimationOptions::Effort::thorough;
   EXPECT_GT(fail_allocations([&] { return scene.decimated(options); }, 0.5), 100);

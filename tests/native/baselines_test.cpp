@@ -28,17 +28,17 @@ struct Decimated {
 };
 
 constexpr double kTolerance = 0.03;
-const Placement kPlacement{glm::dmat4(1), Storage::float32};
+const StoredSpace kSpace{glm::dmat4(1), Storage::float32};
 
 Decimated by(RingCheck& baseline, const TriangleMesh& mesh, const ToleranceVolume& volume,
              DecimationOptions options = {}) {
   options.baseline = &baseline;
-  DecimationResult r = decimate(mesh.vertices, mesh.triangles, kPlacement, &volume, options);
+  DecimationResult r = decimate(mesh.vertices, mesh.triangles, kSpace, &volume, options);
   return {{std::move(r.vertices), std::move(r.triangles)}, r.method, r.renderer};
 }
 
 ToleranceVolume volume_of(const TriangleMesh& mesh) {
-  return ToleranceVolume(mesh.vertices, mesh.triangles, kPlacement, kTolerance);
+  return ToleranceVolume(mesh.vertices, mesh.triangles, kSpace, kTolerance);
 }
 
 struct Fixed final : RingCheck {
@@ -75,12 +75,12 @@ TEST(Baselines, NeedAVolume) {
   Fixed yes(true);
   DecimationOptions options;
   options.baseline = &yes, options.target_triangles = 50;
-  EXPECT_THROW(decimate(mesh.vertices, mesh.triangles, kPlacement, nullptr, options), InvalidInput);
+  EXPECT_THROW(decimate(mesh.vertices, mesh.triangles, kSpace, nullptr, options), InvalidInput);
 }
 
 void expect_kept(const std::string& method) {
   const TriangleMesh mesh = shapes::torus(40, 0.004);
-  const ToleranceVolume volume(mesh.vertices, mesh.triangles, kPlacement, kTolerance, {.precision = 4.0});
+  const ToleranceVolume volume(mesh.vertices, mesh.triangles, kSpace, kTolerance, {.precision = 4.0});
   const auto check = make_check(method, volume);
   baselines::CheckedRing ring(*check);
   const Decimated result = by(ring, mesh, volume);
@@ -111,10 +111,10 @@ double farthest_vertex(const TriangleMesh& from, const TriangleMesh& to) {
 TEST(VertexSamples, KeepVerticesAndNoMore) {
   const TriangleMesh mesh = shapes::torus(60, 0.004);
   const ToleranceVolume volume = volume_of(mesh);
-  for (const auto vertices : {DecimationOptions::Vertices::optimal, DecimationOptions::Vertices::subset}) {
+  for (const auto placement : {DecimationOptions::Placement::optimal, DecimationOptions::Placement::subset}) {
     baselines::VertexSamples samples(volume.frame_tolerance());
     DecimationOptions options;
-    options.vertices = vertices;
+    options.placement = placement;
     const Decimated result = by(samples, mesh, volume, options);
     EXPECT_LT(result.mesh.triangles.size(), 400u);
     const double farthest = farthest_vertex(mesh, result.mesh);

@@ -34,7 +34,7 @@ const TriangleMesh& wavy() {
 constexpr double kTolerance = 0.02;
 
 const ToleranceVolume& volume() {
-  static const ToleranceVolume instance(wavy().vertices, wavy().triangles, Placement(glm::dmat4(1), Storage::float64),
+  static const ToleranceVolume instance(wavy().vertices, wavy().triangles, StoredSpace(glm::dmat4(1), Storage::float64),
                                         kTolerance);
   return instance;
 }
@@ -57,24 +57,23 @@ struct NamedCall {
 };
 
 std::vector<NamedCall> calls() {
-  static const Placement placement(glm::dmat4(1), Storage::float64);
+  static const StoredSpace space(glm::dmat4(1), Storage::float64);
   static const std::vector<std::uint32_t> faces = indices();
   static const std::vector<glm::dvec3> moved = pushed();
   static const auto decimated = [](auto&& set) {
     DecimationOptions options;
     options.threads = 1;
     set(options);
-    decimate(wavy().vertices, wavy().triangles, placement, &volume(), options);
+    decimate(wavy().vertices, wavy().triangles, space, &volume(), options);
   };
   return {
       {"ToleranceVolume",
        [] {
-         ToleranceVolume(wavy().vertices, wavy().triangles, placement, kTolerance, {std::nullopt, 1, nullptr});
+         ToleranceVolume(wavy().vertices, wavy().triangles, space, kTolerance, {std::nullopt, 1, nullptr});
        }},
       {"fast marching",
        [] {
-         ToleranceVolume(wavy().vertices, wavy().triangles, placement, kTolerance,
-                         {1, 1, nullptr, Field::fast_marching});
+         ToleranceVolume(wavy().vertices, wavy().triangles, space, kTolerance, {1, 1, nullptr, Field::fast_marching});
        }},
       {"signed_distance", [] { signed_distance(volume().reference(), volume().grid(), 1); }},
       {"DisplayGrid", [] { DisplayGrid(wavy(), false, kTolerance, {.threads = 1}); }},
@@ -90,13 +89,13 @@ std::vector<NamedCall> calls() {
        [] {
          SmoothingOptions options;
          options.threads = 1;
-         smooth(wavy().vertices, wavy().triangles, placement, &volume(), options);
+         smooth(wavy().vertices, wavy().triangles, space, &volume(), options);
        }},
       {"constrain",
        [] {
          ConstrainOptions options;
          options.threads = 1;
-         constrain(wavy().vertices, moved, faces, 3, placement, volume(), options);
+         constrain(wavy().vertices, moved, faces, 3, space, volume(), options);
        }},
       {"hausdorff",
        [] {
@@ -140,7 +139,7 @@ TEST(Call, IsHeardInsideOneFace) {
   // The face lies where hardly a part of it is nearer than the tolerance or farther: it takes the whole budget.
   const TriangleMesh waves = shapes::squares(
       100, [](const glm::dvec3& p) { return glm::dvec3(p.x, p.y, 0.01 * std::sin(60 * p.x) * std::sin(60 * p.y)); });
-  const ToleranceVolume around(waves.vertices, waves.triangles, Placement(glm::dmat4(1), Storage::float64), 0.00995);
+  const ToleranceVolume around(waves.vertices, waves.triangles, StoredSpace(glm::dmat4(1), Storage::float64), 0.00995);
   const Frame& frame = around.frame();
   const std::vector<glm::dvec3> corners{frame.from_world({0.02, 0.02, 0}), frame.from_world({0.98, 0.02, 0}),
                                         frame.from_world({0.98, 0.98, 0})};
@@ -200,12 +199,12 @@ TEST(Call, IsThatOfWhoeverSharesALoop) {
 TEST(Call, EndsTheFastPhaseInTimeWithWhatIsProved) {
   DecimationOptions options;
   options.threads = 1;
-  const Placement placement(glm::dmat4(1), Storage::float64);
-  const std::size_t whole = decimate(wavy().vertices, wavy().triangles, placement, &volume(), options).triangles.size();
+  const StoredSpace space(glm::dmat4(1), Storage::float64);
+  const std::size_t whole = decimate(wavy().vertices, wavy().triangles, space, &volume(), options).triangles.size();
   options.max_seconds = 1e-9;
   for (const auto effort : {DecimationOptions::Effort::fast, DecimationOptions::Effort::thorough}) {
     options.effort = effort;
-    const DecimationResult result = decimate(wavy().vertices, wavy().triangles, placement, &volume(), options);
+    const DecimationResult result = decimate(wavy().vertices, wavy().triangles, space, &volume(), options);
     EXPECT_TRUE(result.stopped_at_time);
     EXPECT_GT(result.triangles.size(), whole);
     const TriangleMesh mesh{result.vertices, result.triangles};

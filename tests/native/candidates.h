@@ -13,7 +13,7 @@ namespace tolvol::candidates {
 
 using glm::dvec3;
 
-inline const Placement kIdentity(glm::dmat4(1), Storage::float64);
+inline const StoredSpace kIdentity(glm::dmat4(1), Storage::float64);
 
 /// Triangles in the world, three points each.
 using Points = std::vector<dvec3>;
@@ -26,7 +26,7 @@ inline std::vector<std::uint32_t> corners(std::size_t count) {
 
 inline std::vector<Verdict> ask(const ToleranceCheck& check, const ToleranceVolume& volume, const Points& points,
                                 int of = 3) {
-  const Placement placed = kIdentity.in(volume.frame());
+  const StoredSpace placed = kIdentity.in(volume.frame());
   const std::vector<dvec3> in_frame = placed.frame(points);
   return check.check({in_frame, corners(points.size()), of, placed.mapping_error(points)}, {1, nullptr});
 }

@@ -19,7 +19,7 @@ namespace {
 using namespace tolvol;
 using glm::dvec3;
 
-const Placement kIdentity(glm::dmat4(1), Storage::float64);
+const StoredSpace kIdentity(glm::dmat4(1), Storage::float64);
 
 struct Candidates {
   std::vector<dvec3> points;  // three a candidate, in the world
@@ -27,7 +27,7 @@ struct Candidates {
 };
 
 std::vector<Verdict> check(const ToleranceVolume& volume, const Candidates& candidates, unsigned threads = 1) {
-  const Placement placed = kIdentity.in(volume.frame());
+  const StoredSpace placed = kIdentity.in(volume.frame());
   const std::vector<dvec3> in_frame = placed.frame(candidates.points);
   return Certificate(volume).check({in_frame, candidates.indices, 3, placed.mapping_error(candidates.points)},
                                    {threads, nullptr});
@@ -192,7 +192,7 @@ TEST(Certificate, ProbesFindWhatHasNoProofAndNothingElse) {
   const TriangleMesh torus = shapes::torus(60);
   const double tolerance = 0.02;
   const ToleranceVolume volume(torus.vertices, torus.triangles, kIdentity, tolerance);
-  const Placement placed = kIdentity.in(volume.frame());
+  const StoredSpace placed = kIdentity.in(volume.frame());
   const TriangleCertificate certificate(volume.witnesses(), volume.grid(), volume.hierarchy(), volume.provable(0),
                                         volume.refutable(0));
   std::mt19937 engine(9);
@@ -220,7 +220,7 @@ TEST(Certificate, ProbesFindWhatHasNoProofAndNothingElse) {
 TEST(Certificate, PointsSegmentsAndQuads) {
   const TriangleMesh plane = shapes::grid(4);
   const ToleranceVolume volume(plane.vertices, plane.triangles, kIdentity, 0.1);
-  const Placement placed = kIdentity.in(volume.frame());
+  const StoredSpace placed = kIdentity.in(volume.frame());
   const auto verdict = [&](const std::vector<dvec3>& points) {
     std::vector<std::uint32_t> indices(points.size());
     for (std::uint32_t i = 0; i < indices.size(); ++i) indices[i] = i;
@@ -235,7 +235,7 @@ TEST(Certificate, PointsSegmentsAndQuads) {
   // Within in one triangulation, outside in the other: a quad is judged in both.
   const TriangleMesh roof{{{0, 0, 0}, {1, 0, 0.5}, {1, 1, 0}, {0, 1, 0.5}}, {{0, 1, 3}, {1, 2, 3}}};
   const ToleranceVolume over(roof.vertices, roof.triangles, kIdentity, 0.1);
-  const Placement there = kIdentity.in(over.frame());
+  const StoredSpace there = kIdentity.in(over.frame());
   const std::vector<dvec3> corners = there.frame(roof.vertices);
   const std::vector<std::uint32_t> quad{0, 1, 2, 3}, halves{0, 1, 3, 1, 2, 3};
   EXPECT_EQ(Certificate(over).check({corners, quad, 4, 0}, {})[0], Verdict::outside);
@@ -311,7 +311,7 @@ TEST(Certificate, SameVerdictsOnAnyThreadsAndInstructions) {
   EXPECT_EQ(one, check(volume, candidates, 2));
   EXPECT_EQ(one, check(volume, candidates, 5));
   const Simd best = simd_path();
-  simd_path() = Simd::baseline;
+  simd_path() = Simd::portable;
   EXPECT_EQ(one, check(volume, candidates));
   simd_path() = best;
 }

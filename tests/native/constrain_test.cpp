@@ -41,8 +41,7 @@ std::vector<std::uint32_t> flat(const std::vector<glm::uvec3>& triangles) {
 }
 
 ConstrainResult run(const Scene& scene, const Points& wish, const ConstrainOptions& options = {}) {
-  return constrain(scene.mesh.vertices, wish, flat(scene.mesh.triangles), 3, scene.placement(), *scene.volume(),
-                   options);
+  return constrain(scene.mesh.vertices, wish, flat(scene.mesh.triangles), 3, scene.space(), *scene.volume(), options);
 }
 
 /// Noise of a standard deviation of so many tolerances along each axis.
@@ -53,9 +52,9 @@ auto noise(double deviation, unsigned seed = 1) {
   };
 }
 
-std::vector<Verdict> verdicts(const ToleranceVolume& volume, const Placement& placement, const Points& points,
+std::vector<Verdict> verdicts(const ToleranceVolume& volume, const StoredSpace& space, const Points& points,
                               const std::vector<std::uint32_t>& faces, int corners = 3) {
-  const Placement placed = placement.in(volume.frame());
+  const StoredSpace placed = space.in(volume.frame());
   const Points in_frame = placed.frame(points);
   return Certificate(volume).check({in_frame, faces, corners, placed.mapping_error(points)}, {1, nullptr});
 }
@@ -66,12 +65,12 @@ bool all_inside(const std::vector<Verdict>& verdicts) {
 
 void expect_inside(const Scene& scene, const ConstrainResult& r) {
   const auto world = [&](Points points) {
-    for (dvec3& p : points) p = scene.placement().world(p);
+    for (dvec3& p : points) p = scene.space().world(p);
     return TriangleMesh{points, scene.mesh.triangles};
   };
   const double tolerance = scene.tolerance();
   EXPECT_LE(hausdorff(world(r.vertices), world(scene.mesh.vertices), {tolerance, 1, nullptr}).upper, tolerance);
-  EXPECT_TRUE(all_inside(verdicts(*scene.volume(), scene.placement(), r.vertices, flat(scene.mesh.triangles))));
+  EXPECT_TRUE(all_inside(verdicts(*scene.volume(), scene.space(), r.vertices, flat(scene.mesh.triangles))));
 }
 
 bool same_bits(const dvec3& a, const dvec3& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
@@ -175,7 +174,7 @@ TEST(Constrain, OnlyVerticesOfFailingFacesAreHeldBack) {
   const Points wish = scene.wish(noise(0.5));
   const ConstrainResult r = run(scene, wish);
   const std::vector<Verdict> wished =
-      verdicts(*scene.volume(1 - 2e-4), scene.placement(), wish, flat(scene.mesh.triangles));
+      verdicts(*scene.volume(1 - 2e-4), scene.space(), wish, flat(scene.mesh.triangles));
   const auto ring = rings(scene);
   std::size_t untouched = 0;
   for (std::size_t v = 0; v < wish.size(); ++v) {
@@ -213,7 +212,7 @@ TEST(Constrain, NoFactorCanRiseAlone) {
       for (const std::uint32_t i : ring[v]) {
         for (int k = 0; k < 3; ++k) faces.push_back(scene.mesh.triangles[i][k]);
       }
-      EXPECT_FALSE(all_inside(verdicts(*volume, scene.placement(), raised, faces))) << v << " at " << r.factors[v];
+      EXPECT_FALSE(all_inside(verdicts(*volume, scene.space(), raised, faces))) << v << " at " << r.factors[v];
       ++tried;
     }
     EXPECT_GT(tried, 50u);
@@ -247,15 +246,15 @@ TEST(Constrain, PointsSegmentsAndQuads) {
   // what spans the valley is not.
   const TriangleMesh valley{{{-1, -1, 1}, {-1, 1, 1}, {0, -1, 0}, {0, 1, 0}, {1, -1, 1}, {1, 1, 1}},
                             {{0, 2, 1}, {2, 3, 1}, {2, 4, 3}, {4, 5, 3}}};
-  const Placement placement(glm::dmat4(1), Storage::float64);
-  const ToleranceVolume volume(valley.vertices, valley.triangles, placement, 0.05);
+  const StoredSpace space(glm::dmat4(1), Storage::float64);
+  const ToleranceVolume volume(valley.vertices, valley.triangles, space, 0.05);
   // Corners beside the valley, two of them go up the slopes.
   const Points before{{-0.05, -0.5, 0.05}, {0.05, -0.5, 0.05}, {0.05, 0.5, 0.05}, {-0.05, 0.5, 0.05}};
   Points after = before;
   after[0] = {-0.5, -0.5, 0.5}, after[2] = {0.5, 0.5, 0.5};
   const auto factors = [&](const std::vector<std::uint32_t>& faces, int corners) {
-    const ConstrainResult r = constrain(before, after, faces, corners, placement, volume);
-    EXPECT_TRUE(all_inside(verdicts(volume, placement, r.vertices, faces, corners)));
+    const ConstrainResult r = constrain(before, after, faces, corners, space, volume);
+    EXPECT_TRUE(all_inside(verdicts(volume, space, r.vertices, faces, corners)));
     return r.factors;
   };
   EXPECT_EQ(factors({0, 1, 2, 3}, 1), (std::vector<double>{1, 1, 1, 1}));
@@ -275,11 +274,11 @@ TEST(Constrain, OutsideIsAnErrorOrKept) {
   const Points wish = scene.wish(noise(0.1));
   const auto volume = scene.volume();
   const std::vector<std::uint32_t> faces = flat(scene.mesh.triangles);
-  const std::vector<Verdict> found = verdicts(*volume, scene.placement(), before, faces);
+  const std::vector<Verdict> found = verdicts(*volume, scene.space(), before, faces);
   const auto first = std::find_if(found.begin(), found.end(), [](Verdict v) { return v != Verdict::inside; });
   const std::ptrdiff_t count = std::count_if(first, found.end(), [](Verdict v) { return v != Verdict::inside; });
   try {
-    constrain(before, wish, faces, 3, scene.placement(), *volume);
+    constrain(before, wish, faces, 3, scene.space(), *volume);
     FAIL();
   } catch (const InvalidInput& error) {
     const std::string expected = std::to_string(count) +
@@ -288,10 +287,10 @@ TEST(Constrain, OutsideIsAnErrorOrKept) {
     EXPECT_EQ(std::string(error.what()).find(expected), 0u) << error.what();
   }
   const ConstrainResult r =
-      constrain(before, wish, faces, 3, scene.placement(), *volume, {.outside = ConstrainOptions::Outside::keep});
+      constrain(before, wish, faces, 3, scene.space(), *volume, {.outside = ConstrainOptions::Outside::keep});
   EXPECT_EQ(r.outside_faces, std::size_t(count));
   EXPECT_EQ(r.first_outside, std::uint32_t(first - found.begin()));
-  const std::vector<Verdict> after = verdicts(*volume, scene.placement(), r.vertices, faces);
+  const std::vector<Verdict> after = verdicts(*volume, scene.space(), r.vertices, faces);
   std::size_t moved = 0;
   for (std::size_t f = 0; f < found.size(); ++f) {
     EXPECT_EQ(found[f] == Verdict::inside, after[f] == Verdict::inside);
@@ -330,7 +329,7 @@ TEST(Constrain, BadInput) {
   broken.mesh.vertices[9].x = nan;
   const auto volume = scene.volume();
   const auto with = [&](const Points& before, std::vector<std::uint32_t> faces, int corners) {
-    constrain(before, before, faces, corners, scene.placement(), *volume);
+    constrain(before, before, faces, corners, scene.space(), *volume);
   };
   expect_refused([&] { with(broken.mesh.vertices, {0, 1, 2}, 3); }, "vertex 9 is not finite");
   expect_refused([&] { with(scene.mesh.vertices, {0, 1, 2, 0, 1, 400}, 3); }, "face 1 uses vertex 400");

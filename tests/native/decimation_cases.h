@@ -21,7 +21,7 @@ using Case = PlacedMesh;
 
 inline DecimationResult run(const Case& c, const Options& options = {}) {
   const auto volume = c.volume();
-  return decimate(c.mesh.vertices, c.mesh.triangles, c.placement(), volume.get(), options);
+  return decimate(c.mesh.vertices, c.mesh.triangles, c.space(), volume.get(), options);
 }
 
 /// Whatever the number of threads.

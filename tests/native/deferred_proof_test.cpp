@@ -34,19 +34,19 @@ struct Worked {
   explicit Worked(double tolerance, bool subset = false) {
     reference = square_with_ears();
     for (dvec3& p : reference.vertices) p.z = 0.05 * std::sin(9 * p.x) * std::cos(7 * p.y);
-    volume.emplace(reference.vertices, reference.triangles, Placement(glm::dmat4(1), Storage::float64), tolerance,
+    volume.emplace(reference.vertices, reference.triangles, StoredSpace(glm::dmat4(1), Storage::float64), tolerance,
                    ToleranceVolume::Options{.precision = 2});
-    placement = Placement(glm::dmat4(1), Storage::float64).in(volume->frame());
-    const double within = volume->frame_tolerance() * (1 - 1e-9);
-    certificate.emplace(volume->witnesses(), volume->grid(), volume->hierarchy(), within, within);
-    coverage.emplace(volume->reference(), within, reference.triangles.size());
-    for (std::uint32_t i = 0; i < reference.triangles.size(); ++i) coverage->own(i, i);
+    space = StoredSpace(glm::dmat4(1), Storage::float64).in(volume->frame());
+    const double limit = volume->frame_tolerance() * (1 - 1e-9);
+    certificate.emplace(volume->witnesses(), volume->grid(), volume->hierarchy(), limit, limit);
+    coverage.emplace(volume->reference(), limit, reference.triangles.size());
+    for (std::uint32_t i = 0; i < reference.triangles.size(); ++i) coverage->set_witness(i, i);
     BoundedMeshInput input;
     Team alone(1);
     input.triangles = reference.triangles;
     input.mates = cut_to_manifold(reference.vertices, reference.triangles, alone).mates;
     for (std::uint32_t v = 0; v < reference.vertices.size(); ++v) {
-      input.spots.push_back({reference.vertices[v], placement->frame(reference.vertices[v])});
+      input.positions.push_back({reference.vertices[v], space->frame(reference.vertices[v])});
       input.slots.push_back(v);
       input.shares.push_back(v % 5 == 0 ? 0.5 : 1);
     }
@@ -59,8 +59,8 @@ struct Worked {
     input.on_reference = true;
     input.subset = subset;
     input.store = [this](const dvec3& p) {
-      const dvec3 stored = placement->store(p);
-      return Spot{stored, placement->frame(stored)};
+      const dvec3 stored = space->store(p);
+      return VertexPosition{stored, space->frame(stored)};
     };
     Bounds bounds;
     bounds.forward = &*certificate, bounds.backward = &*coverage;
@@ -103,7 +103,7 @@ struct Worked {
   }
 
   TriangleMesh reference;
-  std::optional<Placement> placement;
+  std::optional<StoredSpace> space;
   std::optional<ToleranceVolume> volume;
   std::optional<TriangleCertificate> certificate;
   std::optional<Coverage> coverage;
@@ -123,7 +123,7 @@ void expect_same(const BoundedMesh& a, const BoundedMesh& b) {
     ASSERT_EQ(x.halfedge_handle(v), y.halfedge_handle(v)) << "of vertex " << i;
     ASSERT_EQ(a.survivor(std::uint32_t(i)), b.survivor(std::uint32_t(i)));
     ASSERT_EQ(a.position(std::uint32_t(i)), b.position(std::uint32_t(i)));
-    ASSERT_EQ(a.moved(std::uint32_t(i)), b.moved(std::uint32_t(i)));
+    ASSERT_EQ(a.left_original(std::uint32_t(i)), b.left_original(std::uint32_t(i)));
     ASSERT_EQ(a.distance(std::uint32_t(i)), b.distance(std::uint32_t(i)));
     ASSERT_EQ(a.share(std::uint32_t(i)), b.share(std::uint32_t(i)));
   }
@@ -151,7 +151,7 @@ void expect_same(const BoundedMesh& a, const BoundedMesh& b) {
 
 constexpr double kTolerance = 0.004;
 
-double fourth_power_of_tolerance() { return std::pow(Worked(kTolerance).certificate->within(), 4); }
+double fourth_power_of_tolerance() { return std::pow(Worked(kTolerance).certificate->limit(), 4); }
 
 TEST(DeferredProof, HoldsOnlyWithinTheTolerance) {
   const double unit = fourth_power_of_tolerance();
@@ -224,7 +224,7 @@ TEST(DeferredProof, LeavesBoundariesWithBoundsToOthers) {
   input.triangles = worked.reference.triangles;
   input.mates = cut_to_manifold(worked.reference.vertices, worked.reference.triangles, alone).mates;
   for (std::uint32_t v = 0; v < worked.reference.vertices.size(); ++v) {
-    input.spots.push_back({worked.mesh->stored(v), worked.mesh->position(v)});
+    input.positions.push_back({worked.mesh->stored(v), worked.mesh->position(v)});
     input.slots.push_back(v);
   }
   input.pinned.assign(worked.reference.vertices.size(), false);

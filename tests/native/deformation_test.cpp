@@ -54,13 +54,13 @@ struct Case {
   Storage storage = Storage::float32;
   double tolerance = 0.05;
 
-  Placement placement() const { return {to_world, storage}; }
+  StoredSpace space() const { return {to_world, storage}; }
   DeformationResult run(const LatticeDeformation& lattice, const Options& options = {}) const {
-    const ToleranceVolume volume(mesh.vertices, mesh.triangles, placement(), tolerance);
-    return deform(mesh.vertices, indices(mesh), 3, placement(), &volume, lattice, options);
+    const ToleranceVolume volume(mesh.vertices, mesh.triangles, space(), tolerance);
+    return deform(mesh.vertices, indices(mesh), 3, space(), &volume, lattice, options);
   }
   TriangleMesh world(std::vector<dvec3> vertices) const {
-    for (dvec3& p : vertices) p = placement().world(p);
+    for (dvec3& p : vertices) p = space().world(p);
     return {std::move(vertices), mesh.triangles};
   }
   double distance(const DeformationResult& result) const {
@@ -81,7 +81,7 @@ void expect_refused(const std::string& part, Body&& body) {
 TEST(Deformation, WithoutAVolumeVerticesFollowTheLattice) {
   const Case c;
   const LatticeDeformation lattice = shaken(1);
-  const DeformationResult r = deform(c.mesh.vertices, {}, 3, c.placement(), nullptr, lattice, {});
+  const DeformationResult r = deform(c.mesh.vertices, {}, 3, c.space(), nullptr, lattice, {});
   double largest = 0;
   for (std::size_t i = 0; i < r.vertices.size(); ++i) {
     const dvec3 motion = *lattice.displacement(c.mesh.vertices[i]);
@@ -99,7 +99,7 @@ TEST(Deformation, TheLatticeIsInTheWorldAndTheVerticesAreNot) {
   c.storage = Storage::float64;
   c.to_world = glm::dmat4(0, 2, 0, 0, -3, 0, 0, 0, 0, 0, 5, 0, 7, 8, 9, 1);
   const glm::dmat4 domain = c.to_world * kAroundTorus;
-  const DeformationResult r = deform(c.mesh.vertices, {}, 3, c.placement(), nullptr, lifted(1, domain), {});
+  const DeformationResult r = deform(c.mesh.vertices, {}, 3, c.space(), nullptr, lifted(1, domain), {});
   for (std::size_t i = 0; i < r.vertices.size(); ++i) {
     EXPECT_LT(glm::length(r.vertices[i] - c.mesh.vertices[i] - dvec3(0, 0, 0.2)), 1e-14);
   }
@@ -111,7 +111,7 @@ TEST(Deformation, OutsideOfTheLatticeVerticesStayBitForBit) {
   c.to_world = glm::dmat4(0.3, 0.1, 0, 0, -0.1, 0.3, 0, 0, 0, 0, 0.7, 0, 0.1, 0.2, 0.3, 1);
   glm::dmat4 half = kAroundTorus;  // x below 0
   half[0] *= 0.5;
-  const DeformationResult r = deform(c.mesh.vertices, {}, 3, c.placement(), nullptr, lifted(1, c.to_world * half), {});
+  const DeformationResult r = deform(c.mesh.vertices, {}, 3, c.space(), nullptr, lifted(1, c.to_world * half), {});
   std::size_t outside = 0;
   for (std::size_t i = 0; i < r.vertices.size(); ++i) {
     if (c.mesh.vertices[i].x > 1e-4) {
@@ -130,7 +130,7 @@ TEST(Deformation, InsideItIsCarriedOutWhole) {
   const LatticeDeformation lattice = shaken(0.05);
   const DeformationResult r = c.run(lattice);
   EXPECT_EQ(r.permitted_fraction, 1);
-  EXPECT_EQ(r.vertices, deform(c.mesh.vertices, {}, 3, c.placement(), nullptr, lattice, {}).vertices);
+  EXPECT_EQ(r.vertices, deform(c.mesh.vertices, {}, 3, c.space(), nullptr, lattice, {}).vertices);
   EXPECT_LE(c.distance(r), c.tolerance);
   EXPECT_EQ(r.leaving.faces, 0u);
   EXPECT_EQ(r.method, "certificate");
@@ -161,7 +161,7 @@ TEST(Deformation, BlockedNothingMovesAndTheFractionIsCertified) {
 TEST(Deformation, PulledBackEachVertexGoesAsFarAsItMay) {
   const Case c;
   const LatticeDeformation lattice = lifted(0.2);
-  const std::vector<dvec3> wish = deform(c.mesh.vertices, {}, 3, c.placement(), nullptr, lattice, {}).vertices;
+  const std::vector<dvec3> wish = deform(c.mesh.vertices, {}, 3, c.space(), nullptr, lattice, {}).vertices;
   const DeformationResult r = c.run(lattice, {.mode = Mode::pull_back});
   const double farthest = c.run(lattice, {.mode = Mode::farthest}).largest_motion;
   EXPECT_LE(c.distance(r), c.tolerance);
@@ -177,13 +177,13 @@ TEST(Deformation, PulledBackEachVertexGoesAsFarAsItMay) {
 
 TEST(Deformation, WhatIsOutsideToBeginWithIsKept) {
   Case c;
-  const ToleranceVolume volume(c.mesh.vertices, c.mesh.triangles, c.placement(), c.tolerance);
+  const ToleranceVolume volume(c.mesh.vertices, c.mesh.triangles, c.space(), c.tolerance);
   c.mesh.vertices[100] = rounded_to_float32(1.5 * c.mesh.vertices[100]);
   const std::vector<std::uint32_t> faces = indices(c.mesh);
   for (const double height : {0.02, 0.2}) {
     for (const Mode mode : {Mode::blocked, Mode::farthest, Mode::pull_back}) {
       const Options options{.mode = mode, .outside = Options::Outside::keep};
-      const DeformationResult r = deform(c.mesh.vertices, faces, 3, c.placement(), &volume, lifted(height), options);
+      const DeformationResult r = deform(c.mesh.vertices, faces, 3, c.space(), &volume, lifted(height), options);
       EXPECT_EQ(r.outside.faces, 6u);
       EXPECT_EQ(r.vertices[100], c.mesh.vertices[100]);
       EXPECT_EQ(r.leaving.faces > 0, height == 0.2);
@@ -216,12 +216,12 @@ TEST(Deformation, HostileStatesAreNeverAcceptedOutside) {
 TEST(Deformation, FacesOfFourCornersAreCheckedInEveryTriangulation) {
   // A roof whose ridge is one diagonal of a square; a face along the other diagonal would be a valley.
   const TriangleMesh roof = shapes::squares(1, [](const dvec3& p) { return dvec3(p.x, p.y, 0.3 * (p.x == p.y)); });
-  const Placement placement(glm::dmat4(1), Storage::float64);
-  const ToleranceVolume volume(roof.vertices, roof.triangles, placement, 0.1);
+  const StoredSpace space(glm::dmat4(1), Storage::float64);
+  const ToleranceVolume volume(roof.vertices, roof.triangles, space, 0.1);
   const LatticeDeformation lattice = lifted(0.05, glm::dmat4(glm::dmat3(2)));
-  EXPECT_EQ(deform(roof.vertices, indices(roof), 3, placement, &volume, lattice, {}).permitted_fraction, 1);
+  EXPECT_EQ(deform(roof.vertices, indices(roof), 3, space, &volume, lattice, {}).permitted_fraction, 1);
   const std::vector<std::uint32_t> quad = {0, 2, 3, 1};
-  expect_refused("1 faces are not within", [&] { deform(roof.vertices, quad, 4, placement, &volume, lattice, {}); });
+  expect_refused("1 faces are not within", [&] { deform(roof.vertices, quad, 4, space, &volume, lattice, {}); });
 }
 
 TEST(Deformation, ResultDoesNotDependOnThreads) {
@@ -236,22 +236,22 @@ TEST(Deformation, ResultDoesNotDependOnThreads) {
 
 TEST(Deformation, AMeshThatIsOutsideAlreadyIsRefused) {
   const Case c;
-  const ToleranceVolume volume(c.mesh.vertices, c.mesh.triangles, c.placement(), c.tolerance);
+  const ToleranceVolume volume(c.mesh.vertices, c.mesh.triangles, c.space(), c.tolerance);
   std::vector<dvec3> vertices = c.mesh.vertices;
   vertices[100] *= 1.5;
   for (const Mode mode : {Mode::blocked, Mode::farthest, Mode::pull_back}) {
     expect_refused("6 faces are not within the tolerance of the reference, the first is face",
-                   [&] { deform(vertices, indices(c.mesh), 3, c.placement(), &volume, shaken(0.01), {.mode = mode}); });
+                   [&] { deform(vertices, indices(c.mesh), 3, c.space(), &volume, shaken(0.01), {.mode = mode}); });
   }
 }
 
 TEST(Deformation, BadArraysAreRefused) {
   const Case c;
-  const ToleranceVolume volume(c.mesh.vertices, c.mesh.triangles, c.placement(), c.tolerance);
+  const ToleranceVolume volume(c.mesh.vertices, c.mesh.triangles, c.space(), c.tolerance);
   const LatticeDeformation lattice = shaken(0.01);
   const auto refused = [&](const std::string& part, std::vector<dvec3> vertices, std::vector<std::uint32_t> faces,
                            int corners, const LatticeDeformation& by) {
-    expect_refused(part, [&] { deform(vertices, faces, corners, c.placement(), &volume, by, {}); });
+    expect_refused(part, [&] { deform(vertices, faces, corners, c.space(), &volume, by, {}); });
   };
   std::vector<dvec3> broken = c.mesh.vertices;
   broken[7].z = std::nan("");

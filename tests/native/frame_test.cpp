@@ -31,22 +31,22 @@ TEST(Frame, ScalesToAboutOneAtAnySize) {
   }
 }
 
-TEST(Placement, StoredPositionsComeBack) {
+TEST(StoredSpace, StoredPositionsComeBack) {
   std::mt19937 engine(1);
   std::normal_distribution<double> normal;
   for (const Storage storage : {Storage::float32, Storage::float64}) {
-    const Placement placement = Placement(sheared(), storage).in(Frame(Box{{990, -60, 0}, {1010, -40, 6}}));
+    const StoredSpace space = StoredSpace(sheared(), storage).in(Frame(Box{{990, -60, 0}, {1010, -40, 6}}));
     std::vector<dvec3> points;
     for (int i = 0; i < 1000; ++i)
       points.push_back(rounded_to_float32(dvec3(normal(engine), normal(engine), normal(engine))));
-    const double step = placement.storage_step(points), error = placement.mapping_error(points);
+    const double step = space.storage_step(points), error = space.mapping_error(points);
     for (const dvec3& p : points) {
-      const dvec3 q = placement.frame(p) + 1e-4 * dvec3(normal(engine), normal(engine), normal(engine));
-      const dvec3 back = placement.frame(placement.store(q));
+      const dvec3 q = space.frame(p) + 1e-4 * dvec3(normal(engine), normal(engine), normal(engine));
+      const dvec3 back = space.frame(space.store(q));
       EXPECT_LE(glm::length(back - q), step + 1e3 * error);
       if (storage == Storage::float32) {
         // One coordinate at a time and through memory, which no compiler folds away.
-        const dvec3 s = placement.store(q);
+        const dvec3 s = space.store(q);
         for (int k = 0; k < 3; ++k) {
           const volatile float single = static_cast<float>(s[k]);
           ASSERT_EQ(s[k], single) << "what is stored is a float32, bit for bit";
@@ -56,18 +56,18 @@ TEST(Placement, StoredPositionsComeBack) {
   }
 }
 
-TEST(Placement, MappingErrorCoversLongDouble) {
+TEST(StoredSpace, MappingErrorCoversLongDouble) {
   std::mt19937 engine(2);
   std::normal_distribution<double> normal;
   const glm::dmat4 m = sheared();
   const Frame frame(Box{{990, -60, 0}, {1010, -40, 6}});
-  const Placement placement = Placement(m, Storage::float64).in(frame);
+  const StoredSpace space = StoredSpace(m, Storage::float64).in(frame);
   std::vector<dvec3> points;
   for (int i = 0; i < 1000; ++i) points.emplace_back(100 * normal(engine), 1e4 * normal(engine), normal(engine));
-  const double bound = placement.mapping_error(points);
+  const double bound = space.mapping_error(points);
   double worst = 0;
   for (const dvec3& p : points) {
-    const dvec3 got = placement.frame(p), centre = frame.to_world(dvec3(0));
+    const dvec3 got = space.frame(p), centre = frame.to_world(dvec3(0));
     for (int row = 0; row < 3; ++row) {
       long double exact = m[3][row];
       for (int column = 0; column < 3; ++column) exact += static_cast<long double>(m[column][row]) * p[column];
@@ -78,28 +78,28 @@ TEST(Placement, MappingErrorCoversLongDouble) {
   EXPECT_GE(worst, bound / 100) << "the bound says nothing when it is that wide";
 }
 
-TEST(Placement, RefusesWhatIsNotInvertible) {
+TEST(StoredSpace, RefusesWhatIsNotInvertible) {
   glm::dmat4 flat(1), projective(1), nan(1);
   flat[2] = {1, 1, 0, 0}, flat[1] = {1, -1, 0, 0};
   projective[0][3] = 0.1;
   nan[3][0] = std::numeric_limits<double>::quiet_NaN();
   for (const glm::dmat4& m : {flat, projective, nan, glm::dmat4(0)}) {
-    EXPECT_THROW(Placement(m, Storage::float32), InvalidInput);
+    EXPECT_THROW(StoredSpace(m, Storage::float32), InvalidInput);
   }
   glm::dmat4 tiny(1e-30);
   tiny[3][3] = 1;
-  EXPECT_NO_THROW(Placement(tiny, Storage::float32));
+  EXPECT_NO_THROW(StoredSpace(tiny, Storage::float32));
 }
 
 TEST(ReferenceSize, LongestDiagonalAfterTheMatrixOfUsedVerticesOnly) {
   TriangleMesh mesh = shapes::box(1);
   mesh.vertices.emplace_back(100, 100, 100);  // unused
-  EXPECT_DOUBLE_EQ(reference_size(mesh.vertices, mesh.triangles, glm::dmat4(1)), std::sqrt(3.0));
+  EXPECT_DOUBLE_EQ(longest_diagonal(mesh.vertices, mesh.triangles, glm::dmat4(1)), std::sqrt(3.0));
   glm::dmat4 shear(1);
   shear[1][0] = -3;  // x -= 3 y: the diagonal (1, -1, 1) becomes the longest
-  EXPECT_DOUBLE_EQ(reference_size(mesh.vertices, mesh.triangles, shear), std::sqrt(16.0 + 1 + 1));
+  EXPECT_DOUBLE_EQ(longest_diagonal(mesh.vertices, mesh.triangles, shear), std::sqrt(16.0 + 1 + 1));
   for (dvec3& p : mesh.vertices) p = dvec3(1);
-  EXPECT_THROW(reference_size(mesh.vertices, mesh.triangles, glm::dmat4(1)), InvalidInput);
+  EXPECT_THROW(longest_diagonal(mesh.vertices, mesh.triangles, glm::dmat4(1)), InvalidInput);
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ std::vector<Verdict> check(const ToleranceCheck& method, const ToleranceVolume& 
                            const std::vector<dvec3>& points, int corners = 3, Progress* progress = nullptr) {
   std::vector<std::uint32_t> indices(points.size());
   for (std::uint32_t i = 0; i < indices.size(); ++i) indices[i] = i;
-  const Placement placed = kIdentity.in(volume.frame());
+  const StoredSpace placed = kIdentity.in(volume.frame());
   return method.check({placed.frame(points), indices, corners, placed.mapping_error(points)}, {1, progress});
 }
 

@@ -72,8 +72,8 @@ TEST_F(Gl, BuffersKeepWhatIsWritten) {
 }
 
 TEST_F(Gl, ShaderErrorsNameFileAndReason) {
-  const std::string message = message_of([] { gl::Program({{GL_VERTEX_SHADER, {"lattice.vert", "lattice.vert"}}}); });
-  EXPECT_NE(message.find("lattice.vert + lattice.vert does not compile: "), std::string::npos) << message;
+  const std::string message = message_of([] { gl::Program({{GL_VERTEX_SHADER, {"samples.vert", "samples.vert"}}}); });
+  EXPECT_NE(message.find("samples.vert + samples.vert does not compile: "), std::string::npos) << message;
   EXPECT_NE(message.find("main"), std::string::npos) << message;
 }
 

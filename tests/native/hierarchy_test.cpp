@@ -118,7 +118,7 @@ TEST(Hierarchy, LooksAtFewOfManyNeedles) {
     for (int i = 0; i < 500; ++i) {
       const glm::uvec3& t = mesh.triangles[random.below(20000)];
       const dvec3 p = 0.3 * mesh.vertices[t.x] + 0.4 * mesh.vertices[t.y] + 0.3 * mesh.vertices[t.z];
-      hierarchy.near(p, 1e-5, [&](std::uint32_t) { ++looked_at; });
+      hierarchy.for_each_within(p, 1e-5, [&](std::uint32_t) { ++looked_at; });
       hierarchy.nearest_if(p, [&](std::uint32_t) { return ++looked_at > 0; });
     }
     EXPECT_LT(looked_at, 500u * 30) << around_a_point;
@@ -223,7 +223,7 @@ TEST(Hierarchy, NearVisitsAllWithinTheRadius) {
     const dvec3 p = random.point() * (i % 10 == 0 ? 1e9 : 1.0);
     const double radius = 0.3 * random.below(5) + (i % 10 == 0 ? 2e9 : 0.0);
     std::vector<int> seen(mesh.triangles.size());
-    hierarchy.near(p, radius, [&](std::uint32_t t) { ++seen[t]; });
+    hierarchy.for_each_within(p, radius, [&](std::uint32_t t) { ++seen[t]; });
     for (std::uint32_t t = 0; t < seen.size(); ++t) {
       EXPECT_LE(seen[t], 1);
       if (std::sqrt(closest(mesh, t, p).distance_squared) <= radius) {
@@ -233,7 +233,7 @@ TEST(Hierarchy, NearVisitsAllWithinTheRadius) {
   }
   const dvec3 corner = mesh.vertices[7];
   int visited = 0;
-  hierarchy.near(corner, 0, [&](std::uint32_t) { ++visited; });
+  hierarchy.for_each_within(corner, 0, [&](std::uint32_t) { ++visited; });
   EXPECT_LT(visited, 100);  // not simply all of them
 }
 

@@ -94,9 +94,9 @@ std::size_t parts(const std::vector<glm::uvec3>& triangles, std::size_t vertices
 
 TEST(JoinedSheets, CollapseAlongTheEdgesTheyShare) {
   const Case c = shelves(2, 8);  // 4,608 triangles; 72 would do
-  for (const auto vertices : {Options::Vertices::optimal, Options::Vertices::subset}) {
+  for (const auto placement : {Options::Placement::optimal, Options::Placement::subset}) {
     Options options;
-    options.vertices = vertices;
+    options.placement = placement;
     const DecimationResult r = run(c, options);
     cases::expect_within(c, r);
     EXPECT_LE(r.triangles.size(), 200u);
@@ -107,7 +107,7 @@ TEST(JoinedSheets, CollapseAlongTheEdgesTheyShare) {
       EXPECT_TRUE(before.contains(faces)) << faces;
       EXPECT_LE(count, before.contains(faces) ? before.at(faces) : 0);
     }
-    for (std::size_t v = 0; v < r.vertices.size() && vertices == Options::Vertices::subset; ++v) {
+    for (std::size_t v = 0; v < r.vertices.size() && placement == Options::Placement::subset; ++v) {
       EXPECT_EQ(r.vertices[v], c.mesh.vertices[r.vertex_source[v]]);
     }
   }

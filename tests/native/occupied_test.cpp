@@ -36,32 +36,32 @@ TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
   const std::uint32_t above = kMiddle + static_cast<std::uint32_t>(lower.vertices.size());
   const TriangleMesh both = shapes::joined(lower, upper);
 
-  const Placement world(glm::dmat4(1), Storage::float64);
+  const StoredSpace world(glm::dmat4(1), Storage::float64);
   const ToleranceVolume volume(both.vertices, both.triangles, world, 0.05);
-  const Placement placement = world.in(volume.frame());
-  const double within = volume.frame_tolerance();
-  const TriangleCertificate certificate(volume.witnesses(), volume.grid(), volume.hierarchy(), within, within);
+  const StoredSpace space = world.in(volume.frame());
+  const double limit = volume.frame_tolerance();
+  const TriangleCertificate certificate(volume.witnesses(), volume.grid(), volume.hierarchy(), limit, limit);
   Team alone(1);
   BoundedMeshInput input;
   input.triangles = both.triangles;
   input.mates = cut_to_manifold(both.vertices, both.triangles, alone).mates;
   for (std::uint32_t v = 0; v < both.vertices.size(); ++v) {
-    input.spots.push_back({both.vertices[v], placement.frame(both.vertices[v])});
+    input.positions.push_back({both.vertices[v], space.frame(both.vertices[v])});
     input.slots.push_back(v);
   }
   input.pinned.assign(both.vertices.size(), false);
-  input.store = [&](const dvec3& p) { return Spot{placement.store(p), p}; };
+  input.store = [&](const dvec3& p) { return VertexPosition{space.store(p), p}; };
   Bounds bounds;
   bounds.forward = &certificate;
   BoundedMesh mesh(std::move(input), bounds, alone);
 
-  const auto relocate = [&](const Spot& spot) {
+  const auto relocate = [&](const VertexPosition& target) {
     Change change(mesh);
     change.begin();
-    const Change::Outcome outcome = change.try_relocate(kMiddle, spot);
+    const Change::Outcome outcome = change.try_relocate(kMiddle, target);
     return std::pair(outcome, change.met_another());
   };
-  const Spot taken = mesh.spot(above), here = mesh.spot(kMiddle);
+  const VertexPosition taken = mesh.vertex_position(above), here = mesh.vertex_position(kMiddle);
   EXPECT_EQ(relocate(taken), std::pair(Change::Outcome::possible, false)) << "as long as nothing keeps them apart";
   mesh.keep_apart();
   EXPECT_EQ(relocate(taken), std::pair(Change::Outcome::refused, true));
@@ -69,11 +69,11 @@ TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
 
   Change away(mesh);
   away.begin();
-  const dvec3 aside = taken.position + dvec3(0.1 * within, 0, 0);
+  const dvec3 aside = taken.position + dvec3(0.1 * limit, 0, 0);
   ASSERT_EQ(away.try_relocate(above, mesh.store(aside)), Change::Outcome::possible);
   mesh.apply(away);
   EXPECT_EQ(relocate(taken), std::pair(Change::Outcome::possible, false)) << "the place is free again";
-  EXPECT_EQ(relocate(mesh.spot(above)), std::pair(Change::Outcome::refused, true));
+  EXPECT_EQ(relocate(mesh.vertex_position(above)), std::pair(Change::Outcome::refused, true));
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ TriangleMesh square(double turn = 0, const dvec3& shift = dvec3(0)) {
 
 /// Everything is its own frame here.
 const Frame kFrame;
-Placement world() { return Placement(glm::dmat4(1), Storage::float64, kFrame); }
+StoredSpace world() { return StoredSpace(glm::dmat4(1), Storage::float64, kFrame); }
 
 /// Onto the plane z = 0, y upwards, two units high there.
 Camera from_above(double distance = 100) {
@@ -236,7 +236,7 @@ TEST_F(Picture, TheCameraFramesTheMeshTightly) {
     }
     EXPECT_GE(std::min(left, top), 1) << aspect;
     EXPECT_LE(std::min(left, top), 8) << aspect;
-    how.room = 0.5;
+    how.margin = 0.5;
     const Camera far = framing(mesh.vertices, mesh.triangles, how);
     EXPECT_GT(glm::length(far.eye), 1.4 * glm::length(framing(mesh.vertices, mesh.triangles, {.aspect = aspect}).eye));
   }
@@ -256,7 +256,7 @@ TEST_F(Picture, CamerasThatSeeNothingAreRefused) {
   const TriangleMesh point{{{1, 2, 3}, {1, 2, 3}, {1, 2, 3}}, {{0, 1, 2}}};
   EXPECT_LT(glm::distance(framing(point.vertices, point.triangles, {}).target, dvec3(1, 2, 3)), 1e-12);
   EXPECT_THROW(framing(point.vertices, point.triangles, {.aspect = infinity}), InvalidInput);
-  EXPECT_THROW(framing(point.vertices, point.triangles, {.room = -1}), InvalidInput);
+  EXPECT_THROW(framing(point.vertices, point.triangles, {.margin = -1}), InvalidInput);
 }
 
 TEST_F(Picture, SizesThatCannotBeDrawnAreRefused) {

@@ -18,14 +18,14 @@ struct PlacedMesh {
   Storage storage = Storage::float32;
   double percent = 1;
 
-  Placement placement() const { return {to_world, storage}; }
-  double tolerance() const { return percent / 100 * reference_size(mesh.vertices, mesh.triangles, to_world); }
+  StoredSpace space() const { return {to_world, storage}; }
+  double tolerance() const { return percent / 100 * longest_diagonal(mesh.vertices, mesh.triangles, to_world); }
   /// Of a share of the tolerance.
   std::unique_ptr<ToleranceVolume> volume(double share = 1) const {
-    return std::make_unique<ToleranceVolume>(mesh.vertices, mesh.triangles, placement(), share * tolerance());
+    return std::make_unique<ToleranceVolume>(mesh.vertices, mesh.triangles, space(), share * tolerance());
   }
   TriangleMesh world(std::vector<glm::dvec3> vertices, std::vector<glm::uvec3> triangles) const {
-    for (glm::dvec3& p : vertices) p = placement().world(p);
+    for (glm::dvec3& p : vertices) p = space().world(p);
     return {std::move(vertices), std::move(triangles)};
   }
 };

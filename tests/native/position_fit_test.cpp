@@ -20,13 +20,13 @@ struct Plate {
     reference = shapes::grid(n);
     for (dvec3& p : reference.vertices) p.z = 0;
     lifted = (n / 2) * (n + 1) + n / 2;
-    volume.emplace(reference.vertices, reference.triangles, Placement(glm::dmat4(1), Storage::float64), 0.2,
+    volume.emplace(reference.vertices, reference.triangles, StoredSpace(glm::dmat4(1), Storage::float64), 0.2,
                    ToleranceVolume::Options{.precision = 8});
-    placement = Placement(glm::dmat4(1), Storage::float64).in(volume->frame());
+    space = StoredSpace(glm::dmat4(1), Storage::float64).in(volume->frame());
     certificate.emplace(volume->witnesses(), volume->grid(), volume->hierarchy(), volume->frame_tolerance(),
                         volume->frame_tolerance());
     coverage.emplace(volume->reference(), volume->frame_tolerance(), reference.triangles.size());
-    for (std::uint32_t i = 0; i < reference.triangles.size(); ++i) coverage->own(i, i);
+    for (std::uint32_t i = 0; i < reference.triangles.size(); ++i) coverage->set_witness(i, i);
     BoundedMeshInput input;
     Team alone(1);
     input.triangles = reference.triangles;
@@ -34,11 +34,11 @@ struct Plate {
     for (std::uint32_t v = 0; v < reference.vertices.size(); ++v) {
       dvec3 p = reference.vertices[v];
       if (v == lifted) p.z = height;
-      input.spots.push_back({p, placement->frame(p)});
+      input.positions.push_back({p, space->frame(p)});
       input.slots.push_back(v);
     }
     input.pinned.assign(reference.vertices.size(), false);
-    input.store = [this](const dvec3& p) { return Spot{placement->store(p), p}; };
+    input.store = [this](const dvec3& p) { return VertexPosition{space->store(p), p}; };
     Bounds bounds;
     bounds.forward = &*certificate, bounds.backward = &*coverage;
     mesh.emplace(std::move(input), bounds, alone);
@@ -46,7 +46,7 @@ struct Plate {
 
   TriangleMesh reference;
   std::uint32_t lifted;
-  std::optional<Placement> placement;
+  std::optional<StoredSpace> space;
   std::optional<ToleranceVolume> volume;
   std::optional<TriangleCertificate> certificate;
   std::optional<Coverage> coverage;
@@ -58,7 +58,7 @@ TEST(PositionFit, BringsALiftedVertexBackToThePlane) {
   Change change(*plate.mesh);
   PositionFit fit(*plate.mesh);
   const dvec3 start = plate.mesh->position(plate.lifted);
-  ASSERT_TRUE(change.prepare_relocate(plate.lifted, plate.mesh->spot(plate.lifted)));
+  ASSERT_TRUE(change.prepare_relocate(plate.lifted, plate.mesh->vertex_position(plate.lifted)));
   fit.gather(change);
   const PositionFit::Fit first = fit.fit(change, start);
   const double height = 0.1 * plate.volume->frame().scale();
@@ -82,7 +82,7 @@ TEST(PositionFit, StaysWhereNothingDeviates) {
   Change change(*plate.mesh);
   PositionFit fit(*plate.mesh);
   const dvec3 start = plate.mesh->position(plate.lifted);
-  ASSERT_TRUE(change.prepare_relocate(plate.lifted, plate.mesh->spot(plate.lifted)));
+  ASSERT_TRUE(change.prepare_relocate(plate.lifted, plate.mesh->vertex_position(plate.lifted)));
   fit.gather(change);
   const PositionFit::Fit at_rest = fit.fit(change, start);
   EXPECT_LT(at_rest.energy, 1e-9);

@@ -51,7 +51,7 @@ TEST(Refinement, KeepsTheOneDirectionThatIsAskedFor) {
 TEST(Refinement, SubsetKeepsPositionsBitForBit) {
   const Case c = torus();
   Options options = thorough();
-  options.vertices = Options::Vertices::subset;
+  options.placement = Options::Placement::subset;
   const DecimationResult r = run(c, options);
   cases::expect_within(c, r);
   for (std::size_t v = 0; v < r.vertices.size(); ++v) EXPECT_EQ(r.vertices[v], c.mesh.vertices[r.vertex_source[v]]);
@@ -152,10 +152,10 @@ TEST(Refinement, ThreadsDoNotChangeABit) {
     const auto locked = std::make_unique<bool[]>(shares.size());
     for (std::size_t v = 0; v < shares.size(); v += 7) shares[v] = 0.5, locked[v] = v % 2 == 0;
     for (const bool two_sided : {true, false}) {
-      for (const auto vertices : {Options::Vertices::optimal, Options::Vertices::subset}) {
+      for (const auto placement : {Options::Placement::optimal, Options::Placement::subset}) {
         for (const bool bound : {true, false}) {
           Options options = thorough();
-          options.two_sided = two_sided, options.vertices = vertices;
+          options.two_sided = two_sided, options.placement = placement;
           if (bound) options.shares = shares, options.locked = {locked.get(), shares.size()};
           cases::expect_same_bits(c, options);
         }
@@ -185,8 +185,8 @@ TEST(Refinement, WhatIsTriedAheadKnowsWhatAVertexThatStaysMayStillUse) {
     fans.triangles.emplace_back(n, n + 1, n + 2);
   }
   const TriangleMesh reference{{{-20, -20, 0}, {20, -20, 0}, {20, 20, 0}, {-20, 20, 0}}, {{0, 1, 2}, {0, 2, 3}}};
-  const Placement placement(glm::dmat4(1), Storage::float64);
-  const ToleranceVolume volume(reference.vertices, reference.triangles, placement, 1.0);
+  const StoredSpace space(glm::dmat4(1), Storage::float64);
+  const ToleranceVolume volume(reference.vertices, reference.triangles, space, 1.0);
   std::vector<double> shares(fans.vertices.size(), 1);
   shares[5] = 0.17;
   const auto locked = std::make_unique<bool[]>(shares.size());
@@ -195,7 +195,7 @@ TEST(Refinement, WhatIsTriedAheadKnowsWhatAVertexThatStaysMayStillUse) {
   options.two_sided = false, options.shares = shares, options.locked = {locked.get(), shares.size()};
   for (const unsigned threads : {1u, 2u, 4u}) {
     options.threads = threads;
-    const DecimationResult r = decimate(fans.vertices, fans.triangles, placement, &volume, options);
+    const DecimationResult r = decimate(fans.vertices, fans.triangles, space, &volume, options);
     EXPECT_EQ(r.triangles.size(), triangles - 2 + 3) << threads << " threads";
   }
 }

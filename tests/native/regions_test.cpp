@@ -20,12 +20,12 @@ BoundedMesh mesh_of(const TriangleMesh& from, std::vector<std::uint32_t> slots =
   Team alone(1);
   input.triangles = from.triangles;
   input.mates = cut_to_manifold(from.vertices, from.triangles, alone).mates;
-  for (const glm::dvec3& p : from.vertices) input.spots.push_back({p, p});
+  for (const glm::dvec3& p : from.vertices) input.positions.push_back({p, p});
   input.pinned.assign(from.vertices.size(), false);
   input.slots = std::move(slots);
   for (std::uint32_t v = static_cast<std::uint32_t>(input.slots.size()); v < from.vertices.size(); ++v)
     input.slots.push_back(v);
-  input.store = [](const glm::dvec3& p) { return Spot{p, p}; };
+  input.store = [](const glm::dvec3& p) { return VertexPosition{p, p}; };
   return BoundedMesh(std::move(input), {}, alone);
 }
 

@@ -12,8 +12,8 @@ using glm::dvec3;
 
 struct Triangles {
   explicit Triangles(const TriangleMesh& mesh) : witnesses(prepare_witnesses(mesh)), hierarchy(mesh) {}
-  bool cover(const dvec3& a, const dvec3& b, double within) const {
-    return covers_segment(witnesses, hierarchy, a, b, within);
+  bool cover(const dvec3& a, const dvec3& b, double limit) const {
+    return covers_segment(witnesses, hierarchy, a, b, limit);
   }
   std::vector<WitnessTriangle> witnesses;
   Hierarchy hierarchy;

@@ -56,7 +56,7 @@ Options alone() {
 TEST(Slivers, AFaceAcrossSliversIsProvedInFewParts) {
   const Case c = cylinder(1500, 0.05);
   const auto volume = c.volume();
-  const Placement placed = c.placement().in(volume->frame());
+  const StoredSpace placed = c.space().in(volume->frame());
   // A long face over six pairs of slivers, at an angle to them.
   const auto at = [](double degrees, double z) {
     const double angle = degrees * std::numbers::pi / 180;
@@ -80,7 +80,7 @@ TEST(Slivers, ACylinderEndsNearItsOptimum) {
     cases::expect_within(c, r);
     EXPECT_LE(r.triangles.size(), 240u) << sides;
     Options subset = alone();
-    subset.vertices = Options::Vertices::subset;
+    subset.placement = Options::Placement::subset;
     EXPECT_LE(static_cast<double>(r.triangles.size()), 1.02 * static_cast<double>(run(c, subset).triangles.size()));
   }
 }
@@ -98,7 +98,7 @@ TEST(Slivers, TheWorkAtAFanGrowsHardlyFasterThanItsFaces) {
     const Case c = star(rim);
     const auto volume = c.volume();
     const std::size_t polls =
-        polls_of([&] { decimate(c.mesh.vertices, c.mesh.triangles, c.placement(), volume.get(), alone()); });
+        polls_of([&] { decimate(c.mesh.vertices, c.mesh.triangles, c.space(), volume.get(), alone()); });
     if (before > 0) {
       EXPECT_LE(polls, 3 * before) << rim;
     }

@@ -22,10 +22,10 @@ using Operator = Options::Operator;
 using Weights = Options::Weights;
 using Boundary = Options::Boundary;
 
-const Placement kDouble(glm::dmat4(1), Storage::float64), kSingle(glm::dmat4(1), Storage::float32);
+const StoredSpace kDouble(glm::dmat4(1), Storage::float64), kSingle(glm::dmat4(1), Storage::float32);
 
-SmoothingResult free_smooth(const TriangleMesh& mesh, const Options& options, const Placement& placement = kDouble) {
-  return smooth(mesh.vertices, mesh.triangles, placement, nullptr, options);
+SmoothingResult free_smooth(const TriangleMesh& mesh, const Options& options, const StoredSpace& space = kDouble) {
+  return smooth(mesh.vertices, mesh.triangles, space, nullptr, options);
 }
 
 /// A flat square plate of n x n squares with noise in z, or with noise in the plane as well.
@@ -66,13 +66,13 @@ TEST(Smoothing, CotangentBilaplacianFollowsItsFormula) {
     glm::dmat4 to_world(1);
     if (sheared) to_world[1][0] = 0.3, to_world[2][2] = 2;  // weights are of the world
     const TriangleMesh mesh = shapes::torus(12, 0.01);
-    const Placement placement(to_world, Storage::float64);
+    const StoredSpace space(to_world, Storage::float64);
     const unsigned n = 12;
     const auto at = [n](int i, int j) { return unsigned((i + int(n)) % int(n)) * n + unsigned((j + int(n)) % int(n)); };
     const auto umbrella = [&](int i, int j, const auto& value) {
       // Neighbours in turn; the two corners opposite to an edge are the neighbours before and after.
       const int around[6][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 0}, {-1, -1}, {0, -1}};
-      const auto world = [&](unsigned v) { return placement.world(mesh.vertices[v]); };
+      const auto world = [&](unsigned v) { return space.world(mesh.vertices[v]); };
       dvec3 sum(0);
       double total = 0;
       for (int k = 0; k < 6; ++k) {
@@ -87,7 +87,7 @@ TEST(Smoothing, CotangentBilaplacianFollowsItsFormula) {
     };
     const auto position = [&](int i, int j) { return mesh.vertices[at(i, j)]; };
     const auto first = [&](int i, int j) { return umbrella(i, j, position); };
-    const SmoothingResult r = free_smooth(mesh, {.iterations = 1}, placement);
+    const SmoothingResult r = free_smooth(mesh, {.iterations = 1}, space);
     for (int i = 0; i < int(n); ++i) {
       for (int j = 0; j < int(n); ++j) {
         const dvec3 expected = position(i, j) - 0.25 * umbrella(i, j, first);
@@ -193,12 +193,12 @@ TEST(Smoothing, WhatIsHugeHoldsNothingBack) {
   odd[1][0] = 0.3, odd[2][2] = -2, odd[3] = {10, 20, 30, 1};
   for (const Storage storage : {Storage::float32, Storage::float64}) {
     const TriangleMesh mesh = shapes::torus(30, 0.02);
-    const Placement placement(odd, storage);
-    const ToleranceVolume volume(mesh.vertices, mesh.triangles, placement, 3);
+    const StoredSpace space(odd, storage);
+    const ToleranceVolume volume(mesh.vertices, mesh.triangles, space, 3);
     for (const bool reset : {false, true}) {
       const Options options{.iterations = 20, .reset = reset};
-      const SmoothingResult bounded = smooth(mesh.vertices, mesh.triangles, placement, &volume, options);
-      EXPECT_TRUE(same_bits(bounded.vertices, free_smooth(mesh, options, placement).vertices));
+      const SmoothingResult bounded = smooth(mesh.vertices, mesh.triangles, space, &volume, options);
+      EXPECT_TRUE(same_bits(bounded.vertices, free_smooth(mesh, options, space).vertices));
       EXPECT_EQ(bounded.held_back, std::vector<std::size_t>(20, 0));
     }
   }
@@ -209,8 +209,8 @@ struct Scene {
   glm::dmat4 to_world = glm::dmat4(1);
   double percent = 0.4;
 
-  Placement placement() const { return {to_world, Storage::float32}; }
-  double tolerance() const { return percent / 100 * reference_size(mesh.vertices, mesh.triangles, to_world); }
+  StoredSpace space() const { return {to_world, Storage::float32}; }
+  double tolerance() const { return percent / 100 * longest_diagonal(mesh.vertices, mesh.triangles, to_world); }
 };
 
 std::vector<Scene> scenes() {
@@ -239,21 +239,21 @@ std::vector<Scene> scenes() {
 TEST(Smoothing, EveryResultIsInsideOnEveryMesh) {
   int number = 0;
   for (const Scene& scene : scenes()) {
-    const ToleranceVolume volume(scene.mesh.vertices, scene.mesh.triangles, scene.placement(), scene.tolerance());
+    const ToleranceVolume volume(scene.mesh.vertices, scene.mesh.triangles, scene.space(), scene.tolerance());
     for (const bool reset : {false, true}) {
       SCOPED_TRACE(testing::Message() << "scene " << number << (reset ? " reset" : " pulled back"));
       const Options options{.iterations = 8,
                             .weights = reset ? Weights::uniform : Weights::cotangent,
                             .boundary = Boundary::along,
                             .reset = reset};
-      const SmoothingResult r = smooth(scene.mesh.vertices, scene.mesh.triangles, scene.placement(), &volume, options);
+      const SmoothingResult r = smooth(scene.mesh.vertices, scene.mesh.triangles, scene.space(), &volume, options);
       const auto world = [&](std::vector<dvec3> points) {
-        for (dvec3& p : points) p = scene.placement().world(p);
+        for (dvec3& p : points) p = scene.space().world(p);
         return TriangleMesh{points, scene.mesh.triangles};
       };
       const double tolerance = scene.tolerance();
       EXPECT_LE(hausdorff(world(r.vertices), world(scene.mesh.vertices), {tolerance, 1, nullptr}).upper, tolerance);
-      const Placement placed = scene.placement().in(volume.frame());
+      const StoredSpace placed = scene.space().in(volume.frame());
       const std::vector<dvec3> in_frame = placed.frame(r.vertices);
       std::vector<std::uint32_t> indices;
       for (const glm::uvec3& t : scene.mesh.triangles) indices.insert(indices.end(), {t.x, t.y, t.z});

@@ -203,7 +203,7 @@ TEST_P(ProvingCheck, GroupsTakeTheLeastVerdictInAnyOrder) {
   const std::unique_ptr<ToleranceVolume> volume = make_volume(torus);
   const std::unique_ptr<ToleranceCheck> check = make_check(GetParam(), *volume);
   const Points points = Maker(torus, kTolerance, 9).all_kinds(3'000);
-  const Placement placed = kIdentity.in(volume->frame());
+  const StoredSpace placed = kIdentity.in(volume->frame());
   const std::vector<dvec3> in_frame = placed.frame(points);
   const std::vector<std::uint32_t> indices = candidates::corners(points.size());
   const Pieces pieces{in_frame, indices, 3, placed.mapping_error(points)};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "decimation/predecessors.h"
+#include "decimation/replaced_faces.h"
 
 #include <gtest/gtest.h>
 
@@ -26,16 +26,16 @@ TriangleMesh fan(unsigned count, double height) {
   return mesh;
 }
 
-Predecessors faces_of(const TriangleMesh& mesh, double distance) {
-  Predecessors faces;
+ReplacedFaces faces_of(const TriangleMesh& mesh, double distance) {
+  ReplacedFaces faces;
   for (const glm::uvec3& t : mesh.triangles)
     faces.add(mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z], distance);
   return faces;
 }
 
-TEST(Predecessors, BoundWhatLiesInTheirPlane) {
+TEST(ReplacedFaces, BoundWhatLiesInTheirPlane) {
   const TriangleMesh mesh = fan(7, 0);
-  Predecessors faces = faces_of(mesh, 0);
+  ReplacedFaces faces = faces_of(mesh, 0);
   const dvec3 across[3] = {mesh.vertices[1], mesh.vertices[3], mesh.vertices[6]};
   const double bound = faces.bound(across, kWithin);
   EXPECT_LE(bound, 1e-9 * kWithin);
@@ -43,13 +43,13 @@ TEST(Predecessors, BoundWhatLiesInTheirPlane) {
   // Again and again, from where hardly any room is left.
   double distance = 0.9999 * kWithin;
   for (int i = 0; i < 1'000; ++i) {
-    Predecessors next = faces_of(mesh, distance);
+    ReplacedFaces next = faces_of(mesh, distance);
     distance = next.bound(across, kWithin);
     ASSERT_LE(distance, 0.99991 * kWithin) << i;
   }
 }
 
-TEST(Predecessors, TakeAShareOfTheRoomThatIsLeftAndNoMore) {
+TEST(ReplacedFaces, TakeAShareOfTheRoomThatIsLeftAndNoMore) {
   // A corner a little above their plane each time.
   const TriangleMesh mesh = fan(7, 0);
   double distance = 0;
@@ -63,7 +63,7 @@ TEST(Predecessors, TakeAShareOfTheRoomThatIsLeftAndNoMore) {
   }
 }
 
-TEST(Predecessors, NeverBoundByLessThanTheDistance) {
+TEST(ReplacedFaces, NeverBoundByLessThanTheDistance) {
   std::mt19937 engine(1);
   std::uniform_real_distribution<double> unit(-1, 1);
   int bounded = 0;
@@ -82,14 +82,14 @@ TEST(Predecessors, NeverBoundByLessThanTheDistance) {
   EXPECT_LT(bounded, 2'900);
 }
 
-TEST(Predecessors, LeaveOpenWhatTheyCannotBound) {
+TEST(ReplacedFaces, LeaveOpenWhatTheyCannotBound) {
   const dvec3 inside[3] = {{0.1, 0.1, 0}, {0.4, 0.1, 0}, {0.1, 0.4, 0}},
               beyond[3] = {{0, 0, 0}, {1.2, 0, 0}, {0, 1, 0}};
   EXPECT_LE(faces_of(fan(6, 0), 0).bound(inside, kWithin), kWithin);
   EXPECT_GT(faces_of(fan(6, 0), 0).bound(beyond, kWithin), kWithin);
   EXPECT_GT(faces_of(fan(6, 0), kWithin).bound(inside, kWithin), kWithin) << "no room is left";
   EXPECT_GT(faces_of(fan(6, 0), std::numeric_limits<double>::infinity()).bound(inside, kWithin), kWithin);
-  EXPECT_GT(Predecessors().bound(inside, kWithin), kWithin);
+  EXPECT_GT(ReplacedFaces().bound(inside, kWithin), kWithin);
   constexpr double kTiny = 1e-12;
   EXPECT_GT(faces_of(fan(6, 0), 0).bound(inside, kTiny), kTiny) << "a step of it is no more than rounding hides";
 }

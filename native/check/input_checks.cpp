@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "check/input.h"
+#include "check/input_checks.h"
 
 #include <sstream>
 
@@ -7,9 +7,9 @@
 
 namespace tolvol {
 
-std::optional<std::string> storage_warning(const ToleranceVolume& volume, const Placement& placement,
+std::optional<std::string> storage_warning(const ToleranceVolume& volume, const StoredSpace& space,
                                            std::span<const glm::dvec3> stored) {
-  const double share = placement.storage_step(stored) / volume.frame_tolerance();
+  const double share = space.storage_step(stored) / volume.frame_tolerance();
   std::ostringstream text;
   text << "at these coordinates the stored type rounds positions by up to " << 100 * share << " % of the tolerance; "
        << "move the mesh nearer to its origin or take a larger tolerance";

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// What the checks have in common that draw candidates with the distance texture and count pixels [Botsch04, §4].
+/// The common part of the checks that draw pieces with the distance texture and count their pixels, each of which is a
+/// sample of a piece [Botsch04, §4].
 #pragma once
 
 #include <array>
@@ -15,10 +16,10 @@
 
 namespace tolvol {
 
-class LatticeCheck : public ToleranceCheck {
+class SampledCheck : public ToleranceCheck {
  public:
   /// Occlusion queries for many pieces at a time; where one finds that not all are inside, a counter a piece in shader
-  /// storage. O(points of the lattices).
+  /// storage. O(samples).
   std::vector<Verdict> check(const Pieces& pieces, const Options& options) const override;
   /// One occlusion query a label, many of them in flight.
   std::vector<Verdict> check_groups(const Pieces& pieces, std::span<const std::int32_t> groups,
@@ -26,41 +27,42 @@ class LatticeCheck : public ToleranceCheck {
   std::string renderer() const override { return renderer_; }
 
  protected:
-  /// A triangle to draw, as lattice.vert reads it; lengths in grid spacings, from node (0, 0, 0).
-  struct Part {
+  /// A triangle to draw, as samples.vert reads it; lengths in grid spacings, from node (0, 0, 0).
+  struct SampledTriangle {
     glm::vec3 corner;
     float subdivisions;
     glm::vec3 edge1;  ///< divided by the subdivisions, like edge2
-    std::uint32_t slot;
+    std::uint32_t counter;
     glm::vec3 edge2;
     float unused;
   };
   using Corners = std::array<glm::dvec3, 3>;  ///< of a triangle, in grid spacings from node (0, 0, 0)
 
   struct Programs {
-    /// `counting`: the file that defines sample_counts().
-    explicit Programs(std::string_view counting);
-    gl::Program query, slots;
+    /// `sample_counts`: the file that defines sample_counts().
+    explicit Programs(std::string_view sample_counts);
+    gl::Program query, counting;
   };
 
-  /// `margin`: see lattice.vert. Throws GlUnavailable.
-  LatticeCheck(const ToleranceVolume& volume, float margin);
+  /// `margin`: see samples.vert. Throws GlUnavailable.
+  SampledCheck(const ToleranceVolume& volume, float margin);
 
   /// The distance, in the frame, that samples are compared with. Throws InvalidInput when there is none.
   virtual float bound(double mapping_error) const = 0;
   /// Appends what to draw for a triangle; false when it cannot be drawn, and nothing is then known of it.
-  virtual bool add_parts(const Corners& corners, std::uint32_t slot, std::vector<Part>& parts) const = 0;
+  virtual bool add_triangle_samples(const Corners& corners, std::uint32_t counter,
+                                    std::vector<SampledTriangle>& triangles) const = 0;
   /// Binds texture and uniforms; on the GL thread.
   virtual void use(const gl::Program& program, float bound) const = 0;
   virtual const Programs& programs() const = 0;
-  /// `counted` pixels, of lattices with `points` points together.
+  /// `counted`: samples that are inside, of `points` samples.
   virtual Verdict verdict(std::uint64_t counted, std::uint64_t points) const = 0;
 
   const ToleranceVolume& volume() const { return *volume_; }
 
  private:
   struct Batch;
-  /// Of one slot: pixels counted, of the points drawn. Both 0 where nothing was left to tell apart.
+  /// Of one label: samples that are inside, and samples drawn. Both are 0 where a query has shown all of them inside.
   struct Sum {
     std::uint64_t counted = 0, points = 0;
     bool drawn = true;
@@ -73,11 +75,12 @@ class LatticeCheck : public ToleranceCheck {
                               std::span<const std::uint32_t> labels, bool queries, const Options& options) const;
   Batch make_batch(const Pieces& pieces, std::span<const std::uint32_t> order, std::span<const std::uint32_t> labels,
                    std::size_t& next) const;
-  bool add_piece(const Pieces& pieces, std::size_t piece, std::uint32_t slot, std::vector<Part>& parts) const;
+  bool add_piece(const Pieces& pieces, std::size_t piece, std::uint32_t counter,
+                 std::vector<SampledTriangle>& triangles) const;
   void draw(const Batch& batch, float bound, bool queries, std::vector<Sum>& sums) const;
   template <class Found>
   void count_by_query(const Batch& batch, std::span<const std::size_t> ends, Found&& found) const;
-  void count_by_slot(const Batch& batch, std::vector<Sum>& sums) const;
+  void count_each(const Batch& batch, std::vector<Sum>& sums) const;
 
   const ToleranceVolume* volume_;
   float margin_;

@@ -14,8 +14,8 @@
 namespace tolvol {
 
 /// What the stored type costs at these coordinates: a warning from 1 % of the tolerance on; throws InvalidInput from 50
-/// % on. `placement` is in the volume's frame.
-std::optional<std::string> storage_warning(const ToleranceVolume& volume, const Placement& placement,
+/// % on. `space` is in the volume's frame.
+std::optional<std::string> storage_warning(const ToleranceVolume& volume, const StoredSpace& space,
                                            std::span<const glm::dvec3> stored);
 
 /// Throws InvalidInput: faces of the input are not inside.

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Draws candidate triangles so that each pixel is one point of a lattice on the candidate: corners at (0, 0),
+// Draws candidate triangles so that each pixel is one sample of the candidate: corners at (0, 0),
 // (n + margin, 0) and (0, n + margin). With a margin of 3/2 they cover exactly the pixel centres (i + 1/2, j + 1/2) with
 // i + j <= n, and pixel (i, j) stands for corner + i edge1 + j edge2. With none they are the triangle of [Botsch04, §4],
 // which leaves out its own corners. Every candidate has a square cell of the framebuffer; they take turns.
-layout(std430, binding = 0) readonly buffer Parts { uvec4 parts[]; };  // corner, n; edge1, slot; edge2, unused
+layout(std430, binding = 0) readonly buffer Triangles { uvec4 triangles[]; };  // corner, n; edge1, counter; edge2, unused
 uniform float margin;
 uniform int cell;        // pixels along a cell
 uniform int cells_log2;  // of the number of cells along the framebuffer: integer divisions are slow
@@ -11,20 +11,20 @@ uniform int cells_log2;  // of the number of cells along the framebuffer: intege
 // Flat, in few vectors: they are most of what a software renderer moves. Integers, because bits that are no number might
 // not survive as one.
 flat out uvec4 corner_n;    // in grid spacings; n, the subdivisions
-flat out uvec4 edge1_slot;  // edges divided by n
+flat out uvec4 edge1_counter;  // edges divided by n
 flat out uvec4 edge2_unused;
 out vec3 position;  // of the pixel's centre
 
 void main() {
-  const int part = gl_VertexID / 3, which = gl_VertexID % 3;
-  corner_n = parts[3 * part];
-  edge1_slot = parts[3 * part + 1];
-  edge2_unused = parts[3 * part + 2];
+  const int triangle = gl_VertexID / 3, which = gl_VertexID % 3;
+  corner_n = triangles[3 * triangle];
+  edge1_counter = triangles[3 * triangle + 1];
+  edge2_unused = triangles[3 * triangle + 2];
   const float side = uintBitsToFloat(corner_n.w) + margin;
   const vec2 pixel = vec2(which == 1 ? side : 0, which == 2 ? side : 0);
-  position = uintBitsToFloat(corner_n.xyz) + pixel.x * uintBitsToFloat(edge1_slot.xyz) +
+  position = uintBitsToFloat(corner_n.xyz) + pixel.x * uintBitsToFloat(edge1_counter.xyz) +
              pixel.y * uintBitsToFloat(edge2_unused.xyz);
   const int cells = 1 << cells_log2;
-  const vec2 place = vec2(part & (cells - 1), (part >> cells_log2) & (cells - 1));
+  const vec2 place = vec2(triangle & (cells - 1), (triangle >> cells_log2) & (cells - 1));
   gl_Position = vec4(2 * (place + pixel / cell) / cells - 1, 0, 1);
 }

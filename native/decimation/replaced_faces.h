@@ -14,16 +14,16 @@
 
 namespace tolvol {
 
-class Predecessors {
+class ReplacedFaces {
  public:
   void clear() { faces_.clear(), farthest_ = 0; }
   /// `distance`: an upper bound on the distance of its points to the reference.
   void add(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double distance);
   bool empty() const { return faces_.empty(); }
 
-  /// An upper bound, at most `within`, on the distance of any point of the triangle to the reference; infinity where
+  /// An upper bound, at most `limit`, on the distance of any point of the triangle to the reference; infinity where
   /// none was found. About 20 ns a face where it is not flat.
-  double bound(const glm::dvec3 (&corners)[3], double within);
+  double bound(const glm::dvec3 (&corners)[3], double limit);
 
  private:
   std::vector<WitnessTriangle> faces_;

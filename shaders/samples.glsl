@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What lattice.vert hands to fragments, see there.
+// What samples.vert hands to fragments, see there.
 flat in uvec4 corner_n;
-flat in uvec4 edge1_slot;
+flat in uvec4 edge1_counter;
 flat in uvec4 edge2_unused;
 in vec3 position;

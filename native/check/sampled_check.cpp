@@ -2,7 +2,7 @@
 // Based on [Botsch04, §4]. Candidates are not all drawn in one corner: each has a cell of a framebuffer of several, so
 // that a renderer that deals tiles out to its processors can use more than one. The framebuffer has no attachments:
 // nothing is written but the counts.
-#include "check/lattice_check.h"
+#include "check/sampled_check.h"
 
 #include <algorithm>
 #include <bit>
@@ -24,15 +24,15 @@ constexpr std::size_t kChunk = 1024;   // triangles drawn before a flush: more l
 constexpr std::size_t kInFlight = 64;  // queries begun before the result of the first is waited for
 // A batch ends with the piece that reaches either of these. The first keeps a buffer below the 128 MB that every GL
 // allows, the second the wait for a cancelled call below a tenth of a second.
-constexpr std::size_t kBatchParts = std::size_t{1} << 15;
-constexpr std::uint64_t kBatchPoints = std::uint64_t{1} << 21;
+constexpr std::size_t kBatchTriangles = std::size_t{1} << 15;
+constexpr std::uint64_t kBatchSamples = std::uint64_t{1} << 21;
 
-std::uint64_t lattice_points(float subdivisions) {
+std::uint64_t sample_count(float subdivisions) {
   const auto n = static_cast<std::uint64_t>(subdivisions);
   return (n + 1) * (n + 2) / 2;
 }
 
-void draw_parts(std::size_t begin, std::size_t end) {
+void draw_triangles(std::size_t begin, std::size_t end) {
   for (; begin < end; begin += kChunk) {
     const std::size_t count = std::min(kChunk, end - begin);
     glDrawArrays(GL_TRIANGLES, static_cast<GLint>(3 * begin), static_cast<GLsizei>(3 * count));
@@ -42,31 +42,31 @@ void draw_parts(std::size_t begin, std::size_t end) {
 
 }  // namespace
 
-/// Consecutive slots, each with the parts of its pieces.
-struct LatticeCheck::Batch {
-  std::vector<Part> parts;
-  std::vector<std::size_t> ends;         // of each slot's parts
-  std::vector<std::uint32_t> labels;     // what the slots stand for
+/// Triangles to draw together, those that add to one counter side by side.
+struct SampledCheck::Batch {
+  std::vector<SampledTriangle> triangles;
+  std::vector<std::size_t> ends;         // per counter: where its triangles end
+  std::vector<std::uint32_t> labels;     // per counter: the label whose sum it is part of
   std::vector<std::uint32_t> not_drawn;  // of pieces that cannot be
 };
 
-LatticeCheck::Programs::Programs(std::string_view counting)
-    : query({{GL_VERTEX_SHADER, {"lattice.vert"}},
-             {GL_FRAGMENT_SHADER, {"lattice_part.glsl", counting, "query_samples.frag"}}}),
-      slots({{GL_VERTEX_SHADER, {"lattice.vert"}},
-             {GL_FRAGMENT_SHADER, {"lattice_part.glsl", counting, "count_samples.frag"}}}) {}
+SampledCheck::Programs::Programs(std::string_view sample_counts)
+    : query({{GL_VERTEX_SHADER, {"samples.vert"}},
+             {GL_FRAGMENT_SHADER, {"samples.glsl", sample_counts, "query_samples.frag"}}}),
+      counting({{GL_VERTEX_SHADER, {"samples.vert"}},
+                {GL_FRAGMENT_SHADER, {"samples.glsl", sample_counts, "count_samples.frag"}}}) {}
 
-LatticeCheck::LatticeCheck(const ToleranceVolume& volume, float margin)
+SampledCheck::SampledCheck(const ToleranceVolume& volume, float margin)
     : volume_(&volume), margin_(margin), renderer_(gl::renderer().name()) {}
 
-std::vector<Verdict> LatticeCheck::check(const Pieces& pieces, const Options& options) const {
+std::vector<Verdict> SampledCheck::check(const Pieces& pieces, const Options& options) const {
   require_valid(pieces);
   std::vector<std::uint32_t> each(pieces.size());
   std::iota(each.begin(), each.end(), 0u);
   return decide(pieces, each, each, false, options);
 }
 
-std::vector<Verdict> LatticeCheck::check_groups(const Pieces& pieces, std::span<const std::int32_t> groups,
+std::vector<Verdict> SampledCheck::check_groups(const Pieces& pieces, std::span<const std::int32_t> groups,
                                                 const Options& options) const {
   require_valid(pieces);
   if (groups.size() != pieces.size()) throw InvalidInput("groups must have one label for each face");
@@ -81,7 +81,7 @@ std::vector<Verdict> LatticeCheck::check_groups(const Pieces& pieces, std::span<
   return decide(pieces, order, labels, true, options);
 }
 
-std::vector<Verdict> LatticeCheck::decide(const Pieces& pieces, std::span<const std::uint32_t> order,
+std::vector<Verdict> SampledCheck::decide(const Pieces& pieces, std::span<const std::uint32_t> order,
                                           std::span<const std::uint32_t> labels, bool queries,
                                           const Options& options) const {
   const Call call(options.progress);
@@ -107,49 +107,50 @@ std::vector<Verdict> LatticeCheck::decide(const Pieces& pieces, std::span<const 
 }
 
 /// Of the pieces from `next` on, which is moved past them.
-LatticeCheck::Batch LatticeCheck::make_batch(const Pieces& pieces, std::span<const std::uint32_t> order,
+SampledCheck::Batch SampledCheck::make_batch(const Pieces& pieces, std::span<const std::uint32_t> order,
                                              std::span<const std::uint32_t> labels, std::size_t& next) const {
   Batch batch;
-  batch.parts.reserve(std::min(kBatchParts, 4 * (order.size() - next)));
-  for (std::uint64_t points = 0; next < order.size() && batch.parts.size() < kBatchParts && points < kBatchPoints;
-       ++next) {
+  batch.triangles.reserve(std::min(kBatchTriangles, 4 * (order.size() - next)));
+  for (std::uint64_t points = 0;
+       next < order.size() && batch.triangles.size() < kBatchTriangles && points < kBatchSamples; ++next) {
     const std::uint32_t piece = order[next], label = labels[piece];
     if (batch.labels.empty() || batch.labels.back() != label) {
       batch.labels.push_back(label);
-      batch.ends.push_back(batch.parts.size());
+      batch.ends.push_back(batch.triangles.size());
     }
-    const std::size_t first = batch.parts.size();
-    const auto slot = static_cast<std::uint32_t>(batch.labels.size() - 1);
-    if (!add_piece(pieces, piece, slot, batch.parts)) batch.not_drawn.push_back(label);
-    for (std::size_t i = first; i < batch.parts.size(); ++i) points += lattice_points(batch.parts[i].subdivisions);
-    batch.ends.back() = batch.parts.size();
+    const std::size_t first = batch.triangles.size();
+    const auto counter = static_cast<std::uint32_t>(batch.labels.size() - 1);
+    if (!add_piece(pieces, piece, counter, batch.triangles)) batch.not_drawn.push_back(label);
+    for (std::size_t i = first; i < batch.triangles.size(); ++i)
+      points += sample_count(batch.triangles[i].subdivisions);
+    batch.ends.back() = batch.triangles.size();
   }
   return batch;
 }
 
-bool LatticeCheck::add_piece(const Pieces& pieces, std::size_t piece, std::uint32_t slot,
-                             std::vector<Part>& parts) const {
+bool SampledCheck::add_piece(const Pieces& pieces, std::size_t piece, std::uint32_t counter,
+                             std::vector<SampledTriangle>& triangles) const {
   const DistanceGrid& grid = volume_->grid();
   const double per_spacing = 1 / grid.spacing;
   const std::size_t corners = static_cast<std::size_t>(pieces.corners);
   const std::span<const std::uint32_t> corner = pieces.indices.subspan(piece * corners, corners);
   const auto in_grid = [&](int k) { return (pieces.points[corner[k]] - grid.origin) * per_spacing; };
   return std::ranges::all_of(triangles_of(pieces.corners), [&](const PieceTriangle& t) {
-    return add_parts({in_grid(t[0]), in_grid(t[1]), in_grid(t[2])}, slot, parts);
+    return add_triangle_samples({in_grid(t[0]), in_grid(t[1]), in_grid(t[2])}, counter, triangles);
   });
 }
 
-void LatticeCheck::draw(const Batch& batch, float bound, bool queries, std::vector<Sum>& sums) const {
+void SampledCheck::draw(const Batch& batch, float bound, bool queries, std::vector<Sum>& sums) const {
   for (const std::uint32_t label : batch.not_drawn) sums[label].drawn = false;
-  if (batch.parts.empty()) return;
+  if (batch.triangles.empty()) return;
   float largest = 0;
-  for (const Part& part : batch.parts) largest = std::max(largest, part.subdivisions);
+  for (const SampledTriangle& triangle : batch.triangles) largest = std::max(largest, triangle.subdivisions);
   // A pixel more on both sides than the margin needs.
   const int cell =
       static_cast<int>(std::bit_ceil(std::max<unsigned>(kSmallestCell, static_cast<unsigned>(largest) + 2)));
   const int side = std::max(cell, kSmallestSide);
   gl::run([&] {
-    for (const gl::Program* program : {&programs().query, &programs().slots}) {
+    for (const gl::Program* program : {&programs().query, &programs().counting}) {
       program->set("margin", margin_);
       program->set("cell", cell);
       program->set("cells_log2", std::countr_zero(static_cast<unsigned>(side / cell)));
@@ -159,19 +160,20 @@ void LatticeCheck::draw(const Batch& batch, float bound, bool queries, std::vect
     framebuffer.bind();
     const gl::VertexArray nothing = gl::VertexArray::make();
     nothing.bind();
-    const gl::Buffer parts(batch.parts);
-    parts.bind_storage(0);
+    const gl::Buffer triangles(batch.triangles);
+    triangles.bind_storage(0);
     if (queries) {
-      count_by_query(batch, batch.ends, [&](std::size_t slot, const Sum& sum) { sums[batch.labels[slot]] += sum; });
+      count_by_query(batch, batch.ends,
+                     [&](std::size_t counter, const Sum& sum) { sums[batch.labels[counter]] += sum; });
     } else {
-      count_by_slot(batch, sums);
+      count_each(batch, sums);
     }
   });
 }
 
-/// Calls found(i, sum) for the parts before each of `ends` and after the one before.
+/// Draws the triangles between each two of `ends` in an occlusion query and calls found(i, sum) with its count.
 template <class Found>
-void LatticeCheck::count_by_query(const Batch& batch, std::span<const std::size_t> ends, Found&& found) const {
+void SampledCheck::count_by_query(const Batch& batch, std::span<const std::size_t> ends, Found&& found) const {
   programs().query.use();
   std::vector<gl::Query> flight;
   const auto begin = [&](std::size_t i) { return i ? ends[i - 1] : 0; };
@@ -180,39 +182,43 @@ void LatticeCheck::count_by_query(const Batch& batch, std::span<const std::size_
     if (i >= kInFlight && i - kInFlight < ends.size()) {
       const std::size_t done = i - kInFlight;
       Sum sum{flight[place].result(), 0};
-      for (std::size_t k = begin(done); k < ends[done]; ++k) sum.points += lattice_points(batch.parts[k].subdivisions);
+      for (std::size_t k = begin(done); k < ends[done]; ++k)
+        sum.points += sample_count(batch.triangles[k].subdivisions);
       found(done, sum);
     }
     if (i >= ends.size()) continue;
     if (flight.size() <= place) flight.emplace_back(GL_SAMPLES_PASSED);
     flight[place].begin();
-    draw_parts(begin(i), ends[i]);
+    draw_triangles(begin(i), ends[i]);
     flight[place].end();
   }
 }
 
-/// A query for each of several parts first: where all of these are inside nothing is left to tell apart.
-void LatticeCheck::count_by_slot(const Batch& batch, std::vector<Sum>& sums) const {
+/// Asks an occlusion query about each chunk of triangles first. Where a whole chunk is inside, its pieces need no
+/// counts of their own.
+void SampledCheck::count_each(const Batch& batch, std::vector<Sum>& sums) const {
   std::vector<std::size_t> ends;
-  for (std::size_t end = 0; end < batch.parts.size();) ends.push_back(end = std::min(end + kChunk, batch.parts.size()));
+  for (std::size_t end = 0; end < batch.triangles.size();)
+    ends.push_back(end = std::min(end + kChunk, batch.triangles.size()));
   std::vector<std::size_t> again;
   count_by_query(batch, ends, [&](std::size_t i, const Sum& sum) {
     if (verdict(sum.counted, sum.points) != Verdict::inside) again.push_back(i);
   });
   if (again.empty()) return;
-  gl::Buffer slots(batch.labels.size() * sizeof(std::uint32_t), nullptr);
-  slots.clear();
-  slots.bind_storage(1);
-  programs().slots.use();
+  gl::Buffer counters(batch.labels.size() * sizeof(std::uint32_t), nullptr);
+  counters.clear();
+  counters.bind_storage(1);
+  programs().counting.use();
   for (const std::size_t i : again) {
-    draw_parts(i * kChunk, ends[i]);
+    draw_triangles(i * kChunk, ends[i]);
     for (std::size_t k = i * kChunk; k < ends[i]; ++k) {
-      sums[batch.labels[batch.parts[k].slot]].points += lattice_points(batch.parts[k].subdivisions);
+      sums[batch.labels[batch.triangles[k].counter]].points += sample_count(batch.triangles[k].subdivisions);
     }
   }
   std::vector<std::uint32_t> counts(batch.labels.size());
-  slots.read(0, slots.bytes(), counts.data());
-  for (std::size_t slot = 0; slot < counts.size(); ++slot) sums[batch.labels[slot]].counted += counts[slot];
+  counters.read(0, counters.bytes(), counts.data());
+  for (std::size_t counter = 0; counter < counts.size(); ++counter)
+    sums[batch.labels[counter]].counted += counts[counter];
 }
 
 }  // namespace tolvol

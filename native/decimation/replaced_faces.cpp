@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Every step may add to the bound. It takes no more than a fixed share of the room that is left, so that after many
 // steps there is some left to take, and no more than it needs: on a plane next to nothing.
-#include "decimation/predecessors.h"
+#include "decimation/replaced_faces.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,16 +19,16 @@ constexpr std::size_t kMostParts = 512;  // looked at
 
 }  // namespace
 
-void Predecessors::add(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double distance) {
+void ReplacedFaces::add(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double distance) {
   faces_.emplace_back(a, b, c);
   farthest_ = std::max(farthest_, distance);
 }
 
-double Predecessors::bound(const glm::dvec3 (&corners)[3], double within) {
+double ReplacedFaces::bound(const glm::dvec3 (&corners)[3], double limit) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  const double step = kStep * (within - farthest_);
-  const double near = kLookedFor * step, near2 = near * near, rounding = witness_error(2 * (1 + within));
-  if (!(step >= kLeast * within && near + rounding <= step)) return kNone;
+  const double step = kStep * (limit - farthest_);
+  const double near = kLookedFor * step, near2 = near * near, rounding = witness_error(2 * (1 + limit));
+  if (!(step >= kLeast * limit && near + rounding <= step)) return kNone;
   double used2 = 0;
   parts_.assign(1, {{corners[0], corners[1], corners[2]}});
   for (std::size_t looked = 0; !parts_.empty(); ++looked) {
