@@ -489,7 +489,7 @@ def test_save_report_spares_the_files_of_the_scene(measured, tmp_path):
 
 
 def test_what_is_left_is_removed(tmp_path):
-    with pytest.raises(NotWritten, match="later: .*written it"), safe_files.Staged() as staged:
+    with pytest.raises(NotWritten, match="later: .*written this file"), safe_files.Staged() as staged:
         target = safe_files.Target(tmp_path / "later")
         staged.write(safe_files.Target(tmp_path / "first"), b"1")
         file = staged.folder(target) / "later"

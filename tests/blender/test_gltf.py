@@ -268,7 +268,7 @@ def test_the_buffer_of_in_is_not_that_of_out(tmp_path):
 def test_a_bad_file_is_refused(tmp_path):
     (tmp_path / "in.glb").write_bytes(glb(*torus_document())[:-100])
     code, _, err = decimate(tmp_path / "in.glb", tmp_path / "out.glb", "--tolerance", "1%")
-    assert code == 2 and "in.glb: the file ends early" in err and len(err.splitlines()) == 1
+    assert code == 2 and "in.glb: the file is truncated" in err and len(err.splitlines()) == 1
 
 
 @needs_gltf
@@ -357,9 +357,9 @@ def set_at(path, value):
 BAD_DOCUMENTS = {
     "no asset": (lambda found: found.pop("asset"), "no asset"),
     "old": (set_at(["asset", "version"], "1.0"), "version is 1.0"),
-    "no buffer": (set_at(["buffers", 0, "uri"], "no.bin"), "no.bin: No such file"),
+    "no buffer": (set_at(["buffers", 0, "uri"], "no.bin"), "no.bin cannot be read: No such file"),
     "bad data": (set_at(["buffers", 0, "uri"], "data:;base64,A"), "buffer 0 cannot be read"),
-    "short buffer": (set_at(["buffers", 0, "byteLength"], 999), "ends early"),
+    "short buffer": (set_at(["buffers", 0, "byteLength"], 999), "is truncated"),
     "short view": (set_at(["bufferViews", 1, "byteLength"], 9), "accessor 1 reaches beyond"),
     "long view": (set_at(["bufferViews", 1, "byteLength"], 9999), "accessor 1 reaches beyond"),
     "many": (set_at(["accessors", 1, "count"], 10**12), "accessor 1 reaches beyond"),
@@ -369,10 +369,19 @@ BAD_DOCUMENTS = {
     "no view": (set_at(["accessors", 0, "bufferView"], 7), "accessor 0 names entry 7 of its bufferViews"),
     "no mesh": (set_at(["nodes", 0, "mesh"], 3), "a node names entry 3 of its meshes"),
     "no node": (set_at(["nodes", 0, "children"], [5]), "node 0 names entry 5 of its nodes"),
-    "below itself": (set_at(["nodes"], [{"children": [1]}, {"children": [0]}]), "node . is below itself"),
-    "two above": (set_at(["nodes"], [{"children": [2]}, {"children": [2]}, {}]), "node 2 is below two others, 0 and 1"),
-    "far node": (set_at(["nodes", 0, "translation"], [0, 1e999, 0]), "place of node 0 is not finite"),
-    "kind": (set_at(["accessors", 1, "type"], "VEC2"), "accessor 1 of mesh 0 is VEC2 of 5126, not VEC3"),
+    "below itself": (set_at(["nodes"], [{"children": [1]}, {"children": [0]}]), "node . is its own descendant"),
+    "two above": (
+        set_at(["nodes"], [{"children": [2]}, {"children": [2]}, {}]),
+        "node 2 is a child of two nodes, 0 and 1",
+    ),
+    "far node": (
+        set_at(["nodes", 0, "translation"], [0, 1e999, 0]),
+        "translation, rotation or scale of node 0 is not finite",
+    ),
+    "kind": (
+        set_at(["accessors", 1, "type"], "VEC2"),
+        "accessor 1 of mesh 0 has type VEC2 with component type 5126; type VEC3",
+    ),
     "form": (set_at(["meshes", 0, "primitives"], 3), "form of glTF"),
     "few vertices": (set_at(["accessors", 1, "count"], 3), "a face of mesh 0 names vertex 3, but there are only 3"),
 }
@@ -412,13 +421,13 @@ def test_truncated_and_foreign_files(tmp_path):
     for data, words in (
         (b"", "empty"),
         (whole[:10], "ends inside its glTF header"),
-        (whole[:-1], "ends early"),
+        (whole[:-1], "is truncated"),
         (whole[:8] + struct.pack("<I", 60) + whole[12:60], "ends inside one of its glTF chunks"),
         (whole[:4] + struct.pack("<I", 1) + whole[8:], "version is 1"),
-        (bytes(range(256)), "no glTF file"),
+        (bytes(range(256)), "not a glTF file"),
         (b"[1, 2]", "no asset"),
-        (b'{"asset": {"version": "2.0"', "no glTF file, or not all of one"),
-        (b"[" * 100_000, "no glTF file"),
+        (b'{"asset": {"version": "2.0"', "not a glTF file, or it is truncated"),
+        (b"[" * 100_000, "not a glTF file"),
     ):
         with pytest.raises(Refused, match=words):
             file_check.check(".gltf", data, tmp_path)

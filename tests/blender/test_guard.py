@@ -220,7 +220,7 @@ def test_a_face_of_very_many_corners_is_refused():
     around = np.arange(65) * 2 * np.pi / 65
     ob = add_object("disc", [(np.cos(a), np.sin(a), 0) for a in around], [range(65)])
     guarded(ob, "sculpting")
-    assert "65 corners: Face > Triangulate" in state(ob)["sculpting"][0]
+    assert "65 corners, too many for a guard: use Face > Triangulate" in state(ob)["sculpting"][0]
 
 
 def test_a_tolerance_that_is_changed_counts_at_once():

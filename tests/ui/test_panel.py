@@ -184,7 +184,7 @@ def test_escape_keeps_what_refining_has_reached():
     key("Escape")
     yield from finished(lambda: suzanne().tolvol.last_run)
     job._status = status
-    assert any(text.startswith("Refining") and text.endswith("Esc: Keep What There Is") for text in said)
+    assert any(text.startswith("Refining") and text.endswith("Esc: Keep Present Result") for text in said)
     run = json.loads(suzanne().tolvol.last_run)
     assert run["stopped_by"] == "request" and run["output"]["triangles"] == len(suzanne().data.polygons) < 1500
     assert_proved(suzanne(), reference, 0.3)
