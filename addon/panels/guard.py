@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which tools are guarded, and how that goes."""
+"""The panel that chooses which of Blender's tools are guarded and shows the state of each guard."""
 
 import bpy
 
