@@ -75,7 +75,7 @@ object. An object without a reference gets one first, as by Set Reference"""
     __annotations__ = tolerance_settings({"SKIP_SAVE"}) | decimate_settings({"SKIP_SAVE"})
     placement: EnumProperty(
         name="Placement",
-        description="Where the remaining vertices go",
+        description="How the positions of the remaining vertices are chosen",
         items=PLACEMENTS,
         options={"SKIP_SAVE"},
         update=_choose_placement,

@@ -81,7 +81,9 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
             )
         if not run["moved"]:
             why = (
-                "the tolerance permits no movement" if run["leaving"]["faces"] else "no moved control point is near it"
+                "the tolerance permits no movement"
+                if run["leaving"]["faces"]
+                else "the lattice is at rest, or the mesh is outside it"
             )
             raise Refused(f"{self.lattice} does not move {ob.name}: {why}")
         certified = motion.settle(result.vertices, certified)
