@@ -30,14 +30,14 @@ except ImportError as error:  # After an uncaught exception Blender would end wi
     sys.exit(2)
 
 _DESCRIPTION = """\
-Reduces the meshes of IN to the fewest triangles that stay within the tolerance and writes them to OUT. What is certified is
-OUT as it is read back, before it takes its place. Files: .obj .ply .stl, .gltf and .glb where Blender can read them."""
+Reduces the triangles of the meshes of IN within the tolerance and writes the meshes to OUT. The written file is read back and
+certified before it is moved to OUT. Formats: .obj .ply .stl, and .gltf and .glb where Blender can read them."""
 
 _EPILOG = """\
-The last line of the output says what was reached; its percentages are of the size of the reference (the longest diagonal of
-its bounding box), its time is that of the whole command. Exit codes: 0 proved; 2 bad usage or input; 3 not proved; 1 a file
-that could not be written, or a bug. OUT, its side files, the report and the picture are written with 0 alone, all of them or
-none. Symbolic links are followed. OUT may be IN; no other file that is read is overwritten, nor are textures beside OUT."""
+The last line of the output gives the result. Its percentages are of the size of the reference (the longest diagonal of the
+bounding box), and its time is the time of the whole command. Exit codes: 0 proved; 2 bad usage or input; 3 not proved; 1 a file
+that could not be written, or a bug. Only with exit code 0 are OUT, its side files, the report and the picture written, all of
+them or none. Symbolic links are followed. OUT may be IN. No other file that is read and no texture beside OUT is overwritten."""
 
 
 def arguments():

@@ -21,14 +21,14 @@ except ImportError as error:  # After an uncaught exception Blender would end wi
     sys.exit(2)
 
 _DESCRIPTION = """\
-Measures the surface of A against that of B, and B against A: the largest distance as an interval that is certain and where it
-is; mean, root mean square and percentiles over the area; the share of the area that is farther than each bound; on which side,
-where a surface is closed."""
+Measures the distances from the surface of A to that of B and from B to A: the largest distance as a certified interval, with its
+place; mean, root mean square and percentiles over the area; the share of the area that is farther than each bound; and the parts
+inside and outside, if the other surface is closed."""
 
 _EPILOG = """\
-Percentages are of the size of B: the longest diagonal of its bounding box. Exit codes: 0 measured; 2 bad usage or input; 1 a
-file that could not be written, or a bug. Reports and pictures are written with 0 alone, all of them or none, never over a file
-that is read. Symbolic links are followed."""
+Percentages are of the size of B, which is the longest diagonal of its bounding box. Exit codes: 0 measured; 2 bad usage or input;
+1 a file that could not be written, or a bug. Only with exit code 0 are reports and pictures written, all of them or none, and
+never over a file that is read. Symbolic links are followed."""
 
 
 def bounds(text):
