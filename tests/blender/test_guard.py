@@ -210,7 +210,7 @@ def test_reasons():
     assert "Apply the Multiresolution modifier first" in state(ob)["sculpting"][0]
     ob.modifiers.remove(multires)
     ob.tolvol.reference_kind = "OBJECT"
-    assert "another one was chosen" in state(ob)["sculpting"][0]
+    assert "another kind of reference was chosen" in state(ob)["sculpting"][0]
     ob.tolvol.reference_kind = "SELF"
     ob.tolvol.guard.lattice = True
     assert state(ob)["lattice"] == ("sheet has no Lattice modifier with a lattice", False)

@@ -162,7 +162,7 @@ def test_what_cannot_be_applied_is_refused():
     refused("SUBSURF has no modifier else", modifier="else")
     ob.modifiers.clear()
     refused("SUBSURF has no modifiers")
-    for kind, match in (("LATTICE", "does not move"), ("DECIMATE", "fit it instead"), ("CLOTH", "A simulation")):
+    for kind, match in (("LATTICE", "does not move"), ("DECIMATE", "use Fit instead"), ("CLOTH", "A simulation")):
         modifier = ob.modifiers.new(kind, kind)
         refused(match, modifier=kind)
         ob.modifiers.remove(modifier)

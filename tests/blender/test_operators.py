@@ -105,7 +105,7 @@ def test_choosing_another_reference_makes_it_stale():
     ob = torus()
     bpy.ops.tolvol.set_reference()
     ob.tolvol.reference_kind = "OBJECT"
-    assert snapshots.stale_reason(ob) == "another one was chosen"
+    assert snapshots.stale_reason(ob) == "another kind of reference was chosen"
     assert not bpy.ops.tolvol.set_reference.poll()  # which object?
     ob.tolvol.reference_object = other
     bpy.ops.tolvol.set_reference()

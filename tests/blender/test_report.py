@@ -103,7 +103,7 @@ def test_surfaces_that_are_the_same():
     a, _ = step()
     run = measured(a, a, tolerance=0.01)
     assert run["forward"]["largest"][1] < 1e-12 and run["forward"]["beyond"][0]["share"] == 0
-    assert "both within it, proved" in deviation.deviation_page.page(run)
+    assert "both are within the tolerance, proved" in deviation.deviation_page.page(run)
     assert "NaN" not in json.dumps(measured(a, a))
 
 
