@@ -99,7 +99,7 @@ def _why_not_loaded(path, problems):
         return f"{path} does not load: {able[0]}"
     tried = "; ".join(f"{folder}: {error}" for folder, error in problems)
     return (
-        f"{path} does not load: none of the folders that were tried permits to load a copy of it ({tried}). "
+        f"{path} does not load: none of the folders that were tried permits a copy of it to be loaded ({tried}). "
         "Start Blender with the environment variable TMPDIR set to a folder on a disk that is not mounted noexec"
     )
 

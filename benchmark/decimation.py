@@ -131,7 +131,7 @@ def meshes(paths):
 
 
 def print_table1(figures, options):
-    """Measures every mesh, and the last one with each triangle cut in four."""
+    """Measures every mesh, and the largest one with each triangle cut in four."""
     cases = list(meshes(options.mesh))
     cases.append(table1.million(*max(cases, key=lambda case: len(case[2]))))
     figures["table1"] = []

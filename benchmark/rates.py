@@ -58,7 +58,7 @@ def measure(name, vertices, triangles, options):
         for key, call in runs.items():
             results[key] = timed(key, call)
     entries = []
-    # Every frame moves the mesh. The first frames are not timed.
+    # The first picture is not timed: it prepares the volume's grid and the GL context.
     tolvol.render_distance(points, triangles, volume, size=PICTURE, samples=1)
     for _ in range(REPEATS):
         timed(("picture", "drawn"), lambda: tolvol.render_distance(points, triangles, volume, size=PICTURE, samples=1))

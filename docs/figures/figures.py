@@ -50,7 +50,7 @@ def draw_volume(path, mesh, like):
     page = pictures.Page(VOLUME_SIZE[0] + LEGEND, VOLUME_SIZE[1])
     page.image(0, 0, tolvol.render_volume(volume, view, VOLUME_SIZE, cut=(middle, (1, 0, 0)), samples=3))
     page.text(VOLUME_SIZE[0], pictures.MARGIN, "All points within ε\nof the reference", 12)
-    # The volume is cut only on the far side of a plane through the mesh, so that the section begins at the mesh.
+    # The section shows only points outside the mesh, so the legend begins at distance 0.
     bar = VOLUME_SIZE[0], 90, VOLUME_SIZE[1] - 110
     page.legend(*bar, "signed", volume.tolerance, volume.size, lowest=0, outside=False)
     page.save(path, step=3)
