@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the commands refuse: exit code 2, one line on stderr that names the offender, OUT untouched."""
+"""Bad input to the commands: exit code 2, one line on stderr that names the faulty input, and OUT untouched."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from scenes import sheet_arrays, torus_arrays
 
 
 def refused(done, *words):
-    """Exit code 2 and one line on stderr that has all these words."""
+    """Asserts exit code 2 and one line on stderr with all these words."""
     code, out, err = done
     assert code == 2, (code, out, err)
     assert len(err.splitlines()) == 1 and err.startswith("decimate.py: "), err

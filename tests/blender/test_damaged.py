@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a damaged .blend holds of a run, a measurement and a reference, as the panels read it at every draw."""
+"""Damaged .blend files: the panels read run, measurement and reference at every draw and must not fail."""
 
 import json
 import math

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""glTF in and out: read by a small reader of these tests' own, not by Blender; and what is refused of bad files."""
+"""glTF files: written files are read by a small reader in this file, not by Blender; and bad files are refused."""
 
 import base64
 import json
@@ -23,7 +23,7 @@ TURN = [0, np.sin(0.3), 0, np.cos(0.3)]
 
 
 def document(vertices=SQUARE, triangles=((0, 1, 2), (0, 2, 3)), nodes=None, uvs=None, image=None):
-    """(the JSON of a mesh, its buffer)."""
+    """Returns (the JSON document of a mesh, its buffer)."""
     arrays = [np.asarray(triangles, np.uint32).ravel(), np.asarray(vertices, np.float32)]
     attributes = {"POSITION": 1}
     if uvs is not None:
@@ -98,7 +98,7 @@ def matrix(node):
 
 
 def parsed(path):
-    """(vertices, triangles) of all nodes, in the coordinates of the file."""
+    """Returns (vertices, triangles) of all nodes, in the coordinates of the file."""
     data = path.read_bytes()
     if data[:4] == b"glTF":
         size = struct.unpack_from("<I", data, 12)[0]
@@ -152,13 +152,13 @@ def picture(path, colour):
     return path.read_bytes()
 
 
-# What is read and written -------------------------------------------------------------------------------------------
+# Reading and writing ------------------------------------------------------------------------------------------------
 
 
 @needs_gltf
 @pytest.mark.parametrize(("into", "out"), [(".glb", ".gltf"), (".gltf", ".glb")])
 def test_gltf_in_and_out(tmp_path, into, out):
-    """Of two instances, moved, turned and scaled below nodes that are, too."""
+    """The file has two instances of a mesh that are moved, turned and scaled, below nodes that are so, too."""
     nodes = [
         {"name": "root", "translation": [5, -3, 2], "rotation": TURN, "children": [1, 2]},
         {"name": "first", "mesh": 0, "scale": [1, 2, 0.5]},
@@ -170,7 +170,9 @@ def test_gltf_in_and_out(tmp_path, into, out):
     assert len(reference[1]) == 2 * 2304 and len(stored[1]) == int(match[2].replace(",", "")) < 700
     run = json.loads((tmp_path / "r.json").read_text())
     assert run["tolerance"]["absolute"] == pytest.approx(0.01 * native.module.size(*reference), rel=1e-5)
-    judged(stored, reference, run["tolerance"]["absolute"] * (1 + 1e-5))  # Blender holds where nodes are in float32
+    judged(
+        stored, reference, run["tolerance"]["absolute"] * (1 + 1e-5)
+    )  # Blender stores the placement of nodes in float32.
     assert sorted(part["name"] for part in run["objects"]) == ["first", "second"] and not run["repairs"]
 
 
@@ -212,7 +214,7 @@ def test_textures_beside_out_are_never_overwritten(tmp_path):
     other.mkdir()
     strange = picture(other / "my skin.png", (0, 0, 1))
     inode = (tmp_path / "my skin.png").stat().st_ino
-    for _ in range(2):  # the second time everything is there already
+    for _ in range(2):  # In the second run all files exist already.
         for folder, texture in ((tmp_path, "my skin.png"), (other, "my skin-2.png")):
             succeeded(decimate(source, folder / "out.gltf", "--tolerance", "1%"))
             (uri,) = [image["uri"] for image in json.loads((folder / "out.gltf").read_text())["images"]]
@@ -227,7 +229,7 @@ def test_textures_beside_out_are_never_overwritten(tmp_path):
 
 @needs_gltf
 def test_bones_are_no_meshes_and_what_is_lost_is_said(tmp_path):
-    """Blender draws bones with meshes of its own."""
+    """Blender's reader adds meshes of its own to draw bones: they are not written."""
     found, binary = torus_document(nodes=[{"mesh": 0, "skin": 0, "name": "part"}, {"name": "bone"}])
     attributes, count = found["meshes"][0]["primitives"][0]["attributes"], found["accessors"][1]["count"]
     for name, kind, array in (
@@ -319,7 +321,7 @@ def test_the_files_that_a_file_names(tmp_path):
         assert {path.name for path in side_files.read_with(tmp_path / name)} == files
 
 
-# What is refused ----------------------------------------------------------------------------------------------------
+# Bad files ----------------------------------------------------------------------------------------------------------
 
 
 def checked(found, binary, tmp_path):
@@ -404,7 +406,7 @@ def test_vertices_are_finite(tmp_path, value):
     found["accessors"][1] |= {"min": [0, 0, 0], "max": [1, 1, 0]}
     with pytest.raises(Refused, match="vertex 3 of mesh 0 is not finite"):
         checked(found, binary, tmp_path)
-    # The same by entries that replace others.
+    # The bad coordinate may also be in a sparse accessor, whose entries replace others.
     found, binary = document()
     binary += np.array([1], np.uint32).tobytes() + np.array([0, value, 0], np.float32).tobytes()
     found["buffers"][0]["byteLength"] = len(binary)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Apply Modifier in Tolerance and Fit Modifier to Tolerance: the promise on what is stored, and the best setting."""
+"""Apply Modifier in Tolerance and Fit Modifier to Tolerance: the promise on the stored mesh, and the best setting."""
 
 import bpy
 import numpy as np
@@ -23,7 +23,7 @@ def coordinates(ob):
 
 
 def modified(kind, matrix=None, settings=None):
-    """A torus with one modifier, and all that the modifier needs."""
+    """Returns a torus with one modifier, and adds all objects that the modifier needs."""
     ob = torus(kind, matrix=matrix, around=32, across=16, noise=0.01)
     modifier = ob.modifiers.new(kind, kind)
     for name, value in (settings or {}).items():
@@ -39,7 +39,7 @@ def modified(kind, matrix=None, settings=None):
 
 
 def evaluated(ob):
-    """Where the vertices are with the object's modifiers, as Blender shows it."""
+    """Returns the positions of the vertices with the object's modifiers, as Blender shows them."""
     return column(ob.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices, "co", 3)
 
 
@@ -236,7 +236,7 @@ def test_the_search_finds_lone_values_before_the_others():
         best = samples[deviation(samples) <= 1].min()
         assert deviation(found) <= 1 and tries < 100
         worse += found > 1.03 * best
-    assert worse <= 1  # what is within for less than half a step can be missed
+    assert worse <= 1  # The search may miss values in a range of less than half a step.
 
 
 def test_a_value_that_is_given_is_certified_and_not_searched_for():

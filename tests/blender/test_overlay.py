@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Show Deviation where nothing can be drawn, and what it computes. What it draws is in tests/ui."""
+"""Show Deviation without a window: its computations, and the reasons why it draws nothing. tests/ui tests the drawing."""
 
 import bpy
 import numpy as np

@@ -26,7 +26,7 @@ def surface(vertices, faces, name="part"):
 
 
 def step(height=0.1, start=0.15):
-    """A flat square, and one whose part beyond x = start is lifted, with a slope 0.2 wide."""
+    """Makes a flat square, and one whose part beyond x = start is lifted, with a slope 0.2 wide."""
     vertices, quads = sheet_arrays(count=10, bumps=0.0)
     lifted = vertices.copy()
     lifted[vertices[:, 0] > start, 2] += np.float32(height)
@@ -39,7 +39,7 @@ def measured(a, b, tolerance=None, bounds=(), **options):
     return run | {"a": about[0], "b": about[1]}
 
 
-# What is measured ---------------------------------------------------------------------------------------------------
+# Measurements -------------------------------------------------------------------------------------------------------
 
 
 def test_place_percentiles_bands_and_both_directions():
@@ -111,7 +111,7 @@ def test_surfaces_that_are_the_same():
 
 
 class Page(HTMLParser):
-    """Checks that tags are closed in order and that nothing is loaded from elsewhere; collects the text."""
+    """Checks that tags are closed in order and that the page loads no other file. Collects the text."""
 
     VOID = {"meta", "img", "br", "path", "rect"}
 
@@ -175,7 +175,9 @@ def test_proved_bounds_are_rounded_outwards():
     rounded = deviation.deviation_page._rounded
     assert rounded(0.123401, True) == "0.1235" and rounded(0.123499, False) == "0.1234"
     assert rounded(-0.123401, False) == "-0.1235" and rounded(-0.123499, True) == "-0.1234"
-    assert float(rounded(float(np.float32(0.1)), True)) == 0.1  # what float32 does to a tenth is no reason
+    assert (
+        float(rounded(float(np.float32(0.1)), True)) == 0.1
+    )  # The rounding of 0.1 to float32 does not count as an excess.
     assert float(rounded(0.0, True)) == 0 and float(rounded(1.23e-15, True)) == 1.23e-15
 
 
