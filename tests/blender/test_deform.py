@@ -236,18 +236,18 @@ def test_a_modifier_with_the_same_lattice_is_named(capfd):
     lift(lattice, 0.01)
     ob.modifiers.new("bend", "LATTICE").object = lattice
     bpy.ops.tolvol.deform(lattice="cage")
-    assert "torus also has the modifier bend with cage: remove it" in capfd.readouterr().out
+    assert "The modifier bend of torus deforms the mesh by cage again: remove it" in capfd.readouterr().out
 
 
 # Refused ------------------------------------------------------------------------------------------------------------
 
 
-def test_what_is_no_use_is_refused_with_the_name():
+def test_an_unusable_lattice_is_refused_with_its_name():
     ob = torus()
     refused("nowhere: choose a lattice object", lattice="nowhere")
     refused("torus: choose a lattice object", lattice="torus")
     cage()
-    refused("cage does not move torus: it is at rest", lattice="cage")
+    refused("cage does not move torus: the lattice is at rest", lattice="cage")
     flat = cage("flat", points=(4, 4, 1))
     lift(flat, 0.01)
     refused("flat: a lattice needs at least 2 control points.*along w it has 1", lattice="flat")

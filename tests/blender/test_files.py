@@ -307,7 +307,7 @@ def test_reports_may_be_pipes(scan, tmp_path):
 
 # Ends and other runs ------------------------------------------------------------------------------------------------
 
-# In the middle of a command the main thread is in a native call that lasts minutes and looks at no signals.
+# In the middle of the command the main thread is in a native call that lasts minutes and does not handle signals.
 HANGS = f"""
 import signal, sys
 signal.signal({{number}}, signal.SIG_DFL)  # whoever runs the tests in the background has it ignored

@@ -157,8 +157,8 @@ def test_one_undo_step_brings_mesh_and_modifier_back():
 
 def test_what_cannot_be_applied_is_refused():
     ob = modified("SUBSURF")
-    refused("SUBSURF of SUBSURF: It changes the faces and has nothing to fit", modifier="SUBSURF")
-    refused("SUBSURF has no modifier to take")
+    refused("SUBSURF of SUBSURF: This modifier changes the faces and has no setting to fit", modifier="SUBSURF")
+    refused("SUBSURF has no modifier that can be used here")
     refused("SUBSURF has no modifier else", modifier="else")
     ob.modifiers.clear()
     refused("SUBSURF has no modifiers")
@@ -253,7 +253,7 @@ def test_a_value_that_is_given_is_certified_and_not_searched_for():
 def test_no_setting_and_no_range_of_settings():
     ob = modified("REMESH", settings={"mode": "BLOCKS"})
     fit_modifier = bpy.ops.tolvol.fit_modifier
-    refused("REMESH of REMESH: Set it to Voxel", fit_modifier, modifier="REMESH")
+    refused("REMESH of REMESH: Set the modifier to Voxel", fit_modifier, modifier="REMESH")
     ob.modifiers[0].mode = "VOXEL"
     refused("choose Replace or New Object", fit_modifier, result="SHAPE_KEY")
     ob.shape_key_add(name="Basis")

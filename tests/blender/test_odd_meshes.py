@@ -65,7 +65,7 @@ def test_faces_that_are_segments_or_points_stay(heights):
     vertices, quads = torus_arrays()
     segment = np.array([(2, 0, height) for height in heights], np.float32)
     odd = [len(vertices) + i for i in range(3)]
-    # Blender's tree, the second judge, knows no distance from such a face.
+    # Blender's tree, the second judge, cannot measure the distance from such a face.
     before, after, _ = decimated(np.vstack([vertices, segment]), [*quads, odd], second_judge=False)
     assert after < before / 4
     stays = {tuple(vertex.co) for vertex in bpy.context.object.data.vertices}

@@ -359,7 +359,7 @@ def test_a_reference_that_is_no_mesh_is_refused():
     curve = bpy.data.objects.new("wire", bpy.data.curves.new("wire", "CURVE"))
     ob = torus()
     ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", curve
-    with pytest.raises(RuntimeError, match="wire is no mesh: Object > Convert > Mesh"):
+    with pytest.raises(RuntimeError, match="wire is not a mesh: Object > Convert > Mesh"):
         bpy.ops.tolvol.set_reference()
     assert measurements.shown_size(ob) is None
 

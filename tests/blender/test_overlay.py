@@ -64,7 +64,7 @@ def test_reasons_follow_preference_reference_and_mode(monkeypatch):
     with_reference(ob)
     assert reasons.hidden(ob) is None
     ob.tolvol.reference_kind = "OBJECT"
-    assert "out of date: another one was chosen" in reasons.hidden(ob)
+    assert "out of date: another kind of reference was chosen" in reasons.hidden(ob)
     ob.tolvol.reference_kind = "SELF"
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     assert "Sculpt Mode" in reasons.hidden(ob)

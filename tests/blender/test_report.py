@@ -146,7 +146,7 @@ def test_page_stands_alone_and_says_what_was_measured():
     page = Page(deviation.deviation_page.page(run))
     assert page.tags.count("svg") == page.tags.count("article") == 2 and not page.images
     assert "A <1> from B & co" in page.text and "B & co from A <1>" in page.text
-    assert "Tolerance 0.05 mm" in page.text and "A <1> and B & co beyond it, proved" in page.text
+    assert "Tolerance 0.05 mm" in page.text and "beyond the tolerance, proved: A <1> and B & co" in page.text
     largest = run["forward"]["largest"][1]
     assert 0.1 <= float(re.search(r"at most\s+([\d.]+) mm", page.text)[1]) <= largest * 1.001
     assert f"{largest / 0.05 * 100:.4g} % of the tolerance" in page.text
@@ -154,7 +154,11 @@ def test_page_stands_alone_and_says_what_was_measured():
         assert f"{entry['percent']:g} % of area within" in page.text and f"{entry['distance']:.4g}" in page.text
     assert "0.02 to 0.05" in page.text and "beyond 0.05" in page.text and "is not closed" in page.text
     loose = Page(deviation.deviation_page.page(run | {"tolerance": None}))
-    assert "beyond it" not in loose.text and "of size" in loose.text and "of the tolerance" not in loose.text
+    assert (
+        "beyond the tolerance, proved" not in loose.text
+        and "of size" in loose.text
+        and "of the tolerance" not in loose.text
+    )
 
 
 def test_page_bars_beyond_the_tolerance_are_striped():

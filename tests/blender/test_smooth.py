@@ -221,7 +221,7 @@ def test_shape_keys_follow_what_edit_mode_smooths():
     assert np.abs(up - basis - [0, 0, 0.25]).max() < 1e-6
     ob.active_shape_key_index = 1
     bpy.ops.object.mode_set(mode="EDIT")
-    with pytest.raises(RuntimeError, match="the mesh of torus: choose its shape key Basis first"):
+    with pytest.raises(RuntimeError, match="the base mesh of torus: choose the shape key Basis first"):
         bpy.ops.tolvol.smooth()
 
 
