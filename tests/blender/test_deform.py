@@ -242,7 +242,7 @@ def test_a_modifier_with_the_same_lattice_is_named(capfd):
 # Refused ------------------------------------------------------------------------------------------------------------
 
 
-def test_an_unusable_lattice_is_refused_with_its_name():
+def test_what_is_no_use_is_refused_with_the_name():
     ob = torus()
     refused("nowhere: choose a lattice object", lattice="nowhere")
     refused("torus: choose a lattice object", lattice="torus")

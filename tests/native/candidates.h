@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Makes candidates that mislead a check, and counts the wrong ones among those that it accepted, by measure/hausdorff.h.
-/// The bounds of measure/hausdorff.h are its own. It shares native/geometry and native/base with the checks, and is
-/// tested against brute force and CGAL.
+/// Makes candidates that mislead a check, and counts the wrong ones among those that it accepted, by
+/// measure/hausdorff.h. The bounds of measure/hausdorff.h are its own. It shares native/geometry and native/base with
+/// the checks, and is tested against brute force and CGAL.
 #pragma once
 
 #include <random>
