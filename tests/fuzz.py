@@ -46,7 +46,7 @@ def report(watchdog, case, name, found, options):
     if options.shrink:
 
         def still(smaller):
-            # A slow case shows the same finding again when it exceeds the time limit: it does not have to end.
+            # A reduced case that hangs shows the same finding as one that is slow.
             again = watchdog.run(smaller, SECONDS)[1]
             return again.replace("hang: ", "slow: ") == what.replace("hang: ", "slow: ")
 

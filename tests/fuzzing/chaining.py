@@ -42,7 +42,7 @@ def chain(run):
 
         result = run.call(step, call, run.threads[0])
         vertices = result.vertices
-        # Vertices that no triangle uses go with the first decimation; what moves keeps the rest.
+        # A decimation gives new triangles. An operation that moves vertices keeps the present ones.
         triangles = getattr(result, "triangles", triangles)
         judges.valid(run, vertices, triangles, case.vertices.dtype)
         reference = case.world(case.vertices), case.triangles

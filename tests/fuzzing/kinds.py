@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes that go wrong: each kind is a function of a random generator and of about how many faces it shall have.
+"""Makes difficult meshes. Each kind is a function of a random generator and of the approximate number of faces.
 
-No mesh has more than 100,000 faces, or an area of more than a hundred times its size squared: what lies on itself more
-often than that may take as long as it likes."""
+No mesh has more than 100,000 faces or an area of more than a hundred times its size squared: for a mesh that covers itself
+more often than that no time limit is promised."""
 
 import numpy as np
 

@@ -143,7 +143,7 @@ def constrain(run):
 
 def draw_guard(rng, case):
     largest = np.abs(case.vertices).max(initial=0)
-    if largest and not 1e-25 < largest < 1e25:  # A guard takes only float32, and other sizes are beyond its range.
+    if largest and not 1e-25 < largest < 1e25:  # A guard takes only float32, whose range is smaller.
         case.vertices, case.tolerance = case.vertices / largest, case.tolerance / largest
     case.vertices = case.vertices.astype(np.float32)
     case.options["seed"] = int(rng.integers(1 << 30))

@@ -26,7 +26,7 @@ def motion_of(rng, case, tolerances):
 
 
 def moved(run):
-    """Returns the case's vertices, moved a little if it has the option `moved`, and whether they are all inside."""
+    """Returns the case's vertices, moved a little if the case has the option `moved`."""
     case = run.case
     if not case.options.get("moved"):
         return case.vertices
@@ -34,7 +34,7 @@ def moved(run):
 
 
 def proved_inside(run, vertices, triangles, volume):
-    """Returns for each face whether the check proves it, and requires that no proved face is beyond the tolerance."""
+    """Returns for each face whether the check proves it to be inside."""
     verdicts = run.call(
         "check", lambda: volume.check(vertices, triangles, to_world=run.case.to_world, threads=1)
     ).verdict
@@ -42,7 +42,10 @@ def proved_inside(run, vertices, triangles, volume):
 
 
 def within_as_pieces(run, vertices, faces, reference):
-    """Returns faces as triangles: points and segments as degenerate ones, a quad as those of both its triangulations."""
+    """Requires that faces of 1 to 4 corners are within the tolerance of the reference.
+
+    Points and segments are judged as degenerate triangles, and a quad in both its triangulations.
+    """
     corners = faces.shape[1]
     cuts = {1: [[0, 0, 0]], 2: [[0, 1, 1]], 3: [[0, 1, 2]], 4: [[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]}[corners]
     triangles = np.concatenate([faces[:, cut] for cut in cuts])

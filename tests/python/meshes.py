@@ -153,7 +153,7 @@ def boundary_segments(vertices, triangles):
 
 
 def component_count(vertices, triangles):
-    """Returns the connected components of the triangles. Vertices at equal positions count as one."""
+    """Returns the number of connected components of the triangles. Vertices at equal positions count as one."""
     _, label = np.unique(vertices[triangles.ravel()], axis=0, return_inverse=True)
     corners = label.reshape(-1, 3)
     root = np.arange(label.max() + 1)

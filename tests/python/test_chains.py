@@ -57,7 +57,7 @@ def test_one_reference_for_the_whole_chain_keeps_it_inside_and_one_a_step_does_n
 
 
 def test_what_one_step_left_inside_the_next_takes_in_any_form():
-    """Degenerate faces as triangles, as quads with a repeated corner and as edges: no step refuses the result of another."""
+    """Faces that one step keeps inside are taken by the next step as triangles, as quads with a repeated corner, as edges."""
     vertices, triangles = meshes.sphere(4)
     rng = np.random.default_rng(3)
     vertices = vertices * (1 + 0.1 * rng.standard_normal((len(vertices), 1)))

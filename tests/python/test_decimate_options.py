@@ -203,7 +203,7 @@ def test_the_promise_holds_at_any_precision(precision):
 
 
 def test_locks_of_a_dropped_face_hold_where_the_face_is_that_stands_in_for_it():
-    """Returns a sheet with two more faces that meet in one vertex. The first of them repeats a face of the sheet."""
+    """To a sheet two faces are added that meet in one vertex. The first of them repeats a face of the sheet."""
     x = np.linspace(0, 1, 21)
     sheet = np.stack([*np.meshgrid(x, x), np.zeros((21, 21))], -1).reshape(-1, 3)
     triangles = meshes.grid_triangles(21, 21)

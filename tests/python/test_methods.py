@@ -48,7 +48,8 @@ def test_each_method_sees_both_sides_and_names_itself(method):
     assert (result.verdict == INSIDE).tolist() == [True, True, False, False]
     assert result.method == LABELS[method]
     assert result.renderer == ("CPU" if method == "certificate" else tolvol.renderer())
-    # Only methods that look for a proof return the verdict outside, and the paper's check, which has no verdict unproved.
+    # Only two kinds of methods have the verdict outside: the certificate, which proves it, and the paper's check, which has
+    # no verdict unproved.
     says_outside = method in ("certificate", "paper", "paper_half_h")
     assert result.verdict[3] == (OUTSIDE if says_outside else UNPROVED)
     grouped = volume.check(points, faces, groups=np.array([1, 1, 0, 1], np.int32), method=method)
