@@ -57,7 +57,7 @@ def new_mesh(fill):
 
 
 def suzanne(bm):
-    """Returns Blender's monkey, subdivided, without the noise that models.py adds."""
+    """Adds Blender's monkey to a bmesh, subdivided, without the noise that models.py adds."""
     bpy.ops.mesh.primitive_monkey_add(calc_uvs=False)
     ob = bpy.context.object
     ob.modifiers.new("subdivision", "SUBSURF").levels = 2
