@@ -9,9 +9,8 @@ from ..mesh import mesh_io
 from . import watch
 
 watches = watch.Watches()
-_corrections = (
-    watch.Corrections()
-)  # fingerprint of coordinates and faces -> (vertex indices, their corrected positions)
+# Fingerprint of coordinates and faces -> (indices of vertices, their corrected positions).
+_corrections = watch.Corrections()
 _undoing = False
 
 

@@ -33,9 +33,8 @@ class Decimated:
     vertex_map: np.ndarray
     vertex_source: np.ndarray
     triangle_source: np.ndarray
-    turned: (
-        np.ndarray
-    )  # (l,) bool: an edge was flipped, so that the triangle has other corners than its source triangle
+    # (l,) bool: an edge was flipped, so that the triangle has other corners than its source triangle.
+    turned: np.ndarray
     source_triangle: np.ndarray
     source_weights: np.ndarray
     coincident: int  # number of triangles that were left out: Blender holds only one face on the same three vertices

@@ -114,9 +114,8 @@ def percent(value, whole):
     if share <= 0:
         return "0 %"
     excess = share - 100
-    if (
-        1e-9 < excess < 1
-    ):  # Just above 100 % more digits are shown, so that the text neither hides nor inflates the excess.
+    # Just above 100 % more digits are shown, so that the text neither hides nor inflates the excess.
+    if 1e-9 < excess < 1:
         digits = 1 - math.floor(math.log10(excess))
         return f"{100 + math.ceil(excess * 10**digits - 1e-4) / 10**digits:.{digits}f} %"
     step = 10.0 ** (math.floor(math.log10(share)) - 2)

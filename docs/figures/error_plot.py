@@ -33,9 +33,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "build" / "release"
 
 TOLERANCE = 0.03  # as a share of the size
 REACH = 2  # tolerances that the fields reach, so that all corners of the cells around the tolerance have values
-PRECISIONS = np.geomspace(
-    2, 11.3, 6
-)  # nodes per tolerance; the last one makes the finest grid that the memory budget permits
+# Nodes per tolerance; the last one makes the finest grid that the memory budget permits.
+PRECISIONS = np.geomspace(2, 11.3, 6)
 POINTS, RAYS = 100_000, 4_000
 SEED = 2004
 

@@ -317,9 +317,8 @@ def test_a_temporary_folder_mounted_noexec(tmp_path, everywhere):
 
 
 def test_module_is_looked_for_in_the_environments_folder(tmp_path):
-    (tmp_path / native.path.name).write_bytes(
-        native.path.read_bytes() + b"\0"
-    )  # The content differs, but it is still a library.
+    # The content differs, but it is still a library.
+    (tmp_path / native.path.name).write_bytes(native.path.read_bytes() + b"\0")
     out = run_blender(
         f"""
 sys.path.insert(0, {str(ROOT)!r})

@@ -34,9 +34,8 @@ def dressed_torus():
     mesh, rng = ob.data, np.random.default_rng(5)
     u, v = np.divmod(np.arange(around * across), across)
     corners = column(mesh.loops, "vertex_index", 1, np.int32)
-    first = np.repeat(
-        corners[::4], 4
-    )  # The place is the quad's own, so that the last ring of quads ends at 1 and not at 0.
+    # The place is the quad's own, so that the last ring of quads ends at 1 and not at 0.
+    first = np.repeat(corners[::4], 4)
     uvs = np.stack([(u[corners] - u[first]) % around + u[first], (v[corners] - v[first]) % across + v[first]], 1)
     mesh.uv_layers.new(name="unwrapped").data.foreach_set("uv", (uvs / (around, across)).astype(np.float32).ravel())
     for i in range(4):
@@ -234,12 +233,10 @@ def test_optimal_carries_over_what_is_smooth():
     mesh = ob.data
     now, at = column(mesh.vertices, "co", 3), column(mesh.loops, "vertex_index", 1, np.int32)
     was = {place.tobytes() for place in co}
-    assert (
-        sum(place.tobytes() not in was for place in now) > 10
-    )  # Some vertices moved: otherwise this would test nothing.
-    close = (
-        0.03  # the tolerance, and the distance along the surface by which it may shift the place of the interpolation
-    )
+    # Some vertices moved: otherwise this would test nothing.
+    assert sum(place.tobytes() not in was for place in now) > 10
+    # The tolerance, and the distance along the surface by which it may shift the place of the interpolation.
+    close = 0.03
     assert np.abs(column(mesh.uv_layers[0].data, "uv", 2) - (now[at, :2] * 0.4 + 0.5)).max() < close
     assert np.abs(column(mesh.attributes["height"].data, "value") - now[:, 0] - now[:, 1]).max() < close
     assert np.abs(column(mesh.attributes["colour"].data, "color", 4)[:, :3] - (now[at] * 0.4 + 0.5)).max() < close

@@ -170,9 +170,8 @@ def test_gltf_in_and_out(tmp_path, into, out):
     assert len(reference[1]) == 2 * 2304 and len(stored[1]) == int(match[2].replace(",", "")) < 700
     run = json.loads((tmp_path / "r.json").read_text())
     assert run["tolerance"]["absolute"] == pytest.approx(0.01 * native.module.size(*reference), rel=1e-5)
-    judged(
-        stored, reference, run["tolerance"]["absolute"] * (1 + 1e-5)
-    )  # Blender stores the placement of nodes in float32.
+    # Blender stores the placement of nodes in float32.
+    judged(stored, reference, run["tolerance"]["absolute"] * (1 + 1e-5))
     assert sorted(part["name"] for part in run["objects"]) == ["first", "second"] and not run["repairs"]
 
 

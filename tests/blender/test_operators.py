@@ -665,9 +665,8 @@ def test_a_length_typed_in_a_unit_of_the_scene_is_that_length():
     ):
         units.system, units.scale_length = system, scale
         scale_as_stored = 1.0 if system == "NONE" else units.scale_length
-        settings.tolerance_length = (
-            wanted if system == "NONE" else metres / scale_as_stored
-        )  # Blender computes the length of a text field in this way.
+        # Blender computes the length of a text field in this way.
+        settings.tolerance_length = wanted if system == "NONE" else metres / scale_as_stored
         assert tolerances.tolerance_length(settings, 1.0) == pytest.approx(wanted, rel=1e-15), (system, scale, metres)
     units.system, units.scale_length = "METRIC", 0.001
     settings.tolerance_length = 0.123456789  # A value that was dragged has all digits.

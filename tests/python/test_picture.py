@@ -49,17 +49,15 @@ def test_a_picture_has_the_asked_size_and_a_transparent_background(torus, volume
 
 
 def test_top_row_first(torus, volume):
-    camera = tolvol.Camera(
-        (0, -9, 0), (0, 0, -1.5), angle=30
-    )  # The camera looks below the torus, so the torus is high up in the picture.
+    # The camera looks below the torus, so the torus is high up in the picture.
+    camera = tolvol.Camera((0, -9, 0), (0, 0, -1.5), angle=30)
     rows = np.flatnonzero(draw(torus, volume, camera=camera)[..., 3].any(1))
     assert rows.mean() < 30
 
 
 def test_transfers_show_their_colours(volume):
-    camera = tolvol.Camera(
-        (0, -20, 0), (0, 0, 0), angle=1
-    )  # The nearest point of the torus is in the middle of the picture.
+    # The nearest point of the torus is in the middle of the picture.
+    camera = tolvol.Camera((0, -20, 0), (0, 0, 0), angle=1)
     for transfer, lowest in (("signed", -1), ("magnitude", 0)):
         colours = tolvol.transfer_colours(transfer).astype(int)
         assert colours.shape == (256, 3)

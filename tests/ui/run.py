@@ -18,9 +18,8 @@ sys.dont_write_bytecode = True
 sys.path[:0] = [str(FOLDER), str(FOLDER.parents[1]), str(FOLDER.parent / "blender")]
 # This works only before the first window is drawn.
 bpy.context.preferences.view.show_splash = False
-bpy.context.preferences.system.viewport_aa = (
-    "OFF"  # Anti-aliasing would take more than half of the time when Blender draws in software.
-)
+# Anti-aliasing would take more than half of the time when Blender draws in software.
+bpy.context.preferences.system.viewport_aa = "OFF"
 
 import addon  # noqa: E402
 from addon import native  # noqa: E402

@@ -131,9 +131,8 @@ def test_adjust_last_operation():
     hud = region("HUD")
     xdotool("mousemove", *on_screen(hud, hud.width * 2 // 3, 50))
     yield 1.0
-    key(
-        "Return"
-    )  # Return over a field starts typing. A double click would do so too, but a busy machine may take it for two clicks.
+    # Return over a field starts typing. A double click would do so too, but a busy machine may take it for two clicks.
+    key("Return")
     yield 1.0
     xdotool("key", "ctrl+a", "type", "3")
     key("Return")
@@ -245,9 +244,8 @@ def test_what_is_in_the_way_is_said():
     yield 0.5
     screenshot("12 two users")
     bpy.data.objects.remove(twin)
-    suzanne().tolvol.show_deviation = (
-        False  # A running count would need the module, which is never removed while Blender runs.
-    )
+    # A running count would need the module, which is never removed while Blender runs.
+    suzanne().tolvol.show_deviation = False
     found = native.module
     native.module, native.reason = None, "The compiled module tolvol is missing: install the add-on's zip"
     view()[1].tag_redraw()
