@@ -31,7 +31,7 @@ _NONE = np.empty(0, np.int32)
 
 
 def blocked(ob):
-    """Why the mesh of `ob` cannot be guarded now, whatever the mode, or None. Cheap enough to draw."""
+    """Why the mesh of `ob` cannot be guarded now, in any mode, or None. It is quick enough to be called while drawing."""
     if native.module is None:
         return native.reason
     if reason := snapshots.reference_missing(ob):

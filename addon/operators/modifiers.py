@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Applies modifiers within the tolerance.
 
-A modifier that only moves vertices is applied, and each vertex stops at the tolerance. For a modifier that changes the
-faces the setting is searched that leaves the fewest triangles within the tolerance.
+A modifier that only moves vertices is applied, and each vertex stops at the tolerance. A modifier that changes the faces is
+applied with the setting that leaves the fewest triangles within the tolerance, which a search finds.
 """
 
 import bpy

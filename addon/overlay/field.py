@@ -69,9 +69,8 @@ def field_of(ob, tolerance, changed):
     if reason := _failed.get(key):
         return None, reason
     own = ob.tolvol.snapshot_kind == "SELF"
-    if (
-        field is None or own and not measurements.same_shape(field.placement, snapshots.reference_matrix(ob))
-    ):  # scaled since
+    # A tree of a reference that was scaled since it was made has wrong distances.
+    if field is None or own and not measurements.same_shape(field.placement, snapshots.reference_matrix(ob)):
         work.later(
             ("field", key),
             0,
