@@ -314,7 +314,7 @@ class Command:
         except Refused as error:
             reason = str(error).removeprefix(f"{file}: ")
             raise NotWritten(
-                f"{self.target.name}: what was written cannot be read back ({reason}); is there room on the disk?"
+                f"{self.target.name}: the written file cannot be read back ({reason}); check the free space on the disk"
             ) from None
 
     def _targets_written(self):

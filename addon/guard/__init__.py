@@ -40,7 +40,7 @@ def _state(ob, room):
         return None, None
     if watch.on:
         return watch.said() or "Within the tolerance", True
-    return (watch.reason, False) if watch.reason else ("Being prepared", None)
+    return (watch.reason, False) if watch.reason else ("The guard is being prepared", None)
 
 
 @persistent

@@ -20,7 +20,7 @@ class TOLVOL_OT_guard_undo(bpy.types.Operator):
     """Undo an edit that left the tolerance"""
 
     bl_idname = "tolvol.guard_undo"
-    bl_label = "Undo What Left the Tolerance"
+    bl_label = "Undo Edit Beyond Tolerance"
     bl_options = {"INTERNAL"}
 
     @classmethod

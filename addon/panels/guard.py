@@ -7,9 +7,9 @@ from .. import guard
 from .layout import AMBER, GREEN, GREY, SubPanel, text_lines
 
 _WHERE = {
-    "sculpting": "Takes effect in Sculpt Mode",
-    "editing": "Takes effect in Edit Mode",
-    "lattice": "Takes effect while the mesh is in Object Mode",
+    "sculpting": "The guard takes effect in Sculpt Mode",
+    "editing": "The guard takes effect in Edit Mode",
+    "lattice": "The guard takes effect while the mesh is in Object Mode",
 }
 
 
