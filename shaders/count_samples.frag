@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One counter a slot, where a query each would be too many.
+// Counts samples in one counter for each slot: an occlusion query for each slot would be too many queries.
 layout(std430, binding = 1) buffer Counts { uint counts[]; };
 
 void main() {
