@@ -6,7 +6,7 @@ layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer Candidates { float corners[]; };  // nine numbers for each candidate
 layout(std430, binding = 1) readonly buffer Open { uint open_candidates[]; };
-layout(std430, binding = 2) writeonly buffer Proved { uint proved[]; };  // 1 for a proved candidate; no other value is written
+layout(std430, binding = 2) writeonly buffer Proved { uint proved[]; };  // 1 for a proved candidate; 0 is never written
 layout(std430, binding = 3) readonly buffer Nodes { uint closest[]; };   // the grid's triangles
 layout(std430, binding = 4) readonly buffer ReferenceA { float reference_a[]; };
 layout(std430, binding = 5) readonly buffer ReferenceAb { float reference_ab[]; };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Colours each pixel of a mesh by its distance to the reference: the distance is interpolated, then coloured [Botsch04, §3].
+// Colours each pixel of a mesh by its distance to the reference. The distance is interpolated first, then coloured
+// [Botsch04, §3].
 layout(binding = 0) uniform sampler3D field;
 layout(binding = 1) uniform sampler1D transfer;
 uniform float tolerance;  // in grid spacings

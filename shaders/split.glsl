@@ -31,6 +31,7 @@ mat3 weights(Part part) {
   }
   const ivec2 second = at + ivec2(side, 0), third = at + ivec2(0, side);
   const int whole = 1 << part.depth;
-  const float unit = uintBitsToFloat(uint(127 - part.depth) << 23);  // 1 / whole, computed from bits because a division need not be exact
+  // 1 / whole is computed from bits, because a division need not be exact.
+  const float unit = uintBitsToFloat(uint(127 - part.depth) << 23);
   return unit * mat3(whole - at.x - at.y, at, whole - second.x - second.y, second, whole - third.x - third.y, third);
 }
