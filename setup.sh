@@ -1,10 +1,10 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Installs what a Debian 12 machine lacks and builds the release preset into build/release: the module, and the zip that
-# Blender installs. Nothing is done twice.
-#   sh setup.sh           what the add-on and the demo need
-#   sh setup.sh --tests   also what the tests need
-# TOLVOL_PYTHONS="3.11;3.13" adds a module for each of these Pythons, by version or path.
+# Installs the packages that a Debian 12 machine lacks and builds the release preset into build/release: the module, and the
+# zip that Blender installs. A second run does only the steps that are still needed.
+#   sh setup.sh           installs and builds for the add-on and the demo
+#   sh setup.sh --tests   also installs and builds for the tests
+# TOLVOL_PYTHONS="3.11;3.13" builds a module for each of these Pythons, which are given as versions or paths.
 set -eu
 cd "$(dirname "$0")"
 
@@ -27,7 +27,7 @@ esac
 log=build/setup.log
 mkdir -p build
 
-# stage NAME COMMAND...: one line when it is done; what the command said only when it fails
+# stage NAME COMMAND...: runs a command and prints one line. It prints the command's output only if the command fails.
 stage() {
   name=$1
   shift
@@ -47,7 +47,7 @@ if command -v dpkg-query >/dev/null; then
     dpkg-query -W -f '${db:Status-Status}\n' "$package" 2>/dev/null | grep -qx installed || missing="$missing $package"
   done
 else
-  echo "setup: not a Debian machine; needed, by Debian's names:" $packages
+  echo "setup: this is not a Debian machine; these packages are needed, by their names in Debian:" $packages
 fi
 
 if [ -n "$missing" ]; then

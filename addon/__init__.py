@@ -13,7 +13,8 @@ bl_info = {
     "category": "Mesh",
 }
 
-# Installing a new version over this one reloads this file alone: its parts must be loaded anew too.
+# When a new version is installed over this one, Blender reloads this file alone. The submodules are forgotten here, so
+# that the imports below load them anew.
 for _name in [name for name in sys.modules if name.startswith(__name__ + ".")]:
     del sys.modules[_name]
     globals().pop(_name.removeprefix(__name__ + "."), None)

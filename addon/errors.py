@@ -1,20 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an operator may end with that is no bug. The message names the object and, where there is one, the remedy."""
+"""Failures that an operator reports to the user; any other exception is a bug.
 
-# How the message of NotProved begins, wherever it is read again.
+Each message names the object and, where there is one, the remedy.
+"""
+
+# Every message of NotProved begins with these words: blender_scripts/decimate.py recognises the message by them.
 NOT_PROVED = "Not proved"
 
 
 class Refused(Exception):
-    """The operation cannot be done as asked. Nothing was changed."""
+    """The operation cannot be done as asked. The operator has changed nothing."""
 
 
 class NotProved(Refused):
-    """The result could not be certified within the tolerance. Nothing was changed."""
+    """The result could not be certified to be within the tolerance. The operator has changed nothing."""
 
     def __init__(self, intervals):
         super().__init__(f"{NOT_PROVED}: {intervals}")
 
 
 class NotWritten(Refused):
-    """A file could not be written where it was wanted: the system refused, or there is no room. No other file was changed."""
+    """A file could not be written: the system refused, or the disk is full. No other file was changed."""

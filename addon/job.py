@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One long call of an operator: in a thread with progress in the status bar and Esc, or at once.
+"""Runs the long computation of an operator in a thread, with progress and Esc in the status bar.
 
-An operator gives prepare(), which reads Blender's data and returns the work to do; the work, which runs in the thread
-and touches nothing of Blender; and finish(), which writes the outcome in one go. Work that needs Blender between its parts
-is a generator instead, steps(). A script, Adjust Last Operation and Blender without a window run the same at once.
+An operator has three parts: prepare() reads Blender's data and returns the work; the work runs in the thread and touches
+no data of Blender; finish() writes the outcome in one go. An operator whose work needs Blender between its parts
+overrides steps(), a generator. For a script, for Adjust Last Operation and in Blender without a window the same parts
+run one after the other, and the call returns when they are done.
 """
 
 import atexit
@@ -16,14 +17,14 @@ from bpy.app.handlers import persistent
 from . import native, status_bar
 from .errors import Refused
 
-# What ends sooner than this is waited for: no status line has to flash up for it.
+# Blender waits so many seconds for a job before the status bar shows it: a short job makes no line flash up.
 _PATIENCE = 0.4
 _TICK = 0.1
 
-# All of these are touched by the main thread alone.
+# Only the main thread uses these lists.
 _at_work = []  # jobs whose threads may be running
-_under_way = []  # operators that go on while Blender does
-_to_say = []  # what to say once another file is open
+_under_way = []  # modal operators: Blender goes on while their jobs run
+_to_say = []  # messages for the status bar, to be shown once the next file is open
 
 
 class Job:
@@ -39,7 +40,7 @@ class Job:
     def _run(self, work):
         try:
             self._outcome = work(self.progress)
-        except BaseException as error:  # handed to the main thread, whatever it is
+        except BaseException as error:  # The main thread raises it again, even if it is no Exception.
             self._error = error
 
     def done(self, seconds=0.0):
@@ -54,7 +55,7 @@ class Job:
 
 
 def end_all():
-    """Cancels every job and waits for its thread: one that outlives Python's interpreter takes Blender down with it."""
+    """Cancels every job and waits for its thread: Blender crashes if a thread outlives the Python interpreter."""
     for job in _at_work:
         job.progress.cancel()
     for job in _at_work:
@@ -63,7 +64,7 @@ def end_all():
 
 
 class _Claim:
-    """An object that an operator works on, as it was when the operator began."""
+    """Remembers an object that an operator works on, as the object was when the operator began."""
 
     def __init__(self, ob):
         self._ob = ob
@@ -71,7 +72,7 @@ class _Claim:
         self._mesh = self._state()
 
     def check(self):
-        """Raises Refused unless the outcome can still be written to it."""
+        """Raises Refused unless the outcome can still be written to the object."""
         try:
             name = self._ob.name
         except ReferenceError:
@@ -87,7 +88,7 @@ class _Claim:
 
 
 def run_all(tasks, progress):
-    """The outcomes of task.run(progress); an error says which of several tasks it is of, by task.name."""
+    """Returns the outcomes of task.run(progress). With several tasks an error begins with the name of its task."""
     if len(tasks) == 1:
         return [tasks[0].run(progress)]
     outcomes = []
@@ -102,18 +103,18 @@ def run_all(tasks, progress):
 
 
 class JobOperator:
-    """Mixed into an Operator that has prepare(context) -> work(progress) -> outcome, and finish(context, outcome)."""
+    """A base class for an Operator with prepare(context), which returns work(progress), and finish(context, outcome)."""
 
-    doing = ""  # what the status bar says in place of the native stage
+    doing = ""  # text for the status bar in place of the native stage
 
     _steps = None
     _progress = None
     _job = None
     _timer = None
-    _interrupted = None  # what happened to the objects, so that they must not be touched any more
+    _interrupted = None  # the message why the operator was stopped: its objects must not be touched any more
 
     def targets(self, context):
-        """The objects that it works on, the first of which its settings are of."""
+        """Returns the objects that the operator works on. The settings are those of the first one."""
         return [context.active_object]
 
     @property
@@ -121,7 +122,8 @@ class JobOperator:
         return self.objects[0]
 
     def steps(self, context):
-        """Yields work(progress) and is sent its outcome, in the main thread; only its end may change anything."""
+        """A generator in the main thread: yields work(progress) and is sent its outcome. It may change Blender's data only
+        after the last yield."""
         outcome = yield self.prepare(context)
         self.finish(context, outcome)
 
@@ -166,7 +168,7 @@ class JobOperator:
         return {"RUNNING_MODAL"}
 
     def cancel(self, context):
-        """Blender closes the window, or the file, or a dialog before anything was begun."""
+        """Called when Blender closes the window or the file, or a dialog of the operator before its job has begun."""
         if self._job is None:
             return
         if self._interrupted:
@@ -175,12 +177,12 @@ class JobOperator:
         self._leave(context)
 
     def interrupt(self, happens):
-        """Ends the job while what it began with is still there; modal() or cancel() follows."""
+        """Ends the job while the data that it began with still exists. Blender then calls modal() or cancel()."""
         self._interrupted = f"{self.bl_label} was stopped, because {happens}. It has changed nothing"
         self._end()
 
     def _look(self):
-        """Ends the job as soon as its outcome could not be written any more."""
+        """Ends the job as soon as its outcome cannot be written any more."""
         try:
             self._check()
         except Refused as error:
@@ -204,7 +206,7 @@ class JobOperator:
         self._job = None
 
     def _go_on(self, seconds):
-        """As many steps as there is time for; how the operator ended, if it did."""
+        """Does as many steps as the time permits. Returns the operator's result if it has ended, else None."""
         deadline = time.monotonic() + seconds
         while (left := deadline - time.monotonic()) > 0 and self._job.done(left):
             if ended := self._advance():
@@ -212,13 +214,13 @@ class JobOperator:
         return None
 
     def _advance(self):
-        """Starts the next work, and returns how the operator ended where there is none."""
+        """Starts the next work. Returns the operator's result if there is no more work, else None."""
         try:
             self._job = Job(self._next_work(), self._progress)
         except StopIteration:
             return {"FINISHED"}
         except native.module.Cancelled:
-            self.report({"INFO"}, f"{self.bl_label} was cancelled, nothing was changed")
+            self.report({"INFO"}, f"{self.bl_label} was cancelled. It has changed nothing")
             return {"CANCELLED"}
         except (Refused, native.module.TolvolError) as error:
             self.report({"ERROR"}, native.said(error))
@@ -230,7 +232,7 @@ class JobOperator:
             return next(self._steps)
         try:
             outcome = self._job.outcome()
-            if self._progress.cancelled:  # after the last thing that would have noticed
+            if self._progress.cancelled:  # The work may have ended before it noticed the cancel.
                 raise native.module.Cancelled("cancelled")
             self._check()
         except BaseException as error:
@@ -244,17 +246,17 @@ class JobOperator:
 
 
 def _improving(progress):
-    """Whether there is a result that Esc keeps; a second one cancels."""
+    """Whether Esc keeps the present result. A second Esc cancels."""
     return progress.stage == "refining" and not progress.finishing
 
 
 def _status(progress, doing):
     if progress.cancelled:
         return "Stopping"
-    # The count is of the stages that count: triangles left.
+    # In these two stages the count is the number of triangles left.
     left = f", {progress.count:,} triangles left" if progress.stage in {"decimating", "refining"} else ""
     share = f" {progress.fraction:.0%}" if progress.fraction else ""
-    escape = "Keep What There Is" if _improving(progress) else "Cancel"
+    escape = "Keep Present Result" if _improving(progress) else "Cancel"
     return f"{doing or progress.stage.capitalize() + share + left}    Esc: {escape}"
 
 
@@ -296,7 +298,7 @@ _HANDLERS = (
 def register():
     for name, handler in _HANDLERS:
         getattr(bpy.app.handlers, name).append(handler)
-    atexit.register(end_all)  # Blender does not unregister what a script has registered
+    atexit.register(end_all)  # On exit Blender does not unregister an add-on that a script has registered.
 
 
 def unregister():

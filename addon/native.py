@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The only importer of the compiled module `tolvol`.
+"""Loads the compiled module `tolvol` for all of the add-on.
 
-`module` is the compiled module, found at `path`, or None; then `reason` says why, and the panel shows it. Looked for, in
-this order: the add-on's own folder (bin/ or beside this file), the folders in the environment variable
-TOLVOL_PYTHON_PATH, and build/release/python of a checkout.
+`module` is the compiled module, found at `path`. If it cannot be loaded, `module` is None and `reason` says why; the
+panel shows the reason. The module is searched in this order: in the add-on's own folder (bin/ or beside this file), in
+the folders of the environment variable TOLVOL_PYTHON_PATH, and in build/release/python of a checkout.
 
-What is loaded is a private copy named by its content: Blender unloads no library, so that a file which is replaced
-while it is mapped (the add-on installed again, the module built again) would crash the running session. The copy is put
-into the first folder that programs may be started from: the one for temporary files is mounted `noexec` on some machines.
+The add-on loads a private copy of the module, named by its content. Blender never unloads a library, and replacing a
+library file that is in use (by installing the add-on or building the module again) would crash the session. The copy is
+put into the first folder from which libraries may be loaded: some machines mount the folder for temporary files `noexec`.
 """
 
 import hashlib
@@ -34,7 +34,7 @@ def _folders():
 
 
 def _binaries():
-    """(the first file this Python can load or None, the names of those made for another Python)."""
+    """Returns (the first file that this Python can load or None, the names of the files for other Pythons)."""
     others = []
     for folder in _folders():
         if not folder.is_dir():
@@ -48,15 +48,15 @@ def _binaries():
 
 
 def _load():
-    """(module, where it was found, None) or (None, None, reason)."""
+    """Returns (module, its path, None) or (None, None, reason)."""
     path, others = _binaries()
     python = f"Python {sys.version_info.major}.{sys.version_info.minor}"
     if path is None and others:
-        return None, None, f"{others[0]} is not made for this Blender's {python}: install the package built for it"
+        return None, None, f"{others[0]} is not made for this Blender's {python}: install the package for that version"
     if path is None:
         return None, None, "The compiled module tolvol is missing: install the add-on's zip, or build it with setup.sh"
     name = f"tolvol_{hashlib.blake2b(path.read_bytes(), digest_size=8).hexdigest()}"
-    # The registry outlives this file's reload, so that one content is loaded once per session.
+    # sys.modules survives a reload of this file, so that a module with the same content is loaded once per session.
     if name not in sys.modules:
         problems = []
         for folder in _folders_for_copies():
@@ -71,19 +71,19 @@ def _load():
 
 
 def _folders_for_copies():
-    """Where a copy may be loaded from, the best first."""
+    """Yields the folders to which the module may be copied, the preferred one first."""
     yield Path(tempfile.gettempdir())
-    yield Path(bpy.app.tempdir)  # the preferences may have set it
+    yield Path(bpy.app.tempdir)  # Blender's preferences may set another folder than the system's.
     yield Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     yield _FOLDER
 
 
 def _load_copy(path, name, parent):
-    # Once loaded the copy needs no name in the file system; where it cannot be removed then (Windows) it stays.
+    # The loaded copy needs no file any more, so the folder is removed. Windows cannot remove a loaded file: it stays there.
     with tempfile.TemporaryDirectory(prefix="tolvol-", dir=parent, ignore_cleanup_errors=True) as folder:
         copy = Path(folder) / name / path.name
         copy.parent.mkdir()
-        # With the libraries that the package brings along: the module looks for them beside itself.
+        # The libraries of the package are copied too: the module looks for them beside itself.
         for file in (path, *path.parent.glob("lib*.so*")):
             shutil.copyfile(file, copy.with_name(file.name))
         spec = importlib.util.spec_from_file_location("tolvol", copy)
@@ -93,13 +93,13 @@ def _load_copy(path, name, parent):
 
 
 def _why_not_loaded(path, problems):
-    """problems: (folder, error) of every try."""
+    """Returns a message. problems: (folder, error) of every try."""
     able = [error for folder, error in problems if not _forbids_programs(folder) and not isinstance(error, OSError)]
-    if able:  # the module itself is what does not load
+    if able:  # The folder permits it, so the error is one of the module itself.
         return f"{path} does not load: {able[0]}"
     tried = "; ".join(f"{folder}: {error}" for folder, error in problems)
     return (
-        f"{path} does not load: none of the folders that were tried takes a copy that may be started ({tried}). "
+        f"{path} does not load: none of the folders that were tried permits a copy of it to be loaded ({tried}). "
         "Start Blender with the environment variable TMPDIR set to a folder on a disk that is not mounted noexec"
     )
 
@@ -107,14 +107,14 @@ def _why_not_loaded(path, problems):
 def _forbids_programs(folder):
     try:
         return bool(os.statvfs(folder).f_flag & os.ST_NOEXEC)
-    except (AttributeError, OSError):  # Windows, or no such folder
+    except (AttributeError, OSError):  # Windows has no statvfs; or there is no such folder.
         return False
 
 
 module, path, reason = _load()
 
 
-# How the module speaks of options that have other names in Blender, or none.
+# (words in the module's errors about its options, words about the settings in Blender to put in their place).
 _WORDS = (
     (', or keep them (outside="keep")', "; Select Outside shows them"),
     (
@@ -125,7 +125,7 @@ _WORDS = (
 
 
 def said(error):
-    """What an error of the module says, in the panel's words."""
+    """Returns the message of an error of the module, with the names of settings as in Blender."""
     text = str(error)
     for words, instead in _WORDS:
         text = text.replace(words, instead)
@@ -133,6 +133,6 @@ def said(error):
 
 
 def shutdown():
-    """Ends the module's GL thread, if there is one; what needs it starts it again."""
+    """Ends the module's GL thread if there is one. The next call that needs the thread starts it again."""
     if module is not None:
         module.shutdown()

@@ -1,60 +1,58 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the operations, declared once for the operator that uses them and the panel that keeps them.
+"""Declares the settings of the operations once, for the operator that uses them and for the object that stores them.
 
-Each function returns name -> property; `options` are Blender's property options for all of them.
+Each function returns {name: property}. `options` are Blender's property options for all of these properties.
 """
 
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 PROTECTED = (
-    ("BOUNDARY", "Boundary", "Edges of one face", 1),
-    ("SHARP", "Sharp", "Edges marked sharp", 2),
-    ("SEAM", "Seams", "Edges marked as seam", 4),
+    ("BOUNDARY", "Boundary", "Edges that belong to only one face", 1),
+    ("SHARP", "Sharp", "Edges that are marked as sharp", 2),
+    ("SEAM", "Seams", "Edges that are marked as seams", 4),
     ("CREASE", "Creases", "Edges with a crease", 8),
     ("MATERIAL", "Materials", "Edges between faces of different materials", 16),
-    ("UV", "UV Islands", "Edges where the islands of a UV map meet", 32),
+    ("UV", "UV Islands", "Edges where islands of a UV map meet", 32),
 )
 
 
 def _vertex_group(description, options):
     return {
         "vertex_group": StringProperty(name="Vertex Group", description=description, options=set(options)),
-        "invert_vertex_group": BoolProperty(
-            name="Invert", description="Take the weights the other way around", options=set(options)
-        ),
+        "invert_vertex_group": BoolProperty(name="Invert", description="Use 1 minus each weight", options=set(options)),
     }
 
 
 def decimate_settings(options=frozenset()):
-    """All but the placement, whose default depends on the mesh."""
+    """Returns all settings except the placement: its default depends on the mesh, so it is declared elsewhere."""
     return {
         "keep": EnumProperty(
             name="Keep",
-            description="Which way the tolerance holds",
+            description="The directions in which the tolerance has to hold",
             items=(
                 (
                     "BOTH",
                     "Both Ways",
-                    "The result stays within the tolerance of the reference, and the reference within the tolerance of "
-                    "the result, so nothing is lost",
+                    "Every point of the result stays within the tolerance of the reference, and every point of the "
+                    "reference within the tolerance of the result",
                 ),
                 (
                     "ONE",
                     "One Way",
-                    "The result stays within the tolerance of the reference. Parts of the reference may vanish; its "
-                    "borders and separate pieces stay",
+                    "Every point of the result stays within the tolerance of the reference. Parts of the reference, such "
+                    "as thin spikes, may vanish; its borders and separate pieces stay",
                 ),
             ),
             options=set(options),
         ),
         "use_target": BoolProperty(
             name="Stop At",
-            description="Stop at a number of triangles, if the tolerance lets it get that far",
+            description="Stop at a number of triangles. More remain if the tolerance does not permit so few",
             options=set(options),
         ),
         "target_triangles": IntProperty(
             name="Triangles",
-            description="The number of triangles to stop at; the tolerance holds, whichever comes first",
+            description="The number of triangles to stop at. More remain if the tolerance does not permit so few",
             default=5000,
             min=1,
             soft_max=1_000_000,
@@ -62,21 +60,23 @@ def decimate_settings(options=frozenset()):
         ),
         "effort": EnumProperty(
             name="Effort",
-            description="How much time to spend on fewer triangles",
+            description="How much time the decimation may spend to leave fewer triangles",
             items=(
-                ("FAST", "Fast", "One pass"),
+                ("FAST", "Fast", "Remove triangles in one pass"),
                 (
                     "THOROUGH",
                     "Thorough",
-                    "Then moves vertices and flips edges to remove more, until that brings nothing: about a sixth fewer "
-                    "triangles in two to four times the time",
+                    "After the pass of Fast, move vertices and flip edges to remove more. This leaves a seventh to a "
+                    "fifth fewer triangles in two to five times the processor time, at a tolerance of 0.1 % in five to "
+                    "seven times",
                 ),
             ),
             options=set(options),
         ),
         "max_seconds": FloatProperty(
             name="Time Limit",
-            description="Seconds after which an object is left with what is proved by then; 0 for no limit",
+            description="Seconds after which the decimation of an object ends with the result that is proved by then. 0 "
+            "means no limit",
             min=0,
             soft_max=600,
             step=100,
@@ -85,12 +85,12 @@ def decimate_settings(options=frozenset()):
         ),
         "only_selected": BoolProperty(
             name="Selected Faces Only",
-            description="Decimate the faces that are selected in Edit Mode and leave all others exactly as they are",
+            description="Decimate the faces that are selected in Edit Mode, and leave all other faces exactly as they are",
             options=set(options),
         ),
         "protect": EnumProperty(
             name="Protect",
-            description="Edges that stay exactly where they are, with all their vertices",
+            description="Edges of these kinds stay exactly where they are, with all their vertices",
             items=PROTECTED,
             options={"ENUM_FLAG", *options},
         ),
@@ -101,8 +101,8 @@ def decimate_settings(options=frozenset()):
             options={"ENUM_FLAG", *options},
         ),
     } | _vertex_group(
-        "How much of the tolerance may be used: vertices of weight 0 stay where they are, around those of "
-        "weight 0.5 the result stays within half the tolerance of the reference",
+        "Weights that scale the tolerance: vertices of weight 0 stay where they are, and around vertices of weight 0.5 "
+        "the result stays within half the tolerance of the reference",
         options,
     )
 
@@ -111,7 +111,7 @@ def smooth_settings(options=frozenset()):
     return {
         "iterations": IntProperty(
             name="Iterations",
-            description="How often to smooth",
+            description="The number of smoothing steps",
             default=10,
             min=1,
             soft_max=100,
@@ -120,10 +120,14 @@ def smooth_settings(options=frozenset()):
         ),
         "method": EnumProperty(
             name="Method",
-            description="What smoothing strives for",
+            description="The property of the surface that smoothing improves",
             items=(
-                ("BILAPLACIAN", "Bilaplacian", "Even curvature: smooths noise and keeps the large shape"),
-                ("LAPLACIAN", "Laplacian", "Small area: smooths faster and shrinks what is thin"),
+                (
+                    "BILAPLACIAN",
+                    "Bilaplacian",
+                    "Make the curvature even, which removes noise and keeps the large shape",
+                ),
+                ("LAPLACIAN", "Laplacian", "Make the area small, which smooths faster and shrinks thin parts"),
             ),
             options=set(options),
         ),
@@ -131,22 +135,26 @@ def smooth_settings(options=frozenset()):
             name="Weights",
             description="How much each neighbour of a vertex counts",
             items=(
-                ("COTANGENT", "By Shape", "By the angles between them: triangles keep their proportions"),
-                ("UNIFORM", "Alike", "All the same: triangles become even, too"),
+                (
+                    "COTANGENT",
+                    "By Shape",
+                    "Weigh neighbours by the angles of the triangles, which keep their proportions",
+                ),
+                ("UNIFORM", "Alike", "Weigh all neighbours equally, which makes the triangles even as well"),
             ),
             options=set(options),
         ),
         "boundary": EnumProperty(
             name="Boundary",
-            description="What becomes of open borders",
+            description="How vertices on open borders move",
             items=(
-                ("FIXED", "Fixed", "Their vertices stay where they are"),
-                ("ALONG", "Smooth", "They are smoothed, as lines"),
+                ("FIXED", "Fixed", "Vertices on open borders stay where they are"),
+                ("ALONG", "Smooth", "Open borders are smoothed as lines"),
             ),
             options=set(options),
         ),
     } | _vertex_group(
-        "Strength for each vertex: those of weight 0 stay where they are",
+        "Weights that scale the smoothing of each vertex: vertices of weight 0 stay where they are",
         options,
     )
 
@@ -155,15 +163,19 @@ def modifier_settings(options=frozenset()):
     return {
         "result": EnumProperty(
             name="Result",
-            description="Where the result goes",
+            description="Where the result is stored",
             items=(
-                ("REPLACE", "Replace", "Into the mesh; the modifier is removed"),
-                ("OBJECT", "New Object", "Into a copy of the object without the modifier; this one stays as it is"),
+                ("REPLACE", "Replace", "Store the result in the mesh and remove the modifier"),
+                (
+                    "OBJECT",
+                    "New Object",
+                    "Store the result in a copy of the object without the modifier. This object stays as it is",
+                ),
                 (
                     "SHAPE_KEY",
                     "Shape Key",
-                    "Into a new shape key, which is within the tolerance at its full value; the modifier is removed. "
-                    "Not where the modifier changes the faces",
+                    "Store the result in a new shape key, which is within the tolerance at its full value, and remove the "
+                    "modifier. This is not possible for a modifier that changes the faces",
                 ),
             ),
             options=set(options),

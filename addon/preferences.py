@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Edit > Preferences > Add-ons: the tolerance to begin with, the compiled module, threads, drawing."""
+"""The add-on's preferences, in Edit > Preferences > Add-ons: default tolerance, threads, and drawing in 3D views."""
 
 import bpy
 import gpu
@@ -8,9 +8,9 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty
 from . import native
 from .reference import snapshots
 
-# Percent of the size, where nobody chose anything else.
+# The tolerance of an object for which no other was chosen, in percent of the size.
 TOLERANCE = 0.5
-# What a tolerance in percent of the size may be and how it is typed.
+# The options of all properties that hold a tolerance in percent of the size.
 PERCENT = {
     "min": 1e-6,
     "max": 100.0,
@@ -27,22 +27,22 @@ class TOLVOL_AP_preferences(bpy.types.AddonPreferences):
 
     tolerance: FloatProperty(
         name="Default Tolerance",
-        description="The tolerance of objects for which none was chosen yet, in percent of the reference's size",
+        description="The tolerance of an object until another one is chosen for it, in percent of the reference's size",
         default=TOLERANCE,
         **PERCENT,
         update=lambda _preferences, _context: snapshots.notify(),
     )
     threads: IntProperty(
         name="Threads",
-        description="Threads that a computation may use; 0 uses all cores. Results are the same for any number",
+        description="The number of threads that a computation may use. 0 uses all cores. Results do not depend on it",
         default=0,
         min=0,
         soft_max=64,
     )
     use_gl: BoolProperty(
         name="Draw in 3D Views",
-        description="Let Show Deviation draw by the graphics driver. Turned off, the add-on does everything else as "
-        "before; turned on again, it asks a driver anew that refused",
+        description="Let Show Deviation draw in 3D views with the graphics driver. Everything else works without it. If "
+        "the driver has refused to draw, turning this off and on again makes another try",
         default=True,
         update=lambda _preferences, _context: snapshots.notify(),
     )
@@ -56,18 +56,18 @@ class TOLVOL_AP_preferences(bpy.types.AddonPreferences):
         self.layout.prop(self, "tolerance")
         self.layout.prop(self, "threads")
         self.layout.prop(self, "use_gl")
-        if not bpy.app.background:  # where asking crashes
+        if not bpy.app.background:  # Without a window Blender crashes when it is asked for the renderer.
             self.layout.label(text=f"3D views are drawn by {gpu.platform.renderer_get()}", icon="INFO")
 
 
 def _chosen(context, name, otherwise):
-    """The person's choice; another where the package is not installed as an add-on."""
+    """Returns the value of a preference, or `otherwise` if the package is not installed as an add-on."""
     addon = context.preferences.addons.get(__package__)
     return getattr(addon.preferences, name) if addon else otherwise
 
 
 def tolerance(context):
-    """In percent, of objects for which nobody chose one."""
+    """Returns the default tolerance, in percent of the size."""
     return _chosen(context, "tolerance", TOLERANCE)
 
 

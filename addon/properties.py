@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the panel shows and a file keeps, at Object.tolvol. Settings that an operator shares are declared once, here."""
+"""Declares the properties at Object.tolvol, which the panel shows and the .blend file keeps."""
 
 import math
 
@@ -20,16 +20,19 @@ from .reference import measurements, snapshots, tolerances
 
 TOLERANCE_UNITS = (
     ("PERCENT", "% of Size", "Percent of the longest diagonal of the reference's bounding box"),
-    ("LENGTH", "Length", "A length in the world, whatever the size of the reference"),
+    ("LENGTH", "Length", "A length in the world, which does not depend on the size of the reference"),
 )
 
 
 def tolerance_settings(options=frozenset(), unit=None, percent=None, length=None):
-    """name -> property of the tolerance; `options` for all, what `unit`, `percent` and `length` have for one each."""
+    """Returns {name: property} of the tolerance.
+
+    options: Blender's property options for all of them. unit, percent, length: further arguments for one property each.
+    """
     return {
         "tolerance_mode": EnumProperty(
             name="Tolerance Unit",
-            description="What the tolerance is given in",
+            description="The unit of the tolerance",
             items=TOLERANCE_UNITS,
             options=set(options),
             **(unit or {}),
@@ -54,13 +57,13 @@ def tolerance_settings(options=frozenset(), unit=None, percent=None, length=None
             options=set(options),
             **(length or {}),
         ),
-        # Blender's FloatProperty is float32.
+        # Blender's FloatProperty is float32, which is too coarse for a converted value: these keep it in double.
         "tolerance_percent_converted": StringProperty(
-            description="All digits of the percentage, where it was converted from a length",
+            description="All digits of the percentage if it was converted from a length",
             options={"HIDDEN", *options},
         ),
         "tolerance_length_converted": StringProperty(
-            description="All digits of the length, where it was converted from a percentage",
+            description="All digits of the length if it was converted from a percentage",
             options={"HIDDEN", *options},
         ),
     }
@@ -70,29 +73,29 @@ PLACEMENTS = (
     (
         "OPTIMAL",
         "Fewest Triangles",
-        "Vertices move to where they save most triangles. UV maps and attributes are carried over",
+        "Vertices move to the places that save most triangles. UV maps and attributes are interpolated",
     ),
     (
         "SUBSET",
         "Original Vertices",
-        "Every remaining vertex is an original one, with its UVs and attributes exactly as they are",
+        "Every remaining vertex is a vertex of the original mesh, with its UVs and attributes exactly as they are",
     ),
 )
 
 
 DEFORM_MODES = (
-    ("BLOCKED", "Block", "Change nothing and say how far it may go"),
+    ("BLOCKED", "Block", "Change nothing and report which share of the deformation the tolerance permits"),
     (
         "FARTHEST",
         "As Far as Permitted",
-        "Carry every vertex the same share of its way, as far as the tolerance permits",
+        "Move all vertices by the same share of the deformation, the largest that the tolerance permits",
     ),
-    ("PULL_BACK", "Pull Back", "Carry every vertex as far as the tolerance permits there, and all others all the way"),
+    ("PULL_BACK", "Pull Back", "Move each vertex all the way, or as far as the tolerance permits at that vertex"),
 )
 
 
 def automatic_placement(mesh):
-    """The placement until somebody chooses one: exact UVs for a mesh that has any."""
+    """Returns the placement until one is chosen: the one that keeps UVs exactly, if the mesh has UV maps."""
     return "SUBSET" if isinstance(mesh, bpy.types.Mesh) and mesh.uv_layers else "OPTIMAL"
 
 
@@ -107,7 +110,7 @@ def _set_placement(settings, value):
 
 
 def _get_percent(settings):
-    """What was chosen; until something is, the default of the preferences."""
+    """Returns the chosen percentage, or the default of the preferences if none was chosen."""
     return settings.percent_choice or preferences.tolerance(bpy.context)
 
 
@@ -116,9 +119,10 @@ def _set_percent(settings, value):
 
 
 def _double(name):
-    """A number in double precision, kept as the text `name`: what decides is not rounded to Blender's float32.
+    """Returns a property that holds a number in double precision in the text property `name`.
 
-    Not a number (nan) where none is kept, or none that can be read.
+    Blender's own numbers are float32, and rounding could change the verdict. The property is nan if the text is not a
+    number.
     """
 
     def read(group):
@@ -134,12 +138,12 @@ def _double(name):
 
 
 _LENGTHS = {
-    "tolerance": "That it was compared with",
-    "size": "What was 100 % then",
-    "forward_lower": "The mesh is somewhere at least this far from the reference",
-    "forward": "The mesh is nowhere farther from the reference than this",
-    "backward_lower": "The reference is somewhere at least this far from the mesh",
-    "backward": "The reference is nowhere farther from the mesh than this",
+    "tolerance": "The tolerance that the distances were compared with",
+    "size": "The size of the reference when the mesh was measured",
+    "forward_lower": "Some point of the mesh is at least this far from the reference",
+    "forward": "No point of the mesh is farther from the reference than this",
+    "backward_lower": "Some point of the reference is at least this far from the mesh",
+    "backward": "No point of the reference is farther from the mesh than this",
 }
 
 
@@ -147,8 +151,10 @@ class TOLVOL_PG_measurement(bpy.types.PropertyGroup):
     """The certified distances of one state of a mesh, in world units."""
 
     __annotations__ = {
-        "fingerprint": StringProperty(description="Of the mesh that was measured; empty: none was"),
-        "matrix": FloatVectorProperty(size=16, description="Of the object then"),
+        "fingerprint": StringProperty(
+            description="The fingerprint of the measured mesh. It is empty if none was measured"
+        ),
+        "matrix": FloatVectorProperty(size=16, description="The matrix of the object when the mesh was measured"),
         "share_outside": FloatProperty(description="Share of the mesh's area that is beyond the tolerance"),
     } | {f"{name}_digits": StringProperty(description=text) for name, text in _LENGTHS.items()}
 
@@ -158,7 +164,7 @@ class TOLVOL_PG_measurement(bpy.types.PropertyGroup):
 
     @property
     def complete(self):
-        """Whether something was measured, and all of it can be read."""
+        """Whether a mesh was measured and all its distances can be read."""
         return bool(self.fingerprint) and not any(math.isnan(getattr(self, name)) for name in _LENGTHS)
 
 
@@ -185,7 +191,7 @@ def _length_changed(settings, _context):
 
 
 def _unit_changed(settings, _context):
-    """The tolerance stays what it is, in the other unit."""
+    """Converts the tolerance to the chosen unit, so that it stays the same length."""
     mode, size = settings.tolerance_mode, measurements.shown_size(settings.id_data)
     if mode != (settings.tolerance_mode_before or "PERCENT") and size:
         tolerances.convert_tolerance(settings, size, mode)
@@ -194,25 +200,25 @@ def _unit_changed(settings, _context):
 
 
 DEVIATION_KINDS = (
-    ("SIGNED", "Signed", "With its side: blue inside the reference, red outside"),
-    ("MAGNITUDE", "Magnitude", "How far, on whichever side"),
+    ("SIGNED", "Signed", "Show the distance with its side: blue is inside the reference, red is outside"),
+    ("MAGNITUDE", "Magnitude", "Show the distance without its side"),
 )
 
 
 class TOLVOL_PG_guard(bpy.types.PropertyGroup):
-    """Which of Blender's own tools are kept within the tolerance."""
+    """The settings that choose which of Blender's own tools are kept within the tolerance."""
 
     sculpting: BoolProperty(
         name="Sculpting",
-        description="Hold vertices back at the tolerance while a stroke goes on in Sculpt Mode",
+        description="Stop vertices at the tolerance while a stroke goes on in Sculpt Mode",
     )
     editing: BoolProperty(
         name="Editing",
-        description="Hold vertices back at the tolerance in Edit Mode, and undo edits of the faces that would leave it",
+        description="Stop vertices at the tolerance in Edit Mode, and undo edits of the faces that leave the tolerance",
     )
     lattice: BoolProperty(
         name="Lattice",
-        description="Stop the points of a lattice where the mesh that its modifier deforms would leave the tolerance",
+        description="Stop the control points of a lattice where the mesh that its modifier deforms would leave the tolerance",
     )
 
 
@@ -225,25 +231,25 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
         )
         | decimate_settings()
     )
-    tolerance_mode_before: StringProperty(description="The unit until it was last changed; empty: percent")
-    percent_choice: FloatProperty(description="The percentage that was chosen; 0: none was")
+    tolerance_mode_before: StringProperty(description="The unit before its last change. It is empty for percent")
+    percent_choice: FloatProperty(description="The percentage that was chosen. It is 0 if none was chosen")
 
     show_deviation: BoolProperty(
         name="Show Deviation",
-        description="Colour the mesh in the 3D view by its distance to the reference, live; what is beyond the "
-        "tolerance is striped. The colours prove nothing, Check does",
+        description="Colour the mesh in the 3D view by its distance to the reference while it changes. Parts beyond the "
+        "tolerance are striped. The colours prove nothing: use Check for a proof",
         default=True,
         update=_changed,
     )
     deviation_kind: EnumProperty(
         name="Deviation",
-        description="What the colours show",
+        description="How the colours show the distance",
         items=DEVIATION_KINDS,
         update=_changed,
     )
     deviation_opacity: FloatProperty(
         name="Opacity",
-        description="How much the colours cover what is below them",
+        description="The opacity of the colours over the mesh",
         default=0.8,
         min=0.0,
         max=1.0,
@@ -255,11 +261,16 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
         name="Reference",
         description="The surface that the tolerance refers to",
         items=(
-            ("SELF", "This Mesh", "This mesh as it is when the reference is set. It moves along with the object"),
+            (
+                "SELF",
+                "This Mesh",
+                "The reference is this mesh as it is when the reference is set. It moves along with the object",
+            ),
             (
                 "OBJECT",
                 "Object",
-                "Another object's mesh as it is when the reference is set. It stays where it is in the world",
+                "The reference is another object's mesh as it is when the reference is set. It stays where it is in the "
+                "world",
             ),
         ),
         update=_changed,
@@ -273,33 +284,39 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     )
     placement: EnumProperty(
         name="Placement",
-        description="Where the remaining vertices go",
+        description="How the positions of the remaining vertices are chosen",
         items=PLACEMENTS,
         get=_get_placement,
         set=_set_placement,
     )
-    placement_choice: IntProperty(default=-1, description="The placement that was chosen; -1: none was")
+    placement_choice: IntProperty(default=-1, description="The placement that was chosen. It is -1 if none was chosen")
     lattice: PointerProperty(
         name="Lattice",
-        description="The lattice that carries the mesh along",
+        description="The lattice that deforms the mesh",
         type=bpy.types.Object,
         poll=lambda _settings, ob: ob.type == "LATTICE",
     )
     deform_mode: EnumProperty(
         name="Beyond",
-        description="What becomes of a deformation that would leave the tolerance",
+        description="How to treat a deformation that would leave the tolerance",
         items=DEFORM_MODES,
     )
 
-    snapshot: PointerProperty(type=bpy.types.Mesh, description="The reference as it was set; never changed")
-    snapshot_kind: StringProperty(description="The kind of reference that was chosen then")
-    snapshot_object: PointerProperty(type=bpy.types.Object, description="The object that was chosen then")
-    snapshot_matrix: FloatVectorProperty(size=16, description="The place of the snapshot in the world then")
-    snapshot_fingerprint: StringProperty(description="Tells the snapshot from others")
+    snapshot: PointerProperty(type=bpy.types.Mesh, description="The reference as it was set. It is never changed")
+    snapshot_kind: StringProperty(description="The kind of reference that was chosen when the reference was set")
+    snapshot_object: PointerProperty(
+        type=bpy.types.Object, description="The object that was chosen when the reference was set"
+    )
+    snapshot_matrix: FloatVectorProperty(
+        size=16, description="The placement of the snapshot in the world when the reference was set"
+    )
+    snapshot_fingerprint: StringProperty(
+        description="The fingerprint of the snapshot, which differs from those of others"
+    )
 
     @property
     def snapshot_size(self):
-        """The length that is 100 %, in double, as the object is scaled now."""
+        """The length that is 100 %, in double precision, at the present scale of the object."""
         return snapshots.snapshot_size(self.id_data)
 
     smooth: PointerProperty(type=TOLVOL_PG_smooth)
@@ -307,8 +324,8 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     guard: PointerProperty(type=TOLVOL_PG_guard)
 
     measurement: PointerProperty(type=TOLVOL_PG_measurement)
-    last_run: StringProperty(description="The report of the last decimation, JSON")
-    last_run_of: StringProperty(description="Fingerprint of the mesh it left")
+    last_run: StringProperty(description="The report of the last decimation, as JSON")
+    last_run_of: StringProperty(description="The fingerprint of the mesh that the last decimation left")
 
 
 _CLASSES = (TOLVOL_PG_measurement, TOLVOL_PG_smooth, TOLVOL_PG_modifiers, TOLVOL_PG_guard, TOLVOL_PG_settings)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A line in Blender's status bar for some seconds: timers and handlers have no reports."""
+"""Shows a line in Blender's status bar for some seconds: timers and handlers cannot report messages."""
 
 import bpy
 
@@ -7,14 +7,14 @@ _SECONDS = 4.0
 
 
 def say(text):
-    """Shows the text for a while."""
+    """Shows the text for _SECONDS."""
     clear()
     _set(text)
     bpy.app.timers.register(_give_back, first_interval=_SECONDS, persistent=True)
 
 
 def clear():
-    """Gives the bar back to Blender before its time."""
+    """Removes the text before its time is over."""
     if bpy.app.timers.is_registered(_give_back):
         bpy.app.timers.unregister(_give_back)
         _give_back()

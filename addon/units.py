@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lengths as a person reads them, in the scene's units."""
+"""Converts lengths between numbers and the text that the user reads or types, in the units of the scene."""
 
 import bpy
 import numpy as np
@@ -8,7 +8,7 @@ NO_BREAK = "\u00a0"  # between a number and its unit
 
 
 def length(context, value):
-    """A world length in the scene's units, with enough digits to mean something."""
+    """Returns a world length as text in the scene's units, with at least one digit that is not 0."""
     units = context.scene.unit_settings
     if units.system != "NONE":
         text = bpy.utils.units.to_string(units.system, "LENGTH", value * units.scale_length, precision=3)
@@ -18,23 +18,24 @@ def length(context, value):
 
 
 def shortest(value):
-    """The shortest decimal that Blender's float32 property stands for: the number that a person typed."""
+    """Returns the shortest decimal number that rounds to the float32 `value`: the number that the user typed."""
     return float(str(np.float32(value)))
 
 
-# Metres. Smaller and larger ones of each system are decimal parts of these, or hardly ever typed.
+# The units, in metres, in which users type lengths: metre, foot and inch. Other metric units are decimal multiples of
+# the metre, and other imperial units are hardly ever typed.
 _TYPED_IN = {"NONE": (), "METRIC": (1.0,), "IMPERIAL": (0.3048, 0.0254)}
-# What Blender's conversion of a typed length to the units of the file may be off by, in steps of float32: the scale of
-# the scene and the length are both rounded.
+# The largest error of Blender's conversion of a typed length to the units of the file, in steps of float32: both the
+# scale of the scene and the length are rounded.
 _STEPS = 2
-_DIGITS = 6  # of float32, those that such an error leaves
+_DIGITS = 6  # number of decimal digits of a float32 that such an error leaves correct
 
 
 def typed(value, units):
-    """The length, in the units of the file, that a person typed, where Blender's property holds float32 `value`.
+    """Returns the length that the user typed, in the units of the file, if Blender's property holds the float32 `value`.
 
-    In a scene in millimetres "0.5 mm" arrives as 0.49999997: of the lengths that are that near, the one with the fewest
-    digits in a unit of the scene was meant. units: the scene's unit_settings.
+    In a scene in millimetres "0.5 mm" arrives as 0.49999997. Among the lengths within such an error the function takes
+    the one with the fewest digits in a unit of the scene. units: the scene's unit_settings.
     """
     value = np.float32(value)
     length = shortest(value)

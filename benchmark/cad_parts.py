@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How many triangles decimation leaves of CAD parts, which are made of slivers: fans, strips and walls.
+"""Counts the triangles that decimation leaves of CAD parts made of slivers: fans, strips and walls.
 
 blender --background --python benchmark/cad_parts.py -- [MESH...] [--write FILE.md]
 
-The parts are those of tests/fuzzing/kinds.py in about 4,000 triangles, three of each; MESH: others beside them. With
-*optimal* placement there must never be more than two per cent more triangles than with *subset*, which keeps vertices
-where they are: the script fails where there are. Every result is judged both ways by tolvol.hausdorff.
+The parts are three of each kind in tests/fuzzing/kinds.py, of about 4,000 triangles, and each MESH. The placement *optimal*
+may leave at most 2 % more triangles than *subset*, which keeps vertices where they are: the script fails if it leaves more.
+Every result is judged both ways by tolvol.hausdorff.
 """
 
 import sys
@@ -43,7 +43,7 @@ def parts(paths):
 
 
 def counts(vertices, triangles, percent):
-    """Triangles left, for each of SETTINGS."""
+    """Returns the number of triangles left for each of SETTINGS."""
     tolerance = percent / 100 * tolvol.size(vertices, triangles)
     volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
     found = []
@@ -59,8 +59,8 @@ def counts(vertices, triangles, percent):
 
 def arguments():
     parser = cli.Parser("benchmark/cad_parts.py", description=__doc__.split("\n\n")[0], epilog=__doc__.split("\n\n")[2])
-    parser.add_argument("meshes", metavar="MESH", nargs="*", help="a file beside the parts that are made")
-    parser.add_argument("--write", metavar="FILE.md", help="put the table there")
+    parser.add_argument("meshes", metavar="MESH", nargs="*", help="a file that is decimated as well")
+    parser.add_argument("--write", metavar="FILE.md", help="put the table into this file")
     return parser.parse()
 
 

@@ -1,14 +1,15 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How long calls go on after they are cancelled at random moments: for each call the longest of all rounds, by the clock and by
-the processor.
+"""Measures how long calls go on after they are cancelled at random moments.
+
+For each call the longest time of all rounds is printed, by the clock and by the processor.
 
 /usr/bin/python3 benchmark/cancel_latency.py [FILE.npz...] [--only CALL...] [--tolerance PERCENT...] [--rounds N]
     [--threads N]
 
 FILE.npz holds a mesh, as arrays `vertices` (n, 3) and `triangles` (m, 3). Without a file a torus of 240,000 triangles is made.
-The promise is 0.2 s by the clock on a machine that does nothing else. Where other programs use the processor, too, the lesser
-of the two times says more.
+The promise is 0.2 s by the clock on a machine without other work. If other programs use the processor too, the smaller of the
+two times is the fairer one.
 """
 
 import argparse
@@ -28,11 +29,11 @@ import tolvol  # noqa: E402
 
 import meshes  # noqa: E402
 
-LONGEST = 20  # seconds: later moments of a call are not tried
+LONGEST = 20  # seconds; a call is not cancelled at a later moment
 
 
 class Scene:
-    """A mesh, and what the calls need beside it."""
+    """A mesh, and the other arguments of the calls."""
 
     def __init__(self, vertices, triangles, percent, threads):
         self.mesh = vertices, triangles
@@ -215,8 +216,10 @@ CALLS = {
 
 
 def run(make, scene, moment):
-    """Calls, cancels after so many seconds. (whether it was stopped, seconds of the call, then by clock and by processor
-    after the cancel)."""
+    """Starts a call and cancels it after so many seconds.
+
+    Returns (whether it was stopped, seconds of the call, seconds after the cancel by the clock, the same by the processor).
+    """
     progress, outcome = tolvol.Progress(), []
     call = make(scene, progress)
 

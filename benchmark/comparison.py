@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The same decimation with different methods deciding what is within the tolerance: triangles, time, memory, what was kept.
+"""Compares methods of checking the tolerance in the same decimation: triangles, time, memory and distances.
 
 blender --background --python benchmark/comparison.py -- [MESH...] [--tolerance 1%,0.3%,0.1%] [--write FILE.md]
     [--methods NAME,...] [--json FILE] [--threads N]
 
-MESH: .obj, .ply, .stl, or a model of blender_scripts/models.py; suzanne by default. Every method runs in the product's own
-loop, so that the method alone differs. `time / QEM`: building what it asks and decimating, over the loop without any check
-down to the same count; best of three turns, or one where it takes over 20 s. Distances are certified upper ends, in
-tolerances. --write puts the table between its two comment lines in a Markdown file.
+MESH is an .obj, .ply or .stl file or a model of blender_scripts/models.py, suzanne by default. Every method runs in the loop
+of tolvol.decimate, so that only the method differs. `time / QEM` is the time of building the method's grid and decimating,
+over the time of the loop without any check down to the same count. It is the best of three turns, or of one turn if that
+takes over 20 s. Distances are certified upper ends, in tolerances. --write puts the table between its two comment lines in a
+Markdown file.
 """
 
 import argparse
@@ -28,15 +29,18 @@ from decimation import Stopwatch  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "build" / "release" / "python"))
 
-REPEATS, LONG = 3, 20  # turns, but one alone of what takes more than so many seconds
+REPEATS, LONG = 3, 20  # number of turns; only one turn if that takes more than so many seconds
 COARSE = 0.5  # nodes per tolerance
-FINER = (8, 16)  # cells per tolerance that are tried for a result equal to the certificate's,
-EQUAL = 1.1  # which is one with at most so many times the triangles
+FINER = (8, 16)  # cells per tolerance of the finer permission grids that are tried
+EQUAL = 1.1  # a finer grid counts as equal to the certificate up to so many times its triangles
 
 
 class Method:
-    """One way to decide: `run(vertices, triangles, tolerance, threads)` gives vertices, triangles, bytes of its grid, and
-    nodes or cells per tolerance."""
+    """A method of checking the tolerance.
+
+    run(vertices, triangles, tolerance, threads) returns vertices, triangles, the bytes of the method's grid, and the number
+    of nodes or cells per tolerance.
+    """
 
     def __init__(self, name, promise, run):
         self.name, self.promise, self.run = name, promise, run
@@ -47,7 +51,7 @@ def certified(two_sided, precision=None):
         volume = tolvol.ToleranceVolume(vertices, triangles, tolerance, precision=precision, threads=threads)
         result = tolvol.decimate(vertices, triangles, volume, two_sided=two_sided, threads=threads)
         distances = volume.grid()[0]
-        # Beside each distance stands a triangle of the same size.
+        # The grid stores a triangle with each distance, in as many bytes.
         memory = 2 * distances.strides[0] * distances.shape[0]
         return result.vertices, result.triangles, memory, volume.precision
 
@@ -56,7 +60,7 @@ def certified(two_sided, precision=None):
 
 def baseline(method, precision=None, placement="optimal"):
     def run(vertices, triangles, tolerance, threads):
-        import tolvol_baselines  # built with the tests, never shipped
+        import tolvol_baselines  # This module is built with the tests and never packed.
 
         result = tolvol_baselines.decimate(vertices, triangles, tolerance, method, precision, placement, threads)
         return result[0], result[1], result[2]["memory"], precision
@@ -76,13 +80,16 @@ METHODS = {
 
 
 def equal_grid(enough, *case):
-    """The entry of the coarsest finer permission grid that leaves at most `enough` triangles; None: none that fits does."""
+    """Returns the entry of the coarsest of the FINER permission grids that leaves at most `enough` triangles.
+
+    Returns None if no such grid fits into memory.
+    """
     for precision in FINER:
         try:
             entry = measure(
                 Method(f"{METHODS['grid'].name}, finer", "forward", baseline("permission_grid", precision)), *case
             )
-        except RuntimeError:  # over the grid's memory limit
+        except RuntimeError:  # The grid needs more memory than its limit.
             return None
         if entry["triangles"] <= enough:
             return entry
@@ -118,11 +125,11 @@ def measure(method, vertices, triangles, tolerance, threads):
 
 
 def compare(names, *case):
-    """An entry for each of the methods whose grid fits."""
+    """Returns an entry for each of the methods whose grid fits into memory."""
     entries = {}
     for name in names:
         if name == "coarse" and "one" in entries and entries["one"]["precision"] <= COARSE:
-            continue  # the grid was as coarse already
+            continue  # The grid of the certificate was as coarse already.
         try:
             entries[name] = measure(METHODS[name], *case)
         except RuntimeError as error:
@@ -135,7 +142,7 @@ def compare(names, *case):
 
 
 def kept(entry):
-    """Whether what the method promises holds."""
+    """Whether the result keeps the promise of the method."""
     return (entry["promise"] == "none" or entry["forward"] <= 1) and (
         entry["promise"] != "both" or entry["backward"] <= 1
     )
@@ -190,8 +197,8 @@ def arguments():
     parser.add_argument(
         "--methods", type=method_names, default=",".join(METHODS), metavar="NAME,...", help="default: all, %(default)s"
     )
-    parser.add_argument("--write", metavar="FILE.md", help="put the table there")
-    parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    parser.add_argument("--write", metavar="FILE.md", help="put the table into this file")
+    parser.add_argument("--json", metavar="FILE", help="write the figures to this file")
     parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
     return parser.parse()
 

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Triangles, certified distances and times of tolvol.decimate, beside the same loop without checks and beside OpenMesh.
+"""Measures triangles, certified distances and times of tolvol.decimate, of the same loop without checks, and of OpenMesh.
 
 blender --background --python benchmark/decimation.py -- [MESH...] --tolerance 1% --json FILE
     [--one-sided] [--hostile [--method NAME]] [--threads N]
 
-Without MESH: Blender's monkey in 62,976 and in 251,904 triangles, with noise. Times are the best of three turns, in seconds;
-`ratio` is (field + decimate) / unbounded. Exit code: 0 all proved, 2 bad usage or input, 3 something was not proved.
+Without MESH the script takes Blender's monkey with 62,976 and with 251,904 triangles and with noise. Times are the best of
+three turns, in seconds; `ratio` is (field + decimate) / unbounded. Exit codes: 0 if all results are proved, 2 for bad usage or
+input, 3 if any result is not proved.
 """
 
 import json
@@ -32,7 +33,8 @@ REPEATS = 3
 
 
 class Stopwatch:
-    """The shortest time of each of several calls that take turns: a machine whose speed drifts treats all alike."""
+    """Keeps the shortest time of each of several calls. The calls take turns, so that a drift of the machine's speed affects
+    all of them alike."""
 
     def __init__(self):
         self.seconds = {}
@@ -46,7 +48,7 @@ class Stopwatch:
 
 
 class PeakMemory:
-    """Most memory that the process held since the last reset, in bytes (Linux)."""
+    """Measures the most memory that the process has held since the object was made, in bytes (Linux only)."""
 
     def __init__(self):
         Path("/proc/self/clear_refs").write_text("5")
@@ -59,8 +61,8 @@ class PeakMemory:
 
 
 def measure(name, vertices, triangles, options):
-    """One entry of `meshes`."""
-    import tolvol_baselines  # built with the tests, never shipped
+    """Returns one entry of `meshes`."""
+    import tolvol_baselines  # This module is built with the tests and never packed.
 
     threads = options.threads
     tolerance = cli.in_units(options.tolerance, tolvol.size(vertices, triangles))
@@ -121,7 +123,7 @@ def line(entry):
 
 
 def meshes(paths):
-    """(name, vertices float32, triangles) of the files, or of the models when there are none."""
+    """Yields (name, vertices float32, triangles) of the files, or of the models if no files are given."""
     for path in paths:
         yield path, *models.read(path)
     for name in () if paths else models.LEVELS:
@@ -129,7 +131,7 @@ def meshes(paths):
 
 
 def print_table1(figures, options):
-    """Every mesh, and the largest of them cut in four."""
+    """Measures every mesh, and the largest one with each triangle cut in four."""
     cases = list(meshes(options.mesh))
     cases.append(table1.million(*max(cases, key=lambda case: len(case[2]))))
     figures["table1"] = []
@@ -154,14 +156,18 @@ def arguments():
     parser.add_argument(
         "--tolerance", type=cli.length, default="1%", metavar="T", help="N%% of size (1%%), or a length"
     )
-    parser.add_argument("--json", metavar="FILE", help="write the figures there")
-    parser.add_argument("--one-sided", action="store_true", help="promise the result within the tolerance alone")
-    parser.add_argument("--hostile", action="store_true", help="also try a million misleading candidates a reference")
+    parser.add_argument("--json", metavar="FILE", help="write the figures to this file")
     parser.add_argument(
-        "--method", choices=hostile.METHODS, default="certificate", help="which check they are to mislead"
+        "--one-sided", action="store_true", help="keep only the result within the tolerance of the reference"
     )
-    parser.add_argument("--table1", action="store_true", help="instead: Table 1 of [Botsch04], printed and measured")
-    parser.add_argument("--write", metavar="FILE.md", help="put that table there")
+    parser.add_argument(
+        "--hostile", action="store_true", help="also try a million misleading candidates on each of ten references"
+    )
+    parser.add_argument(
+        "--method", choices=hostile.METHODS, default="certificate", help="the check that these candidates are tried on"
+    )
+    parser.add_argument("--table1", action="store_true", help="only make Table 1 of [Botsch04], printed and measured")
+    parser.add_argument("--write", metavar="FILE.md", help="put Table 1 into this file")
     parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
     return parser.parse()
 

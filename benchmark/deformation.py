@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How often a second a lattice can be moved: the mesh deformed, checked as a whole, and its distances taken.
+"""Measures how often per second a mesh can be deformed by a lattice, checked as a whole, and its distances computed.
 
 blender --background --python benchmark/deformation.py -- MESH [--tolerance 1%] [--threads N]
 
@@ -19,12 +19,12 @@ import models  # noqa: E402
 from addon import native  # noqa: E402
 
 TURNS = 5
-POINTS = 5  # of the lattice, along each axis
-ROOM = 0.05  # of the box, between the mesh and the lattice
+POINTS = 5  # control points of the lattice along each axis
+ROOM = 0.05  # space between the mesh and the lattice, as a share of the mesh's box
 
 
 def lattice(vertices, length):
-    """Moves the mesh by less than `length`, everywhere and unevenly."""
+    """Returns a lattice that moves every part of the mesh by less than `length`, and not all parts alike."""
     lower, size = vertices.min(0), np.ptp(vertices, axis=0)
     domain = np.diag([*((1 + 2 * ROOM) * size), 1.0])
     domain[:3, 3] = lower - ROOM * size
@@ -42,7 +42,7 @@ def seconds(call):
 def arguments():
     parser = cli.Parser("benchmark/deformation.py", description=__doc__.splitlines()[0])
     parser.add_argument("mesh", metavar="MESH", help="a file, or suzanne-4")
-    parser.add_argument("--tolerance", type=cli.length, default="1%", help="a length, or in percent of size; 1%%")
+    parser.add_argument("--tolerance", type=cli.length, default="1%", help="a length, or N%% of size (default: 1%%)")
     parser.add_argument("--threads", type=cli.whole_number(0), default=0, help="0: one per core")
     return parser.parse()
 
@@ -73,7 +73,7 @@ def main(options):
     for name, value in best.items():
         print(f"{name:27} {1e3 * value:8.1f} ms  {len(triangles) / value / 1e6:6.2f} M triangles/s")
     feedback = best["deform + check"] + best["distances"]
-    print(f"{len(triangles):,} triangles deformed, checked and measured {1 / feedback:.1f} times a second")
+    print(f"{len(triangles):,} triangles deformed, checked and measured {1 / feedback:.1f} times per second")
     return 0
 
 

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Candidates made to mislead the check, and what it says of them held against certified distances.
+"""Tries candidates that are made to mislead a check, and compares its verdicts with certified distances.
 
-A third of the candidates lie within 2 % of the tolerance. Wrong accepts are counted by tolvol.hausdorff, which shares
-no code with the check, over all accepted candidates as one mesh: not a sample of them. Of the methods that prove nothing
-those are counted that have a corner outside, which makes it "at least".
+A third of the candidates lie within 2 % of the tolerance. Wrong accepts are counted by tolvol.hausdorff, over all accepted
+candidates and not over a sample. tolvol.hausdorff has bounds of its own. It shares geometry and threads with the check, and is
+tested against brute force and CGAL. For a method that proves nothing only accepted candidates with a corner outside are
+counted: the true number of its wrong accepts is at least as large.
 """
 
 import numpy as np
 
 from addon.native import module as tolvol
 
-BAND = 0.02  # of the tolerance: closer than this to it, "unproved" is no fault
-CANDIDATES = 1_000_000  # a reference
+BAND = 0.02  # share of the tolerance; a candidate that is nearer to the tolerance may stay unproved
+CANDIDATES = 1_000_000  # number of candidates for each reference
 BATCH = 100_000
 OUTSIDE, UNPROVED, INSIDE = 0, 1, 2
 FINEST = 4  # grid nodes per tolerance for methods that interpolate
@@ -21,9 +22,9 @@ NOT_PROVING = ("paper", "paper_half_h")
 
 
 def references(method="certificate", seed=1):
-    """(name, vertices, triangles, tolerance) of references that are hostile themselves."""
+    """Yields (name, vertices, triangles, tolerance) of references that are difficult themselves."""
     rng = np.random.default_rng(seed)
-    # A grid fine enough to interpolate does not fit a smaller tolerance.
+    # For a smaller tolerance a grid that is fine enough to interpolate does not fit into memory.
     tolerance = 5e-2 if method in INTERPOLATING else 1e-3
     for exponent in range(2, 8):
         vertices, triangles = _needles(rng, 300, 10.0**-exponent)
@@ -37,7 +38,7 @@ def references(method="certificate", seed=1):
 
 
 def _needles(rng, count, height):
-    """Triangles with two edges of length about 1 and the given height, anywhere in the unit cube."""
+    """Returns triangles with two edges of length about 1 and the given height, anywhere in the unit cube."""
     a = rng.random((count, 3))
     along = _unit(rng.standard_normal((count, 3)))
     across = _unit(np.cross(along, rng.standard_normal((count, 3))))
@@ -51,13 +52,13 @@ def _unit(vectors):
 
 
 def _on_surface(rng, vertices, triangles, count):
-    """Random points of the reference, and the corners of the triangles they are on."""
+    """Returns random points of the reference, and the corners of the triangles that they are on."""
     corners = vertices[triangles[rng.integers(0, len(triangles), count)]]
     return np.einsum("nk,nkd->nd", rng.dirichlet([0.5, 0.5, 0.5], count), corners), corners
 
 
 def _about_the_tolerance(rng, volume, vertices, triangles, count):
-    """Candidates of which the farthest corner is within BAND of the tolerance, from both sides."""
+    """Returns candidates whose farthest corner is within BAND of the tolerance, on either side of it."""
     found = np.empty((0, 3, 3))
     while len(found) < count:
         tried = _towards_the_tolerance(rng, volume, vertices, triangles, count)
@@ -71,12 +72,15 @@ def _farthest_corner(volume, points):
 
 
 def _towards_the_tolerance(rng, volume, vertices, triangles, count):
-    """Candidates moved along a line until their farthest corner is about the tolerance away, where that succeeds."""
+    """Returns candidates that were moved along a line until their farthest corner is about the tolerance away.
+
+    Not every candidate gets there: the caller has to test them.
+    """
     epsilon = volume.tolerance
     base, _ = _on_surface(rng, vertices, triangles, count)
     direction = _unit(rng.standard_normal((count, 3)))
     shape = epsilon * 10 ** rng.uniform(-3, 0.5, (count, 1, 1)) * rng.standard_normal((count, 3, 3))
-    # Half of them lie flat across the direction, as a face does that an operation wants to create.
+    # Half of them lie across the direction of the move, like a face that an operation wants to create.
     flat = rng.random(count) < 0.5
     shape[flat] -= np.einsum("nkd,nd->nk", shape[flat], direction[flat])[..., None] * direction[flat][:, None]
     wanted = epsilon * (1 + rng.uniform(-BAND, BAND, count))
@@ -87,7 +91,7 @@ def _towards_the_tolerance(rng, volume, vertices, triangles, count):
 
 
 def _anyhow(rng, volume, vertices, triangles, count):
-    """Candidates of any size and place near the reference."""
+    """Returns candidates of any size and place near the reference."""
     epsilon = volume.tolerance
     base, _ = _on_surface(rng, vertices, triangles, count)
     place = epsilon * 10 ** rng.uniform(-2, 0.5, (count, 1)) * rng.standard_normal((count, 3))
@@ -96,7 +100,8 @@ def _anyhow(rng, volume, vertices, triangles, count):
 
 
 def _misleading(rng, volume, vertices, triangles, count):
-    """Corners on the reference itself with one pulled off it, needles, segments, points, and bridges over gaps."""
+    """Returns candidates with corners on the reference: spikes with one corner pulled off it, needles, segments, points,
+    and bridges over gaps."""
     epsilon = volume.tolerance
     base, own = _on_surface(rng, vertices, triangles, count)
     points = own + rng.choice([0, 1e-9, 0.999999], (count, 1, 1)) * epsilon * _unit(rng.standard_normal((count, 1, 3)))
@@ -118,7 +123,7 @@ def _surface(points):
 
 
 def _farther(points, vertices, triangles, bound, threads):
-    """How many of the candidates are certified to be farther than the bound from the reference."""
+    """Returns the number of candidates that are certified to be farther than the bound from the reference."""
     if len(points) == 0:
         return 0
     distance = tolvol.hausdorff(*_surface(points), vertices, triangles, bound=bound, threads=threads)
@@ -131,7 +136,7 @@ def _farther(points, vertices, triangles, bound, threads):
 
 
 def judge(name, vertices, triangles, tolerance, threads=0, method="certificate", count=CANDIDATES, seed=2):
-    """One entry of `hostile`: `count` candidates against one reference."""
+    """Returns one entry of `hostile`: the verdicts on `count` candidates for one reference."""
     vertices = np.asarray(vertices, np.float64)
     precision = FINEST if method in INTERPOLATING else None
     volume = tolvol.ToleranceVolume(vertices, triangles, tolerance, precision=precision, threads=threads)
@@ -198,7 +203,7 @@ def line(entry):
 
 
 def _beyond_band(points, vertices, triangles, tolerance, threads):
-    """How many are certified to be clearly inside or clearly outside."""
+    """Returns the number of candidates that are certified to be inside or outside by more than BAND."""
     far = _farther(points, vertices, triangles, (1 + BAND) * tolerance, threads)
     not_near = _farther(points, vertices, triangles, (1 - BAND) * tolerance, threads)
     return far + len(points) - not_near

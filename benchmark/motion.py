@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a dab of 1,000 vertices costs under tolvol.Guard, and how fast tolvol.smooth is.
+"""Measures the time of a dab of 1,000 vertices under tolvol.Guard, and the speed of tolvol.smooth.
 
 blender --background --python benchmark/motion.py -- --tolerance 1% [--threads N]
 
-On noisy tori of 40,000 and a million vertices. Times are the best of several turns: each dab once where nothing was held
-back before it, and once pushing on where the tolerance is reached.
+The meshes are noisy tori of 40,000 and of a million vertices. Times are the best of several turns. Each dab is made once
+where no vertex is held back, and once where vertices have reached the tolerance.
 """
 
 import sys
@@ -19,14 +19,14 @@ import command_line as cli  # noqa: E402
 from addon import native  # noqa: E402
 
 TURNS = 8
-MOVED = 1000  # vertices a dab
-NOISE = 0.0005  # standard deviation along the normal; the torus has radii 1 and 0.4
+MOVED = 1000  # number of vertices that a dab moves
+NOISE = 0.0005  # standard deviation of the noise along the normal; the torus has radii 1 and 0.4
 ITERATIONS = 10
 SIDES = (200, 1000)
 
 
 def torus(side):
-    """(vertices float32 (side * side, 3), triangles), closed, with noise as a scanner leaves it."""
+    """Returns a closed torus (vertices float32 (side * side, 3), triangles) with noise like that of a scanner."""
     u, v = (a.ravel() for a in np.meshgrid(*2 * [np.arange(side) * 2 * np.pi / side], indexing="ij"))
     tube = 0.4 + np.random.default_rng(1).normal(0, NOISE, len(u))
     ring = 1 + tube * np.cos(v)
@@ -44,7 +44,7 @@ def seconds(call, *arguments, **options):
 
 
 def dabs(vertices, triangles, volume, threads):
-    """Best seconds for a dab that stays inside and for one held back, and how many vertices the last one held."""
+    """Returns the best seconds of a dab that stays inside and of one that is held back, and how many vertices that held."""
     guard = native.module.Guard(vertices, triangles, volume, threads=threads)
     inside, beyond = np.inf, np.inf
     for turn in range(TURNS):
@@ -69,7 +69,7 @@ def dabs(vertices, triangles, volume, threads):
 
 def arguments():
     parser = cli.Parser("benchmark/motion.py", description=__doc__.splitlines()[0])
-    parser.add_argument("--tolerance", type=cli.length, default="1%", help="a length, or in percent of size; 1%%")
+    parser.add_argument("--tolerance", type=cli.length, default="1%", help="a length, or N%% of size (default: 1%%)")
     parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: one per core")
     return parser.parse()
 

@@ -1,16 +1,16 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Other people's decimation asked for the same tolerance on the same meshes, and judged by the same certified distances.
+"""Compares decimation by other tools: same meshes, same tolerance, judged by the same certified distances.
 
 /usr/bin/python3 benchmark/other_tools.py MESH... [--tolerance 1% --tolerance 0.1%] [--only NAME...] [--again]
     [--write FILE.md] [--table NAME] [--picture FILE.png] [--json FILE]
 
-MESH: .obj, .ply or .stl, or scan: one made here, with the noise of a range camera (benchmark/scan.py). The tools are in
-benchmark/tool_calls.py, each with what its documentation says; in the versions of benchmark/other_tools.txt they are
-installed from PyPI into build/other_tools/venv, and CGAL's is built where libcgal-dev is installed.
-Each runs in a process of its own: seconds are those of its call alone, the best of three where one takes less than 5 s.
-Then its parameter is searched for the fewest triangles that keep both directions, unless one call takes more than 20 s.
-Results are kept in build/other_tools/results and taken from there the next time; --again measures anew.
+MESH is an .obj, .ply or .stl file, or `scan`, a mesh with the noise of a range camera that benchmark/scan.py makes. The calls
+of the tools are in benchmark/tool_calls.py, with quotations from their documentation. The tools are installed from PyPI into
+build/other_tools/venv, in the versions of benchmark/other_tools.txt; CGAL's is built where libcgal-dev is installed.
+Each tool runs in a process of its own. Seconds are those of the tool's call alone, the best of three if one takes less than
+5 s. Then the tool's parameter is searched for the fewest triangles that keep both directions, unless one call takes more than
+20 s. Results are kept in build/other_tools/results and used the next time; --again measures them anew.
 """
 
 import argparse
@@ -51,14 +51,14 @@ PINS = HERE / "other_tools.txt"
 CGAL_SOURCE = HERE / "other_tools_cgal.cpp"
 CGAL_HEADER = Path("/usr/include/CGAL/version.h")
 
-REPEATS, QUICK = 3, 5  # calls of what takes less than so many seconds
-SEARCH_CALLS = 16  # of a tool while its parameter is searched,
-SEARCH_QUICK = 20  # which is not done when one takes more than so many seconds,
-SEARCH_LIMIT = 60  # and one that takes longer than that counts as not kept
-NEAR = 1.01  # a bracket so narrow is not bisected any more
+REPEATS, QUICK = 3, 5  # number of calls of a tool whose call takes less than so many seconds
+SEARCH_CALLS = 16  # number of calls of a tool while its parameter is searched
+SEARCH_QUICK = 20  # seconds; the parameter is not searched if one call takes longer
+SEARCH_LIMIT = 60  # seconds; a call in the search that takes longer counts as not kept
+NEAR = 1.01  # ratio of the ends of a bracket that is not bisected any more
 
 FORMATS = (".obj", ".ply", ".stl")
-SCAN = "scan"  # in place of a file
+SCAN = "scan"  # the argument that stands for the mesh of scan.py in place of a file
 
 
 @dataclass
@@ -76,20 +76,20 @@ def digest(data):
     return hashlib.sha256(data).hexdigest()[:8]
 
 
-# ---- the tools' own ground
+# ---- installing the tools
 
 
 def set_up(names):
-    """The virtual environment, anew when the pins have changed, and CGAL's program."""
+    """Makes the virtual environment, again if the pinned versions have changed, and builds CGAL's program."""
     if not PYTHON.exists() or not same_text(PINS, BUILD / "venv" / PINS.name):
-        print("other_tools: a virtual environment, some minutes", flush=True)
+        print("other_tools: making a virtual environment, which takes some minutes", flush=True)
         shutil.rmtree(BUILD / "venv", ignore_errors=True)
         quietly(sys.executable, "-m", "venv", BUILD / "venv")
         quietly(PYTHON, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement", PINS)
         shutil.copy(PINS, BUILD / "venv")
     if "cgal" in names and CGAL_HEADER.exists() and newer(CGAL_SOURCE, CGAL_PROGRAM):
-        print("other_tools: CGAL's program, half a minute", flush=True)
-        # As CGAL's own releases are built; rounding by the processor's mode is what its intervals rely on.
+        print("other_tools: building CGAL's program, which takes half a minute", flush=True)
+        # The options are those of CGAL's own release builds. CGAL's intervals rely on -frounding-math.
         options = ["-std=c++17", "-O3", "-DNDEBUG", "-frounding-math"]
         quietly("g++", *options, CGAL_SOURCE, "-o", CGAL_PROGRAM, "-lgmp", "-lmpfr")
 
@@ -110,7 +110,7 @@ def quietly(*command):
 
 
 def versions():
-    """Of each package; None for CGAL where it is not installed."""
+    """Returns {package: version}. The version of CGAL is None if CGAL is not installed."""
     found = dict(re.findall(r"^([a-z0-9]+)==(\S+)$", PINS.read_text(), re.M))
     header = CGAL_HEADER.read_text() if CGAL_HEADER.exists() else ""
     number = re.search(r"#define CGAL_VERSION (\S+)", header)
@@ -127,7 +127,7 @@ def read_mesh(path, folder):
         raise Stop(f"{path}: {done.stderr.strip().splitlines()[-1]}")
     vertices, triangles = (np.load(file) for file in arrays)
     if not len(triangles):
-        raise Stop(f"{path}: no triangles")
+        raise Stop(f"{path}: the file has no triangles")
     return Mesh(Path(path).stem, vertices, triangles, tolvol.size(vertices, triangles))
 
 
@@ -135,7 +135,10 @@ def read_mesh(path, folder):
 
 
 def interval(a, b, tolerance):
-    """[lower, upper] of the largest distance of a point of a to b, in tolerances: decided, and narrow where it is beyond."""
+    """Returns [lower, upper] of the largest distance of a point of a to b, in tolerances.
+
+    The interval decides whether the distance is within the tolerance, and it is narrow if the distance is beyond.
+    """
     found = tolvol.hausdorff(*a, *b, bound=tolerance)
     if found.upper > tolerance:
         found = tolvol.hausdorff(*a, *b)
@@ -143,14 +146,14 @@ def interval(a, b, tolerance):
 
 
 def directions(mesh, answer):
-    """(a, b) of both ways between what a tool returned and the mesh: the distance is of a's points to b."""
+    """Returns {"forward": (a, b), "backward": (a, b)} for the result of a tool and the mesh. Distances are from a to b."""
     reference = mesh.vertices.astype(np.float64), mesh.triangles
     result = answer["vertices"], answer["triangles"]
     return {"forward": (result, reference), "backward": (reference, result)}
 
 
 def judge(mesh, tolerance, answer):
-    """The certified distances of what a tool returned: {"forward", "backward"}."""
+    """Returns {"forward": interval, "backward": interval}: the certified distances of the result of a tool."""
     return {way: interval(*pair, tolerance) for way, pair in directions(mesh, answer).items()}
 
 
@@ -160,10 +163,11 @@ def keeps_both(mesh, tolerance, answer):
 
 
 def search(start, count, calls=SEARCH_CALLS):
-    """(parameter, triangles) with the fewest triangles, or None. `count(parameter)`: the triangles, None where not kept.
+    """Returns (parameter, triangles) with the fewest triangles, or None.
 
-    From `start` on in growing steps until one parameter is kept and a larger one is not, then bisected on a logarithmic scale.
-    What a larger parameter does is not always worse: the calls that are left try some above.
+    count(parameter) returns the number of triangles, or None if the result does not keep both directions. From `start` on the
+    parameter changes in growing steps until one is kept and a larger one is not. Then the bracket is bisected on a logarithmic
+    scale. A larger parameter does not always leave a worse result, so the remaining calls try some larger ones.
     """
     found = {}
 
@@ -192,7 +196,7 @@ def search(start, count, calls=SEARCH_CALLS):
 
 
 def measure(name, mesh, tolerance, threads, limit):
-    """What a tool leaves when it is asked for the tolerance, and the fewest found."""
+    """Returns the entry of a tool: its result for the tolerance, and the fewest triangles found by the search."""
     tool = TOOLS[name]
     entry = {}
     with tempfile.TemporaryDirectory() as folder:
@@ -221,7 +225,11 @@ def measure(name, mesh, tolerance, threads, limit):
 
 
 def fewest(tool, worker, mesh, tolerance, entry, limit):
-    """{"seconds": of all, and where one is kept: "triangles", "parameter", "call": the seconds of its one call}."""
+    """Searches the fewest triangles that keep both directions.
+
+    Returns {"seconds": the time of the search}, and if a result was found also its "triangles" and "parameter", and as "call"
+    the seconds of its call.
+    """
     calls = {}
 
     def count(parameter):
@@ -244,7 +252,7 @@ def fewest(tool, worker, mesh, tolerance, entry, limit):
 
 
 def remembered(path, again, work):
-    """The result of work(), from the file where it is there."""
+    """Returns the entry in the file. If there is none, or if `again` is set, it calls work() and stores the result."""
     if path.exists() and not again:
         return json.loads(path.read_text())
     entry = work()
@@ -254,7 +262,7 @@ def remembered(path, again, work):
 
 
 def compare(mesh, tolerance, options, numbers):
-    """An entry for each tool."""
+    """Returns an entry for each tool."""
     entries = {}
     for name in options.only:
         number = numbers[TOOLS[name].package]
@@ -262,7 +270,7 @@ def compare(mesh, tolerance, options, numbers):
             entries[name] = {"failure": "libcgal-dev is not installed"}
         else:
             percent = 100 * tolerance / mesh.size
-            if TOOLS[name].package == "tolvol":  # its number stays while it is worked on
+            if TOOLS[name].package == "tolvol":  # Its version number stays the same while its code changes.
                 number += "-" + digest(Path(tolvol.__file__).read_bytes())
             label = f"{mesh.name}-{mesh.digest()}-{percent:.6g}-{options.threads}-{options.limit}-{name}-{number}.json"
             entries[name] = remembered(
@@ -280,7 +288,7 @@ def compare(mesh, tolerance, options, numbers):
 def percentage_or_length(word):
     value, percent = length(word)
     if percent and value > 100:
-        raise argparse.ArgumentTypeError(f"{word!r} is more than the mesh itself")
+        raise argparse.ArgumentTypeError(f"{word!r} is more than the size of the mesh")
     return value, percent
 
 
@@ -302,15 +310,19 @@ def arguments(words):
         help="N%% of size (1%%), or a length; may be repeated; default: 1%% and 0.1%%",
     )
     parser.add_argument("--only", nargs="+", choices=TOOLS, default=list(TOOLS), metavar="NAME", help=", ".join(TOOLS))
-    parser.add_argument("--again", action="store_true", help="measure what is remembered as well")
-    parser.add_argument("--write", metavar="FILE.md", help="put the table there")
+    parser.add_argument("--again", action="store_true", help="also measure results that are stored")
+    parser.add_argument("--write", metavar="FILE.md", help="put the table into this file")
     parser.add_argument(
-        "--table", default="other tools", metavar="NAME", help="its name in FILE.md, default: %(default)s"
+        "--table", default="other tools", metavar="NAME", help="the name of the table in FILE.md (default: %(default)s)"
     )
-    parser.add_argument("--picture", metavar="FILE.png", help="draw triangles against seconds there")
-    parser.add_argument("--json", metavar="FILE", help="write the figures there")
+    parser.add_argument("--picture", metavar="FILE.png", help="draw triangles against seconds to this file")
+    parser.add_argument("--json", metavar="FILE", help="write the figures to this file")
     parser.add_argument(
-        "--limit", type=whole_number(1), default=300, metavar="S", help="seconds for a call, default: %(default)s"
+        "--limit",
+        type=whole_number(1),
+        default=300,
+        metavar="S",
+        help="seconds after which a call is ended (default: %(default)s)",
     )
     parser.add_argument(
         "--threads",

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How many triangles a second each method of check decides, on candidates made from a mesh by small moves.
+"""Measures how many triangles per second each method of checking decides, on candidates made from a mesh by small moves.
 
 blender --background --python benchmark/rates.py -- [MESH...] --tolerance 1% --json FILE [--precision 2] [--write FILE.md]
 
-Without MESH: Blender's monkey in 251,904 triangles, with noise. One query: the whole mesh in one group. Groups: of six
-faces, as the ring of a collapse has. Faces: a verdict each for a million. Times are the best of several turns and include
-the way through Python. Beside each rate: what share of the candidates was proved inside. A picture: the mesh sent to
-the GPU and coloured by distance, one sample a pixel.
+Without MESH the script takes Blender's monkey with 251,904 triangles and with noise. *One query* decides the whole mesh as one
+group. *Groups* have six faces each, like the ring of a collapse. *Faces* gives a verdict for each of a million faces. Times
+are the best of several turns and include the call from Python. Beside each rate stands the share of the candidates that was
+proved inside. A *picture* sends the mesh to the GPU and colours it by distance, with one sample per pixel.
 """
 
 import json
@@ -25,7 +25,7 @@ from addon.native import module as tolvol  # noqa: E402
 from common import machine  # noqa: E402
 
 REPEATS = 5
-MOVE = 0.1  # of the tolerance, along each axis
+MOVE = 0.1  # the largest move of a vertex along each axis, in tolerances
 RING = 6
 BATCH = 1_000_000
 PICTURE = (1024, 1024)
@@ -58,7 +58,7 @@ def measure(name, vertices, triangles, options):
         for key, call in runs.items():
             results[key] = timed(key, call)
     entries = []
-    # Once warm: every frame moves the mesh.
+    # The first picture is not timed: it prepares the volume's grid and the GL context.
     tolvol.render_distance(points, triangles, volume, size=PICTURE, samples=1)
     for _ in range(REPEATS):
         timed(("picture", "drawn"), lambda: tolvol.render_distance(points, triangles, volume, size=PICTURE, samples=1))
@@ -112,7 +112,7 @@ def table(meshes):
             rows.append(
                 [f"field, {field.replace('_', ' ')}", f"ρ = {TABLE_1}, one thread: {seconds:.3f} s", "", "", ""]
             )
-    return tables.table(["Method", "What", "M triangles/s", "Groups/s", "Inside"], rows, "llrrr")
+    return tables.table(["Method", "Setting", "M triangles/s", "Groups/s", "Inside"], rows, "llrrr")
 
 
 def arguments():
@@ -120,8 +120,8 @@ def arguments():
     parser.add_argument("mesh", nargs="*", metavar="MESH", help=".obj, .ply or .stl")
     parser.add_argument("--tolerance", required=True, type=cli.length, metavar="T", help="N%% of size, or a length")
     parser.add_argument("--precision", type=float, default=2, metavar="P", help="grid nodes per tolerance (default 2)")
-    parser.add_argument("--json", metavar="FILE", help="write the figures there")
-    parser.add_argument("--write", metavar="FILE.md", help="put them there as a table")
+    parser.add_argument("--json", metavar="FILE", help="write the figures to this file")
+    parser.add_argument("--write", metavar="FILE.md", help="put the figures into this file as a table")
     return parser.parse()
 
 

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A scan made here: a relief as one look of a range camera sees it, with its noise, its steps and pixels without depth."""
+"""Makes a scan: a relief as a range camera sees it from one place, with noise, steps and pixels without depth."""
 
 import numpy as np
 
-PIXELS = 280  # along each side
+PIXELS = 280  # number of pixels along each side
 NOISE = 3e-4  # standard deviation of a depth; the relief is 2 wide
-STEP = 1e-4  # between depths that the camera tells apart
-MISSING = 0.002  # of the pixels
-STEEPEST = 0.05  # a longer step of depth between neighbours is a gap
+STEP = 1e-4  # the smallest difference of depths that the camera measures
+MISSING = 0.002  # share of the pixels that have no depth
+STEEPEST = 0.05  # neighbouring pixels whose depths differ by more are not connected
 
 
 def scan(seed=1):
-    """Vertices (n, 3) float32, triangles (m, 3) int32: open, with holes and a ragged rim, some 100,000 triangles."""
+    """Returns an open mesh with holes and a ragged rim, of about 100,000 triangles: (n, 3) float32, (m, 3) int32."""
     random = np.random.default_rng(seed)
     s = np.linspace(-1, 1, PIXELS)
     x, y = np.meshgrid(s, s)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Table 1 of [Botsch04], as printed and as measured here: `decimation.py --table1 MESH... [--write FILE.md]`."""
+"""Makes Table 1 of [Botsch04], as printed and as measured here, for `decimation.py --table1 MESH... [--write FILE.md]`."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ import numpy as np
 import tables
 from addon.native import module as tolvol
 
-TOLERANCE = 0.01  # of the size
+TOLERANCE = 0.01  # share of the size
 PRECISION = 1.1
 # model, triangles, left, grid, error in per cent, seconds: fast marching, decimation, total, without error test
 PRINTED = (
@@ -21,12 +21,12 @@ HEADS = (
     *("how", "model", "triangles", "left", "grid", "forward", "backward"),
     *("field s", "decimation s", "total s", "QEM s", "total / QEM", "memory MB"),
 )
-NOISE = 1e-4  # of the size, standard deviation; so small that the shape stays what it is
+NOISE = 1e-4  # standard deviation of the noise as a share of the size, too small to change the shape visibly
 SEED = 2004
 
 
 def million(name, vertices, triangles):
-    """A mesh with each triangle cut in four and every vertex moved a little, as large as the paper's Buddha."""
+    """Cuts each triangle of a mesh in four and moves every vertex a little: the result is as large as the paper's Buddha."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=-1).reshape(-1, 2)
     unique, inverse = np.unique(edges, axis=0, return_inverse=True)
     middle = len(vertices) + inverse.reshape(-1, 3)
@@ -40,8 +40,8 @@ def million(name, vertices, triangles):
 
 
 def measure(name, vertices, triangles, stopwatch, memory, threads):
-    """Two entries: the check as published, one way, and the product's default."""
-    import tolvol_baselines  # built with the tests, never shipped
+    """Returns two entries: the check as published, one way, and the default of tolvol.decimate."""
+    import tolvol_baselines  # This module is built with the tests and never packed.
 
     name, tolerance = Path(name).name, TOLERANCE * tolvol.size(vertices, triangles)
 

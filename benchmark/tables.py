@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables in Markdown files that scripts write and people read: each stands between two comment lines with its name."""
+"""Writes tables into Markdown files. Each table stands between two comment lines with its name."""
 
 from pathlib import Path
 
 
 def table(heads, rows, align):
-    """Markdown; `align`: a letter, l or r, for each column."""
+    """Returns a table as Markdown. `align` has a letter, l or r, for each column."""
     lines = [heads, ["---:" if letter == "r" else "---" for letter in align], *rows]
     return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 
 def write(path, name, text):
-    """Puts `text` between the lines of `name`, at the end of the file where it has none yet."""
+    """Puts `text` between the comment lines of `name`. A file without these lines gets them at its end."""
     begin, end = f"<!-- {name}: written by a script, begin -->", f"<!-- {name}: end -->"
     path = Path(path)
     page = path.read_text() if path.exists() else ""

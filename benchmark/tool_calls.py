@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tools that benchmark/other_tools.py compares, one function each; and the process that runs one of them.
+"""Holds one function for each tool that benchmark/other_tools.py compares, and the process that runs one of them.
 
-Each function takes vertices (n, 3) float32, triangles (m, 3) int32, its parameter and the number of threads, and returns
-vertices, triangles and the seconds of the tool's own call: conversion of arrays is not counted where the tool permits.
-Of each, what its documentation says about the parameter is quoted.
+Each function takes vertices (n, 3) float32, triangles (m, 3) int32, its parameter and the number of threads. It returns
+vertices, triangles and the seconds of the tool's own call, without the conversion of arrays if the tool permits. Each
+docstring quotes the tool's documentation of the parameter.
 
-tool_calls.py read IN VERTICES.npy TRIANGLES.npy     a mesh file, points at the same place made one
-tool_calls.py serve TOOL VERTICES.npy TRIANGLES.npy THREADS     a parameter a line on stdin, answers in JSON on stdout
+`tool_calls.py read IN VERTICES.npy TRIANGLES.npy` reads a mesh file and merges points at the same place.
+`tool_calls.py serve TOOL VERTICES.npy TRIANGLES.npy THREADS` reads a request per line on stdin and answers in JSON on stdout.
 """
 
 import json
@@ -22,7 +22,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 CGAL_PROGRAM = ROOT / "build" / "other_tools" / "cgal"
-HAUSDORFF_STEPS = 16  # bisections of PyMeshLab's number of triangles
+HAUSDORFF_STEPS = 16  # the number of steps in which PyMeshLab's number of triangles is bisected
 
 
 def timed(call, *arguments, **named):
@@ -32,7 +32,7 @@ def timed(call, *arguments, **named):
 
 
 def tolerance_volumes(**options):
-    """`tolvol.decimate`: the volume and the decimation, both ways."""
+    """`tolvol.decimate`, both ways. The time includes building the volume."""
 
     def run(vertices, triangles, tolerance, threads):
         sys.path.insert(0, os.environ.get("TOLVOL_PYTHON_PATH", str(ROOT / "build" / "release" / "python")))
@@ -54,7 +54,7 @@ def on_one_thread(run):
 
 def meshlib(**settings):
     """DecimateSettings::maxError: "stop the decimation as soon as the estimated distance deviation from the original mesh is
-    more than this value". In one part: several in parallel leave more where it is searched."""
+    more than this value". It works on the mesh as one part: several parts in parallel leave more triangles in the search."""
 
     def run(vertices, triangles, error, threads):
         from meshlib import mrmeshnumpy, mrmeshpy
@@ -121,7 +121,7 @@ def vtk_quadric(vertices, triangles, error, threads):
 
 def vtk_pro(vertices, triangles, error, threads):
     """vtkDecimatePro::SetAccumulateError: "a global error bounds, and the ivar MaximumError becomes a global bounds on mesh
-    error". With the topology kept: else it tears the mesh apart to go on, and is farther away."""
+    error". The topology is kept: otherwise the tool tears the mesh apart to go on, and the result is farther away."""
     from vtkmodules.vtkFiltersCore import vtkDecimatePro
 
     decimater = vtkDecimatePro()
@@ -144,7 +144,7 @@ def open3d(vertices, triangles, error, threads):
 
 
 class MeshLab:
-    """meshing_decimation_quadric_edge_collapse has no error to ask for, only a number of triangles (targetfacenum)."""
+    """meshing_decimation_quadric_edge_collapse has no parameter for an error, only a number of triangles (targetfacenum)."""
 
     def __init__(self, vertices, triangles):
         import pymeshlab
@@ -161,8 +161,8 @@ class MeshLab:
         return mesh.vertex_matrix(), mesh.face_matrix()
 
     def distance(self, vertices, triangles):
-        """get_hausdorff_distance, both ways, the larger: of the vertices, and of as many points of the faces as the reference
-        has vertices."""
+        """Returns the larger get_hausdorff_distance of both ways, sampled at the vertices and at as many points of the faces as
+        the reference has vertices."""
         meshes = self.lab.MeshSet()
         meshes.add_mesh(self.lab.Mesh(vertices, triangles))
         meshes.add_mesh(self.reference)
@@ -172,8 +172,7 @@ class MeshLab:
 
 
 def pymeshlab_by_distance(vertices, triangles, tolerance, threads):
-    """The number of triangles halved, and bisected from the first that is too far away on, by MeshLab's own distance; all of
-    that is timed."""
+    """Halves the number of triangles until MeshLab's own distance is beyond the tolerance, then bisects. All of it is timed."""
     lab = MeshLab(vertices, triangles)
 
     def work():
@@ -194,15 +193,15 @@ def pymeshlab_by_distance(vertices, triangles, tolerance, threads):
 
 
 def pymeshlab_by_count(vertices, triangles, ratio, threads):
-    """targetfacenum: so many times fewer triangles."""
+    """Asks for so many times fewer triangles by targetfacenum."""
     lab = MeshLab(vertices, triangles)
     (points, corners), seconds = timed(lab.decimated, max(4, round(len(triangles) / ratio)))
     return points, corners, seconds
 
 
 def pyfqmr(vertices, triangles, epsilon, threads):
-    """simplify_mesh_lossless(epsilon): "Maximal error after which a vertex is not deleted"; its page prefers it to the other
-    call when quality is the aim."""
+    """simplify_mesh_lossless(epsilon): "Maximal error after which a vertex is not deleted". The tool's page prefers this call
+    to the other one when quality is the aim."""
     import pyfqmr
 
     simplifier = pyfqmr.Simplify()
@@ -222,7 +221,7 @@ def manifold3d(vertices, triangles, tolerance, threads):
 
     def work():
         result = solid.simplify(tolerance)
-        result.num_tri()  # evaluates it
+        result.num_tri()  # This call makes Manifold compute the result, which it otherwise does later.
         return result
 
     result, seconds = timed(work)
@@ -231,8 +230,8 @@ def manifold3d(vertices, triangles, tolerance, threads):
 
 
 def openmesh(vertices, triangles, tolerance, threads):
-    """ModHausdorffT::set_tolerance: "set max error tolerance"; ModQuadricT gives the order, as the Decimater's page has it: one
-    module with priorities, the others binary."""
+    """ModHausdorffT::set_tolerance: "set max error tolerance". ModQuadricT gives the order of collapses, because the Decimater's
+    page asks for one module with priorities and other modules that only permit or refuse."""
     import openmesh
 
     mesh = openmesh.TriMesh(vertices.astype(np.float64), triangles)
@@ -254,7 +253,8 @@ def openmesh(vertices, triangles, tolerance, threads):
 
 def pytetwild(**settings):
     """tetrahedralize(epsilon): "Envelop size, specifying the maximum distance of the output surface from the input surface,
-    relative to the bounding box size"; coarsen: "Coarsen the output as much as possible". The surface of its tetrahedra."""
+    relative to the bounding box size"; coarsen: "Coarsen the output as much as possible". The result is the surface of the
+    tetrahedra."""
 
     def run(vertices, triangles, tolerance, threads):
         import pytetwild
@@ -297,14 +297,14 @@ def cgal(vertices, triangles, distance, threads):
 
 @dataclass
 class Tool:
-    """`run` is asked for the tolerance as a length. `search`: what is called when its parameter is searched, from the tolerance
-    on; None where there is nothing to search."""
+    """A tool. `run` is called with the tolerance as a length. `search` is called with other parameters in the search, which
+    starts from the tolerance; it is None for a tool without a search."""
 
     title: str
-    package: str  # on PyPI, or tolvol, or cgal
+    package: str  # the name of the package on PyPI, or tolvol, or cgal
     run: Callable
     search: Callable | None = None
-    by_ratio: bool = False  # the parameter of `search` is by how many times there are fewer triangles
+    by_ratio: bool = False  # whether the parameter of `search` is a ratio: the input's triangles over the result's
 
 
 def searched(title, package, run):
@@ -316,7 +316,7 @@ SUBSET = tolerance_volumes(placement="subset")
 WEIGHTED = {
     "angleWeightedDistToPlane": True,
     "stabilizer": 0,
-}  # both documented for surfaces that are curved everywhere
+}  # MeshLib's documentation advises both settings for surfaces that are curved everywhere.
 
 TOOLS = {
     "ours": Tool("**Tolerance Volumes**", "tolvol", FAST),
@@ -341,7 +341,7 @@ TOOLS = {
 
 
 def merged(vertices, triangles):
-    """Points at the same place made one; triangles that are none left out, and points that no triangle has."""
+    """Merges points at the same place, and leaves out triangles with a repeated corner and points without a triangle."""
     points, first = np.unique(np.asarray(vertices, np.float32), axis=0, return_inverse=True)
     corners = first.ravel()[triangles]
     a, b, c = corners.T
@@ -360,9 +360,12 @@ def read(source, vertices, triangles):
 
 
 def serve(name, vertices, triangles, threads):
-    """Answers until stdin ends. A line is JSON: {"what": "run" or "search", "parameter": x}; the mesh goes to result_*.npy."""
+    """Answers requests until stdin ends. A request is a line {"what": "run" or "search", "parameter": x}.
+
+    The answer to a request is a line on stdout; the resulting mesh is written to result_*.npy.
+    """
     answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # what the tools print goes elsewhere
+    os.dup2(2, 1)  # Messages of the tools go to stderr, so that stdout has only answers.
     tool = TOOLS[name]
     vertices, triangles = np.load(vertices), np.load(triangles)
     for line in sys.stdin:
@@ -374,7 +377,7 @@ def serve(name, vertices, triangles, threads):
             np.save("result_vertices.npy", np.asarray(points, np.float64))
             np.save("result_triangles.npy", np.asarray(corners, np.int32))
             answer = {"seconds": seconds}
-        except Exception as error:  # a row says so
+        except Exception as error:  # The row of the tool in the table shows the error.
             answer = {"failure": " ".join(str(error).split()) or type(error).__name__}
         print(json.dumps(answer), file=answers, flush=True)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What people read of a comparison with other tools: the rows of its table, and its plot."""
+"""Makes the rows of the table and the plot of the comparison with other tools."""
 
 import tables
 from tool_calls import TOOLS
@@ -9,7 +9,7 @@ HEADS += ["Fewest kept", "Search, s"]
 
 
 def kept(entry):
-    """What is proved: "both", "forward" (the result within the tolerance of the reference), "backward", or "no"."""
+    """Returns the proved directions: "both", "forward" (the result is near the reference), "backward", or "no"."""
     forward, backward = (entry.get(way) is not None and entry[way][1] <= 1 for way in ("forward", "backward"))
     return {(True, True): "both", (True, False): "forward", (False, True): "backward"}.get((forward, backward), "no")
 
@@ -58,7 +58,7 @@ def text(figures):
 
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, GREY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#56B4E9", "#777777"
-LOOKS = {  # name: (colour, marker); told apart without colours as well
+LOOKS = {  # name: (colour, marker); the markers tell the tools apart without colours
     "ours": ("#000000", "D"),
     "thorough": ("#000000", "*"),
     "cgal": (ORANGE, "s"),
@@ -78,7 +78,7 @@ LOOKS = {  # name: (colour, marker); told apart without colours as well
 
 
 def draw(cases, picture):
-    """Triangles against seconds, a row for each tolerance and a column for each mesh."""
+    """Draws triangles against seconds, with a row for each tolerance and a column for each mesh."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -117,7 +117,7 @@ def draw(cases, picture):
     handles += [
         sample("#444444", "o", True, "filled: both directions kept, proved"),
         sample("#444444", "o", False, "hollow: not kept"),
-        Line2D([], [], color="#444444", linewidth=0.8, marker=".", label="to the fewest found by search"),
+        Line2D([], [], color="#444444", linewidth=0.8, marker=".", label="line: to the fewest found by search"),
     ]
     figure.legend(handles=handles, loc="lower center", ncol=4, fontsize=9, frameon=False)
     figure.savefig(picture, dpi=110)
@@ -125,7 +125,10 @@ def draw(cases, picture):
 
 
 def mark(axis, colour, marker, entry):
-    """What was left when it was asked, large, and a line to the fewest found; of what left nothing, those alone."""
+    """Draws a large mark for the result for the tolerance, and a line to a small mark for the fewest found by the search.
+
+    For a tool whose result for the tolerance has no triangles, only the small mark is drawn.
+    """
     x, y = entry["triangles"], entry["seconds"]
     found = entry.get("search", {})
     if "triangles" in found:

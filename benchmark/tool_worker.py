@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A process in which one tool works on one mesh, so that it can crash, hang or leak on its own."""
+"""Runs one tool on one mesh in a process of its own, so that a crash, a hang or a leak does not affect the others."""
 
 import contextlib
 import json
@@ -15,7 +15,10 @@ import tool_calls
 
 
 class Worker:
-    """`python`: one that has the tool's package. It is started when it is asked, and again after it was ended."""
+    """The process of a tool. It starts at the first request, and again at the first request after its end.
+
+    python: the path of a Python that has the tool's package.
+    """
 
     def __init__(self, python, name, mesh, threads, folder):
         self.folder = Path(folder)
@@ -35,12 +38,12 @@ class Worker:
             text=True,
             cwd=self.folder,
             env={**os.environ, "OMP_NUM_THREADS": str(self.threads)},
-            start_new_session=True,  # so that its own processes end with it
+            start_new_session=True,  # The processes that the tool starts are then ended with it.
             preexec_fn=lambda: os.sched_setaffinity(0, cores),
         )
 
     def ask(self, what, parameter, limit):
-        """{"seconds", "vertices", "triangles"}, or {"failure"}."""
+        """Returns a dictionary with "seconds", "vertices" and "triangles", or with "failure"."""
         if not self.process:
             self.start()
         try:
@@ -60,11 +63,11 @@ class Worker:
         return answer
 
     def end(self):
-        """The exit code: its own where it has ended by itself."""
+        """Ends the process and returns its exit code."""
         if not self.process:
             return 0
         with contextlib.suppress(BrokenPipeError):
-            self.process.stdin.close()  # which ends one that waits
+            self.process.stdin.close()  # A process that waits for a request ends at this.
         try:
             code = self.process.wait(1)
         except subprocess.TimeoutExpired:

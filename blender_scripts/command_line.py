@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the commands here have in common: arguments, exit codes, and the add-on loaded without being installed.
+"""Parts that all commands here share: arguments, exit codes, and loading the add-on without installing it.
 
-Exit codes: 0 done and proved, 1 a file that could not be written or a bug, 2 bad usage or input, 3 not proved; all but a bug
-with one line on stderr. A signal ends the command with 128 and its number, without temporary files.
+The exit codes are 0 for done and proved, 1 for a file that could not be written or a bug, 2 for bad usage or input, and 3
+for not proved. Every failure except a bug prints one line to stderr. A signal ends the command with the exit code 128 plus
+the signal's number, and its temporary files are removed.
 """
 
 import argparse
@@ -27,7 +28,7 @@ from common import NOT_PROVED, NOT_WRITTEN, USAGE, Stop, in_units, length, requi
 
 
 class Parser(argparse.ArgumentParser):
-    """Errors are one line that names the offender."""
+    """An ArgumentParser whose errors are one line that names the faulty argument."""
 
     def __init__(self, script, **options):
         super().__init__(
@@ -45,7 +46,7 @@ class Parser(argparse.ArgumentParser):
         words = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
         if not words and not may_be_empty:
             self.error("no arguments after --")
-        # "-1%" would count as an option: a value goes with the option before it.
+        # argparse would take a value such as "-1%" for an option. It is joined to the option before it by "=".
         valued = {name for action in self._actions for name in action.option_strings if action.nargs is None}
         joined = []
         for word in words:
@@ -57,24 +58,25 @@ class Parser(argparse.ArgumentParser):
 
 
 def reads(option, path):
-    """(what messages call it, path) of a mesh file that is read and of all files that it needs."""
+    """Returns pairs (name for messages, path) for a mesh file that is read and for all files that it needs."""
     return [(f"{option} {path}", path)] + [(f"{file} of {option}", file) for file in side_files.read_with(path)]
 
 
 def _end_on_signals(script):
-    """SIGTERM, Ctrl-C and a closed terminal remove the temporary files and end the process, within native calls as well."""
-    # Python runs handlers between two of its own instructions, which may be minutes away: a thread reads what came.
+    """Makes SIGTERM, Ctrl-C and a closed terminal remove the temporary files and end the process, even in native calls."""
+    # Python runs signal handlers only between two of its instructions, and a native call may take minutes. A thread reads
+    # the signals instead.
     reader, writer = socket.socketpair()
     writer.setblocking(False)
     signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
     for name in ("SIGTERM", "SIGINT", "SIGHUP"):
-        number = getattr(signal, name, None)  # Windows has fewer
-        if number is not None and signal.getsignal(number) != signal.SIG_IGN:  # nohup has it ignored
+        number = getattr(signal, name, None)  # Windows does not have all of these signals.
+        if number is not None and signal.getsignal(number) != signal.SIG_IGN:  # nohup makes the process ignore SIGHUP.
             signal.signal(number, lambda *_: None)
     scratch = bpy.app.tempdir
 
     def end():
-        with writer:  # kept open by this
+        with writer:  # The reference keeps the socket open.
             number = reader.recv(1)[0]
         safe_files.remove_all()
         shutil.rmtree(scratch, ignore_errors=True)
@@ -85,12 +87,12 @@ def _end_on_signals(script):
 
 
 def run(script, arguments, main):
-    """Calls main(arguments()) of a script with an empty scene and the add-on registered, and ends Blender with the exit code."""
+    """Calls main(arguments()) of a script with an empty scene and the add-on registered. Ends Blender with the exit code."""
     code = 1
     _end_on_signals(Path(script).name)
     try:
         code = _with_addon(main, arguments())
-    except SystemExit as done:  # --help
+    except SystemExit as done:  # --help raises this.
         code = done.code
     except Stop as stop:
         print(f"{Path(script).name}: {stop}", file=sys.stderr)
@@ -103,7 +105,7 @@ def run(script, arguments, main):
 
 
 def _with_addon(main, options):
-    # An installed copy of the add-on, or objects of a start-up file, must not take part.
+    # Factory settings keep an installed copy of the add-on and the objects of a start-up file out of the run.
     bpy.ops.wm.read_factory_settings(use_empty=True)
     if native.module is None:
         raise Stop(native.reason)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the commands have in common that needs no Blender: words of the command line, and the machine's name."""
+"""Parts of the commands that do not need Blender: parsing arguments, and the name of the machine."""
 
 import argparse
 import math
@@ -14,7 +14,7 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf|infinity)"
 
 
 class Stop(Exception):
-    """Ends the command with a line on stderr and an exit code."""
+    """Ends the command with its message on stderr and an exit code."""
 
     def __init__(self, message, code=USAGE):
         super().__init__(message)
@@ -35,7 +35,7 @@ def whole_number(least):
 
 
 def length(text):
-    """'1%' or '0.5' -> (number, whether it is in percent of size)."""
+    """Parses '1%' or '0.5'. Returns (number, whether it is in percent of size)."""
     match = re.fullmatch(rf"\s*({_NUMBER})\s*(%?)\s*", text, re.IGNORECASE)
     if not match:
         raise argparse.ArgumentTypeError(f"{text!r} is neither a length nor a percentage such as 1%")
@@ -51,7 +51,7 @@ def in_units(value_and_percent, size):
 
 
 def require_folder(path, what):
-    """The folder that a file is to be written to must be there before the work begins."""
+    """Raises Stop before the work begins if a file cannot be written to this path. what: the option, for the message."""
     folder = Path(os.path.realpath(path)).parent
     if not folder.is_dir():
         raise Stop(f"{what} {path}: the folder {folder} does not exist")

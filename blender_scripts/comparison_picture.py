@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A picture of a reference and its result side by side, with their edges, by Cycles on the CPU.
+"""Draws a reference and its result side by side, with their edges, by Cycles on the CPU.
 
 blender --background --python blender_scripts/comparison_picture.py -- REFERENCE RESULT PICTURE.png [--report REPORT.json]
 
-REPORT.json is what decimate.py wrote; the picture then states what it proves.
+REPORT.json is a report that decimate.py wrote. With it the picture states the proved distances.
 """
 
 import json
@@ -23,21 +23,22 @@ from addon.mesh import mesh_io  # noqa: E402
 from addon.proof import report  # noqa: E402
 
 WIDTH, HEIGHT = 1280, 640
-SAMPLES = 40  # one large light and an even sky leave so little noise that no denoiser is needed (Debian has none)
+SAMPLES = 40  # Debian's Blender has no denoiser. One large light and an even sky make little noise without one.
 BACKGROUND = (0.90, 0.91, 0.93)
 REFERENCE_COLOUR = (0.20, 0.36, 0.55)
 RESULT_COLOUR = (0.83, 0.36, 0.10)
 TEXT_COLOUR = (0.03, 0.035, 0.05)
-LENS, SENSOR = 85, 36  # mm: long, so that both are seen from nearly the same side
-TURN = math.radians(25)  # of both, about the vertical
-ELEVATION = math.radians(9)  # of the camera
-GAP = 0.10  # between the two; the reference is 1 wide or high, whichever is more
-MARGIN = 0.16  # beside them
-CAPTION = 0.38  # below and above them
+LENS, SENSOR = 85, 36  # mm; with a long lens both models are seen from nearly the same side
+TURN = math.radians(25)  # the rotation of both models about the vertical
+ELEVATION = math.radians(9)  # the elevation of the camera
+# Lengths in the scene, where the larger of the reference's width and height is 1.
+GAP = 0.10  # the gap between the models
+MARGIN = 0.16  # the space beside the models
+CAPTION = 0.38  # the space below and above the models
 
 
 def new_material(name, build):
-    """A material whose surface is the socket that build(node_tree) returns."""
+    """Returns a material whose surface is the socket that build(node_tree) returns."""
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree
@@ -48,7 +49,7 @@ def new_material(name, build):
 
 
 def clay(colour, wire_pixels, wire_strength):
-    """A dull surface with every edge drawn, as wide on the picture wherever it lies."""
+    """Returns a dull material that draws every edge. All edges have the same width in the picture, at any distance."""
 
     def build(tree):
         surface = tree.nodes.new("ShaderNodeBsdfPrincipled")
@@ -100,15 +101,15 @@ def add_light(position, target, size, power):
 
 
 def add_floor():
-    """Invisible but for the shadows on it."""
+    """Adds a floor of which only the shadows on it are visible."""
     mesh = bpy.data.meshes.new("floor")
     mesh.from_pydata([(-50, -50, 0), (50, -50, 0), (50, 50, 0), (-50, 50, 0)], [], [(0, 1, 2, 3)])
     add("floor", mesh).is_shadow_catcher = True
 
 
 def add_caption(camera, x, y, size, text, material):
-    """Text in the plane of the picture: x, y and size in units of the picture's width, (0, 0) its centre."""
-    width = SENSOR / LENS  # of the picture at distance 1
+    """Adds text in the plane of the picture. x, y and size are in units of the picture's width; (0, 0) is its centre."""
+    width = SENSOR / LENS  # the width of the picture at distance 1
     curve = bpy.data.curves.new("caption", "FONT")
     curve.body, curve.align_x, curve.size = text, "CENTER", size * width
     curve.materials.append(material)
@@ -116,8 +117,11 @@ def add_caption(camera, x, y, size, text, material):
 
 
 def compose(reference, result, looks, captions, up, gap=GAP, margin=MARGIN):
-    """The two (vertices, triangles) on a floor, lit and framed; looks: two materials; captions: two (large, small) texts;
-    up: "Y" or "Z"; gap: between the two; margin: beside them. Returns the two objects and the camera."""
+    """Puts two models on a floor, with light and a camera. Returns the two objects and the camera.
+
+    reference, result: pairs (vertices, triangles); looks: two materials; captions: two pairs of texts (large, small);
+    up: "Y" or "Z"; gap: the space between the models; margin: the space beside them.
+    """
     turn = Matrix.Rotation(TURN, 4, "Z") @ Matrix.Rotation(math.pi / 2 if up == "Y" else 0, 4, "X")
     turned = reference[0][np.unique(reference[1])] @ np.array(turn.to_3x3()).T
     lower, upper = turned.min(0), turned.max(0)
@@ -165,7 +169,8 @@ def render(picture):
     scene.view_settings.view_transform = "Standard"
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = WIDTH, HEIGHT, 100
 
-    # An even background behind the shadows: only the compositor gives one that no light touches.
+    # The background has to be even behind the shadows. Light would change any background in the scene, so the compositor
+    # adds it.
     scene.render.film_transparent = True
     scene.use_nodes = True
     tree = scene.node_tree
@@ -184,13 +189,16 @@ def render(picture):
 
 
 def captions(reference, result, numbers):
-    """What is proved is said only where a report says so."""
+    """Returns the captions of both models. They state proved distances only if a report gives them in `numbers`."""
     large = [f"{len(triangles):,} triangles" for _, triangles in (reference, result)]
     if numbers is None:
         return [(large[0], "reference"), (large[1], "result")]
     size = 100 * numbers["tolerance"]["absolute"] / numbers["tolerance"]["percent"]
     forward, backward = (report.percent(numbers[direction][1], size) for direction in ("forward", "backward"))
-    return [(large[0], "reference"), (large[1], f"within {forward} of the reference, which is within {backward} of it")]
+    return [
+        (large[0], "reference"),
+        (large[1], f"result within {forward} of the reference, reference within {backward}"),
+    ]
 
 
 def arguments():
@@ -202,7 +210,7 @@ def arguments():
     parser.add_argument("result", metavar="RESULT")
     parser.add_argument("picture", metavar="PICTURE.png")
     parser.add_argument(
-        "--report", metavar="REPORT.json", help="what decimate.py wrote: the picture states what it proves"
+        "--report", metavar="REPORT.json", help="a report by decimate.py; the picture states the distances proved there"
     )
     return parser.parse()
 
@@ -217,9 +225,9 @@ def main(options):
             raise cli.Stop(f"--report {options.report}: {error}") from None
     reference, result = models.read(options.reference), models.read(options.result)
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    # By convention; nothing in the files says so.
+    # The files do not say which axis is up. By convention it is Y in .obj files and Z in the others.
     up = "Y" if Path(options.reference).suffix.lower() == ".obj" else "Z"
-    # The reference's edges are so many that at full strength they would be all there is to see.
+    # The reference has so many edges that at full strength they would hide its surface.
     looks = clay(REFERENCE_COLOUR, 0.55, 0.55), clay(RESULT_COLOUR, 1.1, 0.9)
     compose(reference, result, looks, captions(reference, result, numbers), up)
     with file_io.quiet():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Decimates a mesh file within a tolerance, proved in both directions of what is then in the file.
+"""Decimates a mesh file within a tolerance. The proof, in both directions, is of the mesh that is in the written file.
 
 blender --background --python blender_scripts/decimate.py -- IN OUT --tolerance 1%
 """
@@ -25,73 +25,77 @@ try:
     from addon.proof import report
     from addon.proof.certify import certify
     from addon.reference import snapshots
-except ImportError as error:  # left alone, Blender would end with exit code 0
-    print(f"decimate.py: Blender's Python lacks something: {error}; install Debian's python3-numpy", file=sys.stderr)
+except ImportError as error:  # After an uncaught exception Blender would end with exit code 0.
+    print(f"decimate.py: Blender's Python lacks a package: {error}; install Debian's python3-numpy", file=sys.stderr)
     sys.exit(2)
 
 _DESCRIPTION = """\
-Reduces the meshes of IN to the fewest triangles that stay within the tolerance and writes them to OUT. What is certified is
-OUT as it is read back, before it takes its place. Files: .obj .ply .stl, .gltf and .glb where Blender can read them."""
+Reduces the triangles of the meshes of IN within the tolerance and writes the meshes to OUT. The written file is read back and
+certified before it is moved to OUT. Formats: .obj .ply .stl, and .gltf and .glb where Blender can read them."""
 
 _EPILOG = """\
-The last line of the output says what was reached; its percentages are of the size of the reference (the longest diagonal of
-its bounding box), its time is that of the whole command. Exit codes: 0 proved; 2 bad usage or input; 3 not proved; 1 a file
-that could not be written, or a bug. OUT, its side files, the report and the picture are written with 0 alone, all of them or
-none. Symbolic links are followed. OUT may be IN; no other file that is read is overwritten, nor are textures beside OUT."""
+The last line of the output gives the result. Its percentages are of the size of the reference (the longest diagonal of the
+bounding box), and its time is the time of the whole command. Exit codes: 0 proved; 2 bad usage or input; 3 not proved; 1 a file
+that could not be written, or a bug. Only with exit code 0 are OUT, its side files, the report and the picture written, all of
+them or none. Symbolic links are followed. OUT may be IN. No other file that is read and no texture beside OUT is overwritten."""
 
 
 def arguments():
     parser = cli.Parser("blender_scripts/decimate.py", description=_DESCRIPTION, epilog=_EPILOG)
     parser.add_argument("input", metavar="IN", help="the mesh to decimate")
-    parser.add_argument("output", metavar="OUT", help="where the result goes; the extension says in which format")
+    parser.add_argument("output", metavar="OUT", help="the file for the result; its extension chooses the format")
     parser.add_argument(
         "--tolerance", required=True, type=cli.length, metavar="T", help="N%% of size, or a length in the file's units"
     )
     parser.add_argument("--reference", metavar="REF", help="a file that the tolerance refers to (default: IN itself)")
     parser.add_argument(
-        "--one-sided", action="store_true", help="keep the result near the reference alone: parts of it may vanish"
+        "--one-sided",
+        action="store_true",
+        help="keep only the result within the tolerance of the reference; parts of the reference may vanish",
     )
     parser.add_argument(
         "--placement",
         choices=("optimal", "subset"),
-        help="optimal: fewest triangles; subset: every vertex is an original one (default: subset with UVs, else optimal)",
+        help="optimal: fewest triangles; subset: every vertex is a vertex of IN (default: subset with UVs, else optimal)",
     )
     parser.add_argument(
         "--effort",
         choices=("fast", "thorough"),
         default="fast",
-        help="thorough: about a sixth fewer triangles in two to four times the time (default: fast)",
+        help="thorough: a seventh to a fifth fewer triangles in two to five times the processor time, at a tolerance of "
+        "0.1%% in five to seven times (default: fast)",
     )
     parser.add_argument(
         "--max-seconds",
         type=cli.whole_number(1),
         metavar="S",
-        help="stop after S seconds an object with what is proved by then (default: no limit)",
+        help="stop after S seconds for each object with the result that is proved by then (default: no limit)",
     )
     parser.add_argument(
         "--target-triangles",
         type=cli.whole_number(1),
         metavar="N",
-        help="stop at N if the tolerance lets it get so far; objects share N by their triangles",
+        help="stop at N triangles if the tolerance permits so few; N is divided among objects by their triangles",
     )
     parser.add_argument(
         "--outside",
         choices=("error", "keep"),
         default="error",
-        help="what to do with faces that are not within the tolerance of the reference: stop, or keep them as they are",
+        help="how to treat faces of IN that are not within the tolerance of the reference: stop with an error, or keep "
+        "them as they are (default: error)",
     )
-    parser.add_argument("--report", metavar="FILE.json", help="write the numbers there")
+    parser.add_argument("--report", metavar="FILE.json", help="write all numbers to this file")
     parser.add_argument(
         "--picture",
         metavar="FILE.png",
-        help="draw the result there, coloured by its distance to the reference; needs OpenGL",
+        help="draw the result to this file, coloured by its distance to the reference; needs OpenGL",
     )
     parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
     return parser.parse()
 
 
 class Command:
-    """One run: read, decimate object by object, write beside OUT, read that back, certify it, move it to OUT."""
+    """One run: reads IN, decimates each object, writes beside OUT, reads that file back, certifies it, moves it to OUT."""
 
     def __init__(self, options, staged):
         self.options = options
@@ -101,7 +105,7 @@ class Command:
         extension = file_io.extension_of(options.output)
         self.target = safe_files.Target(options.output, "OUT")
         place = self.target.place
-        # A link may lead to a name without the extension, which says in which format to write.
+        # A symbolic link may lead to a name without the extension, but the exporter needs the extension.
         self.exported = place if place.suffix.lower() == extension else place.with_name(place.name + extension)
         self.sides = [
             safe_files.Target(path, "OUT's side file") for path in side_files.written_with(self.exported, extension)
@@ -114,13 +118,13 @@ class Command:
         self._require_apart()
         if options.picture:
             pictures.require("--picture", options.picture)
-        # A folder that cannot be written to is found before the work, not after it.
+        # This refuses a folder that cannot be written to before the work begins.
         for target in self._targets_written():
             if not target.is_device:
                 staged.folder(target)
 
     def _require_apart(self):
-        """Nothing that is written may be something that is read, but for OUT, which may be IN with all that belongs to it."""
+        """Refuses a written file that is also read. Only OUT may be IN; their side files may then be the same, too."""
         read = cli.reads("IN", self.options.input)
         if self.options.reference:
             reference = cli.reads("--reference", self.options.reference)
@@ -139,7 +143,7 @@ class Command:
     def run(self):
         reference_file = self._read("--reference", self.options.reference) if self.options.reference else None
         for ob in reference_file.objects if reference_file else ():
-            ob.name = "reference " + ob.name  # the names are those of IN's objects
+            ob.name = "reference " + ob.name  # This leaves the plain names to the objects of IN, which are read next.
         source = self._read("IN", self.options.input)
         whole_input = {"file": self.options.input, **source.counts}
         names = [ob.name for ob in source.objects]
@@ -149,8 +153,8 @@ class Command:
         working = tolerance - file_io.rounding(self.exported, source.objects)
         if working <= 0:
             raise cli.Stop(
-                f"--tolerance: {tolerance:.3g} is less than what writing {self.exported.suffix} rounds away; "
-                "use .ply for OUT, and objects that are neither moved nor turned in IN"
+                f"--tolerance: {tolerance:.3g} is less than the rounding when {self.exported.suffix} is written; "
+                "use .ply for OUT, and objects without location, rotation and scale in IN"
             )
         runs = [
             self._decimate(ob, reference, min(working, surface.size()), target)
@@ -165,7 +169,7 @@ class Command:
         whole["seconds"]["total"] = time.perf_counter() - self.started
         if self.report:
             self.staged.write(self.report, (json.dumps(whole, indent=1) + "\n").encode())
-        # OUT itself last: once it is there, all of it is.
+        # OUT itself is moved last: once it is there, all of its side files are, too.
         self.staged.add(self.target, self.staged.folder(self.target) / self.exported.name)
         self.staged.publish()
         for note in [*(repair["message"] for repair in whole["repairs"]), *whole["warnings"]]:
@@ -184,7 +188,7 @@ class Command:
         print(f"{text}, {report.duration(time.perf_counter() - start)}", flush=True)
 
     def _pair(self, objects, reference_file):
-        """The object that each object's tolerance refers to."""
+        """Returns, for each object, the object to which its tolerance refers."""
         if reference_file is None:
             return objects
         by_name = {ob.name.removeprefix("reference "): ob for ob in reference_file.objects}
@@ -203,7 +207,7 @@ class Command:
         return [joined]
 
     def _tolerance(self, references):
-        """(the tolerance, what 100 % is), for the whole file."""
+        """Returns (the tolerance, the size that is 100 %) for the whole file."""
         size = snapshots.joined(references).size()
         tolerance = cli.in_units(self.options.tolerance, size)
         if tolerance > size:
@@ -218,9 +222,9 @@ class Command:
         return [max(1, target * count // sum(triangles)) for count in triangles]
 
     def _decimate(self, ob, reference, tolerance, target):
-        """The operator's report of one object."""
+        """Decimates one object and returns the operator's report."""
         start = time.perf_counter()
-        if ob.data.users > 1:  # instances in a glTF
+        if ob.data.users > 1:  # Objects of a glTF file may share a mesh.
             ob.data = ob.data.copy()
         for other in bpy.context.view_layer.objects:
             other.select_set(other == ob)
@@ -253,7 +257,7 @@ class Command:
         return run
 
     def _write(self, source, names, references, runs, tolerance, size):
-        """Writes OUT beside its place, and certifies what is read back; the report of the whole file."""
+        """Writes OUT beside its place, reads the file back and certifies it. Returns the report of the whole file."""
         start = time.perf_counter()
         written = self._export(source.objects)
         self._stage(f"wrote {self.exported.name} and read it back", start)
@@ -264,7 +268,7 @@ class Command:
                 self._certify(found[name], reference, tolerance, run["outside"]["faces"])
                 for name, reference, run in zip(names, references, runs)
             ]
-        else:  # a format of one object
+        else:  # The format holds only one object, so all objects were joined.
             kept = sum(run["outside"]["faces"] for run in runs)
             judged = [self._certify(snapshots.joined(found.values()), snapshots.joined(references), tolerance, kept)]
         whole = self._summary(names, runs, judged, tolerance, size)
@@ -274,7 +278,7 @@ class Command:
                 message = f"{lost} of the {count} {kind} of IN are not in OUT"
                 whole["repairs"].append({"kind": kind, "count": lost, "message": message})
         whole["seconds"]["certify"] += time.perf_counter() - start
-        self._stage("certified it both ways", start)
+        self._stage("certified both ways", start)
         if not report.proved(whole):
             raise cli.Stop(
                 f"{NOT_PROVED}: {report.intervals(whole)}; {self.options.output} was not written", cli.NOT_PROVED
@@ -286,7 +290,7 @@ class Command:
         return whole
 
     def _export(self, objects):
-        """Writes objects beside the place of OUT, with their side files; the MeshFile that is read back from there."""
+        """Writes objects with their side files beside the place of OUT. Returns the MeshFile that is read back from there."""
         folder = self.staged.folder(self.target)
         file = folder / self.exported.name
         try:
@@ -310,7 +314,7 @@ class Command:
         except Refused as error:
             reason = str(error).removeprefix(f"{file}: ")
             raise NotWritten(
-                f"{self.target.name}: what was written cannot be read back ({reason}); is there room on the disk?"
+                f"{self.target.name}: the written file cannot be read back ({reason}); check the free space on the disk"
             ) from None
 
     def _targets_written(self):
@@ -327,7 +331,7 @@ class Command:
         self.staged.write(self.picture, png.getvalue())
 
     def _summary(self, names, runs, judged, tolerance, size):
-        """The report of the whole file: the worst of its objects, as certified in the file."""
+        """Returns the report of the whole file. Its distances are the largest of all objects, as certified in the file."""
 
         def worst(pairs):
             return [max(ends) for ends in zip(*pairs)]
@@ -370,7 +374,7 @@ class Command:
 
 
 def _not_above(length):
-    """The largest number that Blender's float32 property can stand for and that is not above `length`."""
+    """Returns the largest number that Blender's float32 property can express and that is not above `length`."""
     candidate = np.float32(length)
     while units.shortest(candidate) > length:
         candidate = np.nextafter(candidate, np.float32(0))

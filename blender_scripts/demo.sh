@@ -38,7 +38,7 @@ mkdir -p out
 log=out/demo.log
 trap 'rm -f "$log" out/demo.err' EXIT
 
-# stage NAME SCRIPT ARGUMENT...: runs a script in Blender; one line when it is done; what it said only when it fails
+# stage NAME SCRIPT ARGUMENT...: runs a script in Blender and prints one line. It prints the script's output only if that fails.
 stage() {
   name=$1
   script=$2
@@ -48,7 +48,7 @@ stage() {
   blender --background --factory-startup --python-exit-code 1 --python "blender_scripts/$script" -- "$@" \
     >"$log" 2>out/demo.err || status=$?
   if [ "$status" -ne 0 ]; then
-    # 2 is a bad argument or file, said in one line on stderr; after anything else the whole output helps.
+    # Exit code 2 is a bad argument or file, and one line on stderr names it. After any other code the whole output helps.
     [ "$status" -eq 2 ] || cat "$log" >&2
     cat out/demo.err >&2
     echo "demo: failed: $name" >&2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Models to work on: from files, or from Blender itself: its monkey, subdivided, with noise as a scanner leaves it.
+"""Makes models for the other scripts: from files, or Blender's monkey, subdivided, with noise like that of a scanner.
 
 blender --background --python blender_scripts/models.py -- suzanne OUT.ply
 """
@@ -15,14 +15,14 @@ import command_line as cli  # noqa: E402
 from addon.files import file_io  # noqa: E402
 from addon.mesh import mesh_io  # noqa: E402
 
-LEVELS = {"suzanne": 3, "suzanne-4": 4}  # of subdivision: 62,976 and 251,904 triangles
-NOISE = 0.0005  # standard deviation along the normal, of the box's diagonal
+LEVELS = {"suzanne": 3, "suzanne-4": 4}  # levels of subdivision, which make 62,976 and 251,904 triangles
+NOISE = 0.0005  # standard deviation of the noise along the normal, as a share of the bounding box's diagonal
 SEED = 2004
 
 
 def build(name):
-    """A new object in the scene; the same coordinates in every run."""
-    bpy.ops.mesh.primitive_monkey_add(calc_uvs=False)  # a scan has none
+    """Returns a new object in the scene. It has the same coordinates in every run."""
+    bpy.ops.mesh.primitive_monkey_add(calc_uvs=False)  # A scan has no UVs.
     ob = bpy.context.object
     ob.name = name
     ob.modifiers.new("subdivision", "SUBSURF").levels = LEVELS[name]
@@ -41,13 +41,13 @@ def build(name):
 
 
 def arrays(ob):
-    """(vertices (n, 3) float32 in the world, triangles (m, 3) int32)."""
+    """Returns (vertices, triangles): (n, 3) float32 in the world and (m, 3) int32."""
     mesh, matrix = mesh_io.read_mesh(ob.data), mesh_io.matrix_array(ob.matrix_world)
     return mesh_io.to_world(mesh.vertices, matrix).astype(np.float32), mesh.triangles
 
 
 def read(path):
-    """All objects of a file as one: (vertices, triangles)."""
+    """Returns all objects of a file as one mesh, (vertices, triangles)."""
     parts = [arrays(ob) for ob in file_io.read_file(path).objects]
     first = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
     triangles = [triangles + start for (_, triangles), start in zip(parts, first)]

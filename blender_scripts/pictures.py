@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of deviations with legends: what tolvol renders, put together on a white page by matplotlib."""
+"""Draws deviations with legends. tolvol renders the images, and matplotlib puts them on a white page."""
 
 from pathlib import Path
 
@@ -8,19 +8,20 @@ import numpy as np
 import command_line as cli
 from addon.native import module as tolvol
 
-DPI = 100  # so that a point of type is 100/72 pixels
+DPI = 100  # A point of type is 100/72 pixels.
 INK, FAINT = "#1b1e25", "#6a6f7a"
-WIDTH, HEIGHT, LEGEND = 800, 700, 230  # pixels, of a picture of one mesh and of the legend beside it
+WIDTH, HEIGHT, LEGEND = 800, 700, 230  # pixels: width and height of the image of a mesh, and width of its legend
 MARGIN = 20
-EDGES_UP_TO = 5000  # triangles: more edges than that hide the colours
-STRIPE = 12  # pixels from one stripe to the next, as rendered
+EDGES_UP_TO = 5000  # triangles; the edges of a mesh with more triangles would hide the colours
+STRIPE = 12  # pixels from one stripe to the next in the images that tolvol renders
 
-# From the front, the right and above, by the convention of the formats: nothing in a file says which way is up.
+# Axis that is up -> a view from the front, the right and above. A file does not say which axis is up: each format has a
+# convention.
 _VIEWS = {"Y": {"direction": (0.55, 0.4, 1), "up": (0, 1, 0)}, "Z": {"direction": (0.55, -1, 0.4), "up": (0, 0, 1)}}
 
 
 def require(option, path):
-    """What a picture needs must be there before the work begins."""
+    """Raises Stop before the work begins if the picture cannot be made or written."""
     cli.require_folder(path, option)
     if Path(path).suffix.lower() != ".png":
         raise cli.Stop(f"{option} {path}: the extension must be .png")
@@ -42,13 +43,13 @@ def unavailable():
 
 
 def camera(vertices, triangles, size, path="", room=0.0):
-    """The view of a mesh, upright as files like `path` have it."""
+    """Returns a camera that shows a mesh upright, by the convention of the format of `path`."""
     view = _VIEWS["Y" if Path(path).suffix.lower() in {".obj", ".gltf", ".glb"} else "Z"]
     return tolvol.Camera.framing(vertices, triangles, size, room=room, **view)
 
 
 class Page:
-    """A white page; places are in pixels from its upper left corner."""
+    """A white page. Positions are in pixels from its upper left corner."""
 
     def __init__(self, width, height):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -62,15 +63,16 @@ class Page:
         self.figure.figimage(pixels, x, self.height - y - pixels.shape[0])
 
     def text(self, x, y, text, size=10, colour=INK, **options):
-        """`y` is where the first line's top is."""
+        """Draws text. `y` is the top of its first line."""
         options = {"va": "top", **options}
         self.figure.text(x / self.width, 1 - y / self.height, text, size=size, color=colour, **options)
 
     def legend(self, x, y, height, transfer, tolerance, size, shares=None, lowest=None, outside=True):
-        """The colours with their lengths.
+        """Draws the colours with their lengths.
 
-        tolerance, size: in the units of the mesh; lowest: what the bar begins with, in tolerances; outside: also explain the
-        stripes; shares: of the area within a quarter, half and all of the tolerance, as text below.
+        tolerance, size: in the units of the mesh; lowest: the lowest distance of the bar, in tolerances; outside: whether to
+        explain the stripes too; shares: the shares of the area within a quarter, half and all of the tolerance, which are
+        printed below.
         """
         bar = height - 50 - 28 * outside - (116 if shares is not None else 0)
         colours, whole = tolvol.transfer_colours(transfer), -1 if transfer == "signed" else 0
@@ -97,7 +99,7 @@ class Page:
 
     @staticmethod
     def _percent(share):
-        """A little that is outside must not read as nothing."""
+        """Returns a share as text. A share above 0 is never shown as 0.0 %."""
         return f"{100 * share:.1f} %" if share == 0 or share >= 0.0005 else "< 0.1 %"
 
     @staticmethod
@@ -107,7 +109,10 @@ class Page:
         return f" {name} = {length}" if name and part else f" {name or length}"
 
     def save(self, path, step=1):
-        """step: of the 256 levels of a channel that are kept; with 3 nobody sees it and the file is a fifth smaller."""
+        """Saves the page. Of the 256 levels of each channel only every `step`-th is used.
+
+        A step of 3 is not visible and makes the file a fifth smaller.
+        """
         from PIL import Image
 
         self.figure.canvas.draw()
@@ -117,25 +122,25 @@ class Page:
 
 
 def stripes(width, height):
-    """What tolvol draws where a mesh is outside."""
+    """Returns an image of the stripes that tolvol draws beyond the tolerance."""
     y, x = np.mgrid[:height, :width]
     colours = np.array(tolvol.OUTSIDE_COLOURS, np.uint8)
     return colours[((x - y) % STRIPE >= STRIPE / 2).astype(int)]
 
 
 def shares_within(surface, reference, tolerance, threads=0):
-    """Shares of the area of a (vertices, triangles) within a quarter, half and all of the tolerance of another."""
+    """Returns the shares of a surface's area within a quarter, half and all of the tolerance of another surface."""
     bounds = [tolerance / 4, tolerance / 2, tolerance]
     spread = tolvol.deviation(*surface, *reference, bounds=bounds, threads=threads)
     return [1 - float(share) for share in spread.share_beyond]
 
 
 def save_deviation(path, surface, reference, tolerance, size, like="", threads=0):
-    """A picture of a surface coloured by its distance to another, both (vertices, triangles) in the world.
+    """Saves a picture of a surface coloured by its distance to another. Both are (vertices, triangles) in the world.
 
-    path: where it goes, or a binary file; size: what 100 % is; like: the file that the surface is from.
+    path: a path or a binary file; size: the length that is 100 %; like: the file of the surface, for the up axis.
     """
-    # A volume is no larger than its reference; surfaces that far apart are striped.
+    # The tolerance of a volume is at most the size of its reference. Parts that are farther away are striped.
     tolerance = min(tolerance, tolvol.size(*reference))
     volume = tolvol.ToleranceVolume(*reference, tolerance, threads=threads)
     view = camera(*surface, (WIDTH, HEIGHT), like)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far two mesh files are from each other: certified largest distances both ways, statistics and histograms.
+"""Measures the distance of two mesh files: certified largest distances both ways, statistics and histograms.
 
 blender --background --python blender_scripts/report.py -- A B [--tolerance 1%] [--bounds 0.5%,1%] [--report FILE.html]
 """
@@ -16,19 +16,19 @@ try:
     from addon.files import file_io, safe_files
     from addon.proof import deviation, report
     from addon.reference import snapshots
-except ImportError as error:  # left alone, Blender would end with exit code 0
-    print(f"report.py: Blender's Python lacks something: {error}; install Debian's python3-numpy", file=sys.stderr)
+except ImportError as error:  # After an uncaught exception Blender would end with exit code 0.
+    print(f"report.py: Blender's Python lacks a package: {error}; install Debian's python3-numpy", file=sys.stderr)
     sys.exit(2)
 
 _DESCRIPTION = """\
-Measures the surface of A against that of B, and B against A: the largest distance as an interval that is certain and where it
-is; mean, root mean square and percentiles over the area; the share of the area that is farther than each bound; on which side,
-where a surface is closed."""
+Measures the distances from the surface of A to that of B and from B to A: the largest distance as a certified interval, with its
+place; mean, root mean square and percentiles over the area; the share of the area that is farther than each bound; and the parts
+inside and outside, if the other surface is closed."""
 
 _EPILOG = """\
-Percentages are of the size of B: the longest diagonal of its bounding box. Exit codes: 0 measured; 2 bad usage or input; 1 a
-file that could not be written, or a bug. Reports and pictures are written with 0 alone, all of them or none, never over a file
-that is read. Symbolic links are followed."""
+Percentages are of the size of B, which is the longest diagonal of its bounding box. Exit codes: 0 measured; 2 bad usage or input;
+1 a file that could not be written, or a bug. Only with exit code 0 are reports and pictures written, all of them or none, and
+never over a file that is read. Symbolic links are followed."""
 
 
 def bounds(text):
@@ -49,19 +49,30 @@ def arguments():
     parser.add_argument("a", metavar="A", help=" ".join(file_io.EXTENSIONS))
     parser.add_argument("b", metavar="B")
     parser.add_argument(
-        "--tolerance", type=cli.length, metavar="T", help="N%% of size, or a length: what the report compares with"
+        "--tolerance",
+        type=cli.length,
+        metavar="T",
+        help="the tolerance that the distances are compared with: N%% of size, or a length",
     )
-    parser.add_argument("--bounds", type=bounds, default=[], metavar="T,T", help="each N%% of size, or a length")
-    parser.add_argument("--unit", default="", metavar="NAME", help="of the files' lengths, to name it in the report")
+    parser.add_argument(
+        "--bounds",
+        type=bounds,
+        default=[],
+        metavar="T,T",
+        help="report the share of the area beyond each of these distances; each is N%% of size, or a length",
+    )
+    parser.add_argument(
+        "--unit", default="", metavar="NAME", help="the unit of the files' lengths, named in the report"
+    )
     parser.add_argument(
         "--report",
         type=report_file,
         action="append",
         default=[],
         metavar="FILE",
-        help=f"write it there, as the extension says: {' '.join(deviation.EXTENSIONS)}; may be given more than once",
+        help=f"write the report to this file ({' '.join(deviation.EXTENSIONS)}); may be given more than once",
     )
-    parser.add_argument("--picture", metavar="FILE.png", help="draw A there, coloured by its distance from B")
+    parser.add_argument("--picture", metavar="FILE.png", help="draw A to this file, coloured by its distance from B")
     parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
     return parser.parse()
 
@@ -81,7 +92,7 @@ def _report(options, staged):
     safe_files.require_apart([(target.name, target.place) for target in targets], read)
     if picture:
         pictures.require("--picture", options.picture)
-    for target in targets:  # a folder that cannot be written to is found before the work, not after it
+    for target in targets:  # This refuses a folder that cannot be written to before the work begins.
         if not target.is_device:
             staged.folder(target)
     surfaces, files = [], []
@@ -106,7 +117,7 @@ def _report(options, staged):
 
 
 def _draw(surfaces, result, options):
-    """(caption, PNG) of both directions where a page asks for them, of the first for --picture."""
+    """Returns pairs (caption, PNG): of both directions if there is an .html report, else of the first for --picture."""
     in_page = any(Path(path).suffix.lower() == ".html" for path in options.report)
     if in_page and (reason := pictures.unavailable()):
         print(f"note: no pictures in the report: {reason}")

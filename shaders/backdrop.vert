@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One triangle over the whole picture, behind everything: the ends of all rays.
+// Draws one triangle over the whole picture, behind everything. Its points are the ends of the rays that meet no surface.
 uniform vec3 eye, forward, right, above;  // in nodes; right and above span half of the picture at distance 1
 uniform float end;
 out vec3 place;

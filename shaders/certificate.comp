@@ -1,30 +1,30 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The witness certificate, a candidate an invocation: a part of it is inside when all three of its corners have a
-// witness in one reference triangle; those of the nodes around the part's centre are tried, then the part is split.
-// Needs split.glsl and witness.glsl.
+// The witness certificate. Each invocation decides one candidate. A part of the candidate is inside if all three of its
+// corners have a witness in the same reference triangle. The triangles of the nodes around the part's centre are tried;
+// if none of them proves the part, the part is split. This file needs split.glsl and witness.glsl.
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer Candidates { float corners[]; };  // nine a candidate
+layout(std430, binding = 0) readonly buffer Candidates { float corners[]; };  // nine numbers for each candidate
 layout(std430, binding = 1) readonly buffer Open { uint open_candidates[]; };
-layout(std430, binding = 2) writeonly buffer Proved { uint proved[]; };  // 1 a candidate; nothing else is ever written
+layout(std430, binding = 2) writeonly buffer Proved { uint proved[]; };  // 1 for a proved candidate; 0 is never written
 layout(std430, binding = 3) readonly buffer Nodes { uint closest[]; };   // the grid's triangles
 layout(std430, binding = 4) readonly buffer ReferenceA { float reference_a[]; };
 layout(std430, binding = 5) readonly buffer ReferenceAb { float reference_ab[]; };
 layout(std430, binding = 6) readonly buffer ReferenceAc { float reference_ac[]; };
 
 uniform uint open_count;
-uniform vec3 origin;  // of the grid
+uniform vec3 origin;  // the origin of the grid
 uniform float spacing;
 uniform ivec3 nodes;
 uniform int pitch;
 uniform float limit2;  // the squared distance up to which a witness proves
 uniform float shortest;  // a part this short is not split further
-uniform int tries;       // nodes asked for a triangle, 1 to 8, the nearest first
-uniform int budget;      // parts looked at
+uniform int tries;       // number of nodes whose triangle is tried, 1 to 8, the nearest first
+uniform int budget;      // the most parts that are looked at
 
 const uint kNone = 0xFFFFFFFFu;
 
-// The closest triangle of a node.
+// Returns the closest triangle of a node, or kNone outside the grid.
 uint triangle_at(ivec3 node) {
   if (any(lessThan(node, ivec3(0))) || any(greaterThanEqual(node, nodes))) return kNone;
   return closest[(uint(node.z) * uint(nodes.y) + uint(node.y)) * uint(pitch) + uint(node.x)];
@@ -43,7 +43,7 @@ bool covers(uint triangle, mat3 part) {
   return true;
 }
 
-// `known`: whether any node around names a triangle.
+// `known`: whether any of the nodes that were tried names a triangle.
 bool is_covered(mat3 part, out bool known) {
   const vec3 cell = ((part[0] + part[1] + part[2]) / 3 - origin) / spacing, low = floor(cell);
   const ivec3 nearest = ivec3(greaterThan(cell - low, vec3(0.5)));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Counts samples in a counter for each piece, where an occlusion query for each would be too many.
+// Counts samples in one counter for each piece: an occlusion query for each piece would be too many queries.
 layout(std430, binding = 1) buffer Counts { uint counts[]; };
 
 void main() {

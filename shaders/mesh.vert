@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A mesh whose vertices are given in the nodes of a distance field.
+// Draws a mesh whose vertices are given in nodes of a distance field.
 layout(location = 0) in vec3 vertex;
 uniform mat4 to_clip;
 out vec3 place;

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Whether the sample of this pixel is inside. A pixel that stands for no sample is not.
-uniform sampler3D distances;  // frame lengths, never too small
-uniform float bound;          // of the interpolated distance
-uniform float bound_near;     // of the distance by way of one node
-uniform float spacing2;       // squared, frame lengths
+/// Tells whether the sample of this pixel is inside. A pixel that stands for no sample is not.
+uniform sampler3D distances;  // in frame lengths, never too small
+uniform float bound;          // upper bound of the interpolated distance
+uniform float bound_near;     // upper bound of the distance at a node plus the way to it
+uniform float spacing2;       // squared grid spacing, in frame lengths
 uniform int cell;
-uniform int around = 8;       // nodes; no constant, because a loop that is unrolled is not left early
+uniform int around = 8;       // number of nodes; it is not a constant, because an unrolled loop is not left early
 
 bool sample_counts() {
   const vec2 pixel = vec2(ivec2(gl_FragCoord.xy) & (cell - 1));
   if (pixel.x + pixel.y > uintBitsToFloat(corner_n.w)) return false;
   precise const vec3 point = uintBitsToFloat(corner_n.xyz) + (pixel.x * uintBitsToFloat(edge1_counter.xyz) +
                                                               pixel.y * uintBitsToFloat(edge2_unused.xyz));
-  // The distance changes by no more than the way: near the reference one node is often enough. Nearest first.
+  // The distance at the point is at most the distance at a node plus the way to it. Well inside the tolerance one node is
+  // often enough. The nearest node comes first.
   const ivec3 low = ivec3(point), first = ivec3(point + 0.5) - low;
   precise float interpolated = 0;
   for (int k = 0; k < around; ++k) {

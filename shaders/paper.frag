@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Whether this pixel violates the bound, by the hardware's own interpolation [Botsch04, §4].
+/// Tells whether this pixel violates the bound, with the interpolation of the hardware [Botsch04, §4].
 uniform sampler3D distances;  // normalised
 uniform vec3 nodes;
-uniform float scale, offset;  // frame length of a texel
+uniform float scale, offset;  // they map a texel to a distance in frame lengths
 uniform float bound;
 
 bool sample_counts() {

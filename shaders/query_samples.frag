@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// For an occlusion query, which counts what is not discarded.
+// Discards samples for an occlusion query, which counts the others.
 void main() {
   if (!sample_counts()) discard;
 }

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Per-pixel distance of a mesh to the reference, interpolated first and coloured then [Botsch04, §3].
+// Colours each pixel of a mesh by its distance to the reference. The distance is interpolated first, then coloured
+// [Botsch04, §3].
 layout(binding = 0) uniform sampler3D field;
 layout(binding = 1) uniform sampler1D transfer;
 uniform float tolerance;  // in grid spacings
-uniform float lowest;     // of the transfer function, in tolerances
+uniform float lowest;     // lowest distance of the transfer function, in tolerances
 uniform vec3 eye;         // in nodes
-uniform vec2 first;       // sample of the picture that is this tile's first
-uniform float period;     // of the stripes, in samples
+uniform vec2 first;       // the first sample of this tile, as a sample of the picture
+uniform float period;     // period of the stripes, in samples
 uniform vec3 outside, stripe;
 in vec3 place;
 out vec4 colour;

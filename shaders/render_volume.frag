@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A tolerance volume as a translucent shell [Botsch04, Fig. 1], in front of a surface or of nothing: of each ray from
-// the eye to `place` the stretch within the volume takes light away and the entry reflects some. Where a plane cuts the
-// volume open, the section shows distances.
+// Draws a tolerance volume as a translucent shell [Botsch04, Fig. 1], in front of a surface or of the background. On each
+// ray from the eye to `place`, the part within the volume absorbs light, and the point of entry reflects some. Where a
+// plane cuts the volume open, the section shows distances.
 layout(binding = 0) uniform sampler3D field;
 layout(binding = 1) uniform sampler1D transfer;
 layout(binding = 2) uniform sampler3D far;
 uniform float far_spacing, tolerance;  // in grid spacings
 uniform vec3 eye;                      // in nodes
-uniform vec4 cut;                      // away with what is above this plane; zero: nothing
-uniform bool surface;                  // whether there is one at `place`
+uniform vec4 cut;                      // the part of the volume above this plane is cut away; zero cuts nothing
+uniform bool surface;                  // whether there is a surface at `place`
 in vec3 place;
 out vec4 colour;  // multiplied by alpha
 
 const vec3 kClay = vec3(0.93, 0.90, 0.86), kShell = vec3(0.16, 0.52, 0.78);
-const float kAbsorption = 0.4;  // of a stretch as long as the tolerance, as an exponent
+const float kAbsorption = 0.4;  // exponent of the absorption along a path as long as the tolerance
 
 void main() {
   const vec3 ray = place - eye;

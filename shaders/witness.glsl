@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pure functions: upper bounds on the distance of points to a triangle, each from an explicit point of the triangle, its
-// witness. Edges are compared as well as the foot of the perpendicular, so that needles and degenerate triangles cost
-// nothing; any parameters that rounding leaves still name a point of the triangle. Everything that the bound rests on is
-// `precise`: what GLSL then promises, and the error it leaves, is derived in native/check/gl_certificate.h.
+// Functions without side effects that compute upper bounds of the distance of a point to a triangle. Each bound is the
+// distance to an explicit point of the triangle, the witness. Points of the edges are tried as well as the foot of the
+// perpendicular, so that needles and degenerate triangles lose nothing. Rounding changes the parameters of the witness, but
+// it remains a point of the triangle. All computations of the bound are `precise`; native/check/gl_certificate.h derives
+// the remaining error from the promises of GLSL.
 
 struct WitnessTriangle {
   vec3 ab, ac, bc;
   vec3 gs, gt;   // gradients of the barycentric coordinates of b and c
-  vec3 inverse;  // of the squared lengths of ab, ac, bc
+  vec3 inverse;  // inverse squared lengths of ab, ac, bc
 };
 
 float squared_length(vec3 v) {
@@ -16,7 +17,7 @@ float squared_length(vec3 v) {
 }
 
 WitnessTriangle witness_triangle(vec3 ab, vec3 ac) {
-  const float tiny = 1e-30;  // instead of 0: no division here can leave the range of float
+  const float tiny = 1e-30;  // replaces 0, so that no division leaves the range of float
   precise vec3 bc = ac - ab;
   const vec3 n = cross(ab, ac);
   const float inverse = 1 / max(squared_length(n), tiny);
@@ -27,14 +28,14 @@ WitnessTriangle witness_triangle(vec3 ab, vec3 ac) {
   return t;
 }
 
-// From x to the nearest point of the segment from the origin to `edge`.
+// Returns the squared distance of x from the segment from the origin to `edge`.
 float squared_distance_to_segment(vec3 x, vec3 edge, float inverse) {
   precise float w = clamp(dot(x, edge) * inverse, 0.0, 1.0);
   precise vec3 rest = x - w * edge;
   return squared_length(rest);
 }
 
-// x: the point as seen from the triangle's first corner.
+// x: the point relative to the triangle's first corner.
 float squared_distance_to_witness(vec3 x, WitnessTriangle t) {
   precise vec3 from_b = x - t.ab;
   const float to_edges = min(min(squared_distance_to_segment(x, t.ab, t.inverse.x),

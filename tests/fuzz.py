@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Looks for what no test thought of: random meshes of every nasty kind, every operation, every option.
+"""Searches failures that no other test covers: random difficult meshes with every operation and every option.
 
-    tests/fuzz.py --minutes 1 --seed 1        cases 0, 1, 2, ... of a seed until the time is over
-    tests/fuzz.py --seed 1 --case 17          one of them again
-    tests/fuzz.py --file FILE.npz             one that was found and made small
+    tests/fuzz.py --minutes 1 --seed 1        runs cases 0, 1, 2, ... of a seed until the time is over
+    tests/fuzz.py --seed 1 --case 17          repeats one of these cases
+    tests/fuzz.py --file FILE.npz             repeats a finding that was reduced and stored
 
-Results are judged by tolvol.hausdorff, by CGAL, and by what the docstrings promise; each call has a
-limit of time. A finding is made small, printed, and stored under build/fuzz. Exit code 1 when there was one. Needs NumPy
-and what setup.sh --tests builds."""
+Results are judged by tolvol.hausdorff, by CGAL, and by the promises of the docstrings. Each call has a time limit. A finding
+is reduced, printed, and stored under build/fuzz. The exit code is 1 if there was a finding. The script needs NumPy and the
+module that setup.sh --tests builds."""
 
 import argparse
 import sys
@@ -40,13 +40,13 @@ def arguments():
 
 
 def report(watchdog, case, name, found, options):
-    """Prints a finding, made small, and how to repeat it."""
+    """Reduces a finding and prints it with the command that repeats it."""
     _, what, message = found
     print(f"\nFOUND {name}: {what}: {message}\n  {case.line()}", flush=True)
     if options.shrink:
 
         def still(smaller):
-            # What was slow does not need to end to be so again.
+            # A reduced case that hangs shows the same finding as one that is slow.
             again = watchdog.run(smaller, SECONDS)[1]
             return again.replace("hang: ", "slow: ") == what.replace("hang: ", "slow: ")
 

@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Sets up and runs every test, or only the runners that are named: sh tests/run.sh [native|asan|python|fuzz|blender|ui|style]...
-#   sh tests/run.sh --bpy VERSION    instead: the tests of the add-on in PyPI's bpy of that version, 4.2 or later
-# One closing line a runner; what a runner printed is in build/tests/, and is shown when it fails.
+#   sh tests/run.sh --bpy VERSION    runs only the tests of the add-on, in PyPI's bpy of that version, 4.2 or later
+# Each runner prints one closing line. Its output is in build/tests/, and is shown if it fails.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -29,7 +29,7 @@ native() { in_shards build/release/tests/native/tolvol_tests; }
 asan() {
   cmake --preset asan && cmake --build --preset asan && in_shards build/asan/tests/native/tolvol_tests
 }
-# Most tests use one thread: a share of them on each core.
+# Most tests use one thread, so each core runs a share of the tests.
 in_shards() {
   shards=$(nproc) index=0 running="" result=0
   while [ $index -lt "$shards" ]; do
@@ -41,7 +41,7 @@ in_shards() {
 }
 python() { /usr/bin/python3 -m pytest -q -p no:cacheprovider -n "$(nproc)" tests/python; }
 fuzz() { /usr/bin/python3 tests/fuzz.py --minutes 1 --seed 5; }
-# A Blender on each core, with every so many files.
+# Each core runs a Blender with a share of the test files.
 blender() {
   at_once=$(nproc) index=0 running="" result=0
   while [ $index -lt "$at_once" ]; do
@@ -58,7 +58,7 @@ failed=""
 for name in "$@"; do
   log=build/tests/$name.log
   started=$(date +%s)
-  # In a shell of its own: no runner can end this one, and all of them run.
+  # Each runner has a shell of its own, so that its failure does not end this shell and all runners run.
   if (set +e; $name) >"$log" 2>&1; then
     outcome=passed
   else

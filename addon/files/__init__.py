@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files: read, checked, and replaced only as a whole."""
+"""Reads mesh files, checks them, and replaces files as a whole."""

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is wrong with a mesh file that Blender's readers would not say.
+"""Finds damage in a mesh file that Blender's readers do not report.
 
-They turn coordinates that are not finite into zeros, drop faces that name a vertex that is not there, and read a
-truncated STL as an empty one. check() finds that in the file itself, and counts its faces, so that those a reader drops
-(repeated ones, those with a repeated corner) can be reported. It builds no mesh: that stays Blender's work.
+Blender's readers turn coordinates that are not finite into zeros, drop faces that name a missing vertex, and read a
+truncated STL file as an empty one. check() finds such damage in the file itself. It also counts the faces of the file,
+so that the faces that a reader drops (repeated faces and faces with a repeated corner) can be reported. check() builds
+no mesh: Blender does that.
 """
 
 import re
@@ -17,7 +18,7 @@ from . import gltf_check
 
 _LARGEST = float(np.finfo(np.float32).max)
 
-# Names of PLY's numbers -> NumPy's, without byte order.
+# The name of a number type in PLY -> its name in NumPy, without byte order.
 _PLY_TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
     **dict.fromkeys(("uchar", "uint8"), "u1"),
@@ -31,9 +32,9 @@ _PLY_TYPES = {
 
 
 def check(extension, data, folder):
-    """The number of faces that the content of a file declares. In `folder` are the files that it may name.
+    """Returns the number of faces that a file's content declares. `folder` holds the files that the content may name.
 
-    Raises Refused with what is wrong, without the file's name.
+    Raises Refused with a message that says what is wrong and does not name the file.
     """
     if not data:
         raise Refused("the file is empty")
@@ -43,7 +44,7 @@ def check(extension, data, folder):
 
 
 def _require_finite(coordinates):
-    """(n, 3) as read; the readers hold float32."""
+    """coordinates: (n, 3). A number beyond float32 counts as infinite, because Blender's readers store float32."""
     bad = np.flatnonzero(~(np.abs(coordinates) <= _LARGEST).all(1))
     if len(bad):
         shown = ", ".join(f"{value:g}" for value in coordinates[bad[0]])
@@ -51,7 +52,7 @@ def _require_finite(coordinates):
 
 
 def _require_indices(lowest, highest, count, first):
-    """Per face the lowest and highest vertex it names, of those numbered from `first`."""
+    """lowest, highest: the smallest and largest vertex number of each face; vertices are numbered from `first`."""
     bad = np.flatnonzero((lowest < first) | (highest >= first + count))
     if len(bad):
         face = bad[0]
@@ -60,7 +61,7 @@ def _require_indices(lowest, highest, count, first):
 
 
 def _numbers(text, dtype):
-    """The numbers in a text, or None when something else is in it."""
+    """Returns the numbers in a text, or None when the text holds anything else."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # NumPy warns where it stops before the end
         try:
@@ -74,7 +75,7 @@ def _numbers(text, dtype):
 
 def _check_obj(data):
     if b"\0" in data:
-        raise Refused("this is no OBJ file: it holds binary data")
+        raise Refused("this is not an OBJ file: it holds binary data")
     text = re.sub(rb"#[^\r\n]*", b"", data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" "))
     lines = re.findall(rb"^[ \t]*v[ \t]+([^\r\n]*)", text, re.MULTILINE)
     firsts = [tuple(line.split()[:3]) for line in lines]
@@ -104,7 +105,7 @@ def _check_obj(data):
 
 
 def _absolute(text, indices, sizes):
-    """Negative indices count back from the vertices that stand above the face."""
+    """Returns the indices counted from 1. A negative index counts back from the last vertex that stands above its face."""
     kinds = [kind == b"v" for kind in re.findall(rb"^[ \t]*([vf])[ \t]+", text, re.MULTILINE)]
     is_vertex = np.array(kinds)
     above = np.repeat(np.cumsum(is_vertex)[~is_vertex], sizes)
@@ -117,10 +118,10 @@ def _absolute(text, indices, sizes):
 def _check_ply(data):
     form, body, elements = _ply_header(data)
     order = ">" if form == "binary_big_endian" else "<"
-    if form == "ascii":  # as if it were binary, every number a double
+    if form == "ascii":  # The text is turned into a binary body of doubles, so that one reader serves both forms.
         numbers = _numbers(body, np.float64)
         if numbers is None:
-            raise Refused("there is something else than numbers after its PLY header")
+            raise Refused("the text after its PLY header holds something that is not a number")
         body = numbers.astype("<f8").tobytes()
         elements = [
             (name, count, [(field, counted and "f8", "f8") for field, counted, _ in properties])
@@ -139,7 +140,7 @@ def _check_ply(data):
             _require_finite(vertices)
         elif name == "face" and count:
             if vertices is None:
-                raise Refused("its faces stand before its vertices: write it anew with another program")
+                raise Refused("its faces stand before its vertices: save it again with another program")
             indices = rows.get("vertex_indices", rows.get("vertex_index"))
             if indices is None:
                 raise Refused("its faces name no vertices")
@@ -152,14 +153,17 @@ def _check_ply(data):
 
 
 def _ply_header(data):
-    """(format, what follows the header, [(element, count, [(property, type of a list's length or None, type)])])."""
+    """Returns (format, the bytes after the header, elements).
+
+    elements: [(name, count, properties)]; properties: [(name, type of a list's length or None, type)].
+    """
     end = re.search(rb"^end_header[ \t]*(\r\n|\n|\r)", data, re.MULTILINE) if data.startswith(b"ply") else None
     if end is None:
-        raise Refused("this is no PLY file: its header is not there or has no end")
+        raise Refused("this is not a PLY file: its header is missing or has no end")
     lines = [line.split() for line in data[: end.start()].decode("latin-1").splitlines()]
     form = next((words[1] for words in lines if words[:1] == ["format"] and len(words) > 1), "not given")
     if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
-        raise Refused(f"its PLY format is {form}, not ascii or binary")
+        raise Refused(f"its PLY format is {form}, but only ascii and binary can be read")
     elements = []
     for words in lines:
         try:
@@ -170,14 +174,15 @@ def _ply_header(data):
             elif words[:1] == ["property"]:
                 elements[-1][2].append((words[2], None, _PLY_TYPES[words[1]]))
         except (IndexError, KeyError, ValueError):
-            raise Refused(f"its PLY header has a line of no meaning: {' '.join(words)}") from None
+            raise Refused(f"its PLY header has a line that cannot be read: {' '.join(words)}") from None
     return form, data[end.end() :], elements
 
 
 def _ply_element(body, offset, count, properties, order):
-    """({property: column}, where the next element begins).
+    """Returns ({property: column}, the offset of the next element).
 
-    A list is an array (count, length) where all are equally long, otherwise a pair (lowest, highest) of each.
+    The column of a list property is an array (count, length) if all lists have the same length. Otherwise it is a pair
+    of arrays: the smallest and the largest entry of each list.
     """
     if not 0 <= count <= len(body):
         raise ValueError
@@ -202,7 +207,7 @@ def _ply_element(body, offset, count, properties, order):
 
 
 def _ply_ragged(body, offset, count, properties, order):
-    """_ply_element, row by row: about 2 us each."""
+    """Does the work of _ply_element row by row, for lists of different lengths. A row takes about 2 us."""
     extents = {field: (np.zeros(count), np.zeros(count)) for field, counted, _ in properties if counted}
     readers = [
         (field, counted and struct.Struct(order + np.dtype(counted).char), np.dtype(kind).char, np.dtype(kind).itemsize)
@@ -235,7 +240,8 @@ def _check_stl(data):
     faces = len(re.findall(rb"^[ \t]*endfacet", data, re.MULTILINE))
     if not data.lstrip().startswith(b"solid") or not faces or len(corners) != 3 * faces:
         raise Refused(
-            "this is no STL file, or not all of one: neither text nor as long as its number of triangles says"
+            "this is not an STL file, or it is truncated: it is neither an STL text nor as long as its number of "
+            "triangles requires"
         )
     coordinates = _numbers(b" ".join(corners), np.float64)
     if coordinates is None or len(coordinates) != 9 * faces:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mesh files read and written by Blender's own importers and exporters, in the file's coordinates: no axis is turned."""
+"""Reads and writes mesh files by Blender's own importers and exporters. Coordinates stay as in the file: no axis is turned."""
 
 import contextlib
 import ctypes
@@ -21,19 +21,20 @@ from . import file_check, gltf_check
 _GLTF = (".gltf", ".glb")
 EXTENSIONS = (".obj", ".ply", ".stl", *_GLTF)
 
-# Blender's glTF reader turns the file's (x, y, z) to (x, -z, y); this turns it back, without rounding.
+# Blender's glTF reader turns the file's (x, y, z) to (x, -z, y). _TURN_BACK, the placement of an object named _AXES,
+# undoes this turn without rounding.
 _AXES = "axes of the file"
 _TURN_BACK = Matrix(((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, 0), (0, 0, 0, 1)))
 
-# OBJ text has six decimals. A coordinate below 16 comes back at most 1e-6 away (half a unit of the last decimal, then
-# float32 again), one beyond 16 as it was.
+# Blender writes six decimals to an OBJ file. A coordinate below 16 is read back with an error of at most 1e-6: half a
+# unit of the last decimal and the rounding to float32. A coordinate beyond 16 is read back exactly.
 _OBJ_STEP = 1e-6
 
 
 class MeshFile:
-    """The mesh objects of a file, now in the scene, and what its reader left out.
+    """The mesh objects that a file brought into the scene, and a record of the faces that Blender's reader left out.
 
-    extras: how many there are in the file of what is no mesh, such as {"skins": 1}.
+    extras: the number of things in the file that are not meshes, by kind, such as {"skins": 1}.
     """
 
     def __init__(self, path, objects, repairs, extras):
@@ -44,7 +45,7 @@ class MeshFile:
 
     @functools.cached_property
     def counts(self):
-        """Vertices and triangles as Blender holds them when this is first asked."""
+        """The numbers of vertices and triangles at the first access: a later change of the meshes does not change them."""
         vertices = sum(len(ob.data.vertices) for ob in self.objects)
         return {
             "vertices": vertices,
@@ -53,20 +54,20 @@ class MeshFile:
 
 
 def extension_of(path):
-    """Raises Refused, listing what there is, for any other."""
+    """Returns the extension of a path. Raises Refused for one that is not in EXTENSIONS, and lists those."""
     extension = Path(path).suffix.lower()
     if extension not in EXTENSIONS:
-        raise Refused(f"{path}: unknown extension {extension or '(none)'}; there are {' '.join(EXTENSIONS)}")
+        raise Refused(f"{path}: unknown extension {extension or '(none)'}; the known ones are {' '.join(EXTENSIONS)}")
     if extension in _GLTF and bpy.app.version < (4, 0) and "bool" not in vars(np):
         raise Refused(
-            f"{path}: glTF cannot be read by Blender {bpy.app.version_string} with NumPy {np.__version__}; "
+            f"{path}: Blender {bpy.app.version_string} cannot read glTF with NumPy {np.__version__}; "
             "use .ply, .obj or .stl, or a newer Blender"
         )
     return extension
 
 
 def read_file(path):
-    """Adds the meshes of a file to the scene. Raises Refused, naming the file, when it is not whole."""
+    """Adds the meshes of a file to the scene. Raises Refused, which names the file, if the file is damaged."""
     extension = extension_of(path)
     try:
         data = Path(path).read_bytes()
@@ -82,20 +83,22 @@ def read_file(path):
             _import(extension, str(path), b"\ng " in data)
             if extension in _GLTF:
                 _turn_back([ob for ob in bpy.data.objects if ob not in before])
-            # Exporters and matrices see the new objects only after this.
+            # Exporters see the new objects, and the objects' matrices become valid, only after this update.
             bpy.context.view_layer.update()
     except RuntimeError as error:
         raise Refused(f"{path}: Blender cannot read it: {str(error).strip().splitlines()[-1]}") from None
     added = [ob for ob in bpy.data.objects if ob not in before and not _is_bone_shape(ob)]
     objects = [ob for ob in added if ob.type == "MESH" and ob.data.polygons]
     if not objects:
-        raise Refused(f"{path}: it has no faces")
+        raise Refused(f"{path}: the file has no faces")
     for ob in objects:
-        ob.name = ob.name.replace(" ", "_")  # as the OBJ exporter would write it
+        ob.name = ob.name.replace(" ", "_")  # The OBJ exporter would do so: the name is the same in all reports.
     dropped = declared - sum(len(ob.data.polygons) for ob in objects)
     repairs = []
     if dropped > 0:
-        message = f"{dropped:,} faces that repeat a corner or another face left out when {Path(path).name} was read"
+        message = (
+            f"{dropped:,} faces that repeat a corner or another face were left out when {Path(path).name} was read"
+        )
         repairs.append({"kind": "unreadable", "count": dropped, "message": message})
     return MeshFile(path, objects, repairs, gltf_check.extras(data) if extension in _GLTF else {})
 
@@ -103,8 +106,8 @@ def read_file(path):
 def write_file(path, objects, textures_beside):
     """Exports mesh objects as they are, without modifiers.
 
-    Where a format writes side files they name textures in the folder `textures_beside` relative to it, others by their
-    full path. Raises OSError, as far as Blender's exporters say what the system refused.
+    A .mtl file names a texture in the folder `textures_beside` relative to that folder, and any other texture by its full
+    path. Raises OSError where the message of Blender's exporter holds the number of the system's error.
     """
     with quiet():
         bpy.context.view_layer.update()
@@ -124,12 +127,13 @@ def write_file(path, objects, textures_beside):
 
 
 def rounding(path, objects):
-    """How far from its place in the world a vertex may be found in the file, at most."""
+    """Returns an upper bound of the distance between a vertex in the world and the same vertex as the file stores it."""
     extension = Path(path).suffix.lower()
     step = _OBJ_STEP if extension == ".obj" else 0.0
     for ob in objects:
         matrix = mesh_io.matrix_array(ob.matrix_world)
-        if not np.array_equal(matrix, np.eye(4)):  # the exporter maps it to the world, or takes it apart, in float32
+        # The exporter applies the matrix, or splits it into location, rotation and scale, in float32.
+        if not np.array_equal(matrix, np.eye(4)):
             reach = np.abs(mesh_io.column(ob.data.vertices, "co", 3)).max(0, initial=0.0)
             largest = (np.abs(matrix[:3, :3]) @ reach + np.abs(matrix[:3, 3])).max()
             step = max(step, _OBJ_STEP * (extension == ".obj") + 4 * float(np.finfo(np.float32).eps) * largest)
@@ -137,12 +141,12 @@ def rounding(path, objects):
 
 
 def _is_bone_shape(ob):
-    """Whether the glTF reader made it, to draw bones with."""
+    """Whether the glTF reader made the object to draw bones with."""
     return any(collection.name.startswith("glTF_not_exported") for collection in ob.users_collection)
 
 
 def _turn_back(objects):
-    """Puts what a glTF file brought below an object that stands for the file's axes."""
+    """Makes the objects that a glTF file brought children of an object whose placement undoes the reader's turn."""
     axes = bpy.data.objects.new(_AXES, None)
     bpy.context.collection.objects.link(axes)
     for ob in objects:
@@ -152,7 +156,7 @@ def _turn_back(objects):
 
 @contextlib.contextmanager
 def _as_imported():
-    """Meanwhile nothing is turned back; whether anything was."""
+    """Undoes _turn_back() while the context lasts. Yields whether there was anything to undo."""
     turned = [(ob, ob.parent) for ob in bpy.data.objects if ob.parent and ob.parent.name.startswith(_AXES)]
     try:
         for ob, _ in turned:
@@ -180,7 +184,8 @@ def _import(extension, path, groups):
     elif extension == ".stl":
         bpy.ops.import_mesh.stl(filepath=path, axis_forward="Y", axis_up="Z")
     else:
-        bpy.ops.import_scene.gltf(filepath=path, import_pack_images=False)  # packed they would forget their folder
+        # Packed images would lose the folder that they came from.
+        bpy.ops.import_scene.gltf(filepath=path, import_pack_images=False)
 
 
 def _export(extension, path, objects):
@@ -238,8 +243,8 @@ def _export(extension, path, objects):
 
 @contextlib.contextmanager
 def quiet():
-    """Keeps what Blender itself prints off stdout and stderr, whose lines belong to the command."""
-    # What the C library still holds must come out on the right side of the change.
+    """Keeps Blender's own messages off stdout and stderr, whose lines belong to the command."""
+    # The C library buffers output: it must be flushed before each change of the descriptors to land on the right side.
     flush = ctypes.CDLL(None).fflush if sys.platform != "win32" else lambda _: None
 
     def flush_all():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is wrong with a glTF file (2.0, .gltf or .glb) that Blender's reader would not say, or would say with a traceback.
+"""Finds damage in a glTF 2.0 file (.gltf or .glb) that Blender's reader does not report or reports by a traceback.
 
-After the specification: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
+The checks follow the specification: https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """
 
 import base64
@@ -23,7 +23,10 @@ _LARGEST = float(np.finfo(np.float32).max)
 
 
 def check(data, folder):
-    """The number of faces that the nodes show. Buffers are looked for in `folder`. Raises Refused with what is wrong."""
+    """Returns the number of faces that the nodes show. `folder` holds the files that buffers name.
+
+    Raises Refused with a message that says what is wrong and does not name the file.
+    """
     document, binary = parts(data)
     try:
         return _Document(document, binary, folder).faces()
@@ -32,16 +35,16 @@ def check(data, folder):
 
 
 def parts(data):
-    """(the document, the binary chunk or None) of either format."""
+    """Returns (the JSON document, the binary chunk or None) of a .gltf or .glb file."""
     binary = None
     if data[:4] == b"glTF":
         data, binary = _chunks(data)
     try:
         document = json.loads(data)
     except (ValueError, RecursionError) as error:
-        raise Refused(f"this is no glTF file, or not all of one: {error}") from None
+        raise Refused(f"this is not a glTF file, or it is truncated: {error}") from None
     if not isinstance(document, dict) or not isinstance(document.get("asset"), dict):
-        raise Refused("this is no glTF file: its JSON has no asset")
+        raise Refused("this is not a glTF file: its JSON has no asset")
     version = document["asset"].get("version")
     if not str(version).startswith("2."):
         raise Refused(f"its glTF version is {version}, not 2.0")
@@ -49,7 +52,7 @@ def parts(data):
 
 
 def extras(data):
-    """How many skins, animations and cameras a file has."""
+    """Returns the numbers of skins, animations and cameras in a file."""
     document, _ = parts(data)
     return {kind: len(document.get(kind, ())) for kind in ("skins", "animations", "cameras")}
 
@@ -62,7 +65,7 @@ def _chunks(data):
     if version != 2:
         raise Refused(f"its glTF version is {version}, not 2.0")
     if length > len(data):
-        raise Refused(f"the file ends early: {len(data):,} bytes of the {length:,} that its header says")
+        raise Refused(f"the file is truncated: it has {len(data):,} of the {length:,} bytes that its header declares")
     while offset + 8 <= length:
         size, kind = struct.unpack_from("<II", data, offset)
         if offset + 8 + size > length:
@@ -70,7 +73,7 @@ def _chunks(data):
         found.setdefault(kind, data[offset + 8 : offset + 8 + size])
         offset += 8 + size
     if _JSON not in found:
-        raise Refused("this is no glTF file: it has no JSON chunk")
+        raise Refused("this is not a glTF file: it has no JSON chunk")
     return found[_JSON], found.get(_BIN)
 
 
@@ -89,7 +92,7 @@ class _Document:
         for number, node in enumerate(nodes):
             numbers = [x for key in ("matrix", "translation", "rotation", "scale") for x in node.get(key, ())]
             if not all(math.isfinite(x) for x in numbers):
-                raise Refused(f"the place of node {number} is not finite")
+                raise Refused(f"the matrix, translation, rotation or scale of node {number} is not finite")
             if "mesh" in node:
                 count += self._mesh(node["mesh"])
         return count
@@ -101,19 +104,19 @@ class _Document:
         return entries[index]
 
     def _require_tree(self, nodes):
-        """A node below itself would keep a reader going for ever."""
+        """Requires that no node is its own descendant: Blender's reader would never end."""
         parents = {}
         for number, node in enumerate(nodes):
             for child in node.get("children", ()):
                 self._entry("nodes", child, f"node {number}")
                 if parents.setdefault(child, number) != number:
-                    raise Refused(f"node {child} is below two others, {parents[child]} and {number}")
+                    raise Refused(f"node {child} is a child of two nodes, {parents[child]} and {number}")
         safe = set()
         for start in range(len(nodes)):
             path, node = [], start
             while node is not None and node not in safe:
                 if len(path) > len(nodes):
-                    raise Refused(f"node {node} is below itself")
+                    raise Refused(f"node {node} is its own descendant")
                 path.append(node)
                 node = parents.get(node)
             safe.update(path)
@@ -129,16 +132,16 @@ class _Document:
     def _primitive(self, primitive, mesh):
         mode = primitive.get("mode", 4)
         places = primitive.get("attributes", {}).get("POSITION")
-        if places is None or mode not in (4, 5, 6):  # points and lines have no faces
+        if places is None or mode not in (4, 5, 6):  # The other modes are points and lines, which have no faces.
             return 0
-        if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):  # only Blender can unpack it
+        if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):  # Only Blender's reader can unpack Draco.
             corners = self._entry("accessors", primitive.get("indices", places), mesh)["count"]
         else:
             corners = self._geometry(primitive, places, mesh)
         return corners // 3 if mode == 4 else max(corners - 2, 0)
 
     def _geometry(self, primitive, places, mesh):
-        """How many corners a primitive lists; what they say is checked."""
+        """Checks coordinates and indices of a primitive and returns the number of corners that it lists."""
         for index in (places, *(target["POSITION"] for target in primitive.get("targets", ()) if "POSITION" in target)):
             coordinates = self._accessor(index, mesh, "VEC3", (5126,))
             bad = np.flatnonzero(~(np.abs(coordinates) <= _LARGEST).all(1))
@@ -154,11 +157,14 @@ class _Document:
         return len(indices)
 
     def _accessor(self, index, asker, kind, components):
-        """(count, width) of what an accessor stands for."""
+        """Returns the values of an accessor, (count, width)."""
         accessor = self._entry("accessors", index, asker)
         name = f"accessor {index}"
         if accessor.get("type") != kind or accessor.get("componentType") not in components:
-            raise Refused(f"{name} of {asker} is {accessor.get('type')} of {accessor.get('componentType')}, not {kind}")
+            raise Refused(
+                f"{name} of {asker} has type {accessor.get('type')} with component type "
+                f"{accessor.get('componentType')}; type {kind} is needed, with a component type that glTF permits there"
+            )
         dtype, width, count = np.dtype(_COMPONENTS[accessor["componentType"]]), _WIDTHS[kind], accessor["count"]
         if not isinstance(count, int) or count < 0:
             raise Refused(f"{name} has a count of {count}")
@@ -173,7 +179,7 @@ class _Document:
             kind = np.dtype(_COMPONENTS[where["componentType"]])
             rows = self._view(where["bufferView"], where.get("byteOffset", 0), sparse["count"], kind, 1, name)[:, 0]
             if len(rows) and rows.max() >= count:
-                raise Refused(f"{name} replaces entry {rows.max()} of {count}")
+                raise Refused(f"{name} replaces its entry {rows.max()}, but it has only {count} entries")
             values = values.copy()
             values[rows] = self._view(new["bufferView"], new.get("byteOffset", 0), sparse["count"], dtype, width, name)
         return values
@@ -186,7 +192,7 @@ class _Document:
         begin, length = view.get("byteOffset", 0), view["byteLength"]
         needed = start + stride * (count - 1) + row if count else 0
         if min(begin, start, length, count) < 0 or stride < row or needed > length or begin + length > len(buffer):
-            raise Refused(f"{asker} reaches beyond the end of its buffer: the file is not whole")
+            raise Refused(f"{asker} reaches beyond the end of its buffer: the file is truncated or damaged")
         return np.ndarray((count, width), dtype, buffer, begin + start, (stride, dtype.itemsize))
 
     def _buffer(self, index, asker):
@@ -194,14 +200,16 @@ class _Document:
             buffer = self._entry("buffers", index, asker)
             data = self._content(buffer.get("uri"), index)
             if len(data) < buffer["byteLength"]:
-                raise Refused(f"its buffer {index} ends early: {len(data):,} bytes of {buffer['byteLength']:,}")
+                raise Refused(
+                    f"its buffer {index} is truncated: it has {len(data):,} of {buffer['byteLength']:,} bytes"
+                )
             self._buffers[index] = data
         return self._buffers[index]
 
     def _content(self, uri, index):
         if uri is None:
             if index or self._binary is None:
-                raise Refused(f"its buffer {index} is not there")
+                raise Refused(f"its buffer {index} is missing")
             return self._binary
         if uri.startswith("data:"):
             try:
@@ -211,4 +219,4 @@ class _Document:
         try:
             return (self._folder / unquote(uri)).read_bytes()
         except OSError as error:
-            raise Refused(f"its buffer {unquote(uri)}: {error.strerror}") from None
+            raise Refused(f"its buffer {unquote(uri)} cannot be read: {error.strerror}") from None

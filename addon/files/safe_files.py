@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that are written whole or not at all: first beside their place, then moved there together.
+"""Writes files whole or not at all: each is first written to a temporary folder beside its place, then all are moved.
 
-Symbolic links are followed: what they point at is replaced, they stay. A file that is replaced passes its mode and its
-owner on. Other names of it (hard links) keep what they had.
+A symbolic link stays, and the file that it points at is replaced. The new file gets the mode and the owner of the file
+that it replaces. A hard link to the replaced file keeps the old content.
 """
 
 import contextlib
@@ -15,36 +15,37 @@ from pathlib import Path
 
 from ..errors import NotWritten, Refused
 
-# Held while temporary folders come and go and while files are moved: who ends the process waits for the last move.
+# The lock is held while temporary folders are made or removed and while files are moved. remove_all() takes it, so that
+# the process ends only after the last move.
 _lock = threading.RLock()
 _folders = set()
 
 
 class Target:
-    """A file that is to be written. Raises Refused where none can be."""
+    """A file that is to be written. Raises Refused where no file can be written."""
 
     def __init__(self, path, option=""):
         self.path = Path(path)
-        self.name = f"{option} {path}".strip()  # as messages have it
+        self.name = f"{option} {path}".strip()  # how messages call the file
         try:
             self.is_device = _is_device(path)
             self.place = Path(path if self.is_device else os.path.realpath(path))
             if self.place.is_symlink() and not self.is_device:
-                raise Refused(f"{self.name}: its symbolic links lead in a circle")
+                raise Refused(f"{self.name}: its symbolic links form a circle")
             if not self.place.parent.is_dir():
                 raise Refused(f"{self.name}: the folder {self.place.parent} does not exist")
             if self.place.is_dir():
                 raise Refused(f"{self.name}: this is a folder")
-        except OSError as error:  # a name that is too long
+        except OSError as error:  # for example, the name is too long
             raise Refused(f"{self.name}: {error.strerror}") from None
 
     def failed(self, error):
-        """The NotWritten for an OSError, or for words."""
+        """Returns the NotWritten for `error`, an OSError or a text."""
         return NotWritten(f"{self.name}: {getattr(error, 'strerror', None) or error}")
 
 
 def _is_device(path):
-    """Whether it is there and is neither a file nor a folder: a pipe, a terminal, /dev/null."""
+    """Whether the path exists and is neither a file nor a folder, but a pipe, a terminal or the like of /dev/null."""
     try:
         mode = os.stat(path).st_mode
     except OSError:
@@ -53,7 +54,7 @@ def _is_device(path):
 
 
 def identity(path):
-    """The same for all paths of one file, by symbolic links or hard links, whether it is there yet or not."""
+    """Returns a value that is equal for all paths of one file, through symbolic and hard links, even before it exists."""
     try:
         found = os.stat(path)
         return found.st_dev, found.st_ino
@@ -67,7 +68,10 @@ def identity(path):
 
 
 def require_apart(written, read):
-    """Raises Refused where two written files are one, or one of them is also read. Pairs (what messages call it, path)."""
+    """Raises Refused where two of the written files are the same file, or a written file is also read.
+
+    written, read: pairs (the name for messages, path).
+    """
     names = {identity(path): f"{name}, which is read" for name, path in read}
     for name, path in written:
         found = identity(path)
@@ -77,11 +81,14 @@ def require_apart(written, read):
 
 
 class Staged:
-    """The files that one command writes, until publish() moves all of them to their places. Leaving it removes the rest."""
+    """The files that one command writes, in temporary folders until publish() moves all of them to their places.
+
+    It is a context manager: leaving the context removes the temporary folders.
+    """
 
     def __init__(self):
         self._beside = {}  # Target -> its temporary folder
-        self._moves = []  # (Target, what is moved there, whether it must not replace anything)
+        self._moves = []  # (Target, the file that is moved there, whether the move must not replace a file)
 
     def __enter__(self):
         return self
@@ -93,10 +100,13 @@ class Staged:
                 _folders.discard(folder)
 
     def folder(self, target):
-        """A temporary folder beside the place of a target. Asked for early, it tells early that nothing can be written."""
+        """Returns a temporary folder beside the place of a target.
+
+        A command asks for the folder before its work, so that a place where nothing can be written is refused early.
+        """
         if target not in self._beside:
             if target.place.exists() and not os.access(target.place, os.W_OK):
-                raise target.failed("it is protected against writing; make it writable, or choose another name")
+                raise target.failed("the file is write-protected; make it writable, or choose another name")
             try:
                 with _lock:
                     made = Path(tempfile.mkdtemp(prefix=".tolvol-", dir=target.place.parent))
@@ -107,7 +117,7 @@ class Staged:
         return self._beside[target]
 
     def write(self, target, data):
-        """Adds a file of these bytes. A device or a pipe cannot be replaced: it gets them at once."""
+        """Adds a file with these bytes. A device or a pipe cannot be replaced: the bytes are written to it at once."""
         file = target.place if target.is_device else self.folder(target) / target.place.name
         try:
             file.write_bytes(data)
@@ -117,8 +127,9 @@ class Staged:
             self.add(target, file)
 
     def add(self, target, file, new=False):
-        """Adds a file from a folder() of this; new: publish() fails where there is a file of that name by then."""
-        if file.parent.parent != target.place.parent:  # a link leads elsewhere, perhaps to another file system
+        """Adds a file that lies in a folder() of this object. new: publish() fails if the place is taken by then."""
+        # A symbolic link may have led to another file system, where a move is not possible: the file is copied there.
+        if file.parent.parent != target.place.parent:
             try:
                 file = Path(shutil.copyfile(file, self.folder(target) / target.place.name))
             except OSError as error:
@@ -126,7 +137,7 @@ class Staged:
         self._moves.append((target, file, new))
 
     def publish(self):
-        """Moves everything, in the order in which it was added; when a move fails the ones before it are undone."""
+        """Moves all files in the order in which they were added. When a move fails, the moves before it are undone."""
         for target, file, _ in self._moves:
             try:
                 _finish(file, target.place)
@@ -146,7 +157,7 @@ class Staged:
                 kept = None
                 if target.place.exists():
                     if new:
-                        raise FileExistsError(0, "another program has just written it; run the command again")
+                        raise FileExistsError(0, "another program has just written this file; run the command again")
                     kept = None if last else _second_name(target.place, file)
                 os.replace(file, target.place)
                 undo.append((target.place, kept))
@@ -160,40 +171,41 @@ class Staged:
 
 
 def _finish(file, place):
-    """Brings a file onto the disk, which may be full, with the owner and the mode of the one that it replaces."""
+    """Flushes a file to the disk, which fails if the disk is full, and gives it the owner and mode of the replaced file."""
     with open(file, "rb+") as opened:
         os.fsync(opened.fileno())
     if place.exists():
         old, new = place.stat(), file.stat()
         if (old.st_uid, old.st_gid) != (new.st_uid, new.st_gid):
-            with contextlib.suppress(OSError):  # who is not root cannot give files away
+            with contextlib.suppress(OSError):  # Only root may give a file to another owner.
                 os.chown(file, old.st_uid, old.st_gid)
         if stat.S_IMODE(file.stat().st_mode) != stat.S_IMODE(old.st_mode):
             os.chmod(file, stat.S_IMODE(old.st_mode))
 
 
 def _second_name(place, file):
-    """What is at a place now, kept beside the file that is to replace it."""
+    """Keeps the file that is at `place` now under a second name beside the file that replaces it. Returns that name."""
     kept = file.with_name(file.name + ".replaced")
     try:
         os.link(place, kept)
-    except OSError:  # not every file system has hard links
+    except OSError:  # Some file systems have no hard links.
         shutil.copy2(place, kept)
     return kept
 
 
 @contextlib.contextmanager
 def _alone_in(folder):
-    """No other run moves its files there meanwhile, so that files that belong together stay together."""
+    """Keeps other runs of these commands from moving files into the folder, so that the files of one run stay together."""
     try:
         import fcntl
 
         descriptor = os.open(folder, os.O_RDONLY)
-    except (ImportError, OSError):  # Windows, or a folder that cannot be listed: each file is whole all the same
+    # Windows has no fcntl, and a folder that cannot be listed cannot be opened: each single file is still whole.
+    except (ImportError, OSError):
         yield
         return
     try:
-        with contextlib.suppress(OSError):  # some network folders know no locks
+        with contextlib.suppress(OSError):  # Some network folders have no locks.
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield
     finally:
@@ -201,7 +213,7 @@ def _alone_in(folder):
 
 
 def remove_all():
-    """Removes all temporary folders and lets nobody make another or move a file: for the end of the process."""
+    """Removes all temporary folders and keeps the lock, so that nothing more is made or moved: for the end of the process."""
     _lock.acquire()
     for folder in _folders:
         shutil.rmtree(folder, ignore_errors=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The files that belong to a mesh file: those that it names, and those that are written with it."""
+"""Finds the files that belong to a mesh file: the files that it names and the files that are written with it."""
 
 import itertools
 import json
@@ -11,18 +11,18 @@ from urllib.parse import quote, unquote
 from ..errors import Refused
 from . import gltf_check
 
-# What an exporter writes beside a file, by a name of its own choice; textures of a glTF come on top.
+# Extension of a mesh file -> extension of the file that Blender's exporter writes beside it, besides textures.
 _WRITTEN = {".obj": ".mtl", ".gltf": ".bin"}
 _GLTF = (".gltf", ".glb")
 
 
 def written_with(place, extension):
-    """The paths that may be written with a file of this format, textures left aside."""
+    """Returns the paths that may be written with a file of this format, without textures."""
     return [Path(place).with_suffix(_WRITTEN[extension])] if extension in _WRITTEN else []
 
 
 def read_with(path):
-    """The files on the disk that a mesh file names: materials, textures, buffers; [] where it cannot be read."""
+    """Returns the files on the disk that a mesh file names (materials, textures, buffers); [] if it cannot be read."""
     extension = Path(path).suffix.lower()
     if extension not in (".obj", *_GLTF):
         return []
@@ -37,7 +37,7 @@ def read_with(path):
 def _file(folder, name):
     try:
         return folder / name if (folder / name).is_file() else None
-    except (OSError, ValueError):  # no name that a file could have
+    except (OSError, ValueError):  # No file can have this name.
         return None
 
 
@@ -59,7 +59,7 @@ def _named_by_obj(data, folder):
 
 
 def _names(data, keys):
-    """The names that may be meant by lines with these keys: options may stand before one, and names may have spaces."""
+    """Yields all names that lines with these keys may mean: options may stand before a name, and a name may have spaces."""
     for line in re.findall(rb"^[ \t]*(?:" + keys + rb")[ \t]+([^\r\n]+)", data, re.MULTILINE | re.IGNORECASE):
         words = os.fsdecode(line).split()
         for first, last in itertools.combinations(range(len(words) + 1), 2):
@@ -67,10 +67,10 @@ def _names(data, keys):
 
 
 def keep_textures(exported, folder, taken):
-    """Renames the textures beside an exported .gltf so that none of them replaces a file that is in `folder`.
+    """Renames the textures beside an exported .gltf file so that none of them replaces a file in `folder`.
 
-    One that is there with the same content keeps its name. taken(path): whether it is meant for another file. Returns the
-    textures that are to be moved to `folder`.
+    A texture that `folder` holds with the same content keeps its name. taken(path) tells whether a path is reserved for
+    another file. Returns the textures that have to be moved to `folder`.
     """
     document = json.loads(exported.read_bytes())
     settled, textures = {}, []

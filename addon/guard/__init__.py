@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guards: a mesh that Blender's own tools sculpt, edit or deform stays within the tolerance while they do it.
+"""Guards keep a mesh within the tolerance while Blender's own tools sculpt, edit or deform it.
 
-There is no call from a brush: Blender evaluates the scene after each dab and each step of a transform, and then calls
-depsgraph_update_post, before it draws.
+Blender's brushes call no add-on. But after each dab and each step of a transform Blender evaluates the scene and calls
+depsgraph_update_post before it draws, and the guards work in that handler.
 """
 
 import time
@@ -13,16 +13,20 @@ from bpy.app.handlers import persistent
 from .. import status_bar
 from . import edit, lattice, sculpt, undo
 
-# Setting of Object.tolvol.guard -> module. Each has wanted(ob), blocked(ob), follow(ob, restored, depsgraph), watches.
+# Setting of Object.tolvol.guard -> the module that does it. Each module has wanted(ob), blocked(ob),
+# follow(ob, restored, depsgraph), rest(ob) and watches.
 ROOMS = {"sculpting": sculpt, "editing": edit, "lattice": lattice}
 
 _TICK = 0.1
 
-_restored = None  # "undo" or "redo" until what it brought back was looked at
+_restored = None  # "undo" or "redo" until the guards have looked at the mesh that it brought back
 
 
 def states(ob):
-    """(setting, text, whether it guards: None while there is nothing to guard) of each guard of `ob` that is switched on."""
+    """Yields (setting, text, on) for each guard of `ob` that is switched on.
+
+    on: whether it guards the mesh now; None while there is nothing to guard or the guard is being prepared.
+    """
     for setting, room in ROOMS.items():
         if getattr(ob.tolvol.guard, setting):
             yield setting, *_state(ob, room)
@@ -36,7 +40,7 @@ def _state(ob, room):
         return None, None
     if watch.on:
         return watch.said() or "Within the tolerance", True
-    return (watch.reason, False) if watch.reason else ("Being prepared", None)
+    return (watch.reason, False) if watch.reason else ("The guard is being prepared", None)
 
 
 @persistent
@@ -67,7 +71,7 @@ def _follow(room, ob, depsgraph):
 
 
 def _sweep():
-    """Lets go of what is no longer wanted: another mode, a switch, an object that was removed or renamed."""
+    """Drops watches that are no longer wanted: the mode or the setting changed, or the object was removed or renamed."""
     for room in ROOMS.values():
         for name, _ in room.watches:
             ob = bpy.data.objects.get(name)
@@ -76,7 +80,7 @@ def _sweep():
 
 
 def _tick():
-    """What has to wait until Blender has time; seconds to the next call, None when there is nothing."""
+    """A timer for work that cannot be done in a handler. Returns the seconds to its next call, None to end the timer."""
     _sweep()
     busy = undo.expect()
     for room in ROOMS.values():
@@ -86,7 +90,7 @@ def _tick():
 
 
 def _look_after(room, ob, watch):
-    """Whether there is more to wait for."""
+    """Whether the timer has to call again for this watch."""
     if watch.preparing:
         if watch.settled():
             _follow(room, ob, bpy.context.evaluated_depsgraph_get())

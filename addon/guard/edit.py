@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guard Editing: vertices stop at the tolerance; an edit of the faces that would leave it is undone."""
+"""Guard Editing: moved vertices stop at the tolerance, and an edit of the faces that leaves the tolerance is undone."""
 
 import bmesh
 import bpy
@@ -9,7 +9,8 @@ from ..mesh import mesh_io
 from . import watch
 
 watches = watch.Watches()
-_corrections = watch.Corrections()  # fingerprint of coordinates and faces -> (indices, places)
+# Fingerprint of coordinates and faces -> (indices of vertices, their corrected positions).
+_corrections = watch.Corrections()
 _undoing = False
 
 
@@ -21,7 +22,7 @@ blocked = watch.blocked
 
 
 def follow(ob, restored, _depsgraph):
-    """Called after whatever happened to `ob`; restored: by "undo" or "redo", None for anything else."""
+    """Called after every change of `ob`. restored: "undo" or "redo" if one of these made the change, else None."""
     ob.update_from_editmode()
     mesh = ob.data
     if not mesh.polygons:
@@ -34,7 +35,8 @@ def follow(ob, restored, _depsgraph):
     if known:
         positions[known[0]] = known[1]
     current = watches.of(ob, topology, lambda followed: watch.Watch(ob, positions.copy(), followed))
-    # What a person goes back to was there before the guard; Adjust Last Operation, which keeps the operator, is an edit.
+    # An undo by the user leads to a mesh of before the guard, which the guard leaves as it is. Adjust Last Operation also
+    # undoes, but it keeps its operator in the list of operators; it counts as an edit.
     if restored == "undo" and not _undoing and not bpy.context.window_manager.operators:
         current.followed = False
     if not current.settled() or not current.on:
@@ -50,12 +52,12 @@ def follow(ob, restored, _depsgraph):
 
 
 def rest(ob):
-    """When the edit is over: Blender cuts the faces anew where the vertices are."""
+    """Called when the edit is over. Blender triangulates the faces anew for the corrected positions."""
     bmesh.update_edit_mesh(ob.data)
 
 
 def outside():
-    """An object with faces that an operator, which may go on, made outside of a mesh that was inside before, or None."""
+    """Returns an object that an edit of its faces took out of the tolerance, or None. The operator may still be running."""
     for name, current in watches:
         if current.followed and not current.on and not current.preparing:
             return bpy.data.objects.get(name)
@@ -63,7 +65,7 @@ def outside():
 
 
 def undo():
-    """Goes one step back for good: until it is inside again, whatever was done meanwhile."""
+    """Undoes one step. Unlike an undo by the user, the guard goes on undoing until the mesh is inside again."""
     global _undoing
     _undoing = True
     try:

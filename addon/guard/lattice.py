@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guard Lattice: the points of a lattice stop where the mesh that its modifier deforms would leave the tolerance.
+"""Guard Lattice: the control points of a lattice stop where the mesh that its modifier deforms would leave the tolerance.
 
-What is checked is the mesh as the viewport shows it, with all modifiers. It moves along with the points, in a straight
-line when nothing but lattices deforms it: that line proposes how far they may go, and what comes of it is checked again.
+The mesh is checked as the viewport shows it, with all modifiers. If only lattices deform the mesh, its vertices move in
+a straight line while the control points do: along that line the guard looks for the farthest permitted position. It
+moves the control points there, and checks the mesh that results once more.
 """
 
 import time
@@ -18,11 +19,11 @@ from ..reference import volumes
 from . import watch
 
 watches = watch.Watches()
-_corrections = watch.Corrections()  # fingerprint of the points of all lattices -> the arrays that they became
+_corrections = watch.Corrections()  # fingerprint of the control points of all lattices -> their corrected positions
 
-# Shares of the way that are tried: the farthest permitted is found to 1/256.
+# Number of bisection steps: the farthest permitted share of the way is found to 1/256.
 _HALVINGS = 8
-# Corrections in a row after which the points go all the way back.
+# After so many corrections in a row the control points go all the way back.
 _MOST_TRIES = 3
 
 
@@ -38,12 +39,12 @@ def blocked(ob):
 
 
 def cages_of(ob):
-    """The lattice objects that deform `ob` in the viewport."""
+    """Returns the lattice objects that deform `ob` in the viewport."""
     return [m.object for m in ob.modifiers if m.type == "LATTICE" and m.object and m.show_viewport]
 
 
 class LatticeWatch(watch.Preparing):
-    """Keeps the last points whose mesh was inside, and that mesh."""
+    """Keeps the last control points for which the deformed mesh was inside, and that mesh."""
 
     def __init__(self, ob):
         super().__init__()
@@ -67,8 +68,11 @@ class LatticeWatch(watch.Preparing):
         return self._built is not None
 
     def judge(self, arrays, points):
-        """None when the mesh is inside, which is kept; else where the points have to go, on their way from the last ones
-        that were kept, or None again when it is not they that moved it."""
+        """Returns where the control points have to go, or None if they may stay.
+
+        A mesh that is inside is kept together with its points. If the mesh is outside, the points have to go back towards
+        the last ones that were kept. They stay if the guard is off, or if a change of something else took the mesh out.
+        """
         positions = arrays.vertices
         failing = self._failing(positions, arrays.triangles)
         if not len(failing):
@@ -81,7 +85,7 @@ class LatticeWatch(watch.Preparing):
             self.on, self.reason = False, f"{outside:,} faces of the deformed mesh are outside"
             return None
         self.stopped()
-        # What did not come out as proposed is proposed nearer, but not for ever.
+        # A proposed position whose mesh is outside leads to a nearer proposal, but only _MOST_TRIES times.
         self._tries = self._tries + 1 if _equal(points, self._proposed) else 0
         share = 0.0 if self._tries > _MOST_TRIES else self._share(positions, arrays.triangles[failing])
         self._proposed = [last + np.float32(share) * (now - last) for now, last in zip(points, self._points)]
@@ -92,7 +96,7 @@ class LatticeWatch(watch.Preparing):
         self._stopped = True
 
     def said(self):
-        """What happened last, or None."""
+        """Returns the message about the last correction, or None."""
         return "The lattice was stopped at the tolerance" if self._stopped else None
 
     def _failing(self, positions, triangles):
@@ -111,7 +115,7 @@ class LatticeWatch(watch.Preparing):
 
 
 def follow(ob, restored, depsgraph):
-    """Called after whatever happened to `ob`; restored: by "undo" or "redo", None for anything else."""
+    """Called after every change of `ob`. restored: "undo" or "redo" if one of these made the change, else None."""
     cages = cages_of(ob)
     points = [mesh_io.column(cage.data.points, "co_deform", 3) for cage in cages]
     wish = watch.fingerprint(*points)
@@ -144,7 +148,7 @@ def _write(cages, points):
 
 
 def rest(ob):
-    """Blender evaluates what was written without telling anybody: it is checked now."""
+    """Checks the mesh after a correction: Blender evaluates the written control points without calling a handler."""
     follow(ob, None, bpy.context.evaluated_depsgraph_get())
 
 

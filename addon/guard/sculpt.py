@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guard Sculpting: what a dab moved beyond the tolerance goes back before it is drawn."""
+"""Guard Sculpting: vertices that a dab moved beyond the tolerance are moved back before Blender draws them."""
 
 import bpy
 
@@ -20,12 +20,12 @@ def blocked(ob):
     if ob.use_dynamic_topology_sculpting:
         return "Switch off Dyntopo: it makes new vertices under the brush"
     if any(modifier.type == "MULTIRES" for modifier in ob.modifiers):
-        return "Apply the Multiresolution modifier first: its own points are sculpted, not the mesh"
+        return "Apply the Multiresolution modifier first: sculpting moves the points of the modifier, not of the mesh"
     return None
 
 
 def follow(ob, restored, _depsgraph):
-    """Called after whatever happened to `ob`; restored: by undo or redo, None for anything else."""
+    """Called after every change of `ob`. restored: "undo" or "redo" if one of these made the change, else None."""
     points = watch.points_of(ob)
     positions = mesh_io.column(points, "co", 3)
     current = watches.of(ob, _topology(ob.data), lambda followed: watch.Watch(ob, positions.copy(), followed))
@@ -33,20 +33,23 @@ def follow(ob, restored, _depsgraph):
         return
     wished = positions.copy() if restored or ob.active_shape_key else None
     held = current.hold(positions)
-    # What undo brings back was certified in its time: it is proved anew rather than changed.
+    # Positions that an undo brings back were inside earlier: they are proved anew and kept if the proof succeeds.
     if len(held) and not (restored and watches.restart(ob, wished)):
         _write(ob, wished, positions)
 
 
 def rest(ob):
-    """When the stroke is over: Blender renews what it keeps of places that the brush meant for the vertices."""
+    """Called when the stroke is over. Blender renews the data that it computed from the brush's uncorrected positions."""
     ob.data.update()
 
 
 def _topology(mesh):
-    if bpy.app.version >= (3, 6):  # arrays that are shared with the evaluated mesh move when they are read
+    # From 3.6 on a mesh shares arrays with its evaluated mesh, and reading them may move them in memory: addresses tell
+    # nothing there.
+    if bpy.app.version >= (3, 6):
         return watch.topology(mesh)
-    # Sculpting changes the faces only by tools that make them anew, elsewhere in memory.
+    # Before 3.6 a tool that changes the faces in Sculpt Mode makes new arrays at other addresses. Comparing addresses is
+    # quicker than reading all faces after each dab.
     return (len(mesh.vertices), len(mesh.loops), mesh.loops[0].as_pointer(), mesh.polygons[0].as_pointer())
 
 
@@ -56,6 +59,6 @@ def _write(ob, wished, positions):
         mesh_io.move_vertices(mesh, wished, positions)
         return
     watch.points_of(ob).foreach_set("co", positions.ravel())
-    # A bare mesh is drawn as it is sculpted; one that is evaluated has to be told.
+    # Blender draws a mesh without shape keys and modifiers as it is sculpted; any other has to be evaluated again.
     if key or ob.modifiers:
         mesh.update()

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Undoing an edit as soon as no operator is under way.
+"""Undoes an edit as soon as no operator is running.
 
-To undo while one has its hands in the mesh crashes Blender, and 3.4 does not tell whether one has. But it takes every
-move of the mouse then: one that arrives at the keymap of the window says that there is none. So that nobody has to move
-the mouse for it, Blender is made to send a move to where the mouse rests.
+An undo while a modal operator works on the mesh crashes Blender, and Blender 3.4 does not tell whether one is running.
+But a running modal operator takes every mouse move: a mouse move that arrives at the keymap of the window shows that no
+operator is running. The user need not move the mouse for this, because Blender is made to send a move to the place
+where the mouse rests.
 """
 
 import bpy
@@ -11,15 +12,15 @@ import bpy
 from .. import status_bar
 from . import edit
 
-_item = None  # (keymap, its item) while there is something to undo
-_sent_for = None  # what the last move of a resting mouse was sent for
+_item = None  # (keymap, its item) while there is an edit to undo
+_sent_for = None  # (watch, last operator) for which the last mouse move was sent
 
 
 class TOLVOL_OT_guard_undo(bpy.types.Operator):
     """Undo an edit that left the tolerance"""
 
     bl_idname = "tolvol.guard_undo"
-    bl_label = "Undo What Left the Tolerance"
+    bl_label = "Undo Edit Beyond Tolerance"
     bl_options = {"INTERNAL"}
 
     @classmethod
@@ -35,7 +36,7 @@ class TOLVOL_OT_guard_undo(bpy.types.Operator):
 
 
 def expect():
-    """Listens to the mouse while there is something to undo."""
+    """Waits for a mouse move while there is an edit to undo. Returns whether there is one."""
     global _item, _sent_for
     ob = edit.outside()
     keyconfig = bpy.context.window_manager.keyconfigs.addon
@@ -46,7 +47,7 @@ def expect():
         keymap, item = _item
         keymap.keymap_items.remove(item)
         _item = None
-    # One that an operator takes is lost: when the operator has ended there is another one.
+    # A running operator takes the mouse move that was sent. When that operator has ended, another move is sent.
     operators = bpy.context.window_manager.operators
     wanted = ob and (edit.watches.shown(ob), operators[-1].as_pointer() if operators else None)
     if wanted != _sent_for:
@@ -57,8 +58,11 @@ def expect():
 
 
 def _send_move():
-    """A pan by nothing makes Blender send one. An operator takes those of its own window alone: with several windows the
-    mouse has to say which one it is in."""
+    """Makes Blender send a mouse move: a pan of a header by zero pixels does so.
+
+    A modal operator takes the mouse moves of its own window only. With several windows this function does nothing,
+    because Python cannot tell which window holds the mouse; a move by the user is needed there.
+    """
     windows = bpy.context.window_manager.windows
     if len(windows) > 1 or bpy.app.background:
         return

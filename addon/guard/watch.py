@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One mesh that other hands edit, kept within the tolerance: from which state on, and what was held back."""
+"""Watches one mesh that Blender's tools edit: keeps it within the tolerance and remembers how much was held back."""
 
 import hashlib
 import itertools
@@ -17,20 +17,21 @@ from ..mesh import mesh_io
 from ..proof.certify import INSIDE
 from ..reference import snapshots, tolerances, volumes
 
-# What is ready sooner than this is waited for; Blender goes on meanwhile where it is not.
+# Blender waits so many seconds for a guard to be prepared. If preparing takes longer, it goes on in a thread.
 _PATIENCE = 0.4
-# Of a face with so many corners all triangles between any three of them are kept inside: 41,664.
+# A face with more corners is refused: all triangles between any three corners are kept inside, and for 64 corners these
+# are 41,664 triangles.
 _MOST_CORNERS = 64
-# Seconds without an edit after which the next one is another stroke.
+# After so many seconds without an edit the next edit counts as another stroke.
 _STROKE_GAP = 0.5
-# Seconds after something was held back in which the stroke counts as going on.
+# A stroke counts as over so many seconds after vertices were last held back in it.
 REST = 0.3
 
 _NONE = np.empty(0, np.int32)
 
 
 def blocked(ob):
-    """Why the mesh of `ob` cannot be guarded now, whatever the mode, or None. Cheap enough to draw."""
+    """Why the mesh of `ob` cannot be guarded now, in any mode, or None. It is quick enough to be called while drawing."""
     if native.module is None:
         return native.reason
     if reason := snapshots.reference_missing(ob):
@@ -41,7 +42,7 @@ def blocked(ob):
 
 
 def situation(ob):
-    """What a watch is made for; another value calls for another watch. Cheap."""
+    """Returns a value that identifies mesh, placement, tolerance and reference. When it changes, a new watch is needed."""
     settings, key = ob.tolvol, ob.active_shape_key
     return (
         ob.as_pointer(),
@@ -54,28 +55,31 @@ def situation(ob):
 
 
 def points_of(ob):
-    """The collection that holds the coordinates being edited: the active shape key's or the mesh's own."""
+    """Returns the collection with the coordinates that are edited: those of the active shape key or of the mesh."""
     return ob.active_shape_key.data if ob.active_shape_key else ob.data.vertices
 
 
 @dataclass(frozen=True)
 class Faces:
-    """What has to stay inside, in every triangulation, and what Blender shows of it."""
+    """The faces that have to stay inside in every triangulation, and the triangles that Blender shows for them."""
 
     faces: np.ndarray  # (m, 3) or (m, 4) int32
-    polygons: np.ndarray  # (m,) the polygon of each
+    polygons: np.ndarray  # (m,) the polygon of each face
     shown: np.ndarray  # (k, 3) int32 triangles
-    shown_polygons: np.ndarray  # (k,)
+    shown_polygons: np.ndarray  # (k,) the polygon of each triangle
 
     @classmethod
     def of(cls, mesh):
-        """Quads whole; of faces with more corners every triangle between three of them, however Blender may cut them."""
+        """Takes quads whole. A face with more corners stands for every triangle between any three of its corners, because
+        Blender may triangulate the face in any way."""
         arrays = mesh_io.read_mesh(mesh)
         starts = mesh_io.column(mesh.polygons, "loop_start", 1, np.int32)
         sizes = mesh_io.column(mesh.polygons, "loop_total", 1, np.int32)
         corners = mesh_io.column(mesh.loops, "vertex_index", 1, np.int32)
         if sizes.max() > _MOST_CORNERS:
-            raise Refused(f"A face has {sizes.max()} corners: Face > Triangulate Faces in Edit Mode first")
+            raise Refused(
+                f"A face has {sizes.max()} corners, too many for a guard: use Face > Triangulate Faces in Edit Mode"
+            )
         faces, polygons = [], []
         for size in np.unique(sizes):
             found = np.flatnonzero(sizes == size)
@@ -89,20 +93,24 @@ class Faces:
         return cls(faces, np.concatenate(polygons), arrays.triangles, arrays.polygons)
 
     def outside(self, built, positions, options):
-        """How many polygons are outside as Blender shows them; options: of a check."""
+        """Returns how many polygons are outside in the triangulation that Blender shows. options: of a check."""
         verdict = built.check(positions, self.shown, **options).verdict
         return len(np.unique(self.shown_polygons[verdict < INSIDE]))
 
 
 class Preparing:
-    """What begins in a thread. `on` once it guards; else `reason` says why not, None while it is being prepared.
-    `followed`: it takes over from one that was on, for the same mesh with other faces."""
+    """A watch that is prepared in a thread.
+
+    on: whether it guards the mesh.
+    reason: why it does not guard the mesh; None while it is on or being prepared.
+    followed: whether it takes over from a watch that was on, for the same mesh with other faces.
+    """
 
     def __init__(self, followed=False):
         self.followed = followed
         self.reason = None
         self.on = False
-        self.rest_at = None  # when the stroke that something was held back in counts as over, if there is one
+        self.rest_at = None  # the time at which the current stroke counts as over; None if nothing was held back in it
         self._job = None
 
     def begin(self, work):
@@ -110,7 +118,7 @@ class Preparing:
         self.settled(None if bpy.app.background else _PATIENCE)
 
     def settled(self, seconds=0.0):
-        """Whether it is known by now if this mesh is guarded; None waits for it."""
+        """Whether the preparing has ended. It is waited for up to `seconds`, without limit if that is None."""
         if self._job is not None and self._job.done(seconds):
             job, self._job = self._job, None
             try:
@@ -124,20 +132,20 @@ class Preparing:
         return self._job is not None
 
     def end(self):
-        """Lets go of a thread that is still at work."""
+        """Cancels a thread that is still at work."""
         if self._job is not None:
             self._job.progress.cancel()
 
 
 def needed(ob):
-    """(reference, tolerance, to_world, threads) for a guard of `ob`. Raises Refused and TolvolError."""
+    """Returns (reference, tolerance, to_world, threads) for a guard of `ob`. Raises Refused and TolvolError."""
     reference = snapshots.reference_of(ob)
     tolerance = tolerances.tolerance_length(ob.tolvol, reference.size())
     return reference, tolerance, mesh_io.matrix_array(ob.matrix_world), preferences.threads(bpy.context)
 
 
 class Watch(Preparing):
-    """Keeps the coordinates of one mesh. Edits made before it is ready are judged when it is."""
+    """Guards the coordinates of one mesh. Edits that are made before the watch is ready are checked when it is ready."""
 
     def __init__(self, ob, positions, followed=False):
         super().__init__(followed)
@@ -157,7 +165,8 @@ class Watch(Preparing):
             built = volumes.native_volume(reference, tolerance, threads, progress)
             options = {"to_world": matrix, "threads": threads, "progress": progress}
             guard = native.module.Guard(positions, faces.faces, built, outside="keep", **options)
-            # A concave face may be inside as it is cut and outside as it might be: its corners stay where they are.
+            # A concave face may be inside in its present triangulation and outside in another one. The guard keeps the
+            # corners of such a face where they are.
             kept = len(np.unique(faces.polygons[guard.outside]))
             return guard, kept and faces.outside(built, positions, options), kept
 
@@ -173,11 +182,14 @@ class Watch(Preparing):
 
     @property
     def held_back(self):
-        """How many vertices were held back in the last stroke that was."""
+        """The number of vertices that were held back in the last stroke."""
         return int(np.count_nonzero(self._held))
 
     def hold(self, positions):
-        """Takes the mesh as it was edited, and keeps the array; moves what has to go back in it: (k,) these vertices."""
+        """Takes the edited positions, and moves those vertices in the array that would leave the tolerance.
+
+        Returns the indices of these vertices, (k,). The watch keeps the array.
+        """
         if np.array_equal(positions.view(np.int32), self._last.view(np.int32)):
             return _NONE
         now = time.monotonic()
@@ -186,7 +198,7 @@ class Watch(Preparing):
         self._edited_at = now
         try:
             indices, places = self._guard.constrain(positions)
-        except native.module.TolvolError as error:  # a coordinate that is not finite
+        except native.module.TolvolError as error:  # for example, a coordinate is not finite
             self.on, self.reason = False, str(error)
             return _NONE
         if len(indices):
@@ -197,7 +209,7 @@ class Watch(Preparing):
         return indices
 
     def said(self):
-        """What happened in the last stroke, or None."""
+        """Returns the message about the last stroke, or None."""
         if self._held.any():
             return f"Held back {self.held_back:,} vertices"
         return f"{self.kept_polygons:,} concave faces stay where they are" if self.kept_polygons else None
@@ -211,13 +223,13 @@ class Watches:
     """The watches of one kind, by the names of their objects."""
 
     def __init__(self):
-        self._of = {}  # name -> (what it was made for, watch)
+        self._of = {}  # name -> ((situation, topology) that the watch was made for, watch)
 
     def __iter__(self):
         return iter([(name, watch) for name, (_, watch) in self._of.items()])
 
     def of(self, ob, topology, make):
-        """The watch of `ob`; a new one, make(followed), unless all is as it was when the present one was made."""
+        """Returns the watch of `ob`. If its situation or topology has changed, make(followed) makes a new watch first."""
         key = situation(ob), topology
         known, watch = self._of.get(ob.name, (None, None))
         if known != key:
@@ -228,7 +240,7 @@ class Watches:
         return watch
 
     def restart(self, ob, positions):
-        """Puts a new watch in the place of the one of `ob` if these positions are inside; whether they are."""
+        """Replaces the watch of `ob` by a new one for these positions if they are inside. Returns whether they are."""
         watch = Watch(ob, positions)
         watch.settled(None)
         if watch.on:
@@ -244,8 +256,11 @@ class Watches:
 
 
 class Corrections:
-    """What became of wishes: Blender pushes the undo step of an operator before anybody can look at the outcome, so that
-    undo and redo bring back the wish. The same wish then ends at the same places bit for bit."""
+    """Remembers how edits were corrected, for undo and redo.
+
+    Blender stores the undo step of an operator before a guard can correct the outcome, so that undo and redo bring back
+    the uncorrected positions. The remembered correction then leads to the same positions bit for bit.
+    """
 
     _KEPT = 64_000_000  # bytes
 
@@ -269,7 +284,7 @@ def fingerprint(*arrays):
 
 
 def topology(mesh):
-    """Equal for equal faces."""
+    """Returns a fingerprint of the faces: equal faces have equal fingerprints."""
     return fingerprint(
         mesh_io.column(mesh.loops, "vertex_index", 1, np.int32),
         mesh_io.column(mesh.polygons, "loop_start", 1, np.int32),

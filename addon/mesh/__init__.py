@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is read from Blender's meshes and written to them."""
+"""Reads Blender's meshes as arrays and writes results to them."""

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a decimated mesh keeps beside its geometry, where keeping the elements alone does not do.
+"""Computes the attributes of a decimated mesh that change although its elements stay.
 
-UV maps read, for each corner, the input triangle and the weights that the native result names; the decimation kept their
-seams. Other values at corners (colours, custom normals) may differ from face to face anywhere: at a vertex that did not
-move a corner takes the value found there that is nearest to the one it had. An edge takes the marks of all the edges
-that were merged into it. Surviving vertices that moved read attributes, vertex groups and shape keys where they lie
-now; those that did not move keep theirs bit for bit.
+UV maps: each corner interpolates the UVs of the input triangle that the native result names for it, with the weights
+named there. The decimation keeps UV seams. Other values at corners (colours, custom normals) may differ from face to
+face anywhere: at a vertex that did not move, a corner takes the input value at that vertex that is nearest to the
+corner's old value. Edges: an edge gets the marks of all the edges that were merged into it. Vertices: a remaining vertex
+that moved interpolates attributes, vertex groups and shape keys of the input at its new position; a vertex that did not
+move keeps its values bit for bit.
 """
 
 import bpy
@@ -13,7 +14,8 @@ import numpy as np
 
 from .mesh_io import column
 
-# Data type of a Blender attribute -> its value's name, width, array type. Others (text) stay with their element.
+# Data type of a Blender attribute -> (property of its elements, width, array type). An attribute of another type, such as
+# text, stays with its element.
 _TYPES = {
     "FLOAT": ("value", 1, np.float32),
     "FLOAT2": ("vector", 2, np.float32),
@@ -24,7 +26,7 @@ _TYPES = {
     "INT8": ("value", 1, np.int32),
     "BOOLEAN": ("value", 1, bool),
 }
-# These have their own way: the coordinates, and normals that are stored relative to the shape.
+# These attributes are written elsewhere: the coordinates, and custom normals, which Blender stores relative to the shape.
 _NOT_CARRIED = {"position", "custom_normal"}
 _EDGE_MARKS = {
     "use_seam": bool,
@@ -36,12 +38,12 @@ _EDGE_MARKS = {
 
 
 class Carry:
-    """Reads from the mesh as it is; write() puts it into the mesh as it has become."""
+    """Reads the attributes of the input mesh. write() stores the new values in the decimated mesh."""
 
     def __init__(self, mesh, source, result):
         self._source = source
         self._result = result
-        # Each result vertex reads at one of its corners; only those that moved have to.
+        # A result vertex that moved interpolates with the triangle and the weights of one of its corners.
         used, first = np.unique(result.triangles, return_index=True)
         self._at = np.zeros((len(result.vertices), 3), np.int32)
         self._at[used] = source.triangles[result.source_triangle.ravel()[first]]
@@ -54,7 +56,7 @@ class Carry:
         self._corners = {
             name: values for name, (values, kind) in _attributes(mesh, "CORNER").items() if kind[2] is np.float32
         }
-        # Before 3.5 UV maps are no attributes.
+        # Before 3.5 Blender does not list UV maps among the attributes.
         self._uvs = [column(layer.data, "uv", 2) for layer in mesh.uv_layers]
         self._normals = _custom_normals(mesh)
         self._edges = column(mesh.edges, "vertices", 2, np.int32)
@@ -62,7 +64,7 @@ class Carry:
         self._edge_attributes = _attributes(mesh, "EDGE")
 
     def blend_groups(self, built):
-        """Vertex groups of the vertices that moved, in the BMesh before its vertices are merged."""
+        """Interpolates the vertex groups of the vertices that moved, in the BMesh before its vertices are merged."""
         layer = built.verts.layers.deform.active
         if layer is None:
             return
@@ -120,7 +122,8 @@ class Carry:
             kind = (name, 1, _EDGE_MARKS[name])
             _merge(mesh.edges, kind, found, values[takes])
         for name, (values, kind) in self._edge_attributes.items():
-            if name not in mesh.attributes:  # newer Blenders drop a mark that no element has left; it came back above
+            # Newer versions of Blender drop an attribute of marks that no element has left. The loop above wrote it.
+            if name not in mesh.attributes:
                 continue
             _merge(mesh.attributes[name].data, kind, found, values[takes])
 
@@ -139,16 +142,18 @@ class Carry:
     def _write_normals(self, mesh, layout):
         if self._normals is None:
             return
-        # Blender stores one normal for all corners between two sharp edges, and would mark edges sharp to store more.
+        # Blender stores one normal for all corners between two sharp edges. To store different ones it would mark more
+        # edges as sharp, so those corners get their mean.
         normals = self._nearest_values(self._normals, layout, _fans(mesh)).astype(np.float64)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         with _AutoSmooth(mesh):
             mesh.normals_split_custom_set(normals)
 
     def _nearest_values(self, values, layout, shared=None):
-        """(corners, width) for the written mesh: read where a vertex moved, chosen where it did not.
+        """Returns (corners, width), the values for the written mesh.
 
-        shared: a label for each corner; those with the same get the same value.
+        At a vertex that moved the values are interpolated; at any other they are chosen among the input values there.
+        shared: a label for each corner; corners with the same label get the same value.
         """
         values = values.reshape(len(values), -1)
         read = _blend(values[self._corner_at], self._corner_weights)
@@ -160,7 +165,7 @@ class Carry:
         still = np.ones(len(self._result.vertices), bool)
         still[self._moved] = False
         chosen = np.flatnonzero(still[vertices])
-        # All input corners, by vertex; then for each chosen corner the run of those at its vertex.
+        # The input corners are sorted by vertex; the candidates of a corner are the run of input corners at its vertex.
         at_vertex = self._source.triangles.ravel()
         order = np.argsort(at_vertex, kind="stable")
         starts = np.searchsorted(at_vertex[order], np.arange(len(self._source.vertices) + 1))
@@ -178,21 +183,27 @@ class Carry:
 
 
 def _blend(values, weights):
-    """(r, 3, ...) values at three places -> (r, ...): the weighted sum of numbers, the heaviest of anything else."""
+    """Blends values at three places, (r, 3, ...), to (r, ...).
+
+    Returns the weighted sum of float32 values; of other types it returns the value with the largest weight.
+    """
     if values.dtype != np.float32:
         return values[np.arange(len(values)), np.argmax(weights, 1)]
     return np.einsum("rk,rk...->r...", weights, values.astype(np.float64)).astype(np.float32)
 
 
 def _mean(values, labels):
-    """(r, width) -> the same, each row the mean of the rows with its label."""
+    """Replaces each row of (r, width) by the mean of the rows with the same label."""
     sums = np.zeros((labels.max(initial=0) + 1, values.shape[1]))
     np.add.at(sums, labels, values)
     return (sums / np.maximum(np.bincount(labels, minlength=len(sums)), 1)[:, None])[labels].astype(np.float32)
 
 
 def _fans(mesh):
-    """A label for each corner of a triangle mesh: equal at a vertex where no sharp edge or flat face lies between."""
+    """Returns a label for each corner of a triangle mesh.
+
+    Two corners at a vertex have the same label if no sharp edge and no flat-shaded face lies between them.
+    """
     edges, starts = (column(mesh.loops, name, 1, np.int32) for name in ("edge_index", "vertex_index"))
     count = len(edges)
     corner = np.arange(count)
@@ -217,7 +228,7 @@ def _fans(mesh):
 
 
 def _attributes(mesh, domain):
-    """name -> (values, (value's name, width, array type)) of the attributes of one domain that an array can hold."""
+    """Returns {name: (values, (property, width, array type))} for the attributes of one domain that an array can hold."""
     found = {}
     uv_maps = {layer.name for layer in mesh.uv_layers}
     for attribute in mesh.attributes:
@@ -231,7 +242,7 @@ def _attributes(mesh, domain):
 def _edge_marks(mesh):
     known = bpy.types.MeshEdge.bl_rna.properties.keys()
     marks = {name: column(mesh.edges, name, 1, kind) for name, kind in _EDGE_MARKS.items() if name in known}
-    # Writing creases or bevel weights would add their layer to a mesh that has none.
+    # Only marks that are used are written: writing creases or bevel weights would add their layer to a mesh without it.
     return {name: values for name, values in marks.items() if values.any()}
 
 
@@ -241,14 +252,14 @@ def _edge_keys(vertices, count):
 
 
 def _assign(collection, name, width, dtype, places, values):
-    """Sets some elements of a collection and leaves the others bit for bit."""
+    """Sets some elements of a collection and leaves the other elements bit for bit."""
     everything = column(collection, name, width, dtype)
     everything[places] = values
     collection.foreach_set(name, everything.ravel())
 
 
 def _merge(collection, kind, places, values):
-    """Marks (flags, creases) of several elements that became one: any of the flags, the largest of the weights."""
+    """Writes marks where several elements became one: a flag if any of them had it, the largest of their weights."""
     name, width, dtype = kind
     everything = column(collection, name, width, dtype)
     if dtype == np.float32 and width == 1:
@@ -263,7 +274,7 @@ def _merge(collection, kind, places, values):
 
 
 class _AutoSmooth:
-    """Before 4.1 custom normals are read and written only while a mesh is set to Auto Smooth."""
+    """Switches Auto Smooth on while the context lasts: before 4.1 Blender reads and writes custom normals only with it."""
 
     def __init__(self, mesh):
         self._mesh = mesh
@@ -279,7 +290,7 @@ class _AutoSmooth:
 
 
 def _custom_normals(mesh):
-    """(corners, 3), or None without custom normals."""
+    """Returns the custom normals, (corners, 3), or None if the mesh has none."""
     if not mesh.has_custom_normals:
         return None
     if bpy.app.version >= (4, 1):

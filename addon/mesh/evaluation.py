@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One modifier of an object on its base mesh alone, as Blender evaluates it, in a scene of its own."""
+"""Evaluates one modifier of an object on the base mesh, without the other modifiers, in a scene made for this."""
 
 import bpy
 import numpy as np
@@ -8,18 +8,19 @@ from .mesh_io import column
 
 
 class Evaluation:
-    """A context manager; `modifier` is a copy to play with, the object and its modifiers stay as they are."""
+    """A context manager. `modifier` is a copy whose settings may be changed; the object and its modifiers stay as they are."""
 
     def __init__(self, ob, name):
         self._original = ob
         self._name = name
 
     def __enter__(self):
-        # The object keeps its parent and constraints, so that what the modifier refers to lies where it does.
+        # The copy keeps parent and constraints of the object, so that it lies where the object does: the modifier may
+        # depend on the distance from other objects.
         self._ob = self._original.copy()
         self._ob.data = self._original.data.copy()
         self._ob.animation_data_clear()
-        self._ob.property_unset("tolvol")  # nothing is kept of it, and nothing watches it
+        self._ob.property_unset("tolvol")  # The copy needs no reference, and no guard has to watch it.
         self._ob.shape_key_clear()
         for modifier in list(self._ob.modifiers):
             if modifier.name != self._name:
@@ -38,11 +39,11 @@ class Evaluation:
         bpy.data.meshes.remove(mesh)
 
     def mesh(self):
-        """The evaluated mesh, until it is asked for again."""
+        """Returns the evaluated mesh, which is valid until the next call."""
         return self._evaluated()[0].data
 
     def new_mesh(self):
-        """The same as a datablock of its own, with all that is stored in it."""
+        """Returns the evaluated mesh as a new datablock, with all its attributes."""
         evaluated, depsgraph = self._evaluated()
         return bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
 
@@ -53,7 +54,7 @@ class Evaluation:
 
 
 def same_faces(mesh, other):
-    """Whether two meshes have the same faces on the same vertices, wherever those are."""
+    """Whether two meshes have the same faces on the same vertices. The positions of the vertices may differ."""
     return len(mesh.vertices) == len(other.vertices) and all(
         np.array_equal(*(column(collection, name, 1, np.int32) for collection in pair))
         for pair, name in (

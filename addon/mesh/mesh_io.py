@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender meshes as arrays: coordinates as they are stored, the triangles that Blender shows, and the 4x4 to the world."""
+"""Reads Blender's meshes as arrays (stored coordinates and the triangles that Blender shows) and writes arrays to them."""
 
 import hashlib
 from dataclasses import dataclass
@@ -19,21 +19,21 @@ class MeshArrays:
     polygons: np.ndarray  # (m,) int32, the polygon that each triangle is part of
 
     def fingerprint(self):
-        """Equal for equal coordinates and triangles, whatever the datablock."""
+        """Returns a text that is equal for equal coordinates and triangles, whatever datablock they are from."""
         digest = hashlib.blake2b(self.vertices.tobytes(), digest_size=16)
         digest.update(self.triangles.tobytes())
         return digest.hexdigest()
 
 
 def column(collection, attribute, width=1, dtype=np.float32):
-    """One attribute of a whole collection, (n,) or (n, width)."""
+    """Returns one attribute of a whole collection, (n,) or (n, width)."""
     values = np.empty(len(collection) * width, dtype)
     collection.foreach_get(attribute, values)
     return values if width == 1 else values.reshape(-1, width)
 
 
 def read_mesh(mesh):
-    """The arrays of `mesh`, about 60 ms for 270,000 triangles."""
+    """Returns the arrays of `mesh`. This takes about 60 ms for 270,000 triangles."""
     mesh.calc_loop_triangles()
     triangles = mesh.loop_triangles
     return MeshArrays(
@@ -45,9 +45,10 @@ def read_mesh(mesh):
 
 
 def whole_quads(mesh, arrays):
-    """(m, 3), or (m, 4) with quads whole and triangles with a repeated corner: faces for checks in every triangulation.
+    """Returns faces for a check of quads in both their triangulations: (m, 4), or (m, 3) if the mesh has no quads.
 
-    arrays: those of the mesh. Of faces with more corners the triangles that Blender shows.
+    In (m, 4) a triangle repeats its last corner. A face with more than four corners is replaced by the triangles that
+    Blender shows. arrays: the arrays of the mesh.
     """
     sizes = column(mesh.polygons, "loop_total", 1, np.int32)
     quad = sizes == 4
@@ -60,7 +61,7 @@ def whole_quads(mesh, arrays):
 
 
 def triangles_at(mesh, vertices):
-    """(m, 3) int32: how Blender would triangulate the mesh if its vertices were there."""
+    """Returns (m, 3) int32: the triangles that Blender would show if the mesh had these vertex positions."""
     scratch = mesh.copy()
     try:
         scratch.vertices.foreach_set("co", vertices.ravel())
@@ -70,28 +71,36 @@ def triangles_at(mesh, vertices):
 
 
 def select_faces(mesh, chosen):
-    """chosen: (polygons,) bool; no vertex or edge by itself. In Object Mode."""
+    """Selects the chosen faces and no other element, in Object Mode. chosen: (polygons,) bool."""
     if bpy.app.version >= (5, 0) and (attribute := mesh.attributes.get(".select_edge")):
-        mesh.attributes.remove(attribute)  # which selects none; 5.0 crashes when they are set in one that is there
+        # Blender 5.0 crashes when the selection of edges is written while this attribute exists. Removing the attribute
+        # deselects all edges.
+        mesh.attributes.remove(attribute)
     for elements in (mesh.vertices, mesh.edges):
         elements.foreach_set("select", np.zeros(len(elements), bool))
     mesh.polygons.foreach_set("select", chosen)
 
 
 def move_vertices(mesh, before, after):
-    """Writes coordinates bit for bit; shape keys keep their motion from the basis. before: the present ones."""
+    """Writes coordinates bit for bit. before: the present coordinates.
+
+    Shape keys keep their offsets from the basis.
+    """
     mesh.vertices.foreach_set("co", after.ravel())
     if mesh.shape_keys:
         for key in mesh.shape_keys.key_blocks:
             basis = key == mesh.shape_keys.reference_key
             key.data.foreach_set("co", (after if basis else column(key.data, "co", 3) + (after - before)).ravel())
-    # Blender keeps the triangles it has through foreach_set and update(); one vertex set by itself makes it cut anew.
+    # foreach_set() and update() keep the present triangulation. Setting a single vertex makes Blender triangulate anew.
     mesh.vertices[0].co = mesh.vertices[0].co
     mesh.update()
 
 
 def move_edited(mesh, indices, places):
-    """Writes coordinates of some vertices bit for bit while the mesh is in Edit Mode; the BMesh, to be updated."""
+    """Writes the coordinates of some vertices bit for bit while the mesh is in Edit Mode.
+
+    Returns the BMesh; the caller has to update the edit mesh.
+    """
     edited = bmesh.from_edit_mesh(mesh)
     edited.verts.ensure_lookup_table()
     for index, place in zip(indices.tolist(), places.tolist()):
@@ -100,7 +109,7 @@ def move_edited(mesh, indices, places):
 
 
 def new_mesh(name, vertices, triangles):
-    """A datablock that holds these coordinates and triangles bit for bit, and nothing else."""
+    """Returns a new datablock that holds these coordinates, rounded to float32, and these triangles."""
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(vertices))
     mesh.vertices.foreach_set("co", np.ascontiguousarray(vertices, np.float32).ravel())
@@ -108,31 +117,31 @@ def new_mesh(name, vertices, triangles):
     mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(triangles, np.int32).ravel())
     mesh.polygons.add(len(triangles))
     mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
-    if bpy.app.version < (4, 0):  # computed, and read-only, from 4.0 on
+    if bpy.app.version < (4, 0):  # From 4.0 on Blender computes loop_total, and it is read-only.
         mesh.polygons.foreach_set("loop_total", np.full(len(triangles), 3, np.int32))
     mesh.update(calc_edges=True)
     return mesh
 
 
 def matrix_array(matrix):
-    """A mathutils.Matrix as (4, 4) float64."""
+    """Returns a mathutils.Matrix as (4, 4) float64."""
     return np.array(matrix, dtype=np.float64)
 
 
 def to_world(vertices, matrix):
-    """Stored coordinates mapped to the world, (n, 3) float64."""
+    """Maps stored coordinates to the world: (n, 3) float64."""
     return np.asarray(vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def loose_edges(mesh):
-    """(k, 2) int32: the vertices of the edges that no face uses."""
+    """Returns (k, 2) int32: the vertices of the edges that no face uses."""
     used = np.zeros(len(mesh.edges), bool)
     used[column(mesh.loops, "edge_index", 1, np.int32)] = True
     return column(mesh.edges, "vertices", 2, np.int32)[~used]
 
 
 def corner_uvs(mesh):
-    """(corners, 2 * layers) float32: the values of all UV maps, or None when there are none."""
+    """Returns (corners, 2 * layers) float32: the values of all UV maps. Returns None if there are none."""
     if not mesh.uv_layers:
         return None
     return np.hstack([column(layer.data, "uv", 2) for layer in mesh.uv_layers])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which vertices of a mesh an operation may touch, and how much: selection, marked edges, symmetry planes, weights."""
+"""Finds the vertices that an operation has to leave alone, by selection, marked edges, symmetry planes or weights."""
 
 import bpy
 import numpy as np
@@ -8,12 +8,13 @@ from ..errors import Refused
 from . import mesh_io
 from .mesh_io import column
 
-# A vertex lies on a symmetry plane within this share of the mesh's extent: what float32 and modelling by hand leave.
+# A vertex counts as lying on a symmetry plane up to this share of the mesh's extent: rounding to float32 and modelling by
+# hand leave vertices so far from the plane.
 _ON_PLANE = 1e-5
 
 
 def unselected(ob):
-    """(n,) bool: vertices of faces that are not selected."""
+    """Returns (n,) bool: the vertices of faces that are not selected."""
     mesh = ob.data
     selected = column(mesh.polygons, "select", 1, bool)
     if not selected.any():
@@ -25,12 +26,12 @@ def unselected(ob):
 
 
 def unselected_vertices(ob):
-    """(n,) bool: vertices that are not selected."""
+    """Returns (n,) bool: the vertices that are not selected."""
     return ~column(ob.data.vertices, "select", 1, bool)
 
 
 def on_edges(mesh, kinds):
-    """(n,) bool: vertices of the edges of these kinds, named as in operation_settings.PROTECTED."""
+    """Returns (n,) bool: the vertices of the edges of these kinds, which are named as in operation_settings.PROTECTED."""
     chosen = np.zeros(len(mesh.edges), bool)
     for kind in kinds:
         chosen |= _EDGES[kind](mesh)
@@ -40,14 +41,14 @@ def on_edges(mesh, kinds):
 
 
 def on_planes(mesh, axes):
-    """(n,) bool: vertices where a coordinate is 0; axes: of "X", "Y" and "Z"."""
+    """Returns (n,) bool: the vertices whose coordinate along one of the axes is 0. axes: a set of "X", "Y" and "Z"."""
     coordinates = np.abs(column(mesh.vertices, "co", 3))
     near = coordinates <= _ON_PLANE * coordinates.max(initial=0.0)
     return near[:, ["XYZ".index(axis) for axis in axes]].any(1)
 
 
 def group_weights(ob, name, invert):
-    """(n,) float64 of a vertex group, or None without a name."""
+    """Returns (n,) float64: the weights of the vertex group with this name. Returns None if the name is empty."""
     if not name:
         return None
     group = ob.vertex_groups.get(name)
@@ -68,7 +69,7 @@ def _boundary(mesh):
 def _creases(mesh):
     if "crease" in bpy.types.MeshEdge.bl_rna.properties:
         return column(mesh.edges, "crease") > 0
-    found = mesh.attributes.get("crease_edge")  # newer Blenders
+    found = mesh.attributes.get("crease_edge")  # where newer versions of Blender store creases
     return column(found.data, "value") > 0 if found else np.zeros(len(mesh.edges), bool)
 
 
@@ -81,7 +82,8 @@ def _island_borders(mesh):
     uvs = mesh_io.corner_uvs(mesh)
     if uvs is None:
         return np.zeros(len(mesh.edges), bool)
-    # A corner stands for the edge to the next one: the values at its lower vertex, then those at the other.
+    # A corner stands for the edge to the next corner of its face. Its row holds the UVs at the edge's vertex with the
+    # smaller index, then those at the other vertex, so that both faces of the edge list them in the same order.
     starts, sizes = (column(mesh.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total"))
     following = np.arange(1, len(mesh.loops) + 1)
     following[starts + sizes - 1] = starts
@@ -92,7 +94,7 @@ def _island_borders(mesh):
 
 
 def _differ(mesh, values):
-    """(edges,) bool: edges whose corners do not all have the same; values: (corners, width)."""
+    """Returns (edges,) bool: the edges whose corners have different values. values: (corners, width)."""
     edges = column(mesh.loops, "edge_index", 1, np.int32)
     first = np.zeros(len(mesh.edges), np.int64)
     first[edges] = np.arange(len(edges))

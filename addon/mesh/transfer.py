@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writing a decimated mesh into a Blender mesh with all that hangs on it.
+"""Writes a decimated mesh into a Blender mesh and keeps the mesh's attributes.
 
-The triangles that go on stay the faces they are and their vertices are welded onto the survivors by one
-bmesh.ops.weld_verts, so that whatever Blender stores at faces and at surviving vertices is kept as it is. What lies at
-corners and edges is gathered by arrays (carry.py).
+The remaining triangles stay the faces that they are in the Blender mesh, and one call of bmesh.ops.weld_verts merges each
+removed vertex into a remaining one. Data that Blender stores at faces and at remaining vertices is thereby kept as it is.
+Data at corners and edges is computed as arrays by carry.py.
 """
 
 from dataclasses import dataclass
@@ -18,32 +18,34 @@ from .mesh_io import column
 
 
 class MeshMismatch(Refused):
-    """Nothing was written."""
+    """Blender's mesh would differ from the computed one. Nothing was written."""
 
     def __init__(self, reason):
-        super().__init__(f"Blender cannot hold the mesh that was computed: {reason}")
+        super().__init__(f"Blender cannot hold the computed mesh: {reason}")
 
 
 @dataclass(frozen=True)
 class Decimated:
-    """The native result of decimate(), as far as Blender can hold it: see there for the arrays."""
+    """The native result of decimate() as far as Blender can hold it. The documentation of decimate() tells the arrays."""
 
     vertices: np.ndarray
     triangles: np.ndarray
     vertex_map: np.ndarray
     vertex_source: np.ndarray
     triangle_source: np.ndarray
-    turned: np.ndarray  # (l,) bool: an edge was flipped, so that the corners are not those of the source triangle
+    # (l,) bool: an edge was flipped, so that the triangle has other corners than its source triangle.
+    turned: np.ndarray
     source_triangle: np.ndarray
     source_weights: np.ndarray
-    coincident: int  # triangles left out: Blender holds one face on any three vertices
+    coincident: int  # number of triangles that were left out: Blender holds only one face on the same three vertices
 
     @classmethod
     def of(cls, result, source):
         vertices, vertex_map, vertex_source = result.vertices, result.vertex_map, result.vertex_source
         welded = vertex_map[source.triangles[result.triangle_source]]
         turned = (welded != result.triangles).any(1)
-        # A face that is only a segment or a point may have had vertices at one position joined: it keeps its own.
+        # The decimation joins vertices at the same position. A face that is only a segment or a point may then name a
+        # vertex twice, which Blender cannot hold: such a face keeps its own vertices.
         a, b, c = result.triangles.T
         repeats = source.triangles[result.triangle_source[(a == b) | (b == c) | (c == a)]]
         own = np.unique(repeats[vertex_source[vertex_map[repeats]] != repeats])
@@ -52,7 +54,7 @@ class Decimated:
         vertices = np.concatenate([vertices, source.vertices[own]])
         vertex_source = np.concatenate([vertex_source, own.astype(vertex_source.dtype)])
         triangles = np.where(turned[:, None], result.triangles, vertex_map[source.triangles[result.triangle_source]])
-        # Two sheets that lay exactly on one another may end on the same vertices; as surfaces they are one.
+        # Two sheets that lie exactly on one another may end on the same vertices. They are the same surface: one is kept.
         _, first = np.unique(np.sort(triangles, 1), axis=0, return_index=True)
         kept = np.sort(first)
         return cls(
@@ -69,10 +71,10 @@ class Decimated:
 
 
 class Writing:
-    """Turns `mesh`, whose arrays are `source`, into the Decimated `result`; a context manager.
+    """A context manager that turns `mesh`, whose arrays are `source`, into the Decimated `result`.
 
-    Entering builds a scratch mesh and compares it with the result, vertex by vertex and triangle by triangle, and raises
-    MeshMismatch when they differ; the mesh is touched by write() alone.
+    Entering the context builds a scratch mesh, compares it with the result vertex by vertex and triangle by triangle, and
+    raises MeshMismatch if they differ. Only write() changes the mesh.
     """
 
     def __init__(self, mesh, source, result):
@@ -110,11 +112,12 @@ class Writing:
 
 
 class Layout:
-    """Where vertices and corners of the native result are found in the mesh that was written.
+    """Tells where vertices and corners of the native result are in the written mesh.
 
-    vertices: (n,) new index of each input vertex, those merged into a survivor have the survivor's
-    result_vertices: (k,) new index of each result vertex
-    triangles, corners: (f,) and (f, 3), the result triangle at each new face, and which of its corners is where
+    vertices: (n,) the new index of each input vertex; a merged vertex has the index of the one that it was merged into
+    result_vertices: (k,) the new index of each result vertex
+    triangles: (f,) the result triangle of each written face
+    corners: (f, 3) the corner of that result triangle at each corner of the written face
     """
 
     def __init__(self, vertices, result_vertices, triangles, corners):
@@ -134,11 +137,12 @@ def _triangulate(built, source):
     sizes = np.bincount(source.polygons, minlength=len(faces)) + 2
     starts = np.searchsorted(source.polygons, np.arange(len(faces)))
     quads = np.flatnonzero(sizes == 4)
-    # The two corners of a quad's diagonal are in both its triangles, and the lowest corner is the polygon's first.
+    # Both triangles of a quad contain the two corners of its diagonal, and the corner with the lowest index is the quad's
+    # first one: the diagonal goes through the first corner if both triangles contain that corner.
     one, two = source.corners[starts[quads]], source.corners[starts[quads] + 1]
     lowest = np.minimum(one.min(1), two.min(1))[:, None]
     through_first = (one == lowest).any(1) & (two == lowest).any(1)
-    # An n-gon is clipped by the code that makes its loop_triangles; _keep_faces would notice another cut.
+    # EAR_CLIP uses the code that makes the loop_triangles of an n-gon. _keep_faces() refuses a triangulation that differs.
     for chosen, method in (
         (quads[through_first], {"quad_method": "FIXED"}),
         (quads[~through_first], {"quad_method": "ALTERNATE"}),
@@ -149,15 +153,17 @@ def _triangulate(built, source):
 
 
 def _keep_faces(built, source, kept):
-    """Deletes all faces but the triangles `kept` of the source, which it returns; edges and vertices stay."""
+    """Deletes all faces except the triangles `kept` of the source and returns those. All edges and vertices stay."""
     faces = built.faces[:]
-    if source.polygons[-1] + 1 == len(source.polygons):  # nothing was cut: face i is triangle i
+    if source.polygons[-1] + 1 == len(source.polygons):  # All polygons are triangles: face i is triangle i.
         rows = np.arange(len(faces))
     else:
         _, present = _scratch_arrays(built)
         rows = _matching_rows(_rotated(source.triangles)[0], _rotated(present)[0])
         if rows is None:
-            raise MeshMismatch("its n-gons are cut otherwise than shown. Triangulate them first (Ctrl T in Edit Mode)")
+            raise MeshMismatch(
+                "its n-gons would be triangulated otherwise than shown. Triangulate them first (Ctrl T in Edit Mode)"
+            )
     stays = np.zeros(len(faces), bool)
     stays[rows[kept]] = True
     bmesh.ops.delete(built, geom=[faces[i] for i in np.flatnonzero(~stays)], context="FACES_ONLY")
@@ -165,14 +171,15 @@ def _keep_faces(built, source, kept):
 
 
 def _turn(built, faces, result):
-    """Makes the faces around which edges were flipped anew, on the vertices that survive; they keep what they are.
+    """Replaces each face around which an edge was flipped by a new one on the remaining vertices, with the same attributes.
 
-    faces: those of the result's triangles.
+    faces: the face of each triangle of the result.
     """
     turned = np.flatnonzero(result.turned).tolist()
     if not turned:
         return
-    # One of them may lie where another one was: what they are is kept by copies that lie nowhere.
+    # A new face may have the vertices of an old one that is not replaced yet, and Blender holds only one face there. So
+    # all old faces are deleted first, and copies on vertices of their own keep the attributes meanwhile.
     copies = bmesh.ops.duplicate(built, geom=[faces[row] for row in turned])["face_map"]
     copies = [copies[faces[row]] for row in turned]
     bmesh.ops.delete(built, geom=[faces[row] for row in turned], context="FACES_ONLY")
@@ -186,7 +193,7 @@ def _turn(built, faces, result):
 
 
 def _weld_targets(result):
-    """(n,) the input vertex that each input vertex is merged onto; itself where it stays."""
+    """Returns (n,): the input vertex that each input vertex is merged into. A vertex that stays has its own index."""
     targets = np.arange(len(result.vertex_map))
     merged = result.vertex_map >= 0
     targets[merged] = result.vertex_source[result.vertex_map[merged]]
@@ -197,13 +204,13 @@ def _weld(built, targets, loose):
     verts = built.verts[:]
     gone = np.flatnonzero(targets != np.arange(len(targets)))
     bmesh.ops.weld_verts(built, targetmap={verts[i]: verts[j] for i, j in zip(gone.tolist(), targets[gone].tolist())})
-    # Edges of deleted faces that became an edge of no other face.
+    # Some edges of deleted faces have become edges of no other face. Edges that were loose before stay.
     stray = [edge for edge in built.edges if edge.is_wire and edge not in loose]
     bmesh.ops.delete(built, geom=stray, context="EDGES")
 
 
 def _scratch_arrays(built):
-    """(vertices, triangles) as the mesh would be stored; triangles is None when a face has more than three corners."""
+    """Returns (vertices, triangles) as Blender would store the mesh; triangles is None if any face is not a triangle."""
     scratch = bpy.data.meshes.new(".scratch")
     try:
         built.to_mesh(scratch)
@@ -216,7 +223,7 @@ def _scratch_arrays(built):
 
 
 def _compare(written, source, result):
-    """The Layout of the written arrays; raises MeshMismatch unless they are the result, triangle by triangle."""
+    """Returns the Layout of the written arrays. Raises MeshMismatch if they are not the result, triangle by triangle."""
     vertices, triangles = written
     targets = _weld_targets(result)
     stays = targets == np.arange(len(targets))
@@ -234,13 +241,13 @@ def _compare(written, source, result):
 
 
 def _rotated(triangles):
-    """Each triangle turned so that its lowest vertex comes first, and by how many corners it was turned."""
+    """Rotates the corners of each triangle so that its lowest vertex comes first. Returns (triangles, number of steps)."""
     shift = np.argmin(triangles, 1)
     return np.take_along_axis(triangles, (np.arange(3) + shift[:, None]) % 3, 1), shift
 
 
 def _matching_rows(wanted, present):
-    """For each row of `wanted` the row of `present` that equals it, one to one; None when they differ."""
+    """Returns for each row of `wanted` the equal row of `present`, one to one; None if they do not all have one."""
     if wanted.shape != present.shape:
         return None
     of_wanted, of_present = np.lexsort(wanted.T), np.lexsort(present.T)

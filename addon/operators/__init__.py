@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""bpy.ops.tolvol: set_tolerance, set_reference, clear_reference, check, select_outside, save_report, decimate, smooth,
-apply_modifier, fit_modifier, deform."""
+"""Registers the operators in bpy.ops.tolvol: set_tolerance, set_reference, clear_reference, check, select_outside,
+save_report, decimate, smooth, apply_modifier, fit_modifier and deform."""
 
 import bpy
 

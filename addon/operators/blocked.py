@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Why an operator cannot run on an object, as text for the panel, the tooltip of the greyed button and scripts."""
+"""Says why an operator cannot run on an object, for the panel, the tooltip of the greyed button, and scripts."""
 
 from .. import native
 from ..reference import snapshots
@@ -8,7 +8,7 @@ _OBJECT_MODE = {"OBJECT"}
 
 
 def object_blocked(ob, modes=_OBJECT_MODE):
-    """Why nothing can be done with `ob` now, or None; modes: those of Blender in which it can."""
+    """Why no operator can run on `ob` now, or None. modes: Blender's modes in which the operator can run."""
     if native.module is None:
         return native.reason
     if ob is None or ob.type != "MESH":
@@ -28,7 +28,7 @@ def reference_blocked(ob, modes=_OBJECT_MODE):
     if source is None:
         return "Choose the reference object"
     if source.type != "MESH":
-        return f"{source.name} is no mesh: Object > Convert > Mesh"
+        return f"{source.name} is not a mesh: Object > Convert > Mesh"
     if not source.data.polygons:
         return f"{source.name} has no faces"
     return None
@@ -61,7 +61,7 @@ def decimate_blocked(ob, modes=_OBJECT_MODE):
 
 
 def allowed(cls, reason):
-    """For an operator's poll: False with the reason in its tooltip."""
+    """Returns the result of an operator's poll(). If there is a reason, the result is False, and the tooltip shows it."""
     if reason:
         cls.poll_message_set(reason)
     return not reason

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Comparing an object with its reference: certified distances both ways, and the faces that are outside."""
+"""Compares an object with its reference: certified distances both ways, and the faces that are outside."""
 
 import functools
 from dataclasses import replace
@@ -20,7 +20,7 @@ from .blocked import allowed, check_blocked
 
 
 class Comparison(JobOperator):
-    """Prepares both surfaces; what is compared is compare(surface, reference, tolerance, threads, progress), in the thread."""
+    """Prepares both surfaces. The thread calls compare(surface, reference, tolerance, threads, progress)."""
 
     threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
 
@@ -38,8 +38,8 @@ class Comparison(JobOperator):
 
 
 class TOLVOL_OT_check(Comparison, bpy.types.Operator):
-    """Measure how far the mesh lies from the reference and the reference from the mesh: the largest distance, proved, \
-and how much of the mesh is beyond the tolerance"""
+    """Measure the largest distance of the mesh from the reference and of the reference from the mesh, both proved, and \
+the share of the mesh that is beyond the tolerance"""
 
     bl_idname = "tolvol.check"
     bl_label = "Check"
@@ -61,18 +61,21 @@ and how much of the mesh is beyond the tolerance"""
         measurements.remember(self.ob, surface, certified, found.tolerance, found.share_outside)
         largest = report.percent(max(found.forward.upper, found.backward.upper), found.tolerance)
         if found.kind == WITHIN:
-            self.report({"INFO"}, f"Within the tolerance both ways: at most {largest} of it, proved")
+            self.report({"INFO"}, f"Within the tolerance both ways: at most {largest} of the tolerance, proved")
         elif found.kind == ONE_WAY:
-            self.report({"WARNING"}, f"Within the tolerance, but the reference is up to {largest} of it from the mesh")
+            self.report(
+                {"WARNING"},
+                f"Within the tolerance one way: the reference is up to {largest} of the tolerance from the mesh",
+            )
         elif found.kind == BEYOND:
-            share = f"{100 * found.share_outside:.1f} % of the area outside"
-            self.report({"WARNING"}, f"Beyond the tolerance: up to {largest} of it, {share}")
+            share = f"{100 * found.share_outside:.1f} % of the area is outside"
+            self.report({"WARNING"}, f"Beyond the tolerance: up to {largest} of the tolerance, {share}")
         else:
             self.report({"WARNING"}, found.line())
 
 
 class TOLVOL_OT_select_outside(Comparison, bpy.types.Operator):
-    """Select the faces that are not proved to be within the tolerance of the reference, in Edit Mode"""
+    """Switch to Edit Mode and select the faces that are not proved to be within the tolerance of the reference"""
 
     bl_idname = "tolvol.select_outside"
     bl_label = "Select Outside"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fewest triangles within the tolerance: computed and certified on arrays, then written to the mesh in one go."""
+"""Decimates meshes within the tolerance: computes and certifies on arrays, then writes each mesh in one go."""
 
 import contextlib
 import functools
@@ -24,12 +24,12 @@ from .blocked import allowed, decimate_blocked
 
 
 def draw_decimate_settings(layout, settings):
-    """The same rows in the panel and in Adjust Last Operation."""
+    """Draws the settings of a decimation, for the panel and for Adjust Last Operation."""
     layout.prop(settings, "keep")
     layout.prop(settings, "effort")
     layout.prop(settings, "max_seconds")
     column = layout.column(align=True)
-    column.use_property_split = False  # the names need the width
+    column.use_property_split = False  # The names of the placements need the whole width.
     column.label(text="Placement")
     column.prop(settings, "placement", expand=True)
     row = layout.row(heading="Stop At", align=True)
@@ -40,7 +40,7 @@ def draw_decimate_settings(layout, settings):
 
 
 def draw_protect_settings(layout, settings, ob):
-    """What a decimation leaves as it is; the same rows in the panel and in Adjust Last Operation."""
+    """Draws the settings of the protected elements, for the panel and for Adjust Last Operation."""
     layout.row(heading="Faces").prop(settings, "only_selected", text="Unselected")
     column = layout.column(align=True)
     column.label(text="Edges")
@@ -53,7 +53,7 @@ def draw_protect_settings(layout, settings, ob):
 
 
 def targets(context):
-    """The objects that a decimation is for: the active one first, then all other selected meshes."""
+    """Returns the objects to decimate: the active one first, then all other selected meshes."""
     active = context.active_object
     return [active, *(ob for ob in context.selected_objects if ob.type == "MESH" and ob != active)]
 
@@ -63,32 +63,33 @@ def _choose_placement(operator, _context):
 
 
 class TOLVOL_OT_decimate(JobOperator, bpy.types.Operator):
-    """Reduce the selected meshes to the fewest triangles that stay within the tolerance, each of its own reference, with \
-the settings of the active one. A mesh without a reference becomes it"""
+    """Reduce the triangles of each selected mesh within the tolerance of its reference, with the settings of the active \
+object. An object without a reference gets one first, as by Set Reference"""
 
     bl_idname = "tolvol.decimate"
     bl_label = "Decimate in Tolerance"
     bl_options = {"REGISTER", "UNDO"}
 
-    # Those not given are the object's own. SKIP_SAVE: never those of the last run, which may have been another object's.
+    # A setting that is not given is taken from the object. SKIP_SAVE keeps Blender from taking it from the last run,
+    # which may have been on another object.
     __annotations__ = tolerance_settings({"SKIP_SAVE"}) | decimate_settings({"SKIP_SAVE"})
     placement: EnumProperty(
         name="Placement",
-        description="Where the remaining vertices go",
+        description="How the positions of the remaining vertices are chosen",
         items=PLACEMENTS,
         options={"SKIP_SAVE"},
         update=_choose_placement,
     )
     own_placements: BoolProperty(
-        description="Nobody has chosen a placement: it depends on the UV maps of each mesh",
+        description="No placement was chosen: the placement depends on the UV maps of each mesh",
         options={"HIDDEN", "SKIP_SAVE"},
     )
     outside: EnumProperty(
         name="Outside",
-        description="What to do with faces that are not within the tolerance of the reference",
+        description="How to treat faces that are not within the tolerance of the reference before the decimation",
         items=(
-            ("ERROR", "Stop", "Change nothing and say how many there are"),
-            ("KEEP", "Keep", "Leave those faces as they are and decimate the rest"),
+            ("ERROR", "Stop", "Change nothing and report the number of such faces"),
+            ("KEEP", "Keep", "Leave such faces as they are and decimate the rest"),
         ),
         options={"SKIP_SAVE"},
     )
@@ -119,7 +120,7 @@ the settings of the active one. A mesh without a reference becomes it"""
             if reason := decimate_blocked(ob):
                 raise Refused(f"{ob.name}: {reason}")
             tasks.append(self._task(context, ob))
-        # Changing the unit in Adjust Last Operation changes nothing else.
+        # The tolerance is stored in the other unit too, so that changing the unit in Adjust Last Operation keeps it.
         other = "PERCENT" if self.tolerance_mode == "LENGTH" else "LENGTH"
         tolerances.convert_tolerance(self, tasks[0].reference.size(), other)
         return functools.partial(run_all, tasks)
@@ -145,7 +146,7 @@ the settings of the active one. A mesh without a reference becomes it"""
         return task
 
     def finish(self, context, outcomes):
-        # All meshes are tried before the first is written.
+        # Entering all contexts checks that Blender can hold all results before the first mesh is changed.
         with contextlib.ExitStack() as stack:
             writes = [
                 stack.enter_context(transfer.Writing(ob.data, surface.arrays, result))
@@ -157,7 +158,7 @@ the settings of the active one. A mesh without a reference becomes it"""
             self._keep(ob, reference, run, f"{ob.name}: " if len(self.objects) > 1 else "")
 
     def _keep(self, ob, reference, run, prefix):
-        """What is remembered and said of one object."""
+        """Remembers the run at its object and reports it."""
         if ob.tolvol.snapshot is None:
             snapshots.set_reference(ob, reference)
         shared.give(self, ob.tolvol, _SHARED if self.own_placements else {*_SHARED, "placement"})
@@ -169,7 +170,7 @@ the settings of the active one. A mesh without a reference becomes it"""
         self.report({"INFO"}, prefix + report.line(run))
 
     def _take_settings(self, settings):
-        """Those of the active object hold for all, so that Adjust Last Operation shows what was used."""
+        """Takes the settings of the active object for all objects, so that Adjust Last Operation shows the ones used."""
         given = self.properties.is_property_set
         for mode, name in (("PERCENT", "tolerance_percent"), ("LENGTH", "tolerance_length")):
             if given(name) and not given("tolerance_mode"):
@@ -198,7 +199,7 @@ _SHARED = {*tolerance_settings(), *decimate_settings()}
 
 
 class _Task:
-    """What runs in the thread: arrays in, arrays and numbers out."""
+    """The work on one object in the thread: it reads and returns arrays and numbers, no data of Blender."""
 
     def __init__(self, name, surface, reference, tolerance, options):
         self.name = name
@@ -254,7 +255,8 @@ class _Task:
         return self.surface, self.reference, result, run
 
     def _name_corners(self, run, wedges):
-        """Where three or more UV islands meet no vertex can go: said, because a map of many islands leaves little to take."""
+        """Counts the vertices where three or more UV islands meet. They have to stay, so a UV map of many islands leaves
+        little to decimate: the run warns of that."""
         triangles = self.surface.arrays.triangles
         _, one_corner_each = np.unique(wedges, return_index=True)
         meeting = int((np.bincount(triangles.ravel()[one_corner_each]) > 2).sum())
@@ -263,6 +265,6 @@ class _Task:
         vertices = len(np.unique(triangles))
         if 2 * meeting > vertices:
             run["warnings"].append(
-                f"{meeting:,} of {vertices:,} vertices have to stay, because three or more UV islands meet there; "
-                "remove UV maps that are not needed"
+                f"{meeting:,} of {vertices:,} vertices have to stay, because three or more UV islands meet at each of "
+                "them; remove UV maps that are not needed"
             )

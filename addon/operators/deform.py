@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Freeform deformation by a Lattice object, within the tolerance."""
+"""Deforms a mesh by a Lattice object within the tolerance."""
 
 import bpy
 import numpy as np
@@ -15,8 +15,8 @@ from .motion import Motion
 
 
 class TOLVOL_OT_deform(JobOperator, bpy.types.Operator):
-    """Carry the mesh along with a lattice, taken as a B-spline of degree 3, within the tolerance of the reference. \
-Vertices outside of the lattice stay. Without a reference this mesh as it is becomes it"""
+    """Deform the mesh by a lattice, as a B-spline of degree 3, within the tolerance of the reference. Vertices outside \
+the lattice stay. An object without a reference gets one first, as by Set Reference"""
 
     bl_idname = "tolvol.deform"
     bl_label = "Lattice Deform in Tolerance"
@@ -24,12 +24,12 @@ Vertices outside of the lattice stay. Without a reference this mesh as it is bec
 
     lattice: StringProperty(
         name="Lattice",
-        description="The lattice object; if none is given, the one chosen in the panel, or else the selected one",
+        description="The lattice object. If none is given, the one of the panel is used, or else the selected one",
         options={"SKIP_SAVE"},
     )
     mode: EnumProperty(
         name="Beyond",
-        description="What becomes of a deformation that would leave the tolerance",
+        description="How to treat a deformation that would leave the tolerance",
         items=DEFORM_MODES,
         options={"SKIP_SAVE"},
     )
@@ -77,10 +77,14 @@ Vertices outside of the lattice stay. Without a reference this mesh as it is bec
             raise Refused(
                 f"Blocked: {run['leaving']['faces']:,} faces of {ob.name} would leave the tolerance. "
                 f"{100 * run['permitted_fraction']:.1f} % of the way is permitted: choose As Far as Permitted, "
-                "or Pull Back to hold back only the vertices there"
+                "or choose Pull Back to hold back only the vertices of these faces"
             )
         if not run["moved"]:
-            why = "the tolerance permits none of it" if run["leaving"]["faces"] else "it is at rest, or somewhere else"
+            why = (
+                "the tolerance permits no movement"
+                if run["leaving"]["faces"]
+                else "the lattice is at rest, or the mesh is outside it"
+            )
             raise Refused(f"{self.lattice} does not move {ob.name}: {why}")
         certified = motion.settle(result.vertices, certified)
         motion.write(ob, result.vertices, certified)
@@ -96,15 +100,15 @@ Vertices outside of the lattice stay. Without a reference this mesh as it is bec
         else:
             chosen = self.ob.tolvol.lattice or (selected[0] if len(selected) == 1 else None)
         if chosen is None or chosen.type != "LATTICE":
-            raise Refused(f"{self.lattice or self.ob.name}: choose a lattice object, or select one beside the mesh")
+            raise Refused(f"{self.lattice or self.ob.name}: choose a lattice object, or select one with the mesh")
         return chosen
 
 
 def native_lattice(cage):
-    """The tolvol.Lattice of a Lattice object, in the world."""
+    """Returns the tolvol.Lattice of a Lattice object, in world coordinates."""
     data = cage.data
     shape = (data.points_u, data.points_v, data.points_w)
-    # Blender counts along u first. At rest its points are a regular grid.
+    # Blender's array of control points runs along u first. The undeformed control points are a regular grid.
     rest, now = (
         mesh_io.column(data.points, name, 3).astype(np.float64).reshape(*shape[::-1], 3).transpose(2, 1, 0, 3)
         for name in ("co", "co_deform")
@@ -113,7 +117,8 @@ def native_lattice(cage):
     box[:3, 3] = rest[0, 0, 0]
     matrix = mesh_io.matrix_array(cage.matrix_world)
     try:
-        # A point that was not moved is exactly at rest, so that what it carries stays bit for bit.
+        # Adding the offset to the native control point at rest keeps a point that was not moved exactly at rest. A vertex
+        # with only such points around it then stays bit for bit.
         points = native.module.lattice_points(shape, matrix @ box) + (now - rest) @ matrix[:3, :3].T
         return native.module.Lattice(points, matrix @ box)
     except native.module.TolvolError as error:
@@ -121,10 +126,12 @@ def native_lattice(cage):
 
 
 def _twice(ob):
-    """Warnings for modifiers that would deform the mesh by the same lattice once more."""
+    """Yields a warning for each modifier that deforms the mesh by the same lattice once more."""
     for modifier in ob.modifiers:
         if modifier.type == "LATTICE" and modifier.object == ob.tolvol.lattice:
-            yield f"{ob.name} also has the modifier {modifier.name} with {modifier.object.name}: remove it"
+            yield (
+                f"The modifier {modifier.name} of {ob.name} deforms the mesh by {modifier.object.name} again: remove it"
+            )
 
 
 def _remarks(result):
@@ -136,5 +143,5 @@ def _remarks(result):
         else:
             remarks.append(f"{100 * run['permitted_fraction']:.1f} % of the way")
     if run["outside_lattice"]:
-        remarks.append(f"{run['outside_lattice']:,} are outside of the lattice")
+        remarks.append(f"{run['outside_lattice']:,} are outside the lattice")
     return remarks

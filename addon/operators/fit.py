@@ -1,26 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The value of a modifier's parameter that leaves the fewest triangles within the tolerance, by trial.
+"""Searches by trial the value of a modifier's parameter that leaves the fewest triangles within the tolerance.
 
-The deviation falls from one end of the range to the other, but not from value to value: a mesh of 300 triangles may keep
-what one of 310 misses. So the range is scanned from the end with the fewest triangles until a value keeps the tolerance,
-and then again, closely, from where the deviation first came near to it.
+Over the range of the parameter the deviation falls, but not from each value to the next: a mesh of 300 triangles may be
+within the tolerance while one of 310 is not, so bisection may miss the best value. Instead, coarse steps go from the end
+with the fewest triangles until a value is within the tolerance. Then fine steps go over the last part of this way, from
+the value where the deviation first came near to the tolerance.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-# Ratios of the values that are tried first: the farther from the tolerance, the larger.
+# Smallest and largest ratio of successive values in the coarse steps: the farther from the tolerance, the larger.
 _COARSE, _COARSEST = 1.2, 2.0
-NEAR = 2.0  # tolerances: neighbouring values may differ by half. From there on the values tried next are
-_FINE = 1.015  # times each other.
-_BARELY = 1.06  # Beside what missed by so little there may be what does not.
+NEAR = 2.0  # tolerances; the fine steps begin where the deviation is first below, because neighbours may differ by half
+_FINE = 1.015  # ratio of successive values in the fine steps
+_BARELY = 1.06  # tolerances; beside a value with a deviation below this one, values half a fine step away are tried
 
 
 def search(first, last):
-    """A generator: yields a value, is sent its deviation in tolerances, and returns the best value or None.
+    """A generator: yields a value, is sent the deviation at this value in tolerances, and returns the best value or None.
 
-    The best value is always the last one that was within. first: where there are fewest triangles.
+    The best value is always the last tried value that was within the tolerance. first: the end of the range with the
+    fewest triangles.
     """
     onward = 1 if last > first else -1
     value, missed = first, []
@@ -50,16 +52,16 @@ def search(first, last):
 
 @dataclass(frozen=True)
 class Parameter:
-    """What is searched for a modifier."""
+    """The parameter of a modifier that is searched, with its range."""
 
-    name: str  # of the property
+    name: str  # the name of the modifier's property
     label: str
-    first: float  # where there are fewest triangles
+    first: float  # the end of the range with the fewest triangles
     last: float
 
 
 def parameter(modifier, triangles, size, tolerance):
-    """The Parameter of a modifier on a mesh: lengths are those of its own coordinates."""
+    """Returns the Parameter of a modifier on a mesh. size, tolerance: in the mesh's own coordinates."""
     if modifier.type == "DECIMATE":
         return Parameter("ratio", "Ratio", 4 / max(triangles, 4), 1.0)
     if modifier.type == "REMESH":
@@ -68,9 +70,9 @@ def parameter(modifier, triangles, size, tolerance):
 
 
 def fit_blocked(modifier):
-    """Why a modifier that changes faces has nothing to search, or None."""
+    """Why a modifier has no parameter that can be searched, or None."""
     if modifier.type == "DECIMATE" and modifier.decimate_type != "COLLAPSE":
-        return "Set it to Collapse"
+        return "Set the modifier to Collapse"
     if modifier.type == "REMESH" and modifier.mode != "VOXEL":
-        return "Set it to Voxel"
+        return "Set the modifier to Voxel"
     return None

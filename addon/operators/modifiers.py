@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Modifiers within the tolerance: those that keep the faces are pulled back to it, those that change them are fitted."""
+"""Applies modifiers within the tolerance.
+
+A modifier that only moves vertices is applied, and each vertex stops at the tolerance. A modifier that changes the faces is
+applied with the setting that leaves the fewest triangles within the tolerance, which a search finds.
+"""
 
 import bpy
 import numpy as np
@@ -37,14 +41,14 @@ def modifier_blocked(ob, modifier):
             return f"{modifier.name} changes the faces: remove the shape keys first"
         return fit.fit_blocked(modifier)
     if modifier.type in _CHANGING:
-        return "It changes the faces and has nothing to fit"
+        return "This modifier changes the faces and has no setting to fit"
     if modifier.type in _SIMULATIONS:
-        return "A simulation cannot be applied in tolerance"
+        return "A simulation cannot be applied within the tolerance"
     return None
 
 
 class _ModifierOperator(JobOperator):
-    """What both have in common: a modifier of the active object, and where the result goes."""
+    """The parts that both operators share: choosing a modifier of the active object, and storing the result."""
 
     @classmethod
     def poll(cls, context):
@@ -55,7 +59,7 @@ class _ModifierOperator(JobOperator):
         return allowed(cls, reason)
 
     def chosen(self, fitted):
-        """The modifier; settings that were not given are taken."""
+        """Returns the chosen modifier. Settings that were not given to the operator are taken from the object."""
         ob = self.ob
         shared.take(self, ob.tolvol.modifiers, modifier_settings())
         if not self.modifier:
@@ -63,16 +67,16 @@ class _ModifierOperator(JobOperator):
             self.modifier = suitable[0].name if suitable else ""
         modifier = ob.modifiers.get(self.modifier)
         if modifier is None:
-            raise Refused(f"{ob.name} has no modifier {self.modifier}".rstrip() + " to take")
+            raise Refused(f"{ob.name} has no modifier {self.modifier}".rstrip() + " that can be used here")
         if reason := modifier_blocked(ob, modifier):
             raise Refused(f"{modifier.name} of {ob.name}: {reason}")
         if (modifier.type in FITTED) != fitted:
-            other = "fit it instead" if modifier.type in FITTED else "apply it instead"
+            other = "use Fit instead of Apply" if modifier.type in FITTED else "use Apply instead of Fit"
             raise Refused(f"{modifier.name} of {ob.name}: {other}")
         return modifier
 
     def target(self, context):
-        """The object that the result goes to; the modifier goes."""
+        """Returns the object that gets the result, a copy if Result is New Object, and removes the modifier from it."""
         ob = self.ob
         if self.result == "OBJECT":
             copy = ob.copy()
@@ -88,8 +92,8 @@ class _ModifierOperator(JobOperator):
 
 
 class TOLVOL_OT_apply_modifier(_ModifierOperator, bpy.types.Operator):
-    """Apply a modifier that keeps the faces, such as Smooth or Lattice: every vertex goes as far as the tolerance of the \
-reference permits. The modifier acts on the base mesh, without those above it. Without a reference the base mesh becomes it"""
+    """Apply a modifier that only moves vertices, such as Smooth, to the base mesh without the other modifiers. Each vertex \
+moves as far as the tolerance permits. An object without a reference gets one first, as by Set Reference"""
 
     bl_idname = "tolvol.apply_modifier"
     bl_label = "Apply Modifier in Tolerance"
@@ -97,7 +101,9 @@ reference permits. The modifier acts on the base mesh, without those above it. W
 
     __annotations__ = modifier_settings({"SKIP_SAVE"})
     modifier: StringProperty(
-        name="Modifier", description="Its name; if none is given, the first that can be applied", options={"SKIP_SAVE"}
+        name="Modifier",
+        description="The name of the modifier. If none is given, the first modifier that can be applied is used",
+        options={"SKIP_SAVE"},
     )
     threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
 
@@ -113,7 +119,8 @@ reference permits. The modifier acts on the base mesh, without those above it. W
             mesh = evaluation.mesh()
             if not same_faces(mesh, ob.data):
                 raise Refused(
-                    f"{name} changes the faces of {ob.name}: only what moves vertices can be applied in tolerance"
+                    f"{name} changes the faces of {ob.name}: only a modifier that moves vertices can be applied within "
+                    "the tolerance"
                 )
             wished = column(mesh.vertices, "co", 3)
         if np.array_equal(wished, motion.before):
@@ -129,7 +136,7 @@ reference permits. The modifier acts on the base mesh, without those above it. W
         motion, wished, vertices, certified = outcome
         name = self.modifier
         if np.array_equal(vertices, motion.before):
-            raise Refused(f"The tolerance permits nothing of what {name} does to {self.ob.name}")
+            raise Refused(f"The tolerance permits no movement of {self.ob.name} by {name}: take a larger tolerance")
         certified = motion.settle(vertices, certified)
         shared.give(self, self.ob.tolvol.modifiers, modifier_settings())
         ob = self.target(context)
@@ -151,8 +158,8 @@ reference permits. The modifier acts on the base mesh, without those above it. W
 
 
 class TOLVOL_OT_fit_modifier(_ModifierOperator, bpy.types.Operator):
-    """Find the setting of a Decimate, Remesh or Weld modifier that leaves the fewest triangles within the tolerance, \
-proved both ways, and apply it to the base mesh, which becomes the reference if there is none"""
+    """Find the setting of a Decimate, Remesh or Weld modifier that leaves the fewest triangles within the tolerance both \
+ways, and apply the modifier to the base mesh. An object without a reference gets one first, as by Set Reference"""
 
     bl_idname = "tolvol.fit_modifier"
     bl_label = "Fit Modifier to Tolerance"
@@ -160,11 +167,13 @@ proved both ways, and apply it to the base mesh, which becomes the reference if 
 
     __annotations__ = modifier_settings({"SKIP_SAVE"})
     modifier: StringProperty(
-        name="Modifier", description="Its name; if none is given, the first that can be fitted", options={"SKIP_SAVE"}
+        name="Modifier",
+        description="The name of the modifier. If none is given, the first modifier that can be fitted is used",
+        options={"SKIP_SAVE"},
     )
     value: FloatProperty(
         name="Value",
-        description="The modifier's ratio, voxel size or distance that was found; one that is given is not searched for",
+        description="The ratio, voxel size or distance of the modifier. If it is 0, the value is searched",
         min=0.0,
         precision=5,
         options={"SKIP_SAVE"},
@@ -184,7 +193,7 @@ proved both ways, and apply it to the base mesh, which becomes the reference if 
         name, trial = modifier.name, _Trial(ob, self.threads or preferences.threads(context))
         parameter = trial.parameter(modifier)
         with Evaluation(ob, name) as evaluation:
-            # Adjust Last Operation comes with the value that was found, or another one.
+            # Adjust Last Operation passes the value that was found, or one that the user typed: no search is needed.
             self.value = self.value or (yield from self._best(evaluation, parameter, trial))
             setattr(evaluation.modifier, parameter.name, self.value)
             mesh = evaluation.new_mesh()
@@ -227,7 +236,7 @@ proved both ways, and apply it to the base mesh, which becomes the reference if 
 
 
 class _Trial:
-    """One object against its reference; what it returns to be done runs in the thread."""
+    """Compares meshes of one object with its reference. measured() and certified() return work for the thread."""
 
     def __init__(self, ob, threads):
         self.surface = snapshots.surface_of(ob)
@@ -245,7 +254,7 @@ class _Trial:
         return fit.parameter(modifier, len(arrays.triangles), size, self.tolerance * size / self.surface.size())
 
     def measured(self, arrays):
-        """Work: the larger of the deviations both ways, in tolerances; at most 1 where it is certified to be within."""
+        """Returns work that gives the larger of the deviations both ways, in tolerances: at most 1 exactly if certified."""
 
         def work(progress):
             if not len(arrays.triangles):
@@ -265,21 +274,27 @@ class _Trial:
         return work
 
     def certified(self, arrays):
-        """Work: what certify() says of the mesh as it will be stored; NotProved unless it is within both ways."""
+        """Returns work that gives the result of certify() for the mesh as Blender will store it.
+
+        The work raises NotProved unless the mesh is within the tolerance both ways.
+        """
 
         def work(progress):
             surface = snapshots.Surface(arrays, self.surface.matrix)
             found = certify(surface, self.reference, self.tolerance, 0, self._threads, progress)
             if max(found["forward"][1], found["backward"][1]) > self.tolerance:
                 ways = (report.percent(found[way][1], self.size) for way in ("forward", "backward"))
-                raise NotProved("up to {} of the size from the reference, and the reference up to {}".format(*ways))
+                raise NotProved(
+                    "the result is up to {} of the size from the reference, and the reference up to {} from the "
+                    "result".format(*ways)
+                )
             self._left = len(arrays.triangles)
             return found
 
         return work
 
     def line(self, certified):
-        """What was reached, in one line."""
+        """Returns the outcome as one line of text."""
         forward, backward = (report.percent(certified[way][1], self.size) for way in ("forward", "backward"))
         return (
             f"{len(self.surface.arrays.triangles):,} -> {self._left:,} triangles, tolerance "

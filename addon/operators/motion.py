@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Vertices of an object that move while its faces stay: pulled back to the tolerance, certified, written in one go."""
+"""Moves vertices of an object while its faces stay: stops them at the tolerance, certifies the result and writes it."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ from ..reference import measurements, snapshots, tolerances, volumes
 
 
 class Motion:
-    """Read and written in the main thread; volume(), hold() and certify() are for the job's."""
+    """The main thread makes it and calls settle() and write(). The thread of the job calls volume(), hold() and certify()."""
 
     def __init__(self, ob, threads):
         ob.update_from_editmode()
@@ -29,17 +29,20 @@ class Motion:
 
     @property
     def before(self):
-        """(n, 3) float32, local."""
+        """The positions of the vertices before the motion: (n, 3) float32, local."""
         return self.surface.arrays.vertices
 
     def volume(self, progress):
         return volumes.native_volume(self.reference, self.tolerance, self.threads, progress)
 
     def hold(self, wished, progress):
-        """(n, 3): every vertex as far on its way to `wished` as the tolerance permits, quads in every triangulation."""
+        """Moves every vertex towards `wished` as far as the tolerance permits. Returns (n, 3).
+
+        Quads are within the tolerance in both triangulations.
+        """
         triangles = self.surface.arrays.triangles
         held = self._constrain(wished, triangles, "error", progress)
-        # A quad may be bent so much that across its other diagonal it is outside from the start: it stays.
+        # A bent quad may be outside from the start in the triangulation that Blender does not show: its corners stay.
         return held if self.faces is triangles else self._constrain(held, self.faces, "keep", progress)
 
     def _constrain(self, wished, faces, outside, progress):
@@ -55,7 +58,7 @@ class Motion:
         ).vertices
 
     def certify(self, vertices, progress, triangles=None):
-        """What certify() says of the moved mesh, which is within the tolerance or NotProved is raised."""
+        """Returns the result of certify() for the moved mesh. Raises NotProved unless the mesh is within the tolerance."""
         arrays = replace(self.surface.arrays, vertices=vertices)
         if triangles is not None:
             arrays = replace(arrays, triangles=triangles)
@@ -68,14 +71,14 @@ class Motion:
         return certified
 
     def settle(self, vertices, certified):
-        """`certified`, or that of the triangles into which Blender cuts the faces where they are now."""
+        """Returns `certified`, or a new result of certify() if Blender triangulates the moved faces differently."""
         triangles = mesh_io.triangles_at(self._mesh, vertices)
         if np.array_equal(triangles, self.surface.arrays.triangles):
             return certified
         return self.certify(vertices, native.module.Progress(), triangles)
 
     def write(self, ob, vertices, certified):
-        """Moves the vertices of `ob`, which has the mesh that was read or a copy of it."""
+        """Moves the vertices of `ob`, whose mesh is the one that was read or a copy of that mesh."""
         if ob.mode == "EDIT":
             self._write_edited(ob, vertices)
         else:
@@ -84,19 +87,19 @@ class Motion:
         measurements.remember(ob, snapshots.surface_of(ob), certified, self.tolerance)
 
     def _write_edited(self, ob, vertices):
-        """The mesh is the one that Edit Mode works on; Blender moves other shape keys along when it is left."""
+        """Moves vertices of the mesh that is in Edit Mode. Blender moves the other shape keys when Edit Mode is left."""
         moved = np.flatnonzero((vertices != self.before).any(1))
         mesh_io.move_edited(ob.data, moved, vertices[moved]).normal_update()
         bmesh.update_edit_mesh(ob.data, destructive=False)
         ob.update_from_editmode()
 
     def keep_reference(self, ob):
-        """A mesh that had no reference was its own."""
+        """Stores the reference that was used if the object had none."""
         if ob.tolvol.snapshot is None:
             snapshots.set_reference(ob, self.reference)
 
     def line(self, remarks, certified):
-        """What was done, in one line."""
+        """Returns the outcome as one line of text."""
         forward, backward = (report.percent(certified[way][1], self.size) for way in ("forward", "backward"))
         return (
             f"{', '.join(remarks)}, tolerance {100 * self.tolerance / self.size:.4g} % = {self.tolerance:.3g}, "
@@ -104,7 +107,7 @@ class Motion:
         )
 
     def moved(self, vertices, wished):
-        """Remarks of line(): how many vertices moved, and how many not as far as was wished."""
+        """Returns remarks for line(): how many vertices moved, and how many of them were held back."""
         count = int((vertices != self.before).any(1).sum())
         held = int((vertices != wished).any(1).sum())
         return [f"{count:,} of {len(vertices):,} vertices moved", *([f"{held:,} held back"] if held else [])]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tolerances to choose from, each shown as a length and as a share of the size."""
+"""A menu of common tolerances, each shown as a length and as a share of the size."""
 
 import bpy
 from bpy.props import EnumProperty, FloatProperty
@@ -14,16 +14,20 @@ _PRESETS = (("LENGTH", 0.05), ("LENGTH", 0.1), ("PERCENT", 0.1), ("PERCENT", 0.5
 
 
 class TOLVOL_OT_set_tolerance(bpy.types.Operator):
-    """Take this tolerance. A file in millimetres, such as most STL files, is imported with one metre for each of them: \
-0.05 in its units is 0.05 mm of the file and 5 cm here"""
+    """Set this tolerance. Blender imports each unit of a file as one metre. In a file in millimetres, such as most STL \
+files, a tolerance of 0.05 in file units is 0.05 mm, which Blender shows as 5 cm"""
 
     bl_idname = "tolvol.set_tolerance"
     bl_label = "Set Tolerance"
     bl_options = {"REGISTER", "UNDO"}
 
-    mode: EnumProperty(name="Unit", description="What the tolerance is given in", items=TOLERANCE_UNITS)
+    mode: EnumProperty(name="Unit", description="The unit of the tolerance", items=TOLERANCE_UNITS)
     value: FloatProperty(
-        name="Tolerance", description="In percent, or in the units of the file", default=0.1, min=1e-12, precision=5
+        name="Tolerance",
+        description="The tolerance, in percent of the size or in the units of the file",
+        default=0.1,
+        min=1e-12,
+        precision=5,
     )
 
     @classmethod
@@ -40,7 +44,7 @@ class TOLVOL_OT_set_tolerance(bpy.types.Operator):
 
 class TOLVOL_MT_tolerances(bpy.types.Menu):
     bl_label = "Tolerance Presets"
-    bl_description = "Common tolerances, each as a length and as a share of the size"
+    bl_description = "Choose a common tolerance. Each is shown as a length and as a share of the size"
 
     def draw(self, context):
         size = measurements.shown_size(context.active_object)
@@ -50,7 +54,7 @@ class TOLVOL_MT_tolerances(bpy.types.Menu):
 
 
 def label(context, mode, value, size):
-    """In the unit it is given in, then as length and share where these say more."""
+    """Returns the text of a preset: the value in its own unit, then as a length, a share of the size or both."""
     if mode == "LENGTH":
         share = [f"{100 * value / size:.3g} % of size"] if size else []
         return f"{value:g} in file units:  " + ",  ".join([length(context, value), *share])

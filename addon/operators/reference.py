@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Setting the reference of an object, and letting go of it."""
+"""Sets, replaces and clears the reference of an object."""
 
 import bpy
 import numpy as np
@@ -12,7 +12,7 @@ from .blocked import allowed, reference_blocked
 
 
 def replace_label(ob):
-    """What setting the reference does to one that is there; the label of the button, where that is so."""
+    """Returns the label of the menu entry that replaces the reference: it names the object whose mesh is taken."""
     source = snapshots.source_object(ob)
     if source is None or source == ob:
         return "Replace Reference by This Mesh"
@@ -20,7 +20,7 @@ def replace_label(ob):
 
 
 def loses_something(ob):
-    """Whether setting the reference gives up a snapshot that is not what would be taken."""
+    """Whether setting the reference discards a snapshot that differs from the new one."""
     if ob.tolvol.snapshot is None:
         return False
     surface = snapshots.surface_of(snapshots.source_object(ob))
@@ -31,12 +31,12 @@ def loses_something(ob):
 
 
 def _ask(context, operator, ob):
-    """Opens a menu that says what would be lost; only its entry replaces the reference."""
+    """Opens a menu that says what would be lost. Only the entry of this menu replaces the reference."""
 
     def draw(menu, _context):
         count = len(ob.tolvol.snapshot.polygons)
-        menu.layout.label(text=f"The reference of {count:,} triangles is given up.")
-        menu.layout.label(text="What was lost from it so far no longer counts as deviation.")
+        menu.layout.label(text=f"The present reference of {count:,} triangles is discarded.")
+        menu.layout.label(text="The deviation is then measured from the new reference only.")
         menu.layout.separator()
         menu.layout.operator_context = "INVOKE_DEFAULT"
         menu.layout.operator(operator.bl_idname, text=replace_label(ob), icon="ERROR").replace = True
@@ -45,8 +45,8 @@ def _ask(context, operator, ob):
 
 
 class TOLVOL_OT_set_reference(JobOperator, bpy.types.Operator):
-    """Take a snapshot of the reference, which the tolerance refers to from now on, and build the tolerance volume. A \
-reference that is set already is replaced, after a question where that loses anything"""
+    """Take a snapshot of the reference, to which the tolerance refers from now on, and build the tolerance volume. If \
+another reference is set, a menu asks whether to replace it"""
 
     bl_idname = "tolvol.set_reference"
     bl_label = "Set Reference"
@@ -55,7 +55,7 @@ reference that is set already is replaced, after a question where that loses any
     threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
     replace: BoolProperty(
         name="Replace",
-        description="Give up the reference that is set, without a question",
+        description="Replace the present reference without asking",
         options={"HIDDEN", "SKIP_SAVE"},
     )
 
@@ -90,7 +90,7 @@ reference that is set already is replaced, after a question where that loses any
 
 
 class TOLVOL_OT_clear_reference(bpy.types.Operator):
-    """Let go of the reference"""
+    """Remove the reference. The mesh stays as it is"""
 
     bl_idname = "tolvol.clear_reference"
     bl_label = "Clear Reference"

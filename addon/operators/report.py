@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The deviation of an object and its reference as a file."""
+"""Saves the deviation of an object and its reference as a file."""
 
 from pathlib import Path
 
@@ -11,13 +11,13 @@ from ..files import safe_files
 from ..proof import deviation
 from .check import Comparison
 
-# Shares of the tolerance that are reported as bands.
+# The report gives the share of the area in the bands between these shares of the tolerance.
 _BANDS = (0.25, 0.5, 0.75)
 
 
 class TOLVOL_OT_save_report(Comparison, bpy.types.Operator):
-    """Measure how far the mesh lies from the reference and the reference from the mesh, and save it: a page to read \
-(.html), a table (.csv) or all numbers (.json)"""
+    """Measure the distances from the mesh to the reference and from the reference to the mesh, and save them as a page to \
+read (.html), a table (.csv) or all numbers (.json)"""
 
     bl_idname = "tolvol.save_report"
     bl_label = "Save Report"
@@ -34,7 +34,7 @@ class TOLVOL_OT_save_report(Comparison, bpy.types.Operator):
         if self.filepath:
             return super().invoke(context, event)
         self._browsing = True
-        # The file's own folder may be gone by now.
+        # The folder of the .blend file may have been removed meanwhile.
         folder = Path(bpy.data.filepath).parent
         if not bpy.data.filepath or not folder.is_dir():
             folder = Path.home()
@@ -43,7 +43,7 @@ class TOLVOL_OT_save_report(Comparison, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, context):
-        if self._browsing:  # the file is chosen: measure with progress and Esc
+        if self._browsing:  # The user has chosen a file. A new invoke measures with progress and Esc.
             return bpy.ops.tolvol.save_report("INVOKE_DEFAULT", filepath=self.filepath, threads=self.threads)
         return super().execute(context)
 
@@ -54,7 +54,7 @@ class TOLVOL_OT_save_report(Comparison, bpy.types.Operator):
         self._target = safe_files.Target(path)
         used = [path for path in (bpy.data.filepath, *bpy.utils.blend_paths(absolute=True)) if path]
         safe_files.require_apart([(str(path), path)], [(path, path) for path in used])
-        with safe_files.Staged() as staged:  # a folder that cannot be written to is found before the work
+        with safe_files.Staged() as staged:  # This refuses a folder that cannot be written to before the work begins.
             if not self._target.is_device:
                 staged.folder(self._target)
         self._about = {

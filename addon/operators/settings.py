@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Properties that an operator shares with the object it runs on."""
+"""Copies the settings that an operator shares with the object on which it runs."""
 
 
 def _in_order(names):
-    """The unit of the tolerance first and its converted digits last: what is set in between changes these."""
+    """Sorts the unit of the tolerance first and its converted digits last: setting the other properties resets the digits."""
     return sorted(names, key=lambda name: (name != "tolerance_mode", name.endswith("_converted")))
 
 
 def take(operator, settings, names):
-    """What was not given to the operator is what `settings` has."""
+    """Takes each property that was not given to the operator from `settings`."""
     for name in _in_order(names):
         if not operator.properties.is_property_set(name):
             setattr(operator, name, getattr(settings, name))
 
 
 def give(operator, settings, names):
-    """What the operator ran with is what the panel shows from now on."""
+    """Stores the properties that the operator ran with in `settings`, so that the panel shows them."""
     for name in _in_order(names):
         setattr(settings, name, getattr(operator, name))
 

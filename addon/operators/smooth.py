@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Smoothing within the tolerance."""
+"""Smooths meshes within the tolerance."""
 
 import functools
 
@@ -20,7 +20,7 @@ _MODES = {"OBJECT", "EDIT"}
 
 
 def draw_smooth_settings(layout, settings, ob):
-    """The same rows in the panel and in Adjust Last Operation."""
+    """Draws the settings of smoothing, for the panel and for Adjust Last Operation."""
     layout.prop(settings, "iterations")
     for name in ("method", "weights", "boundary"):
         layout.prop(settings, name)
@@ -28,8 +28,8 @@ def draw_smooth_settings(layout, settings, ob):
 
 
 class TOLVOL_OT_smooth(JobOperator, bpy.types.Operator):
-    """Smooth the mesh as far as it stays within the tolerance of the reference. Without a reference this mesh as it is \
-becomes it. In Edit Mode: the selected vertices of all meshes that are edited"""
+    """Smooth the mesh as far as it stays within the tolerance of the reference. In Edit Mode, smooth the selected vertices \
+of all edited meshes. An object without a reference gets one first, as by Set Reference"""
 
     bl_idname = "tolvol.smooth"
     bl_label = "Smooth in Tolerance"
@@ -47,7 +47,7 @@ becomes it. In Edit Mode: the selected vertices of all meshes that are edited"""
         draw_smooth_settings(self.layout, self, context.active_object)
 
     def targets(self, context):
-        """The active object; in Edit Mode all that are edited."""
+        """Returns the active object, in Edit Mode together with all other meshes that are edited."""
         active = context.active_object
         edited = [ob for ob in context.view_layer.objects if ob.type == "MESH" and ob.mode == "EDIT" and ob != active]
         return [active, *(edited if active.mode == "EDIT" else [])]
@@ -65,7 +65,7 @@ becomes it. In Edit Mode: the selected vertices of all meshes that are edited"""
             raise Refused(f"{ob.name}: {reason}")
         if ob.mode == "EDIT" and ob.active_shape_key_index > 0:
             basis = ob.data.shape_keys.reference_key.name
-            raise Refused(f"What is smoothed is the mesh of {ob.name}: choose its shape key {basis} first")
+            raise Refused(f"Smoothing changes the base mesh of {ob.name}: choose the shape key {basis} first")
         motion = Motion(ob, self.threads or preferences.threads(context))
         locked = np.zeros(len(motion.before), bool)
         locked[mesh_io.loose_edges(ob.data)] = True
@@ -89,8 +89,10 @@ becomes it. In Edit Mode: the selected vertices of all meshes that are edited"""
         ]
         if not moved:
             names = _names(self._chosen)
-            raise Refused(f"Nothing of {names} can be smoothed: it is even, or all of its vertices have to stay")
-        # All meshes are proved before the first is written.
+            raise Refused(
+                f"Smoothing does not move any vertex of {names}: the surface is smooth, or all its vertices have to stay"
+            )
+        # All results are certified before the first mesh is changed.
         proved = [motion.settle(vertices, certified) for _, motion, vertices, _, certified in moved]
         for (ob, motion, vertices, run, _), certified in zip(moved, proved):
             motion.write(ob, vertices, certified)
@@ -118,7 +120,7 @@ def _names(objects):
 
 
 class _Task:
-    """What runs in the thread for one object."""
+    """The work on one object in the thread."""
 
     def __init__(self, name, motion, options):
         self.name = name
@@ -136,6 +138,6 @@ class _Task:
             progress=progress,
             **self._options,
         )
-        # What was smoothed is inside as Blender shows its quads; held, it is however they are cut.
+        # smooth() keeps quads inside in the triangulation that Blender shows; hold() keeps them inside in both.
         vertices = motion.hold(smoothed.vertices, progress)
         return motion, vertices, smoothed.report, motion.certify(vertices, progress)

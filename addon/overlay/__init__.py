@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Show Deviation: the mesh in the 3D view coloured at every pixel by its distance to the reference, with a legend.
+"""Show Deviation colours the mesh in the 3D view at every pixel by its distance to the reference, and draws a legend.
 
-While no object shows it there is neither a handler nor memory. Distances are computed by the
-graphics driver: they are shown, not proved.
+While no object shows its deviation, the overlay has no handlers and holds no memory. The graphics driver computes the
+distances: they are shown, not proved.
 """
 
 import functools
@@ -17,18 +17,21 @@ from . import draw, field, legend, reasons, shaders, shares, work
 from .surface import Surface
 
 _surfaces = {}  # name of an object that shows its deviation -> Surface
-_drawing = []  # handlers
+_drawing = []  # draw handlers
 
 
 def shows(ob):
-    """Whether the deviation of `ob` is among what is shown."""
+    """Whether the deviation of `ob` is shown."""
     return ob.name in _surfaces
 
 
 def refresh():
-    """Begins or ends to show what is to be shown now. Called whenever a reference or a setting may have changed."""
+    """Adds and removes surfaces and handlers as the settings of the objects demand.
+
+    It is called whenever a reference or a setting may have changed.
+    """
     if not preferences.use_gl(bpy.context):
-        reasons.broken.clear()  # asked anew once it is turned on again
+        reasons.broken.clear()  # When drawing is turned on again, the driver is tried again.
     names = _wanted()
     if not names:
         _end()
@@ -45,7 +48,7 @@ def refresh():
 
 
 def _wanted():
-    """The names of the objects that show their deviation."""
+    """Returns the names of the objects that show their deviation."""
     if native.module is None or reasons.off():
         return set()
     meshes = (ob for ob in bpy.data.objects if ob.type == "MESH" and ob.library is None)
@@ -76,11 +79,11 @@ def _end():
 
 
 def _guarded(function):
-    """What the graphics driver refuses once it is not asked for again; the panel says why."""
+    """Wraps a draw handler: after the first refusal by the graphics driver the overlay ends, and the panel says why."""
 
     @functools.wraps(function)
     def call():
-        if not all(name in bpy.data.objects for name in _surfaces):  # renamed
+        if not all(name in bpy.data.objects for name in _surfaces):  # An object was renamed.
             bpy.app.timers.register(refresh, first_interval=0)
         try:
             function(bpy.context, _surfaces)
@@ -93,7 +96,8 @@ def _guarded(function):
 
 @persistent
 def _note_changes(_scene, depsgraph):
-    if depsgraph.id_type_updated("SCENE") and _wanted() != _surfaces.keys():  # objects came or went or have new names
+    # Objects may have been added, removed or renamed.
+    if depsgraph.id_type_updated("SCENE") and _wanted() != _surfaces.keys():
         refresh()
         return
     changed = {update.id.original: update.is_updated_geometry for update in depsgraph.updates}
@@ -102,7 +106,7 @@ def _note_changes(_scene, depsgraph):
         if ob is None or not (ob in changed or ob.data in changed):
             continue
         geometry = changed.get(ob, False) or changed.get(ob.data, False)
-        # To Blender a stroke of sculpting is no change of the geometry, nor is one of what is selected.
+        # Blender does not count a sculpt stroke or a change of the selection as a change of the geometry.
         if geometry or ob.mode != "OBJECT":
             surface.touch(geometry and ob.mode != "SCULPT")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the 3D views draw: the surfaces of the objects that show their deviation, and the legend of one."""
+"""Draws the surfaces of the objects that show their deviation, and the legend of one of them, into the 3D views."""
 
 import gpu
 import numpy as np
@@ -13,7 +13,7 @@ _STRIPE = 12  # pixels from one stripe to the next
 
 
 def _in_view(context, names):
-    """The objects among these that this view shows with faces."""
+    """Returns the named objects that this 3D view shows with faces."""
     space = context.space_data
     if not space.overlay.show_overlays or space.shading.type == "WIREFRAME":
         return []
@@ -37,13 +37,14 @@ def _signed(ob, tree):
 
 
 def surfaces(context, shown):
-    """Draws them; shown: name -> Surface."""
+    """Draws the surfaces of the objects in view. shown: {name of the object: Surface}."""
     objects = [ob for ob in _in_view(context, shown) if not reasons.hidden(ob)]
     if not objects:
         return
     depsgraph = context.evaluated_depsgraph_get()
     gpu.state.depth_test_set("LESS_EQUAL")
-    gpu.state.depth_mask_set(True)  # so that of two layers that NEARER lets through the nearer one is seen
+    # NEARER may let two layers pass the depth test at one pixel. Writing depths makes the nearer layer visible.
+    gpu.state.depth_mask_set(True)
     gpu.state.blend_set("ALPHA")
     for ob in objects:
         surface = shown[ob.name]
@@ -77,13 +78,14 @@ def _draw(context, ob, surface, found):
     found.bind(shader)
     shader.uniform_block("told", told)
     if x_ray:
-        # Blender has no depths here: without them it would be chance which layers are seen.
+        # In X-ray mode the depth buffer is empty. A first pass writes the depths, so that the second draws only the
+        # nearest layer.
         gpu.state.color_mask_set(False, False, False, False)
         surface.draw(shader)
         gpu.state.color_mask_set(True, True, True, True)
     surface.draw(shader)
     if ob.mode == "EDIT" and not x_ray:
-        # Blender's own edges are below the surface now, its vertices are not.
+        # The coloured surface covers Blender's edges but not its vertices, so the edges are drawn again.
         theme = context.preferences.themes[0].view_3d
         shader = shaders.lines()
         shader.bind()
@@ -94,14 +96,14 @@ def _draw(context, ob, surface, found):
 
 
 def _eye(view, world_to_frame):
-    """In the frame; of a view without perspective a direction, with 0 behind it."""
+    """Returns the eye in the frame, (x, y, z, 1). A view without perspective has a direction instead, (x, y, z, 0)."""
     inverse = view.view_matrix.inverted()
     eye = (*inverse.translation, 1) if view.is_perspective else inverse.col[2]
     return world_to_frame @ np.array(eye)
 
 
 def legend_of_one(context, shown):
-    """The active object's legend, or that of another one in view."""
+    """Draws the legend of the active object if that is in view, else of another object."""
     quarters = context.space_data.region_quadviews
     objects = _in_view(context, shown)
     if not objects or (quarters and context.region_data != quarters[-1]):
@@ -120,7 +122,10 @@ def legend_of_one(context, shown):
 
 
 def note(ob):
-    """What the colours are not. Sculpting is shown as it is stored, whatever deforms it afterwards."""
+    """Returns the note below the legend, which says that the colours prove nothing.
+
+    In Sculpt Mode the colours show the stored mesh, without the modifiers that deform it afterwards.
+    """
     on_top, how = measurements.on_top(ob), "with"
     if ob.mode == "SCULPT":
         on_top, how = [name for name in on_top if name == "modifiers"], "without"

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What distances are read from: a tree of triangles for each reference that is shown, made in a thread and kept while it
-is of use. The tolerance is no part of it."""
+"""Keeps a tree of triangles for each reference that is shown: the shader finds distances in it.
+
+A tree is made in a thread and kept while an object shows its deviation from the reference. It does not depend on the
+tolerance.
+"""
 
 import functools
 
@@ -14,11 +17,11 @@ from ..mesh import mesh_io
 from ..reference import measurements, snapshots, volumes
 from . import shaders, work
 
-# Of what a shader rounds a distance by: a smaller tolerance cannot be shown.
+# A tolerance below so many times the rounding error of the shader cannot be shown.
 _FINEST = 4
 
 _fields = {}  # key -> Field
-_failed = {}  # key -> why there is none
+_failed = {}  # key -> the reason why the Field could not be made
 
 
 class Field:
@@ -27,12 +30,12 @@ class Field:
     def __init__(self, tree, placement):
         self.tree = tree
         self.to_frame = tree.to_frame
-        self.placement = placement  # of the reference when the tree was made
+        self.placement = placement  # the placement of the reference when the tree was made
         self.leaves = len(tree.nodes) // 4
         self._textures = None
 
     def bind(self, shader):
-        """While drawing."""
+        """Gives the textures of the tree to a shader. It may be called only while a 3D view is drawn."""
         if self._textures is None:
             self._textures = {"nodes": _texture(self.tree.nodes), "corners": _texture(self.tree.corners)}
         for name, texture in self._textures.items():
@@ -40,7 +43,7 @@ class Field:
 
 
 def _texture(rows):
-    """(k, 4) float32 as a texture of rows of shaders.ROW texels."""
+    """Returns a texture with rows of shaders.ROW texels that holds (k, 4) float32."""
     texels = np.zeros((-(-len(rows) // shaders.ROW), shaders.ROW, 4), np.float32)
     texels.reshape(-1, 4)[: len(rows)] = rows
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
@@ -48,21 +51,26 @@ def _texture(rows):
 
 
 def key_of(ob):
-    """The same for the same reference at the same place; one that moves along with its object has its place there."""
+    """Returns a key that is equal for equal references at the same place.
+
+    A reference that moves along with its object keeps its key: the place is the one where it was set.
+    """
     settings = ob.tolvol
     return settings.snapshot_fingerprint, tuple(settings.snapshot_matrix)
 
 
 def field_of(ob, tolerance, changed):
-    """(Field, None), or (None, why it is not there yet). One that is missing is made, and then changed() is called."""
+    """Returns (Field, None), or (None, why there is no Field yet).
+
+    A missing Field is made in a thread, and then changed() is called.
+    """
     key = key_of(ob)
     field = _fields.get(key)
     if reason := _failed.get(key):
         return None, reason
     own = ob.tolvol.snapshot_kind == "SELF"
-    if (
-        field is None or own and not measurements.same_shape(field.placement, snapshots.reference_matrix(ob))
-    ):  # scaled since
+    # A tree of a reference that was scaled since it was made has wrong distances.
+    if field is None or own and not measurements.same_shape(field.placement, snapshots.reference_matrix(ob)):
         work.later(
             ("field", key),
             0,
@@ -71,12 +79,12 @@ def field_of(ob, tolerance, changed):
         )
         return None, "Preparing"
     if tolerance * field.tree.scale < _FINEST * native.module.DisplayTree.ROUNDING:
-        return None, "The tolerance is finer than colours can show"
+        return None, "The tolerance is too small to be shown by colours"
     return field, None
 
 
 def at_hand(ob):
-    """The Field that is at hand, or None."""
+    """Returns the Field of the object's reference if it has been made, else None."""
     return _fields.get(key_of(ob))
 
 
@@ -106,13 +114,13 @@ def _finish(key, changed, field, error):
 
 
 def keep_only(keys):
-    """Forgets the fields of other references."""
+    """Forgets the fields of all references except those with these keys."""
     for key in _fields.keys() - keys:
         del _fields[key]
     _failed.clear()
 
 
 def vertex_to_frame(field, ob):
-    """(4, 4): from the object's vertices to the frame of the field's tree."""
+    """Returns (4, 4): the matrix from the object's vertices to the frame of the field's tree."""
     own = ob.tolvol.snapshot_kind == "SELF"
     return field.to_frame @ (field.placement if own else mesh_io.matrix_array(ob.matrix_world))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The corner of the 3D view that says what the colours mean."""
+"""Draws the legend that explains the colours, in a corner of the 3D view."""
 
 import blf
 import gpu
@@ -9,11 +9,11 @@ from . import shaders
 
 _FONT = 0  # Blender's own
 _POINTS = 11
-# In pixels at a scale of 1.
+# The sizes are in pixels at an interface scale of 1.
 _BAR = 14, 132
 _ROW = 17
-_GAP = 10  # between things, and around them
-_MARGIN = 14  # to the edges of the view
+_GAP = 10  # between the parts of the legend and around them
+_MARGIN = 14  # between the legend and the edges of the view
 _STRIPE = 12
 
 _unit_square = None
@@ -36,7 +36,7 @@ def free():
 
 
 class _Page:
-    """Rectangles and text in pixels of the region, y upwards."""
+    """Draws rectangles and text. Coordinates are in pixels of the region, with y upwards."""
 
     def __init__(self, context, signed):
         self.scale = context.preferences.system.ui_scale
@@ -59,7 +59,7 @@ class _Page:
         gpu.state.blend_set("NONE")
 
     def text(self, x, y, text, faint=False):
-        """`y` is the middle of small letters."""
+        """Draws a line of text. `y` is the middle of its lower-case letters."""
         blf.color(_FONT, *self.ink, 0.6 if faint else 1.0)
         blf.position(_FONT, x, y - blf.dimensions(_FONT, "x")[1] / 2, 0)
         blf.draw(_FONT, text)
@@ -70,8 +70,12 @@ def width_of(text):
 
 
 def draw(context, heading, note, signed, tolerance, shares):
-    """note: the lowest line; shares: of the surface in the four bands from the lowest colour on and outside, or None
-    while unknown."""
+    """Draws the legend.
+
+    note: the lowest line.
+    shares: the shares of the surface in the four bands from the lowest colour on and beyond the tolerance; None while
+    they are not known.
+    """
     page = _Page(context, signed)
     scale = page.scale
     lowest = -tolerance if signed else 0.0
@@ -107,7 +111,7 @@ def draw(context, heading, note, signed, tolerance, shares):
 
 
 def draw_note(context, text):
-    """One line in the legend's place."""
+    """Draws one line of text in place of the legend."""
     page = _Page(context, True)
     gap = _GAP * page.scale
     width, height = width_of(text) + 2 * gap, _ROW * page.scale + gap
@@ -124,8 +128,8 @@ def _label(context, value, signed):
 
 
 def percent(share):
-    """A little must not read as nothing, nor nearly all as all."""
-    percent = 100 * round(share, 9)  # sums of shares have rounding
+    """Returns a share as text. A share above 0 is never shown as 0.0 %, and one below 1 never as 100.0 %."""
+    percent = 100 * round(share, 9)  # A sum of shares has rounding errors.
     if 0 < percent < 0.1:
         return f"<{NO_BREAK}0.1{NO_BREAK}%"
     if 99.9 < percent < 100:
@@ -134,7 +138,10 @@ def percent(share):
 
 
 def _corner(context, width, height, margin):
-    """Left and bottom of a box in the lower right corner that other regions leave free; None where there is no room."""
+    """Returns left and bottom of a box in the lower right corner of the view that no other region covers.
+
+    Returns None if there is no room for the box.
+    """
     region, right, bottom = context.region, context.region.width, 0
     for other in context.area.regions:
         if other == region or other.width <= 1 or other.height <= 1:

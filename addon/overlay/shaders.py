@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The programs of the overlay, for Blender's gpu module: the surface, its edges and the legend.
+"""The shaders of the overlay, for Blender's gpu module: the surface, its edges and the legend.
 
-From distance to colour they use the same functions as the module's own pictures, whose text lies in shaders/.
+They compute colours from distances by the same functions as the pictures of the compiled module. The text of these
+functions is in the folder shaders/.
 """
 
 import functools
@@ -13,10 +14,10 @@ import numpy as np
 from .. import native
 
 _ADDON = Path(__file__).resolve().parents[1]
-# Beside the add-on's files in the package, at the top of a checkout.
+# In the package the folder shaders/ is beside the add-on's files; in a checkout it is at the top.
 _SHARED = next(folder for folder in (_ADDON / "shaders", _ADDON.parent / "shaders") if folder.is_dir())
 
-# Blender tells whether what is drawn to expects linear colours.
+# Blender sets srgbTarget to tell whether the target of the drawing expects linear colours.
 _DISPLAYED = """
 vec4 displayed(vec3 colour, float opacity) {
   vec3 linear = mix(colour / 12.92, pow((colour + 0.055) / 1.055, vec3(2.4)), step(0.04045, colour));
@@ -24,8 +25,8 @@ vec4 displayed(vec3 colour, float opacity) {
 }
 """
 
-# The same two products as in Blender's own shaders, so that depths agree but for the rounding that NEARER makes up for:
-# in clip space some steps of a depth buffer of 24 bits.
+# The vertex shader computes the same two products as Blender's own shaders, so that the depths agree up to rounding.
+# NEARER moves the surface towards the eye by more than this rounding: by some steps of a depth buffer of 24 bits.
 _SURFACE_VERTEX = """
 void main() {
   place = (told.to_frame * vec4(position, 1.0)).xyz;
@@ -36,7 +37,7 @@ void main() {
 
 _SURFACE_FRAGMENT = """
 void main() {
-  // A little beyond the tolerance is still told from it.
+  // The search reaches a little beyond the tolerance, so that a distance just beyond it is told from one within.
   float reach = 1.001 * told.tolerance + 2.0 * ROUNDING;
   float d = surface_distance(nodes, corners, int(told.leaves), place, reach, ROUNDING) / told.tolerance;
   vec3 colour;
@@ -55,7 +56,7 @@ _LINES_FRAGMENT = """
 void main() { shown = displayed(flat_colour.rgb, flat_colour.a); }
 """
 
-# As std140 lays it out: whole vectors first, and sixteen bytes filled up.
+# The layout is that of std140: vectors of four come first, and the numbers are filled up to a multiple of sixteen bytes.
 _SURFACE_TOLD = """
 struct Told {
   mat4 view_projection, model, to_frame;
@@ -72,7 +73,7 @@ void main() {
 }
 """
 
-# fill: its kind, where the colours begin, the period of stripes.
+# fill: the kind of filling, the lowest distance in tolerances, the period of the stripes in pixels.
 _LEGEND_FRAGMENT = """
 void main() {
   if (fill.x == BAR) {
@@ -85,15 +86,20 @@ void main() {
 }
 """
 
-# Texels in a row of the textures that hold a tree.
+# Number of texels in a row of the textures that hold a tree.
 ROW = 2048
 
-# What a rectangle of the legend is filled with.
+# The kinds of filling of a rectangle in the legend.
 FLAT, BAR, STRIPES = 0.0, 1.0, 2.0
 
 
 def _info(varying, position, vertex, fragment, shared=()):
-    """varying, position: (type, name) of what goes between the two parts, and into the first."""
+    """Returns a GPUShaderCreateInfo.
+
+    varying: (type, name) of the value that the vertex shader passes to the fragment shader.
+    position: (type, name) of the attribute that the vertex shader reads.
+    shared: files in shaders/ whose functions the fragment shader uses.
+    """
     interface = gpu.types.GPUStageInterfaceInfo(f"tolvol_{varying[1]}")
     interface.smooth(*varying)
     info = gpu.types.GPUShaderCreateInfo()
@@ -111,7 +117,10 @@ def _info(varying, position, vertex, fragment, shared=()):
 
 @functools.cache
 def surface():
-    """Colours a mesh by its distance from the tree in `nodes` and `corners`; told() is what its buffer `told` holds."""
+    """Returns the shader that colours a mesh by its distance from the tree in the samplers `nodes` and `corners`.
+
+    The result of told() has to be bound as the uniform block `told`.
+    """
     shared = "surface_distance.glsl", "distance_colour.glsl"
     info = _info(("VEC3", "place"), ("VEC3", "position"), _SURFACE_VERTEX, _SURFACE_FRAGMENT, shared)
     info.sampler(0, "FLOAT_1D", "transfer")
@@ -126,10 +135,11 @@ def surface():
 
 
 def told(view_projection, model, to_frame, eye, tolerance, leaves, signed, period, opacity):
-    """The buffer for surface().
+    """Returns the uniform buffer for surface() and lines().
 
-    to_frame: from vertices to the frame of the tree, which has so many `leaves`; eye: (x, y, z, 1) or a direction with
-    0, there, as is `tolerance`.
+    to_frame: matrix from the vertices to the frame of the tree, whose number of leaves is `leaves`.
+    eye: in this frame, (x, y, z, 1) for an eye and (x, y, z, 0) for a direction.
+    tolerance: in this frame.
     """
     matrices = [np.array(matrix, np.float32).T.ravel() for matrix in (view_projection, model, to_frame)]
     numbers = tolerance, lowest(signed), period, opacity, leaves, 0, 0, 0
@@ -139,7 +149,7 @@ def told(view_projection, model, to_frame, eye, tolerance, leaves, signed, perio
 
 @functools.cache
 def lines():
-    """Edges of the same mesh, over its surface; flat_colour: theirs."""
+    """Returns the shader that draws edges over the surface, in the colour `flat_colour`."""
     info = _info(("VEC3", "place"), ("VEC3", "position"), _SURFACE_VERTEX, _LINES_FRAGMENT)
     info.push_constant("VEC4", "flat_colour")
     info.typedef_source(_SURFACE_TOLD)
@@ -150,7 +160,7 @@ def lines():
 
 @functools.cache
 def legend():
-    """Fills rectangles, whose corners are in clip space."""
+    """Returns the shader that fills rectangles. Their corners are in clip space."""
     info = _info(("VEC2", "part"), ("VEC2", "position"), _LEGEND_VERTEX, _LEGEND_FRAGMENT, ("distance_colour.glsl",))
     info.sampler(0, "FLOAT_1D", "transfer")
     for constant in (("VEC4", "corners"), ("VEC4", "flat_colour"), ("VEC3", "fill")):
@@ -161,13 +171,13 @@ def legend():
 
 
 def lowest(signed):
-    """Where the colours begin, in tolerances."""
+    """Returns the distance, in tolerances, at which the colours begin."""
     return -1.0 if signed else 0.0
 
 
 @functools.cache
 def transfer(signed):
-    """The module's table of colours."""
+    """Returns the module's table of colours as a texture."""
     colours = native.module.transfer_colours("signed" if signed else "magnitude")
     texels = np.ones((len(colours), 4), np.float32)
     texels[:, :3] = colours / np.float32(255)
@@ -177,6 +187,6 @@ def transfer(signed):
 
 
 def free():
-    """Forgets all that is on the GPU."""
+    """Frees all shaders and textures on the GPU."""
     for function in (surface, lines, legend, transfer):
         function.cache_clear()

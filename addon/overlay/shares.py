@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much of a shown surface lies in which band of distances, for the legend: counted in a thread, now and then."""
+"""Counts for the legend which share of a shown surface lies in each band of distances, in a thread."""
 
 import functools
 
@@ -7,16 +7,17 @@ import numpy as np
 
 from . import field, work
 
-_EVERY = 0.25  # seconds, at most so often while a mesh goes on changing
-_EIGHTHS = np.arange(-4, 5) / 4  # of the range from -tolerance to the tolerance
+_EVERY = 0.25  # seconds between two counts while a mesh goes on changing
+_EIGHTHS = np.arange(-4, 5) / 4  # the ends of eight bands from -tolerance to tolerance, in tolerances
 
-_known = {}  # name of an object -> (what they are the shares of, shares)
+# Name of an object -> ((state of the surface, field, tolerance, placement) that the shares are of, shares).
+_known = {}
 
 
 def known(ob, surface, found, tolerance, changed):
-    """The shares in the eighths, and beyond them at both ends; None while they are not known.
+    """Returns the shares in the eight bands and beyond them at both ends, or None while they are not known.
 
-    Those of another mesh, place or tolerance say nothing: they are counted anew, and then changed() is called.
+    If mesh, placement or tolerance have changed, the shares are counted anew, and then changed() is called.
     """
     placement = np.linalg.inv(found.to_frame) @ field.vertex_to_frame(found, ob)
     about = surface.changes, id(found), tolerance, placement.tobytes()
@@ -47,7 +48,7 @@ def _finish(name, about, changed, shares, error):
 
 
 def forget(name=None):
-    """Those of one object, or of all."""
+    """Forgets the shares of one object, or of all objects if no name is given."""
     if name is None:
         _known.clear()
     else:
@@ -55,7 +56,7 @@ def forget(name=None):
 
 
 def fold(eighths, signed):
-    """Shares in four bands from the lowest colour on, and outside."""
+    """Returns five shares: in the four bands from the lowest colour on, and beyond the tolerance."""
     eighths = np.asarray(eighths)
     within = eighths[1:-1]
     bands = within.reshape(4, 2).sum(1) if signed else within[4:] + within[3::-1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mesh of an object as the 3D view shows it now, and its place on the GPU."""
+"""Holds the mesh of an object as the 3D view shows it now, and its buffers on the GPU."""
 
 import gpu
 import numpy as np
@@ -8,33 +8,33 @@ from ..mesh import mesh_io
 
 
 class Surface:
-    """An object's triangles; written to the GPU anew only after they changed."""
+    """The triangles of an object. They are written to the GPU anew only after they changed."""
 
     def __init__(self):
         self.vertices = None  # (n, 3) float32, local
         self.triangles = None  # (m, 3) int32
-        self.changes = 0  # how often it was read
+        self.changes = 0  # how often a changed mesh was read
         self._polygons = 0
         self._mode = None
-        self._edges = None  # (k, 2) int32 and (k,) whether selected, in Edit Mode
-        self._selected = None
+        self._edges = None  # (k, 2) int32, in Edit Mode
+        self._selected = None  # (k,) bool: whether the edge is selected, in Edit Mode
         self._buffers = {}
-        self._stale = True  # positions may have changed
-        self._recut = True  # and the triangles as well
+        self._stale = True  # The positions may have changed.
+        self._recut = True  # The triangles may have changed.
 
     def touch(self, recut):
-        """Says that the mesh may have changed; recut: not only where its vertices are."""
+        """Marks the mesh as possibly changed. recut: whether its triangles may have changed too, not only positions."""
         self._stale = True
         self._recut |= recut
 
     def update(self, ob, depsgraph):
-        """Reads the mesh if it may have changed. In a draw handler."""
+        """Reads the mesh if it may have changed. It may be called only in a draw handler."""
         if ob.mode != self._mode:
             self.touch(True)
             self._mode = ob.mode
         if not self._stale:
             return
-        # Sculpting changes the stored mesh alone; elsewhere the evaluated one is what the view shows.
+        # Sculpting changes only the stored mesh. In the other modes the view shows the evaluated mesh.
         evaluated = ob.evaluated_get(depsgraph)
         if ob.mode == "SCULPT":
             self._read(ob.data, sculpted_vertices(ob), True)
@@ -79,7 +79,7 @@ class Surface:
             self._batch("TRIS", lambda: self.triangles).draw(shader)
 
     def draw_edges(self, shader, selected):
-        """Those that are selected, or the others. In Edit Mode."""
+        """Draws the selected edges or the edges that are not selected, in Edit Mode."""
         chosen = self._selected == selected
         if chosen.any():
             self._batch("LINES", lambda: self._edges[chosen], selected).draw(shader)
@@ -97,5 +97,5 @@ class Surface:
 
 
 def sculpted_vertices(ob):
-    """What sculpting moves: the active shape key, or the mesh itself."""
+    """Returns the collection that sculpting changes: the points of the active shape key or the vertices of the mesh."""
     return ob.active_shape_key.data if ob.active_shape_key else ob.data.vertices

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What takes too long to be done while drawing: one task at a time in a thread, and Blender's own loop between them."""
+"""Runs tasks that take too long for a draw handler: one task at a time in a thread, started by a timer of Blender."""
 
 import time
 
@@ -10,22 +10,23 @@ from ..job import Job
 
 _TICK = 0.05  # seconds
 
-_waiting = {}  # what it is about -> (when it may begin, prepare, finish)
+_waiting = {}  # key of a task -> (the time at which it may begin, prepare, finish)
 _running = None  # (about, finish, job)
 
 
 def later(about, seconds, prepare, finish):
-    """Lets a thread do prepare() -> work(progress), then calls finish(outcome, error); one of these is None.
+    """Calls prepare(), runs the work(progress) that it returns in a thread, then calls finish(outcome, error).
 
-    prepare and finish run in Blender's main thread, not while it draws. Of several calls about the same thing the first
-    sets the time and the last what is done; while it is being worked on no further call counts.
+    about: a key that identifies the task. seconds: the earliest start from now. Either outcome or error is None. prepare
+    and finish run in Blender's main thread, but not while it draws. Of several calls with the same key the first sets the
+    time, and the last sets prepare and finish. While the task runs, further calls with its key do nothing.
     """
     if _running is not None and _running[0] == about:
         return
     begin = _waiting[about][0] if about in _waiting else time.monotonic() + seconds
     _waiting[about] = begin, prepare, finish
     if not bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.register(_tick, first_interval=0, persistent=True)  # whatever file is opened
+        bpy.app.timers.register(_tick, first_interval=0, persistent=True)  # The timer survives opening another file.
 
 
 def _tick():
@@ -47,7 +48,7 @@ def _tick():
 
 
 def stop():
-    """Ends what is going on, without its outcome."""
+    """Cancels the running task and forgets the waiting ones."""
     global _running
     _waiting.clear()
     if bpy.app.timers.is_registered(_tick):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""3D View > Sidebar > Tolerance, from top to bottom, and entries in Blender's own menus."""
+"""Registers the panels of 3D View > Sidebar > Tolerance, from top to bottom, and entries in Blender's own menus."""
 
 import bpy
 

@@ -23,7 +23,7 @@ class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
             text_lines(
                 context,
                 layout,
-                counts or "The report of the last run is damaged: decimate again to have a new one",
+                counts or "The report of the last run is damaged: decimate again to get a new one",
                 "CHECKMARK" if counts else "ERROR",
             )
         say_blocked(context, layout, ob)

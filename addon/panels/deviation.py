@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far the mesh is from its reference, proved."""
+"""The panels that show how far the mesh is from its reference: proved numbers, and the settings of the overlay."""
 
 import bpy
 
@@ -24,10 +24,10 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         row.operator("tolvol.select_outside")
         layout.operator("tolvol.save_report", text="Save Report...")
         if ob.tolvol.show_deviation and (reason := reasons.off()):
-            text_lines(context, layout, f"Not shown: {reason}", "INFO")
+            text_lines(context, layout, f"The deviation is not shown: {reason}", "INFO")
 
     def _draw_measured(self, context, ob):
-        """The same rows whether there is a measurement or not: buttons below do not jump."""
+        """Draws the same rows with and without a measurement, so that the buttons below them stay where they are."""
         found = verdict.of(ob)
         column = self.layout.column(align=True)
         column.label(text="Largest Deviation")
@@ -45,7 +45,7 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
 
 
 class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
-    """The overlay in the 3D view."""
+    """The settings of the overlay in the 3D view."""
 
     bl_label = "Show Deviation"
     bl_parent_id = "TOLVOL_PT_deviation"
@@ -54,7 +54,8 @@ class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
     def draw_header(self, context):
         ob = context.active_object
         self.layout.prop(ob.tolvol, "show_deviation", text="")
-        if ob.tolvol.show_deviation and not overlay.shows(ob) and not reasons.hidden(ob):  # appended, for example
+        # The overlay is not told of an object that was appended from another file.
+        if ob.tolvol.show_deviation and not overlay.shows(ob) and not reasons.hidden(ob):
             bpy.app.timers.register(overlay.refresh, first_interval=0)
 
     def draw(self, context):

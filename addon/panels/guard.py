@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which tools are guarded, and how that goes."""
+"""The panel that chooses which of Blender's tools are guarded and shows the state of each guard."""
 
 import bpy
 
@@ -7,9 +7,9 @@ from .. import guard
 from .layout import AMBER, GREEN, GREY, SubPanel, text_lines
 
 _WHERE = {
-    "sculpting": "Takes effect in Sculpt Mode",
-    "editing": "Takes effect in Edit Mode",
-    "lattice": "Takes effect while the mesh is in Object Mode",
+    "sculpting": "The guard takes effect in Sculpt Mode",
+    "editing": "The guard takes effect in Edit Mode",
+    "lattice": "The guard takes effect while the mesh is in Object Mode",
 }
 
 

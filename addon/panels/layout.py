@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the panels share: where they stand, text that fits the sidebar, colours."""
+"""Parts that the panels share: their place in the interface, text that fits the sidebar, and coloured icons."""
 
 import blf
 import bpy
@@ -8,11 +8,11 @@ from .. import native
 from ..operators import blocked
 
 _FONT = 0  # Blender's own
-# Pixels of the sidebar that a label with an icon leaves to others: tabs, margins, the icon.
+# Pixels of the sidebar's width that tabs, margins and the icon take from the text of a label.
 _BESIDE_TEXT = 85
 
 GREY = "RADIOBUT_OFF"
-# Blender's coloured squares, which newer versions name anew.
+# Blender's icons of coloured squares have other names in newer versions.
 _ICONS = bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
 _COLOR = "SEQUENCE_COLOR" if "SEQUENCE_COLOR_01" in _ICONS else "STRIP_COLOR"
 RED, AMBER, GREEN = f"{_COLOR}_01", f"{_COLOR}_02", f"{_COLOR}_04"
@@ -40,7 +40,7 @@ def right(layout, text):
 
 
 def text_lines(context, layout, text, icon):
-    """A label broken into lines that fit the sidebar."""
+    """Draws a label, broken into lines that fit the sidebar."""
     scale = context.preferences.system.ui_scale
     blf.size(_FONT, context.preferences.ui_styles[0].widget.points * scale)
     room = max(context.region.width, 100) - _BESIDE_TEXT * scale
@@ -56,7 +56,7 @@ def text_lines(context, layout, text, icon):
 
 
 def say_blocked(context, layout, ob):
-    """Why the mesh cannot be changed; what is wrong with the reference or the mode the panel above says."""
+    """Says why the mesh cannot be changed, unless the reason is the reference or the mode: the top panel says that."""
     reason = blocked.decimate_blocked(ob)
     if reason and reason not in (blocked.object_blocked(ob), blocked.reference_blocked(ob), blocked.check_blocked(ob)):
         text_lines(context, layout, reason, "ERROR")

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Entries in the menus of the 3D view: Object in Object Mode, Vertex in Edit Mode."""
+"""Adds entries to menus of the 3D view: to Object in Object Mode and to Vertex in Edit Mode."""
 
 import bpy
 
-# Blender's menu search (F3) finds what is in a menu.
+# All operators are in this menu, because Blender's menu search (F3) finds only entries of menus.
 _IN_OBJECT_MENU = (
     *("set_reference", "clear_reference", "check", "select_outside", "save_report"),
     *("decimate", "smooth", "apply_modifier", "fit_modifier", "deform"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reference and the tolerance, and how they stand."""
+"""The panel of the reference and the tolerance, and of the state that they are in."""
 
 import bpy
 
@@ -40,7 +40,7 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
             row.operator("tolvol.clear_reference", text="", icon="X")
         _status(context, layout, ob)
         if on_top := measurements.on_top(ob):
-            text_lines(context, layout, f"Holds for the base mesh, without its {' and '.join(on_top)}", "INFO")
+            text_lines(context, layout, f"The proof is for the base mesh, without its {' and '.join(on_top)}", "INFO")
 
     @staticmethod
     def _other_form(context, ob):
@@ -54,7 +54,7 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
 
 
 def _status(context, layout, ob):
-    """How the reference stands, with a colour for it."""
+    """Shows the state of the reference as text, with a coloured icon."""
     settings = ob.tolvol
     reason = blocked.object_blocked(ob)
     if reason and ob.mode == "OBJECT":
@@ -64,14 +64,14 @@ def _status(context, layout, ob):
         why = None if reason else blocked.reference_blocked(ob)
         text_lines(context, layout, why or "No reference set", GREY)
     elif stale := snapshots.stale_reason(ob):
-        text_lines(context, layout, f"Out of date: {stale}", AMBER)
+        text_lines(context, layout, f"The reference is out of date: {stale}", AMBER)
     else:
         triangles = len(settings.snapshot.polygons)
         tolerance = length(context, tolerances.tolerance_length(settings, settings.snapshot_size))
         built = volumes.built_of(ob)
         ready = f"ready in {built.seconds:.2f}{NO_BREAK}s, {_bytes(built.memory)}" if built else "computed when needed"
         text_lines(context, layout, f"{triangles:,} triangles, ±{tolerance}, {ready}", GREEN)
-    # A reference that is set holds in every mode.
+    # The reference is shown in every mode, because guards and overlay use it in other modes too.
     if reason:
         text = "Buttons other than Smooth need Object Mode" if ob.mode == "EDIT" else "Buttons need Object Mode"
         text_lines(context, layout, text, "INFO")

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is certified and measured of a mesh, and how it is said."""
+"""Certifies and measures the distances of a mesh from its reference, and reports them as text and files."""

@@ -1,24 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The numbers that a decimated mesh has to prove, whether it is still in memory or was read back from a file."""
+"""Certifies the distances between a mesh and its reference, for a mesh in memory or one read back from a file."""
 
 import numpy as np
 
 from ..reference import volumes
 from . import measure
 
-INSIDE = 2  # of the native verdicts; unproved counts as outside
+INSIDE = 2  # the native verdict of a triangle that is proved to be inside; any other verdict counts as outside
 
 
 def verdicts(surface, reference, tolerance, threads=0, progress=None):
-    """The native verdict of each triangle of a Surface."""
+    """Returns the native verdict of each triangle of a Surface."""
     built = volumes.native_volume(reference, tolerance, threads, progress)
     arrays, matrix = surface.arrays, surface.matrix
     return built.check(arrays.vertices, arrays.triangles, to_world=matrix, threads=threads, progress=progress).verdict
 
 
 def outside(surface, reference, tolerance, threads=0, progress=None):
-    """(m,) bool: the triangles of a Surface that are not proved; none where certify() finds it within the tolerance, at
-    least one where it does not."""
+    """Returns (m,) bool: the triangles of a Surface that are not proved to be within the tolerance.
+
+    There are none if certify() finds the Surface within the tolerance, and otherwise there is at least one.
+    """
     pair = (surface.world(), surface.arrays.triangles), (reference.world(), reference.arrays.triangles)
     found = measure.largest_distance(*pair, tolerance, threads, progress)
     if found.within(tolerance):
@@ -29,10 +31,10 @@ def outside(surface, reference, tolerance, threads=0, progress=None):
 
 
 def certify(surface, reference, tolerance, kept_faces=0, threads=0, progress=None):
-    """{"forward", "backward", "outside"} of a report: intervals as pairs, for two Surfaces.
+    """Returns the entries "forward", "backward" and "outside" of a report for two Surfaces, with intervals as pairs.
 
-    kept_faces: how many faces of the mesh were outside from the start and kept as they are. "outside" then has "rest", the
-    interval of all other faces, unless more than that many are outside.
+    kept_faces: the number of faces that were outside from the start and were kept. If it is not 0, "outside" has the entry
+    "rest", the interval of all other faces, unless more faces than these are outside.
     """
     judge = (tolerance, threads, progress)
     triangles = surface.arrays.triangles

@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The deviation of two surfaces, both ways: what is measured, and the files it is written to.
+"""Measures the deviation of two surfaces in both directions and writes it as .json, .csv or .html.
 
-A deviation is a dictionary as a .json report holds it; lengths are in the units of the surfaces, shares are of the area
-(0 to 1), and what ends in _range, as `largest` itself, is an interval that the true number is certainly in:
+A deviation is a dictionary, as a .json report holds it. Lengths are in the units of the surfaces, and shares are shares
+of the area (0 to 1). `largest` and every entry whose name ends in _range is an interval that certainly contains the true
+number:
 
-    version, method, unit, size   `size` is what 100 % is
+    version, method, unit, size   `size` is the length that is 100 %
     tolerance                     {absolute, percent}, or None
     a, b                          {name or file, vertices, triangles}
     forward, backward             a from b, and b from a; each:
-        largest, position, triangle, face               where it was seen; face: the polygon, None in several objects
-        mean, mean_range, mean_error, rms, rms_range    mean_error: of the estimate, a standard deviation at most
+        largest, position, triangle, face               position: the point with the largest distance found, in this
+                                                        triangle and face; face: the polygon, None for several objects
+        mean, mean_range, mean_error, rms, rms_range    mean_error: the standard error of `mean`, at most
         percentiles   [{percent, distance, range}]
-        beyond        [{bound, share, range}]           farther than the bound
-        sides         {mean, mean_range, share_inside, share_inside_range, inside, outside}, where the other surface is
-                      closed, else None: `inside`, `outside` are the largest distances there
-        histogram     {edges, shares}                   with the sign, where there are sides
+        beyond        [{bound, share, range}]           share: of the area, farther away than the bound
+        sides         {mean, mean_range, share_inside, share_inside_range, inside, outside} if the other surface is
+                      closed, else None; `mean` is signed, `inside` and `outside` are the largest distances on each side
+        histogram     {edges, shares}                   of signed distances if there are sides
         samples, spacing
 """
 
@@ -33,12 +35,13 @@ PERCENTILES = (50, 90, 95, 99, 99.9)
 EXTENSIONS = (".json", ".csv", ".html")
 
 _METHOD = "certified interval; one sample for each piece of the surface, ranges from bounds on the pieces"
-_FORMULA = "=+-@\uff1d\uff0b\uff0d\uff20"  # the latter: the wide ones of East Asian fonts
-_BINS = 30  # a side of the histogram, about
+# A spreadsheet takes text that begins with one of these for a formula; the last four are the full-width forms.
+_FORMULA = "=+-@\uff1d\uff0b\uff0d\uff20"
+_BINS = 30  # the approximate number of bins on each side of the histogram
 
 
 def deviation(a, b, size, tolerance=None, bounds=(), unit="", threads=0, progress=None):
-    """The dictionary described above but for `a` and `b`, of two Surfaces."""
+    """Returns the dictionary that is described above, without `a` and `b`, for two Surfaces."""
     bounds = sorted({*bounds, *([] if tolerance is None else [tolerance])})
     ways = {}
     for way, surface, other in (("forward", a, b), ("backward", b, a)):
@@ -47,7 +50,7 @@ def deviation(a, b, size, tolerance=None, bounds=(), unit="", threads=0, progres
             *pair[0], *pair[1], bounds=bounds, percentiles=PERCENTILES, threads=threads, progress=progress
         )
         ways[way] = measure.largest_distance(*pair, tolerance, threads, progress), spread, surface.arrays.polygons
-    # The same scale both ways, so that the histograms can be compared.
+    # Both histograms have the same scale, so that they can be compared.
     edges = _edges(max(largest.upper for largest, _, _ in ways.values()), tolerance)
     return {
         "version": native.module.__version__,
@@ -60,7 +63,7 @@ def deviation(a, b, size, tolerance=None, bounds=(), unit="", threads=0, progres
 
 
 def _edges(largest, tolerance):
-    """Of the histogram from 0 on; the tolerance is one of them, unless it is too small to be seen."""
+    """Returns the edges of the bins from 0 on. The tolerance is one of the edges unless it is below a bin's width."""
     top = max(largest, tolerance or 0.0) or 1.0
     bins = int(_BINS * tolerance / top) if tolerance else 0
     width = tolerance / bins if bins else top / _BINS
@@ -71,8 +74,8 @@ def _way(largest, spread, polygons, bounds, edges):
     sides = spread.sides
     if sides:
         edges = np.concatenate([-edges[:0:-1], edges])
-    most = largest.upper  # the bounds on the pieces do not know it
-    # A distance may be above the end of the interval by its rounding.
+    most = largest.upper  # This bound is narrower than the bounds on the pieces, so it limits the other ranges too.
+    # A distance may be above the end of the interval by its own rounding error.
     shares, _ = np.histogram(np.clip(spread.distances, edges[0], edges[-1]), edges, weights=spread.weights)
     return {
         "largest": [largest.lower, largest.upper],
@@ -110,23 +113,23 @@ def _way(largest, spread, polygons, bounds, edges):
 
 
 def content(run, path, pictures=()):
-    """The bytes of a deviation with its `a` and `b`, in the format that the extension of a path names.
+    """Returns the bytes of a file for a deviation with its `a` and `b`, in the format of the path's extension.
 
-    pictures: (caption, bytes of a PNG) pairs, for the page alone.
+    pictures: pairs (caption, bytes of a PNG), which only the .html page shows.
     """
     writers = {
         ".json": lambda: json.dumps(run, indent=1) + "\n",
         ".csv": lambda: table(run),
         ".html": lambda: deviation_page.page(run, pictures),
     }
-    # A name of a file may have bytes that are no text.
+    # The name of a file may have bytes that are not valid text.
     return writers[Path(path).suffix.lower()]().encode("utf-8", "backslashreplace")
 
 
 def table(run):
-    """The same as CSV: one number a row, with the parameter it is for and the ends of its range where it has one.
+    """Returns a deviation as CSV: each row has one number, its parameter, and the ends of its range if it has one.
 
-    Text that a spreadsheet would take for a formula has a ' before it.
+    Text that a spreadsheet would take for a formula gets a ' before it.
     """
     rows = [("direction", "quantity", "at", "value", "lower", "upper")]
     rows += [("", "version", "", run["version"], "", ""), ("", "unit", "", run["unit"], "", "")]
@@ -143,10 +146,11 @@ def table(run):
 
 
 def _harmless(cell):
-    """Names come from files of other people: as a formula one could run programs where the table is opened."""
+    """Makes text safe for a spreadsheet: names come from other people's files, and as a formula a name could run a
+    program where the table is opened."""
     if not isinstance(cell, str):
         return cell
-    line = re.sub(r"[\t\r\n]", " ", cell)  # a lone \r would begin a row for some readers
+    line = re.sub(r"[\t\r\n]", " ", cell)  # Some readers of CSV begin a new row at a lone \r.
     return f"'{line}" if line.lstrip()[:1] in tuple(_FORMULA) else line
 
 

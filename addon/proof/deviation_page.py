@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A deviation as one HTML page that needs no other file: both directions side by side, histograms drawn as SVG.
+"""Writes a deviation as one HTML page that needs no other file: both directions side by side, with histograms as SVG.
 
-Colours are of the palette of M. Okabe and K. Ito, which the colour-blind can tell apart; what is beyond the tolerance is
-striped as well.
+The colours are from the palette of M. Okabe and K. Ito, which the colour-blind can tell apart. Bars beyond the tolerance
+are striped as well.
 """
 
 import base64
@@ -38,13 +38,13 @@ figure img {{ max-width: 100%; }}
 footer {{ margin-top: 2rem; font-size: .87rem; border-top: 1px solid #d0d0d0; padding-top: .8rem; }}
 """
 
-# Of the drawing of a histogram.
+# Size and margins of the drawing of a histogram, in pixels.
 _WIDTH, _HEIGHT, _LEFT, _RIGHT, _TOP, _BOTTOM = 560, 240, 50, 12, 30, 44
-_LEAST_BAR = 1.5  # so that a share of one in a million can be seen
+_LEAST_BAR = 1.5  # least height of a bar in pixels, so that a share of one in a million can be seen
 
 
 def page(run, pictures=()):
-    """The page of a deviation with its `a` and `b` (deviation.py); pictures: (caption, bytes of a PNG) pairs."""
+    """Returns the page of a deviation with its `a` and `b` (see deviation.py). pictures: pairs (caption, bytes of a PNG)."""
     a, b = (escape(_name(run[key])) for key in ("a", "b"))
     figures = "".join(
         f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{base64.b64encode(png).decode()}">'
@@ -78,7 +78,10 @@ def _counts(mesh):
 
 
 def _rounded(value, up, digits=4):
-    """Rounded so that a proved bound does not look better than it is (but for what float32 does to it)."""
+    """Returns a number as text, rounded up or down so that a proved bound does not look better than it is.
+
+    A relative difference of 1e-7, the rounding of float32, is ignored.
+    """
     slack = 1 - 1e-7 if up == (value > 0) else 1 + 1e-7
     rounding = ROUND_CEILING if up else ROUND_FLOOR
     return f"{Context(prec=digits, rounding=rounding).create_decimal_from_float(value * slack):g}"
@@ -105,7 +108,7 @@ def _share(value, range_):
 
 
 def _relative(run, value):
-    """The same length in % of the tolerance, or of the size where there is none."""
+    """Returns a length in percent of the tolerance, or of the size if there is no tolerance."""
     whole = run["tolerance"]["absolute"] if run["tolerance"] else run["size"]
     return f"{100 * value / whole:.3g}&nbsp;%"
 
@@ -122,11 +125,13 @@ def _verdict(run):
     ways = [run[way]["largest"] for way in ("forward", "backward")]
     names = [escape(_name(run[key])) for key in ("a", "b")]
     if all(upper <= tolerance for _, upper in ways):
-        return f'<p class="verdict within">✓ {said}both within it, proved</p>'
+        return f'<p class="verdict within">✓ {said}both are within the tolerance, proved</p>'
     beyond = [name for name, (lower, _) in zip(names, ways) if lower > tolerance]
     if beyond:
-        return f'<p class="verdict beyond">✗ {said}{" and ".join(beyond)} beyond it, proved</p>'
-    return f'<p class="verdict">? {said}not decided: the interval of a largest distance holds the tolerance</p>'
+        return f'<p class="verdict beyond">✗ {said}beyond the tolerance, proved: {" and ".join(beyond)}</p>'
+    return (
+        f'<p class="verdict">? {said}not decided, because the interval of a largest distance contains the tolerance</p>'
+    )
 
 
 def _article(run, way, from_, to, highest):
@@ -185,7 +190,7 @@ def _bands(run, found):
 def _sides(run, found, to):
     sides = found["sides"]
     if not sides:
-        return f'<p class="muted">{to} is not closed: there is no inside.</p>'
+        return f'<p class="muted">{to} is not closed, so it has no inside.</p>'
     inside, ends = sides["share_inside"], sides["share_inside_range"]
     rows = [
         ("inside", *_share(inside, ends), _rounded(sides["inside"][1], True)),
@@ -194,7 +199,7 @@ def _sides(run, found, to):
     return (
         f"<h3>Sides of {to}</h3>"
         + _table(("", "area", "certainly", f"farthest at most{_in_unit(run)}"), rows)
-        + f"<p>Mean with its sign, outside above 0: {sides['mean']:+.3g}{_unit(run)}, certainly "
+        + f"<p>The signed mean, with distances outside above 0, is {sides['mean']:+.3g}{_unit(run)}, certainly "
         f"{_between(sides['mean_range'])}.</p>"
     )
 
@@ -260,9 +265,10 @@ def _notes(run):
         for key in ("spacing", "mean_error")
     )
     return (
-        f"<p>Distances are from each point of the one surface to the nearest point of the other. The largest is a certified "
-        f"interval; the statistics are estimates by {samples} samples (mean spacing {spacing}), a standard error of the mean "
-        f"of at most {errors}, and beside each the interval that certainly holds it, whatever lies between the samples. "
-        f"Bars beyond the tolerance are striped; those too low to be seen are drawn {_LEAST_BAR} pixels high.</p>"
+        f"<p>A distance is measured from a point of one surface to the nearest point of the other. The largest distance is a "
+        f"certified interval. The statistics are estimated from {samples} samples (mean spacing {spacing}); the standard "
+        f"error of the mean is at most {errors}. Beside each number is an interval that certainly contains the true number, "
+        f"whatever lies between the samples. Bars beyond the tolerance are striped. Bars that would be too low to be seen "
+        f"are drawn {_LEAST_BAR} pixels high.</p>"
         f"<p>Tolerance Volumes {escape(run['version'])}</p>"
     )

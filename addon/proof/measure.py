@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Certified distances between two surfaces, in the world, of the coordinates as they are stored."""
+"""Computes certified distances between two surfaces in the world, from the stored coordinates."""
 
 from dataclasses import dataclass, replace
 
@@ -8,7 +8,10 @@ from .. import native
 
 @dataclass(frozen=True)
 class Interval:
-    """The true largest distance lies between the two; at `position`, on that face of the surface, it is at least `lower`."""
+    """The true largest distance lies between `lower` and `upper`.
+
+    The point `position` on the triangle `triangle` of the surface is at least `lower` away from the other surface.
+    """
 
     lower: float
     upper: float
@@ -23,10 +26,11 @@ class Interval:
 
 
 def largest_distance(from_surface, to_surface, tolerance=None, threads=0, progress=None):
-    """Interval of the largest distance of a point of the one (vertices, triangles) from the other.
+    """Returns the Interval of the largest distance of a point of `from_surface` from `to_surface`.
 
-    Its width is at most 1 % of it; where that leaves open whether it is within `tolerance`, it is narrowed until it
-    does not.
+    Each surface is a pair (vertices, triangles). The width of the interval is at most 0.1 % of `upper`, with the
+    exceptions that native/measure/hausdorff.h names. If `tolerance` lies inside the interval, the interval is narrowed
+    until `tolerance` no longer does, as far as rounding permits.
     """
 
     def measured(**options):
@@ -42,6 +46,6 @@ def largest_distance(from_surface, to_surface, tolerance=None, threads=0, progre
 
 
 def both_ways(surface, reference, tolerance=None, threads=0, progress=None):
-    """(surface -> reference, reference -> surface)."""
+    """Returns two Intervals: of the surface from the reference, and of the reference from the surface."""
     forward = largest_distance(surface, reference, tolerance, threads, progress)
     return forward, largest_distance(reference, surface, tolerance, threads, progress)

@@ -1,25 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The numbers of a run. A run is a dictionary as --report writes it (`decimation_run`), lengths in world units."""
+"""Makes the report of a run and texts from it.
+
+A run is a dictionary, as --report writes it (decimation_run()). Its lengths are in world units.
+"""
 
 import json
 import math
 
 from .. import native
 
-# What the certified distance leaves open of itself: Interval is at most this wide, relative to its upper end.
-_RESOLUTION = 0.01
+# The distance of the reference counts as no larger than before if its upper end grew by at most this share, the width of a
+# certified interval (native/measure/hausdorff.h): equal distances count as equal.
+_RESOLUTION = 0.001
 
 
 def decimation_run(source, result, native_report, volume, certified, options, seconds):
-    """What one decimation says of itself.
+    """Returns the run of one decimation.
 
-    source: the MeshArrays that went in; result: the Decimated; native_report: decimate()'s own; certified: by certify(), of
-    what will be stored; options: two_sided, placement, effort, target_triangles as given.
+    source: the MeshArrays of the input; result: the Decimated; native_report: the report of the native decimate();
+    certified: the result of certify() for the mesh that will be stored; options: two_sided, placement, effort and
+    target_triangles as they were given.
     """
-    # Blender keeps vertices that no face uses, so they are no repair here.
+    # The native report lists unused vertices as removed, but Blender keeps them: this is not a repair here.
     repairs = [repair for repair in native_report["repairs"] if repair["kind"] != "unused"]
     if result.coincident:
-        message = f"{result.coincident:,} faces left out that lie exactly on another face"
+        message = f"{result.coincident:,} faces that lie exactly on another face were left out"
         repairs.append({"kind": "coincident", "count": result.coincident, "message": message})
     return {
         "version": native.module.__version__,
@@ -45,17 +50,18 @@ def decimation_run(source, result, native_report, volume, certified, options, se
 
 
 def proved(run):
-    """Whether the certified intervals hold what was promised."""
+    """Whether the certified intervals prove the promise of the run."""
     tolerance = run["tolerance"]["absolute"]
     kept = run["outside"]
-    # Faces that were outside from the start and kept: the rest is within, and the reference no worse than before.
+    # If faces that were outside from the start were kept, the other faces have to be within the tolerance, and the
+    # reference must not be farther away than it was before.
     forward = kept.get("rest", run["forward"])
     backward_bound = max(tolerance, kept.get("backward_before", 0.0) * (1 + _RESOLUTION))
     return forward[1] <= tolerance and (not run["two_sided"] or run["backward"][1] <= backward_bound)
 
 
 def line(run, seconds=None):
-    """A run in one line; every percentage is of the reference's size."""
+    """Returns a run as one line of text. Every percentage is of the reference's size."""
     size = 100 * run["tolerance"]["absolute"] / run["tolerance"]["percent"]
     seconds = sum(run["seconds"].values()) if seconds is None else seconds
     return (
@@ -67,7 +73,10 @@ def line(run, seconds=None):
 
 
 def counts(run):
-    """How many triangles a run left, and what kept it from leaving fewer or all of it from being within."""
+    """Returns the numbers of triangles before and after a run as text, with remarks.
+
+    The remarks say why the run ended early or missed its target, and how many faces outside the tolerance were kept.
+    """
     remarks = []
     if run["target_triangles"] and run["stopped_by"] != "target":
         within = " within the tolerance" if run["stopped_by"] == "tolerance" else ""
@@ -83,7 +92,7 @@ def counts(run):
 
 
 def remembered_counts(text):
-    """counts() of a run that a file keeps as JSON, or None when the text is no such run: a file may be damaged."""
+    """Returns counts() of a run that a .blend file keeps as JSON, or None if the text is damaged."""
     try:
         return counts(json.loads(text))
     except (ValueError, TypeError, LookupError, RecursionError):
@@ -91,7 +100,7 @@ def remembered_counts(text):
 
 
 def intervals(run):
-    """Both certified intervals, for a message."""
+    """Returns both certified intervals as text for a message."""
     size = 100 * run["tolerance"]["absolute"] / run["tolerance"]["percent"]
     forward, backward = (
         f"between {percent(run[way][0], size)} and {percent(run[way][1], size)}" for way in ("forward", "backward")
@@ -100,16 +109,17 @@ def intervals(run):
 
 
 def percent(value, whole):
-    """`value` in % of `whole` with three digits, rounded up: a proved bound must not look smaller than it is."""
+    """Returns `value` in percent of `whole` with three digits, rounded up: a proved bound must not look smaller than it is."""
     share = 100 * value / whole
     if share <= 0:
         return "0 %"
     excess = share - 100
-    if 1e-9 < excess < 1:  # however little is beyond the whole is seen, and not made more of
+    # Just above 100 % more digits are shown, so that the text neither hides nor inflates the excess.
+    if 1e-9 < excess < 1:
         digits = 1 - math.floor(math.log10(excess))
         return f"{100 + math.ceil(excess * 10**digits - 1e-4) / 10**digits:.{digits}f} %"
     step = 10.0 ** (math.floor(math.log10(share)) - 2)
-    # A last digit is not rounded up for less than a ten-thousandth of it, which is what float32 does to 1 %.
+    # An excess of less than a ten-thousandth of the last digit is not rounded up: rounding 1 % to float32 makes such one.
     return f"{math.ceil(share / step - 1e-4) * step:#.3g}".rstrip(".") + " %"
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a mesh is within the tolerance: the one comparison that panel, status bar, Check and Select Outside show."""
+"""Decides whether a mesh is within the tolerance. Panel and Check both use this comparison, so they always agree."""
 
 from dataclasses import dataclass
 
@@ -7,22 +7,22 @@ from ..reference import measurements, tolerances
 from ..units import NO_BREAK
 from .measure import Interval
 
-# What is known of the two directions together.
+# The outcomes for the two directions together.
 WITHIN, ONE_WAY, UNDECIDED, BEYOND = range(4)
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Certified distances and the tolerance that they are compared with, in double, world units."""
+    """Certified distances, and the tolerance that they are compared with, in double precision and world units."""
 
     tolerance: float
-    forward: Interval  # of the mesh from the reference
-    backward: Interval
-    share_outside: float = 0.0  # of the mesh's area; 0 where it is not known for this tolerance
+    forward: Interval  # from the mesh to the reference
+    backward: Interval  # from the reference to the mesh
+    share_outside: float = 0.0  # share of the mesh's area beyond the tolerance; 0 if not known for this tolerance
 
     @property
     def forward_within(self):
-        """Proved."""
+        """Whether the mesh is proved to be within the tolerance of the reference."""
         return self.forward.within(self.tolerance)
 
     @property
@@ -36,23 +36,23 @@ class Verdict:
         return BEYOND if self.forward.beyond(self.tolerance) else UNDECIDED
 
     def line(self):
-        """For the panel."""
+        """Returns the verdict as a line for the panel."""
         if self.kind == WITHIN:
             return "Within the tolerance both ways, proved"
         if self.kind == ONE_WAY:
-            return "Within the tolerance one way, proved: parts of the reference are farther"
+            return "Within the tolerance one way, proved: parts of the reference are farther from the mesh"
         if self.kind == UNDECIDED:
-            return "As far as the tolerance: rounding is more than what is left of it"
+            return "Not proved: the distance differs from the tolerance by less than the rounding"
         share = f": {100 * self.share_outside:.1f}{NO_BREAK}% of the mesh" if self.share_outside else ""
         return f"Beyond the tolerance{share}"
 
 
 def of(ob):
-    """The Verdict of what was measured of `ob` last, about the tolerance as it is set now; None where nothing is known."""
+    """Returns the Verdict of the last measurement of `ob` for the present tolerance, or None without a measurement."""
     measured = measurements.measurement_of(ob)
     if measured is None:
         return None
-    # Per cent are of the size that was measured: a turned object is larger or smaller by the rounding of its matrix.
+    # A percentage is taken of the size that was measured: rotating the object changes its size by rounding.
     tolerance = tolerances.tolerance_length(ob.tolvol, measured.size)
     return Verdict(
         tolerance,

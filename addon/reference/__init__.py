@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reference of an object, its tolerance volumes, and what was measured against it."""
+"""Keeps the reference of an object, its tolerance volumes, and the distances that were measured from it."""
 
 import bpy
 from bpy.app.handlers import persistent

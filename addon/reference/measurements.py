@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was measured of an object last and whether it still holds; and what panels show of a mesh."""
+"""Keeps the last measurement of an object and tells whether it is still valid. Caches the numbers that panels show."""
 
 import numpy as np
 
@@ -8,17 +8,17 @@ from ..mesh import mesh_io
 from ..redraw import redraw_views
 from . import snapshots
 
-# What panels show of a mesh (its size, its fingerprint), by object; forgotten whenever any mesh changes.
+# Cache of numbers that panels show: (object, "size" or "fingerprint", ...) -> value. It is cleared when any mesh changes.
 _shown = {}
 
 
-# How far the lengths of an object's axes and the angles between them may stray before it counts as scaled: ten
-# times what float32 rotations add up to.
+# An object counts as scaled if the lengths of its axes or the angles between them change by more than this, relatively.
+# The rounding of float32 rotations adds up to a tenth of it.
 _RIGID = 1e-5
 
 
 def remember(ob, surface, certified, tolerance, share_outside=0.0):
-    """Keeps what was certified of `surface`, the object's mesh as it is now, and shows it at once."""
+    """Stores the certified distances of `surface`, the object's mesh as it is now, and redraws the panels."""
     measurement = ob.tolvol.measurement
     measurement.fingerprint = surface.arrays.fingerprint()
     measurement.matrix = surface.matrix.ravel()
@@ -30,33 +30,33 @@ def remember(ob, surface, certified, tolerance, share_outside=0.0):
 
 
 def measurement_of(ob):
-    """What was measured last, or None when the mesh, its place or the reference has changed since.
+    """Returns the last measurement, or None if the mesh, its place or the reference has changed since then.
 
-    In other modes than Object Mode the mesh is being changed by Blender, out of sight: nothing is known of it there.
+    Outside Object Mode the result is None: Blender may be changing the mesh there, and Python does not see the changes.
     """
     measurement = ob.tolvol.measurement
     if ob.mode != "OBJECT" or not measurement.complete or measurement.fingerprint != shown_fingerprint(ob):
         return None
     if not all(map(snapshots.sound, (measurement.tolerance, 1 + measurement.forward, 1 + measurement.backward))):
-        return None  # a damaged file
+        return None  # The file is damaged.
     before, now = snapshots.stored_matrix(measurement.matrix), mesh_io.matrix_array(ob.matrix_world)
     moves_along = ob.tolvol.snapshot_kind == "SELF" and same_shape(before, now)
     return measurement if moves_along or np.array_equal(before, now) else None
 
 
 def same_shape(matrix, other):
-    """Whether two placements differ by a rigid motion only, so that lengths are the same."""
+    """Whether two placements differ only by a rigid motion, so that lengths are the same."""
     metric, metric_other = (m[:3, :3].T @ m[:3, :3] for m in (matrix, other))
     return np.abs(metric - metric_other).max() <= _RIGID * np.abs(metric).max()
 
 
 def on_top(ob):
-    """What Blender shows the mesh of `ob` with that no proof covers."""
+    """Returns names of the things that change the shown mesh of `ob` after the base mesh: no proof covers them."""
     return ["modifiers"] * bool(ob.modifiers) + ["shape keys"] * bool(ob.data.shape_keys)
 
 
 def shown_size(ob):
-    """What 100 % is, for drawing; None while it cannot be known."""
+    """Returns the length that is 100 %, for drawing, or None if it is not known."""
     if ob.tolvol.snapshot is not None:
         size = snapshots.snapshot_size(ob)
         return size if snapshots.sound(size) else None
@@ -73,7 +73,7 @@ def shown_size(ob):
 
 
 def shown_fingerprint(ob):
-    """Tells one state of the object's mesh from another, for drawing."""
+    """Returns the fingerprint of the object's mesh, for drawing: it is computed only after a change."""
     key = (ob.as_pointer(), "fingerprint")
     if key not in _shown:
         _shown[key] = mesh_io.read_mesh(ob.data).fingerprint()

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reference of an object: a snapshot of a mesh and its place.
+"""Keeps the reference of an object: a snapshot of a mesh and its place.
 
-The snapshot is a Mesh datablock that Object.tolvol points to, so that it is saved with the file and followed by undo; it
-is never written to. An object that is its own reference carries it along, moved, turned or scaled: snapshot and mesh are
-mapped to the world by the object's present matrix. Another object's reference stays where it was in the world when it was
-set.
+The snapshot is a Mesh datablock that Object.tolvol points to, so that Blender saves it with the file and includes it in
+undo. It is never changed. If an object is its own reference, the object's present matrix maps snapshot and mesh to the
+world, so that the reference moves, turns and scales with the object. If the reference is another object's mesh, it stays
+at the place in the world where it was when it was set.
 """
 
 import math
@@ -18,11 +18,13 @@ from ..errors import Refused
 from ..mesh import mesh_io
 from ..redraw import redraw_views
 
-# fingerprint of a snapshot -> the box of its used vertices, (2, 3) float32; a snapshot never changes.
+# Fingerprint of a snapshot -> the bounding box of its used vertices, (2, 3) float32. The box never becomes outdated,
+# because a snapshot never changes.
 _boxes = {}
 
 
-# Called whenever the reference of an object may have become another one: set, let go of, undone, loaded.
+# Functions that notify() calls whenever a reference may have changed: it was set or removed, or a step was undone, or a
+# file was loaded.
 listeners = []
 
 
@@ -42,12 +44,12 @@ class Surface:
 
 
 def surface_of(ob):
-    """The object's base mesh as it is now."""
+    """Returns the object's base mesh as it is now."""
     return Surface(mesh_io.read_mesh(ob.data), mesh_io.matrix_array(ob.matrix_world))
 
 
 def joined(surfaces):
-    """Several Surfaces as one; their coordinates are the world's, in double precision, unless there is only one."""
+    """Joins several Surfaces to one with world coordinates in double precision. A single Surface is returned as it is."""
     surfaces = list(surfaces)
     if len(surfaces) == 1:
         return surfaces[0]
@@ -61,12 +63,12 @@ def joined(surfaces):
 
 
 def source_object(ob):
-    """The object whose mesh a new reference would be taken from, or None."""
+    """Returns the object whose mesh Set Reference would take, or None."""
     return ob if ob.tolvol.reference_kind == "SELF" else ob.tolvol.reference_object
 
 
 def reference_of(ob):
-    """The reference as it lies in the world now; the mesh that Set Reference would take when none is set."""
+    """Returns the reference at its present place. If none is set, it returns the mesh that Set Reference would take."""
     settings = ob.tolvol
     if settings.snapshot is None:
         source = source_object(ob)
@@ -80,16 +82,16 @@ def reference_of(ob):
 
 
 def reference_matrix(ob):
-    """(4, 4): from the snapshot to the world, now."""
+    """Returns (4, 4): the present matrix from the snapshot to the world."""
     settings = ob.tolvol
     own = settings.snapshot_kind == "SELF"
     return mesh_io.matrix_array(ob.matrix_world) if own else stored_matrix(settings.snapshot_matrix)
 
 
 def snapshot_size(ob):
-    """What reference_of(ob).size() is, bit for bit, in the time of a glance; cheap enough to draw.
+    """Returns the same number as reference_of(ob).size(), bit for bit, but is quick enough to be called while drawing.
 
-    Not a number (nan) where a damaged file holds no surface.
+    Returns nan if a damaged file holds no surface.
     """
     settings = ob.tolvol
     key = settings.snapshot_fingerprint
@@ -99,12 +101,12 @@ def snapshot_size(ob):
         _boxes[key] = np.array([used.min(0), used.max(0)]) if len(used) else np.full((2, 3), np.nan)
     if not np.isfinite(_boxes[key]).all():
         return math.nan
-    # The size is that of the box of the used vertices.
+    # The size of a surface is the size of the bounding box of its used vertices.
     return native.module.size(_boxes[key], np.array([[0, 1, 1]]), to_world=reference_matrix(ob))
 
 
 def set_reference(ob, surface):
-    """Makes `surface` the reference, as chosen by the settings of `ob`."""
+    """Stores `surface` as the reference of `ob`, of the kind that the settings of `ob` name."""
     clear_reference(ob)
     settings = ob.tolvol
     settings.snapshot = mesh_io.new_mesh(f".{ob.name} reference", surface.arrays.vertices, surface.arrays.triangles)
@@ -112,8 +114,9 @@ def set_reference(ob, surface):
     settings.snapshot_object = settings.reference_object if settings.reference_kind == "OBJECT" else None
     settings.snapshot_matrix = surface.matrix.ravel()
     settings.snapshot_fingerprint = surface.arrays.fingerprint()
-    _boxes.pop(settings.snapshot_fingerprint, None)  # a damaged snapshot may have had this fingerprint
-    settings.tolerance_percent = settings.tolerance_percent  # no longer what the preferences say
+    _boxes.pop(settings.snapshot_fingerprint, None)  # A damaged snapshot may have had this fingerprint.
+    # Setting the percentage to itself makes it the object's own: a later change of the preferences does not change it.
+    settings.tolerance_percent = settings.tolerance_percent
     notify()
 
 
@@ -132,25 +135,25 @@ def notify():
     redraw_views()
 
 
-REMEDY = "Replace the reference, or choose the one before again"
+REMEDY = "Replace the reference, or choose the previous one again"
 
 
 def stale_reason(ob):
-    """Why the reference that is set no longer fits, or None. Cheap enough to draw."""
+    """Why the stored reference no longer fits the settings, or None. It is quick enough to be called while drawing."""
     settings = ob.tolvol
     if settings.snapshot is None:
         return None
     if not sound(settings.snapshot_size):
-        return "what the file holds of it is damaged"
+        return "the snapshot in the file is damaged"
     if settings.snapshot_kind != settings.reference_kind:
-        return "another one was chosen"
+        return "another kind of reference was chosen"
     if settings.snapshot_kind == "OBJECT" and settings.snapshot_object != settings.reference_object:
         return "another object was chosen"
     return None
 
 
 def reference_missing(ob):
-    """Why there is no reference to compare `ob` with, or None. Cheap enough to draw."""
+    """Why there is no reference to compare `ob` with, or None. It is quick enough to be called while drawing."""
     if ob.tolvol.snapshot is None:
         return "Set the reference first"
     if reason := stale_reason(ob):
@@ -159,7 +162,7 @@ def reference_missing(ob):
 
 
 def sound(length):
-    """Whether a stored length can be one: what a damaged file holds may be anything."""
+    """Whether a stored number can be a length. A damaged file may hold any number."""
     return 0 < length < np.inf
 
 

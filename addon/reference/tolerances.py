@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tolerance that is set, as a length, in double precision, whatever unit it was typed in."""
+"""Computes the tolerance as a length in double precision, whether it was typed in percent or as a length."""
 
 import math
 
@@ -10,14 +10,14 @@ from ..units import shortest, typed
 
 
 def tolerance_length(settings, size):
-    """The tolerance in world units, in double; `settings` has what properties.tolerance_settings() declares."""
+    """Returns the tolerance in world units. `settings` has the properties of properties.tolerance_settings()."""
     if settings.tolerance_mode == "LENGTH":
         return _chosen(settings, "tolerance_length")
     return _chosen(settings, "tolerance_percent") / 100 * size
 
 
 def _chosen(settings, name):
-    """What is chosen, in double: what was converted from the other unit, or the decimal that a person typed."""
+    """Returns a property in double precision: the value converted from the other unit, or the decimal that was typed."""
     value = getattr(settings, name)
     try:
         converted = float(getattr(settings, f"{name}_converted"))
@@ -29,12 +29,12 @@ def _chosen(settings, name):
 
 
 def convert_tolerance(settings, size, mode):
-    """Makes the tolerance in unit `mode` equal to that in the other unit, in double."""
+    """Sets the tolerance in the unit `mode` to the same length as in the other unit, in double precision."""
     if mode == "LENGTH":
         name, value = "tolerance_length", _chosen(settings, "tolerance_percent") / 100 * size
     else:
         name, value = "tolerance_percent", 100 * _chosen(settings, "tolerance_length") / size
-        # There and back again is the number that was typed.
+        # A percentage that is converted to a length and back has to be the typed number again, without rounding errors.
         if math.isclose(shortest(value), value, rel_tol=1e-15):
             value = shortest(value)
     setattr(settings, name, value)

@@ -1,25 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tolerance volumes that were built last. Jobs of several threads ask for them while panels are drawn."""
+"""A cache of the tolerance volumes that were used last. Threads of jobs use it while the main thread draws panels."""
 
 import threading
 from collections import OrderedDict
 
 from .. import native
 
-_LOOK = 0.05  # seconds between two looks at whether a thread that waits was cancelled
+_LOOK = 0.05  # A waiting thread checks every so many seconds whether it was cancelled.
 
 
 class VolumeCache:
     def __init__(self, most_bytes):
-        """most_bytes: what the volumes may hold together; the one used last is kept whatever it holds."""
+        """most_bytes: the most memory of all volumes together. The last used volume is kept even if it is larger."""
         self._most_bytes = most_bytes
         self._volumes = OrderedDict()
         self._being_built = set()
         self._changed = threading.Condition()  # its lock guards both collections
 
     def get(self, key, build, progress=None):
-        """The volume with this key, made by build() unless it is there. A thread that asks for a volume which another
-        thread is building waits for it, and builds it itself if the other one fails. Raises Cancelled."""
+        """Returns the volume with this key, and calls build() to make it if the cache does not hold it.
+
+        If another thread is building the volume, the call waits for it, and builds the volume itself if the other thread
+        fails. Raises Cancelled.
+        """
         with self._changed:
             while key in self._being_built:
                 if progress is not None and progress.cancelled:
@@ -41,7 +44,7 @@ class VolumeCache:
         return volume
 
     def built(self, key):
-        """The volume with this key if it is there, else None. It waits for no build, so that panels can ask for it."""
+        """Returns the volume with this key, or None if the cache does not hold it. It never waits: panels may call it."""
         with self._changed:
             return self._volumes.get(key)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The native tolerance volumes of references; the last ones used are kept."""
+"""Builds the native tolerance volumes of references and keeps the last used ones."""
 
 from .. import native
 from . import snapshots, tolerances
@@ -9,13 +9,13 @@ _volumes = VolumeCache(most_bytes=600_000_000)
 
 
 def built_of(ob):
-    """The tolerance volume of the reference that is set, if it is in memory; cheap enough to draw."""
+    """Returns the tolerance volume of the stored reference if it is in memory. It is quick enough to be called in drawing."""
     tolerance = tolerances.tolerance_length(ob.tolvol, snapshots.snapshot_size(ob))
     return _volumes.built((ob.tolvol.snapshot_fingerprint, snapshots.reference_matrix(ob).tobytes(), tolerance))
 
 
 def native_volume(surface, tolerance, threads=0, progress=None):
-    """The tolerance volume of a surface: built, or the one that was built of the same content before."""
+    """Returns the tolerance volume of a surface. A volume that was built for the same content is used again."""
     key = (surface.arrays.fingerprint(), surface.matrix.tobytes(), tolerance)
 
     def build():

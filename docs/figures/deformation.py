@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fig. 4 of the paper: a model that a lattice carries along, as wished and within the tolerance, distances as colours.
+"""Draws Fig. 4 of the paper: a model deformed by a lattice, freely and within the tolerance, with distances as colours.
 
 blender --background --python docs/figures/deformation.py -- PICTURE.png [--model MESH] [--tolerance 2%]
 """
@@ -20,20 +20,20 @@ from addon import native  # noqa: E402
 from addon.files import file_io  # noqa: E402
 from addon.proof import measure, report  # noqa: E402
 
-POINTS = 4  # of the lattice, along each axis
-ROOM = 0.06  # between the model and the lattice, of the box
-PULL = 5.0  # tolerances by which the wish moves control points; vertices follow half as far
-GAP, MARGIN = 0.34, 0.5  # between and beside the two, which the lattices need
-# Distance over tolerance from 0 to 1, a ramp that greys as well; beyond it a colour that the ramp has not.
+POINTS = 4  # control points of the lattice along each axis
+ROOM = 0.06  # space between the model and the lattice, as a share of the model's box
+PULL = 5.0  # tolerances by which control points move; vertices follow about half as far
+GAP, MARGIN = 0.34, 0.5  # spaces between and beside the models, which leave room for the lattices
+# Distance over tolerance (0 to 1) -> colour. The colours also differ in grey. BEYOND is not among them.
 RAMP = ((0.0, (0.93, 0.93, 0.88)), (0.35, (0.95, 0.75, 0.35)), (0.7, (0.45, 0.55, 0.75)), (1.0, (0.05, 0.12, 0.35)))
 BEYOND = (0.85, 0.0, 0.45)
 CAGE_COLOUR = (0.25, 0.27, 0.3)
 CAGE_RADIUS = 0.0016
-BAR = (0.2, 0.011)  # width and height of the legend, of the picture's width
+BAR = (0.2, 0.011)  # width and height of the legend, as shares of the picture's width
 
 
 def deviation_material(lit):
-    """Colours the attribute `deviation`, a distance over the tolerance."""
+    """Returns a material that colours a mesh by its attribute `deviation`, a distance over the tolerance."""
 
     def build(tree):
         attribute = tree.nodes.new("ShaderNodeAttribute")
@@ -66,7 +66,8 @@ def set_deviation(mesh, values):
 
 
 def wished_lattice(vertices, length):
-    """(points, domain): the upper front of the box is drawn forward by about `length`, one side of it pressed in."""
+    """Returns (points, domain) of a lattice that draws the upper front of the box forward by about `length` and presses
+    one side in."""
     lower, upper = vertices.min(0), vertices.max(0)
     room = ROOM * (upper - lower)
     domain = np.diag([*(upper - lower + 2 * room), 1.0])
@@ -79,7 +80,7 @@ def wished_lattice(vertices, length):
 
 
 def add_cage(points, model):
-    """The lattice, seen where the object `model` is."""
+    """Adds the lines of a lattice at the place of the object `model`."""
     curve = bpy.data.curves.new("cage", "CURVE")
     curve.dimensions = "3D"
     curve.bevel_depth = CAGE_RADIUS / model.matrix_world.to_scale().x
@@ -100,7 +101,7 @@ def add_cage(points, model):
 
 
 def add_legend(camera, tolerance_text):
-    """A bar of the colours at the top: from 0 to the tolerance, and beyond."""
+    """Adds a bar of the colours at the top of the picture: from 0 to the tolerance, and beyond the tolerance."""
     width, (long, high) = comparison.SENSOR / comparison.LENS, BAR
     top = comparison.HEIGHT / comparison.WIDTH / 2 - 0.015
     x = np.array([-0.5, 0.5, 0.5, 0.9]) * long
@@ -118,10 +119,8 @@ def add_legend(camera, tolerance_text):
 def arguments():
     parser = cli.Parser("docs/figures/deformation.py", description=__doc__.splitlines()[0])
     parser.add_argument("picture", metavar="PICTURE.png")
-    parser.add_argument("--model", metavar="MESH", help="a file, Z up; without it Blender's monkey, subdivided")
-    parser.add_argument(
-        "--tolerance", type=cli.length, default="2%", help="a length, or in percent of size; without it 2%%"
-    )
+    parser.add_argument("--model", metavar="MESH", help="a file with Z up (default: Blender's monkey, subdivided)")
+    parser.add_argument("--tolerance", type=cli.length, default="2%", help="a length, or N%% of size (default: 2%%)")
     return parser.parse()
 
 

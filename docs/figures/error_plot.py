@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Error against grid spacing: exact scatter, fast marching and a permission grid, on a sphere, a box and Blender's monkey.
+"""Plots error against grid spacing for exact scatter, fast marching and a permission grid on three shapes.
 
 blender --background --python docs/figures/error_plot.py -- PICTURE.png
 
-Upper row: the trilinear interpolation of the grid against the exact distance, at random points within the tolerance.
-Lower row, what a check makes of it: along random rays from the surface, the exact distance where the represented volume
-is first left, against the tolerance. Closed references are interpolated with signs; the monkey, whose eye sockets are
-open, without: its boundary is extruded, and signed values jump there.
+The shapes are a sphere, a box and Blender's monkey. The upper row shows the difference between the trilinear interpolation
+of the grid and the exact distance, at random points within the tolerance. The lower row shows the effect on a check: along
+random rays from the surface, the difference between the tolerance and the exact distance where the ray first leaves the
+represented volume. Closed references are interpolated with signs. The monkey has open eye sockets and is interpolated
+without signs: its boundary is extruded, and signed values would jump there.
 
-The paper says that the error falls like h^2. What is found: it does for exact values where the distance is smooth, so
-for the sphere, and for the mean over the others. At the medial axis, which reaches the surface along every convex edge,
-and, without signs, at the surface itself the distance has a kink: there the largest error falls like h. Fast marching is
-of first order at best, whatever the interpolation: at the corners of the box it is off by a whole spacing. A permission
-grid is of first order, too, and gives away about a spacing everywhere: in the mean 40 to 800 times as much as exact
-values interpolated.
+The paper says that the error falls like h^2. For exact values this is so where the distance is smooth: on the sphere, and
+in the mean on the other shapes. At the medial axis, which reaches the surface along every convex edge, the distance has a
+kink, and without signs also at the surface itself. There the largest error falls like h. Fast marching is of first order
+at best, with any interpolation: at the corners of the box its error is a whole spacing. A permission grid is of first
+order, too. It loses about a spacing everywhere, in the mean 40 to 800 times as much as interpolated exact values.
 """
 
 import sys
@@ -31,13 +31,14 @@ from addon.native import module as tolvol  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "build" / "release" / "python"))
 
-TOLERANCE = 0.03  # of the size
-REACH = 2  # tolerances that the fields reach, so that every cell about the tolerance has all its values
-PRECISIONS = np.geomspace(2, 11.3, 6)  # nodes per tolerance; the finest grid that the budget holds
+TOLERANCE = 0.03  # as a share of the size
+REACH = 2  # tolerances that the fields reach, so that all corners of the cells around the tolerance have values
+# Nodes per tolerance; the last one makes the finest grid that the memory budget permits.
+PRECISIONS = np.geomspace(2, 11.3, 6)
 POINTS, RAYS = 100_000, 4_000
 SEED = 2004
 
-METHODS = {  # name: (colour, marker); told apart without colours as well
+METHODS = {  # name: (colour, marker); the markers tell the methods apart without colours
     "scatter": ("#0072B2", "o"),
     "fast marching": ("#D55E00", "s"),
     "permission grid": ("#222222", "^"),
@@ -45,7 +46,7 @@ METHODS = {  # name: (colour, marker); told apart without colours as well
 
 
 def new_mesh(fill):
-    """(vertices, triangles) of what fill(bmesh) makes."""
+    """Returns (vertices, triangles) of the mesh that fill(bmesh) makes."""
     mesh, bm = bpy.data.meshes.new("shape"), bmesh.new()
     fill(bm)
     bmesh.ops.triangulate(bm, faces=bm.faces)
@@ -55,7 +56,7 @@ def new_mesh(fill):
 
 
 def suzanne(bm):
-    """Blender's monkey, subdivided, without the noise that models.py adds."""
+    """Adds Blender's monkey to a bmesh, subdivided, without the noise that models.py adds."""
     bpy.ops.mesh.primitive_monkey_add(calc_uvs=False)
     ob = bpy.context.object
     ob.modifiers.new("subdivision", "SUBSURF").levels = 2
@@ -82,14 +83,14 @@ def directions(count, rng):
 
 
 def interpolation(volume, signed):
-    """Magnitude of the trilinear interpolation of a volume's grid, as a function of points."""
+    """Returns a function of points: the magnitude of the trilinear interpolation of a volume's grid."""
     values, origin, spacing, unit = volume.grid(signed=signed)
     values = np.ascontiguousarray(values if signed else np.abs(values))
 
     last = np.array(values.shape[::-1]) - 1
 
     def at(points):
-        node = np.clip((points - origin) / spacing, 0, last - 1e-9)  # outside the grid as at its border: beyond
+        node = np.clip((points - origin) / spacing, 0, last - 1e-9)  # outside the grid, the value at its border
         low = node.astype(np.int64)
         weight = np.stack([1 - (node - low), node - low])
         result = 0
@@ -102,12 +103,12 @@ def interpolation(volume, signed):
 
 
 def first_exit(inside, start, direction, reach):
-    """The points where rays leave what inside(points) says; of the rays that do within `reach`."""
+    """Returns the points where rays first leave the set given by inside(points), for rays that leave it within `reach`."""
     steps = np.linspace(0, reach, 129)
     stays = np.stack([inside(start + t * direction) for t in steps])
     leaves = ~stays.all(axis=0)
     start, direction = start[leaves], direction[leaves]
-    first = np.argmin(stays[:, leaves], axis=0)  # step outside
+    first = np.argmin(stays[:, leaves], axis=0)  # the first step outside
     low, high = steps[np.maximum(first - 1, 0)], steps[first]
     for _ in range(20):
         middle = (low + high) / 2
@@ -117,7 +118,7 @@ def first_exit(inside, start, direction, reach):
 
 
 def measure(vertices, triangles, closed):
-    """(spacings, {method: errors} of interpolation, the same of the represented volume), all in percent of size.
+    """Returns (spacings, {method: errors of interpolation}, {method: errors of the represented volume}), in percent of size.
 
     errors: (k, 2), the largest and the mean for each spacing.
     """

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pictures of docs/pictures that show what the tolerance volume is and what it keeps, on any mesh.
+"""Makes the pictures of docs/pictures that show the tolerance volume and distances from it, of any mesh.
 
 blender --background --python docs/figures/figures.py -- [MESH] [--output FOLDER] [--tolerance 1%]
 
-volume.png: the tolerance volume around MESH, half of it cut away. distance.png: MESH decimated within the tolerance, and to
-as many triangles by Blender's own Decimate modifier, coloured by the distance to MESH. Without MESH: Blender's monkey, and
-error.png as well, the error of distance fields against their spacing, which takes minutes and needs `sh setup.sh --tests`.
+volume.png shows the tolerance volume around MESH, half of it cut away. distance.png shows MESH decimated within the
+tolerance, and decimated to as many triangles by Blender's own Decimate modifier, both coloured by the distance to MESH.
+Without MESH the script takes Blender's monkey and also makes error.png, the error of distance fields against their spacing.
+error.png takes minutes and needs `sh setup.sh --tests`.
 """
 
 import importlib.util
@@ -24,7 +25,7 @@ from addon.mesh import mesh_io  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
 
 PICTURES = Path(__file__).resolve().parents[2] / "docs" / "pictures"
-VOLUME_TOLERANCE = 0.04  # of the size: so large that it can be seen
+VOLUME_TOLERANCE = 0.04  # share of the size; it is large enough to be seen
 VOLUME_SIZE = (760, 640)
 PANEL = (372, 324)
 HEADING = 64
@@ -32,7 +33,7 @@ LEGEND = 190
 
 
 def by_modifier(vertices, triangles, count):
-    """What Blender's Decimate modifier makes of a mesh: at most `count` triangles."""
+    """Returns a mesh decimated by Blender's Decimate modifier to at most `count` triangles."""
     ob = bpy.data.objects.new("modifier", mesh_io.new_mesh("modifier", vertices, triangles))
     bpy.context.scene.collection.objects.link(ob)
     modifier = ob.modifiers.new("decimate", "DECIMATE")
@@ -49,7 +50,7 @@ def draw_volume(path, mesh, like):
     page = pictures.Page(VOLUME_SIZE[0] + LEGEND, VOLUME_SIZE[1])
     page.image(0, 0, tolvol.render_volume(volume, view, VOLUME_SIZE, cut=(middle, (1, 0, 0)), samples=3))
     page.text(VOLUME_SIZE[0], pictures.MARGIN, "All points within ε\nof the reference", 12)
-    # What is cut open is beyond the mesh, so that the section begins at it.
+    # The section shows only points outside the mesh, so the legend begins at distance 0.
     bar = VOLUME_SIZE[0], 90, VOLUME_SIZE[1] - 110
     page.legend(*bar, "signed", volume.tolerance, volume.size, lowest=0, outside=False)
     page.save(path, step=3)
@@ -89,7 +90,9 @@ def arguments():
         "docs/figures/figures.py", description="Makes the pictures of the tolerance volume and of distances."
     )
     parser.add_argument("mesh", nargs="?", metavar="MESH", help=".obj, .ply or .stl")
-    parser.add_argument("--output", default=PICTURES, metavar="FOLDER", help="where to (default: docs/pictures)")
+    parser.add_argument(
+        "--output", default=PICTURES, metavar="FOLDER", help="the folder for the pictures (default: docs/pictures)"
+    )
     parser.add_argument(
         "--tolerance", default=(1.0, True), type=cli.length, metavar="T", help="N%% of size, or a length"
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fig. 3 of the paper: a model with noise, smoothed without and within the tolerance, distances as colours.
+"""Draws Fig. 3 of the paper: a model with noise, smoothed without and within the tolerance, with distances as colours.
 
 blender --background --python docs/figures/smoothing.py -- PICTURE.png [--model MESH] [--tolerance 0.4%]
 """
@@ -16,7 +16,7 @@ import models  # noqa: E402
 import pictures  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
 
-NOISE = 0.4  # tolerances, the standard deviation along the normals
+NOISE = 0.4  # tolerances; the standard deviation of the noise along the normals
 ITERATIONS = 100
 PANEL = (372, 330)
 HEADING = 64
@@ -24,7 +24,7 @@ LEGEND = 190
 
 
 def with_noise(vertices, triangles, deviation):
-    """The vertices moved along their normals, float32."""
+    """Returns the vertices with noise along their normals, float32."""
     normals = np.zeros_like(vertices, np.float64)
     a, b, c = (vertices[triangles[:, k]].astype(np.float64) for k in range(3))
     for corner in range(3):
@@ -60,8 +60,10 @@ def draw(path, mesh, tolerance, like):
 def arguments():
     parser = cli.Parser("docs/figures/smoothing.py", description=__doc__.splitlines()[0])
     parser.add_argument("picture", metavar="PICTURE.png")
-    parser.add_argument("--model", metavar="MESH", help=".obj, .ply or .stl; without it Blender's monkey, subdivided")
-    parser.add_argument("--tolerance", type=cli.length, default="0.4%", help="a length, or in percent of size")
+    parser.add_argument("--model", metavar="MESH", help=".obj, .ply or .stl (default: Blender's monkey, subdivided)")
+    parser.add_argument(
+        "--tolerance", type=cli.length, default="0.4%", help="a length, or N%% of size (default: 0.4%%)"
+    )
     return parser.parse()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Running decimate.py and report.py as a person does, on files that the tests write."""
+"""Runs decimate.py and report.py as a user does, on files that the tests write."""
 
 import multiprocessing
 import re
@@ -66,10 +66,13 @@ _served = None
 
 
 def command(script, *arguments, before=None, alone=False):
-    """(exit code, stdout, stderr). `alone`: in a process of its own, as a person runs it; so it is with `before`."""
+    """Runs a command and returns (exit code, stdout, stderr).
+
+    With `alone`, and with `before`, it runs in a process of its own, as a user runs it.
+    """
     global _served
     if not (before or alone):
-        one, _served = _served or _Served(), None  # another one, where this one fails
+        one, _served = _served or _Served(), None  # If this Blender fails, the next command gets another one.
         done = one.run(script, arguments)
         _served = one
         return done
@@ -101,7 +104,7 @@ def save(path, *meshes):
 
 
 def world(path):
-    """(vertices, triangles) of all objects of a file."""
+    """Returns (vertices, triangles) of all objects of a file."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     surface = snapshots.joined([snapshots.surface_of(ob) for ob in file_io.read_file(path).objects])
     return surface.world(), surface.arrays.triangles

@@ -26,7 +26,7 @@ def _empty_scene(_registered):
 
 @pytest.fixture(scope="session")
 def gl():
-    """For tests that draw: where nothing can be drawn they are skipped, or fail if TOLVOL_REQUIRE_GL is set."""
+    """Skips tests that draw if nothing can be drawn here, or fails them if TOLVOL_REQUIRE_GL is set."""
     try:
         native.module.renderer()
     except native.module.GlUnavailable as error:

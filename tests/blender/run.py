@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs pytest inside Blender and ends with its exit code, whatever is left registered."""
+"""Runs pytest inside Blender and ends with its exit code, even if handlers or classes are still registered."""
 
 import os
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes that the tests make, and a judge that shares nothing with the add-on's own certificates."""
+"""Makes meshes for the tests. A second judge samples distances with Blender's own tree of triangles, without tolvol."""
 
 import bpy
 import numpy as np
@@ -35,7 +35,7 @@ def activate(ob):
 
 
 def torus_arrays(around=48, across=24, noise=0.004, seed=1):
-    """Vertices and quads of a torus of size 2.5 or so, rough as a scan."""
+    """Returns vertices and quads of a torus of a size of about 2.5, with the roughness of a scan."""
     u, v = np.meshgrid(np.arange(around) * 2 * np.pi / around, np.arange(across) * 2 * np.pi / across, indexing="ij")
     ring = 0.9 + 0.35 * np.cos(v)
     vertices = np.stack([ring * np.cos(u), ring * np.sin(u), 0.35 * np.sin(v)], -1).reshape(-1, 3)
@@ -64,7 +64,7 @@ def sheet(name="sheet", matrix=None, **options):
 
 
 def world_triangles(ob):
-    """(vertices float64 in the world, triangles) of what is stored."""
+    """Returns (vertices float64 in the world, triangles) of the stored mesh."""
     bpy.context.view_layer.update()
     arrays = mesh_io.read_mesh(ob.data)
     return mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world)), arrays.triangles
@@ -85,7 +85,7 @@ def sampled_distance(surface, other, samples=20_000, seed=7):
 
 
 def assert_within(surface, reference, tolerance, both_ways=True):
-    """No sample of one is beyond the tolerance of the other (the tree computes in float32)."""
+    """Asserts that no sample of either surface is beyond the tolerance of the other (the tree computes in float32)."""
     slack = 1e-6 * np.abs(reference[0]).max()
     assert sampled_distance(surface, reference) <= tolerance + slack
     if both_ways:

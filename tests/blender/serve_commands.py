@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs commands one after another in one Blender, whose start takes longer than most of them.
 
-The last argument is the file descriptor of a connection. (script, arguments) come in, (exit code, stdout, stderr) go out.
+The last argument is the file descriptor of a connection. It brings (script, arguments) and takes (exit code, stdout, stderr).
 """
 
 import ctypes
@@ -14,14 +14,14 @@ import traceback
 
 
 def flush():
-    """Python's text and that of Blender's own code, which the C library holds."""
+    """Flushes the output of Python and of Blender's own code, which the C library buffers."""
     sys.stdout.flush()
     sys.stderr.flush()
     ctypes.CDLL(None).fflush(None)
 
 
 def run(script, arguments):
-    """(exit code, stdout, stderr); no code of a script that does not end by sys.exit, as all of them must."""
+    """Runs a script and returns (exit code, stdout, stderr). A script has to end by sys.exit: otherwise the code is None."""
     sys.argv = ["blender", "--", *arguments]
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         flush()
@@ -46,5 +46,5 @@ link = multiprocessing.connection.Connection(int(sys.argv[-1]))
 try:
     while True:
         link.send(run(*link.recv()))
-except EOFError:  # the tests have ended
+except EOFError:  # The tests have ended.
     os._exit(0)

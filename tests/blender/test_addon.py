@@ -46,12 +46,12 @@ def test_versions_agree():
     assert manifest["name"] == info["name"] and info["blender"] == (3, 4, 0)
 
 
-# Bytes of a description that Blender keeps of a class; the rest is cut off.
+# Blender keeps so many bytes of the description of a class and cuts off the rest.
 LONGEST_TOOLTIP = 239
 
 
 def registered_classes():
-    """All classes of the add-on that Blender knows."""
+    """Returns all classes of the add-on that are registered in Blender."""
     modules = [module for name, module in list(sys.modules.items()) if name.split(".")[0] == "addon"]
     found = {value for module in modules for value in vars(module).values() if isinstance(value, type)}
     ours = (cls for cls in found if issubclass(cls, bpy.types.bpy_struct) and cls.__module__.startswith("addon"))
@@ -59,7 +59,7 @@ def registered_classes():
 
 
 def shown_text(cls):
-    """(what Blender shows of a registered class, what was written for it)."""
+    """Returns (the description that Blender shows for a registered class, the description in the source)."""
     if issubclass(cls, bpy.types.Operator):
         rna = getattr(bpy.ops.tolvol, cls.bl_idname.split(".")[1]).get_rna_type()
     else:
@@ -68,7 +68,7 @@ def shown_text(cls):
 
 
 def tooltips(cls):
-    """(which, text) of a registered class, its properties and their choices."""
+    """Yields (name, description) of a registered class, its properties and their choices."""
     rna, written = shown_text(cls)
     yield cls.__name__, written
     for item in rna.properties:
@@ -81,7 +81,7 @@ def tooltips(cls):
 
 
 def test_tooltips_and_labels_follow_blender():
-    """Every operator and setting says what it does, without a full stop and whole."""
+    """Every operator and setting has a description, which ends without a full stop and is not cut off by Blender."""
     classes = registered_classes()
     for kind in (bpy.types.Operator, bpy.types.PropertyGroup, bpy.types.AddonPreferences, bpy.types.Menu):
         assert any(issubclass(cls, kind) for cls in classes), kind
@@ -102,11 +102,14 @@ def test_loaded_module_is_a_private_copy():
     assert loaded.parent != native.path.parent and re.fullmatch(r"tolvol_[0-9a-f]{16}", loaded.parent.name)
     mapped = Path("/proc/self/maps").read_text()
     assert str(loaded) in mapped and str(native.path) not in mapped
-    assert importlib.reload(native).module is native.module  # one content is loaded once
+    assert importlib.reload(native).module is native.module  # A module with the same content is loaded only once.
 
 
 def run_blender(script, tmp_path, within=(), **environment):
-    """stdout of a Blender with settings of its own; the script's last line must be ok(). within: the command it runs in."""
+    """Runs a script in a Blender with settings of its own and returns its stdout. The script's last line has to be ok().
+
+    within: a command that runs Blender.
+    """
     text = "import sys, os, traceback\ndef ok():\n    sys.stdout.flush()\n    os._exit(0)\ntry:\n"
     text += (
         "".join(f"    {line}\n" for line in script.splitlines()) + "except BaseException:\n    traceback.print_exc()\n"
@@ -134,7 +137,7 @@ def package():
 
 
 def repack(path, text=lambda name, content: content, keep=lambda name: True):
-    """A copy of the package, changed."""
+    """Writes a changed copy of the package."""
     with zipfile.ZipFile(package()) as original, zipfile.ZipFile(path, "w") as archive:
         for entry in original.infolist():
             if keep(entry.filename) and not entry.is_dir():
@@ -146,7 +149,7 @@ def newer(name, content):
     if name != "tolerance_volumes/__init__.py":
         return content
     assert b'"version": (0, 1, 0)' in content
-    # Longer, too: Python takes what it compiled for the same if length and second are the same.
+    # The file also becomes longer: Python uses the old compiled file if length and time in seconds are the same.
     return content.replace(b'"version": (0, 1, 0)', b'"version": (0, 2, 0)') + b"# newer\n"
 
 
@@ -283,7 +286,7 @@ ok()""",
 
 
 def noexec(*folders):
-    """A command that runs another one with these folders on disks that programs may not be started from."""
+    """Returns a command that runs another command with these folders mounted noexec."""
     bind = "".join(f"mount --bind '{f}' '{f}' && mount -o remount,bind,noexec '{f}' && " for f in folders)
     command = ["unshare", "--mount", "--map-root-user", "sh", "-c", f'{bind}exec "$@"', "sh"]
     if subprocess.run([*command, "true"], capture_output=True).returncode:
@@ -301,7 +304,7 @@ def test_a_temporary_folder_mounted_noexec(tmp_path, everywhere):
         checks = (
             "assert native.module is None\n"
             f"assert {str(temporary)!r} in native.reason and {str(cache)!r} in native.reason, native.reason\n"
-            "assert 'may be started' in native.reason and 'TMPDIR' in native.reason, native.reason\n"
+            "assert 'permits a copy' in native.reason and 'TMPDIR' in native.reason, native.reason\n"
         )
     run_blender(
         f"sys.path.insert(0, {str(ROOT)!r})\nfrom addon import native\n{checks}ok()",
@@ -314,7 +317,8 @@ def test_a_temporary_folder_mounted_noexec(tmp_path, everywhere):
 
 
 def test_module_is_looked_for_in_the_environments_folder(tmp_path):
-    (tmp_path / native.path.name).write_bytes(native.path.read_bytes() + b"\0")  # another content, still a library
+    # The content differs, but it is still a library.
+    (tmp_path / native.path.name).write_bytes(native.path.read_bytes() + b"\0")
     out = run_blender(
         f"""
 sys.path.insert(0, {str(ROOT)!r})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What hangs on a mesh and what becomes of it: exact on original vertices, carried over where vertices move."""
+"""Attributes of a decimated mesh: exact on original vertices, interpolated where vertices moved."""
 
 import json
 
@@ -34,7 +34,8 @@ def dressed_torus():
     mesh, rng = ob.data, np.random.default_rng(5)
     u, v = np.divmod(np.arange(around * across), across)
     corners = column(mesh.loops, "vertex_index", 1, np.int32)
-    first = np.repeat(corners[::4], 4)  # the quad's own place, so that the last ring of quads ends at 1 and not at 0
+    # The place is the quad's own, so that the last ring of quads ends at 1 and not at 0.
+    first = np.repeat(corners[::4], 4)
     uvs = np.stack([(u[corners] - u[first]) % around + u[first], (v[corners] - v[first]) % across + v[first]], 1)
     mesh.uv_layers.new(name="unwrapped").data.foreach_set("uv", (uvs / (around, across)).astype(np.float32).ravel())
     for i in range(4):
@@ -81,7 +82,7 @@ def creases(mesh):
 
 
 def original_vertices(before, after):
-    """For each vertex of `after` the one of `before` at its position."""
+    """Returns for each vertex of `after` the vertex of `before` at its position."""
     places = {co.tobytes(): i for i, co in enumerate(column(before.vertices, "co", 3))}
     return np.array([places[co.tobytes()] for co in column(after.vertices, "co", 3)])
 
@@ -132,7 +133,7 @@ def test_subset_keeps_faces(subset):
         if f"{kind} FACE" in before.attributes:
             was[kind] = column(before.attributes[f"{kind} FACE"].data, *layout)
             now[kind] = column(ob.data.attributes[f"{kind} FACE"].data, *layout)
-    # The random float tells which polygon a face was; all else has to come from that one.
+    # The random float identifies the polygon that a face comes from. All other attributes have to be of this polygon.
     polygon = {value: i for i, value in enumerate(was["FLOAT"].tolist())}
     origin = [polygon[value] for value in now["FLOAT"].tolist()]
     for name in was:
@@ -162,7 +163,7 @@ def test_subset_keeps_lines_of_marks_in_one_piece(subset):
 
 
 def is_one_closed_line(edges):
-    """Whether edges hang together and close a ring somewhere."""
+    """Whether the edges are connected and contain a closed ring."""
     reached = {int(edges[0, 0])}
     for _ in edges:
         reached |= {int(v) for edge in edges if reached & set(edge.tolist()) for v in edge}
@@ -210,7 +211,7 @@ def test_loose_edge_that_hangs_on_the_surface_keeps_its_foot():
 
 
 def test_optimal_carries_over_what_is_smooth():
-    """Attributes that are functions of the place must be those functions of the new places, as far as the sheet is flat."""
+    """Attributes that are functions of the position are the same functions of the new positions, where the sheet is flat."""
     ob = sheet(count=30, bumps=0.05)
     mesh = ob.data
     co = column(mesh.vertices, "co", 3)
@@ -232,8 +233,10 @@ def test_optimal_carries_over_what_is_smooth():
     mesh = ob.data
     now, at = column(mesh.vertices, "co", 3), column(mesh.loops, "vertex_index", 1, np.int32)
     was = {place.tobytes() for place in co}
-    assert sum(place.tobytes() not in was for place in now) > 10  # otherwise nothing is tested
-    close = 0.03  # the tolerance and the distance along the surface that it may shift the reading by
+    # Some vertices moved: otherwise this would test nothing.
+    assert sum(place.tobytes() not in was for place in now) > 10
+    # The tolerance, and the distance along the surface by which it may shift the place of the interpolation.
+    close = 0.03
     assert np.abs(column(mesh.uv_layers[0].data, "uv", 2) - (now[at, :2] * 0.4 + 0.5)).max() < close
     assert np.abs(column(mesh.attributes["height"].data, "value") - now[:, 0] - now[:, 1]).max() < close
     assert np.abs(column(mesh.attributes["colour"].data, "color", 4)[:, :3] - (now[at] * 0.4 + 0.5)).max() < close
@@ -266,7 +269,7 @@ def corner_normals(mesh):
 
 
 def torus_with_a_hard_ring(custom):
-    """Smooth, but for one sharp ring; with custom normals each of its sides leans away from the other."""
+    """A smooth torus with one sharp ring. The custom normals on the two sides of the ring lean away from each other."""
     ob = torus(noise=0.003)
     mesh = ob.data
     co, at = column(mesh.vertices, "co", 3), column(mesh.loops, "vertex_index", 1, np.int32)
@@ -323,7 +326,7 @@ def test_islands_everywhere_are_named_as_what_holds_the_mesh():
     ob = torus()
     mesh = ob.data
     at = np.arange(len(mesh.loops), dtype=np.float32)
-    mesh.uv_layers.new().data.foreach_set("uv", np.stack([at, at], 1).ravel())  # every face an island of its own
+    mesh.uv_layers.new().data.foreach_set("uv", np.stack([at, at], 1).ravel())  # Every face is a UV island of its own.
     activate(ob)
     bpy.ops.tolvol.decimate(tolerance_percent=1)
     run = json.loads(ob.tolvol.last_run)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the commands refuse: exit code 2, one line on stderr that names the offender, OUT untouched."""
+"""Bad input to the commands: exit code 2, one line on stderr that names the faulty input, and OUT untouched."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from scenes import sheet_arrays, torus_arrays
 
 
 def refused(done, *words):
-    """Exit code 2 and one line on stderr that has all these words."""
+    """Asserts exit code 2 and one line on stderr with all these words."""
     code, out, err = done
     assert code == 2, (code, out, err)
     assert len(err.splitlines()) == 1 and err.startswith("decimate.py: "), err
@@ -76,11 +76,11 @@ BAD_FILES = {
     "empty.ply": (b"", ["empty"]),
     "empty.obj": (b"", ["empty"]),
     "empty.stl": (b"", ["empty"]),
-    "garbage.ply": (bytes(range(256)) * 4, ["no PLY file"]),
-    "garbage.obj": (bytes(range(256)) * 4, ["no OBJ file"]),
-    "garbage.stl": (bytes(range(256)) * 4, ["no STL file"]),
+    "garbage.ply": (bytes(range(256)) * 4, ["not a PLY file"]),
+    "garbage.obj": (bytes(range(256)) * 4, ["not an OBJ file"]),
+    "garbage.stl": (bytes(range(256)) * 4, ["not an STL file"]),
     "truncated.ply": (ply(SQUARE, ["0 1 2", "0 2 3"])[:-6], ["ends inside", "face"]),
-    "truncated.stl": (bytes(80) + (2).to_bytes(4, "little") + bytes(50), ["not all of one"]),
+    "truncated.stl": (bytes(80) + (2).to_bytes(4, "little") + bytes(50), ["it is truncated"]),
     "no faces.ply": (ply(SQUARE, []), ["no faces"]),
     "no faces.obj": ("".join(f"v {v}\n" for v in SQUARE).encode(), ["no faces"]),
     "nan.ply": (ply(["0 0 0", "1 nan 0", *SQUARE[2:]], ["0 1 2"]), ["vertex 2", "not finite", "nan"]),

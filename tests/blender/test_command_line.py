@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""decimate.py and report.py as a person runs them: files in, files out, exit codes, the last line."""
+"""decimate.py and report.py as a user runs them: the files, the exit codes and the last line of the output."""
 
 import json
 import re
@@ -13,7 +13,7 @@ from addon.files import file_io
 from commands import SCRIPTS, command, decimate, save, succeeded, world
 from scenes import assert_within, sheet_arrays, torus_arrays
 
-# What it does -------------------------------------------------------------------------------------------------------
+# Decimating ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("extension", [".ply", ".obj", ".stl"])
@@ -71,7 +71,7 @@ def test_one_sided_placement_target_threads_and_effort(scan, tmp_path):
         reports[name] = json.loads((tmp_path / "r.json").read_text()), match[3], world(tmp_path / "out.ply")
     plain = reports["plain"][0]["output"]["triangles"]
     assert reports["one-sided"][0]["two_sided"] is False
-    # It asks for less; any change of the order of collapses moves counts by up to 4 % either way.
+    # One way asks for less and leaves fewer triangles, but another order of collapses may change counts by up to 4 %.
     assert reports["one-sided"][0]["output"]["triangles"] <= 1.04 * plain
     assert reports["one-sided"][0]["backward"] != reports["plain"][0]["backward"]
     originals = {vertex.tobytes() for vertex in world(scan)[0]}

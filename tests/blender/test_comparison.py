@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""comparison.py: every method in the table, judged; the page around the table stays."""
+"""comparison.py: the table has every method with judged distances, and the page around the table stays."""
 
 import json
 

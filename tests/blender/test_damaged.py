@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a damaged .blend holds of a run, a measurement and a reference, as the panels read it at every draw."""
+"""Damaged .blend files: the panels read run, measurement and reference at every draw and must not fail."""
 
 import json
 import math
@@ -47,7 +47,7 @@ def test_a_damaged_reference_has_to_be_set_anew(decimated):
     decimated.tolvol.snapshot.clear_geometry()
     reference.forget_all()
     assert measurements.shown_size(decimated) is None
-    assert snapshots.stale_reason(decimated) == "what the file holds of it is damaged"
+    assert snapshots.stale_reason(decimated) == "the snapshot in the file is damaged"
     with pytest.raises(RuntimeError, match="damaged"):
         bpy.ops.tolvol.check()
     bpy.ops.tolvol.set_reference()
@@ -59,6 +59,6 @@ def test_a_damaged_reference_is_replaced_by_the_mesh_it_was_taken_of():
     bpy.ops.tolvol.set_reference()
     ob.tolvol.snapshot.clear_geometry()
     reference.forget_all()
-    assert snapshots.stale_reason(ob) == "what the file holds of it is damaged"
+    assert snapshots.stale_reason(ob) == "the snapshot in the file is damaged"
     bpy.ops.tolvol.set_reference()
     assert snapshots.stale_reason(ob) is None and bpy.ops.tolvol.check() == {"FINISHED"}

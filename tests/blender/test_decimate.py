@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The promise, on the mesh that is stored: within the tolerance in the world, both ways."""
+"""The promise on the stored mesh: both directions are within the tolerance in the world."""
 
 import json
 import math
@@ -19,7 +19,7 @@ PERCENT = 1.0
 
 
 def tolerance_of(reference):
-    """1 % of size, computed anew: the longest of the four diagonals of the local box, mapped to the world."""
+    """Computes 1 % of the size independently: of the longest of the four diagonals of the local box, mapped to the world."""
     return PERCENT / 100 * native.module.size(*reference)
 
 
@@ -71,7 +71,7 @@ def test_parented_object_is_measured_in_the_world():
     parent.rotation_euler, parent.scale = (0.3, 0.5, 0.2), (1, 4, 0.5)
     ob = torus()
     ob.parent = parent
-    ob.rotation_euler = (0.7, 0.1, 0)  # under a scaled parent this is a shear
+    ob.rotation_euler = (0.7, 0.1, 0)  # Under a scaled parent this rotation makes a shear.
     activate(ob)
     reference, size = world_triangles(ob), longest_diagonal(ob)
     bpy.ops.tolvol.decimate(tolerance_percent=PERCENT)
@@ -108,7 +108,7 @@ def test_larger_tolerance_leaves_fewer_triangles():
 
 
 def test_one_way_lets_the_reference_vanish_and_says_so():
-    # A thin needle on a plate: nothing of it lies far from the plate's surface but its tip.
+    # On a plate stands a thin needle. Only its tip is far from the surface of the plate.
     results = {}
     for keep in ("BOTH", "ONE"):
         ob = sheet(f"sheet {keep}", bumps=0.0)
@@ -124,7 +124,7 @@ def test_one_way_lets_the_reference_vanish_and_says_so():
     assert run["two_sided"] is False
     assert sampled_distance(one, reference) <= 0.05 + 1e-6
     assert run["forward"][1] <= 0.05
-    # Both intervals are stated, whichever was promised, and the judge agrees with the one that was not.
+    # The report has both intervals, and the judge agrees with the one of the direction that was not promised.
     judged = native.module.hausdorff(*reference, *one)
     assert judged.lower <= run["backward"][1] and run["backward"][0] <= judged.upper
 
@@ -179,7 +179,7 @@ def test_another_objects_reference():
     bpy.ops.tolvol.decimate(tolerance_length=tolerance)
     assert len(model.data.polygons) < 600
     assert_within(world_triangles(model), reference, tolerance)
-    # The scan may go: what counts is the snapshot, where it was in the world.
+    # The scan may be removed: the reference is the snapshot, at the place where the scan was.
     bpy.data.objects.remove(scan)
     bpy.ops.tolvol.check()
     assert verdict.of(model).forward_within
@@ -203,7 +203,7 @@ def test_input_outside_the_reference():
     run = json.loads(model.tolvol.last_run)
     stored = world_triangles(model)
     assert run["outside"]["faces"] > 0 and len(stored[1]) < len(before[1]) / 2
-    # The vertex that sticks out is still there with all its faces; what else there is has to be within.
+    # The vertex that sticks out stays with all its faces. All other faces have to be within the tolerance.
     spike = np.flatnonzero((stored[0] == before[0][100]).all(1))
     assert len(spike) == 1
     around = (stored[1] == spike[0]).any(1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a decimation leaves as it is when asked to, several objects in one step, and effort."""
+"""Protected parts of a decimation, several objects in one step, and effort."""
 
 import json
 
@@ -22,7 +22,7 @@ def tolerance_of(reference, percent=PERCENT):
 
 
 def decimate(ob, percent=PERCENT, **options):
-    """Triangles left, judged both ways on what is stored."""
+    """Decimates, judges the stored mesh both ways, and returns the number of triangles left."""
     reference = world_triangles(ob)
     assert bpy.ops.tolvol.decimate(tolerance_percent=percent, **options) == {"FINISHED"}
     stored = world_triangles(ob)
@@ -112,7 +112,7 @@ def test_corners_of_flipped_faces_read_where_they_lie(placement):
 
 
 def marked(kind):
-    """A mesh with edges of one kind, and which these are."""
+    """Returns a mesh with edges of one kind, and these edges."""
     ob = sheet(count=16, bumps=0.1) if kind == "BOUNDARY" else torus(around=30, across=15)
     mesh = ob.data
     ends = column(mesh.edges, "vertices", 2, np.int32)
@@ -221,7 +221,7 @@ def test_weights_are_shares_of_the_tolerance():
         else:
             assert judged.lower > 0.5 * tolerance_of(reference)
     assert left[0] < left[1] == left[2] < left[3]
-    ob = sheet(bumps=0.0)  # where nothing is lost by taking vertices away
+    ob = sheet(bumps=0.0)  # On a flat sheet all vertices that are not protected could vanish.
     ob.vertex_groups.new(name="room").add(range(100), 1.0, "REPLACE")
     before = {v.tobytes() for v in column(ob.data.vertices, "co", 3)[100:]}
     assert decimate(ob, vertex_group="room") < 1800
@@ -280,7 +280,7 @@ def test_a_placement_that_nobody_chose_is_that_of_each_mesh():
     bpy.ops.tolvol.decimate()
     assert placements(objects) == ["optimal", "subset", "optimal"]
     assert [ob.tolvol.placement_choice for ob in objects] == [-1, -1, -1]
-    # One that was chosen holds for all, whether on the active object or for this run.
+    # A placement that was chosen is used for all objects, whether it was chosen on the active object or for this run.
     for choose in ("object", "run"):
         for ob in objects:
             ob.tolvol.placement_choice = -1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lattice Deform in Tolerance: the lattice as Blender has it, the promise on what is stored, what is refused."""
+"""Lattice Deform in Tolerance: reading Blender's lattice, the promise on the stored mesh, and bad input."""
 
 import bpy
 import numpy as np
@@ -17,7 +17,7 @@ PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ M
 
 
 def cage(name="cage", points=(4, 4, 4), size=(2.8, 2.8, 1.0), matrix=None, interpolation="KEY_BSPLINE"):
-    """A lattice object around the torus, not the active one."""
+    """Adds a lattice object around the torus. The torus stays the active object."""
     active = bpy.context.view_layer.objects.active
     data = bpy.data.lattices.new(name)
     data.points_u, data.points_v, data.points_w = points
@@ -31,7 +31,7 @@ def cage(name="cage", points=(4, 4, 4), size=(2.8, 2.8, 1.0), matrix=None, inter
 
 
 def lift(ob, height, above=-1.0, below=1.0):
-    """Moves the points of a lattice from `above` to `below`, of -0.5 to 0.5 along u, by a length in the world along w."""
+    """Moves the points of a lattice between `above` and `below` along u (-0.5 to 0.5) by a length in the world along w."""
     for point in ob.data.points:
         if above <= point.co.x / (ob.data.points_u - 1) <= below:
             point.co_deform.z += height / ob.matrix_world.to_scale().z
@@ -70,7 +70,7 @@ def test_a_lattice_of_two_points_an_axis_deforms_as_blenders_own():
 
 def test_points_are_read_along_their_axes():
     lattice = cage(points=(2, 3, 5))
-    lattice.data.points[1].co_deform.x += 0.5  # the next along u
+    lattice.data.points[1].co_deform.x += 0.5  # the next point along u
     read = native_lattice(lattice)
     assert read.shape == (2, 3, 5) and read.degree == (1, 2, 3)
     corner = np.array([[1.4, -1.4, -0.5], [-1.4, 1.4, -0.5], [-1.4, -1.4, 0.5]])
@@ -147,7 +147,7 @@ def test_pulled_back_only_the_vertices_there_are_held():
 
 
 def test_quads_that_blender_cuts_along_their_other_diagonal_stay_within():
-    """A corner that is pushed in makes a quad concave, and Blender cuts it through that corner."""
+    """A corner that is pushed in makes a quad concave, and Blender then triangulates the quad through that corner."""
     ob = add_object("kite", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 1)], [(0, 1, 2, 3), (0, 1, 4)])
     ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.9
     before = world_triangles(ob)
@@ -174,7 +174,7 @@ def test_again_and_again_it_does_not_drift():
     assert np.array_equal(mesh_io.read_mesh(ob.tolvol.snapshot).vertices, reference[0].astype(np.float32))
 
 
-# What hangs on the mesh ---------------------------------------------------------------------------------------------
+# Attributes of the mesh ---------------------------------------------------------------------------------------------
 
 
 def test_one_undo_step_restores_everything_bit_for_bit():
@@ -218,7 +218,7 @@ def test_the_lattice_is_the_panels_or_the_selected_one():
     lift(other, 0.015)
     lattice.select_set(True)
     other.select_set(True)
-    refused("torus: choose a lattice object")  # which?
+    refused("torus: choose a lattice object")  # There are two lattices.
     other.select_set(False)
     bpy.ops.tolvol.deform()
     assert ob.tolvol.lattice == lattice
@@ -236,7 +236,7 @@ def test_a_modifier_with_the_same_lattice_is_named(capfd):
     lift(lattice, 0.01)
     ob.modifiers.new("bend", "LATTICE").object = lattice
     bpy.ops.tolvol.deform(lattice="cage")
-    assert "torus also has the modifier bend with cage: remove it" in capfd.readouterr().out
+    assert "The modifier bend of torus deforms the mesh by cage again: remove it" in capfd.readouterr().out
 
 
 # Refused ------------------------------------------------------------------------------------------------------------
@@ -247,7 +247,7 @@ def test_what_is_no_use_is_refused_with_the_name():
     refused("nowhere: choose a lattice object", lattice="nowhere")
     refused("torus: choose a lattice object", lattice="torus")
     cage()
-    refused("cage does not move torus: it is at rest", lattice="cage")
+    refused("cage does not move torus: the lattice is at rest", lattice="cage")
     flat = cage("flat", points=(4, 4, 1))
     lift(flat, 0.01)
     refused("flat: a lattice needs at least 2 control points.*along w it has 1", lattice="flat")

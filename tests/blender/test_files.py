@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""No file is lost: what decimate.py, report.py and Save Report write, replace and leave alone."""
+"""No file is lost: the files that decimate.py, report.py and Save Report write, replace and leave alone."""
 
 import contextlib
 import json
@@ -17,7 +17,7 @@ from addon.files import file_io, safe_files
 from commands import READS_GLTF, SCRIPTS, command, decimate, running, save, succeeded, world
 from scenes import sheet, sheet_arrays
 
-# In a command, before it runs.
+# Python code that runs in a command before the command itself.
 FAILING_REPLACE = """
 import os
 replace = os.replace
@@ -27,7 +27,7 @@ def failing(source, place):
     replace(source, place)
 os.replace = failing
 """
-# Stands for a full disk: files end at a length. For OUT from its export on, or for what comes after it.
+# This code simulates a full disk by a limit of the length of files: from the export of OUT on, or after the export.
 FULL_DISK = f"""
 import resource, signal, sys
 sys.path.insert(0, {str(SCRIPTS.parent)!r})
@@ -47,7 +47,7 @@ PROTECTED = (
 
 @contextlib.contextmanager
 def unchanged(folder):
-    """Afterwards the folder holds the same files with the same content, none of them replaced, and no new ones."""
+    """Asserts at the end that the folder holds the same files with the same content, and that none was replaced or added."""
 
     def found():
         return {
@@ -62,9 +62,9 @@ def unchanged(folder):
 
 
 def failed(done, code, *words):
-    """That exit code, and one line on stderr with all these words."""
+    """Asserts this exit code, and one line on stderr with all these words."""
     assert done[0] == code, done
-    # A library prints one of its own under FULL_DISK.
+    # Under FULL_DISK a library prints a line of its own.
     assert len([line for line in done[2].splitlines() if not line.startswith("ftruncate() failed")]) == 1, done
     for word in words:
         assert str(word) in done[2], done
@@ -76,7 +76,7 @@ def names(folder):
 
 
 def painted(path, name="sheet", image=None):
-    """An OBJ with a material, and a texture where an image is given."""
+    """Writes an OBJ file with a material, and with a texture if an image is given."""
     vertices, quads = sheet_arrays(count=8)
     lines = [f"mtllib {path.stem}.mtl", f"o {name}", *("v %f %f %f" % tuple(v) for v in vertices)]
     lines += ["vt %f %f" % (v[0] / 2 + 0.5, v[1] / 2 + 0.5) for v in vertices]
@@ -142,7 +142,7 @@ def test_links_that_lead_in_a_circle_or_nowhere_are_refused(scan, tmp_path):
 
 
 def alias(tmp_path, path, kind):
-    """Another name of a file, of the extension .json, or itself."""
+    """Returns another name of a file with the extension .json, or the file itself."""
     other = tmp_path / f"{path.stem} {kind}.json"
     if kind == "itself":
         return path
@@ -177,7 +177,7 @@ def test_a_report_is_never_out(scan, tmp_path, kind):
 
 
 def test_files_to_come_are_told_apart_as_well(scan, tmp_path):
-    (tmp_path / "r.json").symlink_to("out.ply")  # neither is there
+    (tmp_path / "r.json").symlink_to("out.ply")  # Neither file exists.
     (tmp_path / "p.png").symlink_to("s.json")
     for extra, words in (
         (("--report", "r.json"), ("--report", "OUT")),
@@ -202,7 +202,7 @@ def test_side_files_are_looked_at_as_well(scan, tmp_path):
         arguments = [tmp_path / word if "." in word else word for word in extra]
         with unchanged(tmp_path):
             failed(decimate(source, tmp_path / out, "--tolerance", "1%", *arguments), 2, *words)
-    # The materials of IN by the name of those of OUT.
+    # The file of materials of IN has the name of OUT's.
     source.write_text(source.read_text().replace("mtllib in.mtl", "mtllib other.mtl"))
     (tmp_path / "in.mtl").rename(tmp_path / "other.mtl")
     with unchanged(tmp_path):
@@ -230,7 +230,7 @@ def test_out_may_be_in_and_keeps_its_mode(tmp_path, kind):
     succeeded(decimate(source, target, "--tolerance", "1%", "--reference", source))
     assert stat.S_IMODE(target.stat().st_mode) == 0o640 and target.read_bytes() != original
     assert target.is_symlink() == (kind == "link")
-    # What has another name is another file from then on.
+    # A hard link to OUT keeps the old content: from then on it is another file.
     assert (source.read_bytes() == original) == (kind == "hard link")
 
 
@@ -248,13 +248,13 @@ def test_a_new_file_has_the_mode_of_new_files(scan, tmp_path):
 
 @pytest.mark.parametrize("option", ["--report", "OUT"])
 def test_a_place_that_takes_no_files(scan, tmp_path, option):
-    """/proc takes none, not even of root."""
+    """Nobody can write a file to /proc, not even root."""
     target = tmp_path / "out.ply"
     target.write_text("kept")
     arguments = (target, "--report", "/proc/x.json") if option == "--report" else ("/proc/out.ply",)
     with unchanged(tmp_path):
         done = failed(decimate(scan, *arguments, "--tolerance", "1%"), 1, f"{option} /proc/", "was not written")
-    assert "triangles" not in done[1]  # said before the work
+    assert "triangles" not in done[1]  # The command ended before the work.
 
 
 def test_a_report_to_a_full_disk(scan, tmp_path):
@@ -278,7 +278,7 @@ def test_out_to_a_full_disk(scan, tmp_path):
 
 def test_a_protected_file_is_not_replaced(scan, tmp_path):
     (tmp_path / "out.ply").write_text("kept")
-    protected = PROTECTED.format(name="out.ply")  # by its mode it is not protected from root
+    protected = PROTECTED.format(name="out.ply")  # A mode without write permission would not protect it from root.
     with unchanged(tmp_path):
         failed(decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", before=protected), 1, "OUT", "protected")
 
@@ -307,7 +307,7 @@ def test_reports_may_be_pipes(scan, tmp_path):
 
 # Ends and other runs ------------------------------------------------------------------------------------------------
 
-# In the middle of a command the main thread is in a native call that lasts minutes and looks at no signals.
+# In the middle of the command the main thread is in a native call that lasts minutes and does not handle signals.
 HANGS = f"""
 import signal, sys
 signal.signal({{number}}, signal.SIG_DFL)  # whoever runs the tests in the background has it ignored
@@ -344,7 +344,7 @@ def until(condition, seconds=60):
 
 
 def test_two_runs_that_write_one_out(tmp_path):
-    """Whichever comes last, OUT, its side file and its report are of one run."""
+    """Two runs write the same files. Afterwards OUT, its side file and its report are all of the same run."""
     sources = []
     for name in ("first", "second"):
         source = painted(tmp_path / f"{name}.obj", name)
@@ -365,7 +365,7 @@ def test_two_runs_that_write_one_out(tmp_path):
 
 
 def test_moves_of_two_runs_do_not_mix(tmp_path, monkeypatch):
-    """One run stops between its two moves until the other wants to move as well."""
+    """One run stops between its two moves until the other run tries to move its files as well."""
     staged = {name: safe_files.Staged() for name in ("first", "second")}
     for name, one in staged.items():
         for file in ("a", "b"):
@@ -379,7 +379,7 @@ def test_moves_of_two_runs_do_not_mix(tmp_path, monkeypatch):
             time.sleep(0.2)
 
     monkeypatch.setattr(os, "replace", slow)
-    monkeypatch.setattr(safe_files, "_lock", contextlib.nullcontext())  # another process does not share it
+    monkeypatch.setattr(safe_files, "_lock", contextlib.nullcontext())  # Another process has a lock of its own.
     thread = threading.Thread(target=staged["first"].publish)
     thread.start()
     between.wait(10)
@@ -489,7 +489,7 @@ def test_save_report_spares_the_files_of_the_scene(measured, tmp_path):
 
 
 def test_what_is_left_is_removed(tmp_path):
-    with pytest.raises(NotWritten, match="later: .*written it"), safe_files.Staged() as staged:
+    with pytest.raises(NotWritten, match="later: .*written this file"), safe_files.Staged() as staged:
         target = safe_files.Target(tmp_path / "later")
         staged.write(safe_files.Target(tmp_path / "first"), b"1")
         file = staged.folder(target) / "later"

@@ -15,7 +15,7 @@ TOLERANCE = 0.03
 
 
 def torus():
-    """(vertices, triangles) in the world."""
+    """Returns (vertices, triangles) in the world."""
     vertices, faces = torus_arrays()
     faces = np.asarray(faces)
     triangles = faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])

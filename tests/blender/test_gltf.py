@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""glTF in and out: read by a small reader of these tests' own, not by Blender; and what is refused of bad files."""
+"""glTF files: written files are read by a small reader in this file, not by Blender; and bad files are refused."""
 
 import base64
 import json
@@ -23,7 +23,7 @@ TURN = [0, np.sin(0.3), 0, np.cos(0.3)]
 
 
 def document(vertices=SQUARE, triangles=((0, 1, 2), (0, 2, 3)), nodes=None, uvs=None, image=None):
-    """(the JSON of a mesh, its buffer)."""
+    """Returns (the JSON document of a mesh, its buffer)."""
     arrays = [np.asarray(triangles, np.uint32).ravel(), np.asarray(vertices, np.float32)]
     attributes = {"POSITION": 1}
     if uvs is not None:
@@ -98,7 +98,7 @@ def matrix(node):
 
 
 def parsed(path):
-    """(vertices, triangles) of all nodes, in the coordinates of the file."""
+    """Returns (vertices, triangles) of all nodes, in the coordinates of the file."""
     data = path.read_bytes()
     if data[:4] == b"glTF":
         size = struct.unpack_from("<I", data, 12)[0]
@@ -152,13 +152,13 @@ def picture(path, colour):
     return path.read_bytes()
 
 
-# What is read and written -------------------------------------------------------------------------------------------
+# Reading and writing ------------------------------------------------------------------------------------------------
 
 
 @needs_gltf
 @pytest.mark.parametrize(("into", "out"), [(".glb", ".gltf"), (".gltf", ".glb")])
 def test_gltf_in_and_out(tmp_path, into, out):
-    """Of two instances, moved, turned and scaled below nodes that are, too."""
+    """The file has two instances of a mesh that are moved, turned and scaled, below nodes that are so, too."""
     nodes = [
         {"name": "root", "translation": [5, -3, 2], "rotation": TURN, "children": [1, 2]},
         {"name": "first", "mesh": 0, "scale": [1, 2, 0.5]},
@@ -170,7 +170,8 @@ def test_gltf_in_and_out(tmp_path, into, out):
     assert len(reference[1]) == 2 * 2304 and len(stored[1]) == int(match[2].replace(",", "")) < 700
     run = json.loads((tmp_path / "r.json").read_text())
     assert run["tolerance"]["absolute"] == pytest.approx(0.01 * native.module.size(*reference), rel=1e-5)
-    judged(stored, reference, run["tolerance"]["absolute"] * (1 + 1e-5))  # Blender holds where nodes are in float32
+    # Blender stores the placement of nodes in float32.
+    judged(stored, reference, run["tolerance"]["absolute"] * (1 + 1e-5))
     assert sorted(part["name"] for part in run["objects"]) == ["first", "second"] and not run["repairs"]
 
 
@@ -212,7 +213,7 @@ def test_textures_beside_out_are_never_overwritten(tmp_path):
     other.mkdir()
     strange = picture(other / "my skin.png", (0, 0, 1))
     inode = (tmp_path / "my skin.png").stat().st_ino
-    for _ in range(2):  # the second time everything is there already
+    for _ in range(2):  # In the second run all files exist already.
         for folder, texture in ((tmp_path, "my skin.png"), (other, "my skin-2.png")):
             succeeded(decimate(source, folder / "out.gltf", "--tolerance", "1%"))
             (uri,) = [image["uri"] for image in json.loads((folder / "out.gltf").read_text())["images"]]
@@ -227,7 +228,7 @@ def test_textures_beside_out_are_never_overwritten(tmp_path):
 
 @needs_gltf
 def test_bones_are_no_meshes_and_what_is_lost_is_said(tmp_path):
-    """Blender draws bones with meshes of its own."""
+    """Blender's reader adds meshes of its own to draw bones: they are not written."""
     found, binary = torus_document(nodes=[{"mesh": 0, "skin": 0, "name": "part"}, {"name": "bone"}])
     attributes, count = found["meshes"][0]["primitives"][0]["attributes"], found["accessors"][1]["count"]
     for name, kind, array in (
@@ -268,7 +269,7 @@ def test_the_buffer_of_in_is_not_that_of_out(tmp_path):
 def test_a_bad_file_is_refused(tmp_path):
     (tmp_path / "in.glb").write_bytes(glb(*torus_document())[:-100])
     code, _, err = decimate(tmp_path / "in.glb", tmp_path / "out.glb", "--tolerance", "1%")
-    assert code == 2 and "in.glb: the file ends early" in err and len(err.splitlines()) == 1
+    assert code == 2 and "in.glb: the file is truncated" in err and len(err.splitlines()) == 1
 
 
 @needs_gltf
@@ -319,7 +320,7 @@ def test_the_files_that_a_file_names(tmp_path):
         assert {path.name for path in side_files.read_with(tmp_path / name)} == files
 
 
-# What is refused ----------------------------------------------------------------------------------------------------
+# Bad files ----------------------------------------------------------------------------------------------------------
 
 
 def checked(found, binary, tmp_path):
@@ -357,9 +358,9 @@ def set_at(path, value):
 BAD_DOCUMENTS = {
     "no asset": (lambda found: found.pop("asset"), "no asset"),
     "old": (set_at(["asset", "version"], "1.0"), "version is 1.0"),
-    "no buffer": (set_at(["buffers", 0, "uri"], "no.bin"), "no.bin: No such file"),
+    "no buffer": (set_at(["buffers", 0, "uri"], "no.bin"), "no.bin cannot be read: No such file"),
     "bad data": (set_at(["buffers", 0, "uri"], "data:;base64,A"), "buffer 0 cannot be read"),
-    "short buffer": (set_at(["buffers", 0, "byteLength"], 999), "ends early"),
+    "short buffer": (set_at(["buffers", 0, "byteLength"], 999), "is truncated"),
     "short view": (set_at(["bufferViews", 1, "byteLength"], 9), "accessor 1 reaches beyond"),
     "long view": (set_at(["bufferViews", 1, "byteLength"], 9999), "accessor 1 reaches beyond"),
     "many": (set_at(["accessors", 1, "count"], 10**12), "accessor 1 reaches beyond"),
@@ -369,10 +370,19 @@ BAD_DOCUMENTS = {
     "no view": (set_at(["accessors", 0, "bufferView"], 7), "accessor 0 names entry 7 of its bufferViews"),
     "no mesh": (set_at(["nodes", 0, "mesh"], 3), "a node names entry 3 of its meshes"),
     "no node": (set_at(["nodes", 0, "children"], [5]), "node 0 names entry 5 of its nodes"),
-    "below itself": (set_at(["nodes"], [{"children": [1]}, {"children": [0]}]), "node . is below itself"),
-    "two above": (set_at(["nodes"], [{"children": [2]}, {"children": [2]}, {}]), "node 2 is below two others, 0 and 1"),
-    "far node": (set_at(["nodes", 0, "translation"], [0, 1e999, 0]), "place of node 0 is not finite"),
-    "kind": (set_at(["accessors", 1, "type"], "VEC2"), "accessor 1 of mesh 0 is VEC2 of 5126, not VEC3"),
+    "below itself": (set_at(["nodes"], [{"children": [1]}, {"children": [0]}]), "node . is its own descendant"),
+    "two above": (
+        set_at(["nodes"], [{"children": [2]}, {"children": [2]}, {}]),
+        "node 2 is a child of two nodes, 0 and 1",
+    ),
+    "far node": (
+        set_at(["nodes", 0, "translation"], [0, 1e999, 0]),
+        "translation, rotation or scale of node 0 is not finite",
+    ),
+    "kind": (
+        set_at(["accessors", 1, "type"], "VEC2"),
+        "accessor 1 of mesh 0 has type VEC2 with component type 5126; type VEC3",
+    ),
     "form": (set_at(["meshes", 0, "primitives"], 3), "form of glTF"),
     "few vertices": (set_at(["accessors", 1, "count"], 3), "a face of mesh 0 names vertex 3, but there are only 3"),
 }
@@ -395,7 +405,7 @@ def test_vertices_are_finite(tmp_path, value):
     found["accessors"][1] |= {"min": [0, 0, 0], "max": [1, 1, 0]}
     with pytest.raises(Refused, match="vertex 3 of mesh 0 is not finite"):
         checked(found, binary, tmp_path)
-    # The same by entries that replace others.
+    # The bad coordinate may also be in a sparse accessor, whose entries replace others.
     found, binary = document()
     binary += np.array([1], np.uint32).tobytes() + np.array([0, value, 0], np.float32).tobytes()
     found["buffers"][0]["byteLength"] = len(binary)
@@ -412,13 +422,13 @@ def test_truncated_and_foreign_files(tmp_path):
     for data, words in (
         (b"", "empty"),
         (whole[:10], "ends inside its glTF header"),
-        (whole[:-1], "ends early"),
+        (whole[:-1], "is truncated"),
         (whole[:8] + struct.pack("<I", 60) + whole[12:60], "ends inside one of its glTF chunks"),
         (whole[:4] + struct.pack("<I", 1) + whole[8:], "version is 1"),
-        (bytes(range(256)), "no glTF file"),
+        (bytes(range(256)), "not a glTF file"),
         (b"[1, 2]", "no asset"),
-        (b'{"asset": {"version": "2.0"', "no glTF file, or not all of one"),
-        (b"[" * 100_000, "no glTF file"),
+        (b'{"asset": {"version": "2.0"', "not a glTF file, or it is truncated"),
+        (b"[" * 100_000, "not a glTF file"),
     ):
         with pytest.raises(Refused, match=words):
             file_check.check(".gltf", data, tmp_path)

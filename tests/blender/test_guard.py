@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guards without a window: a script moves what a brush, a transform or a lattice would. tests/ui has the brushes."""
+"""The guards without a window: scripts move vertices like a brush, a transform or a lattice. tests/ui has real brushes."""
 
 import bmesh
 import bpy
@@ -16,7 +16,7 @@ PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ M
 
 
 def guarded(ob, *kinds, tolerance=TOLERANCE, mode="SCULPT"):
-    """Makes the mesh its own reference, in this mode; (vertices, triangles) of it in the world."""
+    """Makes the mesh its own reference, in this mode. Returns its (vertices, triangles) in the world."""
     ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", tolerance
     assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
     reference = world_triangles(ob)
@@ -28,7 +28,7 @@ def guarded(ob, *kinds, tolerance=TOLERANCE, mode="SCULPT"):
 
 
 def updated(ob):
-    """As Blender does after each dab."""
+    """Updates the scene as Blender does after each dab."""
     ob.update_tag()
     bpy.context.view_layer.update()
 
@@ -44,7 +44,7 @@ def dab(ob, positions):
 
 
 def judged(ob, reference, tolerance=TOLERANCE):
-    """(lower, upper) of the largest distance from the reference, in tolerances, as Blender cuts the faces now."""
+    """Returns (lower, upper) of the largest distance from the reference, in tolerances, in Blender's triangulation."""
     scratch = ob.data.copy()
     scratch.vertices.foreach_set("co", coordinates(ob).ravel())
     arrays = mesh_io.read_mesh(scratch)
@@ -59,7 +59,7 @@ def state(ob):
 
 
 def bump(ob, height, radius=0.3):
-    """The coordinates with a hill in the middle."""
+    """Returns the coordinates with a hill in the middle."""
     wish = coordinates(ob)
     wish[:, 2] += height * np.clip(1 - np.hypot(wish[:, 0], wish[:, 1]) / radius, 0, None)
     return wish
@@ -145,7 +145,7 @@ def test_the_active_shape_key_is_guarded():
     after = dab(ob, wish)
     assert judged(ob, reference)[1] <= 1
     assert np.array_equal(mesh_io.column(ob.data.vertices, "co", 3), after)
-    # A brush moves the keys along with the Basis: they go back along with it.
+    # A brush moves the other shape keys along with the Basis. They have to go back along with it.
     assert np.abs(mesh_io.column(up.data, "co", 3) - (other + after - wish)).max() < 1e-6
 
 
@@ -173,7 +173,7 @@ def test_corners_of_a_concave_face_stay_where_they_are():
     assert judged(ob, reference)[1] <= 1
 
 
-# What cannot be guarded ---------------------------------------------------------------------------------------------
+# Meshes without a guard ---------------------------------------------------------------------------------------------
 
 
 def test_a_mesh_that_is_outside_is_left_alone_with_the_reason():
@@ -210,7 +210,7 @@ def test_reasons():
     assert "Apply the Multiresolution modifier first" in state(ob)["sculpting"][0]
     ob.modifiers.remove(multires)
     ob.tolvol.reference_kind = "OBJECT"
-    assert "another one was chosen" in state(ob)["sculpting"][0]
+    assert "another kind of reference was chosen" in state(ob)["sculpting"][0]
     ob.tolvol.reference_kind = "SELF"
     ob.tolvol.guard.lattice = True
     assert state(ob)["lattice"] == ("sheet has no Lattice modifier with a lattice", False)
@@ -220,7 +220,7 @@ def test_a_face_of_very_many_corners_is_refused():
     around = np.arange(65) * 2 * np.pi / 65
     ob = add_object("disc", [(np.cos(a), np.sin(a), 0) for a in around], [range(65)])
     guarded(ob, "sculpting")
-    assert "65 corners: Face > Triangulate" in state(ob)["sculpting"][0]
+    assert "65 corners, too many for a guard: use Face > Triangulate" in state(ob)["sculpting"][0]
 
 
 def test_a_tolerance_that_is_changed_counts_at_once():
@@ -293,7 +293,7 @@ def test_what_is_moved_in_edit_mode_stops_at_the_tolerance():
 
 
 def test_a_wish_that_redo_brings_back_ends_where_it_did():
-    """The step is pushed with the wish in it, as an operator's is."""
+    """Stores the undo step before the guard corrects the mesh, as Blender does for an operator."""
     ob = sheet(count=20)
     reference = guarded(ob, "editing", mode="EDIT")
     start = coordinates(ob)
@@ -346,7 +346,7 @@ def lift(lattice, height):
     lattice.data.points.foreach_set("co_deform", points.ravel())
     lattice.data.update_tag()
     bpy.context.view_layer.update()
-    bpy.context.view_layer.update()  # of what the guard wrote, which Blender evaluates without a call
+    bpy.context.view_layer.update()  # Blender evaluates the points that the guard wrote without calling a handler.
 
 
 def evaluated(ob, reference):

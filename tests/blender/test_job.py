@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What happens to the objects of a job while it runs, and to jobs when Blender ends."""
+"""Changes of a job's objects while it runs, and jobs that run when Blender ends."""
 
 import threading
 
@@ -14,7 +14,7 @@ DONE = "torus: done"
 
 
 class TOLVOL_OT_stand_in(job.JobOperator, bpy.types.Operator):
-    """A job that something happens to while it runs"""
+    """A job whose objects are changed while it runs"""
 
     bl_idname = "tolvol.stand_in"
     bl_label = "Stand In"
@@ -104,7 +104,7 @@ def test_jobs_end_before_a_file_is_loaded_or_a_step_undone(monkeypatch, happens,
 
 
 def stubborn(progress):
-    """Work that ends only when it is cancelled, as native code does: some time after."""
+    """Work that ends only after it is cancelled and, like native code, some time later."""
     while not progress.cancelled:
         pass
     threading.Event().wait(0.2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Apply Modifier in Tolerance and Fit Modifier to Tolerance: the promise on what is stored, and the best setting."""
+"""Apply Modifier in Tolerance and Fit Modifier to Tolerance: the promise on the stored mesh, and the best setting."""
 
 import bpy
 import numpy as np
@@ -23,7 +23,7 @@ def coordinates(ob):
 
 
 def modified(kind, matrix=None, settings=None):
-    """A torus with one modifier, and all that the modifier needs."""
+    """Returns a torus with one modifier, and adds all objects that the modifier needs."""
     ob = torus(kind, matrix=matrix, around=32, across=16, noise=0.01)
     modifier = ob.modifiers.new(kind, kind)
     for name, value in (settings or {}).items():
@@ -39,7 +39,7 @@ def modified(kind, matrix=None, settings=None):
 
 
 def evaluated(ob):
-    """Where the vertices are with the object's modifiers, as Blender shows it."""
+    """Returns the positions of the vertices with the object's modifiers, as Blender shows them."""
     return column(ob.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.vertices, "co", 3)
 
 
@@ -157,12 +157,12 @@ def test_one_undo_step_brings_mesh_and_modifier_back():
 
 def test_what_cannot_be_applied_is_refused():
     ob = modified("SUBSURF")
-    refused("SUBSURF of SUBSURF: It changes the faces and has nothing to fit", modifier="SUBSURF")
-    refused("SUBSURF has no modifier to take")
+    refused("SUBSURF of SUBSURF: This modifier changes the faces and has no setting to fit", modifier="SUBSURF")
+    refused("SUBSURF has no modifier that can be used here")
     refused("SUBSURF has no modifier else", modifier="else")
     ob.modifiers.clear()
     refused("SUBSURF has no modifiers")
-    for kind, match in (("LATTICE", "does not move"), ("DECIMATE", "fit it instead"), ("CLOTH", "A simulation")):
+    for kind, match in (("LATTICE", "does not move"), ("DECIMATE", "use Fit instead"), ("CLOTH", "A simulation")):
         modifier = ob.modifiers.new(kind, kind)
         refused(match, modifier=kind)
         ob.modifiers.remove(modifier)
@@ -236,7 +236,7 @@ def test_the_search_finds_lone_values_before_the_others():
         best = samples[deviation(samples) <= 1].min()
         assert deviation(found) <= 1 and tries < 100
         worse += found > 1.03 * best
-    assert worse <= 1  # what is within for less than half a step can be missed
+    assert worse <= 1  # The search may miss values in a range of less than half a step.
 
 
 def test_a_value_that_is_given_is_certified_and_not_searched_for():
@@ -253,7 +253,7 @@ def test_a_value_that_is_given_is_certified_and_not_searched_for():
 def test_no_setting_and_no_range_of_settings():
     ob = modified("REMESH", settings={"mode": "BLOCKS"})
     fit_modifier = bpy.ops.tolvol.fit_modifier
-    refused("REMESH of REMESH: Set it to Voxel", fit_modifier, modifier="REMESH")
+    refused("REMESH of REMESH: Set the modifier to Voxel", fit_modifier, modifier="REMESH")
     ob.modifiers[0].mode = "VOXEL"
     refused("choose Replace or New Object", fit_modifier, result="SHAPE_KEY")
     ob.shape_key_add(name="Basis")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes that nobody would model: written as they were computed, nothing torn, lost or left over."""
+"""Unusual meshes: Blender's mesh is the computed one, and no part of it is torn, lost or left over."""
 
 import json
 
@@ -30,7 +30,7 @@ def test_polygons_are_cut_as_they_are_shown():
     sizes = {len(face.vertices) for face in ob.data.polygons}
     assert 4 in sizes and max(sizes) > 4
     reference = world_triangles(ob)
-    bpy.ops.tolvol.decimate(tolerance_length=1e-4, placement="SUBSET")  # nothing can go
+    bpy.ops.tolvol.decimate(tolerance_length=1e-4, placement="SUBSET")  # No vertex can vanish.
     now = world_triangles(ob)
     assert {len(face.vertices) for face in ob.data.polygons} == {3}
     triples = [{tuple(sorted(map(bytes, vertices[t]))) for t in triangles} for vertices, triangles in (reference, now)]
@@ -48,7 +48,7 @@ def test_duplicate_faces_are_dropped_once_and_counted():
 
 
 def decimated(vertices, faces, second_judge=True):
-    """(triangles before, triangles after, repairs by kind) at 1 %, proved."""
+    """Decimates at 1 % and returns (triangles before, triangles after, repairs by kind)."""
     ob = add_object("odd", vertices, faces)
     reference = world_triangles(ob)
     bpy.ops.tolvol.decimate(tolerance_percent=1)
@@ -65,7 +65,7 @@ def test_faces_that_are_segments_or_points_stay(heights):
     vertices, quads = torus_arrays()
     segment = np.array([(2, 0, height) for height in heights], np.float32)
     odd = [len(vertices) + i for i in range(3)]
-    # Blender's tree, the second judge, knows no distance from such a face.
+    # Blender's tree, the second judge, cannot measure the distance from such a face.
     before, after, _ = decimated(np.vstack([vertices, segment]), [*quads, odd], second_judge=False)
     assert after < before / 4
     stays = {tuple(vertex.co) for vertex in bpy.context.object.data.vertices}
@@ -101,7 +101,7 @@ def test_one_sided_strip():
 
 
 def test_touching_pieces_and_fins_hold_together():
-    """A fin on a sheet (an edge with three faces) and a cube at one of its corners: nothing tears, nothing is lost."""
+    """A sheet has a fin (an edge with three faces) and a cube at one of its corners. No part tears or is lost."""
     vertices, quads = sheet_with_fin()
     ob = add_object("fin", vertices, quads)
     reference = world_triangles(ob)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reference, Check, Select Outside; what is refused, with the reason; undo."""
+"""Reference, Check and Select Outside; bad input, with the reason; undo."""
 
 import bpy
 import numpy as np
@@ -45,7 +45,7 @@ def test_update_replaces_and_clear_lets_go():
     ob.data.update()
     bpy.ops.tolvol.set_reference()
     assert ob.tolvol.snapshot.vertices[0].co.x == ob.data.vertices[0].co.x
-    assert len(bpy.data.meshes) == 2  # the first snapshot is gone
+    assert len(bpy.data.meshes) == 2  # The first snapshot was removed.
     bpy.ops.tolvol.clear_reference()
     assert ob.tolvol.snapshot is None and len(bpy.data.meshes) == 1
     assert not bpy.ops.tolvol.clear_reference.poll()
@@ -105,8 +105,8 @@ def test_choosing_another_reference_makes_it_stale():
     ob = torus()
     bpy.ops.tolvol.set_reference()
     ob.tolvol.reference_kind = "OBJECT"
-    assert snapshots.stale_reason(ob) == "another one was chosen"
-    assert not bpy.ops.tolvol.set_reference.poll()  # which object?
+    assert snapshots.stale_reason(ob) == "another kind of reference was chosen"
+    assert not bpy.ops.tolvol.set_reference.poll()  # No object was chosen.
     ob.tolvol.reference_object = other
     bpy.ops.tolvol.set_reference()
     assert snapshots.stale_reason(ob) is None
@@ -126,7 +126,7 @@ def test_reference_object_cannot_be_the_object_itself_or_no_mesh():
 
 
 def moved_up(share=0.25, height=0.1):
-    """A flat sheet, then with the vertices beyond x = 1 - 2 share lifted."""
+    """Makes a flat sheet its own reference and then lifts the vertices beyond x = 1 - 2 share."""
     ob = sheet(count=20, bumps=0.0)
     bpy.ops.tolvol.set_reference()
     for vertex in ob.data.vertices:
@@ -144,7 +144,7 @@ def test_check_measures_both_ways_and_the_share_outside():
     measured = ob.tolvol.measurement
     assert measured.forward == pytest.approx(0.1, rel=0.011)
     assert not verdict.of(ob).forward_within and not verdict.of(ob).backward_within
-    # A quarter of the sheet is 0.1 up, and half of the slope (0.1 wide) to it.
+    # Outside are the quarter of the sheet that is lifted by 0.1, and half of the slope to it, which is 0.1 wide.
     area = 2 * 2 * 0.75 - 2 * 0.1 + 2 * np.hypot(0.1, 0.1) + 2 * 2 * 0.25
     assert measured.share_outside == pytest.approx((2 * 2 * 0.25 + np.hypot(0.1, 0.1)) / area, abs=0.01)
     assert measurements.measurement_of(ob) is not None
@@ -215,7 +215,7 @@ def test_select_outside_leaves_an_object_that_is_inside_alone():
 
 
 def lifted_exactly(height):
-    """A flat square at z = 0 and the same at `height`, which float32 has exactly."""
+    """Makes a flat square at z = 0 and the same square at `height`, which float32 stores exactly."""
     ob = sheet(count=2, bumps=0.0)
     bpy.ops.tolvol.set_reference()
     for vertex in ob.data.vertices:
@@ -227,7 +227,7 @@ def lifted_exactly(height):
 
 
 def test_verdicts_agree_about_what_float32_cannot_tell_from_the_tolerance():
-    """Closer to the tolerance than the steps of Blender's own numbers, above it and below."""
+    """The distance is above and below the tolerance by less than a step of Blender's float32 numbers."""
     height = float(np.float32(0.1))  # 0.100000001490116
     ob = lifted_exactly(height)
     ob.tolvol.tolerance_length = 0.1
@@ -324,7 +324,7 @@ def test_linked_mesh_of_a_local_object_is_refused(library):
         there.meshes = ["linked"]
     link(bpy.data.objects.new("local", there.meshes[0]))
     refused("mesh linked is linked.*Make Local")
-    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}  # which changes no mesh
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}  # Setting a reference does not change a mesh.
 
 
 def test_override_is_refused(library):
@@ -359,7 +359,7 @@ def test_a_reference_that_is_no_mesh_is_refused():
     curve = bpy.data.objects.new("wire", bpy.data.curves.new("wire", "CURVE"))
     ob = torus()
     ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", curve
-    with pytest.raises(RuntimeError, match="wire is no mesh: Object > Convert > Mesh"):
+    with pytest.raises(RuntimeError, match="wire is not a mesh: Object > Convert > Mesh"):
         bpy.ops.tolvol.set_reference()
     assert measurements.shown_size(ob) is None
 
@@ -368,7 +368,7 @@ def test_a_reference_that_is_no_mesh_is_refused():
 
 
 def referenced(name="torus"):
-    """An object whose reference is set, decimated and measured."""
+    """Returns an object with a reference that was decimated and measured."""
     ob = torus(name)
     bpy.ops.tolvol.set_reference()
     bpy.ops.tolvol.decimate()
@@ -538,7 +538,7 @@ def test_settings_not_given_are_the_objects_own_and_those_given_are_kept():
     assert '"target_triangles": 700' in report
     bpy.ops.tolvol.decimate(tolerance_percent=1.5, use_target=False)
     assert ob.tolvol.tolerance_percent == 1.5 and not ob.tolvol.use_target and ob.tolvol.keep == "ONE"
-    # Never the last run's: the next object has its own.
+    # The next object uses its own settings, never those of the last run.
     other = torus("other")
     bpy.ops.tolvol.decimate()
     assert '"percent": 1.0' in other.tolvol.last_run and '"two_sided": true' in other.tolvol.last_run
@@ -546,7 +546,7 @@ def test_settings_not_given_are_the_objects_own_and_those_given_are_kept():
 
 @pytest.fixture
 def chosen_preferences():
-    """What a person chose where the add-on is installed."""
+    """Preferences that the user has chosen for the installed add-on."""
     installed = bpy.context.preferences.addons.new()
     installed.module = addon.__name__
     yield installed.preferences
@@ -594,7 +594,7 @@ def test_what_the_module_refuses_is_said_in_the_panels_words():
         ) as said:
             operator()
         assert "=" not in str(said.value)
-    # Every face of what is left is inside, but half of the reference has nothing near it.
+    # Every remaining face is inside, but half of the reference has no face near it.
     ob = sheet(bumps=0.0)
     bpy.ops.tolvol.set_reference()
     half = sheet("half", bumps=0.0)
@@ -610,7 +610,7 @@ def test_what_the_module_refuses_is_said_in_the_panels_words():
 
 def test_percent_that_was_typed_is_the_percent_that_is_used():
     ob = torus()
-    ob.tolvol.tolerance_percent = 0.1  # not a float32
+    ob.tolvol.tolerance_percent = 0.1  # The tolerance is the typed 0.1, not its float32.
     assert tolerances.tolerance_length(ob.tolvol, 1.0) == 0.1 / 100
 
 
@@ -629,7 +629,7 @@ def test_changing_the_unit_keeps_the_tolerance():
     assert tolerances.tolerance_length(ob.tolvol, size) == wanted and ob.tolvol.tolerance_percent == pytest.approx(0.3)
     bpy.ops.tolvol.decimate()
     assert verdict.of(ob).kind == verdict.WITHIN
-    # The operator, in Adjust Last Operation, has both forms of what it used.
+    # In Adjust Last Operation the operator has the used tolerance in both units.
     ob.tolvol.tolerance_mode = "LENGTH"
     assert verdict.of(ob).kind == verdict.WITHIN and verdict.of(ob).tolerance == wanted
     ob.tolvol.tolerance_length = 0.05
@@ -665,8 +665,9 @@ def test_a_length_typed_in_a_unit_of_the_scene_is_that_length():
     ):
         units.system, units.scale_length = system, scale
         scale_as_stored = 1.0 if system == "NONE" else units.scale_length
-        settings.tolerance_length = wanted if system == "NONE" else metres / scale_as_stored  # as Blender reads a field
+        # Blender computes the length of a text field in this way.
+        settings.tolerance_length = wanted if system == "NONE" else metres / scale_as_stored
         assert tolerances.tolerance_length(settings, 1.0) == pytest.approx(wanted, rel=1e-15), (system, scale, metres)
     units.system, units.scale_length = "METRIC", 0.001
-    settings.tolerance_length = 0.123456789  # dragged
+    settings.tolerance_length = 0.123456789  # A value that was dragged has all digits.
     assert np.float32(tolerances.tolerance_length(settings, 1.0)) == np.float32(0.123456789)

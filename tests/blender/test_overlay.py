@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Show Deviation where nothing can be drawn, and what it computes. What it draws is in tests/ui."""
+"""Show Deviation without a window: its computations, and the reasons why it draws nothing. tests/ui tests the drawing."""
 
 import bpy
 import numpy as np
@@ -64,7 +64,7 @@ def test_reasons_follow_preference_reference_and_mode(monkeypatch):
     with_reference(ob)
     assert reasons.hidden(ob) is None
     ob.tolvol.reference_kind = "OBJECT"
-    assert "out of date: another one was chosen" in reasons.hidden(ob)
+    assert "out of date: another kind of reference was chosen" in reasons.hidden(ob)
     ob.tolvol.reference_kind = "SELF"
     bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
     assert "Sculpt Mode" in reasons.hidden(ob)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""--picture of the commands, and the figures."""
+"""The option --picture of the commands, and the scripts of the figures."""
 
 import base64
 import re
@@ -25,7 +25,7 @@ def pixels(path):
 
 
 def marked(picture):
-    """Pixels of the mesh's part of a picture in the first of the colours of what is outside."""
+    """Returns the number of pixels in the image of the mesh that have the first colour of the stripes."""
     return int((picture[:, :800, :3] == np.array(native.module.OUTSIDE_COLOURS[0])).all(-1).sum())
 
 

@@ -26,7 +26,7 @@ def surface(vertices, faces, name="part"):
 
 
 def step(height=0.1, start=0.15):
-    """A flat square, and one whose part beyond x = start is lifted, with a slope 0.2 wide."""
+    """Makes a flat square, and one whose part beyond x = start is lifted, with a slope 0.2 wide."""
     vertices, quads = sheet_arrays(count=10, bumps=0.0)
     lifted = vertices.copy()
     lifted[vertices[:, 0] > start, 2] += np.float32(height)
@@ -39,7 +39,7 @@ def measured(a, b, tolerance=None, bounds=(), **options):
     return run | {"a": about[0], "b": about[1]}
 
 
-# What is measured ---------------------------------------------------------------------------------------------------
+# Measurements -------------------------------------------------------------------------------------------------------
 
 
 def test_place_percentiles_bands_and_both_directions():
@@ -103,7 +103,7 @@ def test_surfaces_that_are_the_same():
     a, _ = step()
     run = measured(a, a, tolerance=0.01)
     assert run["forward"]["largest"][1] < 1e-12 and run["forward"]["beyond"][0]["share"] == 0
-    assert "both within it, proved" in deviation.deviation_page.page(run)
+    assert "both are within the tolerance, proved" in deviation.deviation_page.page(run)
     assert "NaN" not in json.dumps(measured(a, a))
 
 
@@ -111,7 +111,7 @@ def test_surfaces_that_are_the_same():
 
 
 class Page(HTMLParser):
-    """Checks that tags are closed in order and that nothing is loaded from elsewhere; collects the text."""
+    """Checks that tags are closed in order and that the page loads no other file. Collects the text."""
 
     VOID = {"meta", "img", "br", "path", "rect"}
 
@@ -146,7 +146,7 @@ def test_page_stands_alone_and_says_what_was_measured():
     page = Page(deviation.deviation_page.page(run))
     assert page.tags.count("svg") == page.tags.count("article") == 2 and not page.images
     assert "A <1> from B & co" in page.text and "B & co from A <1>" in page.text
-    assert "Tolerance 0.05 mm" in page.text and "A <1> and B & co beyond it, proved" in page.text
+    assert "Tolerance 0.05 mm" in page.text and "beyond the tolerance, proved: A <1> and B & co" in page.text
     largest = run["forward"]["largest"][1]
     assert 0.1 <= float(re.search(r"at most\s+([\d.]+) mm", page.text)[1]) <= largest * 1.001
     assert f"{largest / 0.05 * 100:.4g} % of the tolerance" in page.text
@@ -154,7 +154,11 @@ def test_page_stands_alone_and_says_what_was_measured():
         assert f"{entry['percent']:g} % of area within" in page.text and f"{entry['distance']:.4g}" in page.text
     assert "0.02 to 0.05" in page.text and "beyond 0.05" in page.text and "is not closed" in page.text
     loose = Page(deviation.deviation_page.page(run | {"tolerance": None}))
-    assert "beyond it" not in loose.text and "of size" in loose.text and "of the tolerance" not in loose.text
+    assert (
+        "beyond the tolerance, proved" not in loose.text
+        and "of size" in loose.text
+        and "of the tolerance" not in loose.text
+    )
 
 
 def test_page_bars_beyond_the_tolerance_are_striped():
@@ -175,7 +179,8 @@ def test_proved_bounds_are_rounded_outwards():
     rounded = deviation.deviation_page._rounded
     assert rounded(0.123401, True) == "0.1235" and rounded(0.123499, False) == "0.1234"
     assert rounded(-0.123401, False) == "-0.1235" and rounded(-0.123499, True) == "-0.1234"
-    assert float(rounded(float(np.float32(0.1)), True)) == 0.1  # what float32 does to a tenth is no reason
+    # The rounding of 0.1 to float32 does not count as an excess.
+    assert float(rounded(float(np.float32(0.1)), True)) == 0.1
     assert float(rounded(0.0, True)) == 0 and float(rounded(1.23e-15, True)) == 1.23e-15
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Smooth in Tolerance: the promise on what is stored, every option, what is refused."""
+"""Smooth in Tolerance: the promise on the stored mesh, every option, and bad input."""
 
 import bmesh
 import bpy
@@ -22,14 +22,14 @@ def coordinates(ob):
 
 
 def smoothed(make=torus, **options):
-    """Where the vertices of a new object end."""
+    """Smooths a new object and returns the positions of its vertices."""
     ob = make()
     assert bpy.ops.tolvol.smooth(**options) == {"FINISHED"}
     return coordinates(ob)
 
 
 def roughness(ob):
-    """Mean angle between the normals of neighbouring faces."""
+    """Returns the mean angle between the normals of neighbouring faces."""
     mesh = ob.data
     normals = column(mesh.polygons, "normal", 3)
     edges = column(mesh.loops, "edge_index", 1, np.int32)
@@ -105,7 +105,7 @@ def test_bent_quads_stay_within_however_they_are_cut():
         cut = np.array(faces, np.int32)[:, corners]
         before = [native.module.hausdorff(reference[0], face[None], *reference).upper <= tolerance for face in cut]
         inside &= before
-    assert inside.sum() > 0.8 * len(faces)  # those that were outside across a diagonal stay as they are
+    assert inside.sum() > 0.8 * len(faces)  # Quads that were outside in the other triangulation stay as they are.
     for corners in ([0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]):
         cut = np.array(faces, np.int32)[inside][:, corners]
         assert native.module.hausdorff(vertices, cut, *reference, bound=tolerance).upper <= tolerance
@@ -129,7 +129,7 @@ def test_loose_edges_stay_attached():
     ob.data.edges[-1].vertices = (4, 5)
     ob.data.update()
     ob.tolvol.tolerance_percent = 20
-    with pytest.raises(RuntimeError, match="Nothing of spike.* can be smoothed"):
+    with pytest.raises(RuntimeError, match="does not move any vertex of spike"):
         bpy.ops.tolvol.smooth()
 
 
@@ -153,7 +153,7 @@ def test_shape_keys_keep_their_motion_and_one_undo_step_restores_everything():
 
 
 def in_edit_mode(make, select):
-    """A new object in Edit Mode, vertices selected where select(coordinates) says."""
+    """Returns a new object in Edit Mode with the vertices selected for which select(coordinates) is true."""
     ob = make()
     bpy.ops.object.mode_set(mode="EDIT")
     chosen = select(coordinates(ob))
@@ -165,7 +165,7 @@ def in_edit_mode(make, select):
 
 
 def stored(ob):
-    """The coordinates in Edit Mode."""
+    """Returns the coordinates in Edit Mode."""
     ob.update_from_editmode()
     return coordinates(ob)
 
@@ -221,12 +221,12 @@ def test_shape_keys_follow_what_edit_mode_smooths():
     assert np.abs(up - basis - [0, 0, 0.25]).max() < 1e-6
     ob.active_shape_key_index = 1
     bpy.ops.object.mode_set(mode="EDIT")
-    with pytest.raises(RuntimeError, match="the mesh of torus: choose its shape key Basis first"):
+    with pytest.raises(RuntimeError, match="the base mesh of torus: choose the shape key Basis first"):
         bpy.ops.tolvol.smooth()
 
 
 def edited_together(select, *objects):
-    """Takes the objects into Edit Mode; the first one is active. select: which vertices of each."""
+    """Takes the objects into Edit Mode. The first one is active. select: the selected vertices of each object."""
     for ob in objects:
         ob.select_set(True)
     bpy.context.view_layer.objects.active = objects[0]
@@ -246,7 +246,7 @@ def test_in_edit_mode_all_edited_meshes_with_a_selection_are_smoothed():
     assert bpy.ops.tolvol.smooth(iterations=60, method="LAPLACIAN") == {"FINISHED"}
     after = [stored(ob) for ob in objects]
     assert [(now != then).any() for now, then in zip(after, before)] == [True, True, False]
-    for ob, reference, percent in zip(objects[:2], references, (1, 0.2)):  # each has a tolerance of its own
+    for ob, reference, percent in zip(objects[:2], references, (1, 0.2)):  # Each object has a tolerance of its own.
         tolerance = percent / 100 * native.module.size(*reference)
         judged = native.module.hausdorff(*world_triangles(ob), *reference, bound=tolerance)
         assert 0.5 * tolerance < judged.upper <= tolerance

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The cache of volumes under threads: panels are drawn while jobs build."""
+"""The cache of volumes with several threads: panels are drawn while jobs build."""
 
 import sys
 import threading
@@ -15,7 +15,7 @@ PATIENCE = 60  # seconds after which a thread counts as stuck
 
 @pytest.fixture
 def builds(monkeypatch):
-    """Volumes whose building waits for .go and then calls .end(); .begun counts them."""
+    """Builds volumes. Building waits for .go and then calls .end(); .begun counts the builds."""
 
     class Builds:
         begun, go, end = 0, threading.Event(), staticmethod(lambda: None)
@@ -79,7 +79,7 @@ def test_a_panel_is_drawn_while_jobs_add_and_drop_volumes(monkeypatch):
 def test_two_jobs_that_need_one_volume_build_it_once(builds):
     surface = snapshots.surface_of(torus(around=12, across=6))
     jobs = [Asking(surface, 0.1) for _ in range(2)]
-    jobs[1].join(0.3)  # the second one has come to where it builds, or waits
+    jobs[1].join(0.3)  # The second thread now either builds or waits.
     builds.go.set()
     assert all(job.ended() for job in jobs)
     assert builds.begun == 1 and jobs[0].volume is jobs[1].volume is not None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's command line for PyPI's bpy, as far as it is used here: blender --background [--factory-startup]
+"""Does the part of Blender's command line that the tests use with PyPI's bpy: blender --background [--factory-startup]
 [--python-exit-code N] [--python-expr CODE | --python FILE]... [-- ARGUMENTS]
 """
 
@@ -17,7 +17,7 @@ def run(code, file):
 
 
 def scripts(arguments):
-    """(code, file) of each script, the exit code of one that fails."""
+    """Returns (code, file) of each script, and the exit code for a script that fails."""
     arguments = iter(arguments)
     found, failure = [], 0
     for argument in arguments:
@@ -59,7 +59,7 @@ def main():
 with tempfile.TemporaryDirectory(prefix="tolvol-bpy-") as scratch:
     os.environ.setdefault("BLENDER_USER_RESOURCES", scratch)
     code = main()
-# What is still registered makes 4.2 crash and 4.5 hang at the end of the process.
+# At the end of the process classes that are still registered make Blender 4.2 crash and 4.5 hang.
 sys.stdout.flush()
 sys.stderr.flush()
 os._exit(code)

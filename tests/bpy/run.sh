@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# The tests of tests/blender in another Blender, PyPI's bpy: sh tests/bpy/run.sh VERSION [PYTEST ARGUMENTS]
-# Its environment is build/bpy/VERSION. Its Python is looked for by name on PATH and in pyenv; $PYTHON names another.
+# Runs tests/blender in another version of Blender, PyPI's bpy: sh tests/bpy/run.sh VERSION [PYTEST ARGUMENTS]
+# The virtual environment is build/bpy/VERSION. Its Python is searched on PATH and in pyenv, unless $PYTHON names one.
 set -eu
 cd "$(dirname "$0")/../.."
 
@@ -42,6 +42,6 @@ EOF
 fi
 
 TOLVOL_PYTHONS="$found" sh setup.sh --tests
-# The benchmark's module is for Debian's Python alone.
+# The module of the benchmarks is built only for Debian's Python.
 [ $# -gt 0 ] || set -- tests/blender
 PATH=$venv/bin:$PATH exec timeout 1800 sh tests/blender/run.sh --ignore=tests/blender/test_comparison.py "$@"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tests/fuzz.py is made of: kinds draws meshes, cases draws operations and options, operations runs and judges
-them, watchdog does so in a child process, shrink makes a finding small."""
+"""The parts of tests/fuzz.py: kinds draws meshes, draw draws operations and options, operations runs and judges them,
+watchdog does so in a child process, and shrink reduces a finding."""
 
 import os
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One case: a mesh, an operation and its options, complete in itself, so that it can be stored, shrunk and repeated."""
+"""One case: a mesh, an operation and its options. It is complete, so that it can be stored, reduced and repeated."""
 
 import json
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ import meshes
 
 
 class Finding(Exception):
-    """Something that must not happen. `what` stays the same while the case is shrunk, the message may not."""
+    """A failure. `what` stays the same while the case is reduced; the message may change."""
 
     def __init__(self, what, message):
         super().__init__(message)
@@ -25,20 +25,20 @@ class Case:
     triangles: np.ndarray
     tolerance: float
     to_world: np.ndarray | None = None
-    options: dict = field(default_factory=dict)  # what JSON can hold
+    options: dict = field(default_factory=dict)  # only values that JSON can hold
     arrays: dict = field(default_factory=dict)  # a row for each vertex
 
     def world(self, vertices):
         return vertices.astype(np.float64) if self.to_world is None else meshes.transform(self.to_world, vertices)
 
     def size(self):
-        """The diagonal of the used vertices in the world, at least half of what tolvol.size says."""
+        """Returns the diagonal of the used vertices in the world. It is at least half of tolvol.size."""
         if not len(self.triangles):
             return 0.0
         return float(np.linalg.norm(np.ptp(self.world(self.vertices[self.triangles.ravel()]), axis=0)))
 
     def is_limited(self):
-        """Whether every call has to end within a time: no area and no tolerance that make it long by themselves."""
+        """Whether every call has to end within the time limit. A very large area or a tiny tolerance makes calls long."""
         a, b, c = self.world(self.vertices)[self.triangles].transpose(1, 0, 2) / (self.size() or 1.0)
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
         return area <= 100 and self.tolerance >= 0.001 * self.size()

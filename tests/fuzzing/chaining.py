@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operation after operation against one reference."""
+"""Chains of operations against one reference."""
 
 import numpy as np
 import tolvol
@@ -17,7 +17,7 @@ def draw_chain(rng, case):
 
 
 def chain(run):
-    """Operation after operation against one reference: each takes what the one before has left."""
+    """Runs a chain of operations against one reference. Each operation takes the result of the previous one."""
     case, options = run.case, run.case.options
     volume = run.volume()
     vertices, triangles, place = case.vertices, case.triangles, {"to_world": case.to_world, "threads": run.threads[0]}
@@ -36,13 +36,13 @@ def chain(run):
                 wish = v + rng.standard_normal(v.shape) * case.tolerance / scale
                 return tolvol.constrain(v, wish.astype(v.dtype), t, volume, **place)
             effort = "thorough" if step == "thorough" else "fast"
-            # What moves keeps one direction: after it, the other one may be lost already.
+            # An operation that moves vertices keeps only one direction, so the other one may be lost afterwards.
             two_sided = both_ways and step != "one-sided"
             return tolvol.decimate(v, t, volume, two_sided=two_sided, effort=effort, **place)
 
         result = run.call(step, call, run.threads[0])
         vertices = result.vertices
-        # Vertices that no triangle uses go with the first decimation; what moves keeps the rest.
+        # A decimation gives new triangles. An operation that moves vertices keeps the present ones.
         triangles = getattr(result, "triangles", triangles)
         judges.valid(run, vertices, triangles, case.vertices.dtype)
         reference = case.world(case.vertices), case.triangles

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""decimate with any of its options, judged by what its docstring promises."""
+"""decimate with any of its options, judged by the promises of its docstring."""
 
 import numpy as np
 import tolvol
@@ -118,8 +118,8 @@ def _judge_locked(result, vertices, triangles, locked):
     now = result.vertex_map[locked & used]
     if (now < 0).any() or not np.array_equal(result.vertices[now], vertices[locked & used]):
         raise Finding("locked", "a locked vertex is not where it was")
-    # Edges are told by their vertices, as sheets that touch without sharing any are different ones; but of a face that
-    # is there twice with vertices of its own one is dropped, and then the other has the edge.
+    # Edges are identified by their vertices, because sheets that touch without sharing vertices are different sheets. But
+    # if a face exists twice with separate vertices, one of the two is dropped, and the edge then belongs to the other.
     edges = judges.edge_counts(triangles[(triangles != np.roll(triangles, 1, axis=1)).all(1)])[0]
     wanted = np.sort(result.vertex_map[edges[locked[edges].all(1)]], 1)
     there = judges.edge_counts(result.triangles)[0]

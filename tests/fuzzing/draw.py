@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a seed and a number to a case: always the same one, whatever was tried before."""
+"""Draws a case from a seed and a number. The case does not depend on the cases before."""
 
 import numpy as np
 
@@ -8,13 +8,13 @@ import meshes
 from . import kinds, operations
 from .case import Case
 
-# How often an operation comes, compared with others.
+# The relative frequency of each operation.
 LIKELY = {"decimate": 4, "chain": 2}
 
 
 def case_of(seed, number):
     rng = np.random.default_rng([seed, number])
-    # Small ones find as much as large ones, in less time; a twentieth are large enough to be slow.
+    # Small meshes find as many failures as large ones in less time. A twentieth of the meshes are large enough to be slow.
     most = np.log10(kinds.MAX_FACES) if rng.random() < 0.05 else 3.5
     kind, vertices, triangles = kinds.draw(rng, int(10 ** rng.uniform(0, most)))
     names = list(operations.OPERATIONS)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a result is what was promised, by code that did not steer the operations: tolvol.hausdorff, CGAL, NumPy."""
+"""Judges results by code that the operations do not use: tolvol.hausdorff, CGAL and NumPy."""
 
 import subprocess
 
@@ -17,10 +17,10 @@ CGAL_SECONDS = 5
 
 
 def within(run, of, to, tolerance, what):
-    """Every point of the mesh `of` (vertices, triangles: in the world) is within `tolerance` of the mesh `to`."""
+    """Requires that every point of the mesh `of` (vertices, triangles: in the world) is within `tolerance` of `to`."""
     if not len(of[1]):
         return
-    # Where the case has a matrix, its vertices were rounded once more on their way here.
+    # If the case has a matrix, its vertices were rounded once more when they were mapped to the world.
     largest = max(np.abs(of[0]).max(), np.abs(to[0]).max())
     slack = 0 if run.case.to_world is None else 1e-15 * largest
     interval = run.call("hausdorff", lambda: tolvol.hausdorff(*of, *to, bound=tolerance + slack, threads=1))
@@ -41,8 +41,11 @@ def within(run, of, to, tolerance, what):
 
 
 def cgal_distance(of, to, error, seconds=CGAL_SECONDS):
-    """The one-sided Hausdorff distance to within `error`; None where CGAL takes too long, and where a
-    triangle has no area: the distance of a segment from a segment came out 3 % too large (CGAL 5.5.1)."""
+    """Returns CGAL's one-sided Hausdorff distance with an error of at most `error`.
+
+    Returns None if CGAL takes too long, or if a triangle has no area: CGAL 5.5.1 gave a distance between two segments that
+    was 3 % too large.
+    """
     if len(of[1]) + len(to[1]) > CGAL_FACES:
         return None
     corners = [np.ascontiguousarray(mesh[0][mesh[1]], np.float64) for mesh in (of, to)]
@@ -50,7 +53,7 @@ def cgal_distance(of, to, error, seconds=CGAL_SECONDS):
         longest = np.maximum.reduce([((p - q) ** 2).sum(1) for p, q in ((a, b), (b, c), (c, a))])
         if (np.linalg.norm(np.cross(b - a, c - a), axis=1) <= 1e-6 * longest).any():
             return None
-    # About a size of 1 around the origin: what is asked of CGAL is a second opinion, not an answer at any scale.
+    # The meshes are scaled to a size of about 1 around the origin: CGAL need not work at any scale to be a second judge.
     centre = (corners[1].min((0, 1)) + corners[1].max((0, 1))) / 2
     scale = max(np.abs(c - centre).max() for c in corners) or 1.0
     head = np.array([len(of[1]), len(to[1]), error / scale])
@@ -76,20 +79,22 @@ def valid(run, vertices, triangles, dtype):
 
 
 def proper_faces(vertices, triangles):
-    """The faces by places instead of vertices, without those that are segments or points. A face that is there twice
-    counts twice: as the two sides of a sheet, which may move apart."""
+    """Returns the faces with positions in place of vertices, without faces that are segments or points.
+
+    A face that exists twice counts twice, because its copies may be the two sides of a sheet and may move apart.
+    """
     places, label = np.unique(vertices + 0.0, axis=0, return_inverse=True)
     faces = np.sort(label[triangles], 1)
     return places, faces[(np.diff(faces, axis=1) > 0).all(1)]
 
 
 def edge_counts(faces):
-    """(edges (k, 2), how many faces have each)."""
+    """Returns (edges (k, 2), the number of faces at each edge)."""
     return np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), 1), axis=0, return_counts=True)
 
 
 def _components(faces):
-    """Parts that hang together by edges: what merely touches in a point is another part, which may move apart."""
+    """Returns the parts that are connected by edges. Parts that only touch in a point are different: they may move apart."""
     if not len(faces):
         return 0
     sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), 1)
@@ -98,7 +103,8 @@ def _components(faces):
 
 
 def connected_alike(run, before, after):
-    """Once welded: no edges of more than two faces that are new, no component lost or joined to another."""
+    """Requires of the welded meshes that the result has no new edges of more than two faces, and that no component was lost
+    or joined to another one."""
     faces, (new_places, new_faces) = proper_faces(*before)[1], proper_faces(*after)
     had = (edge_counts(faces)[1] > 2).sum()
     edges, count = edge_counts(new_faces)
@@ -106,14 +112,16 @@ def connected_alike(run, before, after):
         a, b = new_places[edges[count > 2][0]]
         raise Finding("non-manifold", f"{(count > 2).sum()} edges have more than two faces, {had} had: {a} to {b}")
     components, left = _components(faces), _components(new_faces)
-    # Where more than two faces meet, some of them may be sheets that merely touch and move apart.
+    # Where more than two faces meet, some of them may be sheets that only touch and may move apart.
     if left < components or (left > components and not had):
         raise Finding("components", f"{components} components became {left}")
 
 
 def rims_alike(run, before, after, tolerance):
-    """One-sided operations keep boundaries: each is within the tolerance of the other. Only where edges have one or
-    two faces and no face is there twice: what is a boundary is not clear elsewhere."""
+    """Requires that the boundaries before and after a one-sided operation are within the tolerance of each other.
+
+    Meshes with edges of more than two faces or with repeated faces are not judged: their boundary is not clearly defined.
+    """
     (places, faces), (new_places, new_faces) = proper_faces(*before), proper_faces(*after)
     if edge_counts(faces)[1].max(initial=0) > 2 or len(np.unique(faces, axis=0)) < len(faces):
         return

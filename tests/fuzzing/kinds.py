@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes that go wrong: each kind is a function of a random generator and of about how many faces it shall have.
+"""Makes difficult meshes. Each kind is a function of a random generator and of the approximate number of faces.
 
-No mesh has more than 100,000 faces, or an area of more than a hundred times its size squared: what lies on itself more
-often than that may take as long as it likes."""
+No mesh has more than 100,000 faces or an area of more than a hundred times its size squared: for a mesh that covers itself
+more often than that no time limit is promised."""
 
 import numpy as np
 
@@ -12,18 +12,18 @@ MAX_FACES = 100_000
 
 
 def _grid(rng, n):
-    """Columns and rows of a grid of about n triangles, neither below 3."""
+    """Returns the numbers of columns and rows, at least 3, of a grid of about n triangles."""
     columns = int(max(3, np.sqrt(n / 2) * rng.uniform(0.5, 2)))
     return columns, int(max(3, n / 2 / columns))
 
 
 def _levels(n, first):
-    """How often a mesh of `first` triangles can be cut in four and have n at most."""
+    """Returns how often each triangle of a mesh of `first` triangles can be cut in four with at most n triangles then."""
     return int(max(0, np.log(max(n, first) / first) / np.log(4)))
 
 
 def welded(vertices, triangles):
-    """Vertices at equal positions made one; faces of which two corners then are one are dropped."""
+    """Merges vertices at equal positions, and drops faces that then have a repeated corner."""
     places, label = np.unique(vertices, axis=0, return_inverse=True)
     faces = label[triangles]
     sound = (faces != np.roll(faces, 1, axis=1)).all(1)
@@ -49,7 +49,7 @@ def terrain(rng, n):
 
 
 def _extruded(rng, outline, height):
-    """The outline (k, 2) as a prism; its caps are a fan around the middle, a fan of the first corner or a strip."""
+    """Returns a prism over the outline (k, 2). Its caps are a fan around the middle, a fan from a corner, or a strip."""
     k = len(outline)
     low, high = np.c_[outline, np.zeros(k)], np.c_[outline, np.full(k, height)]
     vertices = np.concatenate([low, high])
@@ -82,7 +82,7 @@ def gear(rng, n):
 
 
 def drilled_plate(rng, n):
-    """Squares with a round hole each, whose points are fanned to the four corners, and walls below."""
+    """A plate of squares with a round hole each. Fans connect the points of a hole to the four corners; walls are below."""
     holes = int(rng.integers(1, 6))
     k = 4 * int(max(1, n / holes / holes / 16))
     angle = np.pi / 4 + np.arange(k + 1) * 2 * np.pi / k
@@ -106,7 +106,7 @@ def drilled_plate(rng, n):
 
 
 def filleted_box(rng, n):
-    """An eighth of a sphere at each corner, slivers along the edges between them, two triangles a side."""
+    """A rounded box: an eighth of a sphere at each corner, slivers along the edges, and two triangles on each side."""
     k = int(max(2, np.sqrt(n / 16)))
     quarter = np.linspace(0, np.pi / 2, k)
     long = np.concatenate([quarter + q * np.pi / 2 for q in range(4)])
@@ -173,14 +173,14 @@ def random_soup(rng, n):
 
 
 def tangle(rng, n):
-    """Random triangles of few vertices: edges with many faces, faces with a corner twice, the same face again."""
+    """Random triangles on few vertices: edges with many faces, faces with a repeated corner, and repeated faces."""
     n = min(max(1, n), 150)
     k = int(rng.integers(3, 3 + n))
     return rng.standard_normal((k, 3)), rng.integers(0, k, (n, 3)).astype(np.int32)
 
 
 def furniture(rng, n):
-    """Walls of boxes in a lattice, of which some are missing: edges with one to four faces."""
+    """Walls between the boxes of a lattice, with some walls missing: the edges have one to four faces."""
     cells = int(rng.integers(1, 4))
     walls = [(axis, *p) for axis in range(3) for p in np.ndindex(*np.where(np.arange(3) == axis, cells + 1, cells))]
     walls = [wall for wall in walls if rng.random() < 0.8] or walls
@@ -216,7 +216,7 @@ def misoriented(rng, n):
 
 
 def duplicated(rng, n):
-    """Faces again, some turned round; some of them with vertices of their own."""
+    """A mesh with repeated faces. Some of these are reversed, and some have separate vertices."""
     vertices, triangles = rng.choice([smooth_closed, noisy, terrain, furniture])(rng, n * 2 // 3)
     again = triangles[rng.random(len(triangles)) < 0.4]
     turned = rng.random(len(again)) < 0.5
@@ -227,7 +227,7 @@ def duplicated(rng, n):
 
 
 def double_sheet(rng, n):
-    """A sheet and its copy: in the same place, hardly above it, or as a thin closed body."""
+    """A sheet and its copy: at the same place, very near to it, or connected to a thin closed body."""
     vertices, triangles = terrain(rng, n // 2)
     gap = rng.choice([0, 1e-12, 1e-6, 1e-3, 0.02])
     back = triangles[:, ::-1] if rng.random() < 0.5 else triangles
@@ -239,7 +239,7 @@ def degenerate(rng, n):
     vertices, triangles = rng.choice([smooth_closed, terrain, fan])(rng, n * 3 // 4)
     a = rng.integers(0, len(vertices), max(1, len(triangles) // 4))
     b = np.where(rng.random(len(a)) < 0.5, a, rng.integers(0, len(vertices), len(a)))
-    if len(a) > 100:  # long segments have no area, but cross everything
+    if len(a) > 100:  # Long segments have no area, but they cross many faces.
         b[100:] = np.minimum(a[100:] + 1, len(vertices) - 1)
     return vertices, np.concatenate([triangles, np.stack([a, a, b], 1)]).astype(np.int32)
 
@@ -261,7 +261,7 @@ def spikes(rng, n):
     vertices, triangles = meshes.sphere(_levels(n, 8))
     pulled = rng.random(len(vertices)) < 10 ** rng.uniform(-3, -0.5)
     vertices[pulled] *= rng.uniform(0, 3, (pulled.sum(), 1))
-    if len(triangles) > 2000:  # a forest of long spikes would have too large an area
+    if len(triangles) > 2000:  # Many long spikes would have too large an area.
         vertices = meshes.spike(_levels(n, 8), length=rng.uniform(0.5, 4))[0]
     return vertices, triangles
 
@@ -366,7 +366,7 @@ CHANGES = (
 
 
 def draw(rng, n):
-    """(name, vertices float32 or float64, triangles) of one random mesh of about n faces."""
+    """Returns (name, vertices float32 or float64, triangles) of one random mesh of about n faces."""
     name = str(rng.choice(list(KINDS)))
     vertices, triangles = KINDS[name](rng, n)
     for change, likely in CHANGES:

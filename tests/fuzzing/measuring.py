@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""check, distance, hausdorff and deviation, each judged by another one or by CGAL."""
+"""check, distance, hausdorff and deviation, each judged by another of these functions or by CGAL."""
 
 import numpy as np
 import tolvol
@@ -36,7 +36,7 @@ def check(run):
     placed = case.world(points)
     within_as_pieces(run, placed, faces[verdict == 2], reference)
     for face in faces[verdict == 0][:5]:
-        # Of a quad, one of the four triangles must be outside.
+        # If a quad is outside, one of its four triangles must be.
         corners = face[[[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]] if len(face) == 4 else [np.resize(face, 3)]
         far = run.call(
             "hausdorff",
@@ -89,7 +89,7 @@ def draw_hausdorff(rng, case):
 
 
 def _pair(run):
-    """The mesh and a copy of it that was moved and lost faces; without a matrix: these take the world's coordinates."""
+    """Returns the mesh and a copy that was moved and lost faces, in world coordinates: these functions take no matrix."""
     case = run.case
     moved = case.vertices + case.arrays.get("motion", 0).astype(case.vertices.dtype)
     pair = [(case.vertices, case.triangles), (moved, np.ascontiguousarray(case.triangles[:: case.options["every"]]))]
@@ -112,7 +112,7 @@ def hausdorff(run):
     together = np.concatenate([a[0], b[0]]).astype(np.float64)
     size = np.abs(together).max()
     if not np.ptp(together, axis=0).any():
-        size = max(size, 1.0)  # a single point has no size that rounding could be compared with
+        size = max(size, 1.0)  # A single point has size 0, with which rounding cannot be compared.
     if not 0 <= found.lower <= found.upper or not np.isfinite(found.upper):
         raise Finding("interval", f"{found.lower} to {found.upper}")
     if found.upper - found.lower > 0.01 * found.upper + 1e-13 * size:

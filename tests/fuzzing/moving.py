@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""smooth, deform, constrain and Guard with any of their options, judged by what their docstrings promise."""
+"""smooth, deform, constrain and Guard with any of their options, judged by the promises of their docstrings."""
 
 import numpy as np
 import tolvol
@@ -45,7 +45,7 @@ def smooth(run):
 
 
 def _judge_motion(run, result, vertices, faces, volume, stay):
-    """What smooth, deform and constrain have in common."""
+    """Judges the promises that smooth, deform and constrain share."""
     case = run.case
     run.tell("judging")
     judges.valid(run, result.vertices, case.triangles, vertices.dtype)
@@ -143,7 +143,7 @@ def constrain(run):
 
 def draw_guard(rng, case):
     largest = np.abs(case.vertices).max(initial=0)
-    if largest and not 1e-25 < largest < 1e25:  # beyond float32, which is all that a guard takes
+    if largest and not 1e-25 < largest < 1e25:  # A guard takes only float32, whose range is smaller.
         case.vertices, case.tolerance = case.vertices / largest, case.tolerance / largest
     case.vertices = case.vertices.astype(np.float32)
     case.options["seed"] = int(rng.integers(1 << 30))
@@ -156,7 +156,7 @@ def guard(run):
     volume = run.volume()
 
     class Edited:
-        """The mesh after some edits, each corrected by the guard."""
+        """Makes some edits, lets the guard correct each, and returns the mesh."""
 
         def __init__(self, threads, progress):
             rng = np.random.default_rng(options["seed"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The operations by name: draw_<name>(rng, case) gives a case its options, <name>(run) carries it out and judges it."""
+"""The operations by name. draw_<name>(rng, case) gives a case its options; <name>(run) runs the case and judges it."""
 
 from . import chaining, decimating, measuring, moving
 

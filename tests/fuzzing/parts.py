@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What several operations of tests/fuzz.py need: wishes, moved meshes, faces of any kind, a lattice, the judge of pieces."""
+"""Parts that several operations share: wished positions, moved meshes, faces of any kind, a lattice, a judge of faces."""
 
 import numpy as np
 import tolvol
@@ -14,7 +14,7 @@ def some(rng, *values):
 
 
 def motion_of(rng, case, tolerances):
-    """A wish for each vertex: noise, one direction, or a few vertices alone; in the world's units, of local axes."""
+    """Returns a wished move of each vertex: noise, one direction, or a move of few vertices; world units, local axes."""
     n, kind = len(case.vertices), rng.integers(3)
     motion = rng.standard_normal((n, 3))
     if kind == 1:
@@ -26,7 +26,7 @@ def motion_of(rng, case, tolerances):
 
 
 def moved(run):
-    """The case's vertices, or, where it has the option `moved`, near them, and whether they are all inside."""
+    """Returns the case's vertices, moved a little if the case has the option `moved`."""
     case = run.case
     if not case.options.get("moved"):
         return case.vertices
@@ -34,7 +34,7 @@ def moved(run):
 
 
 def proved_inside(run, vertices, triangles, volume):
-    """For each face whether the check proves it; none of which it does is beyond."""
+    """Returns for each face whether the check proves it to be inside."""
     verdicts = run.call(
         "check", lambda: volume.check(vertices, triangles, to_world=run.case.to_world, threads=1)
     ).verdict
@@ -42,7 +42,10 @@ def proved_inside(run, vertices, triangles, volume):
 
 
 def within_as_pieces(run, vertices, faces, reference):
-    """Points and segments are degenerate triangles, quads both of their triangulations."""
+    """Requires that faces of 1 to 4 corners are within the tolerance of the reference.
+
+    Points and segments are judged as degenerate triangles, and a quad in both its triangulations.
+    """
     corners = faces.shape[1]
     cuts = {1: [[0, 0, 0]], 2: [[0, 1, 1]], 3: [[0, 1, 2]], 4: [[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]}[corners]
     triangles = np.concatenate([faces[:, cut] for cut in cuts])
@@ -50,7 +53,7 @@ def within_as_pieces(run, vertices, faces, reference):
 
 
 def faces_of(case):
-    """The triangles as faces of 1 to 4 corners; pairs of neighbours as quads, with triangles that repeat a corner."""
+    """Returns the triangles as faces of 1 to 4 corners. With 4, pairs of neighbours are quads, and triangles repeat a corner."""
     corners, triangles = case.options["corners"], case.triangles
     if corners < 4:
         return np.ascontiguousarray(triangles[:, :corners])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a case calls the module: with a limit of time, on several numbers of threads, cancelled, refused with reason."""
+"""Calls the module for a case: with a time limit, on several numbers of threads, with a cancel, with refusals judged."""
 
 import re
 import threading
@@ -10,12 +10,12 @@ import tolvol
 
 from .case import Finding
 
-SECONDS = 10  # what a call may take where nothing makes it long by itself
-CANCEL_SECONDS = 0.5  # 0.2 are promised, on a machine that does nothing else
+SECONDS = 10  # time limit of a call on a mesh for which calls are short
+CANCEL_SECONDS = 0.5  # time limit after a cancel; 0.2 s are promised on a machine without other work
 
 
 class Refused(Exception):
-    """The module refused the case, as it is documented."""
+    """The module refused the case, as its documentation says."""
 
 
 class Run:
@@ -25,7 +25,7 @@ class Run:
         self.threads = case.options.get("threads", [1, 2])
 
     def call(self, name, function, threads=1):
-        """function(), which must not take too long by the clock and by the processor (others may be using it, too)."""
+        """Calls function(). It must not take too long by both the clock and the processor, which others may be using too."""
         self.tell(name)
         clock, processor = time.perf_counter(), time.process_time()
         try:
@@ -42,8 +42,10 @@ class Run:
                 raise Finding(f"slow: {name}", f"{seconds:.1f} s")
 
     def repeated(self, name, call, fields, same=True):
-        """call(threads, progress) on several numbers of threads, cancelled in between; the same bits each time, unless
-        not `same`."""
+        """Calls call(threads, progress) on several numbers of threads, and cancels one call in between.
+
+        The results have to be the same bit for bit unless `same` is false.
+        """
         started = time.perf_counter()
         first = self.call(name, lambda: call(self.threads[0], None), self.threads[0])
         seconds = time.perf_counter() - started
@@ -118,13 +120,13 @@ def _is_a_point(case):
 
 
 def _rounds(case, unit):
-    """Whether rounding of the stored type, or of computing with it, comes near the tolerance."""
+    """Whether the rounding of the stored type, or of computations with it, comes near the tolerance."""
     matrix = 1 if case.to_world is None else np.abs(case.to_world[:3, :3]).sum()
     largest = max(np.abs(case.vertices).max() * matrix, np.abs(case.world(case.vertices)).max())
     return unit * largest > 0.01 * case.tolerance
 
 
-# What the module refuses, and when it may.
+# The refusals of the module, and the cases in which they are right.
 REFUSALS = (
     ("no vertices|no faces", _has_no_faces),
     ("all faces are degenerate", _has_no_area),

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes a case small that shows a finding: options dropped, then faces, then the vertices that none uses."""
+"""Reduces a case that shows a finding: drops options, then faces, then unused vertices."""
 
 import time
 from dataclasses import replace
 
 import numpy as np
 
-# Options that an operation cannot do without.
+# Options that an operation needs: they are not dropped.
 NEEDED = {
     "threads",
     "placement",
@@ -24,7 +24,7 @@ NEEDED |= {"every", "swapped", "outside"}
 
 
 class Shrink:
-    """`still(case)` tells whether a case shows the same finding; no try is begun after so many seconds."""
+    """Reduces a case. still(case) tells whether a case shows the same finding. No try begins after so many seconds."""
 
     def __init__(self, case, still, seconds):
         self.case, self._still, self._end = case, still, time.monotonic() + seconds

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs cases in a child process, so that a crash, a hang or a hunger for memory of the module is a finding as well."""
+"""Runs cases in a child process, so that a crash, a hang or too much memory is a finding as well."""
 
 import multiprocessing
 import os
@@ -13,21 +13,21 @@ from . import operations
 from .case import Finding
 from .run import Refused, Run
 
-# Without a word from the child, of the processor and by the clock: a deadlock takes none of the former, and others may
-# use the machine. What is merely slow ends, and is found by run.py.
+# Time limits for an answer of the child, of the processor and by the clock. A deadlock takes no time of the processor, and
+# other programs may slow the clock, so both are needed. A case that is only slow ends, and run.py finds it.
 HANG_SECONDS = 40
 DEADLOCK_SECONDS = 400
 MEMORY = 8 << 30
 
 
 def processor_seconds(process):
-    """What a process and its threads have used."""
+    """Returns the processor time that a process and its threads have used."""
     fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def outcome(case, tell=lambda step: None):
-    """("passed" | "refused" | "endless" | "found", what, message) of one case, in this process."""
+    """Runs one case in this process. Returns ("passed" | "refused" | "endless" | "found", what, message)."""
     try:
         operations.OPERATIONS[case.operation](Run(case, tell))
     except Refused as reason:
@@ -40,7 +40,7 @@ def outcome(case, tell=lambda step: None):
 
 
 def _work(pipe, other_end):
-    other_end.close()  # so that this process ends when its parent does
+    other_end.close()  # This process then ends when its parent does.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -58,8 +58,10 @@ class Watchdog:
         self._child = None
 
     def run(self, case, seconds=HANG_SECONDS):
-        """What outcome() says, or that the child crashed or said nothing for so many seconds of work: found, or endless where
-        no end within a time is promised."""
+        """Returns the result of outcome() in the child.
+
+        If the child crashes or exceeds the time limits, the result is "found", or "endless" for a case without time limit.
+        """
         if self._child is None:
             self._pipe, end = self._context.Pipe()
             self._child = self._context.Process(target=_work, args=(end, self._pipe), daemon=True)

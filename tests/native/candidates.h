@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Candidates made to mislead a check, and how many of those it accepted are wrong, by measure/hausdorff.h, which
-/// shares no code with any.
+/// Makes candidates that mislead a check, and counts the wrong ones among those that it accepted, by
+/// measure/hausdorff.h. The bounds of measure/hausdorff.h are its own. It shares native/geometry and native/base with
+/// the checks, and is tested against brute force and CGAL.
 #pragma once
 
 #include <random>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Judged by measure/hausdorff.h, which shares no code with the shader, over all accepted candidates as one mesh.
+// All accepted candidates together are judged by measure/hausdorff.h, which is not part of the shader.
 #include "check/gl_certificate.h"
 
 #include <gtest/gtest.h>

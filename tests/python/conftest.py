@@ -20,7 +20,7 @@ def pytest_sessionstart(session):
 
 @pytest.fixture(scope="session")
 def gl():
-    """For tests that draw: where nothing can be drawn they are skipped, or fail if TOLVOL_REQUIRE_GL is set."""
+    """Skips tests that draw if nothing can be drawn here, or fails them if TOLVOL_REQUIRE_GL is set."""
     import tolvol
 
     try:

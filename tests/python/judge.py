@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a decimation promises, judged on what it stored by tolvol.hausdorff: code that did not steer it."""
+"""Judges the promise of a decimation on the stored result by tolvol.hausdorff, which the decimation does not use."""
 
 import numpy as np
 import tolvol
@@ -15,7 +15,7 @@ def decimate(vertices, triangles, tolerance, to_world=None, reference=None, prec
 
 
 def distances(vertices, triangles, result, to_world=None, bound=None):
-    """(result -> reference, reference -> result) in world space."""
+    """Returns the distances (result -> reference, reference -> result) in world space."""
     m = np.eye(4) if to_world is None else to_world
     a = (transform(m, result.vertices), result.triangles)
     b = (transform(m, vertices), triangles)

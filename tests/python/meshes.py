@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes for the tests, made here: (vertices float64 (n, 3), triangles int32 (m, 3)). Random ones are seeded."""
+"""Makes meshes for the tests: (vertices float64 (n, 3), triangles int32 (m, 3)). Random meshes have a fixed seed."""
 
 import numpy as np
 
 
 def grid_triangles(columns, rows, wrap_columns=False, wrap_rows=False):
-    """Two triangles for each cell of a grid of columns x rows vertices, numbered row by row."""
+    """Returns two triangles for each cell of a grid of columns x rows vertices, which are numbered row by row."""
     i, j = np.meshgrid(
         np.arange(columns if wrap_columns else columns - 1), np.arange(rows if wrap_rows else rows - 1), indexing="ij"
     )
@@ -43,7 +43,7 @@ def box(lower=(0, 0, 0), upper=(1, 1, 1)):
 
 
 def subdivide(vertices, triangles):
-    """Each triangle in four; shared edges stay shared."""
+    """Cuts each triangle into four. Shared edges stay shared."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), 1)
     unique, inverse = np.unique(edges, axis=0, return_inverse=True)
     middles = vertices[unique].mean(1)
@@ -90,12 +90,12 @@ def join(*meshes):
 
 
 def soup(vertices, triangles):
-    """The same surface with three vertices of its own for every triangle, as an STL file has it."""
+    """Returns the same surface with three separate vertices for every triangle, like an STL file."""
     return vertices[triangles.ravel()], np.arange(triangles.size, dtype=np.int32).reshape(-1, 3)
 
 
 def needles(levels=4, height=1e-5):
-    """A subdivided box; across its top lie needles, triangles of length 1 and of hardly any height."""
+    """A subdivided box. Across its top lie needles, which are triangles of length 1 and of a very small height."""
     vertices, triangles = box()
     for _ in range(levels):
         vertices, triangles = subdivide(vertices, triangles)
@@ -127,7 +127,7 @@ def non_manifold():
 
 
 def misoriented(seed=3):
-    """A torus of which a third of the faces look the wrong way."""
+    """A torus. A third of its faces have the wrong orientation."""
     vertices, triangles = torus(64, 32)
     wrong = np.random.default_rng(seed).random(len(triangles)) < 1 / 3
     triangles[wrong] = triangles[wrong][:, ::-1]
@@ -145,7 +145,7 @@ def degenerate(seed=4):
 
 
 def boundary_segments(vertices, triangles):
-    """The edges of exactly one triangle, as triangles that are segments; (0, 3) when there are none."""
+    """Returns the edges that belong to exactly one triangle, as triangles that are segments, or (0, 3) without any."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), 1)
     unique, count = np.unique(edges, axis=0, return_counts=True)
     a, b = unique[count == 1].T
@@ -153,7 +153,7 @@ def boundary_segments(vertices, triangles):
 
 
 def component_count(vertices, triangles):
-    """Connected components of the triangles; vertices at equal positions count as one."""
+    """Returns the number of connected components of the triangles. Vertices at equal positions count as one."""
     _, label = np.unique(vertices[triangles.ravel()], axis=0, return_inverse=True)
     corners = label.reshape(-1, 3)
     root = np.arange(label.max() + 1)
@@ -162,7 +162,7 @@ def component_count(vertices, triangles):
         before = root.copy()
         for k in range(3):
             np.minimum.at(root, before[corners[:, k]], lowest)
-        while not np.array_equal(root, root[root]):  # a long strip takes few rounds, too
+        while not np.array_equal(root, root[root]):  # Halving the paths keeps the rounds few, even on a long strip.
             root = root[root]
         if np.array_equal(root, before):
             return len(np.unique(root))
@@ -181,5 +181,5 @@ def matrix(linear, translation=(0, 0, 0)):
 
 
 def transform(m, vertices):
-    """World coordinates in double, as everything that judges wants them."""
+    """Returns world coordinates in double precision, which all judges need."""
     return np.asarray(vertices, np.float64) @ m[:3, :3].T + m[:3, 3]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Chains of operations, each against the same reference, stay within the tolerance; bounded each against its own input,
-as an operation with an error bound of its own would be, they drift out."""
+"""Chains of operations stay within the tolerance if each operation is checked against the same reference.
+
+If each operation is checked against its own input instead, like an operation with its own error bound, the chain drifts out."""
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ def decimate(vertices, triangles, volume):
 
 
 def deform(vertices, triangles, volume):
-    """Drawn upwards by far more than the tolerance."""
+    """Moves vertices upwards by far more than the tolerance."""
     lower, size = vertices.min(0) - 0.2, np.ptp(vertices, axis=0) + 0.4
     domain = meshes.matrix(np.diag(size), lower)
     points = tolvol.lattice_points(4, domain)
@@ -56,7 +57,7 @@ def test_one_reference_for_the_whole_chain_keeps_it_inside_and_one_a_step_does_n
 
 
 def test_what_one_step_left_inside_the_next_takes_in_any_form():
-    """As triangles, as quads with a corner twice, as edges: no step refuses what the step before proved."""
+    """Faces that one step keeps inside are taken by the next step as triangles, as quads with a repeated corner, as edges."""
     vertices, triangles = meshes.sphere(4)
     rng = np.random.default_rng(3)
     vertices = vertices * (1 + 0.1 * rng.standard_normal((len(vertices), 1)))

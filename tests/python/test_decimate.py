@@ -75,7 +75,7 @@ def test_stored_coordinates_of_any_scale(scale):
 
 
 def test_stored_coordinates_far_from_the_origin():
-    # Rounding to float32 moves a coordinate by up to 0.001 here, 3 % of the tolerance: done, with a warning.
+    # Rounding to float32 moves a coordinate by up to 0.001 here, which is 3 % of the tolerance. This causes only a warning.
     vertices, triangles = meshes.torus(64, 32)
     vertices = (vertices + [20000, 0, 0]).astype(np.float32)
     tolerance = 0.01 * tolvol.size(vertices, triangles)
@@ -145,7 +145,7 @@ def test_decimating_twice_against_one_reference_stays_within_it():
 
 
 def test_another_mesh_than_the_reference():
-    """A coarse sphere within the tolerance of a fine one: neither shares a vertex number with the other."""
+    """A coarse sphere is within the tolerance of a fine one, but their vertices are numbered differently."""
     fine, coarse = meshes.sphere(5), meshes.sphere(4)
     rotation = meshes.random_rotation()
     vertices, triangles = coarse[0] @ rotation.T, coarse[1]

@@ -47,7 +47,7 @@ def test_two_sided_keeps_what_one_sided_may_lose():
         assert_promise(vertices, triangles, both, tolerance)
         assert_promise(vertices, triangles, one, tolerance, two_sided=False)
         lost.append(distances(vertices, triangles, one)[1].lower > tolerance)
-    # Whether one collapse eats into the spike depends on the order of all others: not at every tolerance.
+    # Whether a collapse shortens the spike depends on the order of all other collapses, so it does not at every tolerance.
     assert any(lost)
 
 
@@ -105,7 +105,7 @@ def test_shares_narrow_the_tolerance_around_their_vertices(two_sided):
 
 
 def with_a_far_patch():
-    """A sphere of which eight neighbouring vertices are pulled far out, and the sphere."""
+    """Returns a sphere with eight neighbouring vertices pulled far out, and the sphere without that."""
     vertices, triangles = meshes.sphere(4)
     moved = vertices.copy()
     patch = np.argsort(-vertices[:, 2])[:8]
@@ -135,7 +135,7 @@ def test_outside_keep_leaves_those_faces_as_they_are():
 
 
 def with_a_seam():
-    """The torus in six pieces as a cake is cut, whether each triangle is in an odd one, and the wedges."""
+    """Returns a torus cut in six pieces like a cake, whether each triangle is in an odd piece, and the wedges."""
     vertices, triangles = TORUS
     centre = vertices[triangles].mean(1)
     side = (np.arctan2(centre[:, 1], centre[:, 0]) // (np.pi / 3)).astype(int) % 2
@@ -169,7 +169,7 @@ def test_vertices_of_a_seam_keep_their_position():
     continued = on_seam[result.vertex_source]
     assert continued.any() and not continued.all()
     assert np.array_equal(result.vertices[continued], vertices[result.vertex_source[continued]])
-    # Both sides still meet along the seam: no vertex of the seam is merged into one that is not.
+    # Both sides still meet along the seam: no vertex of the seam was merged into a vertex away from the seam.
     assert on_seam[result.vertex_source[result.vertex_map[on_seam]]].all()
 
 
@@ -203,7 +203,7 @@ def test_the_promise_holds_at_any_precision(precision):
 
 
 def test_locks_of_a_dropped_face_hold_where_the_face_is_that_stands_in_for_it():
-    """A sheet, and another of two faces that meet in one vertex: the first of them is a face of the sheet again."""
+    """To a sheet two faces are added that meet in one vertex. The first of them repeats a face of the sheet."""
     x = np.linspace(0, 1, 21)
     sheet = np.stack([*np.meshgrid(x, x), np.zeros((21, 21))], -1).reshape(-1, 3)
     triangles = meshes.grid_triangles(21, 21)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tolvol.deform, Lattice, lattice_points: against the formula, and judged by tolvol.hausdorff on what is stored."""
+"""tolvol.deform, Lattice and lattice_points: compared with the formula, and judged by tolvol.hausdorff on the result."""
 
 from math import comb
 
@@ -263,7 +263,7 @@ def test_a_mesh_that_is_outside_already_is_refused(volume):
     for mode in ("blocked", "farthest", "pull_back"):
         with pytest.raises(tolvol.InvalidInput, match=message):
             tolvol.deform(vertices, bent(), triangles, volume, mode=mode)
-    # Where the deformation as a whole ends inside there is nothing to refuse.
+    # A deformation whose result is inside is not refused.
     back = lifted(-0.2, meshes.matrix(AROUND[:3, :3], AROUND[:3, 3] + [0, 0, 0.2]))
     returned = tolvol.deform(TORUS[0] + [0, 0, 0.2], back, triangles, volume)
     assert np.allclose(returned.vertices, TORUS[0], rtol=0, atol=1e-15) and returned.report["permitted_fraction"] == 1

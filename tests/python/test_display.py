@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tree that viewports show distances from."""
+"""The tree from which viewports compute the distances that they show."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What fills the distance grid: exact scatter or fast marching; signs."""
+"""Filling the distance grid by exact scatter or fast marching, and its signs."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The fuzzer of tests/fuzz.py itself: cases repeat, and what goes wrong is found, whatever way it does, and made small."""
+"""The fuzzer tests/fuzz.py itself: cases can be repeated, failures of all kinds are found, and findings are reduced."""
 
 import os
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bad input is refused by name of the first offender; good input in any layout gives the same result."""
+"""Bad input is refused, and the message names the first faulty entry. Good input gives the same result in any layout."""
 
 import numpy as np
 import pytest

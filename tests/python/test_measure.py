@@ -45,7 +45,7 @@ def test_against_brute_force():
         result = tolvol.hausdorff(a, ta, b, tb)
         weights = rng.dirichlet([0.5, 0.5, 0.5], 300)
         samples = np.concatenate([weights @ a[t] for t in ta])
-        # Dense samples of b never lie nearer than b itself, so their distance is an upper bound of the true one.
+        # No sample of b is nearer than b itself, so the distance to dense samples is an upper bound of the true distance.
         dense = np.concatenate([rng.dirichlet([0.7, 0.7, 0.7], 2000) @ b[t] for t in tb])
         reach = max(np.sqrt(((dense - p) ** 2).sum(1).min()) for p in samples[::20])
         assert result.upper <= max(reach, result.lower) * 1.15
@@ -100,8 +100,8 @@ def test_deviation_weighs_by_area():
 
 
 def test_deviation_of_a_tilted_plate():
-    # Heights spread evenly over 0 to 1: mean 1/2, root mean square 1/sqrt(3), a quarter beyond 3/4. The tilted plate
-    # stands over a plate wide enough that every closest point is straight below.
+    # The heights are spread evenly from 0 to 1: their mean is 1/2, the root mean square 1/sqrt(3), and a quarter is beyond
+    # 3/4. The plate below is so wide that every closest point is straight below.
     vertices, triangles = meshes.plate(2)
     vertices[:, 2] = vertices[:, 0]
     floor = meshes.plate(2, side=9)
@@ -133,7 +133,7 @@ def test_deviation_ranges_hold_the_truth():
 
 
 def test_deviation_of_a_closed_reference_has_sides():
-    # A plate through a torus: a disc of the hole's radius and what is beyond the ring are outside.
+    # A plate goes through a torus. Outside are a disc of the hole's radius and the part of the plate beyond the ring.
     torus = meshes.torus(48, 24)
     vertices, triangles = meshes.plate(33, side=3.0)
     result = tolvol.deviation(vertices - [1.5, 1.5, 0], triangles, *torus)

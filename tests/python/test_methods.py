@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""ToleranceVolume.check(method=): names, groups, threads, what happens without GL, what stays in memory."""
+"""ToleranceVolume.check(method=): names, groups, threads, errors without GL, and memory."""
 
 import os
 import re
@@ -48,7 +48,8 @@ def test_each_method_sees_both_sides_and_names_itself(method):
     assert (result.verdict == INSIDE).tolist() == [True, True, False, False]
     assert result.method == LABELS[method]
     assert result.renderer == ("CPU" if method == "certificate" else tolvol.renderer())
-    # Only those that look for a proof say outside; and the paper's, which knows nothing else.
+    # Only two kinds of methods have the verdict outside: the certificate, which proves it, and the paper's check, which has
+    # no verdict unproved.
     says_outside = method in ("certificate", "paper", "paper_half_h")
     assert result.verdict[3] == (OUTSIDE if says_outside else UNPROVED)
     grouped = volume.check(points, faces, groups=np.array([1, 1, 0, 1], np.int32), method=method)

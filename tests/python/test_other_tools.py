@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""benchmark/other_tools.py as far as it needs nothing of PyPI: search, judge, rows, bad usage, processes that fail."""
+"""The parts of benchmark/other_tools.py that need no package of PyPI: search, judge, rows, bad usage, failing processes."""
 
 import subprocess
 import sys
@@ -25,7 +25,7 @@ def torus():
 
 
 def falling(edge):
-    """A tool whose result is kept up to the parameter `edge`, with fewer triangles the larger it is."""
+    """A tool that keeps both directions up to the parameter `edge`, and leaves fewer triangles for larger parameters."""
     return lambda x: 1000 / x if x <= edge else None
 
 
@@ -121,7 +121,7 @@ def test_scan_is_open_noisy_and_the_same_every_time(tmp_path):
 
 
 def worker(tmp_path, name="ours"):
-    """By this Python, which has the module under test alone."""
+    """Runs the script by this Python, which has the module under test and no other tool."""
     return tool_worker.Worker(sys.executable, name, torus(), 1, tmp_path)
 
 
@@ -156,7 +156,7 @@ def test_results_are_remembered_until_they_are_wanted_anew(tmp_path):
         (["missing.ply"], "missing.ply: no such file"),
         (["notes.txt"], "not one of .obj, .ply, .stl"),
         (["mesh.ply", "--tolerance", "0%"], "not a finite number above 0"),
-        (["mesh.ply", "--tolerance", "101%"], "'101%' is more than the mesh itself"),
+        (["mesh.ply", "--tolerance", "101%"], "'101%' is more than the size of the mesh"),
         (["mesh.ply", "--tolerance", "small"], "neither a length nor a percentage"),
         (["mesh.ply", "--only", "nobody"], "nobody"),
         (["mesh.ply", "--limit", "0"], "0 is less than 1"),

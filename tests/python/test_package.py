@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The installed package in another project: the examples are built against it alone, and what they write is judged."""
+"""The installed package in another project: the examples are built with it alone, and their results are judged."""
 
 import os
 import subprocess
@@ -23,7 +23,7 @@ def run(*command, ok=True):
 
 @pytest.fixture(scope="module")
 def example(tmp_path_factory):
-    """decimate_with_openmesh, built by a copy of examples/ that knows nothing of this tree."""
+    """Builds decimate_with_openmesh from a copy of examples/, which does not know this source tree."""
     folder = tmp_path_factory.mktemp("package")
     run("cmake", "--install", BUILD, "--prefix", folder / "installed")
     for source in (ROOT / "examples").iterdir():
@@ -79,7 +79,7 @@ def test_example_says_what_is_missing(example, tmp_path):
 
 
 def test_headers_stand_alone(example, tmp_path):
-    """Each installed header compiles as the only one of a program, from the package alone."""
+    """Each installed header compiles alone, with only the installed package."""
     include = example.parents[1] / "installed" / "include"
     headers = sorted(path.relative_to(include) for path in include.rglob("*.h*"))
     assert Path("tolvol/check/certificate.h") in headers and Path("tolvol/openmesh/ModToleranceT.hh") in headers

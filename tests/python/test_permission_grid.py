@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The permission grid that the benchmarks compare with."""
+"""The permission grid, with which the benchmarks compare the check."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""render_distance, render_volume, Camera, transfer_colours: what pictures show and what is refused."""
+"""render_distance, render_volume, Camera and transfer_colours: the content of pictures, and bad input."""
 
 import os
 import subprocess
@@ -27,12 +27,12 @@ def volume(torus, gl):
 
 
 def offset(share):
-    """The torus at `share` tolerances from the reference."""
+    """Returns the torus, moved by `share` tolerances away from the reference."""
     return meshes.torus(128, 64, tube=0.4 + share * TOLERANCE)
 
 
 def striped(picture):
-    """Which pixels, drawn with one sample, are marked as outside."""
+    """Tells which pixels of a picture with one sample per pixel are marked as outside."""
     colours = np.array(tolvol.OUTSIDE_COLOURS, np.uint8)
     return (picture[..., None, :3] == colours).all(-1).any(-1) & (picture[..., 3] == 255)
 
@@ -49,13 +49,15 @@ def test_a_picture_has_the_asked_size_and_a_transparent_background(torus, volume
 
 
 def test_top_row_first(torus, volume):
-    camera = tolvol.Camera((0, -9, 0), (0, 0, -1.5), angle=30)  # it looks below the torus, which is then high up
+    # The camera looks below the torus, so the torus is high up in the picture.
+    camera = tolvol.Camera((0, -9, 0), (0, 0, -1.5), angle=30)
     rows = np.flatnonzero(draw(torus, volume, camera=camera)[..., 3].any(1))
     assert rows.mean() < 30
 
 
 def test_transfers_show_their_colours(volume):
-    camera = tolvol.Camera((0, -20, 0), (0, 0, 0), angle=1)  # the nearest point of the torus in the middle
+    # The nearest point of the torus is in the middle of the picture.
+    camera = tolvol.Camera((0, -20, 0), (0, 0, 0), angle=1)
     for transfer, lowest in (("signed", -1), ("magnitude", 0)):
         colours = tolvol.transfer_colours(transfer).astype(int)
         assert colours.shape == (256, 3)
@@ -184,7 +186,7 @@ def test_after_a_shutdown_pictures_are_the_same(torus, volume):
     before = draw(torus, volume), tolvol.render_volume(volume, size=(60, 40))
     tolvol.shutdown()
     with pytest.raises(tolvol.GlUnavailable):
-        draw(torus, volume)  # what was kept went with the context: nothing is drawn by halves
+        draw(torus, volume)  # The kept buffers were lost with the context: the picture must still be complete.
     after = draw(torus, volume), tolvol.render_volume(volume, size=(60, 40))
     assert all(np.array_equal(a, b) for a, b in zip(before, after))
 
@@ -216,7 +218,7 @@ def test_dropped_volumes_leave_no_memory(gl):
     def make(count):
         for _ in range(count):
             tolvol.render_distance(*surface, tolvol.ToleranceVolume(*surface, 0.1), size=(16, 16))
-        tolvol.renderer()  # after what was posted
+        tolvol.renderer()  # This call runs after the calls that were posted before.
 
     make(30)
     before = resident()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Long calls show how far they are to another thread, which can stop them."""
+"""Long calls show their progress to another thread, which can stop them."""
 
 import _thread
 import signal
@@ -100,7 +100,7 @@ def test_finish_keeps_the_last_state_of_a_thorough_decimation():
     assert progress.finishing and outcome[0].report["stopped_by"] == "request"
     assert len(outcome[0].triangles) < len(fast.triangles)
     result = outcome[0].vertices, outcome[0].triangles
-    # Without the bound the interval may reach beyond the tolerance though the distance does not.
+    # Without the bound the interval may reach beyond the tolerance although the true distance is within it.
     assert tolvol.hausdorff(*result, *LARGE, bound=TOLERANCE).upper <= TOLERANCE
     assert tolvol.hausdorff(*LARGE, *result, bound=TOLERANCE).upper <= TOLERANCE
 
@@ -124,7 +124,7 @@ def test_ctrl_c_stops_a_call():
     with pytest.raises(KeyboardInterrupt):
         tolvol.decimate(*LARGE, VOLUME, effort="thorough")
     timer.join()
-    # Nothing of it is left for the next call.
+    # The cancelled call does not affect the next one.
     assert (VOLUME.check(*LARGE).verdict == 2).all()
 
 

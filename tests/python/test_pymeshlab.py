@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """tolvol.deviation and tolvol.hausdorff agree with the Hausdorff filter of MeshLab, which samples at random.
 
-PyMeshLab is not needed for anything else: pip install -r tests/python/extras.txt.
+Only this test needs PyMeshLab: pip install -r tests/python/extras.txt.
 """
 
 import numpy as np
@@ -31,7 +31,7 @@ PAIRS = {
 
 
 def sampled(a, b):
-    """Of MeshLab: {"max", "mean", "RMS", ...} of random points of a."""
+    """Returns MeshLab's distances {"max", "mean", "RMS", ...} of random points of a from b."""
     both = pymeshlab.MeshSet()
     for vertices, triangles in (a, b):
         both.add_mesh(pymeshlab.Mesh(np.asarray(vertices, np.float64), triangles))
@@ -51,7 +51,7 @@ def sampled(a, b):
 def test_agrees_within_the_sampling_error(pair, backward):
     a, b = PAIRS[pair]()[:: -1 if backward else 1]
     ours, theirs = tolvol.deviation(*a, *b), sampled(a, b)
-    # Four standard errors of random samples, and those of our own; MeshLab computes in float32.
+    # The difference may be four standard errors of the random samples and of tolvol's. MeshLab computes in float32.
     count = theirs["n_samples"]
     error = 4 * np.hypot(np.sqrt((ours.rms**2 - ours.mean**2) / count), ours.mean_error) + 1e-6
     fourth = (ours.weights * ours.distances**4).sum()
@@ -65,5 +65,5 @@ def test_agrees_within_the_sampling_error(pair, backward):
     assert ours.mean == pytest.approx(theirs["mean"], abs=error)
     assert ours.rms**2 == pytest.approx(theirs["RMS"] ** 2, abs=square_error)
     assert ours.mean_range[0] - error <= theirs["mean"] <= ours.mean_range[1] + error
-    # Random points miss the farthest one by little, and never pass it.
+    # The farthest of the random points is a little nearer than the farthest point of the surface, and never farther.
     assert 0.97 * largest.lower <= theirs["max"] <= largest.upper + 1e-6

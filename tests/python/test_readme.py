@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the README shows in Python runs as it stands there, and does what it says."""
+"""The Python code in README.md runs as it is printed there and does what the README says."""
 
 import re
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tolvol.ToleranceVolume: what it says of itself, exact distances, verdicts."""
+"""tolvol.ToleranceVolume: its attributes, exact distances and verdicts."""
 
 import numpy as np
 import pytest
@@ -206,7 +206,7 @@ def test_a_hundred_thousand_threads_are_as_good_as_those_there_are():
 
 @pytest.mark.parametrize(("distance", "verdict"), [(0.999, INSIDE), (1.001, OUTSIDE)])
 def test_a_piece_near_the_limit_where_the_nearest_triangle_changes_within_it(distance, verdict):
-    """Two faces that cross like an X, and a piece above the crossing: no edge says where to cut it."""
+    """Two faces cross like an X, and a candidate lies above the crossing: no edge tells where to cut the candidate."""
     corners = [[-4, -9, -4], [4, -9, 4], [0, 20, 0], [4, -9, -4], [-4, -9, 4], [0, 20, 0]]
     volume = tolvol.ToleranceVolume(np.array(corners, float), np.array([[0, 1, 2], [3, 4, 5]], np.int32), 1.0)
     height = distance * np.sqrt(2)

@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Format and lint, and the Python package as pip builds it. Its tools are those of Debian and the ones pinned beside.
+# Checks format and lint, and builds the Python package by pip. The tools are from Debian and from requirements.txt here.
 set -eu
 cd "$(dirname "$0")/../.."
 
@@ -15,7 +15,7 @@ fi
 
 failed=""
 
-# check NAME: runs the function of that name; all of them run, whatever the first ones say
+# check NAME: runs the function of that name. All checks run, even if one of them fails.
 check() {
   if (set +e; "$1"); then
     echo "$1: ok"
@@ -26,7 +26,7 @@ check() {
 }
 
 licence() {
-  # In one of the first two lines: a script has its #! above.
+  # The licence is in one of the first two lines, because the first line of a script is its #!.
   without=$(find . \( -path ./build -o -path ./out -o -path ./.git \) -prune -o -type f \( -name '*.h' -o -name '*.hh' -o \
     -name '*.cpp' -o -name '*.py' -o -name '*.sh' -o -name 'CMakeLists.txt' -o -name '*.toml' -o -path './.ci/*' \) -print |
     while read -r file; do
@@ -36,8 +36,8 @@ licence() {
 }
 
 rooms() {
-  # What the files of each room in native/ may include besides their own. The linker does not see all of it: what links
-  # two rooms links a call from one to the other.
+  # The files of each room in native/ may include only headers of the rooms listed here. The linker does not find all
+  # violations: a program that links two rooms also links a forbidden call from one to the other.
   crossing=$(while read -r room others; do
     grep -rnE '#include "[a-z]+/' "native/$room" |
       grep -vE "#include \"($(echo "$room $others" | tr ' ' '|'))/"
@@ -65,7 +65,7 @@ clang_format() {
 }
 
 clang_tidy() {
-  # GCC's own options are no business of clang's; its count of warnings in other people's headers is noise.
+  # clang does not know some options of GCC, and its counts of warnings in system headers are of no use.
   find native -name '*.cpp' -print0 |
     xargs -0 -n 1 -P "$(nproc)" clang-tidy --quiet -p build/release --extra-arg=-Wno-unknown-warning-option 2>&1 |
     grep -v 'warnings generated' && return 1

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Quits Blender while the add-on is at work: blender --python tests/ui/quitting.py -- WHAT. Blender's exit code and what it
-prints are the outcome."""
+"""Quits Blender while the add-on is at work: blender --python tests/ui/quitting.py -- WHAT.
+
+The outcome is Blender's exit code and its output."""
 
 import sys
 from pathlib import Path
@@ -24,7 +25,7 @@ _MOST_TICKS = 2000
 
 
 def mesh(across):
-    """A flat grid with 2 * across^2 triangles, active."""
+    """Makes a flat grid with 2 * across^2 triangles the active object."""
     for ob in list(bpy.data.objects):
         bpy.data.objects.remove(ob)
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=across, y_subdivisions=across)
@@ -65,7 +66,7 @@ def start():
 
 
 def repeated(work):
-    """Goes on until it is cancelled: a slow machine may draw for longer than the work takes once."""
+    """Repeats the work until it is cancelled: on a slow machine drawing may take longer than the work once."""
 
     def again(progress):
         while True:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs the tests of this folder inside Blender's own event loop and ends Blender with an honest exit code.
+"""Runs the tests of this folder in Blender's own event loop and ends Blender with an exit code that tells whether they pass.
 
-A test is a generator: wherever it yields, Blender gets the time to handle what the mouse and the keyboard did.
+A test is a generator: wherever it yields, Blender gets time to handle the events of the mouse and the keyboard.
 """
 
 import importlib
@@ -16,14 +16,15 @@ import bpy
 FOLDER = Path(__file__).resolve().parent
 sys.dont_write_bytecode = True
 sys.path[:0] = [str(FOLDER), str(FOLDER.parents[1]), str(FOLDER.parent / "blender")]
-# Only before the first window is drawn.
+# This works only before the first window is drawn.
 bpy.context.preferences.view.show_splash = False
-bpy.context.preferences.system.viewport_aa = "OFF"  # more than half of the work of drawing in software
+# Anti-aliasing would take more than half of the time when Blender draws in software.
+bpy.context.preferences.system.viewport_aa = "OFF"
 
 import addon  # noqa: E402
 from addon import native  # noqa: E402
 
-_SETTLE = 0.3  # seconds in which Blender handles an event and draws again
+_SETTLE = 0.3  # seconds that Blender needs to handle an event and to draw again
 
 
 class Run:
@@ -37,7 +38,7 @@ class Run:
         self.current = None
 
     def step(self):
-        """Called by Blender's timer; how long until the next call."""
+        """Blender's timer calls this function. Returns the seconds until the next call."""
         try:
             if self.current is None:
                 if not self.waiting:

@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# The panel in a real Blender window, worked with mouse and keyboard on a virtual screen: sh tests/ui/run.sh [TEST NAME]...
+# Tests the add-on in a real Blender window on a virtual screen, by mouse and keyboard: sh tests/ui/run.sh [TEST NAME]...
 # Screenshots and Blender's output go to build/ui/.
 set -eu
 cd "$(dirname "$0")/../.."
@@ -23,7 +23,7 @@ code=0
 DISPLAY=":$(cat "$out/display")" LIBGL_ALWAYS_SOFTWARE=1 timeout 1500 \
   blender --factory-startup --window-geometry 0 0 1280 800 --python-exit-code 5 --python tests/ui/run.py -- "$@" \
   >"$out/blender.log" 2>&1 || code=$?
-# An exception while a panel is drawn only shows here.
+# An exception in the draw function of a panel appears only in Blender's output.
 if grep -q Traceback "$out/blender.log"; then
   [ "$code" -ne 0 ] || code=1
 fi

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fitting a modifier in a window: Blender evaluates between the parts of the work, and Esc leaves everything as it was."""
+"""Fitting a modifier in a window: Blender evaluates the modifier between the jobs, and Esc leaves the object as it was."""
 
 import bpy
 

@@ -19,7 +19,7 @@ TOLERANCE = 0.02
 
 
 def sheet(count=120, z=0.0):
-    """A flat square that is its own reference, seen from above."""
+    """Makes a flat square that is its own reference, seen from above."""
     ob = scenes.sheet(count=count, bumps=z)
     ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", TOLERANCE
     bpy.ops.tolvol.set_reference()
@@ -47,12 +47,12 @@ def coordinates():
 
 
 def forward(reference):
-    """The largest distance from the reference, certified, in tolerances."""
+    """Returns the certified largest distance from the reference, in tolerances."""
     return native.module.hausdorff(*scenes.world_triangles(ob()), *reference, bound=TOLERANCE).upper / TOLERANCE
 
 
 def stroke(*points):
-    """The left mouse button down along these places."""
+    """Drags the mouse with the left button along these places."""
     steps = ["mousemove", *points[0], "sleep", 0.2, "mousedown", 1]
     for point in points[1:]:
         steps += ["mousemove", *point, "sleep", 0.05]
@@ -68,7 +68,7 @@ def across(length=200, steps=12):
 
 
 def only_guard_panel():
-    """Shows no other sub-panel, and this one open."""
+    """Removes all sub-panels except Guard, and opens it."""
     for cls in panels._CLASSES[1:]:
         bpy.utils.unregister_class(cls)
     TOLVOL_PT_guard.bl_options = set()
@@ -83,7 +83,7 @@ def all_panels():
 
 
 def switch(setting):
-    """Clicks a switch in the sidebar: Blender's Shift Ctrl C over it copies where it is stored."""
+    """Clicks a switch in the sidebar. To find it, Blender's Shift Ctrl C copies the data path of the property below the mouse."""
     sidebar = region("UI")
     for y in range(150, sidebar.height - 5, 10):
         place = on_screen(sidebar, sidebar.width // 3, y)
@@ -98,7 +98,7 @@ def switch(setting):
 
 
 def undone_and_redone(read, *steps):
-    """Presses keys and compares bit for bit: (keys, coordinates) each."""
+    """Takes pairs (keys, coordinates). Presses the keys and compares the coordinates bit for bit."""
     for keys, expected in steps:
         key(keys)
         yield from finished(lambda: np.array_equal(read(), expected))  # noqa: B023
@@ -173,7 +173,7 @@ def _sample(i, at):
 
 
 def grab(far, slowly=False):
-    """G, the mouse up the screen by so many pixels, and a click."""
+    """Presses G, moves the mouse up the screen by so many pixels, and clicks."""
     x, y = centre()
     xdotool("mousemove", x, y)
     yield 0.3
@@ -205,7 +205,7 @@ def test_guard_editing_by_keys():
     undo, redo = "ctrl+z", "ctrl+shift+z"
     steps = (undo, states[1]), (undo, states[0]), (redo, states[1]), (redo, states[2])
     yield from undone_and_redone(coordinates, *steps)
-    # Faces that leave go again, also when they are made again: not under an operator.
+    # New faces that leave the tolerance are removed again, also after a redo, but not while an operator runs.
     with window_context():
         bpy.ops.mesh.solidify("EXEC_DEFAULT", True, thickness=0.5)
         bpy.ops.transform.translate("INVOKE_DEFAULT", True)
@@ -224,7 +224,7 @@ def test_guard_editing_by_keys():
         yield 1.5
     xdotool("mousemove_relative", 5, 0)
     yield from finished(lambda: np.array_equal(coordinates(), states[2]))
-    # What an extrusion makes is inside, and then moves as far as it may.
+    # The faces of an extrusion are inside at first, and then move as far as the tolerance permits.
     key("e")
     yield 0.3
     xdotool("mousemove_relative", 0, 100)
@@ -247,7 +247,7 @@ def test_guard_undoes_an_edit_of_the_faces_while_the_mouse_rests():
         bpy.ops.mesh.solidify("EXEC_DEFAULT", True, thickness=0.5)
     assert len(coordinates()) > len(before)
     yield from finished(lambda: np.array_equal(coordinates(), before), 10)
-    # Not under an operator: once that has ended.
+    # The edit is not undone while an operator runs, but once that has ended.
     with window_context():
         bpy.ops.mesh.solidify("EXEC_DEFAULT", True, thickness=0.5)
         bpy.ops.transform.translate("INVOKE_DEFAULT", True)
@@ -259,7 +259,7 @@ def test_guard_undoes_an_edit_of_the_faces_while_the_mouse_rests():
 
 
 def cage():
-    """A lattice around the sheet, its modifier on it."""
+    """Adds a lattice around the sheet, and its modifier to the sheet."""
     data = bpy.data.lattices.new("cage")
     data.points_u = data.points_v = 4
     lattice = bpy.data.objects.new("cage", data)
@@ -274,7 +274,7 @@ def points():
 
 
 def deformed(reference):
-    """As forward(), of the mesh that the viewport shows."""
+    """Returns the same as forward(), for the mesh that the viewport shows."""
     arrays = mesh_io.read_mesh(ob().evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh())
     vertices = mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob().matrix_world))
     return native.module.hausdorff(vertices, arrays.triangles, *reference, bound=TOLERANCE).upper / TOLERANCE

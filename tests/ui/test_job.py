@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a person or a script does while a job runs."""
+"""Actions of the user or of a script while a job runs."""
 
 import tempfile
 from pathlib import Path
@@ -10,11 +10,11 @@ from addon import job, status_bar
 from test_panel import finished, monkey, stored, suzanne
 from window import reset, view, window_context
 
-_SMOOTHER = 1  # subdivision on top of the monkey's: slow enough that something happens meanwhile
+_SMOOTHER = 1  # levels of subdivision on top of the monkey's, which make the job slow enough
 
 
 def begin():
-    """A decimation that goes on; what is said from now on."""
+    """Starts a decimation. Returns the number of reports before it: all later reports are of the decimation."""
     with window_context():
         suzanne().modifiers.new("more", "SUBSURF").levels = _SMOOTHER
         bpy.ops.object.modifier_apply(modifier="more")
@@ -29,7 +29,7 @@ def begin():
 
 
 def reports():
-    """Lines of Blender's info area."""
+    """Returns the lines of Blender's info area."""
     window, area = view()
     kind, area.type = area.type, "INFO"
     try:

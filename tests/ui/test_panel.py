@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel as a person uses it."""
+"""The panel as a user operates it."""
 
 import json
 
@@ -95,9 +95,9 @@ def test_tolerance_from_the_presets_and_decimation_by_menu_search():
     ob, reference = bpy.data.objects["torus"], scenes.world_triangles(bpy.data.objects["torus"])
     _, y = yield from find_property("tolerance_mode", 0.6)
     sidebar = region("UI")
-    x, _ = on_screen(sidebar, sidebar.width - 47, 0)  # beside the unit
+    x, _ = on_screen(sidebar, sidebar.width - 47, 0)  # the menu beside the unit
     xdotool("mousemove", *centre())
-    yield 0.6  # until no tooltip is in the way
+    yield 0.6  # After so many seconds no tooltip is in the way.
     xdotool("mousemove", x, y, "sleep", "0.1", "mousedown", 1, "sleep", "0.1", "mouseup", 1)
     yield 1.0
     screenshot("presets")
@@ -125,13 +125,14 @@ def test_adjust_last_operation():
     yield 1.0
     first = len(suzanne().data.polygons)
     hud = region("HUD")
-    click(*on_screen(hud, 60, hud.height - 12))  # it is closed at first: only its header
+    click(*on_screen(hud, 60, hud.height - 12))  # The panel is closed at first, so only its header is there.
     yield from finished(lambda: region("HUD").height > 200)
     yield 1.0
     hud = region("HUD")
     xdotool("mousemove", *on_screen(hud, hud.width * 2 // 3, 50))
     yield 1.0
-    key("Return")  # over a field it starts typing; a busy machine may take a double click for two
+    # Return over a field starts typing. A double click would do so too, but a busy machine may take it for two clicks.
+    key("Return")
     yield 1.0
     xdotool("key", "ctrl+a", "type", "3")
     key("Return")
@@ -139,7 +140,7 @@ def test_adjust_last_operation():
     yield 1.0
     screenshot("4 adjusted")
     assert suzanne().tolvol.tolerance_percent == 3
-    assert len(suzanne().tolvol.snapshot.polygons) == 62976  # of the mesh before, not of the first result
+    assert len(suzanne().tolvol.snapshot.polygons) == 62976  # The reference is the first mesh and not the first result.
     assert_proved(suzanne(), reference, 3)
     xdotool("mousemove", *centre())
     yield
@@ -152,7 +153,7 @@ def test_escape_leaves_everything_as_it_was():
     yield from reset(monkey)
     yield from open_tab()
     with bpy.context.temp_override(window=view()[0], area=view()[1], object=suzanne()):
-        suzanne().modifiers.new("more", "SUBSURF").levels = 1  # slow enough to be stopped
+        suzanne().modifiers.new("more", "SUBSURF").levels = 1  # The decimation becomes slow enough to be stopped.
         bpy.ops.object.modifier_apply(modifier="more")
     yield 0.5
     before, said, status = stored(), [], job._status
@@ -166,7 +167,7 @@ def test_escape_leaves_everything_as_it_was():
     assert any(text.startswith("Decimating") and text.endswith("Esc: Cancel") for text in said)
     count = len(said)
     yield 2.0
-    assert len(said) == count  # nothing goes on
+    assert len(said) == count  # No job goes on.
     assert stored() == before and suzanne().tolvol.snapshot is None and not suzanne().tolvol.last_run
     screenshot("6 stopped")
 
@@ -175,7 +176,7 @@ def test_escape_keeps_what_refining_has_reached():
     yield from reset(monkey)
     yield from open_tab()
     suzanne().tolvol.tolerance_percent, suzanne().tolvol.effort = 0.3, "THOROUGH"
-    suzanne().tolvol.placement = "OPTIMAL"  # has more to refine
+    suzanne().tolvol.placement = "OPTIMAL"  # This placement has more to refine.
     reference, said, status = scenes.world_triangles(suzanne()), [], job._status
     job._status = lambda *shown: said.append(status(*shown)) or said[-1]
     yield from press("tolvol.decimate")
@@ -184,7 +185,7 @@ def test_escape_keeps_what_refining_has_reached():
     key("Escape")
     yield from finished(lambda: suzanne().tolvol.last_run)
     job._status = status
-    assert any(text.startswith("Refining") and text.endswith("Esc: Keep What There Is") for text in said)
+    assert any(text.startswith("Refining") and text.endswith("Esc: Keep Present Result") for text in said)
     run = json.loads(suzanne().tolvol.last_run)
     assert run["stopped_by"] == "request" and run["output"]["triangles"] == len(suzanne().data.polygons) < 1500
     assert_proved(suzanne(), reference, 0.3)
@@ -243,7 +244,8 @@ def test_what_is_in_the_way_is_said():
     yield 0.5
     screenshot("12 two users")
     bpy.data.objects.remove(twin)
-    suzanne().tolvol.show_deviation = False  # what is under way needs the module, which never goes in the middle of it
+    # A running count would need the module, which is never removed while Blender runs.
+    suzanne().tolvol.show_deviation = False
     found = native.module
     native.module, native.reason = None, "The compiled module tolvol is missing: install the add-on's zip"
     view()[1].tag_redraw()
@@ -291,7 +293,7 @@ def test_the_answer_of_check_is_seen_without_moving_the_mouse():
     xdotool("mousemove", *centre())
     yield 2.0
     before, patience = sidebar_pixels(), job._PATIENCE
-    job._PATIENCE = 0.0  # however quick the machine is, it ends in a timer
+    job._PATIENCE = 0.0  # The job then ends in a timer even on a quick machine.
     with window_context():
         bpy.ops.tolvol.check("INVOKE_DEFAULT")
     job._PATIENCE = patience

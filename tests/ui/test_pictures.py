@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The add-on as the README and the manual show it: build/ui/guard.png, overlay.png and panel.png."""
+"""Makes the pictures of the add-on in the README and the manual: build/ui/guard.png, overlay.png and panel.png."""
 
 import bpy
 import numpy as np
@@ -25,7 +25,7 @@ from window import (
     xdotool,
 )
 
-_FOREHEAD = (0.43, 0.255), (0.54, 0.235)  # in shares of the view
+_FOREHEAD = (0.43, 0.255), (0.54, 0.235)  # two places, as shares of the view's width and height
 _MIDDLE = (0.46, 0.25), (0.50, 0.243)
 _SNOUT = (0.36, 0.72), (0.38, 0.75)
 
@@ -48,7 +48,7 @@ def test_pictures_for_the_documentation():
         bpy.context.tool_settings.sculpt.brush.strength = 1
         yield from draw(*_FOREHEAD)
         yield from finished(lambda: sides()[0] > 300)
-        yield 1.0  # the shares in the legend; the status bar is given back after four
+        yield 1.0  # By then the legend has its shares. The status bar shows its message for four seconds.
         picture("guard")
     finally:
         all_panels()
@@ -83,7 +83,7 @@ def test_pictures_for_the_documentation():
 
 
 def from_the_front():
-    """And from one side, so near that the monkey fills the view."""
+    """Shows the monkey from one side, so near that it fills the view."""
     camera = view()[1].spaces[0].region_3d
     camera.view_perspective, camera.view_distance = "PERSP", 3.4
     camera.view_rotation = Euler((1.4, 0, 0.5)).to_quaternion()
@@ -102,18 +102,18 @@ def draw(*ends):
 
 
 def aside():
-    """Above the 3D view there is no tooltip in the picture."""
+    """Moves the mouse above the 3D view, so that no tooltip is in the picture."""
     xdotool("mousemove", 600, 10)
 
 
 def magenta():
-    """Pixels of the stripes, which are shaded here."""
+    """Returns the number of pixels with the colours of stripes, which are shaded here."""
     red, green, blue = np.moveaxis(surface(), -1, 0)
     return int(((red > 150) & (green < 80) & (blue > 90)).sum())
 
 
 def settled():
-    """Waits until the colours are there and nothing changes any more."""
+    """Waits until the colours are shown and the picture no longer changes."""
     aside()
     yield from finished(lambda: min(sides()) > 300)
     last = None

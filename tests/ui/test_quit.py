@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Quitting Blender while the add-on is at work: threads are waited for, and nothing aborts."""
+"""Quitting Blender while the add-on is at work: Blender waits for the threads and does not abort."""
 
 import subprocess
 from pathlib import Path

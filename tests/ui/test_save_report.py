@@ -13,7 +13,7 @@ from window import key, open_tab, press, reset, screenshot, xdotool
 
 
 def test_save_report_by_mouse():
-    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"  # in this window
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"  # The file browser opens in this window.
     yield from reset(monkey)
     yield from open_tab()
     yield from press("tolvol.decimate")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Show Deviation as it looks: what is counted are pixels of the screen."""
+"""The colours of Show Deviation: the tests count pixels of the screen."""
 
 import bpy
 import numpy as np
@@ -36,7 +36,7 @@ def ball():
 
 
 def solid_monkey():
-    """Closed, which Blender's own is not."""
+    """Makes a closed monkey. Blender's own is open."""
     bpy.ops.mesh.primitive_monkey_add()
     ob = bpy.context.object
     ob.modifiers.new("subdivision", "SUBSURF").levels = 2
@@ -54,22 +54,22 @@ def the_object():
 
 
 def striped():
-    """Pixels of the view that say: outside."""
+    """Returns the number of pixels of the view with the colours of stripes."""
     return int((np.abs(surface() - native.module.OUTSIDE_COLOURS[0]).max(-1) <= 2).sum())
 
 
 def near():
-    """Pixels of the view with the colour of no deviation, which nothing else there has: yellow, lit or not."""
+    """Returns the number of pixels with the colour of no deviation: yellow, lit or not. No other part of the view has it."""
     red, green, blue = np.moveaxis(surface(), -1, 0)
     return int(((red > 100) & (green > 90) & (blue < 45) & (np.abs(red - green) < 40)).sum())
 
 
 def gone():
-    return near() < 300  # some are the edges of what is drawn around
+    return near() < 300  # Some such pixels belong to edges drawn around.
 
 
 def surface():
-    """Without the sidebar and the legend."""
+    """Returns the picture of the view without the sidebar and the legend."""
     place = region("WINDOW")
     x, y = on_screen(place, 0, 0)
     return pixels()[y + 40 : y + place.height - 40, x + 70 : x + place.width - 400]
@@ -78,7 +78,7 @@ def surface():
 def to_mode(mode):
     with bpy.context.temp_override(window=view()[0], area=view()[1], object=the_object()):
         bpy.ops.object.mode_set(mode=mode)
-    bpy.ops.ed.undo_push(message=mode)  # as a key would
+    bpy.ops.ed.undo_push(message=mode)  # A key would store an undo step, too.
 
 
 def test_deviation_is_shown_while_the_mesh_changes():
@@ -110,7 +110,7 @@ def test_deviation_is_shown_while_the_mesh_changes():
     yield 0.5
     assert near() > 3000
     xdotool("key", "--delay", 100, "s", "1", "period", "0", "5")
-    yield from finished(lambda: striped() > 3000)  # while it is going on
+    yield from finished(lambda: striped() > 3000)  # The stripes appear while the stroke goes on.
     screenshot("overlay 3 scaling in edit mode")
     key("Escape")
     yield from finished(lambda: striped() == 0)
@@ -150,7 +150,7 @@ def test_sides_of_a_closed_reference():
 
 
 def thin_sheets():
-    """Open and thin: two wavy sheets, a hundredth of the tolerance apart, with turned fronts."""
+    """Makes an open and thin mesh: two wavy sheets with opposite orientation, a hundredth of the tolerance apart."""
     vertices, faces = scenes.sheet_arrays(count=60)
     other = vertices + np.array([0, 0, 2e-4], np.float32)
     both = np.concatenate([faces, faces[:, ::-1] + len(vertices)])
@@ -159,7 +159,7 @@ def thin_sheets():
 
 
 def fine_monkey():
-    """Open at the eyes, of 62,976 triangles."""
+    """Makes a monkey of 62,976 triangles, which is open at the eyes."""
     monkey()
     shown_as_magnitude(suzanne(), 0.05)
 
@@ -172,14 +172,14 @@ def shown_as_magnitude(ob, percent):
 
 
 def counted():
-    """The tolerance that the legend's shares are of; None while they are blank."""
+    """Returns the tolerance for which the legend shows shares, or None while they are blank."""
     last = overlay.shares._known.get(the_object().name)
     return last and last[0][2]
 
 
 def far():
-    """Pixels with the colours of a deviation of a quarter of the tolerance and more, lit or not: green, blue and violet
-    where nothing is yellow."""
+    """Returns the number of pixels with colours of a deviation of at least a quarter of the tolerance, lit or not: green,
+    blue and violet."""
     red, green, blue = np.moveaxis(surface(), -1, 0)
     return int(((blue > 60) & (np.maximum(abs(red - green), abs(green - blue)) > 25)).sum())
 
@@ -200,7 +200,7 @@ def test_what_deviates_by_nothing_is_drawn_as_nothing():
         the_object().tolvol.deviation_kind = "SIGNED"
         yield 1.0
         assert striped() == 0
-    # Nor is there a speck where the result is proved.
+    # The proved result has no striped speck either.
     the_object().tolvol.tolerance_percent = 0.1
     yield from press("tolvol.decimate")
     yield from finished(lambda: verdict.of(the_object()) is not None)
@@ -217,7 +217,7 @@ def test_what_deviates_by_nothing_is_drawn_as_nothing():
 
 
 def stroke(start, end, steps=8):
-    """Draws with the brush."""
+    """Drags the brush over the mesh."""
     xdotool("mousemove", *start, "sleep", "0.2", "mousedown", 1)
     for step in range(1, steps + 1):
         xdotool("mousemove", *((a + (b - a) * step // steps) for a, b in zip(start, end)))
@@ -228,12 +228,12 @@ def stroke(start, end, steps=8):
 
 
 def beside():
-    """Where the brush's circle is not counted."""
+    """Returns a place on the screen for the mouse where the circle of the brush is not counted."""
     return on_screen(region("WINDOW"), 75, region("WINDOW").height - 20)
 
 
 def sides():
-    """Pixels of the view that are red, for outside, and blue."""
+    """Returns the numbers of pixels of the view that are red, for outside, and blue, for inside."""
     red, green, blue = np.moveaxis(surface(), -1, 0)
     return int(((red > 110) & (red - blue > 60) & (red - green > 50)).sum()), int(
         ((blue - red > 60) & (blue > 110)).sum()
@@ -277,7 +277,7 @@ def test_views_places_and_switches():
 
     place = yield from find_property("show_deviation", across=0.2)
     assert place is not None
-    yield 0.6  # until no tooltip is in the way
+    yield 0.6  # After so many seconds no tooltip is in the way.
     click(*place)
     yield 0.5
     screenshot("overlay 5 off")

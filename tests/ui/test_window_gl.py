@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""GL beside a window that has a context of its own."""
+"""GL of the module beside Blender's window, which has a context of its own."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The hands and eyes of the tests: mouse, keys, screenshots, and where a button is."""
+"""Functions for the tests that use the mouse and the keyboard, take screenshots, and find buttons."""
 
 import subprocess
 from pathlib import Path
@@ -27,7 +27,7 @@ def screenshot(name):
 
 
 def picture(name):
-    """The 3D view and the status bar as a picture for the documentation, of few colours so that it stays small."""
+    """Saves the 3D view and the status bar as a picture for the documentation, with few colours to keep the file small."""
     area = view()[1]
     height = area.y + area.height
     place = f"{area.width}x{height}+{area.x}+{view()[0].height - height}"
@@ -36,7 +36,7 @@ def picture(name):
 
 
 def pixels():
-    """What is on the screen, (height, width, 3) integers."""
+    """Returns a screenshot, (height, width, 3) integers."""
     picture = subprocess.run(
         ["import", "-window", "root", "-depth", "8", "ppm:-"], check=True, capture_output=True
     ).stdout
@@ -46,7 +46,7 @@ def pixels():
 
 
 def view():
-    """The 3D view and its window."""
+    """Returns the window and the area of its 3D view."""
     window = bpy.context.window_manager.windows[0]
     return window, next(area for area in window.screen.areas if area.type == "VIEW_3D")
 
@@ -56,12 +56,12 @@ def region(kind):
 
 
 def window_context():
-    """For operators that act on the 3D view."""
+    """A context for operators that act on the 3D view."""
     return bpy.context.temp_override(window=view()[0], area=view()[1], region=region("WINDOW"))
 
 
 def on_screen(area_region, x, y):
-    """A place in a region, from its upper left corner, in pixels of the screen (the window fills it)."""
+    """Converts a place in a region, from its upper left corner, to pixels of the screen. The window fills the screen."""
     window, _ = view()
     return area_region.x + x, window.height - (area_region.y + area_region.height) + y
 
@@ -76,7 +76,7 @@ def open_tab():
     view()[1].spaces[0].show_region_ui = True
     yield 0.5
     sidebar = region("UI")
-    # Tabs hang at the right edge; ours is the last.
+    # The tabs are at the right edge, and the tab Tolerance is the last one.
     for y in range(150, 260, 20):
         click(*on_screen(sidebar, sidebar.width - 12, y))
         yield 0.3
@@ -86,7 +86,7 @@ def open_tab():
 
 
 def find(operator, across=0.33):
-    """Moves the mouse down the sidebar until it is over the button of an operator; its place or None.
+    """Moves the mouse down the sidebar until it is over the button of an operator. Returns the place or None.
 
     across: how far from the left of the sidebar. Blender's Ctrl C over a button copies the Python command that it runs.
     """
@@ -94,7 +94,7 @@ def find(operator, across=0.33):
 
 
 def find_property(name, across):
-    """The same for a property of Object.tolvol."""
+    """Does the same as find() for a property of Object.tolvol."""
     return (yield from _find(f".tolvol.{name}", "ctrl+shift+alt+c", across))
 
 
@@ -103,7 +103,7 @@ _found_at = {}
 
 def _find(copied, keys, across):
     sidebar = region("UI")
-    # Mostly it is where it was the last time.
+    # In most cases the button is where it was the last time.
     rows = range(30, sidebar.height - 5, 12)
     last = _found_at.get((copied, across))
     for y in rows if last is None else (last, *rows):
@@ -118,25 +118,25 @@ def _find(copied, keys, across):
 
 
 def press(operator, across=0.33):
-    """Clicks the button of an operator in the sidebar, which is scrolled down for it where it has to be, and back."""
+    """Clicks the button of an operator in the sidebar. If necessary, it scrolls the sidebar down and back."""
     place = yield from find(operator, across)
     scrolled = place is None
     if scrolled:
         yield from scroll(_DOWN)
         place = yield from find(operator, across)
     assert place is not None, f"no button for {operator}"
-    yield 0.6  # until no tooltip is in the way
+    yield 0.6  # After so many seconds no tooltip is in the way.
     click(*place)
     yield 0.3
     if scrolled:
         yield from scroll(_UP)
 
 
-_UP, _DOWN = 4, 5  # buttons of the mouse, as X numbers what a wheel does
+_UP, _DOWN = 4, 5  # X counts the two directions of the wheel as these buttons of the mouse.
 
 
 def scroll(button):
-    """Turns the wheel over the sidebar, as far as that goes."""
+    """Turns the wheel over the sidebar until it no longer scrolls."""
     sidebar = region("UI")
     middle = on_screen(sidebar, sidebar.width // 2, sidebar.height // 2)
     xdotool("mousemove", *middle, "sleep", "0.1", "click", "--repeat", 30, "--delay", 20, button)
@@ -147,20 +147,20 @@ _first_view = {}
 
 
 def maximize():
-    """Gives the 3D view the whole window, or its place back."""
+    """Makes the 3D view fill the whole window, or gives it its former place."""
     with window_context():
         bpy.ops.screen.screen_full_area()
     yield 0.5
 
 
 def sculpt_by_drawing():
-    """In Sculpt Mode: the brush that is chosen at first."""
+    """Chooses the brush Draw in Sculpt Mode, which is also the first choice of Blender."""
     with window_context():
         bpy.ops.wm.tool_set_by_id(name="builtin_brush.Draw")
 
 
 def reset(*make):
-    """A scene with only the object that make() makes, active, seen as at first."""
+    """Makes a scene with only the object that make() makes. The object is active, and the view is the initial one."""
     camera = view()[1].spaces[0].region_3d
     for name in ("view_perspective", "view_distance", "view_location", "view_rotation"):
         value = getattr(camera, name)
