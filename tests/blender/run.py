@@ -15,7 +15,10 @@ try:
     import pytest
 
     arguments = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else []
-    code = int(pytest.main(["-q", "-p", "no:cacheprovider", f"--rootdir={FOLDER}", *(arguments or [str(FOLDER)])]))
+    # Options alone, such as -k undo, select among all tests of this folder.
+    if not any(Path(argument.split("::")[0]).exists() for argument in arguments):
+        arguments.append(str(FOLDER))
+    code = int(pytest.main(["-q", "-p", "no:cacheprovider", f"--rootdir={FOLDER}", *arguments]))
 except BaseException:
     traceback.print_exc()
 sys.stdout.flush()
