@@ -8,17 +8,28 @@
 // - the foot of a well-shaped triangle is improved by one step of iterative refinement;
 // - lengths outside 1e-60 .. 1e60 are scaled by a power of two first, because the fourth powers below would leave the
 // range.
+//
+// is_beyond tries the normal of the plane and, for needles side by side in one plane, the direction in it across the
+// longest edge. For any n the triangle is at least m / |n| away, m being the least n . (p - x) over its corners x, so
+// that a normal of few right bits costs sharpness and no truth. With coordinates up to M and u = 2^-53, a difference p
+// - x is at most 4 M long, and a dot product errs by at most 4 u 4 M |n|; the witness of closest_point errs by 20 u M
+// and its distance by 4 u 4 M more. All that is less than e = 64 u M, and twice that is taken. With s the square root
+// of `squared`, (s + e)^2 <= s^2 (1 + 1e-6) + e^2 (1 + 1e6) <= s^2 (1 + 1e-6) + 2e6 e^2.
 #include "geometry/closest_point.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "geometry/frame.h"
+
 namespace tolvol {
 namespace {
 
 constexpr double kThin = 0.01;  // squared height over squared longest edge
 constexpr double kSmallest = 1e-60, kLargest = 1e60;
+constexpr double kApart = 1e-6, kNoise = 128 * kUnitRoundoff;  // derived above
+constexpr double kFlat = 1e-200;  // the square of a normal whose products may have lost their bits
 
 double largest(const glm::dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
@@ -133,6 +144,20 @@ ClosestPoint closest_point(const glm::dvec3& p, const glm::dvec3& a, const glm::
   q.point = shifted(q.point, exponent);
   q.distance_squared = std::ldexp(q.distance_squared, 2 * exponent);
   return q;
+}
+
+bool is_beyond(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double squared) {
+  const double noise = kNoise * std::max({largest(p), largest(a), largest(b), largest(c)});
+  const double least = squared * (1 + kApart) + 2 / kApart * noise * noise;
+  const auto shown_by = [&](const glm::dvec3& n) {
+    const double n2 = glm::dot(n, n), at_a = glm::dot(n, p - a), at_b = glm::dot(n, p - b), at_c = glm::dot(n, p - c);
+    const double gap = std::max(std::min({at_a, at_b, at_c}), -std::max({at_a, at_b, at_c}));
+    return n2 > kFlat && gap > 0 && gap * gap > n2 * least;
+  };
+  const glm::dvec3 ab = b - a, bc = c - b, ca = a - c, normal = glm::cross(ab, bc);
+  if (shown_by(normal)) return true;
+  const double ab2 = glm::dot(ab, ab), bc2 = glm::dot(bc, bc), ca2 = glm::dot(ca, ca);
+  return shown_by(glm::cross(normal, ab2 >= bc2 && ab2 >= ca2 ? ab : bc2 >= ca2 ? bc : ca));
 }
 
 }  // namespace tolvol

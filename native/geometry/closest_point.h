@@ -18,4 +18,10 @@ struct ClosestPoint {
 /// After C. Ericson, Real-Time Collision Detection, 2005, §5.1.5, made safe for degenerate input.
 ClosestPoint closest_point(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);
 
+/// True only where closest_point(p, a, b, c).distance_squared is above `squared`, as the plane of the triangle or the
+/// one across it through the longest edge shows at a fraction of the cost. It may be false there too: for what the
+/// other edges and the corners decide, for a triangle that is nearly degenerate, and where the difference is within
+/// rounding of the coordinates. O(1).
+bool is_beyond(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double squared);
+
 }  // namespace tolvol

@@ -29,6 +29,7 @@ class Hierarchy {
     glm::dvec3 point{0};
     glm::dvec3 weights{0};  ///< barycentric in `triangle`
     double distance = std::numeric_limits<double>::infinity();
+    std::uint32_t nodes = 0;  ///< of the tree that were visited: what the search cost, the same on every machine
   };
 
   struct Common {
@@ -65,9 +66,9 @@ class Hierarchy {
                 double enough = -1, std::uint32_t hint = kNone) const;
 
   /// visit(index) for every triangle within `radius` (inclusive) of p, and for some that are not: those whose box is.
-  /// A visit that returns false is the last one; it may also return nothing.
+  /// A visit that returns false is the last one; it may also return nothing. Returns how many nodes were visited.
   template <class Visit>
-  void for_each_within(const glm::dvec3& p, double radius, Visit&& visit) const;
+  std::size_t for_each_within(const glm::dvec3& p, double radius, Visit&& visit) const;
 
   std::size_t size() const { return place_.size(); }
 
@@ -96,10 +97,11 @@ class Hierarchy {
 
   /// Shows `attempt(place)` the triangles whose box is within the bound, which attempt lowers as it finds better ones:
   /// `bound` is the square of a scaled distance. Points are local.
+  /// Returns how many nodes it visited.
   template <int Count, class Attempt>
-  void walk(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const;
+  std::size_t walk(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const;
   template <class Real, int Count, class Attempt>
-  void walk_in(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const;
+  std::size_t walk_in(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const;
   const OrientedBoxes* oriented_boxes(std::uint32_t node) const {
     return turned_.empty() || turned_[node] == kNone ? nullptr : &oriented_[turned_[node]];
   }
@@ -130,8 +132,11 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
   ClosestPoint closest{glm::dvec3(0), glm::dvec3(0), std::numeric_limits<double>::infinity()};
   const double reach = beyond_reach ? closest.distance_squared : radius * scale_;
   double bound = reach * reach * (1 + 1e-12);  // generous: the distance itself is compared at the end
+  constexpr unsigned kCrowd = 16;  // triangles; a search on a usual surface looks at fewer, and gains nothing by planes
+  unsigned tried = 0;
   auto attempt = [&](std::uint32_t place) {
     const Corners& t = corners_[place];
+    if (++tried > kCrowd && is_beyond(q, t[0], t[1], t[2], closest.distance_squared)) return;
     const ClosestPoint candidate = closest_point(q, t[0], t[1], t[2]);
     if (candidate.distance_squared > closest.distance_squared) return;
     std::uint32_t triangle = triangle_[place];
@@ -143,14 +148,16 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
     bound = std::min(bound, closest.distance_squared);
   };
   if (hint < place_.size()) attempt(place_[hint]);
-  if (!nodes_.empty()) walk<1>({at}, bound, attempt);
-  if (best == kNone) return {};
-  const Nearest found = beyond_reach ? seen_from(p, best) : unscaled(best, closest, scale_);
-  return found.distance <= radius ? found : Nearest{};
+  const auto nodes = nodes_.empty() ? 0 : std::uint32_t(walk<1>({at}, bound, attempt));
+  Nearest found;
+  if (best != kNone) found = beyond_reach ? seen_from(p, best) : unscaled(best, closest, scale_);
+  if (!(found.distance <= radius)) found = Nearest{};
+  found.nodes = nodes;
+  return found;
 }
 
 template <class Visit>
-void Hierarchy::for_each_within(const glm::dvec3& p, double radius, Visit&& visit) const {
+std::size_t Hierarchy::for_each_within(const glm::dvec3& p, double radius, Visit&& visit) const {
   const auto goes_on = [&](std::uint32_t triangle) {
     if constexpr (std::is_same_v<decltype(visit(triangle)), bool>) {
       return visit(triangle);
@@ -163,33 +170,35 @@ void Hierarchy::for_each_within(const glm::dvec3& p, double radius, Visit&& visi
   const glm::dvec3 at = local(p, beyond_reach);
   if (beyond_reach) {
     for (std::uint32_t triangle = 0; triangle < place_.size() && goes_on(triangle);) ++triangle;
-  } else if (!nodes_.empty()) {
+    return nodes_.size();
+  }
+  if (!nodes_.empty()) {
     double bound = radius * scale_ * (radius * scale_) * (1 + 1e-12);
     bool more = true;
-    walk<1>({at}, bound, [&](std::uint32_t place) {
+    return walk<1>({at}, bound, [&](std::uint32_t place) {
       for (std::uint32_t triangle = triangle_[place]; more && triangle != kNone; triangle = twin(triangle)) {
         more = goes_on(triangle);
       }
       if (!more) bound = -1;  // nothing is within it
     });
   }
+  return 0;
 }
 
 template <int Count, class Attempt>
-void Hierarchy::walk(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const {
+std::size_t Hierarchy::walk(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const {
   double farthest = 0;
   for (const glm::dvec3& p : points) {
     for (int k = 0; k < 3; ++k) farthest = std::max(farthest, std::abs(p[k]));
   }
   if (farthest <= kFloatReach) {
-    walk_in<float, Count>(points, bound, attempt);
-  } else {
-    walk_in<double, Count>(points, bound, attempt);
+    return walk_in<float, Count>(points, bound, attempt);
   }
+  return walk_in<double, Count>(points, bound, attempt);
 }
 
 template <class Real, int Count, class Attempt>
-void Hierarchy::walk_in(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const {
+std::size_t Hierarchy::walk_in(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const {
   // Margins: hierarchy.cpp.
   constexpr bool kSingle = sizeof(Real) == sizeof(float);
   constexpr double kMargin = kSingle ? 1 + 1e-6 : 1 + 1e-13;
@@ -215,8 +224,9 @@ void Hierarchy::walk_in(const std::array<glm::dvec3, Count>& points, double& bou
   int height = 0;
   stack[height++] = {Real(0), 0};
   constexpr unsigned kBetweenPolls = 1024;  // nodes; nearly all searches visit fewer
-  for (unsigned visited = 1; height > 0; ++visited) {
-    if (visited % kBetweenPolls == 0) poll();
+  std::size_t visited = 0;
+  while (height > 0) {
+    if (++visited % kBetweenPolls == 0) poll();
     const Entry top = stack[--height];
     Real limit = threshold();
     if (top.squared > limit) continue;
@@ -251,6 +261,7 @@ void Hierarchy::walk_in(const std::array<glm::dvec3, Count>& points, double& bou
       if (!(near[i].child & kTriangle) && near[i].squared <= limit) stack[height++] = near[i];
     }
   }
+  return visited;
 }
 
 }  // namespace tolvol

@@ -14,8 +14,11 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <span>
 #include <sstream>
 
 #include "base/call.h"
@@ -35,7 +38,7 @@ constexpr std::size_t kBudgetPerTriangle = 4;
 constexpr double kEnough = 0.001;               // of the largest distance: the width of the range of the mean
 constexpr double kNoise = 256 * kUnitRoundoff;  // a range of the mean that is no wider is rounding
 constexpr double kShareRounding = 32 * kUnitRoundoff;
-constexpr std::size_t kChunk = 16384, kBlock = 64;  // pieces between two looks at the progress; for one thread at once
+constexpr std::size_t kChunk = 4096, kBlock = 64;  // pieces between two looks at the progress; for one thread at once
 
 /// What a piece weighs in the averages, by the number of corners of the pieces.
 enum Measure { number = 1, length = 2, area = 3 };
@@ -208,14 +211,16 @@ class Cover {
       });
     }
     budget_ = std::max({kBudget, kBudgetPerTriangle * a.triangles.size(), pieces_.size()});
+    most_steps_ = std::size_t(options.steps * double(budget_));
   }
 
   void measure() {
-    evaluate(0);
+    evaluate(pieces_, 0, true);
     while (measure_ != number && refine()) continue;
   }
 
   const std::vector<Piece>& pieces() const { return pieces_; }
+  std::size_t steps() const { return steps_; }
   bool has_sides() const { return sides_.known(); }
   double spacing() const {
     if (measure_ == number) return 0;
@@ -224,23 +229,41 @@ class Cover {
   }
 
  private:
-  /// The pieces from `first` on.
-  void evaluate(std::size_t first) {
-    for (std::size_t chunk = first; chunk < pieces_.size(); chunk += kChunk) {
-      const std::size_t count = std::min(kChunk, pieces_.size() - chunk);
+  /// Bounds and points of these pieces, the first of which is the `first` of all; returns of how many. Where all steps
+  /// are made it ends, or bounds the rest loosely where it must take `all`.
+  std::size_t evaluate(std::span<Piece> pieces, std::size_t first, bool all) {
+    std::size_t done = 0;
+    while (done < pieces.size() && (all || steps_ < most_steps_)) {
+      const std::size_t count = std::min(kChunk, pieces.size() - done);
+      const bool loosely = steps_ >= most_steps_;
+      std::atomic<std::size_t> steps = 0;
       parallel_for(count, kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
         std::uint32_t hint = Hierarchy::kNone;
-        for (std::size_t i = chunk + begin; i < chunk + end; ++i) {
-          pieces_[i].bounds = distance_bounds(pieces_[i].simplex, b_, hierarchy_, hint);
-          hint = pieces_[i].bounds.nearest;
-          const dvec3 point = point_in(pieces_[i].simplex, i);
+        std::size_t made = 0;
+        for (std::size_t i = done + begin; i < done + end; ++i) {
+          Piece& piece = pieces[i];
+          if (!loosely) {
+            piece.bounds = distance_bounds(piece.simplex, b_, hierarchy_, hint);
+            hint = piece.bounds.nearest;
+            made += piece.bounds.steps;
+          }
+          const dvec3 point = point_in(piece.simplex, first + i);
           const Hierarchy::Nearest nearest = hierarchy_.nearest(point, std::numeric_limits<double>::infinity(), hint);
-          pieces_[i].distance = nearest.distance;
-          pieces_[i].inside = sides_.inside(point, nearest);
+          if (loosely) {
+            piece.bounds = bounds_around(point, nearest, piece.simplex, b_);
+            hint = nearest.triangle;
+          }
+          piece.distance = nearest.distance;
+          piece.inside = sides_.inside(point, nearest);
+          made += nearest.nodes;
         }
+        steps += made;
       });
-      if (options_.progress) options_.progress->update(double(chunk + count) / double(budget_));
+      steps_ += steps;
+      done += count;
+      if (options_.progress) options_.progress->update(double(first + done) / double(budget_));
     }
+    return done;
   }
 
   /// Cuts the worst pieces; false when there is nothing more to gain or to spend.
@@ -256,7 +279,7 @@ class Cover {
     }
     const double enough = std::max(kEnough * largest, kNoise) * total_.value();
     const std::size_t room = (budget_ - pieces_.size()) / 2;  // a piece leaves two or three
-    if (gap.value() <= enough || room == 0) return false;
+    if (gap.value() <= enough || room == 0 || steps_ >= most_steps_) return false;
     // Those above the average that is wanted, the worst first where there is no room for all.
     std::vector<std::size_t> worst;
     for (std::size_t i = 0; i < pieces_.size(); ++i) {
@@ -274,25 +297,29 @@ class Cover {
     }
     poll();
     std::vector<Piece> parts;
+    std::vector<std::size_t> cut, end;  // those that have parts, and where these end
     for (const std::size_t i : worst) {
-      const std::size_t before = parts.size();
-      poll_at(before);
+      poll_at(parts.size());
       halve(pieces_[i], [&](const Simplex& part) { parts.push_back({part, measure_of(part), {}, 0, false}); });
-      if (parts.size() > before) pieces_[i].weight = -1;
+      if (parts.size() == (end.empty() ? 0 : end.back())) continue;
+      cut.push_back(i);
+      end.push_back(parts.size());
     }
     poll();
+    // A piece whose parts are not all known stays whole.
+    const std::size_t known = evaluate(parts, pieces_.size() - cut.size(), false);
+    while (!end.empty() && end.back() > known) end.pop_back();
+    for (std::size_t k = 0; k < end.size(); ++k) pieces_[cut[k]].weight = -1;
     std::size_t seen = 0;
     std::erase_if(pieces_, [&](const Piece& piece) {
       poll_at(++seen);
       return piece.weight < 0;
     });
-    const std::size_t first = pieces_.size();
-    for (std::size_t i = 0; i < parts.size(); ++i) {
+    for (std::size_t i = 0; i < (end.empty() ? 0 : end.back()); ++i) {
       poll_at(i);
       pieces_.push_back(parts[i]);
     }
-    evaluate(first);
-    return !parts.empty();
+    return !end.empty();
   }
 
   template <class Visit>
@@ -309,7 +336,7 @@ class Cover {
   const DeviationOptions& options_;
   Measure measure_ = number;
   Sum total_;
-  std::size_t budget_ = 0;
+  std::size_t budget_ = 0, steps_ = 0, most_steps_ = 0;
   std::vector<Piece> pieces_;
 };
 
@@ -421,6 +448,7 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
     result.weights.push_back(piece.weight / whole);
   }
   result.spacing = cover.spacing() / scale;
+  result.steps = cover.steps();
   if (options.progress) options.progress->update(1);
   return result;
 }

@@ -60,6 +60,26 @@ dvec3 apart(const dvec3& p, const Corners& t, const dvec3& nearest) {
   return gap(p, t, facing) > gap(p, t, towards) ? facing : towards;
 }
 
+Corners corners(const TriangleMesh& b, std::uint32_t triangle) {
+  const glm::uvec3& t = b.triangles[triangle];
+  return {b.vertices[t.x], b.vertices[t.y], b.vertices[t.z]};
+}
+
+/// The upper ends, from the distances of the corners to one triangle of b.
+DistanceBounds above(const Simplex& piece, const TriangleMesh& b, std::uint32_t triangle) {
+  const Corners t = corners(b, triangle);
+  const int k = piece.corners;
+  DistanceBounds bounds;
+  bounds.nearest = triangle;
+  for (int i = 0; i < k; ++i) {
+    const double squared = closest_point(piece.corner[i], t[0], t[1], t[2]).distance_squared;
+    bounds.value.upper = std::max(bounds.value.upper, std::sqrt(squared));
+    bounds.mean.upper += std::sqrt(squared) / k;
+    bounds.mean_square.upper += squared / k;
+  }
+  return bounds;
+}
+
 /// At each corner of a piece the least value of linear functions as above, one for each triangle.
 class Below {
  public:
@@ -125,25 +145,15 @@ dvec3 Simplex::centroid() const {
 
 DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, const Hierarchy& hierarchy,
                                std::uint32_t hint) {
-  const auto triangle = [&](std::uint32_t i) {
-    const glm::uvec3& t = b.triangles[i];
-    return Corners{b.vertices[t.x], b.vertices[t.y], b.vertices[t.z]};
-  };
   const dvec3 c = piece.centroid();
   const int k = piece.corners;
-  DistanceBounds bounds;
   const Hierarchy::Nearest nearest = hierarchy.nearest(c, std::numeric_limits<double>::infinity(), hint);
   const double d = nearest.distance;
-  bounds.nearest = nearest.triangle;
-
-  const Corners t = triangle(nearest.triangle);
+  DistanceBounds bounds = above(piece, b, nearest.triangle);
+  bounds.steps = nearest.nodes;
   double r = 0, spread = 0;
   for (int i = 0; i < k; ++i) {
-    const double squared = closest_point(piece.corner[i], t[0], t[1], t[2]).distance_squared;
     const dvec3 arm = piece.corner[i] - c;
-    bounds.value.upper = std::max(bounds.value.upper, std::sqrt(squared));
-    bounds.mean.upper += std::sqrt(squared) / k;
-    bounds.mean_square.upper += squared / k;
     spread += glm::dot(arm, arm);
     r = std::max(r, glm::length(arm));
   }
@@ -154,21 +164,24 @@ DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, cons
     return rounded_outwards(bounds);
   }
 
-  Below below(piece, c, t, nearest.point);
+  Below below(piece, c, corners(b, nearest.triangle), nearest.point);
   int seen = 0;
-  hierarchy.for_each_within(c, d + 2 * r, [&](std::uint32_t i) {
+  const std::size_t nodes = hierarchy.for_each_within(c, d + 2 * r, [&](std::uint32_t i) {
     if (++seen > kMostTriangles) return false;
-    below.add(triangle(i));
+    below.add(corners(b, i));
     return true;
   });
+  bounds.steps += std::uint32_t(nodes) + std::uint32_t(seen);
   if (seen <= kMostTriangles) {
     bounds.value.lower = below.least();
     bounds.mean.lower = below.mean();
   } else {
     double least = std::numeric_limits<double>::infinity(), sum = 0;
     for (int i = 0; i < k; ++i) {
-      const double at =
-          hierarchy.nearest(piece.corner[i], std::numeric_limits<double>::infinity(), nearest.triangle).distance;
+      const Hierarchy::Nearest corner =
+          hierarchy.nearest(piece.corner[i], std::numeric_limits<double>::infinity(), nearest.triangle);
+      const double at = corner.distance;
+      bounds.steps += corner.nodes;
       least = std::min(least, at * at);
       sum += at * at / k;
     }
@@ -179,6 +192,16 @@ DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, cons
     bounds.mean.lower = std::max(bounds.value.lower, bounds.mean_square.lower / bounds.value.upper);
   }
   bounds.mean_square.lower = std::max(bounds.mean_square.lower, bounds.mean.lower * bounds.mean.lower);
+  return rounded_outwards(bounds);
+}
+
+DistanceBounds bounds_around(const dvec3& point, const Hierarchy::Nearest& nearest, const Simplex& piece,
+                             const TriangleMesh& b) {
+  DistanceBounds bounds = above(piece, b, nearest.triangle);
+  double r = 0;
+  for (int i = 0; i < piece.corners; ++i) r = std::max(r, glm::distance(piece.corner[i], point));
+  bounds.value.lower = bounds.mean.lower = std::max(0.0, nearest.distance - r);
+  bounds.mean_square.lower = bounds.mean.lower * bounds.mean.lower;
   return rounded_outwards(bounds);
 }
 

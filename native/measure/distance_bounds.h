@@ -23,6 +23,7 @@ struct Simplex {
 
 struct DistanceBounds {
   std::uint32_t nearest;           ///< the triangle of b nearest to the centroid
+  std::uint32_t steps = 0;         ///< nodes of the hierarchy and triangles that were looked at: what the bounds cost
   Range value, mean, mean_square;  ///< of the distance over the piece
 };
 
@@ -32,5 +33,10 @@ struct DistanceBounds {
 /// triangle of b that may be near, or Hierarchy::kNone; it does not change the result. Cost: 2 to 10 us.
 DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, const Hierarchy& hierarchy,
                                std::uint32_t hint);
+
+/// The same from what is known of one point of the piece alone, without a search: `nearest` is found there, and the
+/// distance falls by at most the way to another point. The ranges are as wide as the piece is long.
+DistanceBounds bounds_around(const glm::dvec3& point, const Hierarchy::Nearest& nearest, const Simplex& piece,
+                             const TriangleMesh& b);
 
 }  // namespace tolvol

@@ -118,10 +118,9 @@ void bind_measure(py::module_& module) {
       "range that it is certainly in. Refined until the range of the mean is no wider than 0.1 % of the largest "
       "distance "
       "or than rounding, or there\n"
-      "are half a million samples (four for each triangle where that is more). World coordinates, deterministic. Cost: "
-      "2 "
-      "to 10 us\n"
-      "a sample. Raises InvalidInput, Cancelled.");
+      "are half a million samples (four for each triangle where that is more), or\n"
+      "the search has taken 256 steps for each of so many, as between crowded needles: the ranges are then wider, and\n"
+      "as certain. World coordinates, deterministic. Cost: 2 to 10 us a sample. Raises InvalidInput, Cancelled.");
 }
 
 }  // namespace tolvol::python

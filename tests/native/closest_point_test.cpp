@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -13,6 +14,7 @@ namespace {
 using glm::dvec3;
 using tolvol::closest_point;
 using tolvol::ClosestPoint;
+using tolvol::is_beyond;
 using Long = glm::vec<3, long double>;
 
 /// How far the distance of q can be above the true one, relative to the lengths involved, by duality: every point x of
@@ -130,6 +132,42 @@ TEST(ClosestPoint, APointThatIsNotFiniteHasNoDistance) {
         EXPECT_FALSE(std::isfinite(closest_point(p, a, b, {0, height, 0}).distance_squared)) << x << " at " << i;
       }
     }
+  }
+}
+
+// Where a plane is said to show that a triangle is beyond, the witness is; and a plane that is far away shows it.
+TEST(ClosestPoint, BeyondOnlyWhereTheWitnessIs) {
+  std::mt19937 random(6);
+  std::normal_distribution<double> normal(0, 1);
+  const auto vector = [&] { return dvec3(normal(random), normal(random), normal(random)); };
+  int shown = 0, far = 0;
+  for (int i = 0; i < 60000; ++i) {
+    const double flat = std::pow(10, -(i % 18)), place = i % 3 ? 0 : std::pow(10, i % 8);
+    const dvec3 base = place * vector(), a = base + vector(), b = a + vector(),
+                c = glm::mix(a, b, 0.3) + flat * vector();
+    const dvec3 p = i % 5 ? base + vector() : a + std::pow(10, -(i % 16)) * vector();
+    const double squared = closest_point(p, a, b, c).distance_squared;
+    EXPECT_FALSE(is_beyond(p, a, b, c, squared)) << i;
+    EXPECT_FALSE(is_beyond(p, a, b, c, std::numeric_limits<double>::infinity()));
+    const glm::dvec3 normal = glm::cross(b - a, c - a);
+    const double height = std::abs(glm::dot(glm::normalize(normal), p - a));
+    for (const double share : {0.9, 0.99999}) {
+      const bool beyond = is_beyond(p, a, b, c, share * height * height);
+      EXPECT_TRUE(!beyond || squared > share * height * height);
+      if (place == 0 && flat > 1e-6 && height > 1e-3) ++far, shown += beyond;
+    }
+  }
+  EXPECT_EQ(shown, far);
+  EXPECT_GT(far, 10000);
+  const dvec3 o(0), x(1, 0, 0), y(0, 1, 0), p(0.2, 0.2, 1);
+  for (const double scale : {1e-200, 1e200}) EXPECT_FALSE(is_beyond(scale * p, scale * o, scale * x, scale * y, 0));
+  EXPECT_FALSE(is_beyond(p, o, x, x, 0.1));
+  EXPECT_TRUE(is_beyond(p, o, x, y, 0.99));
+  const dvec3 beside(0.3, -0.1, 0), above(0.3, 0.2, 0), tip(0.5, 1e-3, 0);
+  for (const auto& [a, b, c] : {std::array{o, x, tip}, {tip, o, x}, {x, o, tip}}) {
+    EXPECT_TRUE(is_beyond(beside, a, b, c, 0.0099));
+    EXPECT_TRUE(is_beyond(above, a, b, c, 0.039));
+    EXPECT_FALSE(is_beyond(dvec3(0.5, 5e-4, 0), a, b, c, 0));
   }
 }
 

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <random>
 
 #include "base/errors.h"
+#include "measure/hausdorff.h"
 #include "shapes.h"
 
 namespace {
@@ -249,6 +251,58 @@ TEST(Deviation, AnyScaleAndAnyPlace) {
     EXPECT_NEAR(d.share_beyond[0].value, 1, 1e-12);
     EXPECT_EQ(d.share_beyond[1].value, 0);
     EXPECT_NEAR(d.spacing / scale, 1 / 256.0, 2e-4);
+  }
+}
+
+// Between two fans of needles that meet in one point every search looks at a share of all triangles, so that the number
+// of pieces says little about the time. What ends early is as true, and wider.
+TEST(Deviation, EndsByItsStepsWhereNeedlesCrowd) {
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal(0, 1);
+  const unsigned n = 206;
+  TriangleMesh fan, moved;
+  for (unsigned i = 0; i < n; ++i) {
+    fan.vertices.emplace_back(std::cos(2 * M_PI * i / n), std::sin(2 * M_PI * i / n), 0);
+    fan.triangles.emplace_back(n, i, (i + 1) % n);
+  }
+  fan.vertices.emplace_back(0, 0, 0);
+  moved = fan;
+  for (dvec3& p : moved.vertices) p += dvec3(normal(random), normal(random), normal(random));
+  const double percentiles[] = {50, 100};
+  const std::size_t pieces = 524288, first = 65536 + 2 * n;  // at most; about how many there are at first
+  for (const auto& [a, b] : {std::pair{fan, moved}, {moved, fan}}) {
+    Deviation before{};
+    for (const double steps : {0.0, 2.0, 8.0}) {
+      DeviationOptions options;
+      options.percentiles = percentiles, options.steps = steps;
+      const Deviation d = deviation(a, b, options);
+      // What is begun ends, and each of the first pieces has a search of its own: of 63 nodes at most, with 206 faces.
+      EXPECT_LE(double(d.steps), steps * pieces + 63.0 * first + 4096 * 512);
+      EXPECT_LE(d.distances.size(), pieces);
+      EXPECT_NEAR(std::accumulate(d.weights.begin(), d.weights.end(), 0.0), 1, 1e-9);
+      const HausdorffInterval largest = hausdorff(a, b);
+      EXPECT_GE(d.percentiles[1].range.upper, largest.lower - 1e-12);
+      EXPECT_LE(d.percentiles[1].range.lower, largest.upper + 1e-12);
+      double mean = 0, square = 0;
+      for (std::size_t i = 0; i < d.distances.size(); ++i) {
+        const double distance = std::abs(d.distances[i]);
+        mean += d.weights[i] * distance, square += d.weights[i] * distance * distance;
+      }
+      EXPECT_NEAR(d.mean.value, mean, 1e-9);
+      EXPECT_NEAR(d.rms.value, std::sqrt(square), 1e-9);
+      if (before.steps > 0) {
+        EXPECT_GT(d.steps, before.steps);
+        EXPECT_NEAR(d.mean.value, before.mean.value, 4 * (d.mean_error + before.mean_error));
+        EXPECT_LE(d.mean.range.upper - d.mean.range.lower, before.mean.range.upper - before.mean.range.lower);
+        EXPECT_LE(std::max(d.mean.range.lower, before.mean.range.lower),
+                  std::min(d.mean.range.upper, before.mean.range.upper));
+      }
+      options.threads = 3;
+      const Deviation again = deviation(a, b, options);
+      EXPECT_EQ(again.steps, d.steps);
+      EXPECT_EQ(again.distances, d.distances);
+      before = d;
+    }
   }
 }
 

@@ -76,6 +76,9 @@ TEST(DistanceBounds, HoldWhateverThePiece) {
       EXPECT_EQ(bounds.nearest, hierarchy.nearest(s.centroid()).triangle);
       const DistanceBounds hinted = distance_bounds(s, b, hierarchy, std::uint32_t(i % b.triangles.size()));
       EXPECT_EQ(hinted.mean.lower, bounds.mean.lower);
+      EXPECT_GT(bounds.steps, 0u);
+      const dvec3 point = glm::mix(s.centroid(), s.corner[0], 0.5);
+      expect_holds(bounds_around(point, hierarchy.nearest(point), s, b), truth, 0.002 * longest);
     }
   }
 }
