@@ -78,7 +78,6 @@ std::uint32_t BoundedMesh::survivor(std::uint32_t v) const {
   return v;
 }
 
-/// Whether an edge joins the two in the result, be it between copies of them.
 bool BoundedMesh::joined_by_other(std::uint32_t a, std::uint32_t b) const {
   for (const std::uint32_t x : copies(a)) {
     for (const std::uint32_t y : copies(b)) {
@@ -130,48 +129,48 @@ void BoundedMesh::place(std::uint32_t vertex, const VertexPosition& target) {
 /// The vertex that vanishes becomes one with the one that stays: its copies that do not vanish are that one's from now
 /// on.
 void BoundedMesh::merge_copies(const Change& change) {
-  const std::uint32_t merged = slots_[from(change.halfedge_)], kept = slots_[change.vertex_];
+  const std::uint32_t kept_vertex = *change.vertex();
+  const std::uint32_t merged = slots_[from(change.halfedge())], kept = slots_[kept_vertex];
   copies_.erase(merged);
-  if (!change.carried_.empty()) {
-    std::vector<std::uint32_t>& all = copies_.try_emplace(kept, 1, change.vertex_).first->second;
-    all.insert(all.end(), change.carried_.begin(), change.carried_.end());
+  if (!change.carried().empty()) {
+    std::vector<std::uint32_t>& all = copies_.try_emplace(kept, 1, kept_vertex).first->second;
+    all.insert(all.end(), change.carried().begin(), change.carried().end());
   }
-  for (const std::uint32_t v : change.carried_) {
+  for (const std::uint32_t v : change.carried()) {
     slots_[v] = kept;
-    place(v, change.position_);
-    if (bounds_.forward) distance_[v] = change.new_distance_;
+    place(v, change.position());
+    if (bounds_.forward) distance_[v] = change.distance();
   }
-  for (const std::uint32_t v : copies(change.vertex_)) joined_[v] = true;
+  for (const std::uint32_t v : copies(kept_vertex)) joined_[v] = true;
 }
 
-void BoundedMesh::apply(Change& change) {
-  const bool proved = change.proof_ == Change::Proof::now;
+void BoundedMesh::apply(const Change& change) {
+  const bool proved = change.proof() == Change::Proof::now;
   if (bounds_.baseline) bounds_.baseline->commit();
-  if (bounds_.backward && proved) bounds_.backward->commit(change.backward_);
-  if (!change.boundary_elements_.empty()) bounds_.boundary_backward->commit(change.boundary_backward_);
-  for (const Change::NewWedge& n : change.new_wedges_) {
+  if (bounds_.backward && proved) bounds_.backward->commit(change.backward());
+  if (change.changes_boundary()) bounds_.boundary_backward->commit(change.boundary_backward());
+  for (const Change::NewWedge& n : change.new_wedges()) {
     wedges_[n.triangle][n.corner] = n.gained.wedge;
     corner_source_[n.triangle][n.corner] = n.gained.source;
   }
-  const bool is_flip = change.kind_ == Change::Kind::flip;
-  for (std::size_t i = 0; i < change.faces_.size(); ++i) {
-    const Change::Face& face = change.faces_[i];
-    const std::uint32_t id = change.elements_[i].id;
+  const bool is_flip = change.kind() == Change::Kind::flip;
+  for (std::size_t i = 0; i < change.faces().size(); ++i) {
+    const Change::Face& face = change.faces()[i];
+    const std::uint32_t id = change.elements()[i].id;
     const glm::uvec3 triangle(face.vertices[0], face.vertices[1], face.vertices[2]);
     if (is_flip) count_around(triangles_[id], -1), count_around(triangle, 1);
     triangles_[id] = triangle;
     if (bounds_.forward && proved) face_distance_[id] = face.distance;
   }
   if (is_flip) {
-    mesh_.flip(change.edge_);
+    mesh_.flip(change.edge());
     return;
   }
-  const std::uint32_t v = change.vertex_;
-  if (change.kind_ == Change::Kind::collapse) {
-    for (const Coverage::Removed& r : change.removed_) count_around(triangles_[r.id], -1);
-    triangle_count_ -= change.removed_.size();
-    if (joined(from(change.halfedge_))) merge_copies(change);
-    for (const Halfedge h : change.collapses_) {
+  if (change.kind() == Change::Kind::collapse) {
+    for (const Coverage::Removed& r : change.removed()) count_around(triangles_[r.id], -1);
+    triangle_count_ -= change.removed().size();
+    if (joined(from(change.halfedge()))) merge_copies(change);
+    for (const Halfedge h : change.collapses()) {
       const std::uint32_t merged = from(h), kept = to(h);
       merged_into_[merged] = kept;
       if (kept_apart_) occupied_.remove(stored_[merged]);
@@ -181,8 +180,63 @@ void BoundedMesh::apply(Change& change) {
       collapse(mesh_, h);
     }
   }
-  place(v, change.position_);
-  if (bounds_.forward) distance_[v] = change.new_distance_;
+  place(*change.vertex(), change.position());
+  if (bounds_.forward) distance_[*change.vertex()] = change.distance();
+}
+
+BoundedMesh::Saved BoundedMesh::save(std::span<const std::uint32_t> vertices,
+                                     std::span<const std::uint32_t> faces) const {
+  Saved saved;
+  for (const std::uint32_t v : vertices) {
+    saved.vertices.push_back({v, vertex_position(v), distance_[v], share(v), left_original(v)});
+  }
+  for (const std::uint32_t f : faces) {
+    saved.faces.push_back({f, triangles_[f], has_wedges() ? wedges_[f] : glm::uvec3(0), corner_source_[f],
+                           bounds_.forward ? face_distance_[f] : 0, mesh_.face(face(f))});
+    for (const Halfedge h : mesh_.fh_range(face(f))) {
+      const Vertex start = mesh_.from_vertex_handle(h);
+      const Halfedge opposite = mesh_.opposite_halfedge_handle(h);
+      saved.halfedges.push_back({h, mesh_.halfedge(h)});
+      saved.anchors.push_back({start, mesh_.halfedge_handle(start)});
+      if (mesh_.is_boundary(opposite)) saved.halfedges.push_back({opposite, mesh_.halfedge(opposite)});
+    }
+  }
+  return saved;
+}
+
+void BoundedMesh::restore(const Saved& saved) {
+  for (const Saved::OfHalfedge& s : saved.halfedges) {
+    mesh_.halfedge(s.halfedge) = s.kernel;
+    mesh_.status(s.halfedge).set_deleted(false);
+    mesh_.status(mesh_.edge_handle(s.halfedge)).set_deleted(false);
+  }
+  for (const Saved::OfHalfedge& s : saved.halfedges) {  // sets what its neighbours name, too
+    mesh_.set_next_halfedge_handle(s.halfedge, mesh_.next_halfedge_handle(s.halfedge));
+    mesh_.set_next_halfedge_handle(mesh_.prev_halfedge_handle(s.halfedge), s.halfedge);
+  }
+  for (const Saved::Anchor& s : saved.anchors) mesh_.set_halfedge_handle(s.vertex, s.halfedge);
+  for (const Saved::OfFace& s : saved.faces) {
+    if (alive(s.face)) {
+      count_around(triangles_[s.face], -1);
+    } else {
+      ++triangle_count_;
+    }
+    count_around(s.triangle, 1);
+    mesh_.face(face(s.face)) = s.kernel;
+    mesh_.status(face(s.face)).set_deleted(false);
+    triangles_[s.face] = s.triangle;
+    corner_source_[s.face] = s.corner_source;
+    if (bounds_.forward) face_distance_[s.face] = s.distance;
+    if (has_wedges()) wedges_[s.face] = s.wedges;
+  }
+  for (const Saved::OfVertex& s : saved.vertices) {
+    mesh_.status(handle(s.vertex)).set_deleted(false);
+    positions_[s.vertex] = s.position.position, stored_[s.vertex] = s.position.stored;
+    distance_[s.vertex] = s.distance;
+    if (!shares_.empty()) shares_[s.vertex] = s.share;
+    left_original_[s.vertex] = s.left_original;
+    merged_into_[s.vertex] = s.vertex;
+  }
 }
 
 }  // namespace tolvol

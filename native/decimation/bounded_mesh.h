@@ -78,6 +78,8 @@ class BoundedMesh {
   /// points of a face (infinite where none is known).
   double distance(std::uint32_t vertex) const { return distance_[vertex]; }
   double face_distance(std::uint32_t triangle) const { return face_distance_[triangle]; }
+  /// Notes such a bound, which was proved for the face as it is.
+  void note_face_distance(std::uint32_t triangle, double distance) { face_distance_[triangle] = distance; }
   /// Of the forward bound, what new faces around the vertex may use.
   double share(std::uint32_t vertex) const { return shares_.empty() ? 1 : shares_[vertex]; }
   /// How many faces have the vertex as a corner.
@@ -97,6 +99,13 @@ class BoundedMesh {
   }
   /// Equal for copies; the number of one of them.
   std::uint32_t slot(std::uint32_t vertex) const { return slots_[vertex]; }
+  /// Whether an edge joins two vertices in the result that is not the one between these two but one between copies.
+  bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
+  bool pinned(std::uint32_t vertex) const { return pinned_[vertex]; }
+  /// Whether the corners of faces have wedges.
+  bool has_wedges() const { return !wedges_.empty(); }
+  /// The wedge of a corner, where corners have wedges.
+  std::uint32_t wedge(std::uint32_t triangle, int corner) const { return wedges_[triangle][corner]; }
   /// Where corner `corner` of a triangle takes its attributes: an input corner as 3 * triangle + corner.
   std::uint32_t corner_source(std::uint32_t triangle, int corner) const { return corner_source_[triangle][corner]; }
 
@@ -128,16 +137,44 @@ class BoundedMesh {
 
   /// Carries out a change whose last try succeeded on this mesh as it is. What is to be proved later then is, by a
   /// DeferredProof.
-  void apply(Change& change);
+  void apply(const Change& change);
+
+  /// Some vertices and faces as they were, with the halfedges of these faces and those opposite to them at a boundary.
+  struct Saved {
+    using Kernel = OpenMesh::TriConnectivity;
+    struct OfVertex {
+      std::uint32_t vertex;
+      VertexPosition position;
+      double distance, share;
+      bool left_original;
+    };
+    struct OfFace {
+      std::uint32_t face;
+      glm::uvec3 triangle, wedges, corner_source;
+      double distance;
+      Kernel::Face kernel;
+    };
+    struct OfHalfedge {
+      Halfedge halfedge;
+      Kernel::Halfedge kernel;
+    };
+    struct Anchor {  ///< the halfedge that the kernel finds a vertex's others by
+      Vertex vertex;
+      Halfedge halfedge;
+    };
+    std::vector<OfVertex> vertices;
+    std::vector<OfFace> faces;
+    std::vector<OfHalfedge> halfedges;
+    std::vector<Anchor> anchors;
+  };
+  Saved save(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces) const;
+  /// Takes back all changes since save(), of which each was one of the saved faces and moved saved vertices alone.
+  void restore(const Saved& saved);
 
  private:
-  friend class Change;
-  friend class DeferredProof;
-
   void build(bool on_reference, std::span<const std::uint32_t> mates, Team& team);
   int rank(std::uint32_t vertex) const;
   void count_around(const glm::uvec3& triangle, std::int32_t change);
-  bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
   void merge_copies(const Change& change);
   void place(std::uint32_t vertex, const VertexPosition& target);
 

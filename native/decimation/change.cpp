@@ -64,13 +64,13 @@ bool Change::prepare_collapse(Halfedge h, const VertexPosition& target) {
   if (mesh_->joined(mesh_->from(h)) && !gather_copies(h)) return false;
   for (const Halfedge each : collapses_) {
     if (!link_condition(each) || !gather(each, target.position)) return false;
-    if (!mesh_->wedges_.empty() && !wedges_fit(each)) return false;
+    if (mesh_->has_wedges() && !wedges_fit(each)) return false;
   }
   constexpr int kNoFace = -1;
   for (const std::uint32_t v : carried_) {
-    gather_side(v, target.position, glm::length(mesh_->positions_[v] - target.position), kNoFace, kNoFace);
+    gather_side(v, target.position, glm::length(mesh_->position(v) - target.position), kNoFace, kNoFace);
   }
-  if (!mesh_->copies_.empty() && !slots_fit()) return false;
+  if (mesh_->has_copies() && !slots_fit()) return false;
   for (const Halfedge each : collapses_) {
     for (Face& face : faces_) {
       if (face.vertices[face.corner] == mesh_->from(each)) face.vertices[face.corner] = mesh_->to(each);
@@ -84,7 +84,7 @@ bool Change::prepare_relocate(std::uint32_t vertex, const VertexPosition& target
   clear(Kind::relocate, target);
   vertex_ = vertex, share_ = mesh_->share(vertex);
   constexpr int kNoFace = -1;
-  gather_side(vertex, target.position, glm::length(mesh_->positions_[vertex] - target.position), kNoFace, kNoFace);
+  gather_side(vertex, target.position, glm::length(mesh_->position(vertex) - target.position), kNoFace, kNoFace);
   boundary_of_relocation();
   return true;
 }
@@ -98,22 +98,21 @@ bool Change::prepare_flip(Edge e) {
   // The faces (b, a, c) and (a, b, d) become (b, d, c) and (a, c, d); the kernel keeps their names that way around.
   const std::uint32_t a = mesh_->to(h), b = mesh_->to(o), c = mesh_->to(mesh.next_halfedge_handle(h)),
                       d = mesh_->to(mesh.next_halfedge_handle(o));
-  if (mesh_->pinned_[a] && mesh_->pinned_[b]) return false;
-  if (!mesh_->copies_.empty() && mesh_->joined_by_other(c, d)) return false;
+  if (mesh_->pinned(a) && mesh_->pinned(b)) return false;
+  if (mesh_->has_copies() && mesh_->joined_by_other(c, d)) return false;
   const std::uint32_t first = static_cast<std::uint32_t>(mesh.face_handle(h).idx()),
                       second = static_cast<std::uint32_t>(mesh.face_handle(o).idx());
   constexpr double kAnywhere = std::numeric_limits<double>::infinity();  // no point of a face is carried along
   const auto add = [&](std::uint32_t id, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-    const auto& p = mesh_->positions_;
-    elements_.push_back({id, {p[x], p[y], p[z]}, kAnywhere});
-    faces_.push_back({false, 0, p[x], {x, y, z}, 0});
+    elements_.push_back({id, {mesh_->position(x), mesh_->position(y), mesh_->position(z)}, kAnywhere});
+    faces_.push_back({false, 0, mesh_->position(x), {x, y, z}, 0});
   };
   add(first, b, d, c), add(second, a, c, d);
-  if (mesh_->wedges_.empty()) return true;
+  if (!mesh_->has_wedges()) return true;
   const auto corner = [&](std::uint32_t f, std::uint32_t v) {
-    const glm::uvec3& t = mesh_->triangles_[f];
+    const glm::uvec3& t = mesh_->triangle(f);
     const int k = t.x == v ? 0 : t.y == v ? 1 : 2;
-    return Corner{mesh_->wedges_[f][k], mesh_->corner_source_[f][k]};
+    return Corner{mesh_->wedge(f, k), mesh_->corner_source(f, k)};
   };
   if (corner(first, a).wedge != corner(second, a).wedge || corner(first, b).wedge != corner(second, b).wedge) {
     return false;
@@ -152,18 +151,18 @@ bool Change::link_condition(Halfedge h) {
 /// Adds the faces around a vertex as they are once it is at `position`.
 void Change::gather_side(std::uint32_t vertex, const glm::dvec3& position, double moved, int skip0, int skip1) {
   const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
-  const auto& positions = mesh_->positions_;
   const Halfedge start = mesh.halfedge_handle(BoundedMesh::handle(vertex));
   Halfedge at = start;
   do {
     const int f = mesh.face_handle(at).idx();
     if (f >= 0 && f != skip0 && f != skip1) {
-      const glm::uvec3& t = mesh_->triangles_[static_cast<std::size_t>(f)];
+      const glm::uvec3& t = mesh_->triangle(static_cast<std::uint32_t>(f));
       const int corner = t.x == vertex ? 0 : t.y == vertex ? 1 : 2;
-      Coverage::Element element{static_cast<std::uint32_t>(f), {positions[t.x], positions[t.y], positions[t.z]}, moved};
+      Coverage::Element element{
+          static_cast<std::uint32_t>(f), {mesh_->position(t.x), mesh_->position(t.y), mesh_->position(t.z)}, moved};
       element.corners[corner] = position;
       elements_.push_back(element);
-      faces_.push_back({true, corner, positions[vertex], {t.x, t.y, t.z}, 0});
+      faces_.push_back({true, corner, mesh_->position(vertex), {t.x, t.y, t.z}, 0});
     }
     at = mesh.next_halfedge_handle(mesh.opposite_halfedge_handle(at));
   } while (at != start);
@@ -172,8 +171,8 @@ void Change::gather_side(std::uint32_t vertex, const glm::dvec3& position, doubl
 bool Change::gather(Halfedge h, const glm::dvec3& position) {
   const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
   const std::uint32_t v0 = mesh_->from(h), v1 = mesh_->to(h);
-  const double moved0 = glm::length(mesh_->positions_[v0] - position),
-               moved1 = glm::length(mesh_->positions_[v1] - position);
+  const double moved0 = glm::length(mesh_->position(v0) - position),
+               moved1 = glm::length(mesh_->position(v1) - position);
   const int skip0 = mesh.face_handle(h).idx(), skip1 = mesh.opposite_face_handle(h).idx();
   gather_side(v0, position, moved0, skip0, skip1);
   const std::size_t of_v0 = elements_.size();
@@ -196,11 +195,11 @@ bool Change::gather(Halfedge h, const glm::dvec3& position) {
     std::size_t place = 0;
     while (place < elements_.size() && elements_[place].id != static_cast<std::uint32_t>(successor)) ++place;
     if (place == elements_.size()) {
-      const glm::uvec3& t = mesh_->triangles_[static_cast<std::size_t>(successor)];
+      const glm::uvec3& t = mesh_->triangle(static_cast<std::uint32_t>(successor));
       elements_.push_back({static_cast<std::uint32_t>(successor),
-                           {mesh_->positions_[t.x], mesh_->positions_[t.y], mesh_->positions_[t.z]},
+                           {mesh_->position(t.x), mesh_->position(t.y), mesh_->position(t.z)},
                            0});
-      faces_.push_back({false, 0, mesh_->positions_[t.x], {t.x, t.y, t.z}, 0});
+      faces_.push_back({false, 0, mesh_->position(t.x), {t.x, t.y, t.z}, 0});
     }
     removed_.push_back({static_cast<std::uint32_t>(f), static_cast<std::uint32_t>(place), std::max(moved0, moved1)});
   }
@@ -212,7 +211,7 @@ bool Change::gather(Halfedge h, const glm::dvec3& position) {
 bool Change::wedges_fit(Halfedge h) {
   const std::uint32_t v0 = mesh_->from(h), v1 = mesh_->to(h);
   const auto corner_of = [&](std::uint32_t f, std::uint32_t v) {
-    return mesh_->triangles_[f].x == v ? 0 : mesh_->triangles_[f].y == v ? 1 : 2;
+    return mesh_->triangle(f).x == v ? 0 : mesh_->triangle(f).y == v ? 1 : 2;
   };
   struct Side {
     std::uint32_t lost;  ///< the wedge at v0
@@ -220,19 +219,19 @@ bool Change::wedges_fit(Halfedge h) {
   };
   std::array<Side, 2> sides{};
   std::size_t count = 0;
-  for (const Halfedge side : {h, mesh_->mesh_.opposite_halfedge_handle(h)}) {
-    const int face = mesh_->mesh_.face_handle(side).idx();
+  for (const Halfedge side : {h, mesh_->connectivity().opposite_halfedge_handle(h)}) {
+    const int face = mesh_->connectivity().face_handle(side).idx();
     if (face < 0) continue;
     const std::uint32_t f = static_cast<std::uint32_t>(face);
     const int c0 = corner_of(f, v0), c1 = corner_of(f, v1);
-    sides[count++] = {mesh_->wedges_[f][c0], {mesh_->wedges_[f][c1], mesh_->corner_source_[f][c1]}};
+    sides[count++] = {mesh_->wedge(f, c0), {mesh_->wedge(f, c1), mesh_->corner_source(f, c1)}};
   }
   // One wedge at v0 would have to become two at v1.
   if (count == 2 && sides[0].lost == sides[1].lost && sides[0].gained.wedge != sides[1].gained.wedge) return false;
   for (std::size_t i = 0; i < elements_.size(); ++i) {
     const Face& face = faces_[i];
     if (face.vertices[face.corner] != v0) continue;
-    const std::uint32_t f = elements_[i].id, wedge = mesh_->wedges_[f][face.corner];
+    const std::uint32_t f = elements_[i].id, wedge = mesh_->wedge(f, face.corner);
     const auto side = std::find_if(sides.begin(), sides.begin() + static_cast<std::ptrdiff_t>(count),
                                    [&](const Side& s) { return s.lost == wedge; });
     if (side == sides.begin() + static_cast<std::ptrdiff_t>(count)) return false;
@@ -305,9 +304,9 @@ bool Change::slots_fit() {
 bool Change::folds_over() const {
   if (kind_ == Kind::flip) {
     const auto normal = [&](std::uint32_t face) {
-      const glm::uvec3& t = mesh_->triangles_[face];
-      const auto& p = mesh_->positions_;
-      return glm::cross(p[t.y] - p[t.x], p[t.z] - p[t.x]);
+      const glm::uvec3& t = mesh_->triangle(face);
+      const glm::dvec3& a = mesh_->position(t.x);
+      return glm::cross(mesh_->position(t.y) - a, mesh_->position(t.z) - a);
     };
     const glm::dvec3 before = normal(elements_[0].id) + normal(elements_[1].id);
     return std::any_of(elements_.begin(), elements_.end(), [&](const Coverage::Element& e) {
@@ -333,9 +332,8 @@ double Change::share(const Face& face) const {
 
 void Change::gather_replaced_faces() {
   const auto add = [&](std::uint32_t id) {
-    const glm::uvec3& t = mesh_->triangles_[id];
-    const auto& p = mesh_->positions_;
-    replaced_faces_.add(p[t.x], p[t.y], p[t.z], mesh_->face_distance_[id]);
+    const glm::uvec3& t = mesh_->triangle(id);
+    replaced_faces_.add(mesh_->position(t.x), mesh_->position(t.y), mesh_->position(t.z), mesh_->face_distance(id));
   };
   for (const Coverage::Element& e : elements_) add(e.id);
   for (const Coverage::Removed& r : removed_) add(r.id);
@@ -369,7 +367,6 @@ bool Change::shows_outside() {
 }
 
 bool Change::faces_are_inside() {
-  const auto& distance = mesh_->distance_;
   replaced_faces_.clear();
   for (std::size_t k = 0; k < elements_.size(); ++k) {
     const std::size_t i = (failed_last_ + k) % elements_.size();
@@ -377,14 +374,15 @@ bool Change::faces_are_inside() {
     Face& face = faces_[i];
     const TriangleCertificate forward = mesh_->bounds().forward->narrowed(share(face));
     // No point of the face moves farther than its moving corner.
-    face.distance = mesh_->face_distance_[element.id] + element.moved;
+    face.distance = mesh_->face_distance(element.id) + element.moved;
     if (element.moved == 0 || face.distance <= forward.limit()) continue;
     if (is_large(element)) {
       if (replaced_faces_.empty()) gather_replaced_faces();
       face.distance = replaced_faces_.bound(element.corners, forward.limit());
       if (face.distance <= forward.limit()) continue;
     }
-    glm::dvec3 corners(distance[face.vertices[0]], distance[face.vertices[1]], distance[face.vertices[2]]);
+    glm::dvec3 corners(mesh_->distance(face.vertices[0]), mesh_->distance(face.vertices[1]),
+                       mesh_->distance(face.vertices[2]));
     if (kind_ != Kind::flip) corners[face.corner] = new_distance_;
     face.distance = forward.bound_with_room(element.corners, corners);
     if (face.distance == TriangleCertificate::kUnproved) {
@@ -413,15 +411,14 @@ void Change::boundary_of_collapse() {
   // The boundary runs a -> s -> t -> c; s and t merge into one.
   const Halfedge previous = mesh.prev_halfedge_handle(edge), next = mesh.next_halfedge_handle(edge);
   const std::uint32_t a = mesh_->from(previous), s = mesh_->from(edge), t = mesh_->to(edge), c = mesh_->to(next);
-  const auto& positions = mesh_->positions_;
-  const glm::dvec3& p = position_.position;
-  const double moved_s = glm::length(positions[s] - p), moved_t = glm::length(positions[t] - p);
-  boundary_elements_.push_back({a, {positions[a], p, p}, moved_s});
+  const glm::dvec3 &p = position_.position, &pa = mesh_->position(a), &pc = mesh_->position(c);
+  const double moved_s = glm::length(mesh_->position(s) - p), moved_t = glm::length(mesh_->position(t) - p);
+  boundary_elements_.push_back({a, {pa, p, p}, moved_s});
   if (vertex_ == t) {
-    boundary_elements_.push_back({t, {p, positions[c], positions[c]}, moved_t});
+    boundary_elements_.push_back({t, {p, pc, pc}, moved_t});
     boundary_removed_.push_back({s, 1, std::max(moved_s, moved_t)});
   } else {
-    boundary_elements_.push_back({s, {p, positions[c], positions[c]}, std::max(moved_s, moved_t)});
+    boundary_elements_.push_back({s, {p, pc, pc}, std::max(moved_s, moved_t)});
     boundary_removed_.push_back({t, 1, moved_t});
   }
 }
@@ -432,8 +429,8 @@ void Change::boundary_of_relocation() {
   // The kernel keeps the outgoing halfedge of a boundary vertex on the boundary.
   const Halfedge next = mesh.halfedge_handle(BoundedMesh::handle(vertex_)), previous = mesh.prev_halfedge_handle(next);
   const std::uint32_t a = mesh_->from(previous), c = mesh_->to(next);
-  const glm::dvec3 &p = position_.position, &pa = mesh_->positions_[a], &pc = mesh_->positions_[c];
-  const double moved = glm::length(mesh_->positions_[vertex_] - p);
+  const glm::dvec3 &p = position_.position, &pa = mesh_->position(a), &pc = mesh_->position(c);
+  const double moved = glm::length(mesh_->position(vertex_) - p);
   boundary_elements_ = {{a, {pa, p, p}, moved}, {vertex_, {p, pc, pc}, moved}};
 }
 

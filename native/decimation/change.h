@@ -19,6 +19,8 @@ class Change {
   using Halfedge = BoundedMesh::Halfedge;
   using Edge = BoundedMesh::Edge;
 
+  enum class Kind { collapse, relocate, flip };
+
   /// Ordered: what was refused at one position may succeed at another, what is impossible cannot.
   enum class Outcome { impossible, refused, possible };
 
@@ -29,6 +31,16 @@ class Change {
     glm::dvec3 before;  ///< from here
     std::uint32_t vertices[3];
     double distance;  ///< upper bound on the distance of its points to the reference
+  };
+
+  /// What a corner has at its vertex: its wedge, and the input corner of which it takes the attributes.
+  struct Corner {
+    std::uint32_t wedge, source;
+  };
+  struct NewWedge {
+    std::uint32_t triangle;
+    int corner;
+    Corner gained;
   };
 
   /// Whether check() looks for the proofs of all bounds, or leaves them to a DeferredProof and asks only where the
@@ -53,13 +65,30 @@ class Change {
   Outcome check();
 
   Proof proof() const { return proof_; }
+  Kind kind() const { return kind_; }
   const std::vector<Coverage::Element>& elements() const { return elements_; }
   const std::vector<Face>& faces() const { return faces_; }  ///< parallel to elements()
   const std::vector<Coverage::Removed>& removed() const { return removed_; }
   /// Of a collapse, the halfedges whose start merges into their end: one, or one in each sheet.
   const std::vector<Halfedge>& collapses() const { return collapses_; }
+  /// Of a collapse, the halfedge that it was asked for: one of collapses().
+  Halfedge halfedge() const { return halfedge_; }
+  /// Of a collapse, the copies of the vertex that vanishes that move along with it: they become copies of vertex().
+  const std::vector<std::uint32_t>& carried() const { return carried_; }
+  /// Of a flip.
+  Edge edge() const { return edge_; }
   /// The vertex that a collapse leaves or that a relocation moves; none of a flip.
   std::optional<std::uint32_t> vertex() const { return kind_ == Kind::flip ? std::nullopt : std::optional(vertex_); }
+  /// Where that vertex goes.
+  const VertexPosition& position() const { return position_; }
+  const std::vector<NewWedge>& new_wedges() const { return new_wedges_; }
+  /// An upper bound on the distance to the reference there, where check() has asked the forward bound.
+  double distance() const { return new_distance_; }
+  /// Whether boundary edges with bounds of their own change.
+  bool changes_boundary() const { return !boundary_elements_.empty(); }
+  /// The trials of a check() that found the change possible.
+  const Coverage::Trial& backward() const { return backward_; }
+  const Coverage::Trial& boundary_backward() const { return boundary_backward_; }
   /// Whether one of the series of tries was refused because another vertex is where its vertex would be, or would be
   /// now: then it holds no longer than that vertex stays there.
   bool met_another() const { return met_another_ || meets_another(); }
@@ -69,17 +98,6 @@ class Change {
   void begin() { failed_last_ = 0, met_another_ = false, backward_.begin(), boundary_backward_.begin(); }
 
  private:
-  friend class BoundedMesh;
-  enum class Kind { collapse, relocate, flip };
-  struct Corner {
-    std::uint32_t wedge, source;
-  };
-  struct NewWedge {
-    std::uint32_t triangle;
-    int corner;
-    Corner gained;
-  };
-
   void clear(Kind kind, const VertexPosition& target);
   double share(const Face& face) const;
   void gather_side(std::uint32_t vertex, const glm::dvec3& position, double moved, int skip0, int skip1);

@@ -26,7 +26,7 @@ class DeferredProof {
                 std::span<const std::uint32_t> faces, std::vector<std::uint32_t>& places);
 
   /// Boundary edges with bounds of their own are proved at once.
-  bool possible() const { return possible_; }
+  bool possible() const;
   /// Before a collapse of the region is carried out.
   void note(const Change& change);
   /// Whether what the region has become keeps the bounds; if so, it is what further changes start from. O(faces and
@@ -36,29 +36,6 @@ class DeferredProof {
   void take_back();
 
  private:
-  using Kernel = OpenMesh::TriConnectivity;
-  struct SavedVertex {
-    VertexPosition position;
-    Quadric quadric;
-    double distance, share;
-    bool left_original;
-  };
-  struct SavedFace {
-    glm::uvec3 triangle, wedges, corner_source;
-    double distance;
-    Kernel::Face kernel;
-  };
-  struct SavedHalfedge {
-    BoundedMesh::Halfedge halfedge;
-    Kernel::Halfedge kernel;
-  };
-  struct SavedAnchor {  ///< the halfedge that the kernel finds a vertex's others by
-    std::uint32_t vertex;
-    BoundedMesh::Halfedge halfedge;
-  };
-
-  void save_vertex(std::uint32_t vertex);
-  void save_face(std::uint32_t face);
   std::uint32_t successor(std::uint32_t place) const;
   bool faces_hold();
   bool pieces_hold();
@@ -67,11 +44,8 @@ class DeferredProof {
   BoundedMesh& mesh_;
   std::span<const std::uint32_t> vertices_, faces_;
   std::vector<std::uint32_t>& places_;
-  bool possible_ = true;
-  std::vector<SavedVertex> saved_vertices_;
-  std::vector<SavedFace> saved_faces_;
-  std::vector<SavedHalfedge> saved_halfedges_;
-  std::vector<SavedAnchor> saved_anchors_;
+  const BoundedMesh::Saved saved_;
+  std::vector<Quadric> quadrics_;          ///< as they were
   std::vector<std::uint8_t> changed_;      ///< per face
   std::vector<std::uint32_t> successors_;  ///< per face: the place of the one that it was removed for, or its own
   std::vector<std::uint32_t> alive_;       ///< places of the faces that are left,

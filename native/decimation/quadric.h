@@ -31,7 +31,6 @@ struct Quadric {
     xx += q.xx, xy += q.xy, xz += q.xz, yy += q.yy, yz += q.yz, zz += q.zz, b += q.b, c += q.c;
     return *this;
   }
-  friend Quadric operator+(Quadric a, const Quadric& b) { return a += b; }
 
   double operator()(const glm::dvec3& p) const {
     return p.x * (xx * p.x + 2 * (xy * p.y + xz * p.z)) + p.y * (yy * p.y + 2 * yz * p.z) + zz * p.z * p.z +
@@ -51,5 +50,7 @@ struct Quadric {
            -determinant;
   }
 };
+
+inline Quadric operator+(Quadric a, const Quadric& b) { return a += b; }
 
 }  // namespace tolvol
