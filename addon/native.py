@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Loads the compiled module `tolvol` for all of the add-on.
+"""Loads the package `tolvol` for all of the add-on.
 
-`module` is the compiled module, found at `path`. If it cannot be loaded, `module` is None and `reason` says why; the
-panel shows the reason. The module is searched in this order: in the add-on's own folder (bin/ or beside this file), in
-the folders of the environment variable TOLVOL_PYTHON_PATH, and in build/release/python of a checkout.
+`module` is the package, and `path` is its compiled module. If it cannot be loaded, `module` is None and `reason` says
+why; the panel shows the reason. The package is searched in this order: in the add-on's own folder bin/, in the folders
+of the environment variable TOLVOL_PYTHON_PATH, and in build/release/python of a checkout.
 
-The add-on loads a private copy of the module, named by its content. Blender never unloads a library, and replacing a
-library file that is in use (by installing the add-on or building the module again) would crash the session. The copy is
-put into the first folder from which libraries may be loaded: some machines mount the folder for temporary files `noexec`.
+The add-on loads a private copy of the package, named by its content. Blender never unloads a library, and replacing a
+library file that is in use (by installing the add-on or building the module again) would crash the session. The name
+also keeps the copy apart from a package tolvol that the user has installed. The copy is put into the first folder from
+which libraries may be loaded: some machines mount the folder for temporary files `noexec`.
 """
 
 import hashlib
@@ -26,7 +27,6 @@ _FOLDER = Path(__file__).resolve().parent
 
 def _folders():
     yield _FOLDER / "bin"
-    yield _FOLDER
     for entry in os.environ.get("TOLVOL_PYTHON_PATH", "").split(os.pathsep):
         if entry:
             yield Path(entry)
@@ -37,31 +37,32 @@ def _binaries():
     """Returns (the first file that this Python can load or None, the names of the files for other Pythons)."""
     others = []
     for folder in _folders():
-        if not folder.is_dir():
-            continue
-        files = sorted(p for p in folder.iterdir() if p.name.startswith("tolvol.") and p.suffix in {".so", ".pyd"})
+        files = sorted(p for p in (folder / "tolvol").glob("_native.*") if p.suffix in {".so", ".pyd"})
         for path in files:
-            if any(path.name == "tolvol" + suffix for suffix in importlib.machinery.EXTENSION_SUFFIXES):
+            if any(path.name == "_native" + suffix for suffix in importlib.machinery.EXTENSION_SUFFIXES):
                 return path, others
         others += [path.name for path in files]
     return None, others
 
 
 def _load():
-    """Returns (module, its path, None) or (None, None, reason)."""
+    """Returns (package, path of its compiled module, None) or (None, None, reason)."""
     path, others = _binaries()
     python = f"Python {sys.version_info.major}.{sys.version_info.minor}"
     if path is None and others:
         return None, None, f"{others[0]} is not made for this Blender's {python}: install the package for that version"
     if path is None:
-        return None, None, "The compiled module tolvol is missing: install the add-on's zip, or build it with setup.sh"
-    name = f"tolvol_{hashlib.blake2b(path.read_bytes(), digest_size=8).hexdigest()}"
-    # sys.modules survives a reload of this file, so that a module with the same content is loaded once per session.
+        return None, None, "The package tolvol is missing: install the add-on's zip, or build it with setup.sh"
+    files = [path, *sorted(path.parent.glob("*.py"))]
+    name = f"tolvol_{hashlib.blake2b(b''.join(file.read_bytes() for file in files), digest_size=8).hexdigest()}"
+    # The libraries of the package are copied too: the compiled module looks for them beside itself.
+    files += path.parent.glob("lib*.so*")
+    # sys.modules survives a reload of this file, so that a package with the same content is loaded once per session.
     if name not in sys.modules:
         problems = []
         for folder in _folders_for_copies():
             try:
-                sys.modules[name] = _load_copy(path, name, folder)
+                _load_copy(files, name, folder)
                 break
             except (ImportError, OSError) as error:
                 problems.append((folder, error))
@@ -71,25 +72,30 @@ def _load():
 
 
 def _folders_for_copies():
-    """Yields the folders to which the module may be copied, the preferred one first."""
+    """Yields the folders to which the package may be copied, the preferred one first."""
     yield Path(tempfile.gettempdir())
     yield Path(bpy.app.tempdir)  # Blender's preferences may set another folder than the system's.
     yield Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     yield _FOLDER
 
 
-def _load_copy(path, name, parent):
+def _load_copy(files, name, parent):
+    """Loads a copy of the files as the package `name`."""
     # The loaded copy needs no file any more, so the folder is removed. Windows cannot remove a loaded file: it stays there.
     with tempfile.TemporaryDirectory(prefix="tolvol-", dir=parent, ignore_cleanup_errors=True) as folder:
-        copy = Path(folder) / name / path.name
-        copy.parent.mkdir()
-        # The libraries of the package are copied too: the module looks for them beside itself.
-        for file in (path, *path.parent.glob("lib*.so*")):
-            shutil.copyfile(file, copy.with_name(file.name))
-        spec = importlib.util.spec_from_file_location("tolvol", copy)
-        loaded = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(loaded)
-    return loaded
+        copy = Path(folder) / name
+        copy.mkdir()
+        for file in files:
+            shutil.copyfile(file, copy / file.name)
+        spec = importlib.util.spec_from_file_location(
+            name, copy / "__init__.py", submodule_search_locations=[str(copy)]
+        )
+        sys.modules[name] = importlib.util.module_from_spec(spec)
+        try:
+            spec.loader.exec_module(sys.modules[name])
+        except BaseException:
+            del sys.modules[name]
+            raise
 
 
 def _why_not_loaded(path, problems):

@@ -271,7 +271,7 @@ def compare(mesh, tolerance, options, numbers):
         else:
             percent = 100 * tolerance / mesh.size
             if TOOLS[name].package == "tolvol":  # Its version number stays the same while its code changes.
-                number += "-" + digest(Path(tolvol.__file__).read_bytes())
+                number += "-" + digest(Path(tolvol._native.__file__).read_bytes())
             label = f"{mesh.name}-{mesh.digest()}-{percent:.6g}-{options.threads}-{options.limit}-{name}-{number}.json"
             entries[name] = remembered(
                 BUILD / "results" / label,

@@ -35,15 +35,12 @@ void refuse_uninitialised_objects(const pybind11::module_& module) {
 
 }  // namespace
 
-PYBIND11_MODULE(tolvol, module) {
+PYBIND11_MODULE(_native, module) {
   refuse_newer_numpy();
-  module.doc() =
-      "Tolerance volumes: keep a triangle mesh within a tolerance of a reference surface, proved.\n\n"
-      "Vertices are (n, 3) float32 or float64 arrays in local coordinates; to_world is a (4, 4) matrix that maps them "
-      "to world\n"
-      "units, in which tolerances and distances are given. Triangles are (m, 3) integer arrays. Long calls release the "
-      "GIL and\n"
-      "take progress= (a Progress) and threads= (0: one per core; the result never depends on it).";
+  module.doc() = "The compiled part of the package tolvol.";
+  // Classes, errors and signatures take their module's name from here: users know the package alone.
+  const pybind11::object name = module.attr("__name__");
+  module.attr("__name__") = "tolvol";
   module.attr("__version__") = TOLVOL_VERSION;
   tolvol::python::bind_errors(module);
   tolvol::python::bind_progress(module);
@@ -57,4 +54,5 @@ PYBIND11_MODULE(tolvol, module) {
   tolvol::python::bind_measure(module);
   tolvol::python::bind_picture(module);
   refuse_uninitialised_objects(module);
+  module.attr("__name__") = name;
 }

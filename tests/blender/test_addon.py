@@ -5,6 +5,7 @@ import ast
 import importlib
 import os
 import re
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -98,7 +99,7 @@ def test_tooltips_and_labels_follow_blender():
 
 
 def test_loaded_module_is_a_private_copy():
-    loaded = Path(native.module.__file__)
+    loaded = Path(sys.modules[native.module.__name__ + "._native"].__file__)
     assert loaded.parent != native.path.parent and re.fullmatch(r"tolvol_[0-9a-f]{16}", loaded.parent.name)
     mapped = Path("/proc/self/maps").read_text()
     assert str(loaded) in mapped and str(native.path) not in mapped
@@ -166,11 +167,14 @@ def test_package_holds_what_is_here():
         shaders = {name for name in others if name.startswith("tolerance_volumes/shaders/")}
         for name in shaders:
             assert archive.read(name) == (ROOT / "shaders" / Path(name).name).read_bytes(), f"pack {name} anew"
-    libraries = {name for name in others if re.fullmatch(r"tolerance_volumes/bin/(tolvol\.|lib).*", name)}
-    modules = {name for name in libraries if "/tolvol." in name}
-    assert {Path(name).name for name in modules} == {path.name for path in native.path.parent.glob("tolvol.*.so")}
+    libraries = {name for name in others if re.fullmatch(r"tolerance_volumes/bin/tolvol/(_native\.|lib).*", name)}
+    modules = {name for name in libraries if "/_native." in name}
+    assert {Path(name).name for name in modules} == {path.name for path in native.path.parent.glob("_native.*.so")}
     assert native.path.name in {Path(name).name for name in modules} and len(shaders) == 2
-    assert others - libraries - shaders == {"tolerance_volumes/LICENSE"}
+    assert others - libraries - shaders == {
+        "tolerance_volumes/LICENSE",
+        "tolerance_volumes/bin/tolvol/__init__.py",
+    }
 
 
 DECIMATE = """
@@ -244,14 +248,14 @@ ok()""",
     ("others", "reason"),
     [
         ([], "is missing"),
-        (["tolvol.cpython-39-x86_64-linux-gnu.so"], "tolvol.cpython-39.* is not made for this Blender's Python"),
+        (["_native.cpython-39-x86_64-linux-gnu.so"], "_native.cpython-39.* is not made for this Blender's Python"),
     ],
 )
 def test_without_the_module_the_addon_stays_and_says_why(tmp_path, others, reason):
     archive = repack(tmp_path / "addon.zip", keep=lambda name: "/bin/" not in name)
     with zipfile.ZipFile(archive, "a") as extended:
         for name in others:
-            extended.writestr(f"tolerance_volumes/bin/{name}", b"")
+            extended.writestr(f"tolerance_volumes/bin/tolvol/{name}", b"")
     run_blender(
         f"""
 import bpy, re
@@ -272,8 +276,10 @@ ok()""",
 
 
 def test_a_module_that_does_not_load_is_a_reason(tmp_path):
-    suffix = importlib.machinery.EXTENSION_SUFFIXES[0]
-    (tmp_path / f"tolvol{suffix}").write_bytes(b"no library")
+    package = tmp_path / "tolvol"
+    package.mkdir()
+    (package / "__init__.py").write_text("from ._native import decimate")
+    (package / f"_native{importlib.machinery.EXTENSION_SUFFIXES[0]}").write_bytes(b"no library")
     run_blender(
         f"""
 sys.path.insert(0, {str(ROOT)!r})
@@ -318,13 +324,15 @@ def test_a_temporary_folder_mounted_noexec(tmp_path, everywhere):
 
 def test_module_is_looked_for_in_the_environments_folder(tmp_path):
     # The content differs, but it is still a library.
-    (tmp_path / native.path.name).write_bytes(native.path.read_bytes() + b"\0")
+    shutil.copytree(native.path.parent, tmp_path / "tolvol")
+    path = tmp_path / "tolvol" / native.path.name
+    path.write_bytes(native.path.read_bytes() + b"\0")
     out = run_blender(
         f"""
 sys.path.insert(0, {str(ROOT)!r})
 from addon import native
 print(native.path)
-assert str(native.path) == {str(tmp_path / native.path.name)!r}
+assert str(native.path) == {str(path)!r}
 print(os.path.basename(os.path.dirname(native.module.__file__)))
 ok()""",
         tmp_path,

@@ -12,7 +12,7 @@ import tolvol
 import meshes
 
 ROOT = Path(__file__).resolve().parents[2]
-BUILD = Path(tolvol.__file__).resolve().parents[1]
+BUILD = Path(tolvol.__file__).resolve().parents[2]
 
 
 def run(*command, ok=True):

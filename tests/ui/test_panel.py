@@ -247,7 +247,7 @@ def test_what_is_in_the_way_is_said():
     # A running count would need the module, which is never removed while Blender runs.
     suzanne().tolvol.show_deviation = False
     found = native.module
-    native.module, native.reason = None, "The compiled module tolvol is missing: install the add-on's zip"
+    native.module, native.reason = None, "The package tolvol is missing: install the add-on's zip"
     view()[1].tag_redraw()
     yield 0.5
     screenshot("13 no module")
