@@ -139,16 +139,11 @@ void BoundedMesh::merge_copies(const Change& change) {
   for (const std::uint32_t v : change.carried()) {
     slots_[v] = kept;
     place(v, change.position());
-    if (bounds_.forward) distance_[v] = change.distance();
   }
   for (const std::uint32_t v : copies(kept_vertex)) joined_[v] = true;
 }
 
 void BoundedMesh::apply(const Change& change) {
-  const bool proved = change.proof() == Change::Proof::now;
-  if (bounds_.baseline) bounds_.baseline->commit();
-  if (bounds_.backward && proved) bounds_.backward->commit(change.backward());
-  if (change.changes_boundary()) bounds_.boundary_backward->commit(change.boundary_backward());
   for (const Change::NewWedge& n : change.new_wedges()) {
     wedges_[n.triangle][n.corner] = n.gained.wedge;
     corner_source_[n.triangle][n.corner] = n.gained.source;
@@ -160,7 +155,6 @@ void BoundedMesh::apply(const Change& change) {
     const glm::uvec3 triangle(face.vertices[0], face.vertices[1], face.vertices[2]);
     if (is_flip) count_around(triangles_[id], -1), count_around(triangle, 1);
     triangles_[id] = triangle;
-    if (bounds_.forward && proved) face_distance_[id] = face.distance;
   }
   if (is_flip) {
     mesh_.flip(change.edge());
@@ -181,7 +175,6 @@ void BoundedMesh::apply(const Change& change) {
     }
   }
   place(*change.vertex(), change.position());
-  if (bounds_.forward) distance_[*change.vertex()] = change.distance();
 }
 
 BoundedMesh::Saved BoundedMesh::save(std::span<const std::uint32_t> vertices,

@@ -78,7 +78,8 @@ class BoundedMesh {
   /// points of a face (infinite where none is known).
   double distance(std::uint32_t vertex) const { return distance_[vertex]; }
   double face_distance(std::uint32_t triangle) const { return face_distance_[triangle]; }
-  /// Notes such a bound, which was proved for the face as it is.
+  /// Notes such a bound, which was proved.
+  void note_distance(std::uint32_t vertex, double distance) { distance_[vertex] = distance; }
   void note_face_distance(std::uint32_t triangle, double distance) { face_distance_[triangle] = distance; }
   /// Of the forward bound, what new faces around the vertex may use.
   double share(std::uint32_t vertex) const { return shares_.empty() ? 1 : shares_[vertex]; }
@@ -135,8 +136,7 @@ class BoundedMesh {
            occupied_.contains(target.stored);
   }
 
-  /// Carries out a change whose last try succeeded on this mesh as it is. What is to be proved later then is, by a
-  /// DeferredProof.
+  /// Carries out a change that is possible on this mesh as it is. Whoever decides about changes calls it, ChangeTrial.
   void apply(const Change& change);
 
   /// Some vertices and faces as they were, with the halfedges of these faces and those opposite to them at a boundary.

@@ -4,7 +4,6 @@
 #include "decimation/change.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace tolvol {
@@ -22,38 +21,15 @@ bool turns_too_far(const glm::dvec3& before, const glm::dvec3& after) {
 
 }  // namespace
 
-Change::Outcome Change::try_collapse(Halfedge h, const VertexPosition& target) {
-  if (!std::isfinite(glm::dot(target.position, glm::dvec3(1)))) return Outcome::refused;  // beyond the stored type
-  return prepare_collapse(h, target) ? check() : Outcome::impossible;
-}
-
-Change::Outcome Change::try_relocate(std::uint32_t vertex, const VertexPosition& target) {
-  if (!std::isfinite(glm::dot(target.position, glm::dvec3(1)))) return Outcome::refused;
-  return prepare_relocate(vertex, target) ? check() : Outcome::impossible;
-}
-
-Change::Outcome Change::try_flip(Edge e) { return prepare_flip(e) ? check() : Outcome::impossible; }
-
 bool Change::meets_another() const {
   if (kind_ == Kind::flip) return false;
   const std::uint32_t other = kind_ == Kind::collapse ? mesh_->from(halfedge_) : vertex_;
   return mesh_->meets_another(position_, vertex_, other);
 }
 
-Change::Outcome Change::check() {
-  if (meets_another()) {
-    met_another_ = true;
-    return Outcome::refused;
-  }
-  const bool kept =
-      !folds_over() && (proof_ == Proof::later ? vertex_is_inside() : keeps_bounds() && boundary_is_inside());
-  return kept ? Outcome::possible : Outcome::refused;
-}
-
 void Change::clear(Kind kind, const VertexPosition& target) {
   kind_ = kind, position_ = target, share_ = 1;
   elements_.clear(), faces_.clear(), removed_.clear(), new_wedges_.clear();
-  boundary_elements_.clear(), boundary_removed_.clear();
 }
 
 bool Change::prepare_collapse(Halfedge h, const VertexPosition& target) {
@@ -76,7 +52,6 @@ bool Change::prepare_collapse(Halfedge h, const VertexPosition& target) {
       if (face.vertices[face.corner] == mesh_->from(each)) face.vertices[face.corner] = mesh_->to(each);
     }
   }
-  boundary_of_collapse();
   return true;
 }
 
@@ -85,7 +60,6 @@ bool Change::prepare_relocate(std::uint32_t vertex, const VertexPosition& target
   vertex_ = vertex, share_ = mesh_->share(vertex);
   constexpr int kNoFace = -1;
   gather_side(vertex, target.position, glm::length(mesh_->position(vertex) - target.position), kNoFace, kNoFace);
-  boundary_of_relocation();
   return true;
 }
 
@@ -105,7 +79,7 @@ bool Change::prepare_flip(Edge e) {
   constexpr double kAnywhere = std::numeric_limits<double>::infinity();  // no point of a face is carried along
   const auto add = [&](std::uint32_t id, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
     elements_.push_back({id, {mesh_->position(x), mesh_->position(y), mesh_->position(z)}, kAnywhere});
-    faces_.push_back({false, 0, mesh_->position(x), {x, y, z}, 0});
+    faces_.push_back({false, 0, mesh_->position(x), {x, y, z}});
   };
   add(first, b, d, c), add(second, a, c, d);
   if (!mesh_->has_wedges()) return true;
@@ -162,7 +136,7 @@ void Change::gather_side(std::uint32_t vertex, const glm::dvec3& position, doubl
           static_cast<std::uint32_t>(f), {mesh_->position(t.x), mesh_->position(t.y), mesh_->position(t.z)}, moved};
       element.corners[corner] = position;
       elements_.push_back(element);
-      faces_.push_back({true, corner, mesh_->position(vertex), {t.x, t.y, t.z}, 0});
+      faces_.push_back({true, corner, mesh_->position(vertex), {t.x, t.y, t.z}});
     }
     at = mesh.next_halfedge_handle(mesh.opposite_halfedge_handle(at));
   } while (at != start);
@@ -199,7 +173,7 @@ bool Change::gather(Halfedge h, const glm::dvec3& position) {
       elements_.push_back({static_cast<std::uint32_t>(successor),
                            {mesh_->position(t.x), mesh_->position(t.y), mesh_->position(t.z)},
                            0});
-      faces_.push_back({false, 0, mesh_->position(t.x), {t.x, t.y, t.z}, 0});
+      faces_.push_back({false, 0, mesh_->position(t.x), {t.x, t.y, t.z}});
     }
     removed_.push_back({static_cast<std::uint32_t>(f), static_cast<std::uint32_t>(place), std::max(moved0, moved1)});
   }
@@ -323,126 +297,10 @@ bool Change::folds_over() const {
   return false;
 }
 
-/// Of the forward bound that the points of a face may use.
 double Change::share(const Face& face) const {
   double least = share_;
   for (const std::uint32_t v : face.vertices) least = std::min(least, mesh_->share(v));
   return least;
-}
-
-void Change::gather_replaced_faces() {
-  const auto add = [&](std::uint32_t id) {
-    const glm::uvec3& t = mesh_->triangle(id);
-    replaced_faces_.add(mesh_->position(t.x), mesh_->position(t.y), mesh_->position(t.z), mesh_->face_distance(id));
-  };
-  for (const Coverage::Element& e : elements_) add(e.id);
-  for (const Coverage::Removed& r : removed_) add(r.id);
-}
-
-/// Whether a face is likely to lie near many triangles of the reference.
-bool Change::is_large(const Coverage::Element& e) const {
-  constexpr double kLarge = 8;  // times the tolerance
-  const double large = kLarge * mesh_->bounds().forward->limit();
-  return longest_squared({{e.corners[0], e.corners[1], e.corners[2]}}) > large * large;
-}
-
-bool Change::vertex_is_inside() {
-  const TriangleCertificate& forward = *mesh_->bounds().forward;
-  new_distance_ = forward.distance_bound(position_.position);
-  return new_distance_ <= share_ * forward.limit();
-}
-
-/// Whether a point of a large face is outside: before anything is proved in vain.
-bool Change::shows_outside() {
-  for (std::size_t k = 0; k < elements_.size(); ++k) {
-    const std::size_t i = (failed_last_ + k) % elements_.size();
-    const Coverage::Element& element = elements_[i];
-    if (element.moved == 0 || !is_large(element)) continue;
-    if (mesh_->bounds().forward->narrowed(share(faces_[i])).shows_outside(element.corners)) {
-      failed_last_ = i;
-      return true;
-    }
-  }
-  return false;
-}
-
-bool Change::faces_are_inside() {
-  replaced_faces_.clear();
-  for (std::size_t k = 0; k < elements_.size(); ++k) {
-    const std::size_t i = (failed_last_ + k) % elements_.size();
-    const Coverage::Element& element = elements_[i];
-    Face& face = faces_[i];
-    const TriangleCertificate forward = mesh_->bounds().forward->narrowed(share(face));
-    // No point of the face moves farther than its moving corner.
-    face.distance = mesh_->face_distance(element.id) + element.moved;
-    if (element.moved == 0 || face.distance <= forward.limit()) continue;
-    if (is_large(element)) {
-      if (replaced_faces_.empty()) gather_replaced_faces();
-      face.distance = replaced_faces_.bound(element.corners, forward.limit());
-      if (face.distance <= forward.limit()) continue;
-    }
-    glm::dvec3 corners(mesh_->distance(face.vertices[0]), mesh_->distance(face.vertices[1]),
-                       mesh_->distance(face.vertices[2]));
-    if (kind_ != Kind::flip) corners[face.corner] = new_distance_;
-    face.distance = forward.bound_with_room(element.corners, corners);
-    if (face.distance == TriangleCertificate::kUnproved) {
-      failed_last_ = i;
-      return false;
-    }
-  }
-  return true;
-}
-
-/// In the order of what the answers cost.
-bool Change::keeps_bounds() {
-  const Bounds& bounds = mesh_->bounds();
-  if (bounds.baseline) return bounds.baseline->accepts(elements_, removed_);
-  if (bounds.forward && ((kind_ != Kind::flip && !vertex_is_inside()) || shows_outside())) return false;
-  if (bounds.backward && !bounds.backward->try_change(elements_, removed_, backward_)) return false;
-  return !bounds.forward || faces_are_inside();
-}
-
-void Change::boundary_of_collapse() {
-  if (!mesh_->bounds().boundary_backward) return;
-  const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
-  Halfedge edge = halfedge_;
-  if (!mesh.is_boundary(edge)) edge = mesh.opposite_halfedge_handle(halfedge_);
-  if (!mesh.is_boundary(edge)) return;
-  // The boundary runs a -> s -> t -> c; s and t merge into one.
-  const Halfedge previous = mesh.prev_halfedge_handle(edge), next = mesh.next_halfedge_handle(edge);
-  const std::uint32_t a = mesh_->from(previous), s = mesh_->from(edge), t = mesh_->to(edge), c = mesh_->to(next);
-  const glm::dvec3 &p = position_.position, &pa = mesh_->position(a), &pc = mesh_->position(c);
-  const double moved_s = glm::length(mesh_->position(s) - p), moved_t = glm::length(mesh_->position(t) - p);
-  boundary_elements_.push_back({a, {pa, p, p}, moved_s});
-  if (vertex_ == t) {
-    boundary_elements_.push_back({t, {p, pc, pc}, moved_t});
-    boundary_removed_.push_back({s, 1, std::max(moved_s, moved_t)});
-  } else {
-    boundary_elements_.push_back({s, {p, pc, pc}, std::max(moved_s, moved_t)});
-    boundary_removed_.push_back({t, 1, moved_t});
-  }
-}
-
-void Change::boundary_of_relocation() {
-  if (!mesh_->bounds().boundary_backward || !mesh_->on_boundary(vertex_)) return;
-  const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
-  // The kernel keeps the outgoing halfedge of a boundary vertex on the boundary.
-  const Halfedge next = mesh.halfedge_handle(BoundedMesh::handle(vertex_)), previous = mesh.prev_halfedge_handle(next);
-  const std::uint32_t a = mesh_->from(previous), c = mesh_->to(next);
-  const glm::dvec3 &p = position_.position, &pa = mesh_->position(a), &pc = mesh_->position(c);
-  const double moved = glm::length(mesh_->position(vertex_) - p);
-  boundary_elements_ = {{a, {pa, p, p}, moved}, {vertex_, {p, pc, pc}, moved}};
-}
-
-bool Change::boundary_is_inside() {
-  if (boundary_elements_.empty()) return true;
-  const Bounds& bounds = mesh_->bounds();
-  const glm::dvec3 unknown(std::numeric_limits<double>::infinity());
-  for (const Coverage::Element& e : boundary_elements_) {
-    if (e.moved > 0 && bounds.boundary_forward->bound(e.corners, unknown) == TriangleCertificate::kUnproved)
-      return false;
-  }
-  return bounds.boundary_backward->try_change(boundary_elements_, boundary_removed_, boundary_backward_);
 }
 
 }  // namespace tolvol

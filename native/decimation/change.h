@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// One change of a BoundedMesh under trial: the faces as they would be, and whether they keep the bounds. It only reads
-/// the mesh, and holds all that a trial needs, so that a thread each can try different changes of one mesh.
+/// One change of a BoundedMesh, a collapse, a relocation or a flip, and the faces as it would leave them. It says
+/// whether the mesh stays a manifold whose seams and sheets hold together; whether the bounds are kept, a ChangeTrial
+/// says. It only reads the mesh.
 #pragma once
 
 #include <array>
@@ -10,7 +11,6 @@
 #include <vector>
 
 #include "decimation/bounded_mesh.h"
-#include "decimation/replaced_faces.h"
 
 namespace tolvol {
 
@@ -21,18 +21,13 @@ class Change {
 
   enum class Kind { collapse, relocate, flip };
 
-  /// Ordered: what was refused at one position may succeed at another, what is impossible cannot.
-  enum class Outcome { impossible, refused, possible };
-
   /// A face as the change would leave it; its corners are in Coverage::Element.
   struct Face {
     bool moves;  ///< whether a corner of it moves: `corner`,
     int corner;
     glm::dvec3 before;  ///< from here
     std::uint32_t vertices[3];
-    double distance;  ///< upper bound on the distance of its points to the reference
   };
-
   /// What a corner has at its vertex: its wedge, and the input corner of which it takes the attributes.
   struct Corner {
     std::uint32_t wedge, source;
@@ -43,28 +38,19 @@ class Change {
     Corner gained;
   };
 
-  /// Whether check() looks for the proofs of all bounds, or leaves them to a DeferredProof and asks only where the
-  /// vertex is.
-  enum class Proof { now, later };
-
   /// Keeps a reference to `mesh`.
-  explicit Change(const BoundedMesh& mesh, Proof proof = Proof::now) : mesh_(&mesh), proof_(proof) {}
+  explicit Change(const BoundedMesh& mesh) : mesh_(&mesh) {}
 
+  // Each gathers the faces of another change, and returns whether that one is possible at all. One that is not possible
+  // is not to be asked for more.
   /// The start of `h` merges into its end, which goes to `target`.
-  Outcome try_collapse(Halfedge h, const VertexPosition& target);
-  /// A vertex moves.
-  Outcome try_relocate(std::uint32_t vertex, const VertexPosition& target);
-  /// The edge of two faces becomes the other diagonal.
-  Outcome try_flip(Edge e);
-
-  // The steps of the above, for a search that wants to see the faces before it pays for the bounds. Each prepares the
-  // faces and says whether the change is possible at all; check() then asks for the bounds.
   bool prepare_collapse(Halfedge h, const VertexPosition& target);
+  /// A vertex moves.
   bool prepare_relocate(std::uint32_t vertex, const VertexPosition& target);
+  /// The edge of two faces becomes the other diagonal.
   bool prepare_flip(Edge e);
-  Outcome check();
 
-  Proof proof() const { return proof_; }
+  const BoundedMesh& mesh() const { return *mesh_; }
   Kind kind() const { return kind_; }
   const std::vector<Coverage::Element>& elements() const { return elements_; }
   const std::vector<Face>& faces() const { return faces_; }  ///< parallel to elements()
@@ -82,44 +68,25 @@ class Change {
   /// Where that vertex goes.
   const VertexPosition& position() const { return position_; }
   const std::vector<NewWedge>& new_wedges() const { return new_wedges_; }
-  /// An upper bound on the distance to the reference there, where check() has asked the forward bound.
-  double distance() const { return new_distance_; }
-  /// Whether boundary edges with bounds of their own change.
-  bool changes_boundary() const { return !boundary_elements_.empty(); }
-  /// The trials of a check() that found the change possible.
-  const Coverage::Trial& backward() const { return backward_; }
-  const Coverage::Trial& boundary_backward() const { return boundary_backward_; }
-  /// Whether one of the series of tries was refused because another vertex is where its vertex would be, or would be
-  /// now: then it holds no longer than that vertex stays there.
-  bool met_another() const { return met_another_ || meets_another(); }
-  /// Parts of the reference's pieces that the series of tries has looked at.
-  std::size_t looked_at() const { return backward_.looked_at(); }
-  /// Starts a series of tries around one place. What it finds depends on nothing before.
-  void begin() { failed_last_ = 0, met_another_ = false, backward_.begin(), boundary_backward_.begin(); }
+  /// How much of the forward bound the vertex may use, and the points of a face.
+  double share() const { return share_; }
+  double share(const Face& face) const;
+
+  /// Whether the vertex would be where another vertex is.
+  bool meets_another() const;
+  /// Whether the normal of a face would turn too far.
+  bool folds_over() const;
 
  private:
   void clear(Kind kind, const VertexPosition& target);
-  double share(const Face& face) const;
   void gather_side(std::uint32_t vertex, const glm::dvec3& position, double moved, int skip0, int skip1);
   bool link_condition(Halfedge h);
   bool gather(Halfedge h, const glm::dvec3& position);
   bool wedges_fit(Halfedge h);
   bool gather_copies(Halfedge h);
   bool slots_fit();
-  bool meets_another() const;
-  bool folds_over() const;
-  void gather_replaced_faces();
-  bool is_large(const Coverage::Element& e) const;
-  bool vertex_is_inside();
-  bool shows_outside();
-  bool faces_are_inside();
-  bool keeps_bounds();
-  bool boundary_is_inside();
-  void boundary_of_collapse();
-  void boundary_of_relocation();
 
   const BoundedMesh* mesh_;
-  Proof proof_;
   Kind kind_ = Kind::collapse;
   Halfedge halfedge_;
   std::vector<Halfedge> collapses_;     ///< with the same edge of other sheets
@@ -127,21 +94,13 @@ class Change {
   Edge edge_;
   std::uint32_t vertex_ = 0;  ///< the one that moves
   VertexPosition position_{};
-  double share_ = 1;  ///< of the forward bound, at the vertex that moves
+  double share_ = 1;
   std::vector<Coverage::Element> elements_;
   std::vector<Face> faces_;
   std::vector<Coverage::Removed> removed_;
-  std::vector<Coverage::Element> boundary_elements_;
-  std::vector<Coverage::Removed> boundary_removed_;
   std::vector<NewWedge> new_wedges_;
   std::vector<int> neighbours_;
   std::vector<std::uint32_t> apexes_, around_;
-  ReplacedFaces replaced_faces_;
-  Coverage::Trial backward_, boundary_backward_;
-  double new_distance_ = 0;
-  bool met_another_ = false;
-  std::size_t failed_last_ =
-      0;  ///< the face that failed last: of another try at the same place it is the likeliest to fail
 };
 
 }  // namespace tolvol

@@ -130,14 +130,15 @@ std::optional<double> CollapseLoop::risen(const CollapseQueue::Entry& entry) con
 CollapseLoop::Tried* CollapseLoop::found(std::uint32_t edge) {
   if (!team_) return nullptr;
   Tried& tried = tried_[tried_of_[edge]];
-  if (tried.edge != edge || tried.met_another || (tried.attempt && tried.attempt->change.met_another())) return nullptr;
+  if (tried.edge != edge || tried.met_another || (tried.attempt && tried.attempt->trial.met_another())) return nullptr;
   const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
   return std::max(touched_[mesh_.from(h)], touched_[mesh_.to(h)]) <= tried.at ? &tried : nullptr;
 }
 
 std::unique_ptr<CollapseLoop::Attempt> CollapseLoop::take_attempt() {
   const std::lock_guard lock(idle_mutex_);
-  if (idle_.empty()) return std::make_unique<Attempt>(mesh_, later_ ? Change::Proof::later : Change::Proof::now);
+  if (idle_.empty())
+    return std::make_unique<Attempt>(mesh_, later_ ? ChangeTrial::Proof::later : ChangeTrial::Proof::now);
   std::unique_ptr<Attempt> last = std::move(idle_.back());
   idle_.pop_back();
   return last;
@@ -152,8 +153,8 @@ void CollapseLoop::give_back(std::unique_ptr<Attempt> attempt) {
 void CollapseLoop::try_now(Tried& tried) {
   std::unique_ptr<Attempt> attempt = take_attempt();
   collapse_.attempt(tried.edge, *attempt);
-  tried.outcome = attempt->outcome, tried.looked_at = attempt->change.looked_at();
-  tried.met_another = attempt->change.met_another();
+  tried.outcome = attempt->outcome, tried.looked_at = attempt->trial.looked_at();
+  tried.met_another = attempt->trial.met_another();
   if (tried.outcome == EdgeCollapse::Outcome::possible) {
     tried.attempt = std::move(attempt);
   } else {
@@ -218,7 +219,7 @@ bool CollapseLoop::reserved(std::uint32_t edge) const {
 void CollapseLoop::carry_out(Tried& tried) {
   const std::uint32_t edge = tried.edge;
   if (tried.outcome == EdgeCollapse::Outcome::possible) {
-    if (later_) later_->note(tried.attempt->change);
+    if (later_) later_->note(tried.attempt->trial.change());
     const auto h = tried.attempt->halfedge;
     const glm::dvec3 before = mesh_.position(mesh_.to(h));
     ring_.clear();

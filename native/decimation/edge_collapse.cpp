@@ -105,20 +105,20 @@ double EdgeCollapse::cost(std::uint32_t edge) const {
 
 void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
   a.outcome = Outcome::impossible;
+  a.trial.begin();
   const std::optional<Plan> p = plan(BoundedMesh::edge(edge));
   if (!p) return;
-  a.change.begin();
   a.halfedge = p->halfedge;
   const Halfedge h = a.halfedge;
-  a.outcome = a.change.try_collapse(
+  a.outcome = a.trial.try_collapse(
       h, p->freedom == Freedom::anywhere ? mesh_.store(p->position) : mesh_.vertex_position(mesh_.to(h)));
   if (a.outcome != Outcome::possible && p->freedom == Freedom::either_way) {
     const Halfedge other = mesh_.connectivity().opposite_halfedge_handle(h);
-    const Outcome second = a.change.try_collapse(other, mesh_.vertex_position(mesh_.from(h)));
+    const Outcome second = a.trial.try_collapse(other, mesh_.vertex_position(mesh_.from(h)));
     if (second == Outcome::possible) a.halfedge = other;
     a.outcome = std::max(a.outcome, second);
   } else if (a.outcome == Outcome::refused && p->freedom == Freedom::anywhere &&
-             a.change.proof() == Change::Proof::now) {
+             a.trial.proof() == ChangeTrial::Proof::now) {
     a.outcome = search(a, p->position);
   }
 }
@@ -135,26 +135,26 @@ EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) c
     const auto possible_at_end = [&](bool that_costs) {
       return std::ranges::any_of(std::array{s0, s1}, [&](const VertexPosition& end) {
         return end.position != best && (q(end.position) > nothing) == that_costs &&
-               a.change.try_collapse(h, end) == Outcome::possible;
+               a.trial.try_collapse(h, end) == Outcome::possible;
       });
     };
     if (possible_at_end(false)) return Outcome::possible;
     if (q(best) <= nothing) return Outcome::refused;
-    const Outcome fitted = a.fit.collapse(a.change, h, best, kGiveUpAbove);
+    const Outcome fitted = a.fit.collapse(a.trial, h, best, kGiveUpAbove);
     if (fitted != Outcome::refused) return fitted;
     return possible_at_end(true) ? Outcome::possible : Outcome::refused;
   }
   for (const VertexPosition& other : {s0, s1, mesh_.store((s0.position + s1.position) * 0.5)}) {
-    const Outcome outcome = a.change.try_collapse(h, other);
+    const Outcome outcome = a.trial.try_collapse(h, other);
     if (outcome != Outcome::refused) return outcome;
   }
   return Outcome::refused;
 }
 
 std::uint32_t EdgeCollapse::carry_out(Attempt& a) {
-  for (const Halfedge h : a.change.collapses()) quadrics_[mesh_.to(h)] += quadrics_[mesh_.from(h)];
+  for (const Halfedge h : a.trial.change().collapses()) quadrics_[mesh_.to(h)] += quadrics_[mesh_.from(h)];
   const std::uint32_t kept = mesh_.to(a.halfedge);
-  mesh_.apply(a.change);
+  a.trial.carry_out(mesh_);
   return kept;
 }
 

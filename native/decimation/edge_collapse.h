@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "decimation/bounded_mesh.h"
-#include "decimation/change.h"
+#include "decimation/change_trial.h"
 #include "decimation/position_fit.h"
 #include "decimation/quadric.h"
 
@@ -20,7 +20,7 @@ class EdgeCollapse {
  public:
   using Halfedge = BoundedMesh::Halfedge;
   using Edge = BoundedMesh::Edge;
-  using Outcome = Change::Outcome;
+  using Outcome = ChangeTrial::Outcome;
 
   static constexpr double kNever = std::numeric_limits<double>::infinity();
 
@@ -34,11 +34,11 @@ class EdgeCollapse {
 
   /// What came of trying an edge, and the scratch of it: not for two threads at once.
   struct Attempt {
-    explicit Attempt(const BoundedMesh& mesh, Change::Proof proof = Change::Proof::now)
-        : change(mesh, proof), fit(mesh) {}
+    explicit Attempt(const BoundedMesh& mesh, ChangeTrial::Proof proof = ChangeTrial::Proof::now)
+        : trial(mesh, proof), fit(mesh) {}
     Outcome outcome = Outcome::impossible;
     Halfedge halfedge;  ///< whose start would merge into its end
-    Change change;
+    ChangeTrial trial;
     PositionFit fit;
   };
   /// Reads faces around the edge's two ends, and nothing else of the mesh that changes.

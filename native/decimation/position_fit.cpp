@@ -122,20 +122,20 @@ PositionFit::Fit PositionFit::fit(const Change& change, const glm::dvec3& positi
   return {sums.energy, deviation, position + step};
 }
 
-Change::Outcome PositionFit::collapse(Change& change, Change::Halfedge h, const glm::dvec3& start,
-                                      std::span<const double> give_up_above) {
+ChangeTrial::Outcome PositionFit::collapse(ChangeTrial& trial, Change::Halfedge h, const glm::dvec3& start,
+                                           std::span<const double> give_up_above) {
   glm::dvec3 position = start;
   bool first = true;
   for (const double hopeless : give_up_above) {
-    if (!change.prepare_collapse(h, mesh_->store(position))) return Change::Outcome::impossible;
-    if (std::exchange(first, false)) gather(change);
-    const Fit found = fit(change, position, hopeless);
+    if (!trial.prepare_collapse(h, mesh_->store(position))) return ChangeTrial::Outcome::impossible;
+    if (std::exchange(first, false)) gather(trial.change());
+    const Fit found = fit(trial.change(), position, hopeless);
     if (found.deviation > hopeless) break;
     position = found.position;
-    const Change::Outcome outcome = change.try_collapse(h, mesh_->store(position));
-    if (outcome != Change::Outcome::refused) return outcome;
+    const ChangeTrial::Outcome outcome = trial.try_collapse(h, mesh_->store(position));
+    if (outcome != ChangeTrial::Outcome::refused) return outcome;
   }
-  return Change::Outcome::refused;
+  return ChangeTrial::Outcome::refused;
 }
 
 double PositionFit::energy_now(const Change& change) {

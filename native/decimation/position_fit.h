@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "decimation/change.h"
+#include "decimation/change_trial.h"
 
 namespace tolvol {
 
@@ -30,10 +30,10 @@ class PositionFit {
   /// Of the faces as the change would leave them, its vertex at `position`. About 10 ns a face and piece. Where the
   /// deviation is beyond `hopeless`, that is all that is found.
   Fit fit(const Change& change, const glm::dvec3& position, double hopeless = std::numeric_limits<double>::infinity());
-  /// Tries a collapse, which `change` then holds, at fitted positions: from `start` a step for each of the limits,
+  /// Tries a collapse at fitted positions: from `start` a step for each of the limits,
   /// until it is possible. With a deviation beyond the step's limit before it, over the tolerance, it is refused.
-  Change::Outcome collapse(Change& change, Change::Halfedge h, const glm::dvec3& start,
-                           std::span<const double> give_up_above);
+  ChangeTrial::Outcome collapse(ChangeTrial& trial, Change::Halfedge h, const glm::dvec3& start,
+                                std::span<const double> give_up_above);
   /// Energy of the same faces as they are.
   double energy_now(const Change& change);
 

@@ -88,7 +88,7 @@ bool Refinement::sweep(const Kind& kind, std::span<const std::uint32_t> steps, c
 Refinement::Attempt& Refinement::tried(const Kind& kind, std::span<const std::uint32_t> steps, std::size_t place) {
   const auto at = [&](std::size_t i) -> Attempt& { return attempts_[i % attempts_.size()]; };
   const auto holds = [&](std::size_t i) {
-    return at(i).place == i && (this->*kind.read)(steps[i]) <= at(i).at && !at(i).change.met_another();
+    return at(i).place == i && (this->*kind.read)(steps[i]) <= at(i).at && !at(i).trial.met_another();
   };
   if (holds(place)) return at(place);
   std::vector<std::size_t> batch;
@@ -103,12 +103,12 @@ Refinement::Attempt& Refinement::tried(const Kind& kind, std::span<const std::ui
 
 void Refinement::apply(Attempt& a) {
   ++clock_;
-  for (const Change::Face& face : a.change.faces()) {
+  for (const Change::Face& face : a.trial.change().faces()) {
     for (const std::uint32_t v : face.vertices) touched_[v] = changed_[v] = clock_;
   }
-  mesh_.apply(a.change);
+  a.trial.carry_out(mesh_);
   // A vertex that stays where it was has another share, distance and boundary, though its other faces are the same.
-  const std::optional<std::uint32_t> kept = a.change.vertex();
+  const std::optional<std::uint32_t> kept = a.trial.change().vertex();
   if (!kept) return;
   changed_[*kept] = clock_;
   for (const auto v : mesh_.connectivity().vv_range(BoundedMesh::handle(*kept))) {
@@ -122,25 +122,25 @@ bool Refinement::relocation_wanted(std::uint32_t vertex) const {
 }
 
 void Refinement::try_relocation(std::uint32_t vertex, Attempt& a) const {
-  a.change.begin();
+  a.trial.begin();
   // Faces around a vertex that stays count as moving: the fit is for where it could go.
-  a.possible = a.change.prepare_relocate(vertex, mesh_.vertex_position(vertex));
+  a.possible = a.trial.prepare_relocate(vertex, mesh_.vertex_position(vertex));
   if (!a.possible) return;
-  a.fit.gather(a.change);
+  a.fit.gather(a.trial.change());
   a.possible = find_move(vertex, a);
 }
 
 /// One step towards where the vertex fits best.
 bool Refinement::find_move(std::uint32_t vertex, Attempt& a) const {
   const glm::dvec3 from = mesh_.position(vertex);
-  a.change.prepare_relocate(vertex, mesh_.vertex_position(vertex));
-  const PositionFit::Fit now = a.fit.fit(a.change, from);
+  a.trial.prepare_relocate(vertex, mesh_.vertex_position(vertex));
+  const PositionFit::Fit now = a.fit.fit(a.trial.change(), from);
   double step = 1;
   for (int i = 0; i < kHalvings; ++i, step *= 0.5) {
     const VertexPosition target = mesh_.store(from + step * (now.position - from));
-    if (!a.change.prepare_relocate(vertex, target)) return false;
-    if (!(a.fit.fit(a.change, target.position).energy < kGain * now.energy)) continue;
-    if (a.change.check() == Change::Outcome::possible) return true;
+    if (!a.trial.prepare_relocate(vertex, target)) return false;
+    if (!(a.fit.fit(a.trial.change(), target.position).energy < kGain * now.energy)) continue;
+    if (a.trial.check() == ChangeTrial::Outcome::possible) return true;
   }
   return false;
 }
@@ -174,13 +174,13 @@ bool Refinement::flip_wanted(std::uint32_t edge) const {
 }
 
 void Refinement::try_flip(std::uint32_t edge, Attempt& a) const {
-  a.change.begin();
-  a.possible = a.change.prepare_flip(BoundedMesh::edge(edge));
+  a.trial.begin();
+  a.possible = a.trial.prepare_flip(BoundedMesh::edge(edge));
   if (!a.possible) return;
-  a.fit.gather(a.change);
-  const double after = a.fit.fit(a.change, glm::dvec3(0)).energy;
-  const double before = a.fit.energy_now(a.change);
-  a.possible = after < kGain * before && a.change.check() == Change::Outcome::possible;
+  a.fit.gather(a.trial.change());
+  const double after = a.fit.fit(a.trial.change(), glm::dvec3(0)).energy;
+  const double before = a.fit.energy_now(a.trial.change());
+  a.possible = after < kGain * before && a.trial.check() == ChangeTrial::Outcome::possible;
 }
 
 void Refinement::flip(std::uint32_t edge, Attempt& a) {
@@ -193,19 +193,19 @@ bool Refinement::collapse_wanted(std::uint32_t edge) const {
 }
 
 void Refinement::try_collapse(std::uint32_t edge, Attempt& a) const {
-  constexpr auto kPossible = Change::Outcome::possible;
-  a.change.begin();
+  constexpr auto kPossible = ChangeTrial::Outcome::possible;
+  a.trial.begin();
   a.possible = false;
   const auto [freedom, h] = mesh_.merge(BoundedMesh::edge(edge));
   const VertexPosition from = mesh_.vertex_position(mesh_.from(h)), to = mesh_.vertex_position(mesh_.to(h));
   if (freedom == BoundedMesh::Freedom::anywhere) {
     for (const glm::dvec3& start : {0.5 * (from.position + to.position), from.position, to.position}) {
-      a.possible = a.possible || a.fit.collapse(a.change, h, start, kGiveUpAbove) == kPossible;
+      a.possible = a.possible || a.fit.collapse(a.trial, h, start, kGiveUpAbove) == kPossible;
     }
   } else if (freedom != BoundedMesh::Freedom::none) {
-    a.possible = a.change.try_collapse(h, to) == kPossible;
+    a.possible = a.trial.try_collapse(h, to) == kPossible;
     if (!a.possible && freedom == BoundedMesh::Freedom::either_way) {
-      a.possible = a.change.try_collapse(mesh_.connectivity().opposite_halfedge_handle(h), from) == kPossible;
+      a.possible = a.trial.try_collapse(mesh_.connectivity().opposite_halfedge_handle(h), from) == kPossible;
     }
   }
 }

@@ -17,7 +17,7 @@
 #include "base/parallel.h"
 #include "base/progress.h"
 #include "decimation/bounded_mesh.h"
-#include "decimation/change.h"
+#include "decimation/change_trial.h"
 #include "decimation/position_fit.h"
 
 namespace tolvol {
@@ -36,8 +36,8 @@ class Refinement {
 
   /// What came of trying a step, and the scratch of it.
   struct Attempt {
-    explicit Attempt(const BoundedMesh& mesh) : change(mesh), fit(mesh) {}
-    Change change;
+    explicit Attempt(const BoundedMesh& mesh) : trial(mesh), fit(mesh) {}
+    ChangeTrial trial;
     PositionFit fit;
     bool possible = false;
     std::size_t place = kNowhere;  ///< of the step in its order

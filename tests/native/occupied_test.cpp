@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "check/certificate.h"
-#include "decimation/change.h"
+#include "decimation/change_trial.h"
 #include "shapes.h"
 #include "topology/manifold_cut.h"
 
@@ -56,24 +56,24 @@ TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
   BoundedMesh mesh(std::move(input), bounds, alone);
 
   const auto relocate = [&](const VertexPosition& target) {
-    Change change(mesh);
-    change.begin();
-    const Change::Outcome outcome = change.try_relocate(kMiddle, target);
-    return std::pair(outcome, change.met_another());
+    ChangeTrial trial(mesh);
+    trial.begin();
+    const ChangeTrial::Outcome outcome = trial.try_relocate(kMiddle, target);
+    return std::pair(outcome, trial.met_another());
   };
   const VertexPosition taken = mesh.vertex_position(above), here = mesh.vertex_position(kMiddle);
-  EXPECT_EQ(relocate(taken), std::pair(Change::Outcome::possible, false)) << "as long as nothing keeps them apart";
+  EXPECT_EQ(relocate(taken), std::pair(ChangeTrial::Outcome::possible, false)) << "as long as nothing keeps them apart";
   mesh.keep_apart();
-  EXPECT_EQ(relocate(taken), std::pair(Change::Outcome::refused, true));
-  EXPECT_EQ(relocate(here), std::pair(Change::Outcome::possible, false)) << "where it is itself";
+  EXPECT_EQ(relocate(taken), std::pair(ChangeTrial::Outcome::refused, true));
+  EXPECT_EQ(relocate(here), std::pair(ChangeTrial::Outcome::possible, false)) << "where it is itself";
 
-  Change away(mesh);
+  ChangeTrial away(mesh);
   away.begin();
   const dvec3 aside = taken.position + dvec3(0.1 * limit, 0, 0);
-  ASSERT_EQ(away.try_relocate(above, mesh.store(aside)), Change::Outcome::possible);
-  mesh.apply(away);
-  EXPECT_EQ(relocate(taken), std::pair(Change::Outcome::possible, false)) << "the place is free again";
-  EXPECT_EQ(relocate(mesh.vertex_position(above)), std::pair(Change::Outcome::refused, true));
+  ASSERT_EQ(away.try_relocate(above, mesh.store(aside)), ChangeTrial::Outcome::possible);
+  away.carry_out(mesh);
+  EXPECT_EQ(relocate(taken), std::pair(ChangeTrial::Outcome::possible, false)) << "the place is free again";
+  EXPECT_EQ(relocate(mesh.vertex_position(above)), std::pair(ChangeTrial::Outcome::refused, true));
 }
 
 }  // namespace
