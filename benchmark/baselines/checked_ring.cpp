@@ -1,25 +1,40 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "baselines/checked_ring.h"
 
+#include "decimation/change.h"
+
 namespace tolvol::baselines {
 
 void CheckedRing::begin(const TriangleMesh&, double mapping_error) { mapping_error_ = mapping_error; }
 
-bool CheckedRing::accepts(std::span<const Coverage::Element> faces, std::span<const Coverage::Removed>) {
-  points_.clear();
-  indices_.clear();
-  groups_.clear();
-  for (const Coverage::Element& face : faces) {
-    if (face.moved == 0) continue;
-    groups_.push_back(0);
-    for (const glm::dvec3& corner : face.corners) {
-      indices_.push_back(static_cast<std::uint32_t>(points_.size()));
-      points_.push_back(corner);
+class CheckedRing::Asking final : public Trial {
+ public:
+  explicit Asking(const CheckedRing& ring) : ring_(ring) {}
+  bool accepts(const Change& change) override {
+    points_.clear();
+    indices_.clear();
+    groups_.clear();
+    for (const Coverage::Element& face : change.elements()) {
+      if (face.moved == 0) continue;
+      groups_.push_back(0);
+      for (const glm::dvec3& corner : face.corners) {
+        indices_.push_back(static_cast<std::uint32_t>(points_.size()));
+        points_.push_back(corner);
+      }
     }
+    const std::vector<Verdict> verdicts =
+        ring_.check_->check_groups({points_, indices_, 3, ring_.mapping_error_}, groups_, {.threads = 1});
+    return verdicts.empty() || verdicts.front() == Verdict::inside;
   }
-  const std::vector<Verdict> verdicts =
-      check_->check_groups({points_, indices_, 3, mapping_error_}, groups_, {.threads = 1});
-  return verdicts.empty() || verdicts.front() == Verdict::inside;
-}
+  void commit(const Change&) override {}
+
+ private:
+  const CheckedRing& ring_;
+  std::vector<glm::dvec3> points_;
+  std::vector<std::uint32_t> indices_;
+  std::vector<std::int32_t> groups_;
+};
+
+std::unique_ptr<Bounds::Trial> CheckedRing::trial() { return std::make_unique<Asking>(*this); }
 
 }  // namespace tolvol::baselines

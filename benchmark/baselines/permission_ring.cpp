@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "decimation/change.h"
+
 namespace tolvol::baselines {
 namespace {
 
@@ -85,9 +87,20 @@ bool permits(const PermissionGrid& grid, const glm::dvec3 (&corners)[3]) {
   return true;
 }
 
-bool PermissionRing::accepts(std::span<const Coverage::Element> faces, std::span<const Coverage::Removed>) {
-  return std::all_of(faces.begin(), faces.end(),
-                     [&](const Coverage::Element& face) { return face.moved == 0 || permits(*grid_, face.corners); });
-}
+class PermissionRing::Asking final : public Trial {
+ public:
+  explicit Asking(const PermissionGrid& grid) : grid_(grid) {}
+  bool accepts(const Change& change) override {
+    return std::ranges::all_of(change.elements(), [&](const Coverage::Element& face) {
+      return face.moved == 0 || permits(grid_, face.corners);
+    });
+  }
+  void commit(const Change&) override {}
+
+ private:
+  const PermissionGrid& grid_;
+};
+
+std::unique_ptr<Bounds::Trial> PermissionRing::trial() { return std::make_unique<Asking>(*grid_); }
 
 }  // namespace tolvol::baselines

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "baselines/permission_grid.h"
-#include "check/ring_check.h"
+#include "decimation/ring_check.h"
 
 namespace tolvol::baselines {
 
@@ -18,10 +18,12 @@ class PermissionRing final : public RingCheck {
   explicit PermissionRing(const PermissionGrid& grid) : grid_(&grid) {}
 
   void begin(const TriangleMesh&, double) override {}
-  bool accepts(std::span<const Coverage::Element> faces, std::span<const Coverage::Removed> removed) override;
+  std::unique_ptr<Trial> trial() override;
   std::string method() const override { return "permission_grid"; }
 
  private:
+  class Asking;
+
   const PermissionGrid* grid_;
 };
 

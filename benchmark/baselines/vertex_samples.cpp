@@ -4,6 +4,8 @@
 // each time and keeps it with its nearest face; this is the same decision, faster.
 #include "baselines/vertex_samples.h"
 
+#include "decimation/change.h"
+
 namespace tolvol::baselines {
 
 void VertexSamples::begin(const TriangleMesh& mesh, double) {
@@ -19,5 +21,21 @@ void VertexSamples::begin(const TriangleMesh& mesh, double) {
     }
   }
 }
+
+class VertexSamples::Asking final : public Trial {
+ public:
+  explicit Asking(Coverage& samples) : samples_(samples) {}
+  void begin() override { trial_.begin(); }
+  bool accepts(const Change& change) override {
+    return samples_.try_change(change.elements(), change.removed(), trial_);
+  }
+  void commit(const Change&) override { samples_.commit(trial_); }
+
+ private:
+  Coverage& samples_;
+  Coverage::Trial trial_;
+};
+
+std::unique_ptr<Bounds::Trial> VertexSamples::trial() { return std::make_unique<Asking>(*samples_); }
 
 }  // namespace tolvol::baselines

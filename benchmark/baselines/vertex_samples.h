@@ -8,9 +8,11 @@
 /// vertices alone; here surviving ones have a face, too, which costs nothing (their distance is 0) and lets them move.
 #pragma once
 
+#include <memory>
 #include <optional>
 
-#include "check/ring_check.h"
+#include "check/coverage.h"
+#include "decimation/ring_check.h"
 
 namespace tolvol::baselines {
 
@@ -20,17 +22,15 @@ class VertexSamples final : public RingCheck {
   explicit VertexSamples(double tolerance) : tolerance_(tolerance) {}
 
   void begin(const TriangleMesh& mesh, double mapping_error) override;
-  bool accepts(std::span<const Coverage::Element> faces, std::span<const Coverage::Removed> removed) override {
-    return samples_->try_change(faces, removed, trial_);
-  }
-  void commit() override { samples_->commit(trial_); }
+  std::unique_ptr<Trial> trial() override;
   std::string method() const override { return "vertex_samples"; }
 
  private:
+  class Asking;
+
   double tolerance_;
   TriangleMesh points_;  // a triangle for each vertex, all of its corners there
   std::optional<Coverage> samples_;
-  Coverage::Trial trial_;
 };
 
 }  // namespace tolvol::baselines

@@ -10,7 +10,7 @@
 
 namespace tolvol {
 
-BoundedMesh::BoundedMesh(BoundedMeshInput input, const Bounds& bounds, Team& team)
+BoundedMesh::BoundedMesh(BoundedMeshInput input, Bounds* bounds, Team& team)
     : bounds_(bounds),
       subset_(input.subset),
       store_(std::move(input.store)),
@@ -21,10 +21,10 @@ BoundedMesh::BoundedMesh(BoundedMeshInput input, const Bounds& bounds, Team& tea
       slots_(std::move(input.slots)),
       wedges_(std::move(input.wedges)) {
   for (const VertexPosition& s : input.positions) positions_.push_back(s.position), stored_.push_back(s.stored);
-  build(input.on_reference, input.mates, team);
+  build(input.mates, team);
 }
 
-void BoundedMesh::build(bool on_reference, std::span<const std::uint32_t> mates, Team& team) {
+void BoundedMesh::build(std::span<const std::uint32_t> mates, Team& team) {
   mesh_.request_vertex_status();
   mesh_.request_edge_status();
   mesh_.request_halfedge_status();
@@ -47,22 +47,15 @@ void BoundedMesh::build(bool on_reference, std::span<const std::uint32_t> mates,
   corner_source_.resize(m);
   for (std::uint32_t i = 0; i < m; ++i) corner_source_[i] = {3 * i, 3 * i + 1, 3 * i + 2};
   if (!wedges_.empty()) {
-    std::vector<std::uint32_t> first(n, Coverage::kNone);
+    constexpr std::uint32_t kNoWedge = 0xFFFFFFFFu;
+    std::vector<std::uint32_t> first(n, kNoWedge);
     for (std::size_t i = 0; i < m; ++i) {
       for (int k = 0; k < 3; ++k) {
         std::uint32_t& wedge = first[triangles_[i][k]];
-        if (wedge == Coverage::kNone) wedge = wedges_[i][k];
+        if (wedge == kNoWedge) wedge = wedges_[i][k];
         if (wedge != wedges_[i][k]) seam_[triangles_[i][k]] = true;
       }
     }
-  }
-  distance_.assign(n, 0);
-  if (bounds_.forward) {
-    for (std::size_t i = 0; i < n && !on_reference; ++i) {
-      poll_at(i);
-      distance_[i] = bounds_.forward->distance_bound(positions_[i]);
-    }
-    face_distance_.assign(m, on_reference ? 0 : TriangleCertificate::kUnproved);
   }
 }
 
@@ -181,11 +174,11 @@ BoundedMesh::Saved BoundedMesh::save(std::span<const std::uint32_t> vertices,
                                      std::span<const std::uint32_t> faces) const {
   Saved saved;
   for (const std::uint32_t v : vertices) {
-    saved.vertices.push_back({v, vertex_position(v), distance_[v], share(v), left_original(v)});
+    saved.vertices.push_back({v, vertex_position(v), share(v), left_original(v)});
   }
   for (const std::uint32_t f : faces) {
-    saved.faces.push_back({f, triangles_[f], has_wedges() ? wedges_[f] : glm::uvec3(0), corner_source_[f],
-                           bounds_.forward ? face_distance_[f] : 0, mesh_.face(face(f))});
+    saved.faces.push_back(
+        {f, triangles_[f], has_wedges() ? wedges_[f] : glm::uvec3(0), corner_source_[f], mesh_.face(face(f))});
     for (const Halfedge h : mesh_.fh_range(face(f))) {
       const Vertex start = mesh_.from_vertex_handle(h);
       const Halfedge opposite = mesh_.opposite_halfedge_handle(h);
@@ -219,13 +212,11 @@ void BoundedMesh::restore(const Saved& saved) {
     mesh_.status(face(s.face)).set_deleted(false);
     triangles_[s.face] = s.triangle;
     corner_source_[s.face] = s.corner_source;
-    if (bounds_.forward) face_distance_[s.face] = s.distance;
     if (has_wedges()) wedges_[s.face] = s.wedges;
   }
   for (const Saved::OfVertex& s : saved.vertices) {
     mesh_.status(handle(s.vertex)).set_deleted(false);
     positions_[s.vertex] = s.position.position, stored_[s.vertex] = s.position.stored;
-    distance_[s.vertex] = s.distance;
     if (!shares_.empty()) shares_[s.vertex] = s.share;
     left_original_[s.vertex] = s.left_original;
     merged_into_[s.vertex] = s.vertex;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The mesh that a decimation works on: connectivity, positions, and what every face is known to be within. Lives in
-/// the volume's frame; knows nothing of files, transforms or reports. It changes by applying a Change.
+/// The mesh that a decimation works on: connectivity, positions, and the bounds that its changes must keep. It is in
+/// the volume's frame, and knows nothing of files, transforms or reports. It changes by applying a Change.
 #pragma once
 
 #include <OpenMesh/Core/Mesh/TriConnectivity.hh>
@@ -13,23 +13,12 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "check/certificate.h"
-#include "check/coverage.h"
-#include "check/ring_check.h"
+#include "decimation/bounds.h"
 #include "decimation/occupied.h"
 
 namespace tolvol {
 
 class Change;
-
-/// What every change must keep; a null pointer is a promise not asked for.
-struct Bounds {
-  const TriangleCertificate* forward = nullptr;
-  Coverage* backward = nullptr;
-  const TriangleCertificate* boundary_forward = nullptr;  ///< on the reference's boundary edges
-  Coverage* boundary_backward = nullptr;                  ///< elements are boundary edges, named by their first vertex
-  RingCheck* baseline = nullptr;                          ///< asked in place of all of them
-};
 
 /// A position as it is stored, and in the frame: always mapped from what is stored.
 struct VertexPosition {
@@ -45,9 +34,8 @@ struct BoundedMeshInput {
   std::vector<std::uint32_t> slots;  ///< per vertex: equal for copies, those that are one vertex of the result
   std::vector<bool> joined;          ///< per vertex: an edge of it lies on edges of other sheets; may be empty
   std::vector<glm::uvec3>
-      wedges;                 ///< per triangle and corner: equal at a vertex where attributes are equal; may be empty
-  bool on_reference = false;  ///< every triangle is one of the reference
-  bool subset = false;        ///< every surviving vertex keeps its position
+      wedges;           ///< per triangle and corner: equal at a vertex where attributes are equal; may be empty
+  bool subset = false;  ///< every surviving vertex keeps its position
   /// Rounds a position in the frame to what can be stored.
   std::function<VertexPosition(const glm::dvec3&)> store;
 };
@@ -59,10 +47,12 @@ class BoundedMesh {
   using Edge = OpenMesh::EdgeHandle;
   using Face = OpenMesh::FaceHandle;
 
-  BoundedMesh(BoundedMeshInput input, const Bounds& bounds, Team& team);
+  /// `bounds`: what its changes must keep, null for nothing. Keeps a reference to them.
+  BoundedMesh(BoundedMeshInput input, Bounds* bounds, Team& team);
 
   const OpenMesh::TriConnectivity& connectivity() const { return mesh_; }
-  const Bounds& bounds() const { return bounds_; }
+  Bounds* bounds() const { return bounds_; }
+  CertifiedBounds* certified() const { return bounds_ ? bounds_->certified() : nullptr; }
   std::size_t triangle_count() const { return triangle_count_; }
   bool alive(std::uint32_t triangle) const { return !mesh_.status(face(triangle)).deleted(); }
   /// The vertex that a vertex was merged into (itself when it survives).
@@ -74,13 +64,6 @@ class BoundedMesh {
   VertexPosition store(const glm::dvec3& position) const { return store_(position); }
   /// Whether the vertex left its original position.
   bool left_original(std::uint32_t vertex) const { return left_original_[vertex] != 0; }
-  /// Upper bounds on the distance to the reference, where there is a forward bound to keep: of a vertex, and of all
-  /// points of a face (infinite where none is known).
-  double distance(std::uint32_t vertex) const { return distance_[vertex]; }
-  double face_distance(std::uint32_t triangle) const { return face_distance_[triangle]; }
-  /// Notes such a bound, which was proved.
-  void note_distance(std::uint32_t vertex, double distance) { distance_[vertex] = distance; }
-  void note_face_distance(std::uint32_t triangle, double distance) { face_distance_[triangle] = distance; }
   /// Of the forward bound, what new faces around the vertex may use.
   double share(std::uint32_t vertex) const { return shares_.empty() ? 1 : shares_[vertex]; }
   /// How many faces have the vertex as a corner.
@@ -145,13 +128,12 @@ class BoundedMesh {
     struct OfVertex {
       std::uint32_t vertex;
       VertexPosition position;
-      double distance, share;
+      double share;
       bool left_original;
     };
     struct OfFace {
       std::uint32_t face;
       glm::uvec3 triangle, wedges, corner_source;
-      double distance;
       Kernel::Face kernel;
     };
     struct OfHalfedge {
@@ -172,14 +154,14 @@ class BoundedMesh {
   void restore(const Saved& saved);
 
  private:
-  void build(bool on_reference, std::span<const std::uint32_t> mates, Team& team);
+  void build(std::span<const std::uint32_t> mates, Team& team);
   int rank(std::uint32_t vertex) const;
   void count_around(const glm::uvec3& triangle, std::int32_t change);
   void merge_copies(const Change& change);
   void place(std::uint32_t vertex, const VertexPosition& target);
 
   OpenMesh::TriConnectivity mesh_;
-  Bounds bounds_;
+  Bounds* bounds_;
   bool subset_;
   std::function<VertexPosition(const glm::dvec3&)> store_;
   std::vector<glm::uvec3> triangles_;
@@ -191,7 +173,6 @@ class BoundedMesh {
   std::vector<std::uint8_t> joined_;  ///< not bits, which threads would share
   std::vector<std::uint32_t> slots_;
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> copies_;  ///< by slot, where there are several
-  std::vector<double> distance_, face_distance_;
   std::vector<glm::uvec3> wedges_, corner_source_;
   mutable std::vector<std::uint32_t> merged_into_;
   bool kept_apart_ = false;

@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "check/coverage.h"
 #include "decimation/bounded_mesh.h"
 
 namespace tolvol {

@@ -6,12 +6,11 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
-#include <optional>
-#include <vector>
+#include <memory>
 
 #include "decimation/bounded_mesh.h"
+#include "decimation/bounds.h"
 #include "decimation/change.h"
-#include "decimation/replaced_faces.h"
 
 namespace tolvol {
 
@@ -27,8 +26,8 @@ class ChangeTrial {
   /// vertex is.
   enum class Proof { now, later };
 
-  /// Keeps a reference to `mesh`.
-  explicit ChangeTrial(const BoundedMesh& mesh, Proof proof = Proof::now) : change_(mesh), proof_(proof) {}
+  /// Keeps references to `mesh` and its bounds. Proofs of certificates alone can be left for later.
+  explicit ChangeTrial(const BoundedMesh& mesh, Proof proof = Proof::now);
 
   /// Starts a series of tries around one place. What it finds depends on nothing before.
   void begin();
@@ -51,35 +50,17 @@ class ChangeTrial {
   /// now: then it holds no longer than that vertex stays there.
   bool met_another() const { return met_another_ || (prepared_ && change_.meets_another()); }
   /// Parts of the reference's pieces that the series of tries has looked at.
-  std::size_t looked_at() const { return backward_.looked_at(); }
+  std::size_t looked_at() const { return bounds_ ? bounds_->looked_at() : 0; }
 
   /// Carries out the change on `mesh`, on which check() found it possible and which is as it was then.
-  void carry_out(BoundedMesh& mesh) const;
+  void carry_out(BoundedMesh& mesh);
 
  private:
-  bool keeps_bounds(const Change& change);
-  bool vertex_is_inside(const Change& change);
-  bool is_large(const Change& change, const Coverage::Element& e) const;
-  bool shows_outside(const Change& change);
-  bool faces_are_inside(const Change& change);
-  void gather_replaced_faces(const Change& change);
-  void gather_boundary(const Change& change);
-  void boundary_of_collapse(const Change& change);
-  void boundary_of_relocation(const Change& change);
-  bool boundary_is_inside(const Change& change);
-
   Change change_;
   Proof proof_;
   bool prepared_ = false;  ///< a change of this series
   bool met_another_ = false;
-  ReplacedFaces replaced_faces_;
-  std::vector<Coverage::Element> boundary_elements_;
-  std::vector<Coverage::Removed> boundary_removed_;
-  Coverage::Trial backward_, boundary_backward_;
-  double vertex_distance_ = 0;          ///< upper bounds on the distance to the reference, of the vertex
-  std::vector<double> face_distances_;  ///< and of the faces of the change
-  /// The face that failed last: of another try at the same place it is the likeliest to fail.
-  std::size_t failed_last_ = 0;
+  std::unique_ptr<Bounds::Trial> bounds_;  ///< null where there are none
 };
 
 }  // namespace tolvol

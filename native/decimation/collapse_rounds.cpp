@@ -10,6 +10,7 @@
 
 #include "base/call.h"
 #include "base/parallel.h"
+#include "decimation/certified_bounds.h"
 #include "decimation/collapse_loop.h"
 #include "decimation/deferred_proof.h"
 #include "decimation/edge_collapse.h"
@@ -36,13 +37,14 @@ class Rounds {
         collapse_(mesh),
         shared_(collapse_),
         costs_(mesh.connectivity().n_edges()),
-        places_(mesh.bounds().forward ? mesh.connectivity().n_faces() : 0),
+        places_(mesh.certified() ? mesh.connectivity().n_faces() : 0),
         progress_(progress) {
     if (progress) progress->begin("decimating");
   }
 
+  /// For bounds that are certified: in the first rounds their proofs are put off.
   void by_regions() {
-    bool on_trust = mesh_.bounds().forward;
+    bool on_trust = true;
     for (int round = 0;; ++round) {
       const std::size_t triangles = mesh_.triangle_count(), vertices = triangles / 2;
       if (vertices < kLeastVertices) return;
@@ -82,7 +84,7 @@ class Rounds {
   }
 
   void whole(std::size_t target) {
-    if (mesh_.bounds().forward) mesh_.keep_apart();
+    if (mesh_.certified()) mesh_.keep_apart();
     price();
     CollapseLoop loop(shared_, team_);
     for (std::uint32_t e = 0; e < costs_.size(); ++e) {
@@ -116,7 +118,7 @@ class Rounds {
   }
 
   double trusted_cost() const {
-    const double limit = mesh_.bounds().forward->limit();
+    const double limit = mesh_.certified()->forward().limit();
     return kTrustedCost * limit * limit * limit * limit;
   }
 
@@ -159,7 +161,7 @@ class Rounds {
 
 void collapse_edges(BoundedMesh& mesh, std::size_t target, Team& team, Progress* progress) {
   Rounds rounds(mesh, team, progress);
-  if (target == 0 && !mesh.bounds().baseline) rounds.by_regions();
+  if (target == 0 && mesh.certified()) rounds.by_regions();
   rounds.whole(target);
 }
 

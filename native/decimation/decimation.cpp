@@ -15,6 +15,7 @@
 #include "check/certificate.h"
 #include "check/input_checks.h"
 #include "decimation/boundary.h"
+#include "decimation/certified_bounds.h"
 #include "decimation/collapse_rounds.h"
 #include "decimation/refinement.h"
 #include "topology/manifold_cut.h"
@@ -67,14 +68,12 @@ class Decimation {
         })) {
       throw InvalidInput("all faces are degenerate (segments or points): there is no surface to decimate");
     }
-    Bounds bounds;
-    if (volume_) bounds = set_bounds();
+    Bounds* const bounds = volume_ ? set_bounds() : nullptr;
     BoundedMesh mesh(mesh_input(), bounds, team_);
     const std::size_t apart = cut_.aside.size();
     const std::size_t target = options_.target_triangles > apart ? options_.target_triangles - apart : 0;
     collapse(mesh, target);
-    if (volume_ && !options_.baseline && options_.effort == DecimationOptions::Effort::thorough &&
-        !result_.stopped_at_time) {
+    if (mesh.certified() && options_.effort == DecimationOptions::Effort::thorough && !result_.stopped_at_time) {
       Refinement(mesh, team_)
           .run(
               target, [&] { return ended_early(); }, options_.progress);
@@ -159,7 +158,7 @@ class Decimation {
     return true;
   }
 
-  Bounds set_bounds() {
+  Bounds* set_bounds() {
     std::vector<glm::dvec3> used;
     for (const std::uint32_t i : cut_.vertex_input) used.push_back(vertices_[i]);
     if (const auto warning = storage_warning(*volume_, space_, used)) result_.warnings.push_back(*warning);
@@ -170,12 +169,10 @@ class Decimation {
     }
     const double mapping_error = space_.mapping_error(used);
     const double provable = volume_->provable(mapping_error), limit = provable * (1 - kHeadroom);
-    Bounds bounds;
     if (options_.baseline) {
       options_.baseline->begin({positions_, cut_.triangles}, mapping_error);
       result_.method = options_.baseline->method(), result_.renderer = options_.baseline->renderer();
-      bounds.baseline = options_.baseline;
-      return bounds;
+      return options_.baseline;
     }
     const Certificate certificate(*volume_);
     result_.method = certificate.method(), result_.renderer = certificate.renderer();
@@ -188,24 +185,24 @@ class Decimation {
 
     forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), limit,
                      volume_->refutable(mapping_error));
-    bounds.forward = &*forward_;
+    CertifiedBounds::Directions directions{*forward_};
     if (options_.two_sided) {
       backward_.emplace(volume_->reference(), limit, cut_.triangles.size());
       cover(provable);
-      bounds.backward = &*backward_;
+      directions.backward = &*backward_;
     } else {
       boundary_.emplace(*volume_, cut_, positions_, identical_, limit, provable, team_);
       for (const std::uint32_t v : boundary_->uncertified()) pin(v, "boundary not near the reference's boundary");
       if (boundary_->any()) {
-        bounds.boundary_forward = &boundary_->forward();
-        bounds.boundary_backward = &boundary_->backward();
+        directions.boundary_forward = &boundary_->forward();
+        directions.boundary_backward = &boundary_->backward();
         // Edges that were cut count as boundary in the kernel, and are none.
         for (std::uint32_t v = 0; v < cut_.cause.size(); ++v) {
           if (cut_.cause[v] == CutCause::non_manifold) pin(v, "non-manifold");
         }
       }
     }
-    return bounds;
+    return &certified_.emplace(directions, positions_, cut_.triangles.size(), identical_);
   }
 
   void certify_input(const Certificate& certificate, double mapping_error) {
@@ -309,7 +306,6 @@ class Decimation {
       }
       islands_ = island_labels(cut_.triangles, input.wedges);
     }
-    input.on_reference = identical_;
     input.subset = options_.placement == DecimationOptions::Placement::subset;
     input.store = [this](const glm::dvec3& p) {
       const glm::dvec3 stored = space_.store(p);
@@ -455,6 +451,7 @@ class Decimation {
   std::optional<TriangleCertificate> forward_;
   std::optional<Coverage> backward_;
   std::optional<BoundaryBounds> boundary_;
+  std::optional<CertifiedBounds> certified_;
   std::vector<std::uint32_t> kept_;  // per result triangle: its triangle in the cut mesh
   DecimationResult result_;
 };

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "check/ring_check.h"
 #include "check/tolerance_volume.h"
+#include "decimation/ring_check.h"
 
 namespace tolvol {
 

@@ -13,10 +13,12 @@ DeferredProof::DeferredProof(EdgeCollapse& collapse, BoundedMesh& mesh, std::spa
                              std::span<const std::uint32_t> faces, std::vector<std::uint32_t>& places)
     : collapse_(collapse),
       mesh_(mesh),
+      bounds_(*mesh.certified()),
       vertices_(vertices),
       faces_(faces),
       places_(places),
       saved_(mesh.save(vertices, faces)),
+      saved_bounds_(bounds_.save(vertices, faces)),
       changed_(faces.size()),
       successors_(faces.size()) {
   for (std::uint32_t i = 0; i < faces.size(); ++i) places_[faces[i]] = successors_[i] = i;
@@ -25,7 +27,7 @@ DeferredProof::DeferredProof(EdgeCollapse& collapse, BoundedMesh& mesh, std::spa
 
 bool DeferredProof::possible() const {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
-  return !mesh_.bounds().boundary_backward ||
+  return !bounds_.bounds_boundaries() ||
          std::ranges::none_of(faces_, [&](std::uint32_t f) { return connectivity.is_boundary(BoundedMesh::face(f)); });
 }
 
@@ -45,7 +47,7 @@ bool DeferredProof::holds() {
     rank_[i] = static_cast<std::uint32_t>(alive_.size());
     alive_.push_back(i);
   }
-  return faces_hold() && (!mesh_.bounds().backward || pieces_hold());
+  return faces_hold() && (!bounds_.backward() || pieces_hold());
 }
 
 bool DeferredProof::faces_hold() {
@@ -54,11 +56,12 @@ bool DeferredProof::faces_hold() {
     const std::uint32_t f = faces_[i];
     const glm::uvec3& t = mesh_.triangle(f);
     const TriangleCertificate forward =
-        mesh_.bounds().forward->narrowed(std::min({mesh_.share(t.x), mesh_.share(t.y), mesh_.share(t.z)}));
-    const double distance = forward.bound_with_room({mesh_.position(t.x), mesh_.position(t.y), mesh_.position(t.z)},
-                                                    {mesh_.distance(t.x), mesh_.distance(t.y), mesh_.distance(t.z)});
+        bounds_.forward().narrowed(std::min({mesh_.share(t.x), mesh_.share(t.y), mesh_.share(t.z)}));
+    const double distance =
+        forward.bound_with_room({mesh_.position(t.x), mesh_.position(t.y), mesh_.position(t.z)},
+                                {bounds_.distance(t.x), bounds_.distance(t.y), bounds_.distance(t.z)});
     if (distance == TriangleCertificate::kUnproved) return false;
-    mesh_.note_face_distance(f, distance);
+    bounds_.note_face_distance(f, distance);
   }
   return true;
 }
@@ -81,13 +84,14 @@ bool DeferredProof::pieces_hold() {
     if (successors_[i] != i) removed.push_back({faces_[i], rank_[successor(i)], kAnywhere});
   }
   Coverage::Trial trial;
-  if (!mesh_.bounds().backward->try_change(elements, removed, trial)) return false;
-  mesh_.bounds().backward->commit(trial);
+  if (!bounds_.backward()->try_change(elements, removed, trial)) return false;
+  bounds_.backward()->commit(trial);
   return true;
 }
 
 void DeferredProof::take_back() {
   mesh_.restore(saved_);
+  bounds_.restore(saved_bounds_, vertices_, faces_);
   for (std::size_t i = 0; i < vertices_.size(); ++i) collapse_.set_quadric(vertices_[i], quadrics_[i]);
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "decimation/bounded_mesh.h"
+#include "decimation/certified_bounds.h"
 #include "decimation/change.h"
 #include "decimation/edge_collapse.h"
 #include "decimation/quadric.h"
@@ -21,7 +22,8 @@ namespace tolvol {
 class DeferredProof {
  public:
   /// Remembers a region as it is: its vertices, and the faces that have one of them. `places`: per face of the mesh,
-  /// for its place among them; one array for all regions. Keeps references to all of it.
+  /// for its place among them; one array for all regions. Keeps references to all of it, and to the mesh's bounds,
+  /// which are certified.
   DeferredProof(EdgeCollapse& collapse, BoundedMesh& mesh, std::span<const std::uint32_t> vertices,
                 std::span<const std::uint32_t> faces, std::vector<std::uint32_t>& places);
 
@@ -42,9 +44,11 @@ class DeferredProof {
 
   EdgeCollapse& collapse_;
   BoundedMesh& mesh_;
+  CertifiedBounds& bounds_;
   std::span<const std::uint32_t> vertices_, faces_;
   std::vector<std::uint32_t>& places_;
   const BoundedMesh::Saved saved_;
+  const CertifiedBounds::Saved saved_bounds_;
   std::vector<Quadric> quadrics_;          ///< as they were
   std::vector<std::uint8_t> changed_;      ///< per face
   std::vector<std::uint32_t> successors_;  ///< per face: the place of the one that it was removed for, or its own

@@ -129,7 +129,7 @@ void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
 EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) const {
   const Halfedge h = a.halfedge;
   const VertexPosition s0 = mesh_.vertex_position(mesh_.from(h)), s1 = mesh_.vertex_position(mesh_.to(h));
-  if (mesh_.bounds().forward) {
+  if (mesh_.certified()) {
     const Quadric q = quadrics_[mesh_.from(h)] + quadrics_[mesh_.to(h)];
     const double nothing = length_cost(s0.position, s1.position);
     const auto possible_at_end = [&](bool that_costs) {

@@ -46,7 +46,7 @@ struct PositionFit::Sums {
 
 void PositionFit::gather(const Change& change) {
   samples_.clear();
-  const Coverage* const backward = mesh_->bounds().backward;
+  const Coverage* const backward = bounds_->backward();
   if (!backward) return;
   for (const Coverage::Removed& r : change.removed()) backward->sample(r.id, kStride, samples_);
   for (const Coverage::Element& e : change.elements()) backward->sample(e.id, kStride, samples_);
@@ -101,13 +101,13 @@ void PositionFit::add_faces(const Change& change, double hopeless, Sums& sums) c
     const double area = 0.5 * kFaceShare * glm::length(glm::cross(t.ab, t.ac));
     for (const auto& [beta, along] : kFacePoints) {
       const glm::dvec3 x = beta * p + (1 - beta) * (along * b + (1 - along) * a);
-      if (const auto q = mesh_->bounds().forward->nearby_point(x)) sums.add(*q - x, area, face.moves ? beta : 0);
+      if (const auto q = bounds_->forward().nearby_point(x)) sums.add(*q - x, area, face.moves ? beta : 0);
     }
   }
 }
 
 PositionFit::Fit PositionFit::fit(const Change& change, const glm::dvec3& position, double hopeless) {
-  const double limit = mesh_->bounds().forward->limit();
+  const double limit = bounds_->forward().limit();
   Sums sums{1 / (limit * limit)};
   prepare(change, true);
   add_pieces(change, hopeless, sums);
@@ -139,7 +139,7 @@ ChangeTrial::Outcome PositionFit::collapse(ChangeTrial& trial, Change::Halfedge 
 }
 
 double PositionFit::energy_now(const Change& change) {
-  const double limit = mesh_->bounds().forward->limit();
+  const double limit = bounds_->forward().limit();
   Sums sums{1 / (limit * limit)};
   prepare(change, false);
   constexpr double kAll = std::numeric_limits<double>::infinity();

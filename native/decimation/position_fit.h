@@ -9,14 +9,15 @@
 #include <span>
 #include <vector>
 
+#include "decimation/certified_bounds.h"
 #include "decimation/change_trial.h"
 
 namespace tolvol {
 
 class PositionFit {
  public:
-  /// Keeps a reference to `mesh`, which needs a forward bound.
-  explicit PositionFit(const BoundedMesh& mesh) : mesh_(&mesh) {}
+  /// Keeps references to `mesh` and its bounds, which are certified if anything is asked.
+  explicit PositionFit(const BoundedMesh& mesh) : mesh_(&mesh), bounds_(mesh.certified()) {}
 
   /// Takes some of the pieces of the reference that the faces of a prepared change have to cover; good for any
   /// position, and for the faces as they are now.
@@ -44,6 +45,7 @@ class PositionFit {
   void add_faces(const Change& change, double hopeless, Sums& sums) const;
 
   const BoundedMesh* mesh_;
+  const CertifiedBounds* bounds_;
   std::vector<Coverage::Sample> samples_;
   std::vector<WitnessTriangle> faces_;
 };

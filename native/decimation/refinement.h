@@ -24,7 +24,7 @@ namespace tolvol {
 
 class Refinement {
  public:
-  /// Changes `mesh`, which needs a forward bound, and keeps references to both.
+  /// Changes `mesh`, whose bounds are certified, and keeps references to both.
   Refinement(BoundedMesh& mesh, Team& team);
 
   /// Until some rounds collapse nothing, `target` triangles are left, or `expired`, asked before every step, says so.

@@ -10,6 +10,7 @@
 #include "baselines/permission_ring.h"
 #include "baselines/vertex_samples.h"
 #include "check/methods.h"
+#include "decimation/change.h"
 #include "decimation/decimation.h"
 #include "measure/hausdorff.h"
 #include "shapes.h"
@@ -44,12 +45,17 @@ ToleranceVolume volume_of(const TriangleMesh& mesh) {
 struct Fixed final : RingCheck {
   explicit Fixed(bool answer) : answer(answer) {}
   void begin(const TriangleMesh& mesh, double) override { triangles = mesh.triangles.size(); }
-  bool accepts(std::span<const Coverage::Element> faces, std::span<const Coverage::Removed> removed) override {
-    for (const Coverage::Element& face : faces) EXPECT_LT(face.id, triangles);
-    for (const Coverage::Removed& face : removed) EXPECT_LT(face.id, triangles);
-    return ++questions, answer;
-  }
-  void commit() override { ++commits; }
+  struct Asking final : Trial {
+    explicit Asking(Fixed& fixed) : fixed(fixed) {}
+    bool accepts(const Change& change) override {
+      for (const Coverage::Element& face : change.elements()) EXPECT_LT(face.id, fixed.triangles);
+      for (const Coverage::Removed& face : change.removed()) EXPECT_LT(face.id, fixed.triangles);
+      return ++fixed.questions, fixed.answer;
+    }
+    void commit(const Change&) override { ++fixed.commits; }
+    Fixed& fixed;
+  };
+  std::unique_ptr<Trial> trial() override { return std::make_unique<Asking>(*this); }
   std::string method() const override { return "fixed"; }
 
   bool answer;

@@ -56,15 +56,14 @@ struct Worked {
     }
     input.pinned.assign(reference.vertices.size(), false);
     input.pinned[40] = true;
-    input.on_reference = true;
     input.subset = subset;
     input.store = [this](const dvec3& p) {
       const dvec3 stored = space->store(p);
       return VertexPosition{stored, space->frame(stored)};
     };
-    Bounds bounds;
-    bounds.forward = &*certificate, bounds.backward = &*coverage;
-    mesh.emplace(std::move(input), bounds, alone);
+    bounds.emplace(CertifiedBounds::Directions{*certificate, &*coverage}, positions(), reference.triangles.size(),
+                   true);
+    mesh.emplace(std::move(input), &*bounds, alone);
     collapse.emplace(*mesh);
     shared.emplace(*collapse);
     parts = regions(*mesh, 1200, 0.5, alone);
@@ -79,6 +78,8 @@ struct Worked {
     }
     places.resize(reference.triangles.size());
   }
+
+  std::vector<dvec3> positions() const { return space->frame(reference.vertices); }
 
   DeferredProof later(std::uint32_t region) {
     return DeferredProof(*collapse, *mesh, vertices[region], faces[region], places);
@@ -107,6 +108,7 @@ struct Worked {
   std::optional<ToleranceVolume> volume;
   std::optional<TriangleCertificate> certificate;
   std::optional<Coverage> coverage;
+  std::optional<CertifiedBounds> bounds;
   std::optional<BoundedMesh> mesh;
   std::optional<EdgeCollapse> collapse;
   std::optional<CollapseLoop::Shared> shared;
@@ -124,7 +126,7 @@ void expect_same(const BoundedMesh& a, const BoundedMesh& b) {
     ASSERT_EQ(a.survivor(std::uint32_t(i)), b.survivor(std::uint32_t(i)));
     ASSERT_EQ(a.position(std::uint32_t(i)), b.position(std::uint32_t(i)));
     ASSERT_EQ(a.left_original(std::uint32_t(i)), b.left_original(std::uint32_t(i)));
-    ASSERT_EQ(a.distance(std::uint32_t(i)), b.distance(std::uint32_t(i)));
+    ASSERT_EQ(a.certified()->distance(std::uint32_t(i)), b.certified()->distance(std::uint32_t(i)));
     ASSERT_EQ(a.share(std::uint32_t(i)), b.share(std::uint32_t(i)));
   }
   for (int i = 0; i < int(x.n_halfedges()); ++i) {
@@ -142,7 +144,7 @@ void expect_same(const BoundedMesh& a, const BoundedMesh& b) {
     const OpenMesh::FaceHandle f(i);
     ASSERT_EQ(x.status(f).deleted(), y.status(f).deleted());
     ASSERT_EQ(x.halfedge_handle(f), y.halfedge_handle(f)) << "of face " << i;
-    ASSERT_EQ(a.face_distance(std::uint32_t(i)), b.face_distance(std::uint32_t(i)));
+    ASSERT_EQ(a.certified()->face_distance(std::uint32_t(i)), b.certified()->face_distance(std::uint32_t(i)));
     for (int k = 0; k < 3; ++k) {
       ASSERT_EQ(a.corner_source(std::uint32_t(i), k), b.corner_source(std::uint32_t(i), k));
     }
@@ -217,8 +219,9 @@ INSTANTIATE_TEST_SUITE_P(DeferredProof, TakesBack, testing::Bool(),
 
 TEST(DeferredProof, LeavesBoundariesWithBoundsToOthers) {
   Worked worked(kTolerance);
-  Bounds bounds = worked.mesh->bounds();
-  bounds.boundary_forward = bounds.forward, bounds.boundary_backward = bounds.backward;
+  CertifiedBounds::Directions directions{*worked.certificate};
+  directions.boundary_forward = &*worked.certificate, directions.boundary_backward = &*worked.coverage;
+  CertifiedBounds bounds(directions, worked.positions(), worked.reference.triangles.size(), true);
   BoundedMeshInput input;
   Team alone(1);
   input.triangles = worked.reference.triangles;
@@ -228,7 +231,7 @@ TEST(DeferredProof, LeavesBoundariesWithBoundsToOthers) {
     input.slots.push_back(v);
   }
   input.pinned.assign(worked.reference.vertices.size(), false);
-  BoundedMesh mesh(std::move(input), bounds, alone);
+  BoundedMesh mesh(std::move(input), &bounds, alone);
   EdgeCollapse collapse(mesh);
   EXPECT_FALSE(DeferredProof(collapse, mesh, worked.vertices[0], worked.faces[0], worked.places).possible());
 }

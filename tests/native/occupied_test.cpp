@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "check/certificate.h"
+#include "decimation/certified_bounds.h"
 #include "decimation/change_trial.h"
 #include "shapes.h"
 #include "topology/manifold_cut.h"
@@ -51,9 +52,9 @@ TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
   }
   input.pinned.assign(both.vertices.size(), false);
   input.store = [&](const dvec3& p) { return VertexPosition{space.store(p), p}; };
-  Bounds bounds;
-  bounds.forward = &certificate;
-  BoundedMesh mesh(std::move(input), bounds, alone);
+  const std::vector<dvec3> positions = space.frame(both.vertices);
+  CertifiedBounds bounds({certificate}, positions, both.triangles.size(), false);
+  BoundedMesh mesh(std::move(input), &bounds, alone);
 
   const auto relocate = [&](const VertexPosition& target) {
     ChangeTrial trial(mesh);

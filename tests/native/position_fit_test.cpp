@@ -28,6 +28,7 @@ struct Plate {
     coverage.emplace(volume->reference(), volume->frame_tolerance(), reference.triangles.size());
     for (std::uint32_t i = 0; i < reference.triangles.size(); ++i) coverage->set_witness(i, i);
     BoundedMeshInput input;
+    std::vector<dvec3> positions;
     Team alone(1);
     input.triangles = reference.triangles;
     input.mates = cut_to_manifold(reference.vertices, reference.triangles, alone).mates;
@@ -35,13 +36,13 @@ struct Plate {
       dvec3 p = reference.vertices[v];
       if (v == lifted) p.z = height;
       input.positions.push_back({p, space->frame(p)});
+      positions.push_back(space->frame(p));
       input.slots.push_back(v);
     }
     input.pinned.assign(reference.vertices.size(), false);
     input.store = [this](const dvec3& p) { return VertexPosition{space->store(p), p}; };
-    Bounds bounds;
-    bounds.forward = &*certificate, bounds.backward = &*coverage;
-    mesh.emplace(std::move(input), bounds, alone);
+    bounds.emplace(CertifiedBounds::Directions{*certificate, &*coverage}, positions, reference.triangles.size(), false);
+    mesh.emplace(std::move(input), &*bounds, alone);
   }
 
   TriangleMesh reference;
@@ -50,6 +51,7 @@ struct Plate {
   std::optional<ToleranceVolume> volume;
   std::optional<TriangleCertificate> certificate;
   std::optional<Coverage> coverage;
+  std::optional<CertifiedBounds> bounds;
   std::optional<BoundedMesh> mesh;
 };
 

@@ -26,7 +26,7 @@ BoundedMesh mesh_of(const TriangleMesh& from, std::vector<std::uint32_t> slots =
   for (std::uint32_t v = static_cast<std::uint32_t>(input.slots.size()); v < from.vertices.size(); ++v)
     input.slots.push_back(v);
   input.store = [](const glm::dvec3& p) { return VertexPosition{p, p}; };
-  return BoundedMesh(std::move(input), {}, alone);
+  return BoundedMesh(std::move(input), nullptr, alone);
 }
 
 /// No vertex has vertices of two regions around it: then no face, and no fan of faces, is changed by two.

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// What the changes of a mesh must keep: whether the faces that a change leaves may take the place of those that there
+/// are. CertifiedBounds proves it; a RingCheck has another method decide.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+
+namespace tolvol {
+
+class CertifiedBounds;
+class Change;
+
+class Bounds {
+ public:
+  virtual ~Bounds() = default;
+
+  /// Decides about one change after another, and holds all that this needs, so that a thread each can ask about
+  /// different changes of one mesh.
+  class Trial {
+   public:
+    virtual ~Trial() = default;
+    /// Starts a series of questions around one place. What is answered depends on nothing before.
+    virtual void begin() {}
+    /// Whether the change, which is possible, keeps the bounds. Only reads.
+    virtual bool accepts(const Change& change) = 0;
+    /// The change was accepted last, and the mesh, which is still as it was then, is about to be changed by it.
+    virtual void commit(const Change& change) = 0;
+    /// How many parts of pieces the series of questions has looked at.
+    virtual std::size_t looked_at() const { return 0; }
+  };
+  /// A trial to keep for one thread. Keeps a reference to the bounds.
+  virtual std::unique_ptr<Trial> trial() = 0;
+
+  /// The certificates, if they decide. Only then can a proof be put off, or a position be fitted to the reference.
+  virtual CertifiedBounds* certified() { return nullptr; }
+};
+
+}  // namespace tolvol
