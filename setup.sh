@@ -14,8 +14,8 @@ targets=extension
 case "${1-}" in
 "") ;;
 --tests)
-  packages="$packages python3-pytest python3-pytest-xdist python3-venv libcgal-dev clang-format clang-tidy
-    xvfb xdotool imagemagick"
+  packages="$packages python3-pytest python3-venv libcgal-dev ccache clang-format
+    clang-tidy xvfb xdotool imagemagick"
   targets="all extension"
   ;;
 *)

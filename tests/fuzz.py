@@ -3,6 +3,7 @@
 """Searches failures that no other test covers: random difficult meshes with every operation and every option.
 
     tests/fuzz.py --minutes 1 --seed 1        runs cases 0, 1, 2, ... of a seed until the time is over
+    tests/fuzz.py --cases 600 --seed 1        runs so many cases, however long they take
     tests/fuzz.py --seed 1 --case 17          repeats one of these cases
     tests/fuzz.py --file FILE.npz             repeats a finding that was reduced and stored
 
@@ -30,6 +31,7 @@ SHOWN_FACES = 12
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=1.0)
+    parser.add_argument("--cases", type=int, help="so many cases, not so many minutes")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="the number of the first case")
     parser.add_argument("--case", type=int, help="only the case of this number")
@@ -83,7 +85,7 @@ def main():
         sys.exit(f"fuzz: the judge {judges.CGAL} is not built; run sh setup.sh --tests")
     outcomes, operations, findings, number = Counter(), Counter(), Counter(), options.first
     end = time.monotonic() + 60 * options.minutes
-    while time.monotonic() < end:
+    while time.monotonic() < end if options.cases is None else number < options.first + options.cases:
         case = draw.case_of(options.seed, number)
         found = watchdog.run(case)
         outcomes[found[0]] += 1

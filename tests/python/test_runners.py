@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""tests/runners: which tasks count as failed, and what the closing line says then."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "runners"))
+
+import run
+import tasks
+
+GTEST_FAILED = (
+    "[  PASSED  ] 8 tests.\n[  SKIPPED ] 2 tests, listed below:\n[  SKIPPED ] A.A\n"
+    "[  FAILED  ] 1 test, listed below:\n[  FAILED  ] A.B\n\n 1 FAILED TEST"
+)
+FUZZ = (
+    "fuzz: seed 5, 812 cases, 12 refused with reason, 0 without an end that none was promised, {} findings of 2 kinds"
+)
+
+
+@pytest.mark.parametrize(
+    "count, output, command, failure, said",
+    [
+        (tasks.count_gtest, "[  PASSED  ] 3 tests.", "exit 0", "", "3 passed, 0 failed"),
+        (tasks.count_gtest, GTEST_FAILED, "exit 1", "has 1 failed", "8 passed, 1 failed, 2 skipped"),
+        (tasks.count_gtest, "[  PASSED  ] 0 tests.", "exit 0", "ran no test", "0 passed, 1 failed"),
+        (tasks.count_gtest, "[ RUN      ] A.B", "exit 0", "has no closing line, exit code 0", "0 passed, 1 failed"),
+        (tasks.count_gtest, "[  PASSED  ] 3 tests.", "kill -SEGV $$", "was ended by SIGSEGV", "3 passed, 1 failed"),
+        (tasks.count_gtest, "[  PASSED  ] 3 tests.", "exit 1", "ended with exit code 1", "3 passed, 1 failed"),
+        (tasks.count_pytest, "2 passed, 1 skipped in 63.20s (0:01:03)", "exit 0", "", "2 passed, 0 failed, 1 skipped"),
+        (tasks.count_pytest, "1 failed, 2 passed, 2 errors in 3.2s", "exit 1", "has 3 failed", "2 passed, 3 failed"),
+        (
+            tasks.count_pytest,
+            "no tests ran in 0.01s",
+            "exit 5",
+            "has no closing line, exit code 5",
+            "0 passed, 1 failed",
+        ),
+        (tasks.count_pytest, "3 failed, 20 passed in 300.1 s", "exit 1", "has 3 failed", "20 passed, 3 failed"),
+        (tasks.count_fuzz, FUZZ.format(3), "exit 1", "has 3 failed", "809 passed, 3 failed"),
+        (tasks.count_checks, "a: ok\nb: FAILED\nstyle: failed: b", "exit 1", "has 1 failed", "1 passed, 1 failed"),
+        (tasks.count_checks, "style: in order", "exit 0", "ran no test", "0 passed, 1 failed"),
+    ],
+)
+def test_a_task_fails_by_its_end_and_by_its_closing_line(
+    tmp_path, monkeypatch, capsys, count, output, command, failure, said
+):
+    monkeypatch.setattr(run, "OUT", tmp_path)
+    monkeypatch.setattr(run, "TIMES", tmp_path / "times.json")
+    (tmp_path / "output").write_text(output + "\n")
+    script = f"cat '{tmp_path / 'output'}'; {command}"
+    failed = run.Run([tasks.Task("native", "one", ("sh", "-c", script), count)]).run()
+    printed = capsys.readouterr().out
+    assert failed == bool(failure) and (tmp_path / "native.one.log").read_text() == output + "\n"
+    seconds = r"in \d+ s"
+    line = f"native: {'FAILED' if failed else 'passed'} {seconds} of the processor: {said}"
+    assert re.search(f"^{line}{re.escape(f' (one {failure})') if failed else ''}$", printed, re.MULTILINE)
+    assert re.search(
+        f"^tests: {'failed: native' if failed else 'all passed'}: {said}, {seconds}$", printed, re.MULTILINE
+    )
+    assert (output in printed) == failed
+    assert ("native/one" in (tmp_path / "times.json").read_text()) == (not failed)
