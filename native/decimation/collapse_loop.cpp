@@ -44,11 +44,9 @@ CollapseLoop::CollapseLoop(Shared& shared, Team& team)
     : shared_(shared), collapse_(shared.collapse), mesh_(collapse_.mesh()), queue_(shared.stamps), tried_(1) {
   // Copies are looked up beyond the faces around an edge.
   if (team.alone() || mesh_.has_copies()) return;
-  team_ = &team;
-  // Those of the last time, too, may still be waiting for their turn.
-  tried_.resize(2 * kMostAttempts);
-  tried_of_.assign(mesh_.connectivity().n_edges(), 0);
-  touched_.assign(mesh_.connectivity().n_vertices(), 0);
+  // Edges of the last batch, too, may still be waiting for their turn.
+  ahead_ = TriesAhead(team, 2 * kMostAttempts, mesh_.connectivity().n_edges(), mesh_.connectivity().n_vertices());
+  tried_.resize(ahead_.slot_count());
   reserved_.assign(mesh_.connectivity().n_vertices(), 0);
   surrounded_.assign(mesh_.connectivity().n_vertices(), 0);
 }
@@ -67,8 +65,8 @@ bool CollapseLoop::rationed(std::uint32_t edge) const {
   });
 }
 
-void CollapseLoop::note_refusal(const Tried& tried) {
-  const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(tried.edge), 0);
+void CollapseLoop::note_refusal(std::uint32_t edge, const Tried& tried) {
+  const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
   for (const std::uint32_t end : {mesh_.from(h), mesh_.to(h)}) {
     const std::uint32_t faces = mesh_.faces_around(end);
     if (faces > kCrowded) crowds_.try_emplace(end, Crowd{faces, 0}).first->second.work += faces + tried.looked_at;
@@ -114,7 +112,7 @@ void CollapseLoop::run(const Until& until, Progress* progress) {
       continue;
     }
     Tried* const tried = found(entry->edge);
-    carry_out(tried ? *tried : try_ahead(entry->edge));
+    carry_out(entry->edge, tried ? *tried : try_ahead(entry->edge));
   }
 }
 
@@ -128,11 +126,12 @@ std::optional<double> CollapseLoop::risen(const CollapseQueue::Entry& entry) con
 
 /// What was found for the edge, if that still holds.
 CollapseLoop::Tried* CollapseLoop::found(std::uint32_t edge) {
-  if (!team_) return nullptr;
-  Tried& tried = tried_[tried_of_[edge]];
-  if (tried.edge != edge || tried.met_another || (tried.attempt && tried.attempt->trial.met_another())) return nullptr;
+  if (ahead_.alone()) return nullptr;
   const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
-  return std::max(touched_[mesh_.from(h)], touched_[mesh_.to(h)]) <= tried.at ? &tried : nullptr;
+  const auto slot = ahead_.found(edge, std::array{mesh_.from(h), mesh_.to(h)});
+  if (!slot) return nullptr;
+  Tried& tried = tried_[*slot];
+  return tried.met_another || (tried.attempt && tried.attempt->trial.met_another()) ? nullptr : &tried;
 }
 
 std::unique_ptr<CollapseLoop::Attempt> CollapseLoop::take_attempt() {
@@ -150,11 +149,11 @@ void CollapseLoop::give_back(std::unique_ptr<Attempt> attempt) {
   idle_.push_back(std::move(attempt));
 }
 
-void CollapseLoop::try_now(Tried& tried) {
+void CollapseLoop::try_now(std::uint32_t edge, Tried& tried) {
+  give_back(std::move(tried.attempt));  // of an edge whose turn did not come
   std::unique_ptr<Attempt> attempt = take_attempt();
-  collapse_.attempt(tried.edge, *attempt);
-  tried.outcome = attempt->outcome, tried.looked_at = attempt->trial.looked_at();
-  tried.met_another = attempt->trial.met_another();
+  collapse_.attempt(edge, *attempt);
+  tried = {attempt->outcome, attempt->trial.looked_at(), attempt->trial.met_another(), nullptr};
   if (tried.outcome == EdgeCollapse::Outcome::possible) {
     tried.attempt = std::move(attempt);
   } else {
@@ -164,38 +163,28 @@ void CollapseLoop::try_now(Tried& tried) {
 
 /// Tries the edge and, with several threads, those that would come next.
 CollapseLoop::Tried& CollapseLoop::try_ahead(std::uint32_t edge) {
-  if (!team_) {
-    tried_[0].edge = edge;
-    try_now(tried_[0]);
-    return tried_[0];
-  }
-  const auto take = [&](std::uint32_t e) -> Tried& {
-    tried_of_[e] = static_cast<std::uint32_t>(next_);
-    Tried& tried = tried_[next_];
-    next_ = (next_ + 1) % tried_.size();
-    give_back(std::move(tried.attempt));  // of what was void before its turn came
-    tried = {};
-    tried.edge = e, tried.at = clock_;
-    return tried;
-  };
-  Tried& first = take(edge);
+  const auto try_one = [&](std::uint32_t each, std::size_t slot) { try_now(each, tried_[slot]); };
+  return tried_[ahead_.alone() ? ahead_.run({&edge, 1}, try_one) : ahead_.run(with_next(edge), try_one)];
+}
+
+/// The edge and, of those that would come next, the ones that are not in each other's way.
+std::vector<std::uint32_t> CollapseLoop::with_next(std::uint32_t edge) {
+  std::vector<std::uint32_t> batch{edge};
   const std::size_t most = std::clamp<std::size_t>(mesh_.triangle_count() / kTrianglesPerAttempt, 1, kMostAttempts);
-  std::vector<Tried*> batch{&first};
-  std::vector<CollapseQueue::Entry> ahead;
+  std::vector<CollapseQueue::Entry> next;
   ++batches_;
   reserve_around(edge);
-  while (ahead.size() + 1 < most) {
+  while (next.size() + 1 < most) {
     const auto entry = queue_.pop();
     if (!entry) break;
     if (deleted(entry->edge)) continue;
-    ahead.push_back(*entry);
+    next.push_back(*entry);
     const Tried* const tried = found(entry->edge);
-    if (!tried && !reserved(entry->edge)) batch.push_back(&take(entry->edge));
+    if (!tried && !reserved(entry->edge)) batch.push_back(entry->edge);
     if (!tried || tried->outcome == EdgeCollapse::Outcome::possible) reserve_around(entry->edge);
   }
-  for (const CollapseQueue::Entry& entry : ahead) queue_.push(entry.edge, entry.cost);
-  team_->run(batch.size(), 1, [&](std::size_t i, std::size_t) { try_now(*batch[i]); });
-  return first;
+  for (const CollapseQueue::Entry& entry : next) queue_.push(entry.edge, entry.cost);
+  return batch;
 }
 
 /// Once the edge is collapsed, nothing holds that was found for edges of the vertices around it.
@@ -216,8 +205,7 @@ bool CollapseLoop::reserved(std::uint32_t edge) const {
   return reserved_[mesh_.from(h)] == batches_ || reserved_[mesh_.to(h)] == batches_;
 }
 
-void CollapseLoop::carry_out(Tried& tried) {
-  const std::uint32_t edge = tried.edge;
+void CollapseLoop::carry_out(std::uint32_t edge, Tried& tried) {
   if (tried.outcome == EdgeCollapse::Outcome::possible) {
     if (later_) later_->note(tried.attempt->trial.change());
     const auto h = tried.attempt->halfedge;
@@ -238,14 +226,10 @@ void CollapseLoop::carry_out(Tried& tried) {
     }
     give_back(std::move(tried.attempt));
   } else if (tried.outcome == EdgeCollapse::Outcome::refused) {
-    note_refusal(tried);
+    note_refusal(edge, tried);
     if (!later_) shared_.refused[edge].store(true, std::memory_order_relaxed);
   }
-  tried.edge = kNoEdge;
-}
-
-void CollapseLoop::touch(std::uint32_t vertex) {
-  if (team_) touched_[vertex] = clock_;
+  ahead_.drop(edge);
 }
 
 void CollapseLoop::renew(std::uint32_t edge) {
@@ -256,8 +240,8 @@ void CollapseLoop::renew(std::uint32_t edge) {
 void CollapseLoop::renew_around(std::uint32_t vertex) {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
   const auto v = BoundedMesh::handle(vertex);
-  ++clock_;
-  touch(vertex);
+  ahead_.advance();
+  ahead_.note_change(vertex);
   for (const auto e : connectivity.ve_range(v)) renew(static_cast<std::uint32_t>(e.idx()));
   for (const auto near : connectivity.vv_range(v)) call_back(static_cast<std::uint32_t>(near.idx()));
 }
@@ -265,8 +249,8 @@ void CollapseLoop::renew_around(std::uint32_t vertex) {
 /// The same near the vertex that vanished alone, whose neighbours are in ring_: `vertex` stayed where it was.
 void CollapseLoop::renew_ring(std::uint32_t vertex) {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
-  ++clock_;
-  touch(vertex);
+  ahead_.advance();
+  ahead_.note_change(vertex);
   for (const std::uint32_t near : ring_) {
     if (near == vertex) continue;
     const auto h = connectivity.find_halfedge(BoundedMesh::handle(near), BoundedMesh::handle(vertex));
@@ -278,7 +262,7 @@ void CollapseLoop::renew_ring(std::uint32_t vertex) {
 /// Edges of the vertex that were refused may now be possible. Those of a vertex with a great many faces are called back
 /// from their other ends.
 void CollapseLoop::call_back(std::uint32_t vertex) {
-  touch(vertex);
+  ahead_.note_change(vertex);
   if (mesh_.faces_around(vertex) > kGreatMany || (!crowds_.empty() && !ready(vertex))) return;
   for (const auto e : mesh_.connectivity().ve_range(BoundedMesh::handle(vertex))) {
     // At a rim it may be another region's too.

@@ -2,9 +2,7 @@
 /// The greedy edge-collapse loop: cheapest edge first, each collapse checked when its turn comes or carried out on
 /// trust, over a whole mesh or over one of its regions beside others.
 ///
-/// With a team of threads the next few edges are tried ahead, all at once but for those in each other's way, and what
-/// was found is kept for their turn. It holds unless a face around the edge has changed meanwhile: the result is the
-/// same for any number of threads.
+/// With a team of threads the next few edges are tried ahead, all at once but for those in each other's way.
 #pragma once
 
 #include <atomic>
@@ -21,6 +19,7 @@
 #include "decimation/deferred_proof.h"
 #include "decimation/edge_collapse.h"
 #include "decimation/regions.h"
+#include "decimation/tries_ahead.h"
 
 namespace tolvol {
 
@@ -51,11 +50,8 @@ class CollapseLoop {
 
  private:
   using Attempt = EdgeCollapse::Attempt;
-  static constexpr std::uint32_t kNoEdge = 0xFFFFFFFFu;
-  /// An edge that was tried.
+  /// What came of trying an edge.
   struct Tried {
-    std::uint32_t edge = kNoEdge;
-    std::uint32_t at = 0;  ///< of the collapses carried out
     EdgeCollapse::Outcome outcome = EdgeCollapse::Outcome::impossible;
     std::size_t looked_at = 0;         ///< parts of the reference's pieces
     bool met_another = false;          ///< a vertex far away in the mesh, which may have gone
@@ -70,19 +66,19 @@ class CollapseLoop {
 
   bool deleted(std::uint32_t edge) const;
   bool rationed(std::uint32_t edge) const;
-  void note_refusal(const Tried& tried);
+  void note_refusal(std::uint32_t edge, const Tried& tried);
   bool ready(std::uint32_t vertex);
   bool own(std::uint32_t edge) const;
   Tried* found(std::uint32_t edge);
   Tried& try_ahead(std::uint32_t edge);
-  void try_now(Tried& tried);
+  std::vector<std::uint32_t> with_next(std::uint32_t edge);
+  void try_now(std::uint32_t edge, Tried& tried);
   void reserve_around(std::uint32_t edge);
   bool reserved(std::uint32_t edge) const;
-  void carry_out(Tried& tried);
+  void carry_out(std::uint32_t edge, Tried& tried);
   std::unique_ptr<Attempt> take_attempt();
   void give_back(std::unique_ptr<Attempt> attempt);
   std::optional<double> risen(const CollapseQueue::Entry& entry) const;
-  void touch(std::uint32_t vertex);
   void renew(std::uint32_t edge);
   void renew_around(std::uint32_t vertex);
   void renew_ring(std::uint32_t vertex);
@@ -94,14 +90,11 @@ class CollapseLoop {
   const Regions* regions_ = nullptr;  ///< null: the whole
   std::uint32_t region_ = 0;
   DeferredProof* later_ = nullptr;
-  Team* team_ = nullptr;  ///< where there are others than the caller
   CollapseQueue queue_;
-  std::vector<Tried> tried_;
-  std::vector<std::uint32_t> tried_of_;    ///< per edge: its place in tried_, if that names the edge
-  std::size_t next_ = 0;                   ///< place in tried_ that is taken next, the longest taken
-  std::uint32_t clock_ = 0;                ///< collapses carried out
-  std::vector<std::uint32_t> touched_;     ///< per vertex: when a face around it changed last,
-  std::vector<std::uint32_t> reserved_;    ///< and the last batch of tries in which one could change before its turn
+  TriesAhead ahead_;
+  std::vector<Tried> tried_;  ///< per slot of ahead_
+  /// Per vertex: the last batch of tries in which a face around it could change before the vertex's turn,
+  std::vector<std::uint32_t> reserved_;
   std::vector<std::uint32_t> surrounded_;  ///< and the last one in which its neighbours were noted so
   std::uint32_t batches_ = 0;              ///< of tries, so far
   std::vector<std::uint32_t> ring_;        ///< neighbours of the vertex that vanished last

@@ -24,15 +24,16 @@ constexpr std::size_t kAhead = 8;  // steps tried at once by several threads: st
 
 Refinement::Refinement(BoundedMesh& mesh, Team& team)
     : mesh_(mesh),
-      team_(team),
-      changed_(mesh.connectivity().n_vertices(), 1),
       touched_(mesh.connectivity().n_vertices(), 1),
       relocated_(mesh.connectivity().n_vertices(), 0),
       flipped_(mesh.connectivity().n_edges(), 0),
       collapsed_(mesh.connectivity().n_edges(), 0) {
   // Copies are looked up beyond the faces around a step.
-  const std::size_t count = team.alone() || mesh.has_copies() ? 1 : kAhead;
-  while (attempts_.size() < count) attempts_.emplace_back(mesh);
+  if (!team.alone() && !mesh.has_copies()) {
+    const std::size_t vertices = mesh.connectivity().n_vertices(), edges = mesh.connectivity().n_edges();
+    ahead_ = TriesAhead(team, 2 * kAhead, std::max(vertices, edges), vertices);
+  }
+  while (attempts_.size() < ahead_.slot_count()) attempts_.emplace_back(mesh);
 }
 
 void Refinement::run(std::size_t target, const std::function<bool()>& expired, Progress* progress) {
@@ -76,7 +77,7 @@ void Refinement::run(std::size_t target, const std::function<bool()>& expired, P
 
 /// Tries all steps of a kind, in order. Returns whether it came to the end.
 bool Refinement::sweep(const Kind& kind, std::span<const std::uint32_t> steps, const std::function<bool()>& go_on) {
-  for (Attempt& a : attempts_) a.place = kNowhere;
+  ahead_.drop_all();
   for (std::size_t place = 0; place < steps.size(); ++place) {
     if (!go_on()) return false;
     if ((this->*kind.wanted)(steps[place])) (this->*kind.carry_out)(steps[place], tried(kind, steps, place));
@@ -86,33 +87,36 @@ bool Refinement::sweep(const Kind& kind, std::span<const std::uint32_t> steps, c
 
 /// What was found for the step at `place`, if that still holds; else it is tried, and with it those after it.
 Refinement::Attempt& Refinement::tried(const Kind& kind, std::span<const std::uint32_t> steps, std::size_t place) {
-  const auto at = [&](std::size_t i) -> Attempt& { return attempts_[i % attempts_.size()]; };
-  const auto holds = [&](std::size_t i) {
-    return at(i).place == i && (this->*kind.read)(steps[i]) <= at(i).at && !at(i).trial.met_another();
+  const auto found = [&](std::uint32_t step) -> Attempt* {
+    if (ahead_.alone()) return nullptr;
+    const auto slot = ahead_.found(step, (this->*kind.read)(step));
+    return slot && !attempts_[*slot].trial.met_another() ? &attempts_[*slot] : nullptr;
   };
-  if (holds(place)) return at(place);
-  std::vector<std::size_t> batch;
-  for (std::size_t i = place; i < std::min(place + attempts_.size(), steps.size()); ++i) {
-    if (!(this->*kind.wanted)(steps[i]) || holds(i)) continue;
-    at(i).place = i, at(i).at = clock_;
-    batch.push_back(i);
+  if (Attempt* const a = found(steps[place])) return *a;
+  const std::size_t ahead = ahead_.alone() ? 1 : kAhead;
+  std::vector<std::uint32_t> batch;
+  for (std::size_t i = place; i < std::min(place + ahead, steps.size()); ++i) {
+    if ((this->*kind.wanted)(steps[i]) && !found(steps[i])) batch.push_back(steps[i]);
   }
-  team_.run(batch.size(), 1, [&](std::size_t i, std::size_t) { (this->*kind.attempt)(steps[batch[i]], at(batch[i])); });
-  return at(place);
+  return attempts_[ahead_.run(
+      batch, [&](std::uint32_t step, std::size_t slot) { (this->*kind.attempt)(step, attempts_[slot]); })];
 }
 
 void Refinement::apply(Attempt& a) {
-  ++clock_;
+  ahead_.advance();
   for (const Change::Face& face : a.trial.change().faces()) {
-    for (const std::uint32_t v : face.vertices) touched_[v] = changed_[v] = clock_;
+    for (const std::uint32_t v : face.vertices) {
+      touched_[v] = ahead_.now();
+      ahead_.note_change(v);
+    }
   }
   a.trial.carry_out(mesh_);
   // A vertex that stays where it was has another share, distance and boundary, though its other faces are the same.
   const std::optional<std::uint32_t> kept = a.trial.change().vertex();
   if (!kept) return;
-  changed_[*kept] = clock_;
+  ahead_.note_change(*kept);
   for (const auto v : mesh_.connectivity().vv_range(BoundedMesh::handle(*kept))) {
-    changed_[static_cast<std::size_t>(v.idx())] = clock_;
+    ahead_.note_change(static_cast<std::uint32_t>(v.idx()));
   }
 }
 
@@ -150,7 +154,7 @@ void Refinement::relocate(std::uint32_t vertex, Attempt& a) {
     apply(a);
     a.possible = moves < kMoves && find_move(vertex, a);
   }
-  relocated_[vertex] = clock_;
+  relocated_[vertex] = ahead_.now();
 }
 
 std::uint64_t Refinement::at_ends(const std::vector<std::uint64_t>& times, std::uint32_t edge) const {
@@ -158,15 +162,21 @@ std::uint64_t Refinement::at_ends(const std::vector<std::uint64_t>& times, std::
   return std::max(times[mesh_.from(h)], times[mesh_.to(h)]);
 }
 
-/// Of the other diagonal as well: an edge may have come there.
-std::uint64_t Refinement::read_at_diagonals(std::uint32_t edge) const {
+Refinement::Read Refinement::read_at_ends(std::uint32_t edge) const {
+  const Halfedge h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
+  const std::uint32_t from = mesh_.from(h), to = mesh_.to(h);
+  return {from, to, from, to};
+}
+
+/// Reads at the other diagonal as well: an edge may have come there.
+Refinement::Read Refinement::read_at_diagonals(std::uint32_t edge) const {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
-  std::uint64_t last = read_at_ends(edge);
+  Read read = read_at_ends(edge);
   for (unsigned side = 0; side < 2; ++side) {
     const Halfedge h = connectivity.halfedge_handle(BoundedMesh::edge(edge), side);
-    if (!connectivity.is_boundary(h)) last = std::max(last, changed_[mesh_.to(connectivity.next_halfedge_handle(h))]);
+    if (!connectivity.is_boundary(h)) read[2 + side] = mesh_.to(connectivity.next_halfedge_handle(h));
   }
-  return last;
+  return read;
 }
 
 bool Refinement::flip_wanted(std::uint32_t edge) const {
@@ -185,7 +195,7 @@ void Refinement::try_flip(std::uint32_t edge, Attempt& a) const {
 
 void Refinement::flip(std::uint32_t edge, Attempt& a) {
   if (a.possible) apply(a);
-  flipped_[edge] = clock_;
+  flipped_[edge] = ahead_.now();
 }
 
 bool Refinement::collapse_wanted(std::uint32_t edge) const {
@@ -211,7 +221,7 @@ void Refinement::try_collapse(std::uint32_t edge, Attempt& a) const {
 }
 
 void Refinement::collapse(std::uint32_t edge, Attempt& a) {
-  collapsed_[edge] = clock_;
+  collapsed_[edge] = ahead_.now();
   if (a.possible) apply(a);
 }
 

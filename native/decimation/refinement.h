@@ -2,11 +2,10 @@
 /// Fewer triangles after the collapse loop has ended: vertices move to where they fit best and edges are flipped, which
 /// makes room for further collapses, round after round until one brings nothing. Every step keeps the bounds.
 ///
-/// Steps are tried in a fixed order. With several threads the next few are tried ahead, all at once; what was found is
-/// used when its turn comes, unless something that the try read has changed meanwhile: the result is the same for any
-/// number of threads.
+/// Steps are tried in a fixed order. With several threads the next few are tried ahead, all at once.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -19,6 +18,7 @@
 #include "decimation/bounded_mesh.h"
 #include "decimation/change_trial.h"
 #include "decimation/position_fit.h"
+#include "decimation/tries_ahead.h"
 
 namespace tolvol {
 
@@ -40,23 +40,21 @@ class Refinement {
     ChangeTrial trial;
     PositionFit fit;
     bool possible = false;
-    std::size_t place = kNowhere;  ///< of the step in its order
-    std::uint64_t at = 0;          ///< of the clock
   };
+  /// The vertices around which a try reads; some may be named more than once.
+  using Read = std::array<std::uint32_t, 4>;
   /// A kind of step, of a vertex or an edge each.
   struct Kind {
-    /// When what a try reads changed last.
-    std::uint64_t (Refinement::*read)(std::uint32_t) const;
+    Read (Refinement::*read)(std::uint32_t) const;
     bool (Refinement::*wanted)(std::uint32_t) const;
     void (Refinement::*attempt)(std::uint32_t, Attempt&) const;
     void (Refinement::*carry_out)(std::uint32_t, Attempt&);
   };
-  static constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
 
   bool sweep(const Kind& kind, std::span<const std::uint32_t> steps, const std::function<bool()>& go_on);
   Attempt& tried(const Kind& kind, std::span<const std::uint32_t> steps, std::size_t place);
 
-  std::uint64_t read_at(std::uint32_t vertex) const { return changed_[vertex]; }
+  Read read_at(std::uint32_t vertex) const { return {vertex, vertex, vertex, vertex}; }
   bool relocation_wanted(std::uint32_t vertex) const;
   void try_relocation(std::uint32_t vertex, Attempt& a) const;
   bool find_move(std::uint32_t vertex, Attempt& a) const;
@@ -64,8 +62,8 @@ class Refinement {
 
   /// The later of an edge's two ends.
   std::uint64_t at_ends(const std::vector<std::uint64_t>& times, std::uint32_t edge) const;
-  std::uint64_t read_at_ends(std::uint32_t edge) const { return at_ends(changed_, edge); }
-  std::uint64_t read_at_diagonals(std::uint32_t edge) const;
+  Read read_at_ends(std::uint32_t edge) const;
+  Read read_at_diagonals(std::uint32_t edge) const;
   bool flip_wanted(std::uint32_t edge) const;
   void try_flip(std::uint32_t edge, Attempt& a) const;
   void flip(std::uint32_t edge, Attempt& a);
@@ -84,13 +82,9 @@ class Refinement {
                                   &Refinement::collapse};
 
   BoundedMesh& mesh_;
-  Team& team_;
-  std::vector<Attempt> attempts_;  ///< of the steps that come next, by place
-  // Steps are counted; what failed is not tried again until a face around it has changed since.
-  std::uint64_t clock_ = 1;
-  /// Per vertex: when a face around it changed last, or what is known of a vertex of one: what was found there no
-  /// longer holds, though a step that failed would fail again.
-  std::vector<std::uint64_t> changed_;
+  TriesAhead ahead_;
+  std::vector<Attempt> attempts_;  ///< per slot of ahead_
+  // What failed is not tried again until a face around it has changed since; the times are those of ahead_.
   std::vector<std::uint64_t> touched_;                          ///< per vertex: when a face around it changed last
   std::vector<std::uint64_t> relocated_, flipped_, collapsed_;  ///< per vertex, edge, edge: when it was tried last
 };

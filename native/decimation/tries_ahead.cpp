@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "decimation/tries_ahead.h"
+
+#include <algorithm>
+#include <cassert>
+
+namespace tolvol {
+
+TriesAhead::TriesAhead(Team& team, std::size_t slots, std::size_t step_count, std::size_t vertex_count)
+    : team_(&team), slots_(slots), slot_of_(step_count, 0), changed_(vertex_count, 0) {}
+
+std::size_t TriesAhead::take(std::span<const std::uint32_t> steps) {
+  assert(steps.size() <= slots_.size());
+  const std::size_t first = next_;
+  for (const std::uint32_t step : steps) {
+    slot_of_[step] = static_cast<std::uint32_t>(next_);
+    slots_[next_] = {step, now_};
+    next_ = (next_ + 1) % slots_.size();
+  }
+  return first;
+}
+
+std::optional<std::size_t> TriesAhead::found(std::uint32_t step, std::span<const std::uint32_t> read) const {
+  if (alone()) return std::nullopt;
+  const std::size_t slot = slot_of_[step];
+  if (slots_[slot].step != step) return std::nullopt;
+  const bool changed =
+      std::ranges::any_of(read, [&](std::uint32_t vertex) { return changed_[vertex] > slots_[slot].at; });
+  return changed ? std::nullopt : std::optional(slot);
+}
+
+void TriesAhead::drop(std::uint32_t step) {
+  if (alone()) return;
+  Slot& slot = slots_[slot_of_[step]];
+  if (slot.step == step) slot.step = kNoStep;
+}
+
+void TriesAhead::drop_all() { std::ranges::fill(slots_, Slot()); }
+
+}  // namespace tolvol
