@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "decimation/decimation_output.h"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+
+#include "base/call.h"
+#include "geometry/hierarchy.h"
+
+namespace tolvol {
+namespace {
+
+constexpr std::uint32_t kNone = CutMesh::kNone;
+
+class Output {
+ public:
+  Output(const DecimationInput& input, const BoundedMesh& mesh, DecimationResult& result)
+      : input_(input), cut_(input.cut()), mesh_(mesh), result_(result) {}
+
+  void write() {
+    // Result vertices in the order of the input vertices that they continue.
+    std::vector<std::uint32_t> order;
+    std::vector<std::uint32_t> used(input_.positions().size(), kNone);
+    const auto slot = [&](std::uint32_t v) { return mesh_.slot(mesh_.survivor(v)); };
+    // Corner k of a result triangle, in the order of the input triangle that it continues.
+    const auto corner = [&](std::uint32_t input, std::uint32_t t, int k) {
+      return slot(t == kNone ? cut_.input_vertex[input_.triangles()[input][k]]
+                             : mesh_.triangle(t)[input_.own_corner(t, k)]);
+    };
+    const auto use = [&](std::uint32_t s) {
+      if (used[s] == kNone) used[s] = 0, order.push_back(s);
+    };
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> kept;  // (input triangle, triangle of the cut mesh or kNone)
+    for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
+      if (mesh_.alive(t)) kept.emplace_back(cut_.triangle_input[t], t);
+    }
+    for (const std::uint32_t i : cut_.aside) kept.emplace_back(i, kNone);
+    std::sort(kept.begin(), kept.end());
+    for (const auto& [input, t] : kept) {
+      poll_at(order.size());
+      for (int k = 0; k < 3; ++k) use(corner(input, t, k));
+    }
+    std::sort(order.begin(), order.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return cut_.vertex_input[a] < cut_.vertex_input[b]; });
+    for (std::uint32_t i = 0; i < order.size(); ++i) {
+      const std::uint32_t v = order[i];
+      used[v] = i;
+      const std::uint32_t source = cut_.vertex_input[v];
+      result_.vertex_source.push_back(source);
+      result_.vertices.push_back(mesh_.stored(v));
+    }
+    for (const auto& [input, t] : kept) {
+      glm::uvec3 triangle;
+      for (int k = 0; k < 3; ++k) triangle[k] = used[corner(input, t, k)];
+      result_.triangles.push_back(triangle);
+      result_.triangle_source.push_back(input);
+      kept_.push_back(t);
+    }
+    result_.vertex_map.assign(input_.vertices().size(), -1);
+    for (std::size_t i = 0; i < input_.vertices().size(); ++i) {
+      if (cut_.input_vertex[i] == kNone) continue;
+      result_.vertex_map[i] = static_cast<std::int32_t>(used[slot(cut_.input_vertex[i])]);
+    }
+  }
+
+  void take_attributes() {
+    const glm::dmat3 unit(1);
+    const std::vector<std::uint32_t>& islands = input_.islands();
+    std::vector<std::uint32_t> any_corner(input_.positions().size(), kNone);
+    for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
+      for (int k = 0; k < 3; ++k) {
+        std::uint32_t& corner = any_corner[cut_.triangles[t][k]];
+        if (corner == kNone) corner = 3 * t + static_cast<std::uint32_t>(k);
+      }
+    }
+    std::optional<Hierarchy> own;
+    const TriangleMesh input{input_.positions(), cut_.triangles};
+    for (std::size_t i = 0; i < kept_.size(); ++i) {
+      poll_at(i);
+      glm::uvec3 triangle(result_.triangle_source[i]);
+      glm::dmat3 weights = unit;
+      for (int k = 0; k < 3 && kept_[i] != kNone; ++k) {
+        const std::uint32_t t = kept_[i];
+        const int corner = input_.own_corner(t, k);
+        const std::uint32_t v = mesh_.triangle(t)[corner];
+        if (!mesh_.left_original(v)) {
+          const std::uint32_t source = islands.empty() ? any_corner[v] : mesh_.corner_source(t, corner);
+          const std::uint32_t original = input_.input_corner(source / 3, static_cast<int>(source % 3));
+          triangle[k] = original / 3;
+          weights[k] = unit[static_cast<int>(original % 3)];
+          continue;
+        }
+        const auto same_island = [&](std::uint32_t other) { return islands.empty() || islands[other] == islands[t]; };
+        const glm::dvec3& p = mesh_.position(v);
+        if (const Hierarchy* const reference = input_.own_hierarchy()) {
+          const Hierarchy::Nearest nearest = reference->nearest_if(p, [&](std::uint32_t i) {
+            return input_.element_of()[i] != kNone && same_island(input_.element_of()[i]);
+          });
+          triangle[k] = nearest.triangle;
+          weights[k] = nearest.weights;
+          continue;
+        }
+        if (!own) own.emplace(input);
+        const Hierarchy::Nearest nearest = own->nearest_if(p, same_island);
+        triangle[k] = cut_.triangle_input[nearest.triangle];
+        weights[k] = nearest.weights;
+        if (cut_.reversed[nearest.triangle]) std::swap(weights[k].y, weights[k].z);
+      }
+      result_.source_triangle.push_back(triangle);
+      result_.source_weights.push_back(weights);
+    }
+  }
+
+  void report() {
+    const auto repair = [&](std::size_t count, const char* kind, const char* message) {
+      if (count) result_.repairs.push_back({kind, count, std::to_string(count) + " " + message});
+    };
+    repair(cut_.duplicates, "duplicate", "exact duplicate faces dropped");
+    repair(cut_.degenerate_on_edge, "degenerate", "degenerate faces on an edge of another face dropped");
+    repair(cut_.aside.size(), "kept_degenerate", "degenerate faces kept as they are");
+    repair(cut_.welded, "welded", "vertices at exactly the position of another joined to it");
+    repair(cut_.cut_edges, "cut", "non-manifold edges, which collapse along themselves alone");
+    repair(cut_.reversed_count, "misoriented", "faces against their neighbours' orientation, kept so");
+    std::size_t unused = 0;
+    for (const std::uint32_t v : cut_.input_vertex) unused += v == kNone;
+    repair(unused, "unused", "vertices that no face uses are not part of the result");
+    for (const CutCause cause : cut_.cause) {
+      if (cause == CutCause::degenerate) ++result_.locked["degenerate face"];
+    }
+  }
+
+ private:
+  const DecimationInput& input_;
+  const CutMesh& cut_;
+  const BoundedMesh& mesh_;
+  DecimationResult& result_;
+  std::vector<std::uint32_t> kept_;  ///< per result triangle: its triangle in the cut mesh
+};
+
+}  // namespace
+
+void write_result(const DecimationInput& input, const BoundedMesh& mesh, DecimationResult& result) {
+  Output output(input, mesh, result);
+  output.write();
+  output.take_attributes();
+  output.report();
+}
+
+}  // namespace tolvol
