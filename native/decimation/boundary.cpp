@@ -23,7 +23,7 @@ BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mes
       reference_.triangles.emplace_back(a, b, b);
     }
     if (reference_.triangles.empty()) {
-      // Nothing to be near to: the boundary stays as it is.
+      // The boundary stays as it is, because there is nothing that it could be near to.
       for (const glm::uvec2& e : mesh.boundary) uncertified_.insert(uncertified_.end(), {e.x, e.y});
       return;
     }

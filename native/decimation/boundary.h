@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// What is promised of open boundaries when only one direction is kept: boundary edges stay within the tolerance of the
-/// reference's boundary edges, and those within the tolerance of them.
+/// The bounds of open boundaries, which a decimation keeps when it keeps only one direction of the surfaces: the
+/// boundary edges of the mesh stay within the tolerance of the reference's boundary edges, and the reference's within
+/// the tolerance of the mesh's.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -16,13 +17,13 @@ namespace tolvol {
 
 class BoundaryBounds {
  public:
-  /// `limit`: what collapses must keep; `provable`: what counts as near at the start.
+  /// `limit` is the distance that collapses must keep; an edge nearer than `provable` counts as near at the start.
   BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh, std::span<const glm::dvec3> positions,
                  bool mesh_is_reference, double limit, double provable, Team& team);
   BoundaryBounds(const BoundaryBounds&) = delete;
   BoundaryBounds& operator=(const BoundaryBounds&) = delete;
 
-  /// Whether there is a boundary on both sides; else there is nothing to keep.
+  /// Whether the mesh and the reference both have a boundary. If not, there is nothing to keep.
   bool any() const { return forward_.has_value(); }
   const TriangleCertificate& forward() const { return *forward_; }
   Coverage& backward() { return *backward_; }
@@ -30,9 +31,9 @@ class BoundaryBounds {
   const std::vector<std::uint32_t>& uncertified() const { return uncertified_; }
 
  private:
-  TriangleMesh reference_;  // boundary edges as degenerate triangles (a, b, b)
+  TriangleMesh reference_;  // It holds boundary edges as degenerate triangles (a, b, b).
   std::vector<WitnessTriangle> witnesses_;
-  DistanceGrid no_grid_;  // segments are found by the hierarchy
+  DistanceGrid no_grid_;  // It stays empty: the hierarchy finds the segments.
   std::optional<Hierarchy> hierarchy_;
   std::optional<TriangleCertificate> forward_;
   std::optional<Coverage> backward_;

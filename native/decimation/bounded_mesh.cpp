@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Connectivity by OpenMesh; faces keep their input's indices, deleted ones are only marked.
+// OpenMesh holds the connectivity. Faces keep the indices of the input; deleted ones are only marked.
 #include "decimation/bounded_mesh.h"
 
 #include <algorithm>
@@ -82,7 +82,7 @@ bool BoundedMesh::joined_by_other(std::uint32_t a, std::uint32_t b) const {
   return false;
 }
 
-/// A vertex of higher rank can only be the one that stays.
+/// The rank of a vertex in a merge: the vertex of higher rank is the one that stays.
 int BoundedMesh::rank(std::uint32_t vertex) const {
   if (pinned_[vertex]) return 5;
   return joined(vertex) ? 4 : (seam_[vertex] ? 2 : 0) + (on_boundary(vertex) ? 1 : 0);
@@ -93,7 +93,7 @@ BoundedMesh::Merge BoundedMesh::merge(Edge e) const {
   const std::uint32_t v0 = from(h), v1 = to(h);
   const int rank0 = rank(v0), rank1 = rank(v1);
   if ((pinned_[v0] && pinned_[v1]) || slots_[v0] == slots_[v1]) return {Freedom::none, h};
-  // Where sheets touch in a point, that point may slide along the boundary of one.
+  // A point in which sheets touch may slide along the boundary of one of them.
   if (joined(v0) != joined(v1) && !pinned_[v0] && !pinned_[v1] && wedges_.empty() && mesh_.is_boundary(e)) {
     return {Freedom::either_way, h};
   }
@@ -119,8 +119,7 @@ void BoundedMesh::place(std::uint32_t vertex, const VertexPosition& target) {
   stored_[vertex] = target.stored;
 }
 
-/// The vertex that vanishes becomes one with the one that stays: its copies that do not vanish are that one's from now
-/// on.
+/// Makes the copies of the vertex that vanishes, as far as they do not vanish, copies of the vertex that stays.
 void BoundedMesh::merge_copies(const Change& change) {
   const std::uint32_t kept_vertex = *change.vertex();
   const std::uint32_t merged = slots_[from(change.halfedge())], kept = slots_[kept_vertex];
@@ -196,7 +195,7 @@ void BoundedMesh::restore(const Saved& saved) {
     mesh_.status(s.halfedge).set_deleted(false);
     mesh_.status(mesh_.edge_handle(s.halfedge)).set_deleted(false);
   }
-  for (const Saved::OfHalfedge& s : saved.halfedges) {  // sets what its neighbours name, too
+  for (const Saved::OfHalfedge& s : saved.halfedges) {  // This also sets the names in its neighbours.
     mesh_.set_next_halfedge_handle(s.halfedge, mesh_.next_halfedge_handle(s.halfedge));
     mesh_.set_next_halfedge_handle(mesh_.prev_halfedge_handle(s.halfedge), s.halfedge);
   }

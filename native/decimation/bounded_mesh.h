@@ -20,22 +20,23 @@ namespace tolvol {
 
 class Change;
 
-/// A position as it is stored, and in the frame: always mapped from what is stored.
+/// A position as it is stored, and the same position in the frame, which is mapped from the stored one.
 struct VertexPosition {
   glm::dvec3 stored, position;
 };
 
 struct BoundedMeshInput {
-  std::vector<glm::uvec3> triangles;      ///< an oriented manifold with boundary
-  std::vector<std::uint32_t> mates;       ///< as those of a CutMesh
-  std::vector<VertexPosition> positions;  ///< of the vertices
-  std::vector<bool> pinned;    ///< per vertex: neither moves nor vanishes, and an edge between two such stays
-  std::vector<double> shares;  ///< per vertex: of the forward bound that new faces around it may use; may be empty
-  std::vector<std::uint32_t> slots;  ///< per vertex: equal for copies, those that are one vertex of the result
-  std::vector<bool> joined;          ///< per vertex: an edge of it lies on edges of other sheets; may be empty
-  std::vector<glm::uvec3>
-      wedges;           ///< per triangle and corner: equal at a vertex where attributes are equal; may be empty
-  bool subset = false;  ///< every surviving vertex keeps its position
+  std::vector<glm::uvec3> triangles;      ///< An oriented manifold with boundary.
+  std::vector<std::uint32_t> mates;       ///< The mates of a CutMesh.
+  std::vector<VertexPosition> positions;  ///< For each vertex.
+  std::vector<bool>
+      pinned;  ///< For each vertex: it neither moves nor vanishes, and an edge between two such vertices stays.
+  std::vector<double>
+      shares;  ///< For each vertex: the share of the forward bound that new faces around it may use. May be empty.
+  std::vector<std::uint32_t> slots;  ///< For each vertex: equal for copies, which are one vertex of the result.
+  std::vector<bool> joined;          ///< For each vertex: an edge of it lies on edges of other sheets. May be empty.
+  std::vector<glm::uvec3> wedges;    ///< For each corner: equal at a vertex where attributes are equal. May be empty.
+  bool subset = false;               ///< Every surviving vertex keeps its position.
   /// Rounds a position in the frame to what can be stored.
   std::function<VertexPosition(const glm::dvec3&)> store;
 };
@@ -64,24 +65,27 @@ class BoundedMesh {
   VertexPosition store(const glm::dvec3& position) const { return store_(position); }
   /// Whether the vertex left its original position.
   bool left_original(std::uint32_t vertex) const { return left_original_[vertex] != 0; }
-  /// Of the forward bound, what new faces around the vertex may use.
+  /// The share of the forward bound that new faces around the vertex may use.
   double share(std::uint32_t vertex) const { return shares_.empty() ? 1 : shares_[vertex]; }
   /// How many faces have the vertex as a corner.
   std::uint32_t faces_around(std::uint32_t vertex) const {
     return faces_around_[vertex].load(std::memory_order_relaxed);
   }
   bool on_boundary(std::uint32_t vertex) const { return mesh_.is_boundary(handle(vertex)); }
-  /// Whether vertices of the kernel are one vertex of the result: what one may do then depends on where the others are.
+  /// Whether some vertices of the kernel are one vertex of the result. A change of one of them then depends on where
+  /// the others are.
   bool has_copies() const { return !copies_.empty(); }
-  /// Whether it has copies or an edge on edges of other sheets, so that a change there may be one of theirs too.
+  /// Whether the vertex has copies, or an edge that lies on edges of other sheets, so that a change there may change
+  /// them, too.
   bool joined(std::uint32_t vertex) const { return joined_[vertex] != 0; }
-  /// The vertex and its copies; of the kernel, alive and at one place. Valid until the next change of one of them.
+  /// The vertex and its copies: vertices of the kernel that are alive and at one place. Valid until the next change of
+  /// one of them.
   std::span<const std::uint32_t> copies(std::uint32_t vertex) const {
     const auto found = copies_.find(slots_[vertex]);
     if (found != copies_.end()) return found->second;
-    return {&merged_into_[vertex], 1};  // what is there was merged into itself
+    return {&merged_into_[vertex], 1};  // A vertex that is alive was merged into itself.
   }
-  /// Equal for copies; the number of one of them.
+  /// The slot of the vertex, which is equal for copies: the number of one of them.
   std::uint32_t slot(std::uint32_t vertex) const { return slots_[vertex]; }
   /// Whether an edge joins two vertices in the result that is not the one between these two but one between copies.
   bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
@@ -111,15 +115,15 @@ class BoundedMesh {
   /// Whether a vertex may move by itself.
   bool movable(std::uint32_t vertex) const { return !subset_ && !pinned_[vertex] && !seam_[vertex] && !joined(vertex); }
 
-  /// From now on no change puts a vertex where another is: for one thread that applies changes. O(n).
+  /// From now on no change puts a vertex where another is. Only one thread may apply changes then. O(n).
   void keep_apart();
-  /// Whether a vertex other than the two would be put where another is.
+  /// Whether the place of `target` belongs to a vertex other than these two, and vertices are kept apart.
   bool meets_another(const VertexPosition& target, std::uint32_t vertex, std::uint32_t other) const {
     return kept_apart_ && target.stored != stored_[vertex] && target.stored != stored_[other] &&
            occupied_.contains(target.stored);
   }
 
-  /// Carries out a change that is possible on this mesh as it is. Whoever decides about changes calls it, ChangeTrial.
+  /// Carries out a change that is possible on this mesh as it is. ChangeTrial, which decides about changes, calls it.
   void apply(const Change& change);
 
   /// Some vertices and faces as they were, with the halfedges of these faces and those opposite to them at a boundary.
@@ -140,7 +144,7 @@ class BoundedMesh {
       Halfedge halfedge;
       Kernel::Halfedge kernel;
     };
-    struct Anchor {  ///< the halfedge that the kernel finds a vertex's others by
+    struct Anchor {  ///< The halfedge by which the kernel finds the others of a vertex.
       Vertex vertex;
       Halfedge halfedge;
     };
@@ -167,16 +171,17 @@ class BoundedMesh {
   std::vector<glm::uvec3> triangles_;
   std::vector<glm::dvec3> positions_, stored_;
   std::vector<bool> pinned_, seam_;
-  std::vector<std::atomic<std::uint32_t>> faces_around_;  ///< atomic: regions share the vertices between them
-  std::vector<std::uint8_t> left_original_;               ///< not bits, which threads would share
+  std::vector<std::atomic<std::uint32_t>> faces_around_;  ///< Regions share the vertices between them.
+  std::vector<std::uint8_t> left_original_;               ///< Threads would share bits.
   std::vector<double> shares_;
-  std::vector<std::uint8_t> joined_;  ///< not bits, which threads would share
+  std::vector<std::uint8_t> joined_;  ///< Threads would share bits.
   std::vector<std::uint32_t> slots_;
-  std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> copies_;  ///< by slot, where there are several
+  std::unordered_map<std::uint32_t, std::vector<std::uint32_t>>
+      copies_;  ///< By slot, where a slot has several vertices.
   std::vector<glm::uvec3> wedges_, corner_source_;
   mutable std::vector<std::uint32_t> merged_into_;
   bool kept_apart_ = false;
-  Occupied occupied_;  ///< if so: by the vertices that are there
+  Occupied occupied_;  ///< The places of the vertices, if they are kept apart.
   std::atomic<std::size_t> triangle_count_ = 0;
 };
 

@@ -24,12 +24,12 @@ class Bounds {
     virtual void begin() {}
     /// Whether the change, which is possible, keeps the bounds. Only reads.
     virtual bool accepts(const Change& change) = 0;
-    /// The change was accepted last, and the mesh, which is still as it was then, is about to be changed by it.
+    /// Notes that the change, which was accepted last, is about to be carried out. The mesh is still as it was then.
     virtual void commit(const Change& change) = 0;
     /// How many parts of pieces the series of questions has looked at.
     virtual std::size_t looked_at() const { return 0; }
   };
-  /// A trial to keep for one thread. Keeps a reference to the bounds.
+  /// Makes a trial for one thread. The trial keeps a reference to the bounds.
   virtual std::unique_ptr<Trial> trial() = 0;
 
   /// The certificates, if they decide. Only then can a proof be put off, or a position be fitted to the reference.

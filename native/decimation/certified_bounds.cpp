@@ -35,7 +35,7 @@ void CertifiedBounds::restore(const Saved& saved, std::span<const std::uint32_t>
   for (std::size_t i = 0; i < faces.size(); ++i) face_distance_[faces[i]] = saved.face_distance[i];
 }
 
-/// Asks only where the vertex of a change is.
+/// A trial that asks only where the vertex of a change is.
 class CertifiedBounds::VertexTrial : public Trial {
  public:
   explicit VertexTrial(CertifiedBounds& bounds) : bounds_(bounds) {}
@@ -52,10 +52,10 @@ class CertifiedBounds::VertexTrial : public Trial {
   }
 
   CertifiedBounds& bounds_;
-  double vertex_distance_ = 0;  ///< an upper bound on its distance to the reference
+  double vertex_distance_ = 0;  ///< An upper bound on the vertex's distance to the reference.
 };
 
-/// Asks all that is asked for, in the order of what the answers cost.
+/// A trial that asks for every bound, the cheapest question first.
 class CertifiedBounds::FullTrial final : public VertexTrial {
  public:
   using VertexTrial::VertexTrial;
@@ -90,7 +90,7 @@ class CertifiedBounds::FullTrial final : public VertexTrial {
   std::vector<Coverage::Element> boundary_elements_;
   std::vector<Coverage::Removed> boundary_removed_;
   Coverage::Trial backward_, boundary_backward_;
-  std::vector<double> face_distances_;  ///< per face of the change: an upper bound on its distance to the reference
+  std::vector<double> face_distances_;  ///< For each face of the change: an upper bound on its distance.
   /// The face that failed last: of another try at the same place it is the likeliest to fail.
   std::size_t failed_last_ = 0;
 };
@@ -101,12 +101,12 @@ std::unique_ptr<Bounds::Trial> CertifiedBounds::trial_on_trust() { return std::m
 
 /// Whether a face is likely to lie near many triangles of the reference.
 bool CertifiedBounds::FullTrial::is_large(const Coverage::Element& e) const {
-  constexpr double kLarge = 8;  // times the tolerance
+  constexpr double kLarge = 8;  // A face is large if it is longer than so many times the tolerance.
   const double large = kLarge * bounds_.forward().limit();
   return longest_squared({{e.corners[0], e.corners[1], e.corners[2]}}) > large * large;
 }
 
-/// Whether a point of a large face is outside: before anything is proved in vain.
+/// Whether a point of a large face is outside. It is asked before anything is proved in vain.
 bool CertifiedBounds::FullTrial::shows_outside(const Change& change) {
   const std::size_t count = change.elements().size();
   for (std::size_t k = 0; k < count; ++k) {
@@ -161,7 +161,7 @@ void CertifiedBounds::FullTrial::gather_replaced_faces(const Change& change) {
   for (const Coverage::Removed& r : change.removed()) add(r.id);
 }
 
-/// Boundary edges as a collapse or a relocation would leave them.
+/// Gathers the boundary edges as a collapse or a relocation would leave them.
 void CertifiedBounds::FullTrial::gather_boundary(const Change& change) {
   boundary_elements_.clear(), boundary_removed_.clear();
   const BoundedMesh& mesh = change.mesh();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The bounds that are proved: every point of the mesh within the tolerance of the reference, every point of the
-/// reference within it of the mesh, or boundaries within it of each other, as far as each is asked for. It keeps
-/// account of what is known of every vertex and face, in the volume's frame.
+/// Bounds that are proved: every point of the mesh is within the tolerance of the reference; if asked for, every point
+/// of the reference is within it of the mesh, and the boundaries are within it of each other. The class keeps account
+/// of what is known of every vertex and face, in the volume's frame.
 #pragma once
 
 #include <cstdint>
@@ -21,12 +21,12 @@ class CertifiedBounds final : public Bounds {
   /// The checks of each direction; a null pointer is a promise that is not asked for.
   struct Directions {
     const TriangleCertificate& forward;
-    Coverage* backward = nullptr;                           ///< elements are triangles of the mesh
-    const TriangleCertificate* boundary_forward = nullptr;  ///< on the reference's boundary edges
-    Coverage* boundary_backward = nullptr;  ///< elements are boundary edges, named by their first vertex
+    Coverage* backward = nullptr;                           ///< Its elements are triangles of the mesh.
+    const TriangleCertificate* boundary_forward = nullptr;  ///< It is about the reference's boundary edges.
+    Coverage* boundary_backward = nullptr;  ///< Its elements are boundary edges, named by their first vertex.
   };
-  /// For a mesh with vertices at these positions, before any change. `on_reference`: every triangle is one of the
-  /// reference. Keeps references to the checks.
+  /// Makes the bounds for a mesh with vertices at these positions, before any change. `on_reference` says that every
+  /// triangle is one of the reference. Keeps references to the checks.
   CertifiedBounds(const Directions& directions, std::span<const glm::dvec3> positions, std::size_t triangle_count,
                   bool on_reference);
 
@@ -40,8 +40,8 @@ class CertifiedBounds final : public Bounds {
   Coverage* backward() const { return directions_.backward; }
   bool bounds_boundaries() const { return directions_.boundary_backward; }
 
-  /// Upper bounds on the distance to the reference: of a vertex, and of all points of a face (infinite where none is
-  /// known).
+  /// Upper bounds on the distance to the reference: of a vertex, and of all points of a face (infinite where no bound
+  /// is known).
   double distance(std::uint32_t vertex) const { return distance_[vertex]; }
   double face_distance(std::uint32_t triangle) const { return face_distance_[triangle]; }
   /// Notes such a bound, which was proved for the face as it is.
@@ -52,7 +52,7 @@ class CertifiedBounds final : public Bounds {
     std::vector<double> distance, face_distance;
   };
   Saved save(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces) const;
-  /// `vertices`, `faces`: those that were saved.
+  /// Goes back to it. `vertices` and `faces` are those that were saved.
   void restore(const Saved& saved, std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces);
 
  private:

@@ -9,13 +9,14 @@
 namespace tolvol {
 namespace {
 
-constexpr double kFoldCosine = 0.2;  // a face's normal turns by less than acos of this
+/// The normal of a face may turn by less than the angle of this cosine.
+constexpr double kFoldCosine = 0.2;
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
 bool turns_too_far(const glm::dvec3& before, const glm::dvec3& after) {
   const double before2 = squared_length(before), after2 = squared_length(after), cosine = glm::dot(before, after);
-  if (!(before2 > 0)) return false;  // a degenerate face has no side to keep
+  if (!(before2 > 0)) return false;  // A degenerate face has no side to keep.
   return !(cosine > 0 && cosine * cosine >= kFoldCosine * kFoldCosine * before2 * after2);
 }
 
@@ -76,7 +77,7 @@ bool Change::prepare_flip(Edge e) {
   if (mesh_->has_copies() && mesh_->joined_by_other(c, d)) return false;
   const std::uint32_t first = static_cast<std::uint32_t>(mesh.face_handle(h).idx()),
                       second = static_cast<std::uint32_t>(mesh.face_handle(o).idx());
-  constexpr double kAnywhere = std::numeric_limits<double>::infinity();  // no point of a face is carried along
+  constexpr double kAnywhere = std::numeric_limits<double>::infinity();  // The change carries no point of a face along.
   const auto add = [&](std::uint32_t id, std::uint32_t x, std::uint32_t y, std::uint32_t z) {
     elements_.push_back({id, {mesh_->position(x), mesh_->position(y), mesh_->position(z)}, kAnywhere});
     faces_.push_back({false, 0, mesh_->position(x), {x, y, z}});
@@ -122,7 +123,7 @@ bool Change::link_condition(Halfedge h) {
   return !(mesh.is_boundary(v0) && mesh.is_boundary(v1) && !mesh.is_boundary(h) && !mesh.is_boundary(o));
 }
 
-/// Adds the faces around a vertex as they are once it is at `position`.
+/// Adds the faces around a vertex as they would be with the vertex at `position`.
 void Change::gather_side(std::uint32_t vertex, const glm::dvec3& position, double moved, int skip0, int skip1) {
   const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
   const Halfedge start = mesh.halfedge_handle(BoundedMesh::handle(vertex));
@@ -160,7 +161,7 @@ bool Change::gather(Halfedge h, const glm::dvec3& position) {
     const int f = mesh.face_handle(edge).idx();
     if (f < 0) continue;
     apex[side] = mesh_->to(mesh.next_halfedge_handle(edge));
-    // The two other edges of the removed face: the one at v0 first, because the faces around v0 always are in the ring.
+    // The edge of the removed face at v0 is asked first, because the faces around v0 always are in the ring.
     Halfedge at_v0 = mesh.next_halfedge_handle(edge), at_v1 = mesh.prev_halfedge_handle(edge);
     if (side == 0) std::swap(at_v0, at_v1);
     int successor = mesh.opposite_face_handle(at_v0).idx();
@@ -177,7 +178,7 @@ bool Change::gather(Halfedge h, const glm::dvec3& position) {
     }
     removed_.push_back({static_cast<std::uint32_t>(f), static_cast<std::uint32_t>(place), std::max(moved0, moved1)});
   }
-  // The last closed shape, a tetrahedron, is kept: two coinciding faces would be left of it.
+  // A tetrahedron, the last closed shape, is kept, because two coinciding faces would be left of it.
   return !(of_v0 == 1 && apex[0] != Coverage::kNone && apex[1] != Coverage::kNone &&
            mesh.valence(BoundedMesh::handle(v1)) == 3 && !mesh_->on_boundary(v1));
 }
@@ -188,8 +189,8 @@ bool Change::wedges_fit(Halfedge h) {
     return mesh_->triangle(f).x == v ? 0 : mesh_->triangle(f).y == v ? 1 : 2;
   };
   struct Side {
-    std::uint32_t lost;  ///< the wedge at v0
-    Corner gained;       ///< what takes its place at v1
+    std::uint32_t lost;  ///< The wedge at v0.
+    Corner gained;       ///< The corner that takes its place at v1.
   };
   std::array<Side, 2> sides{};
   std::size_t count = 0;
@@ -214,8 +215,9 @@ bool Change::wedges_fit(Halfedge h) {
   return true;
 }
 
-/// Where several sheets meet in the vertex that vanishes. Where they meet along edges, each has to have the edge that
-/// is collapsed, so that the line of edges is shortened; where they only touch, the others are carried along.
+/// Gathers what happens to the copies of the vertex that vanishes, in which several sheets meet. Where the sheets meet
+/// along edges, each must have the edge that is collapsed, so that the line of edges becomes shorter. Where they only
+/// touch, the other copies are carried along.
 bool Change::gather_copies(Halfedge h) {
   const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
   const auto in_line = [&](Halfedge edge) { return mesh_->joined_by_other(mesh_->from(edge), mesh_->to(edge)); };
@@ -242,8 +244,8 @@ bool Change::gather_copies(Halfedge h) {
   return !line || (carried_.empty() && in_line(h));
 }
 
-/// The link condition of the result, in which copies are one vertex: what is next to both ends is next to the edge, and
-/// no face comes to lie on another.
+/// The link condition of the result, in which copies are one vertex: a vertex next to both ends is next to the edge,
+/// and no face comes to lie on another.
 bool Change::slots_fit() {
   const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
   apexes_.clear();

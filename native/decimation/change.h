@@ -24,9 +24,9 @@ class Change {
 
   /// A face as the change would leave it; its corners are in Coverage::Element.
   struct Face {
-    bool moves;  ///< whether a corner of it moves: `corner`,
+    bool moves;  ///< Whether its corner number `corner` moves.
     int corner;
-    glm::dvec3 before;  ///< from here
+    glm::dvec3 before;  ///< Where the corner is before.
     std::uint32_t vertices[3];
   };
   /// What a corner has at its vertex: its wedge, and the input corner of which it takes the attributes.
@@ -42,8 +42,8 @@ class Change {
   /// Keeps a reference to `mesh`.
   explicit Change(const BoundedMesh& mesh) : mesh_(&mesh) {}
 
-  // Each gathers the faces of another change, and returns whether that one is possible at all. One that is not possible
-  // is not to be asked for more.
+  // Each of these gathers the faces of another change, and returns whether that change is possible at all. If it is
+  // not, nothing else may be asked of it.
   /// The start of `h` merges into its end, which goes to `target`.
   bool prepare_collapse(Halfedge h, const VertexPosition& target);
   /// A vertex moves.
@@ -54,15 +54,15 @@ class Change {
   const BoundedMesh& mesh() const { return *mesh_; }
   Kind kind() const { return kind_; }
   const std::vector<Coverage::Element>& elements() const { return elements_; }
-  const std::vector<Face>& faces() const { return faces_; }  ///< parallel to elements()
+  const std::vector<Face>& faces() const { return faces_; }  ///< In the order of elements().
   const std::vector<Coverage::Removed>& removed() const { return removed_; }
-  /// Of a collapse, the halfedges whose start merges into their end: one, or one in each sheet.
+  /// The halfedges of a collapse whose start merges into their end: one, or one in each sheet.
   const std::vector<Halfedge>& collapses() const { return collapses_; }
-  /// Of a collapse, the halfedge that it was asked for: one of collapses().
+  /// The halfedge that a collapse was asked for: one of collapses().
   Halfedge halfedge() const { return halfedge_; }
-  /// Of a collapse, the copies of the vertex that vanishes that move along with it: they become copies of vertex().
+  /// The copies of the vertex that vanishes in a collapse that move along with it and become copies of vertex().
   const std::vector<std::uint32_t>& carried() const { return carried_; }
-  /// Of a flip.
+  /// The edge of a flip.
   Edge edge() const { return edge_; }
   /// The vertex that a collapse leaves or that a relocation moves; none of a flip.
   std::optional<std::uint32_t> vertex() const { return kind_ == Kind::flip ? std::nullopt : std::optional(vertex_); }
@@ -90,10 +90,10 @@ class Change {
   const BoundedMesh* mesh_;
   Kind kind_ = Kind::collapse;
   Halfedge halfedge_;
-  std::vector<Halfedge> collapses_;     ///< with the same edge of other sheets
-  std::vector<std::uint32_t> carried_;  ///< copies of the vertex that vanishes that have no such edge
+  std::vector<Halfedge> collapses_;     ///< With the same edge of other sheets.
+  std::vector<std::uint32_t> carried_;  ///< Copies of the vertex that vanishes that have no such edge.
   Edge edge_;
-  std::uint32_t vertex_ = 0;  ///< the one that moves
+  std::uint32_t vertex_ = 0;  ///< The vertex that moves.
   VertexPosition position_{};
   double share_ = 1;
   std::vector<Coverage::Element> elements_;

@@ -58,9 +58,9 @@ class ChangeTrial {
  private:
   Change change_;
   Proof proof_;
-  bool prepared_ = false;  ///< a change of this series
+  bool prepared_ = false;  ///< Whether a change of this series was prepared.
   bool met_another_ = false;
-  std::unique_ptr<Bounds::Trial> bounds_;  ///< null where there are none
+  std::unique_ptr<Bounds::Trial> bounds_;  ///< Null where the mesh has no bounds.
 };
 
 }  // namespace tolvol

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A rejected edge waits until its two-ring changes. Around a vertex with many faces every collapse would call back all
-// its edges, each try as costly as there are faces, which makes the cube of their number: there the edges wait until
-// an eighth of the faces has gone, and of those that come back only some are tried. Around a vertex with a great many
-// faces, a collapse calls back no more than what is near the vertex that vanished, and the costs of the other edges,
-// which only rise while it stays where it is, are renewed when their turn comes.
+// A refused edge waits until its two-ring changes. Around a vertex with many faces every collapse would call back all
+// edges of the vertex, and each try costs as much as there are faces: all of it would cost the cube of their number.
+// There the edges wait until an eighth of the faces has gone, and only some of the edges that come back are tried.
+// Around a vertex with a great many faces a collapse calls back only the edges near the vertex that vanished. The costs
+// of the other edges, which only rise while the vertex stays where it is, are renewed when their turn comes.
 #include "decimation/collapse_loop.h"
 
 #include <algorithm>
@@ -15,12 +15,15 @@
 namespace tolvol {
 namespace {
 
-// Edges looked at to be tried at once: one for so many triangles, because collapses come in each other's way, and at
-// most so many.
+// The loop looks at one edge for so many triangles to find edges to try at once, because collapses come in each other's
+// way, and at no more than the second number.
 constexpr std::size_t kTrianglesPerAttempt = 12, kMostAttempts = 64;
-constexpr std::uint32_t kCrowded = 24;           // faces around a vertex: with more, tries are rationed,
-constexpr std::uint64_t kCrowdBudget = 1 << 15;  // to so many faces and parts of the reference's pieces looked at
-constexpr std::uint32_t kGreatMany = 512;        // faces around a vertex: with more, costs are renewed late
+/// Tries are rationed at a vertex with more faces around it.
+constexpr std::uint32_t kCrowded = 24;
+/// The number of faces and of parts of the reference's pieces that the tries at such a vertex may look at.
+constexpr std::uint64_t kCrowdBudget = 1 << 15;
+/// Costs are renewed late at a vertex with more faces around it.
+constexpr std::uint32_t kGreatMany = 512;
 
 }  // namespace
 
@@ -42,7 +45,7 @@ CollapseLoop::CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t
 
 CollapseLoop::CollapseLoop(Shared& shared, Team& team)
     : shared_(shared), collapse_(shared.collapse), mesh_(collapse_.mesh()), queue_(shared.stamps), tried_(1) {
-  // Copies are looked up beyond the faces around an edge.
+  // A try looks up copies, which are beyond the faces around its edge.
   if (team.alone() || mesh_.has_copies()) return;
   // Edges of the last batch, too, may still be waiting for their turn.
   ahead_ = TriesAhead(team, 2 * kMostAttempts, mesh_.connectivity().n_edges(), mesh_.connectivity().n_vertices());
@@ -55,7 +58,7 @@ bool CollapseLoop::deleted(std::uint32_t edge) const {
   return mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted();
 }
 
-/// Whether an end of the edge had its share of tries.
+/// Whether an end of the edge has had its share of tries.
 bool CollapseLoop::rationed(std::uint32_t edge) const {
   if (crowds_.empty()) return false;
   const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
@@ -73,7 +76,7 @@ void CollapseLoop::note_refusal(std::uint32_t edge, const Tried& tried) {
   }
 }
 
-/// Whether edges of the vertex that were refused may be tried again, after a face around it has changed.
+/// Whether the refused edges of the vertex may be tried again after a face around it has changed.
 bool CollapseLoop::ready(std::uint32_t vertex) {
   const auto found = crowds_.find(vertex);
   if (found == crowds_.end()) return true;
@@ -116,7 +119,7 @@ void CollapseLoop::run(const Until& until, Progress* progress) {
   }
 }
 
-/// The cost of an edge that was not renewed when it rose.
+/// The present cost of an edge, if it has risen and was not renewed.
 std::optional<double> CollapseLoop::risen(const CollapseQueue::Entry& entry) const {
   const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(entry.edge), 0);
   if (std::max(mesh_.faces_around(mesh_.from(h)), mesh_.faces_around(mesh_.to(h))) <= kGreatMany) return std::nullopt;
@@ -124,7 +127,7 @@ std::optional<double> CollapseLoop::risen(const CollapseQueue::Entry& entry) con
   return cost > entry.cost ? std::optional(cost) : std::nullopt;
 }
 
-/// What was found for the edge, if that still holds.
+/// The outcome that was found for the edge ahead, if it still holds; else null.
 CollapseLoop::Tried* CollapseLoop::found(std::uint32_t edge) {
   if (ahead_.alone()) return nullptr;
   const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
@@ -150,7 +153,7 @@ void CollapseLoop::give_back(std::unique_ptr<Attempt> attempt) {
 }
 
 void CollapseLoop::try_now(std::uint32_t edge, Tried& tried) {
-  give_back(std::move(tried.attempt));  // of an edge whose turn did not come
+  give_back(std::move(tried.attempt));  // The attempt of an edge whose turn did not come.
   std::unique_ptr<Attempt> attempt = take_attempt();
   collapse_.attempt(edge, *attempt);
   tried = {attempt->outcome, attempt->trial.looked_at(), attempt->trial.met_another(), nullptr};
@@ -167,7 +170,7 @@ CollapseLoop::Tried& CollapseLoop::try_ahead(std::uint32_t edge) {
   return tried_[ahead_.alone() ? ahead_.run({&edge, 1}, try_one) : ahead_.run(with_next(edge), try_one)];
 }
 
-/// The edge and, of those that would come next, the ones that are not in each other's way.
+/// The edge, and those edges that would come next and are not in each other's way.
 std::vector<std::uint32_t> CollapseLoop::with_next(std::uint32_t edge) {
   std::vector<std::uint32_t> batch{edge};
   const std::size_t most = std::clamp<std::size_t>(mesh_.triangle_count() / kTrianglesPerAttempt, 1, kMostAttempts);
@@ -187,7 +190,7 @@ std::vector<std::uint32_t> CollapseLoop::with_next(std::uint32_t edge) {
   return batch;
 }
 
-/// Once the edge is collapsed, nothing holds that was found for edges of the vertices around it.
+/// Reserves the vertices around the edge: once it is collapsed, nothing holds that was found for their edges.
 void CollapseLoop::reserve_around(std::uint32_t edge) {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
   const auto h = connectivity.halfedge_handle(BoundedMesh::edge(edge), 0);
@@ -211,7 +214,7 @@ void CollapseLoop::carry_out(std::uint32_t edge, Tried& tried) {
     const auto h = tried.attempt->halfedge;
     const glm::dvec3 before = mesh_.position(mesh_.to(h));
     ring_.clear();
-    // The kept vertex has at most so many faces afterwards.
+    // This sum is the most faces that the kept vertex can have afterwards.
     if (mesh_.faces_around(mesh_.from(h)) + mesh_.faces_around(mesh_.to(h)) > kGreatMany) {
       for (const auto near : mesh_.connectivity().vv_range(BoundedMesh::handle(mesh_.from(h)))) {
         ring_.push_back(static_cast<std::uint32_t>(near.idx()));
@@ -236,7 +239,7 @@ void CollapseLoop::renew(std::uint32_t edge) {
   if (own(edge)) add(edge, collapse_.cost(edge));
 }
 
-/// After a collapse: the costs that it changes, and the edges that may now be possible.
+/// After a collapse, renews the costs that it changes, and calls back edges that may now be possible.
 void CollapseLoop::renew_around(std::uint32_t vertex) {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
   const auto v = BoundedMesh::handle(vertex);
@@ -246,7 +249,7 @@ void CollapseLoop::renew_around(std::uint32_t vertex) {
   for (const auto near : connectivity.vv_range(v)) call_back(static_cast<std::uint32_t>(near.idx()));
 }
 
-/// The same near the vertex that vanished alone, whose neighbours are in ring_: `vertex` stayed where it was.
+/// Does so only near the vertex that vanished, whose neighbours are in ring_; `vertex` has stayed where it was.
 void CollapseLoop::renew_ring(std::uint32_t vertex) {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
   ahead_.advance();
@@ -259,13 +262,13 @@ void CollapseLoop::renew_ring(std::uint32_t vertex) {
   }
 }
 
-/// Edges of the vertex that were refused may now be possible. Those of a vertex with a great many faces are called back
-/// from their other ends.
+/// Puts the refused edges of the vertex back into the queue, because they may now be possible. The edges of a vertex
+/// with a great many faces are called back from their other ends.
 void CollapseLoop::call_back(std::uint32_t vertex) {
   ahead_.note_change(vertex);
   if (mesh_.faces_around(vertex) > kGreatMany || (!crowds_.empty() && !ready(vertex))) return;
   for (const auto e : mesh_.connectivity().ve_range(BoundedMesh::handle(vertex))) {
-    // At a rim it may be another region's too.
+    // At a rim another region may read and write it, too.
     std::atomic<bool>& refused = shared_.refused[static_cast<std::size_t>(e.idx())];
     if (!refused.load(std::memory_order_relaxed)) continue;
     refused.store(false, std::memory_order_relaxed);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The greedy edge-collapse loop: cheapest edge first, each collapse checked when its turn comes or carried out on
-/// trust, over a whole mesh or over one of its regions beside others.
+/// The greedy edge-collapse loop, over a whole mesh or over one of its regions beside others. It takes the cheapest
+/// edge first, and checks each collapse when its turn comes or carries it out on trust.
 ///
-/// With a team of threads the next few edges are tried ahead, all at once but for those in each other's way.
+/// With a team of threads it tries the next few edges ahead, all at once but for those in each other's way.
 #pragma once
 
 #include <atomic>
@@ -25,43 +25,44 @@ namespace tolvol {
 
 class CollapseLoop {
  public:
-  /// What the loops over one mesh hand on to each other. Loops over different parts may run at once.
+  /// The state that the loops over one mesh hand on to each other. Loops over different regions may run at once.
   struct Shared {
     explicit Shared(EdgeCollapse& collapse);
     EdgeCollapse& collapse;
-    std::size_t before;                      ///< triangles
-    std::vector<std::uint32_t> stamps;       ///< per edge, of the queues
-    std::vector<std::atomic<bool>> refused;  ///< per edge: it failed a bound and waits for its neighbourhood to change
+    std::size_t before;                      ///< The number of triangles at the start.
+    std::vector<std::uint32_t> stamps;       ///< For each edge, the stamp of the queues.
+    std::vector<std::atomic<bool>> refused;  ///< Whether the edge waits for its neighbourhood to change.
   };
-  /// Over one region; what is collapsed is noted in `later`, if that is not null, instead of being proved.
+  /// A loop over one region. If `later` is not null, collapses are noted there instead of being proved.
   CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t region, DeferredProof* later);
-  /// Over the whole mesh, on the threads of `team`.
+  /// A loop over the whole mesh, on the threads of `team`.
   CollapseLoop(Shared& shared, Team& team);
 
-  /// Before run(): an edge, and its cost.
+  /// Adds an edge and its cost, before run().
   void add(std::uint32_t edge, double cost);
-  /// Where to stop: at an edge of such a cost, or with so many triangles left of the mesh.
+  /// The loop stops at an edge of this cost, or when the mesh has so many triangles left.
   struct Until {
     double cost;
     std::size_t triangles;
   };
-  /// Collapses until then, or until no edge can. O(n log n) without bounds. Throws Cancelled, between two collapses.
+  /// Collapses edges until then, or until no edge can collapse. O(n log n) without bounds. Throws Cancelled between two
+  /// collapses.
   void run(const Until& until, Progress* progress);
 
  private:
   using Attempt = EdgeCollapse::Attempt;
-  /// What came of trying an edge.
+  /// The outcome of trying an edge.
   struct Tried {
     EdgeCollapse::Outcome outcome = EdgeCollapse::Outcome::impossible;
-    std::size_t looked_at = 0;         ///< parts of the reference's pieces
-    bool met_another = false;          ///< a vertex far away in the mesh, which may have gone
-    std::unique_ptr<Attempt> attempt;  ///< where it is possible
+    std::size_t looked_at = 0;         ///< The number of parts of the reference's pieces that were looked at.
+    bool met_another = false;          ///< Whether a vertex was in the way that may have gone since.
+    std::unique_ptr<Attempt> attempt;  ///< Null unless the collapse is possible.
   };
 
-  /// Tries at a vertex with many faces around it: each costs as much as there are faces.
+  /// The tries at a vertex with many faces around it; each costs as much as there are faces.
   struct Crowd {
-    std::uint32_t faces;  ///< around it when the first of them was made
-    std::uint64_t work;   ///< of all of them: faces and parts of the reference's pieces looked at
+    std::uint32_t faces;  ///< The number of faces around it at the first try.
+    std::uint64_t work;   ///< All faces, and parts of the reference's pieces, that the tries looked at.
   };
 
   bool deleted(std::uint32_t edge) const;
@@ -87,22 +88,22 @@ class CollapseLoop {
   Shared& shared_;
   EdgeCollapse& collapse_;
   const BoundedMesh& mesh_;
-  const Regions* regions_ = nullptr;  ///< null: the whole
+  const Regions* regions_ = nullptr;  ///< Null for the whole mesh.
   std::uint32_t region_ = 0;
   DeferredProof* later_ = nullptr;
   CollapseQueue queue_;
   TriesAhead ahead_;
-  std::vector<Tried> tried_;  ///< per slot of ahead_
-  /// Per vertex: the last batch of tries in which a face around it could change before the vertex's turn,
+  std::vector<Tried> tried_;  ///< For each slot of ahead_.
+  /// For each vertex, the last batch of tries in which a face around it could change before its turn.
   std::vector<std::uint32_t> reserved_;
-  std::vector<std::uint32_t> surrounded_;  ///< and the last one in which its neighbours were noted so
-  std::uint32_t batches_ = 0;              ///< of tries, so far
-  std::vector<std::uint32_t> ring_;        ///< neighbours of the vertex that vanished last
-  /// By vertex, of those with many faces around them where a try was refused.
+  std::vector<std::uint32_t> surrounded_;  ///< And the last batch in which its neighbours were noted so.
+  std::uint32_t batches_ = 0;              ///< The number of batches so far.
+  std::vector<std::uint32_t> ring_;        ///< The neighbours of the vertex that vanished last.
+  /// The crowds by vertex: those with many faces around them where a try was refused.
   std::unordered_map<std::uint32_t, Crowd> crowds_;
-  /// Kept for their memory; the last given back is taken first, while it is in the cache.
+  /// Attempts that are kept for their memory. The last one given back is taken first, because it is in the cache.
   std::vector<std::unique_ptr<Attempt>> idle_;
-  std::mutex idle_mutex_;  ///< guards idle_
+  std::mutex idle_mutex_;  ///< It guards idle_.
 };
 
 }  // namespace tolvol

@@ -7,10 +7,11 @@
 namespace tolvol {
 namespace {
 
-constexpr int kBucketBits = 15;  // sign, exponent, and three bits of the mantissa: eight buckets an octave
+constexpr int kBucketBits =
+    15;  // The sign, the exponent and three bits of the mantissa: eight buckets for each octave.
 
 std::size_t bucket_of(double cost) {
-  // The bits of doubles are ordered as the doubles are, of negative ones the other way around.
+  // The bits of doubles are ordered as the doubles are; those of negative doubles are ordered the other way around.
   const std::uint64_t bits = std::bit_cast<std::uint64_t>(cost), sign = std::uint64_t{1} << 63;
   return (bits & sign ? ~bits : bits | sign) >> (64 - kBucketBits);
 }
@@ -21,7 +22,7 @@ CollapseQueue::CollapseQueue(std::span<std::uint32_t> stamps)
     : buckets_(std::size_t{1} << kBucketBits), stamps_(stamps) {}
 
 void CollapseQueue::push(std::uint32_t edge, double cost) {
-  cost += 0.0;  // of the two zeros the positive one: they are equal, and so must their buckets be
+  cost += 0.0;  // This turns the negative zero into the positive one: equal costs must be in one bucket.
   const Stamped entry{cost, edge, ++stamps_[edge]};
   const std::size_t bucket = bucket_of(cost);
   if (bucket >= open_) {

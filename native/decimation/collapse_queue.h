@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Edges in the order of their costs, cheapest first; ties go to the lower edge, so that the order is the same
-/// everywhere.
+/// A queue of edges in the order of their costs, cheapest first. Ties go to the lower edge, so that the order is the
+/// same on every machine.
 ///
-/// Costs are sorted into buckets as they come, and only the bucket whose turn it is becomes a heap: one small enough
-/// for the cache, made of what has not been renewed meanwhile.
+/// Entries are sorted into buckets as they come, and only the bucket whose turn it is becomes a heap. The heap fits the
+/// cache, and holds only entries that nothing has replaced meanwhile.
 #pragma once
 
 #include <cstdint>
@@ -20,10 +20,10 @@ class CollapseQueue {
     std::uint32_t edge;
   };
 
-  /// `stamps`: per edge, of all queues that its entries were ever in.
+  /// `stamps` has one number for each edge, which all queues share that the edge was ever in.
   explicit CollapseQueue(std::span<std::uint32_t> stamps);
 
-  /// Instead of the edge's former entry. Costs are finite.
+  /// Replaces the edge's former entry. Costs are finite.
   void push(std::uint32_t edge, double cost);
   /// Takes the edge's entry out, if it has one.
   void drop(std::uint32_t edge) { ++stamps_[edge]; }
@@ -39,9 +39,9 @@ class CollapseQueue {
   }
 
   std::vector<std::vector<Stamped>> buckets_;
-  std::size_t open_ = 0;  ///< buckets before this one are in the heap
+  std::size_t open_ = 0;  ///< Buckets before this one are in the heap.
   std::vector<Stamped> heap_;
-  std::span<std::uint32_t> stamps_;  ///< per edge: an entry with another one is out of date
+  std::span<std::uint32_t> stamps_;  ///< For each edge; an entry with another stamp is out of date.
 };
 
 }  // namespace tolvol

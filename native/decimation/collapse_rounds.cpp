@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// In a round each region goes up to the same cost, so that the order is nearly that of one loop over all; the counts
-// that it leads to are higher or lower by up to four per cent, in the mean about the same.
+// In a round each region goes up to the same cost, so that the order is nearly that of one loop over the whole mesh.
+// The result has up to four per cent more or fewer triangles, and in the mean about as many.
 #include "decimation/collapse_rounds.h"
 
 #include <algorithm>
@@ -19,14 +19,20 @@
 namespace tolvol {
 namespace {
 
-constexpr std::size_t kMostVertices = 4096;   // of a region
-constexpr std::size_t kLeastRegions = 12;     // for as many threads
-constexpr std::size_t kLeastVertices = 1024;  // a mesh of fewer is not cut: rims would be much of it
-constexpr double kRoundShare = 0.9;           // of the edges that the first of a round may collapse
-constexpr double kLeastGain = 0.1;            // of the triangles: after a round that removes fewer there is no other
-constexpr double kMostTakenBack = 0.25;       // of the regions: after such a round each collapse is proved at once
-/// Of the fourth power of the tolerance, which has the costs' unit: up to here hardly a collapse is refused, and while
-/// regions are worked on on trust their rounds go on.
+/// The number of vertices that a region has at most.
+constexpr std::size_t kMostVertices = 4096;
+/// The mesh is cut into at least so many regions, which as many threads can share.
+constexpr std::size_t kLeastRegions = 12;
+/// A mesh of fewer vertices is not cut, because the rims would be much of it.
+constexpr std::size_t kLeastVertices = 1024;
+/// The share of the edges that are cheap enough to be collapsed in a round.
+constexpr double kRoundShare = 0.9;
+/// After a round that removes a smaller share of the triangles there is no other round.
+constexpr double kLeastGain = 0.1;
+/// After a round that takes back a larger share of the regions each collapse is proved at once.
+constexpr double kMostTakenBack = 0.25;
+/// A cost, in the fourth power of the tolerance, which has the costs' unit. Up to this cost hardly a collapse is
+/// refused, and rounds on trust go at least so far.
 constexpr double kTrustedCost = 1;
 
 class Rounds {
@@ -42,7 +48,7 @@ class Rounds {
     if (progress) progress->begin("decimating");
   }
 
-  /// For bounds that are certified: in the first rounds their proofs are put off.
+  /// Works in rounds, for bounds that are certified: the first rounds put their proofs off.
   void by_regions() {
     bool on_trust = true;
     for (int round = 0;; ++round) {
@@ -50,7 +56,7 @@ class Rounds {
       if (vertices < kLeastVertices) return;
       price();
       const double limit = std::max(cost_at(kRoundShare), on_trust ? trusted_cost() : 0);
-      // Every other time the rims come to lie elsewhere.
+      // The two shares take turns, so that the rims lie elsewhere in the next round.
       const Regions parts =
           regions(mesh_, std::min(kMostVertices, vertices / kLeastRegions), round % 2 == 0 ? 0.5 : 0.35, team_);
       const std::vector<Members> members = members_of(parts);
@@ -95,7 +101,7 @@ class Rounds {
   }
 
  private:
-  /// Costs of the edges that may be collapsed now.
+  /// Computes the costs of the edges that may be collapsed now.
   void price() {
     constexpr std::size_t kBlock = 1024;
     team_.run(costs_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
@@ -123,9 +129,9 @@ class Rounds {
   }
 
   struct Members {
-    std::vector<std::uint32_t> edges;  ///< that can collapse
+    std::vector<std::uint32_t> edges;  ///< Edges that can collapse.
     std::vector<std::uint32_t> vertices;
-    std::vector<std::uint32_t> faces;  ///< around them
+    std::vector<std::uint32_t> faces;  ///< The faces around the vertices.
   };
 
   std::vector<Members> members_of(const Regions& parts) const {
@@ -153,7 +159,7 @@ class Rounds {
   EdgeCollapse collapse_;
   CollapseLoop::Shared shared_;
   std::vector<double> costs_;
-  std::vector<std::uint32_t> places_;  ///< per face, for the deferred proofs of the region that it is in
+  std::vector<std::uint32_t> places_;  ///< For each face; DeferredProof uses it.
   Progress* progress_;
 };
 

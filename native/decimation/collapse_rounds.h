@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Decimation of a mesh by edge collapses: rounds in which regions are worked on side by side, each as cheap edges as
-/// in the others, then one loop over all that is left.
+/// Decimation of a mesh by edge collapses. In rounds, the threads work on regions side by side, each up to the same
+/// cost; then one loop works on the whole mesh.
 ///
-/// In the first rounds regions are collapsed on trust and proved afterwards, because hardly a collapse would be
-/// refused. A region fits the cache, and the threads share them out. How the mesh is cut into regions depends on the
-/// mesh alone: the result is the same for any number of threads.
+/// The first rounds collapse regions on trust and prove them afterwards, because hardly a collapse would be refused. A
+/// region fits the cache. How the mesh is cut into regions depends on the mesh alone, so that the result is the same
+/// for any number of threads.
 #pragma once
 
 #include <cstddef>
@@ -15,9 +15,9 @@
 
 namespace tolvol {
 
-/// Until no edge can collapse or `target` triangles are left; with a target there are no rounds, because its order is
-/// that of the whole. O(n log n) without bounds. Throws Cancelled, and then leaves the mesh with what is proved, so
-/// that a caller who knows why may go on with it.
+/// Collapses edges until none can collapse or `target` triangles are left. With a target other than 0 there are no
+/// rounds, because a target asks for the order of the whole mesh; nor are there rounds without certified bounds. O(n
+/// log n) without bounds. Throws Cancelled, and then leaves a mesh that is proved, with which the caller may go on.
 void collapse_edges(BoundedMesh& mesh, std::size_t target, Team& team, Progress* progress);
 
 }  // namespace tolvol

@@ -45,7 +45,7 @@ class Decimation {
     return options_.max_seconds > 0 && spent.count() > options_.max_seconds;
   }
 
-  /// Until no edge can be collapsed, or the time is over: what was being tried then is not carried out.
+  /// Collapses edges until none can be collapsed or the time is over. A try that is under way then is not carried out.
   void collapse(BoundedMesh& mesh, std::size_t target) {
     const Call limited(nullptr, [this] { return out_of_time(); });
     try {

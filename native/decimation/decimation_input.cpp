@@ -71,8 +71,8 @@ void DecimationInput::pin() {
   });
 }
 
-/// visit(input vertex, vertex of the manifold) for all that hold an input vertex: the one it became, and those at its
-/// place of a face that stands in for one that was dropped.
+/// Calls visit(input vertex, vertex of the manifold) for all vertices that hold an input vertex: the one that it
+/// became, and those at its place in a face that stands in for a face that was dropped.
 template <class Visit>
 void DecimationInput::for_holders(Visit&& visit) const {
   for (std::uint32_t i = 0; i < vertices_.size(); ++i) {
@@ -143,7 +143,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
     if (boundary_->any()) {
       directions.boundary_forward = &boundary_->forward();
       directions.boundary_backward = &boundary_->backward();
-      // Edges that were cut count as boundary in the kernel, and are none.
+      // Edges that were cut count as boundary in the kernel, although they are none.
       for (std::uint32_t v = 0; v < cut_.cause.size(); ++v) {
         if (cut_.cause[v] == CutCause::non_manifold) pin(v, "non-manifold");
       }
@@ -170,7 +170,7 @@ void DecimationInput::certify_input(const Certificate& certificate, double mappi
   }
 }
 
-/// First witnesses for every triangle of the reference.
+/// Finds the first witnesses for every triangle of the reference.
 void DecimationInput::cover(double provable) {
   if (identical_) {
     for (std::uint32_t i = 0; i < triangles_.size(); ++i) {

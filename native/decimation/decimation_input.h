@@ -33,22 +33,22 @@ class DecimationInput {
   DecimationInput(const DecimationInput&) = delete;
   DecimationInput& operator=(const DecimationInput&) = delete;
 
-  /// What the changes of the mesh must keep; null for nothing.
+  /// The bounds that the changes of the mesh must keep; null for none.
   Bounds* bounds() const { return bounds_; }
-  /// The mesh to decimate: once. Its store() refers to this.
+  /// The mesh to decimate, which may be taken once. Its store() refers to this object.
   BoundedMeshInput take_mesh();
 
   std::span<const glm::dvec3> vertices() const { return vertices_; }
   std::span<const glm::uvec3> triangles() const { return triangles_; }
   const CutMesh& cut() const { return cut_; }
-  /// Of the cut mesh's vertices, in the frame.
+  /// The positions of the cut mesh's vertices, in the frame.
   const std::vector<glm::dvec3>& positions() const { return positions_; }
-  /// Per triangle of the cut mesh, what hangs together without a seam, after take_mesh(); empty without wedges.
+  /// For each triangle of the cut mesh, the number of its island; valid after take_mesh(), empty without wedges.
   const std::vector<std::uint32_t>& islands() const { return islands_; }
 
   /// The reference's triangles, where the input is the reference itself; else null.
   const Hierarchy* own_hierarchy() const { return identical_ ? &volume_->hierarchy() : nullptr; }
-  /// Then, per input triangle: its triangle in the cut mesh or CutMesh::kNone.
+  /// In this case, for each input triangle: its triangle in the cut mesh or CutMesh::kNone.
   const std::vector<std::uint32_t>& element_of() const { return element_of_; }
 
   /// The input corner, as 3 * triangle + corner, of a corner of the cut mesh.
@@ -80,9 +80,9 @@ class DecimationInput {
 
   CutMesh cut_;
   std::vector<glm::dvec3> positions_;
-  std::vector<bool> pinned_;  ///< per vertex of the cut mesh
+  std::vector<bool> pinned_;  ///< For each vertex of the cut mesh.
   std::vector<std::uint32_t> islands_;
-  bool identical_ = false;  ///< the input is the reference itself
+  bool identical_ = false;  ///< Whether the input is the reference itself.
   std::vector<std::uint32_t> element_of_;
   std::optional<TriangleCertificate> forward_;
   std::optional<Coverage> backward_;

@@ -19,11 +19,11 @@ class Output {
       : input_(input), cut_(input.cut()), mesh_(mesh), result_(result) {}
 
   void write() {
-    // Result vertices in the order of the input vertices that they continue.
+    // Result vertices are in the order of the input vertices that they continue.
     std::vector<std::uint32_t> order;
     std::vector<std::uint32_t> used(input_.positions().size(), kNone);
     const auto slot = [&](std::uint32_t v) { return mesh_.slot(mesh_.survivor(v)); };
-    // Corner k of a result triangle, in the order of the input triangle that it continues.
+    // This is corner k of a result triangle, in the order of the input triangle that it continues.
     const auto corner = [&](std::uint32_t input, std::uint32_t t, int k) {
       return slot(t == kNone ? cut_.input_vertex[input_.triangles()[input][k]]
                              : mesh_.triangle(t)[input_.own_corner(t, k)]);
@@ -135,7 +135,7 @@ class Output {
   const CutMesh& cut_;
   const BoundedMesh& mesh_;
   DecimationResult& result_;
-  std::vector<std::uint32_t> kept_;  ///< per result triangle: its triangle in the cut mesh
+  std::vector<std::uint32_t> kept_;  ///< For each result triangle: its triangle in the cut mesh.
 };
 
 }  // namespace

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the collapses of a region change is all within the faces around its vertices, but for the boundary: its
-// halfedges beyond the region name those of the region that they follow or that follow them. No two regions change the
-// same one of these names, so that regions can be worked on, proved and put back side by side.
+// The collapses of a region change only the faces around its vertices, and the names of neighbours in the boundary
+// halfedges beyond the region: these name the halfedges of the region that they follow or that follow them. No two
+// regions change the same name, so that regions can be worked on, proved and put back side by side.
 #include "decimation/deferred_proof.h"
 
 #include <algorithm>

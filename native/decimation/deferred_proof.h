@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Collapses on trust: those of a region are carried out first, and the bounds are proved for what they lead to, once
-/// instead of for every mesh on the way. Where no proof is found the region is put back as it was.
+/// Collapses on trust: the collapses of a region are carried out first, and the bounds are proved once for the faces
+/// that they lead to, instead of for every mesh on the way. Where no proof is found the region is put back as it was.
 ///
-/// While the tolerance is wide for the faces that there are, hardly any collapse would be refused, and proving each is
-/// most of the work.
+/// While the tolerance is wide for the faces of the mesh, hardly any collapse would be refused, and most of the work
+/// would be to prove each.
 #pragma once
 
 #include <cstdint>
@@ -27,14 +27,14 @@ class DeferredProof {
   DeferredProof(EdgeCollapse& collapse, BoundedMesh& mesh, std::span<const std::uint32_t> vertices,
                 std::span<const std::uint32_t> faces, std::vector<std::uint32_t>& places);
 
-  /// Boundary edges with bounds of their own are proved at once.
+  /// Whether the proofs of the region can be put off: not if it has boundary edges with bounds of their own.
   bool possible() const;
-  /// Before a collapse of the region is carried out.
+  /// Notes a collapse of the region that is about to be carried out.
   void note(const Change& change);
-  /// Whether what the region has become keeps the bounds; if so, it is what further changes start from. O(faces and
-  /// pieces of the reference there), about 0.1 us each.
+  /// Whether the region keeps the bounds as it is now; if so, further changes start from it. It takes about 0.1 us for
+  /// each face, and for each piece of the reference there.
   bool holds();
-  /// Puts the region back as it was, when it does not hold.
+  /// Puts the region back as it was, if holds() has returned false or was not asked.
   void take_back();
 
  private:
@@ -49,11 +49,11 @@ class DeferredProof {
   std::vector<std::uint32_t>& places_;
   const BoundedMesh::Saved saved_;
   const CertifiedBounds::Saved saved_bounds_;
-  std::vector<Quadric> quadrics_;          ///< as they were
-  std::vector<std::uint8_t> changed_;      ///< per face
-  std::vector<std::uint32_t> successors_;  ///< per face: the place of the one that it was removed for, or its own
-  std::vector<std::uint32_t> alive_;       ///< places of the faces that are left,
-  std::vector<std::uint32_t> rank_;        ///< and per place, if it is one of them, where it stands among them
+  std::vector<Quadric> quadrics_;          ///< For each vertex, as it was.
+  std::vector<std::uint8_t> changed_;      ///< For each face, whether it has changed.
+  std::vector<std::uint32_t> successors_;  ///< For each face, the place of the face that took it over, or its own.
+  std::vector<std::uint32_t> alive_;       ///< The places of the faces that are left.
+  std::vector<std::uint32_t> rank_;        ///< For each place of a face that is left, where it stands among them.
 };
 
 }  // namespace tolvol

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Quadrics and edge order after Garland and Heckbert 1997 (area weights, boundary planes); link condition and
-// connectivity by OpenMesh. A rejected position is not a rejected collapse: where the quadric's minimiser fails a
-// bound, it is fitted to what the faces around it have to cover.
+// Quadrics and the order of edges are those of Garland and Heckbert 1997, with area weights and boundary planes. A
+// position that is refused is not yet a collapse that is refused: where the quadric's minimiser fails a bound, the
+// position is fitted to the pieces that the faces around it have to cover.
 #include "decimation/edge_collapse.h"
 
 #include <algorithm>
@@ -12,13 +12,15 @@
 namespace tolvol {
 namespace {
 
-constexpr double kBoundaryWeight = 10;  // of a boundary edge's plane, times its squared length
-constexpr double kReach = 2;            // a minimiser is trusted within this many edge lengths of the edge's middle
-/// Steps of the fit before a collapse is refused; with a deviation beyond this before a step, over the tolerance,
-/// hardly one in fifty still succeeds.
+/// The weight of a boundary edge's plane for each unit of its squared length.
+constexpr double kBoundaryWeight = 10;
+/// A minimiser is trusted within so many edge lengths of the edge's middle.
+constexpr double kReach = 2;
+/// The fit takes so many steps before a collapse is refused. It gives up before a step if the deviation, as a multiple
+/// of the tolerance, is beyond the number, because hardly one collapse in fifty still succeeds then.
 constexpr double kGiveUpAbove[] = {1.4, 1.2, 1.12};
-/// Where many collapses cost nothing, on a plate, short edges go first: a weight of the fourth power of the length,
-/// which has the quadrics' unit. Without it one vertex would sweep along a row and leave needles behind.
+/// The weight of the fourth power of an edge's length, which has the quadrics' unit. It lets short edges go first where
+/// many collapses cost nothing, as on a plate. Without it one vertex would sweep along a row and leave needles behind.
 constexpr double kLengthWeight = 1e-6;
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
@@ -41,7 +43,7 @@ void EdgeCollapse::sum_quadrics() {
     const glm::dvec3 &a = mesh_.position(t.x), &b = mesh_.position(t.y), &c = mesh_.position(t.z);
     const glm::dvec3 normal = glm::cross(b - a, c - a);
     const double length = glm::length(normal);
-    if (!(length > 0)) continue;  // a degenerate face has no plane
+    if (!(length > 0)) continue;  // A degenerate face has no plane.
     const glm::dvec3 unit = normal / length;
     const Quadric q(unit, -glm::dot(unit, a), 0.5 * length);
     for (int k = 0; k < 3; ++k) quadrics_[t[k]] += q;
@@ -123,9 +125,10 @@ void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
   }
 }
 
-/// Other positions for a collapse whose best one fails: an end that costs nothing either, as on a plane, then fitted
-/// ones, then the ends that cost something; where there is nothing to fit to, the ends and the middle. Where the best
-/// one costs nothing, a position off the planes would spoil them for the collapses to come: the edge waits instead.
+/// Tries other positions for a collapse whose best position fails: an end that costs nothing either, as on a plane,
+/// then fitted positions, then the ends that cost something. Where there is nothing to fit to, it tries the ends and
+/// the middle. Where the best position costs nothing, a position off the planes would spoil them for the collapses to
+/// come, and the edge waits instead.
 EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) const {
   const Halfedge h = a.halfedge;
   const VertexPosition s0 = mesh_.vertex_position(mesh_.from(h)), s1 = mesh_.vertex_position(mesh_.to(h));

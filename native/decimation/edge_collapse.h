@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Collapsing one edge: what it costs, where its vertex goes, whether the bounds hold, and carrying it out. Which
-/// edge's turn it is, others decide.
+/// The collapse of one edge: its cost, where its vertex goes, whether the bounds hold, and how it is carried out.
+/// Others decide which edge's turn it is.
 #pragma once
 
 #include <cstdint>
@@ -29,15 +29,15 @@ class EdgeCollapse {
 
   const BoundedMesh& mesh() const { return mesh_; }
 
-  /// The order in which edges are collapsed; kNever for one that stays. Reads faces around its ends.
+  /// The cost of an edge, by which edges are ordered; kNever for an edge that stays. Reads faces around its ends.
   double cost(std::uint32_t edge) const;
 
-  /// What came of trying an edge, and the scratch of it: not for two threads at once.
+  /// The outcome of trying an edge, and the scratch of the try. Two threads must not share one.
   struct Attempt {
     explicit Attempt(const BoundedMesh& mesh, ChangeTrial::Proof proof = ChangeTrial::Proof::now)
         : trial(mesh, proof), fit(mesh) {}
     Outcome outcome = Outcome::impossible;
-    Halfedge halfedge;  ///< whose start would merge into its end
+    Halfedge halfedge;  ///< Its start would merge into its end.
     ChangeTrial trial;
     PositionFit fit;
   };
@@ -47,7 +47,7 @@ class EdgeCollapse {
   std::uint32_t carry_out(Attempt& a);
 
   const Quadric& quadric(std::uint32_t vertex) const { return quadrics_[vertex]; }
-  /// Where collapses are taken back.
+  /// Puts a quadric back where collapses are taken back.
   void set_quadric(std::uint32_t vertex, const Quadric& quadric) { quadrics_[vertex] = quadric; }
 
  private:

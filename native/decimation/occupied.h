@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Which places vertices of a mesh are at, so that no vertex is put where another is: readers that weld equal positions
-/// would make one of the two, and more than two faces meet at an edge.
+/// The places that the vertices of a mesh occupy, so that no vertex is put where another is. A reader that welds equal
+/// positions would make the two vertices one, and then more than two faces may meet at an edge.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +24,7 @@ class Occupied {
   struct Hash {
     std::size_t operator()(const glm::dvec3& p) const {
       std::size_t hash = 0;
-      // Of the two zeros, which are equal, the positive one.
+      // The sum with 0.0 turns the negative zero into the positive one, which is equal to it.
       for (int k = 0; k < 3; ++k) hash = hash * 0x9E3779B97F4A7C15u + std::hash<double>()(p[k] + 0.0);
       return hash;
     }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Iteratively reweighted least squares for the p-norm of the deviations, p = 6 (for large p it tends to the minimax
-// fit; C. L. Lawson, "Contributions to the theory of linear least maximum approximation", 1961). A point at barycentric
-// weight beta of the moving corner follows a step s of that corner by beta s, so that a deviation r becomes |r - beta
-// s|, linearised along r. Both directions are in it: pieces of the reference against the faces, points of the faces
-// against the reference.
+// The method is iteratively reweighted least squares for the p-norm of the deviations, with p = 6 (for large p it tends
+// to the minimax fit; C. L. Lawson, "Contributions to the theory of linear least maximum approximation", 1961). A point
+// at barycentric weight beta of the moving corner follows a step s of that corner by beta s, so that a deviation r
+// becomes |r - beta s|, linearised along r. The sums take pieces of the reference against the faces, and points of the
+// faces against the reference.
 #include "decimation/position_fit.h"
 
 #include <algorithm>
@@ -17,18 +17,22 @@
 namespace tolvol {
 namespace {
 
-constexpr std::size_t kStride = 24;         // of the pieces one stands for so many: fewer triangles come of no more
-constexpr std::size_t kBetweenPolls = 256;  // samples
-constexpr double kDamping = 1e-3;           // of the trace: along directions that nothing determines the vertex stays
-constexpr double kFaceShare = 0.1;          // of a face's area, that each of its own points stands for
-// Points of a face, as the weight of the moving corner and, of what is left, that of the corner before it.
+/// One piece stands for so many of an element. More samples lead to no fewer triangles.
+constexpr std::size_t kStride = 24;
+/// The number of samples between two polls.
+constexpr std::size_t kBetweenPolls = 256;
+/// The share of the trace that is added to the diagonal: the vertex stays along directions that nothing determines.
+constexpr double kDamping = 1e-3;
+/// The share of a face's area that each of its own points stands for.
+constexpr double kFaceShare = 0.1;
+/// Points of a face: the weight of the moving corner, and the share of the other weights that the corner before it has.
 constexpr double kFacePoints[][2] = {{1, 0},   {0.75, 0}, {0.75, 1}, {0.5, 0},     {0.5, 0.5},
                                      {0.5, 1}, {0.25, 0}, {0.25, 1}, {0.25, 0.33}, {0.25, 0.67}};
 
 }  // namespace
 
 struct PositionFit::Sums {
-  double unit2;  ///< 1 / tolerance^2
+  double unit2;  ///< It is 1 / tolerance^2.
   double energy = 0, largest2 = 0;
   glm::dmat3 m{0};
   glm::dvec3 g{0};
@@ -64,7 +68,7 @@ void PositionFit::prepare(const Change& change, bool changed) {
   }
 }
 
-/// Ends at the first deviation beyond the limit, as add_faces() does.
+/// It ends at the first deviation beyond the limit, as add_faces() does.
 void PositionFit::add_pieces(const Change& change, double hopeless, Sums& sums) const {
   for (std::size_t first = 0; first < samples_.size() && sums.deviation() <= hopeless; first += 4) {
     const auto at = [&](std::size_t k) { return std::min(first + k, samples_.size() - 1); };

@@ -10,13 +10,13 @@
 namespace tolvol {
 
 struct Quadric {
-  // p^T A p + 2 b^T p + c, A symmetric.
+  // The quadric of p is p^T A p + 2 b^T p + c, where A is symmetric.
   double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
   glm::dvec3 b{0};
   double c = 0;
 
   Quadric() = default;
-  /// weight * (n . p + d)^2
+  /// The quadric weight * (n . p + d)^2.
   Quadric(const glm::dvec3& n, double d, double weight)
       : xx(weight * n.x * n.x),
         xy(weight * n.x * n.y),
@@ -37,11 +37,11 @@ struct Quadric {
            2 * glm::dot(b, p) + c;
   }
 
-  /// The minimiser, where it is well determined.
+  /// The point of the least value, where it is well determined.
   std::optional<glm::dvec3> minimiser() const {
     const double cxx = yy * zz - yz * yz, cxy = xz * yz - xy * zz, cxz = xy * yz - xz * yy;
     const double determinant = xx * cxx + xy * cxy + xz * cxz, trace = xx + yy + zz;
-    // Below this the smallest axis is lost in the rounding of the largest.
+    // Below this the rounding of the largest axis hides the smallest one.
     constexpr double kSingular = 1e-7;
     if (!(determinant > kSingular * trace * trace * trace)) return std::nullopt;
     const double cyy = xx * zz - xz * xz, cyz = xy * xz - xx * yz, czz = xx * yy - xy * xy;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// After the idea of alternating relocation, flips and collapses (H. Hoppe et al., "Mesh optimization", 1993), with the
-// certificates of both directions instead of an energy to decide what is allowed.
+// The idea to alternate relocations, flips and collapses is from H. Hoppe et al., "Mesh optimization", 1993. Here the
+// certificates of both directions decide which steps are allowed, and not an energy.
 #include "decimation/refinement.h"
 
 #include <algorithm>
@@ -11,14 +11,20 @@
 namespace tolvol {
 namespace {
 
-constexpr int kMoves = 4;        // of one vertex in a row
-constexpr int kHalvings = 3;     // of a step that does not lower the energy
-constexpr double kGain = 0.999;  // a step that lowers the energy less is not taken
-/// Steps of the fit from one start before a collapse is refused; with a deviation beyond this before a step, over the
-/// tolerance, hardly one succeeds: without these limits collapses take four times the time and find no more.
+/// The number of moves of one vertex in a row.
+constexpr int kMoves = 4;
+/// The number of lengths that are tried for a move, each half of the one before.
+constexpr int kHalvings = 3;
+/// A step that does not lower the energy below this share of it is not taken.
+constexpr double kGain = 0.999;
+/// The fit of a collapse takes so many steps from one start. It gives up before a step if the deviation, as a multiple
+/// of the tolerance, is beyond the number, because hardly a collapse succeeds then. Without these limits collapses take
+/// four times the time and find no more.
 constexpr double kGiveUpAbove[] = {2.5, 1.8, 1.5, 1.4, 1.3, 1.25, 1.2, 1.15};
-constexpr int kPatience = 3;       // rounds without a collapse before the end
-constexpr std::size_t kAhead = 8;  // steps tried at once by several threads: steps come in each other's way
+/// The number of rounds without a collapse before the end.
+constexpr int kPatience = 3;
+/// The number of steps that several threads try at once. More steps would come in each other's way.
+constexpr std::size_t kAhead = 8;
 
 }  // namespace
 
@@ -28,7 +34,7 @@ Refinement::Refinement(BoundedMesh& mesh, Team& team)
       relocated_(mesh.connectivity().n_vertices(), 0),
       flipped_(mesh.connectivity().n_edges(), 0),
       collapsed_(mesh.connectivity().n_edges(), 0) {
-  // Copies are looked up beyond the faces around a step.
+  // A try looks up copies, which are beyond the faces around its step.
   if (!team.alone() && !mesh.has_copies()) {
     const std::size_t vertices = mesh.connectivity().n_vertices(), edges = mesh.connectivity().n_edges();
     ahead_ = TriesAhead(team, 2 * kAhead, std::max(vertices, edges), vertices);
@@ -85,7 +91,8 @@ bool Refinement::sweep(const Kind& kind, std::span<const std::uint32_t> steps, c
   return true;
 }
 
-/// What was found for the step at `place`, if that still holds; else it is tried, and with it those after it.
+/// The outcome that was found for the step at `place`, if it still holds. If not, the step is tried, and with it the
+/// steps that come next.
 Refinement::Attempt& Refinement::tried(const Kind& kind, std::span<const std::uint32_t> steps, std::size_t place) {
   const auto found = [&](std::uint32_t step) -> Attempt* {
     if (ahead_.alone()) return nullptr;
@@ -127,14 +134,14 @@ bool Refinement::relocation_wanted(std::uint32_t vertex) const {
 
 void Refinement::try_relocation(std::uint32_t vertex, Attempt& a) const {
   a.trial.begin();
-  // Faces around a vertex that stays count as moving: the fit is for where it could go.
+  // Faces around a vertex that stays count as moving, because the fit is for the place where it could go.
   a.possible = a.trial.prepare_relocate(vertex, mesh_.vertex_position(vertex));
   if (!a.possible) return;
   a.fit.gather(a.trial.change());
   a.possible = find_move(vertex, a);
 }
 
-/// One step towards where the vertex fits best.
+/// Tries one step towards the place where the vertex fits best.
 bool Refinement::find_move(std::uint32_t vertex, Attempt& a) const {
   const glm::dvec3 from = mesh_.position(vertex);
   a.trial.prepare_relocate(vertex, mesh_.vertex_position(vertex));

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Fewer triangles after the collapse loop has ended: vertices move to where they fit best and edges are flipped, which
-/// makes room for further collapses, round after round until one brings nothing. Every step keeps the bounds.
+/// Removes more triangles after the collapse loop has ended: it moves vertices to where they fit best and flips edges,
+/// which makes room for further collapses, round after round until a few rounds collapse nothing. Every step keeps the
+/// bounds.
 ///
-/// Steps are tried in a fixed order. With several threads the next few are tried ahead, all at once.
+/// It tries steps in a fixed order. With several threads it tries the next few steps ahead, all at once.
 #pragma once
 
 #include <array>
@@ -27,14 +28,14 @@ class Refinement {
   /// Changes `mesh`, whose bounds are certified, and keeps references to both.
   Refinement(BoundedMesh& mesh, Team& team);
 
-  /// Until some rounds collapse nothing, `target` triangles are left, or `expired`, asked before every step, says so.
-  /// Throws Cancelled.
+  /// Runs until a few rounds collapse nothing, `target` triangles are left, or `expired`, which is asked before every
+  /// step, returns true. Throws Cancelled.
   void run(std::size_t target, const std::function<bool()>& expired, Progress* progress);
 
  private:
   using Halfedge = BoundedMesh::Halfedge;
 
-  /// What came of trying a step, and the scratch of it.
+  /// The outcome of trying a step, and the scratch of the try.
   struct Attempt {
     explicit Attempt(const BoundedMesh& mesh) : trial(mesh), fit(mesh) {}
     ChangeTrial trial;
@@ -43,7 +44,7 @@ class Refinement {
   };
   /// The vertices around which a try reads; some may be named more than once.
   using Read = std::array<std::uint32_t, 4>;
-  /// A kind of step, of a vertex or an edge each.
+  /// A kind of step; each step is about a vertex or an edge.
   struct Kind {
     Read (Refinement::*read)(std::uint32_t) const;
     bool (Refinement::*wanted)(std::uint32_t) const;
@@ -60,7 +61,7 @@ class Refinement {
   bool find_move(std::uint32_t vertex, Attempt& a) const;
   void relocate(std::uint32_t vertex, Attempt& a);
 
-  /// The later of an edge's two ends.
+  /// The later of the times of an edge's two ends.
   std::uint64_t at_ends(const std::vector<std::uint64_t>& times, std::uint32_t edge) const;
   Read read_at_ends(std::uint32_t edge) const;
   Read read_at_diagonals(std::uint32_t edge) const;
@@ -83,10 +84,11 @@ class Refinement {
 
   BoundedMesh& mesh_;
   TriesAhead ahead_;
-  std::vector<Attempt> attempts_;  ///< per slot of ahead_
-  // What failed is not tried again until a face around it has changed since; the times are those of ahead_.
-  std::vector<std::uint64_t> touched_;                          ///< per vertex: when a face around it changed last
-  std::vector<std::uint64_t> relocated_, flipped_, collapsed_;  ///< per vertex, edge, edge: when it was tried last
+  std::vector<Attempt> attempts_;  ///< For each slot of ahead_.
+  // A step that failed is not tried again until a face around it has changed. The times are those of ahead_.
+  std::vector<std::uint64_t> touched_;  ///< For each vertex: when a face around it changed last.
+  std::vector<std::uint64_t> relocated_, flipped_,
+      collapsed_;  ///< For each vertex, edge and edge: when it was tried last.
 };
 
 }  // namespace tolvol

@@ -13,7 +13,7 @@ namespace {
 
 using Vertices = std::span<std::uint32_t>;
 
-/// Cuts in two across the longest side of their box.
+/// Cuts the vertices in two across the longest side of their box.
 std::pair<Vertices, Vertices> halves(const BoundedMesh& mesh, Vertices vertices, double share) {
   Box box;
   for (const std::uint32_t v : vertices) box.add(mesh.position(v));
@@ -29,7 +29,8 @@ std::pair<Vertices, Vertices> halves(const BoundedMesh& mesh, Vertices vertices,
   return {vertices.first(place), vertices.subspan(place)};
 }
 
-/// Cuts again and again until none has more than `most`; the first time `first` of them go to one side.
+/// Cuts again and again until no part has more than `most` vertices. The first time the share `first` of them goes to
+/// one side.
 std::vector<Vertices> pieces(const BoundedMesh& mesh, Vertices all, std::size_t most, double first, Team& team) {
   std::vector<Vertices> found{all};
   double share = first;

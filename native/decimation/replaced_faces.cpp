@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every step may add to the bound. It takes no more than a fixed share of the room that is left, so that after many
-// steps there is some left to take, and no more than it needs: on a plane next to nothing.
+// Every change may add to the bound. A change takes no more than a fixed share of the room that is left, so that room
+// is left after many changes, and no more than it needs, which on a plane is next to nothing.
 #include "decimation/replaced_faces.h"
 
 #include <algorithm>
@@ -10,12 +10,18 @@
 namespace tolvol {
 namespace {
 
-constexpr double kStep = 1.0 / 32;       // of the room that is left
-constexpr double kLookedFor = 0.5;       // of a step: the rest is room for rounding
-constexpr double kLeast = 1e-6;          // of the tolerance: a smaller step is not taken
-constexpr double kWorthCutting = 0.25;   // of what is looked for
-constexpr double kFloor = 0.1;           // of what is looked for: a shorter part is not split further
-constexpr std::size_t kMostParts = 512;  // looked at
+/// The share of the room left below the limit that one change may take.
+constexpr double kStep = 1.0 / 32;
+/// The share of a step that the search looks for; the rest is room for rounding.
+constexpr double kLookedFor = 0.5;
+/// A step of a smaller share of the tolerance is not taken.
+constexpr double kLeast = 1e-6;
+/// A part is cut only where both sides are strips of at least this width, a share of the distance that is looked for.
+constexpr double kWorthCutting = 0.25;
+/// A part that is shorter than this share of the distance that is looked for is not split further.
+constexpr double kFloor = 0.1;
+/// The number of parts that a search looks at before it gives up.
+constexpr std::size_t kMostParts = 512;
 
 }  // namespace
 
@@ -39,14 +45,14 @@ double ReplacedFaces::bound(const glm::dvec3 (&corners)[3], double limit) {
     FourPoints points;
     points.set(a, b, c, (a + b + c) * (1.0 / 3));
     double centre2 = kNone;
-    const WitnessTriangle* below = nullptr;  // the nearest to the centre
-    double least2 = near2;                   // how far the corners are from one face at most
+    const WitnessTriangle* below = nullptr;  // The face nearest to the centre.
+    double least2 = near2;                   // The square of how far the corners are from one face at most.
     bool covered = false;
     for (const WitnessTriangle& face : faces_) {
       double d2[4];
       witness_distances(face, points, d2);
       if (d2[3] < centre2) centre2 = d2[3], below = &face;
-      // Written so that NaN is not covered.
+      // The comparisons are written so that NaN is not covered.
       if (d2[0] <= least2 && d2[1] <= least2 && d2[2] <= least2) {
         least2 = std::max({d2[0], d2[1], d2[2]});
         covered = true;
@@ -56,7 +62,7 @@ double ReplacedFaces::bound(const glm::dvec3 (&corners)[3], double limit) {
       used2 = std::max(used2, least2);
       continue;
     }
-    // Written so that NaN ends here.
+    // The comparison is written so that NaN ends here.
     if (!(centre2 <= near2) || longest_squared(part) <= kFloor * kFloor * near2 || part.cuts == kMostCuts) return kNone;
     if (!cut(part, *below, kWorthCutting * near, parts_)) split(part, parts_);
   }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The faces that a change replaces, as witnesses of those that take their place: what is within w of a face that is
-/// within e of the reference is within e + w of it.
+/// The faces that a change replaces, as witnesses of the faces that take their place: a point within w of a face that
+/// is within e of the reference is within e + w of the reference.
 ///
-/// There are few of them, where a large face lies near thousands of triangles of the reference: on what is flat, or
-/// nearly, this proves in no time what looking at all of these proves again and again.
+/// A change replaces few faces, but a large face lies near thousands of triangles of the reference. Where the faces are
+/// nearly flat, the few prove at once what the thousands would prove anew for every change.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -17,17 +17,17 @@ namespace tolvol {
 class ReplacedFaces {
  public:
   void clear() { faces_.clear(), farthest_ = 0; }
-  /// `distance`: an upper bound on the distance of its points to the reference.
+  /// `distance` is an upper bound on the distance of the face's points to the reference.
   void add(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double distance);
   bool empty() const { return faces_.empty(); }
 
-  /// An upper bound, at most `limit`, on the distance of any point of the triangle to the reference; infinity where
-  /// none was found. About 20 ns a face where it is not flat.
+  /// An upper bound, at most `limit`, on the distance of any point of the triangle to the reference; infinity where the
+  /// search finds none. It takes about 20 ns for each face where the faces are not flat.
   double bound(const glm::dvec3 (&corners)[3], double limit);
 
  private:
   std::vector<WitnessTriangle> faces_;
-  double farthest_ = 0;  ///< of their distances
+  double farthest_ = 0;  ///< The largest of the faces' distances.
   std::vector<Part> parts_;
 };
 

@@ -9,15 +9,16 @@
 
 namespace tolvol {
 
-/// It is asked about one change after another: the decimation runs on one thread.
+/// The decimation runs on one thread, and asks it about one change after another.
 class RingCheck : public Bounds {
  public:
-  /// Once, before the first trial: the mesh that is decimated, in the volume's frame. Its triangles are the elements of
-  /// the changes. `mapping_error`: StoredSpace::mapping_error() of all that the questions may be about.
+  /// Is called once, before the first trial, with the mesh that is decimated, in the volume's frame. Its triangles are
+  /// the elements of the changes. `mapping_error` is StoredSpace::mapping_error() of all points that the questions may
+  /// be about.
   virtual void begin(const TriangleMesh& mesh, double mapping_error) = 0;
 
   virtual std::string method() const = 0;
-  /// What computes it: "CPU", or the name of a GL renderer.
+  /// The name of what computes the answers: "CPU", or a GL renderer.
   virtual std::string renderer() const { return "CPU"; }
 };
 

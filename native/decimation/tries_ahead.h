@@ -3,7 +3,7 @@
 /// used when the turn of its step comes, unless something that it read has changed meanwhile: what is carried out, and
 /// in which order, is the same for any number of threads.
 ///
-/// Which steps come next, what a try finds and where that is kept, the caller decides: it keeps one result a slot.
+/// The caller decides which steps come next and what a try finds, and keeps one result for each slot.
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@ namespace tolvol {
 
 class TriesAhead {
  public:
-  /// For one thread: it tries a step when its turn comes, and there is one slot.
+  /// For one thread, which tries a step when its turn comes. There is one slot.
   TriesAhead() = default;
   /// Steps and vertices are numbered up to these counts. `slots`: how many of the last tries are kept. Keeps a
   /// reference to `team`, which has other threads than the caller's.
@@ -56,17 +56,17 @@ class TriesAhead {
   static constexpr std::uint32_t kNoStep = std::numeric_limits<std::uint32_t>::max();
   struct Slot {
     std::uint32_t step = kNoStep;
-    std::uint64_t at = 0;  ///< when it was tried
+    std::uint64_t at = 0;  ///< When it was tried.
   };
 
   std::size_t take(std::span<const std::uint32_t> steps);
 
-  Team* team_ = nullptr;  ///< null for one thread
+  Team* team_ = nullptr;  ///< Null for one thread.
   std::uint64_t now_ = 1;
   std::vector<Slot> slots_;
-  std::vector<std::uint32_t> slot_of_;  ///< per step: its slot, if that names the step
-  std::size_t next_ = 0;                ///< the slot that is taken next
-  std::vector<std::uint64_t> changed_;  ///< per vertex: when what is around it changed last
+  std::vector<std::uint32_t> slot_of_;  ///< For each step: its slot, if that slot names the step.
+  std::size_t next_ = 0;                ///< The slot that is taken next.
+  std::vector<std::uint64_t> changed_;  ///< For each vertex: when what is around it changed last.
 };
 
 }  // namespace tolvol

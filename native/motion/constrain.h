@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Any motion of a mesh, bounded: given a state that is inside a tolerance volume and a wished one, as much of the wish
-/// as the tolerance allows.
+/// Bounds any motion of a mesh: from a state that is inside a tolerance volume it goes towards a wished state as far as
+/// the tolerance allows.
 #pragma once
 
 #include <cstdint>
@@ -19,31 +19,32 @@ struct ConstrainOptions {
   enum class Outside { error, keep };
 
   PullBack::Mode mode = PullBack::Mode::pull_back;
-  Outside outside = Outside::error;  ///< keep: vertices of faces that are outside in `before` stay where they are
-  unsigned threads = 0;              ///< 0: one per core; never changes the result
+  Outside outside = Outside::error;  ///< With keep, vertices of faces that are outside in `before` stay where they are.
+  unsigned threads = 0;              ///< 0 is one for each core. It never changes the result.
   Progress* progress = nullptr;
 };
 
 struct ConstrainResult {
-  std::vector<glm::dvec3> vertices;  ///< stored
-  std::vector<double> factors;       ///< share of each vertex's motion from `before` to `after`, 0 to 1
-  std::size_t held_back = 0;         ///< factors below 1
-  std::size_t outside_faces = 0;     ///< faces of `before` that are not within the tolerance, kept as they are
+  std::vector<glm::dvec3> vertices;  ///< In stored coordinates.
+  std::vector<double> factors;       ///< The share, 0 to 1, of each vertex's motion from `before` to `after`.
+  std::size_t held_back = 0;         ///< The number of factors below 1.
+  std::size_t outside_faces =
+      0;  ///< The number of faces of `before` that are not within the tolerance, which are kept as they are.
   std::optional<std::uint32_t> first_outside;
-  std::string method, renderer;  ///< of the check
+  std::string method, renderer;  ///< The check that decided.
   std::vector<std::string> warnings;
 };
 
 /// Vertex v ends at the stored rounding of before + f (after - before), f its factor: bit for bit `after` where f is 1
 /// and `before` where f is 0. Every face of the result is inside as it is stored, corners with different factors
-/// included. `faces`: `corners` (1 to 4) indices a face, as in Pieces.
+/// included. `faces` has `corners` (1 to 4) indices for each face, as in Pieces.
 ///
 /// A vertex that touches no face that failed has factor 1. With Mode::pull_back no single factor can rise by 1/64 alone
 /// (or to 1, where that is less), and none is below that of Mode::reset, whose factors are 0 and 1.
 ///
 /// Throws InvalidInput for bad arrays, naming the first offender, for faces of `before` that are not inside (unless
 /// Outside::keep) and where the stored type cannot hold the tolerance; Cancelled. About 1 us a vertex to certify
-/// `before`; then see PullBack::move.
+/// `before`; PullBack::move says what the motion costs.
 ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const glm::dvec3> after,
                           std::span<const std::uint32_t> faces, int corners, const StoredSpace& space,
                           const ToleranceVolume& volume, const ConstrainOptions& options = {});

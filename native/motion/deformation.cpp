@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The paper asks one global query about the deformed mesh and blocks what does not pass. So does this, by the
-// certificate; for what does not pass it looks for the share of the way that does, or has vertices pulled back.
+// The paper asks one global query about the deformed mesh, and blocks a deformation that does not pass. So does this
+// code, by the certificate. For a deformation that does not pass it looks for the share of the way that passes, or has
+// vertices pulled back.
 #include "motion/deformation.h"
 
 #include <algorithm>
@@ -17,7 +18,7 @@
 namespace tolvol {
 namespace {
 
-/// Of the way: the permitted fraction is known to a thousandth of it.
+/// The permitted fraction is known to this share of the way.
 constexpr int kHalvings = 10;
 
 constexpr std::size_t kBlock = 1024;
@@ -113,7 +114,7 @@ class Deformation {
     }
   }
 
-  /// What is outside to begin with stays as it is, and is asked about no more.
+  /// Keeps the faces that are outside to begin with as they are, and asks about them no more.
   void keep_outside() {
     const std::vector<std::uint32_t> outside = not_inside(before_, faces_);
     if (outside.empty()) return;
@@ -148,7 +149,7 @@ class Deformation {
     for (int halving = 0; halving < kHalvings; ++halving) {
       const double middle = 0.5 * (inside + outside);
       std::vector<glm::dvec3> state = at(middle);
-      // What failed farther out is likeliest to fail here, and is asked first.
+      // Faces that failed farther out are the likeliest to fail here, and are asked first.
       std::vector<std::uint32_t> still = not_inside(state, only(failing));
       if (still.empty()) {
         still = leaving(state);
@@ -167,7 +168,7 @@ class Deformation {
     if (options_.mode == Mode::farthest) result_.vertices = std::move(permitted);
   }
 
-  /// The stored state at a share of the way.
+  /// The stored positions at a share of the way.
   std::vector<glm::dvec3> at(double share) const {
     std::vector<glm::dvec3> state(before_.begin(), before_.end());
     for (std::size_t i = 0; i < state.size(); ++i) {
@@ -192,7 +193,7 @@ class Deformation {
     return result;
   }
 
-  /// Which of the faces are not certified to be inside, ascending.
+  /// The given faces that are not certified to be inside, ascending.
   std::vector<std::uint32_t> not_inside(std::span<const glm::dvec3> stored,
                                         std::span<const std::uint32_t> faces) const {
     std::vector<glm::dvec3> points(stored.size());
@@ -209,7 +210,7 @@ class Deformation {
     return result;
   }
 
-  /// Those of all faces, but for the ones that are kept as they are.
+  /// All faces that are not certified to be inside, except for the kept ones.
   std::vector<std::uint32_t> leaving(std::span<const glm::dvec3> stored) const {
     std::vector<std::uint32_t> result = not_inside(stored, faces_);
     if (!kept_.empty()) std::erase_if(result, [&](std::uint32_t face) { return kept_[face]; });
@@ -225,7 +226,7 @@ class Deformation {
   const DeformationOptions& options_;
   std::optional<Certificate> certificate_;
   std::vector<glm::dvec3> after_;
-  std::vector<bool> kept_;  // per face; empty: none is
+  std::vector<bool> kept_;  // For each face; empty if none is kept.
   DeformationResult result_;
 };
 

@@ -12,8 +12,10 @@
 namespace tolvol {
 namespace {
 
-constexpr std::size_t kChunk = 64;            // vertices compared at once; most chunks are as they were
-constexpr std::size_t kBlock = 256 * kChunk;  // vertices for one thread
+/// The number of vertices that are compared at once; most chunks are as they were.
+constexpr std::size_t kChunk = 64;
+/// The number of vertices that one thread takes at a time.
+constexpr std::size_t kBlock = 256 * kChunk;
 
 glm::dvec3 at(std::span<const float> positions, std::size_t vertex) {
   return {positions[3 * vertex], positions[3 * vertex + 1], positions[3 * vertex + 2]};
@@ -57,7 +59,7 @@ void Guard::reset(std::span<const float> positions, Progress* progress) {
   interrupted_ = false;
 }
 
-/// Vertices of which any bit is not as in the state, ascending.
+/// The vertices of which any bit differs from the state, ascending.
 std::vector<std::uint32_t> Guard::changed(std::span<const float> positions) const {
   const std::size_t count = vertex_count();
   const auto differ = [&](std::size_t begin, std::size_t end) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Keeps a mesh that is edited by other hands inside a tolerance volume, edit by edit: what a sculpting session asks
-/// after each dab. An edit costs what it touches and a comparison of all positions with the last ones.
+/// Keeps a mesh that others edit inside a tolerance volume, edit by edit: a sculpting session asks it after each dab.
+/// An edit costs the work on the faces that it touches, and a comparison of all positions with the last ones.
 #pragma once
 
 #include <cstdint>
@@ -19,12 +19,12 @@ namespace tolvol {
 class Guard {
  public:
   struct Options {
-    ConstrainOptions::Outside outside = ConstrainOptions::Outside::error;  ///< keep: see ConstrainOptions
-    unsigned threads = 0;                                                  ///< 0: one per core
-    Progress* progress = nullptr;                                          ///< of the construction alone
+    ConstrainOptions::Outside outside = ConstrainOptions::Outside::error;  ///< See ConstrainOptions.
+    unsigned threads = 0;                                                  ///< 0 is one for each core.
+    Progress* progress = nullptr;                                          ///< The progress of the construction alone.
   };
 
-  /// What constrain() moved back: vertices, ascending, and where to, three coordinates each.
+  /// The vertices that constrain() moved back, ascending, and their new positions, three coordinates each.
   struct Correction {
     std::vector<std::uint32_t> vertices;
     std::vector<float> positions;
@@ -48,17 +48,17 @@ class Guard {
   void reset(std::span<const float> positions, Progress* progress = nullptr);
 
   std::size_t vertex_count() const { return last_.size() / 3; }
-  const std::vector<std::uint32_t>& outside() const { return outside_; }  ///< faces that were outside at the start
-  const std::optional<std::string>& warning() const { return warning_; }  ///< storage_warning(), at the start
+  const std::vector<std::uint32_t>& outside() const { return outside_; }  ///< The faces that were outside at the start.
+  const std::optional<std::string>& warning() const { return warning_; }  ///< The storage_warning() at the start.
 
  private:
   void begin(std::span<const float> positions, Progress* progress);
   void require_size(std::span<const float> positions) const;
   std::vector<std::uint32_t> changed(std::span<const float> positions) const;
 
-  bool interrupted_ = false;  // a call was left by an exception: pull_back_ no longer holds the state, last_ does
+  bool interrupted_ = false;  // An exception has ended a call: last_ holds the state, and pull_back_ does not.
   std::vector<std::uint32_t> faces_;
-  std::vector<float> last_;  // the state, as it is stored
+  std::vector<float> last_;  // The state, as it is stored.
   Options options_;
   PullBack pull_back_;
   std::vector<std::uint32_t> outside_;

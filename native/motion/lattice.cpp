@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Basis functions by algorithm A2.2 of L. Piegl, W. Tiller, The NURBS Book, 1997. Where this deviates from Sederberg
-// and Parry: they have Bernstein polynomials, for which a regular grid of control points is the identity. For other
-// degrees it is not, unless the parameter of a point is found by inverting the map at rest, which here is one monotone
-// function per axis. And what is evaluated is the motion of the control points, not their position, so that nothing is
-// rounded where nothing moved.
+// The basis functions are computed by algorithm A2.2 of L. Piegl, W. Tiller, The NURBS Book, 1997. Where this deviates
+// from Sederberg and Parry: they have Bernstein polynomials, for which a regular grid of control points is the
+// identity. For other degrees it is not, unless the parameter of a point is found by inverting the map at rest, which
+// here is one monotone function per axis. The code evaluates the motion of the control points, not their position, so
+// that nothing is rounded where nothing moved.
 #include "motion/lattice.h"
 
 #include <algorithm>
@@ -18,14 +18,16 @@ namespace {
 
 constexpr const char* kAxisNames[3] = {"u", "v", "w"};
 
-/// Of an edge of the box: how far outside a point still counts as in it. Meshes that just fit a box stick out of it by
-/// the rounding of their float32 coordinates, and must not be torn there.
+/// A point counts as in the box up to this share of an edge outside. Meshes that just fit a box stick out of it by the
+/// rounding of their float32 coordinates, and must not be torn there.
 constexpr double kSlack = 0x1p-18;
 
-/// Of the range: knots closer than this would divide by almost nothing; they can only be meant to be equal.
+/// Knots closer than this share of the range count as equal, because a division by their difference would be by almost
+/// nothing.
 constexpr double kKnotGap = 1e-9;
 
-/// Newton's method takes four; halving alone would end after as many as a double has bits.
+/// The most steps of the search. Newton's method takes four; halving alone would end after as many as a double has
+/// bits.
 constexpr int kSteps = 64;
 
 StoredSpace domain_space(const glm::dmat4& domain) {
@@ -48,7 +50,7 @@ std::string place_name(std::size_t i, const glm::uvec3& size) {
   return text.str();
 }
 
-/// A common factor of all weights cancels: the heaviest is 1.
+/// Scales the weights so that the heaviest is 1: a common factor of all weights cancels.
 std::vector<double> normalised_weights(const Lattice& lattice) {
   if (lattice.weights.empty()) return std::vector<double>(lattice.points.size(), 1);
   if (lattice.weights.size() != lattice.points.size()) {
@@ -138,7 +140,7 @@ LatticeAxis::LatticeAxis(const std::string& name, unsigned size, unsigned degree
       for (unsigned r = 0; r < j; ++r) reciprocals_.push_back(1 / (knots_[span + 1 + r] - knots_[span + 1 - j + r]));
     }
   }
-  if (degree + 1 == size) return;  // one polynomial, and it reproduces its parameter
+  if (degree + 1 == size) return;  // There is one polynomial, which reproduces its parameter.
   double values[kMaxDegree + 1];
   std::vector<double> places(knots_.size(), 0.0);
   for (unsigned i = degree; i < size; ++i) places[i] = evaluate(span(knots_, knots_[i]), knots_[i], values).place;
@@ -183,7 +185,7 @@ LatticeAxis::Support LatticeAxis::at(double x) const {
   support.first = span - degree_;
   double parameter = x;
   if (!places_.empty()) {
-    // Newton's method, kept between bounds.
+    // This is Newton's method, kept between bounds.
     double lower = knots_[span], upper = knots_[span + 1];
     const double rise = places_[span + 1] - places_[span];
     parameter = rise > 0 ? lower + std::clamp((x - places_[span]) / rise, 0.0, 1.0) * (upper - lower) : lower;
@@ -230,7 +232,7 @@ LatticeDeformation::LatticeDeformation(const Lattice& lattice)
 
 std::optional<glm::dvec3> LatticeDeformation::displacement(const glm::dvec3& world) const {
   const glm::dvec3 place = domain_.store(world);
-  // Written so that NaN is outside.
+  // The comparison is written so that NaN is outside.
   if (!glm::all(glm::greaterThanEqual(place, glm::dvec3(-kSlack))) ||
       !glm::all(glm::lessThanEqual(place, glm::dvec3(1 + kSlack)))) {
     return std::nullopt;

@@ -17,12 +17,12 @@ namespace tolvol {
 /// Control points in world units. At rest they are the regular grid of a box: point (i, j, k) is at (i / (size.x - 1),
 /// j / (size.y - 1), k / (size.z - 1)) of it.
 struct Lattice {
-  glm::uvec3 size{0};                             ///< control points along each axis, at least 2
-  std::vector<glm::dvec3> points;                 ///< where they are now; (i, j, k) is number (i size.y + j) size.z + k
-  std::vector<double> weights;                    ///< in the same order, positive; empty: all equal
-  glm::dmat4 domain{1};                           ///< the box: the unit cube mapped to the world
-  glm::uvec3 degree{3};                           ///< below the number of points; that number less 1: Bernstein
-  std::array<std::vector<double>, 3> knots = {};  ///< clamped, size + degree + 1 each; empty: uniform
+  glm::uvec3 size{0};              ///< The number of control points along each axis, at least 2.
+  std::vector<glm::dvec3> points;  ///< Where they are now; (i, j, k) is number (i size.y + j) size.z + k.
+  std::vector<double> weights;     ///< In the same order, positive; empty if all are equal.
+  glm::dmat4 domain{1};            ///< It maps the unit cube to the box in the world.
+  glm::uvec3 degree{3};            ///< Below the number of points. One less than it means Bernstein polynomials.
+  std::array<std::vector<double>, 3> knots = {};  ///< Clamped, size + degree + 1 for each axis; empty if uniform.
 };
 
 /// The control points of a lattice at rest, in the order of Lattice::points.
@@ -34,7 +34,7 @@ class LatticeAxis {
  public:
   static constexpr unsigned kMaxDegree = 15;
 
-  /// The basis functions that are not zero at a place: those of the points first, ..., first + degree.
+  /// The basis functions that are not zero at a place. They belong to the points first, ..., first + degree.
   struct Support {
     unsigned first;
     double values[kMaxDegree + 1];
@@ -56,9 +56,9 @@ class LatticeAxis {
   unsigned span(const std::vector<double>& breaks, double value) const;
 
   unsigned size_, degree_;
-  std::vector<double> knots_;        // from 0 to 1
-  std::vector<double> reciprocals_;  // of the knot differences that evaluate() needs, a span after the other
-  std::vector<double> places_;       // of the knots, by the grid at rest; empty when they are the knots themselves
+  std::vector<double> knots_;        // They go from 0 to 1.
+  std::vector<double> reciprocals_;  // Of the knot differences that evaluate() needs, span after span.
+  std::vector<double> places_;       // The knots' places by the grid at rest; empty if they equal the knots.
 };
 
 class LatticeDeformation {
@@ -75,8 +75,9 @@ class LatticeDeformation {
   glm::uvec3 size_;
   StoredSpace domain_;
   std::array<LatticeAxis, 3> axes_;
-  std::vector<glm::dvec4> moved_;  // per point: its motion times its weight, and the weight
-  std::vector<glm::dvec4> rest_;   // per point: its place in the box times its weight; empty when all weights are equal
+  std::vector<glm::dvec4> moved_;  // For each point: its motion times its weight, and the weight.
+  std::vector<glm::dvec4>
+      rest_;  // For each point: its place in the box times its weight; empty if all weights are equal.
 };
 
 }  // namespace tolvol

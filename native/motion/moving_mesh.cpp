@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // No point of a face is farther from the reference than before by more than the longest step of its corners: this
-// settles almost all faces without a question to the reference. The rest is asked of the witness certificate.
+// settles almost all faces without a question to the reference. The witness certificate decides about the others.
 #include "motion/moving_mesh.h"
 
 #include <algorithm>
@@ -17,14 +17,18 @@
 namespace tolvol {
 namespace {
 
-/// Of the provable distance: what is nearer is proved by the certificate whatever its shape, as the pieces that it
-/// splits into become smaller than the rest. So what is settled without it is nothing that it could not prove.
+/// A share of the provable distance. The certificate proves a face that is nearer than it whatever the face's shape,
+/// because the parts that it splits into become smaller than the rest of the distance. So every face that is settled
+/// without the certificate is one that the certificate could prove.
 constexpr double kEasy = 0.98;
-constexpr double kKnown = 2;             // of the provable distance: up to here distances are known
-constexpr double kRounding = 0x1p-44;    // of distances in the frame
-constexpr double kInflate = 0x1p-50;     // rounding of a step's length and of adding it, relative
-constexpr std::size_t kBlock = 1024;     // faces or vertices, for work of about 10 ns each, and
-constexpr std::size_t kSmallBlock = 32;  // for work of about 1 us each
+/// Distances are known up to this multiple of the provable distance.
+constexpr double kKnown = 2;
+/// A bound on the rounding of distances in the frame.
+constexpr double kRounding = 0x1p-44;
+/// A bound on the relative rounding of a step's length, and of a sum with it.
+constexpr double kInflate = 0x1p-50;
+/// The numbers of faces or vertices that a thread takes at a time, for work of about 10 ns and of about 1 us each.
+constexpr std::size_t kBlock = 1024, kSmallBlock = 32;
 
 bool finite(const glm::dvec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
@@ -110,7 +114,7 @@ void MovingMesh::make_rings(std::size_t vertex_count) {
 }
 
 MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress* progress) {
-  std::vector<glm::dvec3> extremes;  // what mapping errors are judged by
+  std::vector<glm::dvec3> extremes;  // The mapping error is computed for these.
   for (std::uint32_t v = 0; v < stored.size(); ++v) {
     poll_at(v);
     if (!finite(stored[v])) refuse("vertex", v, stored[v], "is not finite");
@@ -158,7 +162,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress
       const std::uint32_t f = open[i];
       reach_[f] = reach_by_certificate(f);
       if (reach_[f] != kUnproved) continue;
-      reach_[f] = provable_;  // nothing is known of it beyond the state as it is
+      reach_[f] = provable_;  // Beyond the state as it is, nothing is known of the face.
       outside[i] = over_triangulations(f, [&](const auto&... triangle) {
                      return certificates_.front().verdict(triangle...) == Verdict::inside ? 0 : kUnproved;
                    }) == kUnproved;
@@ -172,7 +176,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress
   return result;
 }
 
-/// Whether the face is the face of that number of the reference.
+/// Whether the face equals the reference's face of this number.
 bool MovingMesh::is_own(std::uint32_t face) const {
   const TriangleMesh& reference = volume_->reference();
   if (corners_ != 3 || face >= reference.triangles.size()) return false;
@@ -195,7 +199,7 @@ std::vector<std::uint32_t> MovingMesh::faces_around(std::span<const std::uint32_
 
 MovingMesh::PointBound MovingMesh::bound_at(const glm::dvec3& at) const {
   const double box = 1 + 2 * volume_->frame_tolerance();
-  // Written so that NaN is outside.
+  // The comparison is written so that NaN is outside.
   if (!(std::abs(at.x) <= box && std::abs(at.y) <= box && std::abs(at.z) <= box)) return {kFar};
   const PointBound found = certificates_.front().nearest(at, kKnown * provable_);
   return found.triangle == Hierarchy::kNone ? PointBound{kFar} : found;
@@ -221,7 +225,7 @@ double MovingMesh::reach_by_motion(std::uint32_t face) const {
   return reach <= kEasy * limit_ ? reach : kUnproved;
 }
 
-/// The largest of bound(corners, distances, triangles near them) over the triangles that the face may consist of.
+/// The largest value of bound(corners, distances, triangles near them) over the triangles that the face may consist of.
 template <class Bound>
 double MovingMesh::over_triangulations(std::uint32_t face, Bound&& bound) const {
   const auto corner = corners_of(face);
@@ -242,7 +246,7 @@ double MovingMesh::reach_by_certificate(std::uint32_t face) const {
   for (const std::uint32_t v : corners_of(face)) {
     if (trial_[v].bound.distance > limit_) return kUnproved;
   }
-  // First as Certificate decides, so that it proves the face again; then the headroom.
+  // The first question is the one that Certificate asks, so that it proves the face again; then comes the headroom.
   double reach = kUnproved;
   for (const TriangleCertificate& certificate : certificates_) {
     reach =
@@ -270,7 +274,7 @@ void MovingMesh::measure(std::span<const std::uint32_t> faces, Progress* progres
   });
 }
 
-/// Writes trial_reach_ of all of them.
+/// Writes trial_reach_ of all these faces.
 std::vector<std::uint32_t> MovingMesh::failing(std::span<const std::uint32_t> faces, Progress* progress) {
   if (progress) progress->update(progress->fraction());
   std::vector<std::uint32_t> open = select(faces.size(), threads_, [&](std::size_t i) {
@@ -302,7 +306,7 @@ void MovingMesh::try_all(std::span<const std::uint32_t> vertices, std::span<cons
 }
 
 void MovingMesh::try_at(std::uint32_t vertex, const glm::dvec3& at, const PointBound& bound) {
-  // What is known of a place must not depend on how one got there: a guess would do for a shorter distance.
+  // What is known of a place must not depend on the way there, although a guess would do for a shorter distance.
   set_trial(vertex, {at, certificates_.front().leaves_room(bound.distance) ? PointBound{} : bound});
 }
 

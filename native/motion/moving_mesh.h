@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// A mesh inside a tolerance volume whose vertices are tried at other places: which faces would be inside there?
+/// A mesh inside a tolerance volume whose vertices are tried at other places. It tells which faces would be inside
+/// there.
 #pragma once
 
 #include <array>
@@ -19,22 +20,23 @@
 
 namespace tolvol {
 
-/// Holds a state, all of it inside, and a trial beside it, at first equal. Positions are in the frame.
+/// It holds a state, all of which is inside, and beside it a trial, which equals the state at first. Positions are in
+/// the frame.
 class MovingMesh {
  public:
   static constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
-  /// What is known of the way from a place to the reference: the distance is kUnknown until it is asked for, and huge,
-  /// with no triangle, far beyond the tolerance.
+  /// What is known of the distance from a place to the reference: it is kUnknown until it is asked for. Far beyond the
+  /// tolerance it is huge, and there is no triangle.
   using PointBound = TriangleCertificate::PointBound;
 
   struct Start {
-    std::vector<std::uint32_t> outside;  ///< faces that are not proved inside, ascending: their vertices never move
-    std::optional<std::string> warning;  ///< of storage_warning()
+    std::vector<std::uint32_t> outside;  ///< Faces that are not proved inside, ascending. Their vertices never move.
+    std::optional<std::string> warning;  ///< By storage_warning().
   };
 
-  /// `faces`: `corners` (1 to 4) indices a face, as in Pieces. Keeps references to `volume` and `faces`. Throws
-  /// InvalidInput for an index that is not below `vertex_count`. O(n + m).
+  /// `faces` has `corners` (1 to 4) indices for each face, as in Pieces. Keeps references to `volume` and `faces`.
+  /// Throws InvalidInput for an index that is not below `vertex_count`. O(n + m).
   MovingMesh(const ToleranceVolume& volume, const StoredSpace& space, std::span<const std::uint32_t> faces, int corners,
              std::size_t vertex_count, unsigned threads);
 
@@ -46,39 +48,39 @@ class MovingMesh {
   /// for the first position that is not finite.
   void try_all(std::span<const std::uint32_t> vertices, std::span<const glm::dvec3> before,
                std::span<const glm::dvec3> after);
-  /// `bound`: what is known there.
+  /// Tries a vertex at a position. `bound` is what is known of that place.
   void try_at(std::uint32_t vertex, const glm::dvec3& at, const PointBound& bound);
   void take_back(std::uint32_t vertex) { trial_[vertex] = state_[vertex], step_[vertex] = 0; }
   /// Which of these faces are not inside on trial. Every face must be asked about after the last change to a corner.
-  /// Settled ones cost about 10 ns each, those near the tolerance 0.1 us to many.
+  /// A settled face costs about 10 ns, a face near the tolerance 0.1 us or much more.
   std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Progress* progress);
   /// Tries the vertex there if all faces around it are inside then; returns whether. Different threads may ask for
   /// vertices that share no face. The distances of all corners must be known: measure(). `blame`: the place in the
   /// ring of the face that is asked first, set to that of the face that refused.
   bool try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint32_t& blame);
   void measure(std::span<const std::uint32_t> faces, Progress* progress);
-  /// Makes the trial of these the state. `faces`: all around them.
+  /// Makes the trial of these vertices the state. `faces` are all faces around them.
   void accept(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces);
 
   const glm::dvec3& state(std::uint32_t vertex) const { return state_[vertex].at; }
   /// From now on, keeps in mind where vertices were refused: 64 bytes a vertex, for those who push the same ones
   /// against the limit again and again. It saves searches and changes no answer.
   void remember_refusals() { refusals_.resize(state_.size()); }
-  /// The distance itself where the grid's guess leaves little room.
+  /// Finds the distance itself where the grid's guess leaves little room.
   PointBound bound_at(const glm::dvec3& at) const;
-  /// The same of a place where a vertex is tried, on its wish or a little ahead of where it is.
+  /// Does so for a place where a vertex is tried, on its wish or a little ahead of where it is.
   enum class Aim { wish, ahead };
   PointBound bound_at(std::uint32_t vertex, const glm::dvec3& at, Aim aim);
-  /// Whether that is the distance itself, and not a guess or nothing.
+  /// Whether the bound is the distance itself, and neither a guess nor unknown.
   bool is_exact(const PointBound& bound) const {
     return bound.distance != kUnknown && !certificates_.front().leaves_room(bound.distance);
   }
   const PointBound& bound_of_state(std::uint32_t vertex) const { return state_[vertex].bound; }
   const PointBound& bound_of_trial(std::uint32_t vertex) const { return trial_[vertex].bound; }
-  double step(std::uint32_t vertex) const { return step_[vertex]; }  ///< length from state to trial
+  double step(std::uint32_t vertex) const { return step_[vertex]; }  ///< The length from state to trial.
   bool frozen(std::uint32_t vertex) const { return frozen_[vertex]; }
   bool any_frozen() const { return any_frozen_; }
-  double limit() const { return limit_; }  ///< the provable distance less a headroom
+  double limit() const { return limit_; }  ///< The provable distance less a headroom.
   const ToleranceVolume& volume() const { return *volume_; }
   const StoredSpace& space() const { return space_; }
   unsigned threads() const { return threads_; }
@@ -95,7 +97,7 @@ class MovingMesh {
  private:
   struct VertexState {
     glm::dvec3 at;
-    PointBound bound;  ///< the distance is kFar far beyond the tolerance
+    PointBound bound;  ///< Its distance is kFar far beyond the tolerance.
   };
 
   /// No point of the reference is within the tolerance of any place nearer to `at` than `margin`.
@@ -104,7 +106,7 @@ class MovingMesh {
     double margin = 0;
   };
 
-  // This and kUnknown prove nothing when they are taken for upper bounds.
+  // Taken for upper bounds, this and kUnknown prove nothing.
   static constexpr double kFar = std::numeric_limits<double>::max();
   static constexpr double kUnproved = TriangleCertificate::kUnproved;
 
@@ -121,17 +123,18 @@ class MovingMesh {
   std::span<const std::uint32_t> faces_;
   std::size_t corners_;
   unsigned threads_;
-  std::vector<std::uint32_t> ring_start_, ring_;  // vertex -> its faces
+  std::vector<std::uint32_t> ring_start_, ring_;  // They map each vertex to its faces.
   std::vector<bool> frozen_;
   bool any_frozen_ = false;
-  double provable_ = 0, limit_ = 0;                // what the certificate decides by, and what of it is used
-  std::vector<TriangleCertificate> certificates_;  // for the two; none before start()
+  double provable_ = 0, limit_ = 0;  // The distance that the certificate decides by, and the part that is used.
+  std::vector<TriangleCertificate> certificates_;  // One for each of these two; none before start().
   std::vector<VertexState> state_, trial_;
   std::vector<double> step_;
-  std::vector<std::array<Refusal, 2>> refusals_;  // per vertex and Trial, the last; none unless remembered
-  std::vector<double> reach_, trial_reach_;       // per face: no point of it is farther from the reference
-  std::vector<std::uint64_t> seen_;               // per face: when faces_around() last met it,
-  std::uint64_t now_ = 0;                         // ... in calls
+  std::vector<std::array<Refusal, 2>>
+      refusals_;  // The last ones for each vertex and Trial; empty unless they are remembered.
+  std::vector<double> reach_, trial_reach_;  // For each face: no point of it is farther from the reference.
+  std::vector<std::uint64_t> seen_;          // For each face: in which call faces_around() met it last.
+  std::uint64_t now_ = 0;                    // The number of these calls.
 };
 
 }  // namespace tolvol

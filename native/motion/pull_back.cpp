@@ -19,15 +19,22 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
-constexpr double kRise = 1.0 / 64;  // what no factor can rise by in the end
-constexpr double kShrink = 0.5;     // of a factor, in each round in which a face of the vertex fails
-/// Of the provable distance: where vertices are put first, as pieces of a quarter of the tolerance prove a face there.
+/// In the end no factor can rise by this.
+constexpr double kRise = 1.0 / 64;
+/// A factor shrinks to this share in each round in which a face of the vertex fails.
+constexpr double kShrink = 0.5;
+/// The share of the provable distance at which vertices are put first, because parts of a quarter of the tolerance
+/// prove a face there.
 constexpr double kComfort = 0.97;
-/// Of the same, in Mode::settle: who got there stays, unless kLast of the tolerance more does not lead outside.
+/// In Mode::settle, a vertex that has reached this share of the provable distance stays there, unless it is still
+/// inside after a further way of the share kLast of the same distance.
 constexpr double kSettled = 0.965, kLast = 0.04;
-constexpr int kCrossings = 8;       // tries to find where a vertex leaves the volume; a plane takes one
-constexpr double kClose = 0.002;    // of the provable distance: near enough to that place
-constexpr std::size_t kBlock = 32;  // vertices, for work of some us each
+/// The number of tries to find where a vertex leaves the volume; a plane takes one.
+constexpr int kCrossings = 8;
+/// The search ends within this share of the provable distance.
+constexpr double kClose = 0.002;
+/// The number of vertices that a thread takes at a time, for work of a few us each.
+constexpr std::size_t kBlock = 32;
 
 }  // namespace
 
@@ -76,7 +83,7 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
   return result;
 }
 
-/// Step (1). Ends, because a face that fails has a corner away from the state, in which it did not fail.
+/// Does step (1). It ends, because a face that fails has a corner away from the state, in which it did not fail.
 std::vector<PullBack::Held> PullBack::hold(const Moving& moving, std::span<const glm::dvec3> before,
                                            std::span<const glm::dvec3> after, std::vector<std::uint32_t> failed,
                                            Progress* progress) {
@@ -112,8 +119,9 @@ void PullBack::place(Held& held, const Along& along) {
   mesh_.try_at(held.vertex, mesh_.space().frame(stored_at(held, along.factor)), along.bound);
 }
 
-/// Where the vertex itself is about `target` from the reference, at the most, between a place where it is nearer and
-/// one where it is farther: false position, in which an end that stays twice counts half (Illinois).
+/// Finds a place where the vertex itself is about `target` from the reference, at the most, between a place where it is
+/// nearer and one where it is farther. The method is false position in which an end that stays twice counts half
+/// (Illinois).
 PullBack::Along PullBack::crossing(const Held& held, double target, Along inner, Along outer) const {
   const double close = kClose * mesh_.limit(), aim = target - close / 2;
   double inner_excess = inner.bound.distance - aim, outer_excess = outer.bound.distance - aim;
@@ -130,7 +138,7 @@ PullBack::Along PullBack::crossing(const Held& held, double target, Along inner,
   return inner;
 }
 
-/// A place on the way, and the distance there however far it is.
+/// A place on the way, and the distance there, however far it is.
 PullBack::Along PullBack::along(const Held& held, double factor, std::uint32_t hint) const {
   const glm::dvec3 at = mesh_.space().frame(stored_at(held, factor));
   if (hint == Hierarchy::kNone) hint = mesh_.volume().grid().triangle_near(at);
@@ -146,7 +154,7 @@ void PullBack::release(Held& held, Mode mode) {
     held.largest_factor = 1;
     return place(held, {1, held.wish});
   }
-  // A wish at the end of the world tells nothing: all of the volume is in this box.
+  // A wish far away is replaced by a place on its way at this box, in which all of the volume is.
   const double box = 1 + 2 * mesh_.volume().frame_tolerance();
   const glm::dvec3 from = mesh_.state(held.vertex), way = mesh_.space().frame(held.after) - from;
   double exit = 1;
@@ -176,7 +184,7 @@ void PullBack::release(Held& held, Mode mode) {
   place(held, end);
 }
 
-/// Step (2).
+/// Does step (2).
 void PullBack::pull(std::vector<Held>& held, Mode mode, Progress* progress) {
   parallel_for(held.size(), kBlock, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) release(held[i], mode);
@@ -215,9 +223,10 @@ void PullBack::held_around(std::uint32_t vertex, Visit&& visit) const {
   }
 }
 
-/// Greedy, in the order of the vertices: no two of a colour share a face. Returns how many colours there are.
+/// Colours the vertices greedily in their order, so that no two of a colour share a face. Returns the number of
+/// colours.
 std::uint32_t PullBack::colour(std::vector<Held>& held) const {
-  std::vector<std::uint32_t> taken;  // by colour: the last vertex that has a neighbour of it
+  std::vector<std::uint32_t> taken;  // For each colour: the last vertex that has a neighbour of it.
   for (std::uint32_t i = 0; i < held.size(); ++i) {
     held_around(held[i].vertex, [&](std::uint32_t other) {
       if (other < i) taken[held[other].colour] = i;
@@ -230,7 +239,7 @@ std::uint32_t PullBack::colour(std::vector<Held>& held) const {
   return static_cast<std::uint32_t>(taken.size());
 }
 
-/// Step (3). Ends, because from its second turn on a vertex goes forward by kRise or not at all.
+/// Does step (3). It ends, because from its second turn on a vertex goes forward by kRise or not at all.
 void PullBack::let_go(std::vector<Held>& held, Mode mode, Progress* progress) {
   const auto settled = [&](const Held& h) { return h.factor >= (mode == Mode::settle ? h.largest_factor : 1); };
   std::vector<std::uint32_t> around;

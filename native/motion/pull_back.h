@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// Keeps a moving mesh inside a tolerance volume: vertices of faces that would leave it are pulled back along their
-/// motion. What constrain(), Guard and smooth() share; the state is kept from one motion to the next.
+/// motion. constrain(), Guard and smooth() share it. It keeps the state from one motion to the next.
 #pragma once
 
 #include <cstdint>
@@ -15,10 +15,10 @@ namespace tolvol {
 class PullBack {
  public:
   enum class Mode {
-    pull_back,  ///< as far as the tolerance lets each vertex go: none can rise by 1/64 of its motion alone
-    settle,     ///< the same but for the last 4 % of the tolerance, which take most of the time
-    halve,      ///< factors are halved until all faces are inside: quick, for steps that are repeated
-    reset,      ///< all the way back or not at all, the one step back of [Botsch04, §5]
+    pull_back,  ///< Each vertex goes as far as the tolerance lets it: none can rise by 1/64 of its motion alone.
+    settle,     ///< The same, except for the last 4 % of the tolerance, which take most of the time.
+    halve,      ///< Factors are halved until all faces are inside: quick, for steps that are repeated.
+    reset,      ///< Vertices go all the way back or not at all, the one step back of [Botsch04, §5].
   };
 
   /// A set of vertices that move together, ascending, and the faces that touch one of them.
@@ -27,23 +27,23 @@ class PullBack {
   };
 
   struct Result {
-    std::vector<double> factors;      ///< for each moving vertex: the share of its motion, 0 to 1
-    std::vector<glm::dvec3> reached;  ///< for each moving vertex: the stored position there
-    std::size_t held_back = 0;        ///< factors below 1
+    std::vector<double> factors;      ///< For each moving vertex: the share of its motion, 0 to 1.
+    std::vector<glm::dvec3> reached;  ///< For each moving vertex: the stored position there.
+    std::size_t held_back = 0;        ///< The number of factors below 1.
   };
 
-  /// As MovingMesh.
+  /// Has the parameters of MovingMesh.
   PullBack(const ToleranceVolume& volume, const StoredSpace& space, std::span<const std::uint32_t> faces, int corners,
            std::size_t vertex_count, unsigned threads);
-  /// As MovingMesh::start().
+  /// Does what MovingMesh::start() does.
   MovingMesh::Start start(std::span<const glm::dvec3> stored, Progress* progress);
 
   Moving moving(std::vector<std::uint32_t> vertices);
 
   /// Moves each vertex from `before`, its stored position now, towards `after`, and makes where it ends the new state.
   /// All faces of the new state are inside; see constrain.h for what else holds of the factors. Throws InvalidInput,
-  /// changing nothing, for a wish that is not finite. After Cancelled only start() may be called. Settled faces cost
-  /// about 10 ns each, those near the tolerance about 1 us a try.
+  /// changing nothing, for a wish that is not finite. After Cancelled only start() may be called. A settled face
+  /// costs about 10 ns, and a face near the tolerance about 1 us for each try.
   Result move(const Moving& moving, std::span<const glm::dvec3> before, std::span<const glm::dvec3> after, Mode mode,
               Progress* progress);
 
@@ -51,13 +51,14 @@ class PullBack {
   /// A vertex that cannot simply have its wish.
   struct Held {
     std::uint32_t vertex;
-    glm::dvec3 before, after;     ///< stored
-    MovingMesh::PointBound wish;  ///< at `after`
-    double length;                ///< of the motion, in the frame
+    glm::dvec3 before, after;     ///< In stored coordinates.
+    MovingMesh::PointBound wish;  ///< At `after`.
+    double length;                ///< The length of the motion, in the frame.
     double factor = 0;
-    /// About where the vertex itself leaves the volume, 1 only if it does not; in Mode::settle as far as it is to go.
+    /// About the factor at which the vertex itself leaves the volume, 1 only if it does not leave it. In Mode::settle,
+    /// the factor that it is to reach.
     double largest_factor = 1;
-    std::uint32_t blame = 0;  ///< place in the vertex's ring of the face that refused last
+    std::uint32_t blame = 0;  ///< The place in the vertex's ring of the face that refused last.
     std::uint32_t colour = 0;
   };
 
@@ -84,7 +85,7 @@ class PullBack {
   bool attempt(Held& held, double factor);
 
   MovingMesh mesh_;
-  std::vector<std::uint32_t> held_index_;  // per vertex: its place among the held ones, kNone
+  std::vector<std::uint32_t> held_index_;  // For each vertex: its place among the held ones, or kNone.
 };
 
 }  // namespace tolvol

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Explicit steps of the normalised operators of Desbrun et al. 1999. Deviations: cotangents are clamped, as a needle's
-// would drown all others (their cure, implicit integration, does not know a tolerance); the sum for an edge is never
-// negative, as a mean needs; where the boundary is smoothed along itself, the weights of its two edges are the inverse
-// lengths; umbrella vectors of boundary vertices count as zero for their inner neighbours.
+// The steps are explicit steps of the normalised operators of Desbrun et al. 1999, except for this: cotangents are
+// clamped, as a needle's would drown all others (their cure, implicit integration, does not know a tolerance); the sum
+// for an edge is never negative, as a mean needs; where the boundary is smoothed along itself, the weights of its two
+// edges are the inverse lengths; umbrella vectors of boundary vertices count as zero for their inner neighbours.
 //
 // Steps are computed in stored coordinates, with weights that are measured in the world: an affine map takes means to
 // means. So a vertex that does not move keeps its bits, and the result does not depend on any frame.
@@ -23,7 +23,8 @@ namespace tolvol {
 namespace {
 
 constexpr double kLaplacianStep = 0.5, kBilaplacianStep = 0.25;
-constexpr double kLargestCotangent = 19.1;  // of 3 degrees
+/// The cotangent of 3 degrees.
+constexpr double kLargestCotangent = 19.1;
 constexpr std::size_t kBlock = 1024;
 
 class Smoothing {
@@ -147,7 +148,7 @@ class Smoothing {
       double& strength = strength_[same_as_[v]];
       if (!options_.strength.empty()) strength = std::min(strength, options_.strength[v]);
       if (!options_.locked.empty() && options_.locked[v]) strength = 0;
-      if (kind_[v] == Kind::fixed) strength_[v] = 0;  // among them all that are the same as another one
+      if (kind_[v] == Kind::fixed) strength_[v] = 0;  // All that are the same as another one are among them.
     }
   }
 
@@ -274,17 +275,17 @@ class Smoothing {
   const ToleranceVolume* volume_;
   const SmoothingOptions& options_;
   SmoothingResult result_;
-  std::vector<glm::dvec3> positions_;      // stored; of vertices that are the same, the first is kept up to date
-  std::vector<std::uint32_t> same_as_;     // per vertex: the first one at its place
-  std::vector<glm::uvec3> triangles_;      // of first ones
-  std::vector<std::uint32_t> link_start_;  // per vertex: its place in links_
+  std::vector<glm::dvec3> positions_;      // Stored; among vertices that are the same, the first is kept up to date.
+  std::vector<std::uint32_t> same_as_;     // For each vertex: the first one at its place.
+  std::vector<glm::uvec3> triangles_;      // Their corners are such first ones.
+  std::vector<std::uint32_t> link_start_;  // For each vertex: its place in links_.
   std::vector<Link> links_;
   std::vector<Kind> kind_;
   std::vector<double> strength_;
   std::vector<std::uint32_t> faces_;
-  std::unique_ptr<PullBack> pull_back_;  // none without a volume
+  std::unique_ptr<PullBack> pull_back_;  // Null without a volume.
   PullBack::Moving moving_;
-  std::vector<double> cotangents_;  // per corner
+  std::vector<double> cotangents_;  // For each corner.
   std::vector<glm::dvec3> umbrellas_, before_, after_;
 };
 

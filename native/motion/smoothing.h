@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Laplacian and bilaplacian smoothing, within a tolerance volume or without.
+/// Laplacian and bilaplacian smoothing, within a tolerance volume or without one.
 #pragma once
 
 #include <cstdint>
@@ -18,32 +18,33 @@ struct SmoothingOptions {
   enum class Weights { uniform, cotangent };
   enum class Boundary {
     fixed,
-    along,  ///< boundary vertices are smoothed along the boundary; its corners and branches stay
+    along,  ///< Boundary vertices are smoothed along the boundary; its corners and branches stay.
   };
 
   unsigned iterations = 10;
   Operator kind = Operator::bilaplacian;
   Weights weights = Weights::cotangent;
   Boundary boundary = Boundary::fixed;
-  std::span<const bool> locked = {};      ///< per vertex, may be empty: stays where it is
-  std::span<const double> strength = {};  ///< per vertex, may be empty: 0 to 1, of a full step
+  std::span<const bool> locked = {};      ///< For each vertex, or empty: it stays where it is.
+  std::span<const double> strength = {};  ///< For each vertex, or empty: the share, 0 to 1, of a full step.
   bool reset =
       false;  ///< a vertex that would leave the tolerance stays for this iteration, instead of being pulled back
-  ConstrainOptions::Outside outside = ConstrainOptions::Outside::error;  ///< keep: vertices of such faces stay
-  unsigned threads = 0;                                                  ///< 0: one per core; never changes the result
+  ConstrainOptions::Outside outside = ConstrainOptions::Outside::error;  ///< With keep, vertices of such faces stay.
+  unsigned threads = 0;  ///< 0 is one for each core. It never changes the result.
   Progress* progress = nullptr;
 };
 
 struct SmoothingResult {
-  std::vector<glm::dvec3> vertices;    ///< stored
-  std::vector<std::size_t> held_back;  ///< for each iteration: vertices that did not go all the way
-  double largest_motion = 0;           ///< world units, from the input to the result
-  std::size_t welded = 0;              ///< vertices treated as one with an earlier one at the same place
-  std::size_t fixed_boundary = 0;      ///< vertices that stay because they are on the boundary,
-  std::size_t fixed_non_manifold = 0;  ///< ... because an edge there has more than two faces
-  std::size_t outside_faces = 0;       ///< faces of the input that are not within the tolerance, kept as they are
+  std::vector<glm::dvec3> vertices;    ///< In stored coordinates.
+  std::vector<std::size_t> held_back;  ///< For each iteration: the number of vertices that did not go all the way.
+  double largest_motion = 0;           ///< In world units, from the input to the result.
+  std::size_t welded = 0;              ///< The number of vertices treated as one with an earlier one at the same place.
+  std::size_t fixed_boundary = 0;      ///< The number of vertices that stay because they are on the boundary.
+  std::size_t fixed_non_manifold = 0;  ///< The number that stay because an edge there has more than two faces.
+  std::size_t outside_faces =
+      0;  ///< The number of input faces that are not within the tolerance, which are kept as they are.
   std::optional<std::uint32_t> first_outside;
-  std::string method, renderer;  ///< of the check; empty without a volume
+  std::string method, renderer;  ///< The check that decided; empty without a volume.
   std::vector<std::string> warnings;
 };
 
