@@ -10,6 +10,7 @@
 
 #include "base/errors.h"
 #include "check/certificate.h"
+#include "many.h"
 #include "measure/hausdorff.h"
 #include "placed_mesh.h"
 #include "shapes.h"
@@ -220,7 +221,7 @@ TEST(Constrain, NoFactorCanRiseAlone) {
 }
 
 TEST(Constrain, TheResultDoesNotDependOnThreads) {
-  const Scene scene{shapes::torus(80)};
+  const Scene scene{shapes::torus(across(80))};
   const Points wish = scene.wish(noise(0.6));
   const ConstrainResult one = run(scene, wish, {.threads = 1});
   for (const unsigned threads : {2u, 3u, 7u}) {

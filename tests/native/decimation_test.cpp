@@ -12,6 +12,7 @@
 #include "base/errors.h"
 #include "base/simd.h"
 #include "decimation_cases.h"
+#include "many.h"
 #include "measure/hausdorff.h"
 #include "shapes.h"
 #include "topology/wedges.h"
@@ -409,7 +410,7 @@ TEST(Decimation, FlatPlatesEndAtAnyTolerance) {
 
 TEST(Decimation, LargePlatesBecomeTwoTriangles) {
   // A face of the result lies near tens of thousands of triangles of the reference: more than a proof looks at.
-  for (const unsigned n : {128u, 150u}) {
+  for (const unsigned n : {across(128), across(150)}) {
     const Case c{shapes::stored(shapes::grid(n)), glm::dmat4(1), Storage::float32, 0.03};
     const DecimationResult r = run(c);
     expect_within(c, r);
@@ -419,7 +420,7 @@ TEST(Decimation, LargePlatesBecomeTwoTriangles) {
 
 // Where a collapse along a side has to wait, a corner must not leave its place for it.
 TEST(Decimation, LargeBoxesBecomeTwelveTriangles) {
-  TriangleMesh mesh = shapes::box(64);
+  TriangleMesh mesh = shapes::box(across(64));
   for (glm::dvec3& v : mesh.vertices) v *= glm::dvec3(0.52, 0.95, 0.15);
   for (const auto placement : {DecimationOptions::Placement::optimal, DecimationOptions::Placement::subset}) {
     const Case c{shapes::stored(mesh), glm::dmat4(1), Storage::float32, 0.1};
@@ -433,7 +434,7 @@ TEST(Decimation, LargeBoxesBecomeTwelveTriangles) {
 
 TEST(Decimation, RoundingToFloatDoesNotKeepAPlateInPieces) {
   // Turned, a plate of float32 is flat up to a two-thousandth of this tolerance.
-  Case c{shapes::grid(128), glm::dmat4(1), Storage::float32, 0.1};
+  Case c{shapes::grid(across(128)), glm::dmat4(1), Storage::float32, 0.1};
   const dvec3 u = glm::normalize(dvec3(1, 2, 3)), v = glm::normalize(glm::cross(u, dvec3(1, 0, -2)));
   for (dvec3& p : c.mesh.vertices) p = dvec3(0.3, -0.2, 0.7) + p.x * u + p.y * v + p.z * glm::cross(u, v);
   c.mesh = shapes::stored(c.mesh);

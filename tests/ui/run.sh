@@ -20,7 +20,7 @@ while [ ! -s "$out/display" ]; do
 done
 
 code=0
-DISPLAY=":$(cat "$out/display")" LIBGL_ALWAYS_SOFTWARE=1 timeout 1500 \
+DISPLAY=":$(cat "$out/display")" LIBGL_ALWAYS_SOFTWARE=1 timeout 3000 \
   blender --factory-startup --window-geometry 0 0 1280 800 --python-exit-code 5 --python tests/ui/run.py -- "$@" \
   >"$out/blender.log" 2>&1 || code=$?
 # An exception in the draw function of a panel appears only in Blender's output.

@@ -5,8 +5,8 @@ import bpy
 
 import scenes
 from addon import job
-from test_panel import assert_proved, finished, monkey, stored, suzanne
-from window import centre, key, reset, screenshot, view, xdotool
+from test_panel import assert_proved, monkey, stored, suzanne
+from window import centre, finished, key, reset, screenshot, view, xdotool
 
 
 def fit(ob):

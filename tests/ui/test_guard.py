@@ -12,8 +12,21 @@ import scenes
 from addon import guard, native, panels
 from addon.mesh import mesh_io
 from addon.panels.guard import TOLVOL_PT_guard
-from test_panel import finished
-from window import centre, click, key, on_screen, open_tab, region, reset, screenshot, view, window_context, xdotool
+from window import (
+    centre,
+    click,
+    finished,
+    key,
+    on_screen,
+    open_tab,
+    region,
+    reset,
+    screenshot,
+    sent,
+    view,
+    window_context,
+    xdotool,
+)
 
 TOLERANCE = 0.02
 
@@ -88,8 +101,8 @@ def switch(setting):
     for y in range(150, sidebar.height - 5, 10):
         place = on_screen(sidebar, sidebar.width // 3, y)
         bpy.context.window_manager.clipboard = ""
-        xdotool("mousemove", *place, "sleep", "0.03", "key", "ctrl+shift+c")
-        yield 0.1
+        yield from sent("mousemove", *place)
+        yield from sent("key", "ctrl+shift+c")
         if bpy.context.window_manager.clipboard == f"tolvol.guard.{setting}":
             click(*place)
             yield 0.3
@@ -246,7 +259,7 @@ def test_guard_undoes_an_edit_of_the_faces_while_the_mouse_rests():
     with window_context():
         bpy.ops.mesh.solidify("EXEC_DEFAULT", True, thickness=0.5)
     assert len(coordinates()) > len(before)
-    yield from finished(lambda: np.array_equal(coordinates(), before), 10)
+    yield from finished(lambda: np.array_equal(coordinates(), before))
     # The edit is not undone while an operator runs, but once that has ended.
     with window_context():
         bpy.ops.mesh.solidify("EXEC_DEFAULT", True, thickness=0.5)
@@ -254,7 +267,7 @@ def test_guard_undoes_an_edit_of_the_faces_while_the_mouse_rests():
     yield 2.0
     assert len(coordinates()) > len(before)
     key("Return")
-    yield from finished(lambda: np.array_equal(coordinates(), before), 10)
+    yield from finished(lambda: np.array_equal(coordinates(), before))
     mode("OBJECT")
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import bpy
 
 from addon import job, status_bar
-from test_panel import finished, monkey, stored, suzanne
-from window import reset, view, window_context
+from test_panel import monkey, stored, suzanne
+from window import finished, reset, view, window_context
 
 _SMOOTHER = 1  # levels of subdivision on top of the monkey's, which make the job slow enough
 

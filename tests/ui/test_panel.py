@@ -17,6 +17,7 @@ from window import (
     click,
     find,
     find_property,
+    finished,
     key,
     on_screen,
     open_tab,
@@ -25,6 +26,7 @@ from window import (
     region,
     reset,
     screenshot,
+    still,
     view,
     window_context,
     xdotool,
@@ -46,15 +48,6 @@ def suzanne():
 def stored():
     arrays = mesh_io.read_mesh(suzanne().data)
     return arrays.vertices.tobytes(), arrays.triangles.tobytes()
-
-
-def finished(change, seconds=30):
-    """Waits until change() is true."""
-    for _ in range(int(seconds / 0.2)):
-        if change():
-            return
-        yield 0.2
-    raise AssertionError("nothing happened")
 
 
 def assert_proved(ob, reference, percent):
@@ -180,7 +173,7 @@ def test_escape_keeps_what_refining_has_reached():
     reference, said, status = scenes.world_triangles(suzanne()), [], job._status
     job._status = lambda *shown: said.append(status(*shown)) or said[-1]
     yield from press("tolvol.decimate")
-    yield from finished(lambda: any(text.startswith("Refining") for text in said), 120)
+    yield from finished(lambda: any(text.startswith("Refining") for text in said))
     screenshot("refining")
     key("Escape")
     yield from finished(lambda: suzanne().tolvol.last_run)
@@ -291,20 +284,18 @@ def test_the_answer_of_check_is_seen_without_moving_the_mouse():
     yield from open_tab()
     yield from press("tolvol.set_reference")
     xdotool("mousemove", *centre())
-    yield 2.0
-    before, patience = sidebar_pixels(), job._PATIENCE
+    before, patience = (yield from still(sidebar_pixels)), job._PATIENCE
     job._PATIENCE = 0.0  # The job then ends in a timer even on a quick machine.
     with window_context():
         bpy.ops.tolvol.check("INVOKE_DEFAULT")
     job._PATIENCE = patience
     yield from finished(lambda: verdict.of(suzanne()) is not None)
-    yield 1.0
-    seen = sidebar_pixels()
+    yield from finished(lambda: (sidebar_pixels() != before).any())
+    seen = yield from still(sidebar_pixels)
     screenshot("14 checked without the mouse")
     view()[1].tag_redraw()
     yield 1.0
-    assert (seen != before).any()
-    assert (seen == sidebar_pixels()).all()
+    assert (seen == (yield from still(sidebar_pixels))).all()
 
 
 def test_what_replaces_the_original_asks():

@@ -9,9 +9,9 @@ from addon import guard
 from addon.proof import verdict
 from addon.reference import measurements
 from test_guard import all_panels, only_guard_panel
-from test_panel import finished
 from test_show_deviation import sides, solid_monkey, stroke, surface, the_object, to_mode
 from window import (
+    finished,
     maximize,
     on_screen,
     open_tab,
@@ -20,6 +20,7 @@ from window import (
     region,
     reset,
     sculpt_by_drawing,
+    still,
     view,
     window_context,
     xdotool,
@@ -116,7 +117,4 @@ def settled():
     """Waits until the colours are shown and the picture no longer changes."""
     aside()
     yield from finished(lambda: min(sides()) > 300)
-    last = None
-    while last is None or not np.array_equal(last, pixels()):
-        last = pixels()
-        yield 1.0
+    yield from still(pixels)

@@ -8,8 +8,8 @@ from pathlib import Path
 import bpy
 
 from addon.operators.report import TOLVOL_OT_save_report
-from test_panel import finished, monkey, suzanne
-from window import key, open_tab, press, reset, screenshot, xdotool
+from test_panel import monkey, suzanne
+from window import finished, key, open_tab, press, reset, screenshot, xdotool
 
 
 def test_save_report_by_mouse():

@@ -7,11 +7,12 @@ import numpy as np
 import scenes
 from addon import native, overlay
 from addon.proof import verdict
-from test_panel import finished, monkey, suzanne
+from test_panel import monkey, suzanne
 from window import (
     centre,
     click,
     find_property,
+    finished,
     key,
     on_screen,
     open_tab,

@@ -2,6 +2,7 @@
 """Functions for the tests that use the mouse and the keyboard, take screenshots, and find buttons."""
 
 import subprocess
+import time
 from pathlib import Path
 
 import bpy
@@ -20,6 +21,52 @@ def click(x, y):
 
 def key(name):
     xdotool("key", name)
+
+
+class TOLVOL_TEST_OT_mark(bpy.types.Operator):
+    """Counts how often its key was handled"""
+
+    bl_idname, bl_label = "tolvol_test.mark", "Mark"
+    count = 0
+
+    def execute(self, context):
+        TOLVOL_TEST_OT_mark.count += 1
+        return {"FINISHED"}
+
+
+_MARK = "Pause"  # a key that Blender does not use
+_STUCK = 120  # seconds after which Blender counts as stuck
+
+
+def sent(*events):
+    """Sends events by xdotool and waits until Blender has handled them: it then handles the key that follows them.
+
+    No operator may be at work that takes all keys.
+    """
+    if not hasattr(bpy.types, TOLVOL_TEST_OT_mark.__name__):
+        bpy.utils.register_class(TOLVOL_TEST_OT_mark)
+        keymap = bpy.context.window_manager.keyconfigs.addon.keymaps.new("Window")
+        keymap.keymap_items.new(TOLVOL_TEST_OT_mark.bl_idname, _MARK.upper(), "PRESS")
+    count = TOLVOL_TEST_OT_mark.count
+    xdotool(*events, "key", _MARK)
+    yield from finished(lambda: TOLVOL_TEST_OT_mark.count > count, pause=0.01)
+
+
+def finished(change, seconds=_STUCK, pause=0.2):
+    """Waits until change() is true."""
+    end = time.monotonic() + seconds
+    while not change():
+        assert time.monotonic() < end, "nothing happened"
+        yield pause
+
+
+def still(read):
+    """Waits until read() returns the same array twice, a second apart. Returns that array."""
+    last, now = None, read()
+    while last is None or not np.array_equal(last, now):
+        yield 1.0
+        last, now = now, read()
+    return now
 
 
 def screenshot(name):
@@ -109,8 +156,8 @@ def _find(copied, keys, across):
     for y in rows if last is None else (last, *rows):
         place = on_screen(sidebar, int(sidebar.width * across), y)
         bpy.context.window_manager.clipboard = ""
-        xdotool("mousemove", *place, "sleep", "0.03", "key", keys)
-        yield 0.08
+        yield from sent("mousemove", *place)
+        yield from sent("key", keys)
         if copied in bpy.context.window_manager.clipboard:
             _found_at[copied, across] = y
             return place
