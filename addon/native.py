@@ -120,22 +120,19 @@ def _forbids_programs(folder):
 module, path, reason = _load()
 
 
-# (words in the module's errors about its options, words about the settings in Blender to put in their place).
-_WORDS = (
-    (', or keep them (outside="keep")', "; Select Outside shows them"),
-    (
-        'keep one direction only (two_sided=False), or go on from what there is (outside="keep")',
-        "or set Keep to One Way",
-    ),
-)
+# The add-on's own sentences for errors of the package by their code, where the package's sentences name its options.
+_SENTENCES = {
+    "input_outside": "{count:,} faces are not within the tolerance of the reference, the first is face {first}; take a "
+    "larger tolerance or set the reference anew. Select Outside shows these faces",
+    "reference_outside": "{count:,} faces of the reference are not within the tolerance of the mesh, the first is face "
+    "{first}; take a larger tolerance, set the reference anew, or set Keep to One Way",
+}
 
 
 def said(error):
-    """Returns the message of an error of the module, with the names of settings as in Blender."""
-    text = str(error)
-    for words, instead in _WORDS:
-        text = text.replace(words, instead)
-    return text
+    """Returns the message of a Refused or of an error of the package, with the names of settings as in Blender."""
+    sentence = _SENTENCES.get(getattr(error, "code", None))
+    return sentence.format(count=error.count, first=error.first) if sentence else str(error)
 
 
 def shutdown():

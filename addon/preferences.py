@@ -72,7 +72,8 @@ def tolerance(context):
 
 
 def threads(context):
-    return _chosen(context, "threads", 0)
+    """Returns the number of threads that a computation may use, or None for all cores."""
+    return _chosen(context, "threads", 0) or None
 
 
 def use_gl(context):

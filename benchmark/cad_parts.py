@@ -5,7 +5,7 @@ blender --background --python benchmark/cad_parts.py -- [MESH...] [--write FILE.
 
 The parts are three of each kind in tests/fuzzing/kinds.py, of about 4,000 triangles, and each MESH. The placement *optimal*
 may leave at most 2 % more triangles than *subset*, which keeps vertices where they are: the script fails if it leaves more.
-Every result is judged both ways by tolvol.hausdorff.
+Every result is judged both ways by tolvol.directed_hausdorff.
 """
 
 import sys
@@ -44,14 +44,14 @@ def parts(paths):
 
 def counts(vertices, triangles, percent):
     """Returns the number of triangles left for each of SETTINGS."""
-    tolerance = percent / 100 * tolvol.size(vertices, triangles)
+    tolerance = percent / 100 * tolvol.diagonal(vertices, triangles)
     volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
     found = []
     for options in SETTINGS.values():
         result = tolvol.decimate(vertices, triangles, volume, **options)
         pair = (result.vertices, result.triangles), (vertices, triangles)
         for a, b in (pair, pair[::-1]):
-            if tolvol.hausdorff(*a, *b, bound=tolerance).upper > tolerance:
+            if tolvol.directed_hausdorff(*a, *b, bound=tolerance).upper > tolerance:
                 raise SystemExit(f"{options} is not within {percent} % both ways")
         found.append(len(result.triangles))
     return found

@@ -38,7 +38,7 @@ class Scene:
     def __init__(self, vertices, triangles, percent, threads):
         self.mesh = vertices, triangles
         self.threads = threads
-        self.size = tolvol.size(vertices, triangles)
+        self.size = tolvol.diagonal(vertices, triangles)
         self.tolerance = percent / 100 * self.size
         self.volume = tolvol.ToleranceVolume(*self.mesh, self.tolerance)
         self.moved = vertices + vertices.dtype.type(0.4 * self.tolerance) * np.array([1, 0, 0], vertices.dtype)
@@ -142,15 +142,15 @@ def deform(mode):
 
 
 def hausdorff(s, p):
-    return lambda: tolvol.hausdorff(s.moved, s.mesh[1], *s.mesh, **options(s, p))
+    return lambda: tolvol.directed_hausdorff(s.moved, s.mesh[1], *s.mesh, **options(s, p))
 
 
 def hausdorff_to_coarse(s, p):
-    return lambda: tolvol.hausdorff(*s.mesh, *s.coarse, **options(s, p))
+    return lambda: tolvol.directed_hausdorff(*s.mesh, *s.coarse, **options(s, p))
 
 
 def hausdorff_from_coarse(s, p):
-    return lambda: tolvol.hausdorff(*s.coarse, *s.mesh, **options(s, p))
+    return lambda: tolvol.directed_hausdorff(*s.coarse, *s.mesh, **options(s, p))
 
 
 def deviation(s, p):

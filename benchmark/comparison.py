@@ -109,7 +109,9 @@ def measure(method, vertices, triangles, tolerance, threads):
     reference, stored = (vertices.astype(np.float64), triangles), (points.astype(np.float64), faces)
 
     def farthest(a, b, promised):
-        return tolvol.hausdorff(*a, *b, bound=tolerance if promised else None, threads=threads).upper / tolerance
+        return (
+            tolvol.directed_hausdorff(*a, *b, bound=tolerance if promised else None, threads=threads).upper / tolerance
+        )
 
     return {
         "method": method.name,
@@ -199,7 +201,7 @@ def arguments():
     )
     parser.add_argument("--write", metavar="FILE.md", help="put the table into this file")
     parser.add_argument("--json", metavar="FILE", help="write the figures to this file")
-    parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
+    parser.add_argument("--threads", type=cli.whole_number(1), metavar="N", help="default: all cores")
     return parser.parse()
 
 
@@ -211,7 +213,7 @@ def main(options):
     for word in options.mesh:
         vertices, triangles = mesh_of(word)
         for wanted in options.tolerance:
-            size = tolvol.size(vertices, triangles)
+            size = tolvol.diagonal(vertices, triangles)
             tolerance = cli.in_units(wanted, size)
             entries = compare(options.methods, vertices, triangles, tolerance, options.threads)
             title = f"{Path(word).stem}, {len(triangles):,} triangles, ε = {100 * tolerance / size:g} %"

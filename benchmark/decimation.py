@@ -65,7 +65,7 @@ def measure(name, vertices, triangles, options):
     import tolvol_baselines  # This module is built with the tests and never packed.
 
     threads = options.threads
-    tolerance = cli.in_units(options.tolerance, tolvol.size(vertices, triangles))
+    tolerance = cli.in_units(options.tolerance, tolvol.diagonal(vertices, triangles))
     two_sided = not options.one_sided
 
     def build():
@@ -92,8 +92,8 @@ def measure(name, vertices, triangles, options):
 
     reference = vertices.astype(np.float64), triangles
     stored = result.vertices.astype(np.float64), result.triangles
-    forward = tolvol.hausdorff(*stored, *reference, bound=tolerance, threads=threads)
-    backward = tolvol.hausdorff(*reference, *stored, bound=tolerance if two_sided else None, threads=threads)
+    forward = tolvol.directed_hausdorff(*stored, *reference, bound=tolerance, threads=threads)
+    backward = tolvol.directed_hausdorff(*reference, *stored, bound=tolerance if two_sided else None, threads=threads)
     return {
         "file": name,
         "triangles_in": len(triangles),
@@ -168,7 +168,7 @@ def arguments():
     )
     parser.add_argument("--table1", action="store_true", help="only make Table 1 of [Botsch04], printed and measured")
     parser.add_argument("--write", metavar="FILE.md", help="put Table 1 into this file")
-    parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
+    parser.add_argument("--threads", type=cli.whole_number(1), metavar="N", help="default: all cores")
     return parser.parse()
 
 

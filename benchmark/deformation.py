@@ -43,7 +43,7 @@ def arguments():
     parser = cli.Parser("benchmark/deformation.py", description=__doc__.splitlines()[0])
     parser.add_argument("mesh", metavar="MESH", help="a file, or suzanne-4")
     parser.add_argument("--tolerance", type=cli.length, default="1%", help="a length, or N%% of size (default: 1%%)")
-    parser.add_argument("--threads", type=cli.whole_number(0), default=0, help="0: one per core")
+    parser.add_argument("--threads", type=cli.whole_number(1), metavar="N", help="default: all cores")
     return parser.parse()
 
 
@@ -52,7 +52,7 @@ def main(options):
         vertices, triangles = models.arrays(models.build(options.mesh))
     else:
         vertices, triangles = models.read(options.mesh)
-    tolerance = cli.in_units(options.tolerance, native.module.size(vertices, triangles))
+    tolerance = cli.in_units(options.tolerance, native.module.diagonal(vertices, triangles))
     volume = native.module.ToleranceVolume(vertices, triangles, tolerance)
     inside, beyond = (lattice(vertices, share * tolerance) for share in (0.9, 9))
     threads = {"threads": options.threads}

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tries candidates that are made to mislead a check, and compares its verdicts with certified distances.
 
-A third of the candidates lie within 2 % of the tolerance. Wrong accepts are counted by tolvol.hausdorff, over all accepted
-candidates and not over a sample. tolvol.hausdorff has bounds of its own. It shares geometry and threads with the check, and is
-tested against brute force and CGAL. For a method that proves nothing only accepted candidates with a corner outside are
-counted: the true number of its wrong accepts is at least as large.
+A third of the candidates lie within 2 % of the tolerance. Wrong accepts are counted by tolvol.directed_hausdorff, over
+all accepted candidates and not over a sample. This function has bounds of its own. It shares geometry and threads with
+the check, and is tested against brute force and CGAL. For a method that proves nothing only accepted candidates with a
+corner outside are counted: the true number of its wrong accepts is at least as large.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from addon.native import module as tolvol
 BAND = 0.02  # share of the tolerance; a candidate that is nearer to the tolerance may stay unproved
 CANDIDATES = 1_000_000  # number of candidates for each reference
 BATCH = 100_000
-OUTSIDE, UNPROVED, INSIDE = 0, 1, 2
+OUTSIDE, UNPROVED, INSIDE = tolvol.Verdict
 FINEST = 4  # grid nodes per tolerance for methods that interpolate
 INTERPOLATING = ("occlusion_query", "paper", "paper_half_h")
 METHODS = ("certificate", "gl_certificate", *INTERPOLATING)
@@ -126,7 +126,7 @@ def _farther(points, vertices, triangles, bound, threads):
     """Returns the number of candidates that are certified to be farther than the bound from the reference."""
     if len(points) == 0:
         return 0
-    distance = tolvol.hausdorff(*_surface(points), vertices, triangles, bound=bound, threads=threads)
+    distance = tolvol.directed_hausdorff(*_surface(points), vertices, triangles, bound=bound, threads=threads)
     if distance.upper <= bound:
         return 0
     if len(points) == 1:
@@ -135,7 +135,7 @@ def _farther(points, vertices, triangles, bound, threads):
     return sum(_farther(part, vertices, triangles, bound, threads) for part in (points[:half], points[half:]))
 
 
-def judge(name, vertices, triangles, tolerance, threads=0, method="certificate", count=CANDIDATES, seed=2):
+def judge(name, vertices, triangles, tolerance, threads=None, method="certificate", count=CANDIDATES, seed=2):
     """Returns one entry of `hostile`: the verdicts on `count` candidates for one reference."""
     vertices = np.asarray(vertices, np.float64)
     precision = FINEST if method in INTERPOLATING else None
@@ -152,9 +152,9 @@ def judge(name, vertices, triangles, tolerance, threads=0, method="certificate",
         result = (
             certified if method == "certificate" else volume.check(*_surface(points), threads=threads, method=method)
         )
-        verdict = result.verdict
+        verdict = result.verdicts
         verdicts += np.bincount(verdict, minlength=3)
-        proved += int((certified.verdict == INSIDE).sum())
+        proved += int((certified.verdicts == INSIDE).sum())
         near += int((np.abs(_farthest_corner(volume, points) / tolerance - 1) <= BAND).sum())
         accepted = points[verdict == INSIDE]
         if method in NOT_PROVING:
@@ -162,7 +162,7 @@ def judge(name, vertices, triangles, tolerance, threads=0, method="certificate",
             wrong += int((farthest > 1 + 1e-9).sum())
             largest = max(largest, farthest.max(initial=0))
             continue
-        distance = tolvol.hausdorff(*_surface(accepted), vertices, triangles, bound=tolerance, threads=threads)
+        distance = tolvol.directed_hausdorff(*_surface(accepted), vertices, triangles, bound=tolerance, threads=threads)
         largest = max(largest, distance.upper / tolerance)
         if distance.upper > tolerance:
             wrong += _farther(accepted, vertices, triangles, tolerance, threads)

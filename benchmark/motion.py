@@ -63,21 +63,21 @@ def dabs(vertices, triangles, volume, threads):
             elapsed, (indices, back) = seconds(guard.constrain, positions)
             positions[indices] = back
         beyond = min(beyond, elapsed)
-    assert (volume.check(positions, triangles).verdict == 2).all()
+    assert (volume.check(positions, triangles).verdicts == native.module.Verdict.INSIDE).all()
     return inside, beyond, len(indices)
 
 
 def arguments():
     parser = cli.Parser("benchmark/motion.py", description=__doc__.splitlines()[0])
     parser.add_argument("--tolerance", type=cli.length, default="1%", help="a length, or N%% of size (default: 1%%)")
-    parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: one per core")
+    parser.add_argument("--threads", type=cli.whole_number(1), metavar="N", help="default: all cores")
     return parser.parse()
 
 
 def measure(side, tolerance, threads):
     tolvol = native.module
     vertices, triangles = torus(side)
-    tolerance = cli.in_units(tolerance, tolvol.size(vertices, triangles))
+    tolerance = cli.in_units(tolerance, tolvol.diagonal(vertices, triangles))
     volume = tolvol.ToleranceVolume(vertices, triangles, tolerance, threads=threads)
     inside, beyond, held = dabs(vertices, triangles, volume, threads)
     whole = min(seconds(volume.check, vertices, triangles, threads=threads)[0] for _ in range(3))

@@ -120,7 +120,7 @@ def versions():
 def read_mesh(path, folder):
     if path == SCAN:
         vertices, triangles = scan()
-        return Mesh(SCAN, vertices, triangles, tolvol.size(vertices, triangles))
+        return Mesh(SCAN, vertices, triangles, tolvol.diagonal(vertices, triangles))
     arrays = folder / "vertices.npy", folder / "triangles.npy"
     done = subprocess.run([PYTHON, tool_calls.__file__, "read", path, *arrays], capture_output=True, text=True)
     if done.returncode:
@@ -128,7 +128,7 @@ def read_mesh(path, folder):
     vertices, triangles = (np.load(file) for file in arrays)
     if not len(triangles):
         raise Stop(f"{path}: the file has no triangles")
-    return Mesh(Path(path).stem, vertices, triangles, tolvol.size(vertices, triangles))
+    return Mesh(Path(path).stem, vertices, triangles, tolvol.diagonal(vertices, triangles))
 
 
 # ---- judging and searching
@@ -139,9 +139,9 @@ def interval(a, b, tolerance):
 
     The interval decides whether the distance is within the tolerance, and it is narrow if the distance is beyond.
     """
-    found = tolvol.hausdorff(*a, *b, bound=tolerance)
+    found = tolvol.directed_hausdorff(*a, *b, bound=tolerance)
     if found.upper > tolerance:
-        found = tolvol.hausdorff(*a, *b)
+        found = tolvol.directed_hausdorff(*a, *b)
     return [found.lower / tolerance, found.upper / tolerance]
 
 
@@ -159,7 +159,7 @@ def judge(mesh, tolerance, answer):
 
 def keeps_both(mesh, tolerance, answer):
     pairs = directions(mesh, answer).values()
-    return all(tolvol.hausdorff(*a, *b, bound=tolerance).upper <= tolerance for a, b in pairs)
+    return all(tolvol.directed_hausdorff(*a, *b, bound=tolerance).upper <= tolerance for a, b in pairs)
 
 
 def search(start, count, calls=SEARCH_CALLS):

@@ -34,7 +34,7 @@ METHODS = ("gl_certificate", "occlusion_query", "paper", "paper_half_h")
 
 
 def measure(name, vertices, triangles, options):
-    tolerance = cli.in_units(options.tolerance, tolvol.size(vertices, triangles))
+    tolerance = cli.in_units(options.tolerance, tolvol.diagonal(vertices, triangles))
     volume = tolvol.ToleranceVolume(vertices, triangles, tolerance, precision=options.precision)
     rng = np.random.default_rng(1)
     points = (vertices + MOVE * tolerance * rng.uniform(-1, 1, vertices.shape)).astype(np.float32)
@@ -68,7 +68,7 @@ def measure(name, vertices, triangles, options):
     for field in ("scatter", "fast_marching"):
         fields[field] = timed.seconds.pop((field, "field"))
     for (method, what), seconds in timed.seconds.items():
-        verdict = results[method, what].verdict
+        verdict = results[method, what].verdicts
         entries.append(
             {
                 "method": results[method, what].method,

@@ -34,7 +34,7 @@ def million(name, vertices, triangles):
     ab, bc, ca = middle.T
     parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
     points = np.concatenate([vertices, vertices[unique].mean(1)]).astype(np.float64)
-    points += np.random.default_rng(SEED).normal(0, NOISE * tolvol.size(vertices, triangles), points.shape)
+    points += np.random.default_rng(SEED).normal(0, NOISE * tolvol.diagonal(vertices, triangles), points.shape)
     faces = np.concatenate([np.stack(part, 1) for part in parts]).astype(np.int32)
     return f"{name}, cut in four", points.astype(np.float32), faces
 
@@ -43,7 +43,7 @@ def measure(name, vertices, triangles, stopwatch, memory, threads):
     """Returns two entries: the check as published, one way, and the default of tolvol.decimate."""
     import tolvol_baselines  # This module is built with the tests and never packed.
 
-    name, tolerance = Path(name).name, TOLERANCE * tolvol.size(vertices, triangles)
+    name, tolerance = Path(name).name, TOLERANCE * tolvol.diagonal(vertices, triangles)
 
     def published():
         marched = tolvol.ToleranceVolume(
@@ -71,8 +71,8 @@ def measure(name, vertices, triangles, stopwatch, memory, threads):
             "triangles": len(triangles),
             "left": len(faces),
             "grid": list(reversed(volume.grid()[0].shape)),
-            "forward": tolvol.hausdorff(*stored, *reference, threads=threads).upper / tolerance,
-            "backward": tolvol.hausdorff(*reference, *stored, threads=threads).upper / tolerance,
+            "forward": tolvol.directed_hausdorff(*stored, *reference, threads=threads).upper / tolerance,
+            "backward": tolvol.directed_hausdorff(*reference, *stored, threads=threads).upper / tolerance,
             "field": field,
             "decimation": decimation,
             "qem": watch.seconds["qem"],

@@ -90,7 +90,7 @@ def arguments():
         metavar="FILE.png",
         help="draw the result to this file, coloured by its distance to the reference; needs OpenGL",
     )
-    parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
+    parser.add_argument("--threads", type=cli.whole_number(1), metavar="N", help="default: all cores")
     return parser.parse()
 
 
@@ -244,7 +244,7 @@ class Command:
                     effort=self.options.effort.upper(),
                     max_seconds=self.options.max_seconds or 0,
                     outside=self.options.outside.upper(),
-                    threads=self.options.threads,
+                    threads=self.options.threads or 0,
                     **asked,
                 )
         except RuntimeError as error:

@@ -42,10 +42,10 @@ def unavailable():
     return None
 
 
-def camera(vertices, triangles, size, path="", room=0.0):
+def camera(vertices, triangles, size, path="", margin=0.0):
     """Returns a camera that shows a mesh upright, by the convention of the format of `path`."""
     view = _VIEWS["Y" if Path(path).suffix.lower() in {".obj", ".gltf", ".glb"} else "Z"]
-    return tolvol.Camera.framing(vertices, triangles, size, room=room, **view)
+    return tolvol.Camera.framing(vertices, triangles, size=size, margin=margin, **view)
 
 
 class Page:
@@ -128,24 +128,24 @@ def stripes(width, height):
     return colours[((x - y) % STRIPE >= STRIPE / 2).astype(int)]
 
 
-def shares_within(surface, reference, tolerance, threads=0):
+def shares_within(surface, reference, tolerance, threads=None):
     """Returns the shares of a surface's area within a quarter, half and all of the tolerance of another surface."""
     bounds = [tolerance / 4, tolerance / 2, tolerance]
     spread = tolvol.deviation(*surface, *reference, bounds=bounds, threads=threads)
     return [1 - float(share) for share in spread.share_beyond]
 
 
-def save_deviation(path, surface, reference, tolerance, size, like="", threads=0):
+def save_deviation(path, surface, reference, tolerance, size, like="", threads=None):
     """Saves a picture of a surface coloured by its distance to another. Both are (vertices, triangles) in the world.
 
     path: a path or a binary file; size: the length that is 100 %; like: the file of the surface, for the up axis.
     """
     # The tolerance of a volume is at most the size of its reference. Parts that are farther away are striped.
-    tolerance = min(tolerance, tolvol.size(*reference))
+    tolerance = min(tolerance, tolvol.diagonal(*reference))
     volume = tolvol.ToleranceVolume(*reference, tolerance, threads=threads)
     view = camera(*surface, (WIDTH, HEIGHT), like)
     edges = len(surface[1]) <= EDGES_UP_TO
-    pixels = tolvol.render_distance(*surface, volume, view, (WIDTH, HEIGHT), edges=edges, threads=threads)
+    pixels = tolvol.render_distance(*surface, volume, camera=view, size=(WIDTH, HEIGHT), edges=edges, threads=threads)
     page = Page(WIDTH + LEGEND, HEIGHT)
     page.image(0, 0, pixels)
     shares = shares_within(surface, reference, tolerance, threads)

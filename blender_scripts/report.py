@@ -73,7 +73,7 @@ def arguments():
         help=f"write the report to this file ({' '.join(deviation.EXTENSIONS)}); may be given more than once",
     )
     parser.add_argument("--picture", metavar="FILE.png", help="draw A to this file, coloured by its distance from B")
-    parser.add_argument("--threads", type=cli.whole_number(0), default=0, metavar="N", help="0: all cores (default)")
+    parser.add_argument("--threads", type=cli.whole_number(1), metavar="N", help="default: all cores")
     return parser.parse()
 
 

@@ -14,7 +14,6 @@ import numpy as np
 from .. import native
 from ..errors import Refused
 from ..mesh import mesh_io
-from ..proof.certify import INSIDE
 from ..reference import volumes
 from . import watch
 
@@ -100,7 +99,9 @@ class LatticeWatch(watch.Preparing):
         return "The lattice was stopped at the tolerance" if self._stopped else None
 
     def _failing(self, positions, triangles):
-        return np.flatnonzero(self._built.check(positions, triangles, **self._options).verdict < INSIDE)
+        return np.flatnonzero(
+            self._built.check(positions, triangles, **self._options).verdicts < native.module.Verdict.INSIDE
+        )
 
     def _share(self, positions, triangles):
         inside, outside = 0.0, 1.0

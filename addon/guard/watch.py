@@ -14,7 +14,6 @@ from .. import native, preferences
 from ..errors import Refused
 from ..job import Job
 from ..mesh import mesh_io
-from ..proof.certify import INSIDE
 from ..reference import snapshots, tolerances, volumes
 
 # Blender waits so many seconds for a guard to be prepared. If preparing takes longer, it goes on in a thread.
@@ -94,8 +93,8 @@ class Faces:
 
     def outside(self, built, positions, options):
         """Returns how many polygons are outside in the triangulation that Blender shows. options: of a check."""
-        verdict = built.check(positions, self.shown, **options).verdict
-        return len(np.unique(self.shown_polygons[verdict < INSIDE]))
+        verdict = built.check(positions, self.shown, **options).verdicts
+        return len(np.unique(self.shown_polygons[verdict < native.module.Verdict.INSIDE]))
 
 
 class Preparing:

@@ -188,8 +188,8 @@ object. An object without a reference gets one first, as by Set Reference"""
             "placement": placement.lower(),
             "two_sided": self.keep == "BOTH",
             "effort": self.effort.lower(),
-            "max_seconds": self.max_seconds,
-            "target_triangles": self.target_triangles if self.use_target else 0,
+            "max_seconds": self.max_seconds or None,
+            "target_triangles": self.target_triangles if self.use_target else None,
             "outside": self.outside.lower(),
             "threads": self.threads or preferences.threads(context),
         }

@@ -100,7 +100,7 @@ def _prepare(name, tolerance):
 
     def make(progress):
         built = volumes.native_volume(reference, tolerance, threads, progress)
-        return Field(native.module.DisplayTree(built, progress), reference.matrix)
+        return Field(native.module.DisplayTree(built, progress=progress), reference.matrix)
 
     return make
 

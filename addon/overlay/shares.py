@@ -31,7 +31,7 @@ def known(ob, surface, found, tolerance, changed):
             surface.vertices,
             surface.triangles,
             tolerance * _EIGHTHS,
-            placement,
+            to_world=placement,
         )
         work.later(
             ("shares", name),

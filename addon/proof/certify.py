@@ -3,20 +3,19 @@
 
 import numpy as np
 
+from .. import native
 from ..reference import volumes
 from . import measure
 
-INSIDE = 2  # the native verdict of a triangle that is proved to be inside; any other verdict counts as outside
 
-
-def verdicts(surface, reference, tolerance, threads=0, progress=None):
+def verdicts(surface, reference, tolerance, threads=None, progress=None):
     """Returns the native verdict of each triangle of a Surface."""
     built = volumes.native_volume(reference, tolerance, threads, progress)
     arrays, matrix = surface.arrays, surface.matrix
-    return built.check(arrays.vertices, arrays.triangles, to_world=matrix, threads=threads, progress=progress).verdict
+    return built.check(arrays.vertices, arrays.triangles, to_world=matrix, threads=threads, progress=progress).verdicts
 
 
-def outside(surface, reference, tolerance, threads=0, progress=None):
+def outside(surface, reference, tolerance, threads=None, progress=None):
     """Returns (m,) bool: the triangles of a Surface that are not proved to be within the tolerance.
 
     There are none if certify() finds the Surface within the tolerance, and otherwise there is at least one.
@@ -25,12 +24,12 @@ def outside(surface, reference, tolerance, threads=0, progress=None):
     found = measure.largest_distance(*pair, tolerance, threads, progress)
     if found.within(tolerance):
         return np.zeros(len(surface.arrays.triangles), bool)
-    unproved = verdicts(surface, reference, tolerance, threads, progress) < INSIDE
+    unproved = verdicts(surface, reference, tolerance, threads, progress) < native.module.Verdict.INSIDE
     unproved[found.triangle] = True
     return unproved
 
 
-def certify(surface, reference, tolerance, kept_faces=0, threads=0, progress=None):
+def certify(surface, reference, tolerance, kept_faces=0, threads=None, progress=None):
     """Returns the entries "forward", "backward" and "outside" of a report for two Surfaces, with intervals as pairs.
 
     kept_faces: the number of faces that were outside from the start and were kept. If it is not 0, "outside" has the entry
@@ -42,7 +41,7 @@ def certify(surface, reference, tolerance, kept_faces=0, threads=0, progress=Non
     forward, backward = measure.both_ways((surface.world(), triangles), other, *judge)
     outside = {}
     if kept_faces:
-        inside = triangles[verdicts(surface, reference, tolerance, threads, progress) >= INSIDE]
+        inside = triangles[verdicts(surface, reference, tolerance, threads, progress) == native.module.Verdict.INSIDE]
         if len(triangles) - len(inside) <= kept_faces and len(inside):
             rest = measure.largest_distance((surface.world(), inside), other, *judge)
             outside["rest"] = [rest.lower, rest.upper]

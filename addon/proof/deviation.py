@@ -40,7 +40,7 @@ _FORMULA = "=+-@\uff1d\uff0b\uff0d\uff20"
 _BINS = 30  # the approximate number of bins on each side of the histogram
 
 
-def deviation(a, b, size, tolerance=None, bounds=(), unit="", threads=0, progress=None):
+def deviation(a, b, size, tolerance=None, bounds=(), unit="", threads=None, progress=None):
     """Returns the dictionary that is described above, without `a` and `b`, for two Surfaces."""
     bounds = sorted({*bounds, *([] if tolerance is None else [tolerance])})
     ways = {}

@@ -25,7 +25,7 @@ class Interval:
         return self.lower > tolerance
 
 
-def largest_distance(from_surface, to_surface, tolerance=None, threads=0, progress=None):
+def largest_distance(from_surface, to_surface, tolerance=None, threads=None, progress=None):
     """Returns the Interval of the largest distance of a point of `from_surface` from `to_surface`.
 
     Each surface is a pair (vertices, triangles). The width of the interval is at most 0.1 % of `upper`, with the
@@ -34,7 +34,9 @@ def largest_distance(from_surface, to_surface, tolerance=None, threads=0, progre
     """
 
     def measured(**options):
-        found = native.module.hausdorff(*from_surface, *to_surface, threads=threads, progress=progress, **options)
+        found = native.module.directed_hausdorff(
+            *from_surface, *to_surface, threads=threads, progress=progress, **options
+        )
         return Interval(found.lower, found.upper, found.position, found.triangle)
 
     interval = measured()
@@ -45,7 +47,7 @@ def largest_distance(from_surface, to_surface, tolerance=None, threads=0, progre
     return interval
 
 
-def both_ways(surface, reference, tolerance=None, threads=0, progress=None):
+def both_ways(surface, reference, tolerance=None, threads=None, progress=None):
     """Returns two Intervals: of the surface from the reference, and of the reference from the surface."""
     forward = largest_distance(surface, reference, tolerance, threads, progress)
     return forward, largest_distance(reference, surface, tolerance, threads, progress)

@@ -30,7 +30,7 @@ def decimation_run(source, result, native_report, volume, certified, options, se
         "version": native.module.__version__,
         "input": {"vertices": len(source.vertices), "triangles": len(source.triangles)},
         "output": {"vertices": len(result.vertices), "triangles": len(result.triangles)},
-        "tolerance": {"absolute": volume.tolerance, "percent": 100 * volume.tolerance / volume.size},
+        "tolerance": {"absolute": volume.tolerance, "percent": 100 * volume.tolerance / volume.diagonal},
         "two_sided": options["two_sided"],
         "placement": options["placement"],
         "effort": options["effort"],

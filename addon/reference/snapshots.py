@@ -40,7 +40,7 @@ class Surface:
 
     def size(self):
         """The length that is 100 %."""
-        return native.module.size(self.arrays.vertices, self.arrays.triangles, to_world=self.matrix)
+        return native.module.diagonal(self.arrays.vertices, self.arrays.triangles, to_world=self.matrix)
 
 
 def surface_of(ob):
@@ -102,7 +102,7 @@ def snapshot_size(ob):
     if not np.isfinite(_boxes[key]).all():
         return math.nan
     # The size of a surface is the size of the bounding box of its used vertices.
-    return native.module.size(_boxes[key], np.array([[0, 1, 1]]), to_world=reference_matrix(ob))
+    return native.module.diagonal(_boxes[key], np.array([[0, 1, 1]]), to_world=reference_matrix(ob))
 
 
 def set_reference(ob, surface):

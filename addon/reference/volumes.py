@@ -14,7 +14,7 @@ def built_of(ob):
     return _volumes.built((ob.tolvol.snapshot_fingerprint, snapshots.reference_matrix(ob).tobytes(), tolerance))
 
 
-def native_volume(surface, tolerance, threads=0, progress=None):
+def native_volume(surface, tolerance, threads=None, progress=None):
     """Returns the tolerance volume of a surface. A volume that was built for the same content is used again."""
     key = (surface.arrays.fingerprint(), surface.matrix.tobytes(), tolerance)
 

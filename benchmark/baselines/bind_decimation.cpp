@@ -59,7 +59,7 @@ Baseline make_baseline(const std::string& method, const ToleranceVolume& volume,
 
 py::tuple decimate_by(const py::object& vertices, const py::object& triangles, double tolerance,
                       const std::string& method, std::optional<double> precision, const std::string& placement,
-                      int threads) {
+                      std::optional<int> threads) {
   const python::Vertices v = python::to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = python::to_triangles(triangles, "triangles");
   if (placement != "optimal" && placement != "subset")
@@ -99,7 +99,7 @@ py::tuple decimate_by(const py::object& vertices, const py::object& triangles, d
 void bind_decimation(py::module_& module) {
   module.def("decimate", &decimate_by, py::arg("vertices"), py::arg("triangles"), py::arg("tolerance"),
              py::arg("method"), py::arg("precision") = py::none(), py::arg("placement") = "optimal",
-             py::arg("threads") = 0,
+             py::arg("threads") = py::none(),
              "(vertices, triangles, report) of tolvol.decimate with another method deciding about each collapse. "
              "Nothing is promised.\n"
              "method: \"permission_grid\", \"vertex_samples\", or one of ToleranceVolume.check. precision: grid nodes "

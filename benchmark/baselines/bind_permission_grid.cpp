@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <pybind11/stl.h>
+
 #include "baselines/module.h"
 #include "baselines/permission_grid.h"
 #include "python/arrays.h"
@@ -9,7 +11,7 @@ namespace {
 namespace py = pybind11;
 
 PermissionGrid make(const py::object& vertices, const py::object& triangles, double tolerance, double precision,
-                    int threads) {
+                    std::optional<int> threads) {
   const TriangleMesh mesh{python::to_vertices(vertices, "vertices").values,
                           python::to_triangles(triangles, "triangles")};
   validate(mesh.vertices, mesh.triangles);
@@ -29,7 +31,7 @@ void bind_permission_grid(py::module_& module) {
   py::class_<PermissionGrid>(module, "PermissionGrid", py::module_local(),
                              "The tolerance volume as a bit per cell [Zelinka and Garland 2002].")
       .def(py::init(&make), py::arg("vertices"), py::arg("triangles"), py::arg("tolerance"), py::arg("precision") = 4.0,
-           py::arg("threads") = 0,
+           py::arg("threads") = py::none(),
            "vertices: (n, 3), world units. precision: cells per tolerance. A cell is permitted when it lies completely "
            "inside\n"
            "the volume. O(cells).")

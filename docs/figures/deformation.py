@@ -130,7 +130,7 @@ def main(options):
         vertices, triangles = models.read(options.model)
     else:
         vertices, triangles = models.arrays(models.build("suzanne"))
-    size = native.module.size(vertices, triangles)
+    size = native.module.diagonal(vertices, triangles)
     tolerance = cli.in_units(options.tolerance, size)
     volume = native.module.ToleranceVolume(vertices, triangles, tolerance)
     points, domain = wished_lattice(vertices, PULL * tolerance)

@@ -125,7 +125,7 @@ def measure(vertices, triangles, closed):
     import tolvol_baselines as baselines
 
     rng = np.random.default_rng(SEED)
-    size = tolvol.size(vertices, triangles)
+    size = tolvol.diagonal(vertices, triangles)
     tolerance = TOLERANCE * size
     coarse = tolvol.ToleranceVolume(vertices, triangles, tolerance)
     points = surface_points(vertices, triangles, POINTS, rng)

@@ -44,15 +44,15 @@ def by_modifier(vertices, triangles, count):
 
 def draw_volume(path, mesh, like):
     vertices, triangles = mesh
-    volume = tolvol.ToleranceVolume(*mesh, VOLUME_TOLERANCE * tolvol.size(*mesh))
+    volume = tolvol.ToleranceVolume(*mesh, VOLUME_TOLERANCE * tolvol.diagonal(*mesh))
     view = pictures.camera(*mesh, VOLUME_SIZE, like, volume.tolerance)
     middle = (vertices[triangles].max((0, 1)) + vertices[triangles].min((0, 1))) / 2
     page = pictures.Page(VOLUME_SIZE[0] + LEGEND, VOLUME_SIZE[1])
-    page.image(0, 0, tolvol.render_volume(volume, view, VOLUME_SIZE, cut=(middle, (1, 0, 0)), samples=3))
+    page.image(0, 0, tolvol.render_volume(volume, camera=view, size=VOLUME_SIZE, cut=(middle, (1, 0, 0)), samples=3))
     page.text(VOLUME_SIZE[0], pictures.MARGIN, "All points within ε\nof the reference", 12)
     # The section shows only points outside the mesh, so the legend begins at distance 0.
     bar = VOLUME_SIZE[0], 90, VOLUME_SIZE[1] - 110
-    page.legend(*bar, "signed", volume.tolerance, volume.size, lowest=0, outside=False)
+    page.legend(*bar, "signed", volume.tolerance, volume.diagonal, lowest=0, outside=False)
     page.save(path, step=3)
 
 
@@ -67,7 +67,7 @@ def draw_distances(path, mesh, tolerance, like):
         ((within, "within the tolerance"), (regardless, "Blender's Decimate modifier"))
     ):
         x = column * PANEL[0]
-        farthest = tolvol.hausdorff(*surface, *mesh).upper / volume.tolerance
+        farthest = tolvol.directed_hausdorff(*surface, *mesh).upper / volume.tolerance
         page.text(x + PANEL[0] / 2, 14, f"{len(surface[1]):,} triangles, {name}", 12, ha="center")
         page.text(
             x + PANEL[0] / 2,
@@ -78,10 +78,14 @@ def draw_distances(path, mesh, tolerance, like):
             ha="center",
         )
         for row, transfer in enumerate(("signed", "magnitude")):
-            pixels = tolvol.render_distance(*surface, volume, view, PANEL, transfer, edges=True, samples=3)
+            pixels = tolvol.render_distance(
+                *surface, volume, camera=view, size=PANEL, transfer=transfer, edges=True, samples=3
+            )
             page.image(x, HEADING + row * PANEL[1], pixels)
     for row, transfer in enumerate(("signed", "magnitude")):
-        page.legend(2 * PANEL[0], HEADING + 20 + row * PANEL[1], PANEL[1] - 40, transfer, volume.tolerance, volume.size)
+        page.legend(
+            2 * PANEL[0], HEADING + 20 + row * PANEL[1], PANEL[1] - 40, transfer, volume.tolerance, volume.diagonal
+        )
     page.save(path, step=3)
 
 
@@ -107,7 +111,7 @@ def main(options):
     mesh = models.read(options.mesh) if options.mesh else models.arrays(models.build("suzanne"))
     like = options.mesh or ""
     draw_volume(volume, mesh, like)
-    draw_distances(distance, mesh, cli.in_units(options.tolerance, tolvol.size(*mesh)), like)
+    draw_distances(distance, mesh, cli.in_units(options.tolerance, tolvol.diagonal(*mesh)), like)
     if not options.mesh:
         error_plot.draw(error)
     return 0

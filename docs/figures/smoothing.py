@@ -48,12 +48,12 @@ def draw(path, mesh, tolerance, like):
     page = pictures.Page(3 * PANEL[0] + LEGEND, HEADING + PANEL[1])
     for column, (vertices, name) in enumerate(states):
         x = column * PANEL[0]
-        farthest = tolvol.hausdorff(vertices, triangles, reference, triangles).upper / tolerance
+        farthest = tolvol.directed_hausdorff(vertices, triangles, reference, triangles).upper / tolerance
         page.text(x + PANEL[0] / 2, 14, name, 12, ha="center")
         text = f"every point within {farthest:.2f} ε of the reference" if column else f"{len(triangles):,} triangles"
         page.text(x + PANEL[0] / 2, 38, text, 9, pictures.FAINT, ha="center")
-        page.image(x, HEADING, tolvol.render_distance(vertices, triangles, volume, view, PANEL, "signed", samples=3))
-    page.legend(3 * PANEL[0], HEADING + 10, PANEL[1] - 30, "signed", tolerance, volume.size)
+        page.image(x, HEADING, tolvol.render_distance(vertices, triangles, volume, camera=view, size=PANEL, samples=3))
+    page.legend(3 * PANEL[0], HEADING + 10, PANEL[1] - 30, "signed", tolerance, volume.diagonal)
     page.save(path, step=3)
 
 
@@ -70,7 +70,7 @@ def arguments():
 def main(options):
     pictures.require("PICTURE", options.picture)
     mesh = models.read(options.model) if options.model else models.arrays(models.build("suzanne"))
-    draw(options.picture, mesh, cli.in_units(options.tolerance, tolvol.size(*mesh)), options.model or "")
+    draw(options.picture, mesh, cli.in_units(options.tolerance, tolvol.diagonal(*mesh)), options.model or "")
     return 0
 
 

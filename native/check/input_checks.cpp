@@ -13,7 +13,7 @@ std::optional<std::string> storage_warning(const ToleranceVolume& volume, const 
   std::ostringstream text;
   text << "at these coordinates the stored type rounds positions by up to " << 100 * share << " % of the tolerance; "
        << "move the mesh nearer to its origin or take a larger tolerance";
-  if (share > 0.5) throw InvalidInput(text.str());
+  if (share > 0.5) throw InvalidInput(text.str(), "tolerance_too_small");
   if (share > 0.01) return text.str();
   return std::nullopt;
 }
@@ -22,7 +22,7 @@ void refuse_outside(std::size_t count, std::uint32_t first) {
   std::ostringstream text;
   text << count << " faces are not within the tolerance of the reference, the first is face " << first
        << "; take a larger tolerance, set the reference anew, or keep them (outside=\"keep\")";
-  throw InvalidInput(text.str());
+  throw FacesOutside(count, first, text.str(), "input_outside");
 }
 
 }  // namespace tolvol

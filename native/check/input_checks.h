@@ -18,7 +18,7 @@ namespace tolvol {
 std::optional<std::string> storage_warning(const ToleranceVolume& volume, const StoredSpace& space,
                                            std::span<const glm::dvec3> stored);
 
-/// Throws InvalidInput: faces of the input are not inside.
+/// Throws FacesOutside: faces of the input are not inside.
 [[noreturn]] void refuse_outside(std::size_t count, std::uint32_t first);
 
 }  // namespace tolvol

@@ -42,12 +42,13 @@ PlacedPoints::PlacedPoints(std::span<const glm::dvec3> stored, const StoredSpace
       continue;
     }
     const std::string name = "point " + std::to_string(points.size());
-    if (!finite(p)) throw InvalidInput(name + " is not finite");
+    if (!finite(p)) throw InvalidInput(name + " is not finite", "invalid_mesh");
     // In the world: a point may leave the range of double by the frame's scale alone.
     const glm::dvec3 away = glm::abs(world.world(p) - centre);
     const double certain = kFar / frame.scale() + world.mapping_error(std::span(&p, 1));
     if (!(std::max({away.x, away.y, away.z}) > certain)) {
-      throw InvalidInput(name + " is too far away for double precision under to_world; move it nearer to the origin");
+      throw InvalidInput(name + " is too far away for double precision under to_world; move it nearer to the origin",
+                         "too_far");
     }
     points.push_back(glm::clamp(at, -kFar, kFar));
   }
@@ -64,7 +65,8 @@ void require_valid(const Pieces& pieces) {
     poll_at(i);
     if (pieces.indices[i] < pieces.points.size()) continue;
     throw InvalidInput("faces[" + std::to_string(i / corners) + "] uses point " + std::to_string(pieces.indices[i]) +
-                       ", but there are only " + std::to_string(pieces.points.size()));
+                           ", but there are only " + std::to_string(pieces.points.size()),
+                       "invalid_mesh");
   }
 }
 

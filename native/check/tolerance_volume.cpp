@@ -47,7 +47,7 @@ ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span
   if (tolerance > diagonal_) {
     std::ostringstream text;
     text << "the tolerance " << tolerance << " is larger than the reference, whose size is " << diagonal_;
-    throw InvalidInput(text.str());
+    throw InvalidInput(text.str(), "tolerance_too_large");
   }
   const std::vector<glm::dvec3> used = used_only(vertices, triangles);
   Box world;
@@ -96,7 +96,7 @@ double ToleranceVolume::provable(double mapping_error) const {
     std::ostringstream text;
     text << "the tolerance " << tolerance_ << " is too small for double precision at these coordinates; "
          << "move the mesh nearer to the origin or take a larger tolerance";
-    throw InvalidInput(text.str());
+    throw InvalidInput(text.str(), "tolerance_too_small");
   }
   return left;
 }

@@ -51,7 +51,8 @@ DecimationInput::DecimationInput(std::span<const glm::dvec3> vertices, std::span
   if (std::none_of(cut_.triangles.begin(), cut_.triangles.end(), [&](const glm::uvec3& t) {
         return glm::cross(positions_[t.y] - positions_[t.x], positions_[t.z] - positions_[t.x]) != glm::dvec3(0);
       })) {
-    throw InvalidInput("all faces are degenerate (segments or points): there is no surface to decimate");
+    throw InvalidInput("all faces are degenerate (segments or points): there is no surface to decimate",
+                       "invalid_mesh");
   }
   if (volume_) bounds_ = set_bounds(team);
 }
@@ -204,7 +205,7 @@ void DecimationInput::cover(double provable) {
          << "; take a larger tolerance, set the reference anew, keep one direction only (two_sided=False), or go on "
             "from "
          << "what there is (outside=\"keep\")";
-    throw InvalidInput(text.str());
+    throw FacesOutside(uncovered, first, text.str(), "reference_outside");
   }
   if (uncovered) {
     report_.warnings.push_back(std::to_string(uncovered) +

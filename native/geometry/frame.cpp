@@ -34,10 +34,11 @@ StoredSpace::StoredSpace(const glm::dmat4& to_world, Storage storage, const Fram
     : to_world_(to_world), storage_(storage), mirrors_(false), frame_(frame) {
   for (int column = 0; column < 4; ++column) {
     for (int row = 0; row < 4; ++row) {
-      if (!std::isfinite(to_world[column][row])) throw InvalidInput("to_world has a value that is not finite");
+      if (!std::isfinite(to_world[column][row]))
+        throw InvalidInput("to_world has a value that is not finite", "invalid_transform");
     }
     if (to_world[column][3] != (column == 3 ? 1.0 : 0.0)) {
-      throw InvalidInput("to_world is not affine: its last row must be 0 0 0 1");
+      throw InvalidInput("to_world is not affine: its last row must be 0 0 0 1", "invalid_transform");
     }
   }
   // Columns of length one first: the determinant of a matrix of tiny scales would underflow.
@@ -47,13 +48,14 @@ StoredSpace::StoredSpace(const glm::dmat4& to_world, Storage storage, const Fram
     const glm::dvec3 c = linear[column];
     const double largest = std::max({std::abs(c.x), std::abs(c.y), std::abs(c.z)});
     if (largest > 0) lengths[column] = largest * glm::length(c / largest);
-    if (!(lengths[column] > 0)) throw InvalidInput("to_world is singular: an axis is scaled to zero; give it a scale");
+    if (!(lengths[column] > 0))
+      throw InvalidInput("to_world is singular: an axis is scaled to zero; give it a scale", "invalid_transform");
     linear[column] /= lengths[column];
   }
   const double determinant = glm::determinant(linear);
   mirrors_ = determinant < 0;
   if (std::abs(determinant) < 1e-12) {
-    throw InvalidInput("to_world is singular: it flattens the mesh; give every axis a scale");
+    throw InvalidInput("to_world is singular: it flattens the mesh; give every axis a scale", "invalid_transform");
   }
   glm::dmat3 inverse = glm::inverse(linear);
   for (int column = 0; column < 3; ++column) {
@@ -133,7 +135,7 @@ double longest_diagonal(std::span<const glm::dvec3> stored, std::span<const glm:
     const glm::dvec3 diagonal = linear * (side * sign);
     longest = std::max(longest, std::hypot(diagonal.x, diagonal.y, diagonal.z));
   }
-  if (!(longest > 0)) throw InvalidInput("all vertices are at one point: the mesh has no size");
+  if (!(longest > 0)) throw InvalidInput("all vertices are at one point: the mesh has no size", "invalid_mesh");
   return longest;
 }
 

@@ -12,15 +12,15 @@
 namespace tolvol {
 
 void validate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles) {
-  if (vertices.empty()) throw InvalidInput("the mesh has no vertices");
-  if (triangles.empty()) throw InvalidInput("the mesh has no faces");
+  if (vertices.empty()) throw InvalidInput("the mesh has no vertices", "invalid_mesh");
+  if (triangles.empty()) throw InvalidInput("the mesh has no faces", "invalid_mesh");
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     poll_at(i);
     const glm::dvec3& p = vertices[i];
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
       std::ostringstream text;
       text << "vertex " << i << " is not finite (" << p.x << ", " << p.y << ", " << p.z << ")";
-      throw InvalidInput(text.str());
+      throw InvalidInput(text.str(), "invalid_mesh");
     }
   }
   for (std::size_t i = 0; i < triangles.size(); ++i) {
@@ -29,7 +29,7 @@ void validate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> 
       if (triangles[i][k] >= vertices.size()) {
         std::ostringstream text;
         text << "triangle " << i << " uses vertex " << triangles[i][k] << ", but there are only " << vertices.size();
-        throw InvalidInput(text.str());
+        throw InvalidInput(text.str(), "invalid_mesh");
       }
     }
   }

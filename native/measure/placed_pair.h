@@ -38,7 +38,8 @@ struct PlacedPair {
     add(world_b, part.triangles);
     for (const NearPart::Cut& cut : part.cuts) box.add(cut.in(Frame(), world_b));
     frame = Frame(box);
-    if (!std::isfinite(frame.scale())) throw InvalidInput("the meshes are smaller than 1e-307: scale them up");
+    if (!std::isfinite(frame.scale()))
+      throw InvalidInput("the meshes are smaller than 1e-307: scale them up", "invalid_mesh");
     a = placed(world_a);
     b = placed(world_b);
     b.triangles = part.triangles;

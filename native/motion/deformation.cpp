@@ -40,7 +40,7 @@ class Deformation {
     if (volume) certificate_.emplace(*volume);
     for (std::size_t i = 0; i < vertices.size(); ++i) {
       if (std::isfinite(glm::dot(vertices[i], glm::dvec3(1)))) continue;
-      throw InvalidInput("vertex " + std::to_string(i) + " is not finite");
+      throw InvalidInput("vertex " + std::to_string(i) + " is not finite", "invalid_mesh");
     }
     if (corners < 1 || corners > 4 || faces.size() % corners_ != 0) {
       throw InvalidInput("a face must have 1 to 4 corners, and all faces the same number");
@@ -49,7 +49,8 @@ class Deformation {
     for (std::size_t i = 0; i < faces.size(); ++i) {
       if (faces[i] < vertices.size()) continue;
       throw InvalidInput("face " + std::to_string(i / corners_) + " uses vertex " + std::to_string(faces[i]) +
-                         ", but there are only " + std::to_string(vertices.size()));
+                             ", but there are only " + std::to_string(vertices.size()),
+                         "invalid_mesh");
     }
   }
 
@@ -86,7 +87,7 @@ class Deformation {
         if (!displacement || *displacement == glm::dvec3(0)) continue;
         after_[i] = world.store(p + *displacement);
         if (!std::isfinite(glm::dot(after_[i], glm::dvec3(1)))) {
-          throw InvalidInput("the lattice carries vertex " + std::to_string(i) + " too far to be stored");
+          throw InvalidInput("the lattice carries vertex " + std::to_string(i) + " too far to be stored", "too_far");
         }
       }
     });

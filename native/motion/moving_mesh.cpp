@@ -32,10 +32,11 @@ constexpr std::size_t kBlock = 1024, kSmallBlock = 32;
 
 bool finite(const glm::dvec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
-[[noreturn]] void refuse(const std::string& name, std::size_t vertex, const glm::dvec3& p, const char* what) {
+[[noreturn]] void refuse(const std::string& name, std::size_t vertex, const glm::dvec3& p, const char* what,
+                         const char* code) {
   std::ostringstream text;
   text << name << " " << vertex << " " << what << " (" << p.x << ", " << p.y << ", " << p.z << ")";
-  throw InvalidInput(text.str());
+  throw InvalidInput(text.str(), code);
 }
 
 /// The least index in [0, count) for which hits(i) holds; count when there is none.
@@ -88,7 +89,8 @@ MovingMesh::MovingMesh(const ToleranceVolume& volume, const StoredSpace& space, 
   for (std::size_t i = 0; i < faces.size(); ++i) {
     if (faces[i] >= vertex_count) {
       throw InvalidInput("face " + std::to_string(i / corners_) + " uses vertex " + std::to_string(faces[i]) +
-                         ", but there are only " + std::to_string(vertex_count));
+                             ", but there are only " + std::to_string(vertex_count),
+                         "invalid_mesh");
     }
   }
   make_rings(vertex_count);
@@ -117,7 +119,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress
   std::vector<glm::dvec3> extremes;  // The mapping error is computed for these.
   for (std::uint32_t v = 0; v < stored.size(); ++v) {
     poll_at(v);
-    if (!finite(stored[v])) refuse("vertex", v, stored[v], "is not finite");
+    if (!finite(stored[v])) refuse("vertex", v, stored[v], "is not finite", "invalid_mesh");
     if (!ring(v).empty()) extremes.push_back(stored[v]);
   }
   Start result{{}, storage_warning(*volume_, space_, extremes)};
@@ -143,7 +145,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress
     return !finite(state_[v].at) && !ring(static_cast<std::uint32_t>(v)).empty();
   });
   if (offender < stored.size()) {
-    refuse("vertex", offender, stored[offender], "is too far away for double precision");
+    refuse("vertex", offender, stored[offender], "is too far away for double precision", "too_far");
   }
   trial_ = state_;
   if (!refusals_.empty()) refusals_.assign(stored.size(), {});
@@ -301,8 +303,9 @@ void MovingMesh::try_all(std::span<const std::uint32_t> vertices, std::span<cons
   });
   if (offender == vertices.size()) return;
   for (const std::uint32_t v : vertices) take_back(v);
+  const bool far = finite(after[offender]);
   refuse("the wish for vertex", vertices[offender], after[offender],
-         finite(after[offender]) ? "is too far away for double precision" : "is not finite");
+         far ? "is too far away for double precision" : "is not finite", far ? "too_far" : "invalid_mesh");
 }
 
 void MovingMesh::try_at(std::uint32_t vertex, const glm::dvec3& at, const PointBound& bound) {

@@ -262,8 +262,8 @@ class Smoothing {
       const glm::dvec3& end = positions_[same_as_[v]];
       if (end == input_[v]) continue;
       if (!std::isfinite(end.x) || !std::isfinite(end.y) || !std::isfinite(end.z)) {
-        throw InvalidInput("the coordinates around vertex " + std::to_string(v) +
-                           " are too large for double precision");
+        throw InvalidInput("the coordinates around vertex " + std::to_string(v) + " are too large for double precision",
+                           "too_far");
       }
       result_.vertices[v] = end;
       result_.largest_motion = std::max(result_.largest_motion, glm::length(in_world(end - input_[v])));

@@ -34,7 +34,7 @@ DrawnMesh::DrawnMesh(std::span<const glm::dvec3> stored, std::span<const glm::uv
     const glm::dvec3 p = space.frame(stored[i]);
     nodes[i] = field.node(p);
     if (!(glm::dot(nodes[i], nodes[i]) < kReach * kReach)) {
-      throw InvalidInput("vertex " + std::to_string(i) + " is too far from the reference to be drawn");
+      throw InvalidInput("vertex " + std::to_string(i) + " is too far from the reference to be drawn", "too_far");
     }
     box.add(p);
   }

@@ -43,7 +43,7 @@ std::uint32_t to_index(std::int64_t value, py::ssize_t row, const std::string& n
   if (value < 0 || value >= std::numeric_limits<std::uint32_t>::max()) {
     std::ostringstream text;
     text << name << "[" << row << "] has the index " << value << ", which is out of range";
-    throw InvalidInput(text.str());
+    throw InvalidInput(text.str(), "invalid_mesh");
   }
   return static_cast<std::uint32_t>(value);
 }
@@ -114,9 +114,9 @@ std::vector<std::int32_t> to_labels(const py::object& object, const std::string&
   return result;
 }
 
-unsigned to_threads(int threads) {
-  if (threads < 0) throw InvalidInput("threads must not be negative; 0 is one per core");
-  return static_cast<unsigned>(threads);
+unsigned to_threads(std::optional<int> threads) {
+  if (threads && *threads < 1) throw InvalidInput("threads must be at least 1, or None for one per core");
+  return static_cast<unsigned>(threads.value_or(0));
 }
 
 glm::dmat4 to_matrix(const py::object& object, const std::string& name) {

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -43,8 +44,8 @@ py::array_t<T, py::array::c_style> to_values(const py::object& array, const char
   return py::array_t<T, py::array::c_style>(py::reinterpret_borrow<py::array>(array));
 }
 
-/// 0: one per core. Throws InvalidInput when negative.
-unsigned to_threads(int threads);
+/// None becomes 0, one per core. Throws InvalidInput below 1.
+unsigned to_threads(std::optional<int> threads);
 
 /// (4, 4), row-major as NumPy writes it; None is the identity.
 glm::dmat4 to_matrix(const py::object& array, const std::string& name = "to_world");

@@ -35,7 +35,7 @@ ConstrainOptions::Outside to_outside(const std::string& outside) {
 
 Constrained constrain_arrays(const py::object& before, const py::object& after, const py::object& faces,
                              const Volume& volume, const py::object& to_world, const std::string& mode,
-                             const std::string& outside, int threads, Progress* progress) {
+                             const std::string& outside, std::optional<int> threads, Progress* progress) {
   const Vertices from = to_vertices(before, "before"), to = to_vertices(after, "after");
   if (from.storage != to.storage) throw InvalidInput("before and after must have the same type");
   int corners = 3;
@@ -86,8 +86,8 @@ struct LockedGuard {
 };
 
 std::unique_ptr<LockedGuard> make_guard(const py::object& positions, const py::object& faces, const Volume& volume,
-                                        const py::object& to_world, const std::string& outside, int threads,
-                                        Progress* progress) {
+                                        const py::object& to_world, const std::string& outside,
+                                        std::optional<int> threads, Progress* progress) {
   const Positions p = to_positions(positions);
   int corners = 3;
   std::vector<std::uint32_t> indices = to_faces(faces, "faces", corners);
@@ -121,69 +121,133 @@ void guard_reset(LockedGuard& guard, const py::object& positions, Progress* prog
 }  // namespace
 
 void bind_constrain(py::module_& module) {
-  py::class_<Constrained>(module, "Constrained", py::module_local(), "What constrain found.")
-      .def_readonly("vertices", &Constrained::vertices, "(n, 3), the type of the input, local.")
+  py::class_<Constrained>(module, "ConstrainResult", py::module_local(),
+                          "The mesh that constrain returns, and how far each vertex went.")
+      .def_readonly("vertices", &Constrained::vertices, "(n, 3) array of the input's dtype: local coordinates.")
       .def_readonly("factors", &Constrained::factors,
-                    "(n,) float64: the share of its motion that each vertex went, 0 to 1.")
-      .def_readonly("report", &Constrained::report, "held_back (vertices), outside, method, renderer, warnings.");
-  module.def(
-      "constrain", &constrain_arrays, py::arg("before"), py::arg("after"), py::arg("faces"), py::arg("volume"),
-      py::arg("to_world") = py::none(), py::arg("mode") = "pull_back", py::arg("outside") = "error",
-      py::arg("threads") = 0, py::arg("progress") = py::none(),
-      "As much of a motion as the tolerance allows: vertex v ends at before + f (after - before), rounded as it "
-      "is stored,\n"
-      "f its factor; all faces are then inside. before, after: (n, 3), both float32 or both float64, local; "
-      "before must be\n"
-      "inside. faces: (m, k) integers, k from 1 (points) to 4 (quads, in every triangulation); a triangle among "
-      "quads repeats a\n"
-      "corner. A vertex that touches no face that failed has its wish, bit for bit.\n\n"
-      "mode: \"pull_back\", where no single factor can rise by 1/64 alone, or \"reset\", all or nothing. "
-      "outside: \"error\", or\n"
-      "\"keep\" the vertices of faces that are outside in before where they are. Raises InvalidInput and "
-      "Cancelled.\n"
-      "Cost: about 1 us a vertex to certify before; for each that is held back 2 to 20 us where neighbours move alike "
-      "over a smooth\n"
-      "reference, and 100 to 400 us where the reference is rough or each is pushed its own way by several tolerances. "
-      "Among large\n"
-      "triangles that run through each other searches look at a share of them all: with 3,000 random ones 1.2 ms for "
-      "each that is\n"
-      "held back. Reset: M. Botsch "
-      "et al., "
-      "GPU-based\n"
-      "Tolerance Volumes for Mesh Processing, 2004, section 5.");
+                    "(n,) float64: the share of its motion that each vertex went, from 0 to 1.")
+      .def_readonly("report", &Constrained::report, R"doc(A dict with these entries:
 
-  py::class_<LockedGuard>(
-      module, "Guard", py::module_local(),
-      "Keeps a mesh that is edited by other hands inside a volume, edit by edit, as constrain does. "
-      "An edit costs what it\n"
-      "touches and a comparison of all positions with the last ones: about 1 ms for 1,000 of a "
-      "million vertices, and\n"
-      "for each that is held back as constrain.")
-      .def(py::init(&make_guard), py::arg("positions"), py::arg("faces"), py::arg("volume"),
-           py::arg("to_world") = py::none(), py::arg("outside") = "error", py::arg("threads") = 0,
+held_back : the number of vertices that did not go all the way
+outside : a dict of `faces`, the number of faces that were outside before and were kept, and `first`, the first of them
+method, renderer : which check was used, and what computed it
+warnings : a list of sentences)doc");
+  module.def("constrain", &constrain_arrays, py::arg("before"), py::arg("after"), py::arg("faces"), py::arg("volume"),
+             py::kw_only(), py::arg("to_world") = py::none(), py::arg("mode") = "pull_back",
+             py::arg("outside") = "error", py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+             R"doc(Move the vertices of a mesh as far as the tolerance permits.
+
+Vertex v ends at before + f (after - before), rounded to the stored type, where f is its factor. All faces of the result
+are inside the volume, also where the factors of their corners differ. A vertex that touches no face that failed ends
+exactly at `after`, bit for bit.
+
+Parameters
+----------
+before, after : (n, 3) arrays, both float32 or both float64
+    Local coordinates before the motion and as they are wished.
+faces : (m, k) integer array
+    k is 1 (points), 2 (segments), 3 (triangles) or 4 (quads, which are kept inside in every triangulation). A triangle
+    among quads repeats a corner.
+volume : ToleranceVolume
+mode : {"pull_back", "reset"}
+    "pull_back" goes so far that no single factor can rise by 1/64 alone. With "reset" each factor is 0 or 1.
+outside : {"error", "keep"}
+    What happens if faces are outside before the motion: an error, or their vertices stay where they are.
+to_world, threads, progress
+    See help(tolvol).
+
+Returns
+-------
+ConstrainResult
+
+Raises
+------
+InvalidInput
+    If an array is not valid, if the stored type cannot hold the tolerance, or if faces are outside before the motion.
+Cancelled
+
+Notes
+-----
+Cost: about 1 us a vertex to certify the mesh before the motion. Each vertex that is held back costs 2 to 20 us if its
+neighbours move like it over a smooth reference, and 100 to 400 us if the reference is rough or each vertex is pushed in
+a direction of its own by several tolerances. Among large triangles that run through each other a search looks at a share
+of them all: with 3,000 random ones a vertex that is held back costs 1.2 ms.
+
+"reset" is from M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.)doc");
+
+  py::class_<LockedGuard>(module, "Guard", py::module_local(),
+                          R"doc(Keeps a mesh that is edited step by step inside a volume, as constrain does.
+
+An edit costs a comparison of all positions with the last ones and what it touches: about 1 ms for 1,000 of a million
+vertices, and for each vertex that is held back as much as in constrain.)doc")
+      .def(py::init(&make_guard), py::arg("positions"), py::arg("faces"), py::arg("volume"), py::kw_only(),
+           py::arg("to_world") = py::none(), py::arg("outside") = "error", py::arg("threads") = py::none(),
            py::arg("progress") = py::none(), py::keep_alive<1, 4>(),
-           "positions: (n, 3) float32, local, the state to start from. faces, outside: as for constrain. Raises "
-           "InvalidInput and\n"
-           "Cancelled. Cost: about 1 us a vertex.")
-      .def("constrain", &guard_constrain, py::arg("positions"), py::arg("progress") = py::none(),
-           "Takes the mesh as it was edited since the last call and returns (indices (k,) int32, positions (k, 3) "
-           "float32): the\n"
-           "vertices that have to go back, and where to; write them before the next call. All others stay bit for bit "
-           "as they came.\n"
-           "positions: (n, 3) float32, not copied when contiguous. Undo is an edit like others. Raises InvalidInput "
-           "for another\n"
-           "number of vertices and for one that moved and is not finite, and Cancelled; both keep the state.")
-      .def("reset", &guard_reset, py::arg("positions"), py::arg("progress") = py::none(),
-           "Starts anew from these positions. Raises InvalidInput, keeping the state, when faces are outside; "
-           "Cancelled. Cost: about\n"
-           "1 us a vertex.")
-      .def_property_readonly("vertex_count", [](const LockedGuard& guard) { return guard.native.vertex_count(); })
+           R"doc(Start from these positions.
+
+Parameters
+----------
+positions : (n, 3) float32 array
+    Local coordinates.
+faces, volume, outside
+    As for constrain.
+to_world, threads, progress
+    See help(tolvol). The progress is that of this call alone.
+
+Raises
+------
+InvalidInput
+    As constrain does.
+Cancelled
+
+Notes
+-----
+Cost: about 1 us a vertex.)doc")
+      .def("constrain", &guard_constrain, py::arg("positions"), py::kw_only(), py::arg("progress") = py::none(),
+           R"doc(Take the mesh as it was edited since the last call, and return the vertices that have to go back.
+
+Write the returned positions before the next call. All other vertices stay as they came, bit for bit. Undo is an edit
+like any other.
+
+Parameters
+----------
+positions : (n, 3) float32 array
+    It is not copied if it is contiguous.
+progress : Progress, optional
+
+Returns
+-------
+indices : (k,) int32 array
+positions : (k, 3) float32 array
+
+Raises
+------
+InvalidInput
+    If the number of vertices differs, or if a vertex that moved is not finite. The guard keeps its state.
+Cancelled
+    The guard keeps its state.)doc")
+      .def("reset", &guard_reset, py::arg("positions"), py::kw_only(), py::arg("progress") = py::none(),
+           R"doc(Start anew from these positions.
+
+Raises
+------
+InvalidInput
+    As the constructor does. The guard keeps its state.
+Cancelled
+    The guard keeps its state.
+
+Notes
+-----
+Cost: about 1 us a vertex.)doc")
+      .def_property_readonly(
+          "vertex_count", [](const LockedGuard& guard) { return guard.native.vertex_count(); },
+          "The number of vertices.")
       .def_property_readonly(
           "outside", [](const LockedGuard& guard) { return from_vector<std::int32_t>(guard.native.outside()); },
-          "(k,) int32: the faces that were outside at the start; their vertices never move.")
+          "(k,) int32: the faces that were outside at the start. Their vertices never move.")
       .def_property_readonly(
           "warning", [](const LockedGuard& guard) { return guard.native.warning(); },
-          "What the stored type costs at these coordinates, when it is 1 % of the tolerance or more; else None.");
+          "A sentence if the rounding of the stored type exceeds 1 % of the tolerance, else None.");
 }
 
 }  // namespace tolvol::python

@@ -60,9 +60,9 @@ py::dict make_report(const DecimationResult& r, std::size_t triangles_in, double
 
 Result decimate_arrays(const py::object& vertices, const py::object& triangles, const Volume* volume,
                        const py::object& to_world, const std::string& placement, bool two_sided,
-                       std::int64_t target_triangles, const py::object& locked, const py::object& shares,
+                       std::optional<std::int64_t> target_triangles, const py::object& locked, const py::object& shares,
                        const std::string& outside, const py::object& wedges, const std::string& effort,
-                       double max_seconds, int threads, Progress* progress) {
+                       std::optional<double> max_seconds, std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const StoredSpace space(to_matrix(to_world), v.storage);
@@ -73,11 +73,13 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
       choose(outside, "outside", "error", DecimationOptions::Outside::error, "keep", DecimationOptions::Outside::keep);
   options.effort = choose(effort, "effort", "fast", DecimationOptions::Effort::fast, "thorough",
                           DecimationOptions::Effort::thorough);
-  if (!(max_seconds >= 0)) throw InvalidInput("max_seconds must not be negative");
-  options.max_seconds = max_seconds;
+  if (max_seconds && !(*max_seconds > 0)) throw InvalidInput("max_seconds must be positive, or None for no limit");
+  options.max_seconds = max_seconds.value_or(0);
   options.two_sided = two_sided;
-  if (target_triangles < 0) throw InvalidInput("target_triangles must not be negative");
-  options.target_triangles = static_cast<std::size_t>(target_triangles);
+  if (target_triangles && *target_triangles < 1) {
+    throw InvalidInput("target_triangles must be at least 1, or None for as few as the tolerance permits");
+  }
+  options.target_triangles = static_cast<std::size_t>(target_triangles.value_or(0));
   py::array_t<bool, py::array::c_style> locked_values;
   if (!locked.is_none()) {
     locked_values = to_values<bool>(locked, "locked must be a bool array, one value for each vertex");
@@ -140,58 +142,110 @@ py::array_t<std::int32_t> wedges(const py::object& triangles, const py::object& 
 
 void bind_decimation(py::module_& module) {
   py::class_<Result>(module, "DecimationResult", py::module_local(),
-                     "A decimated mesh, and where each part of it came from.")
-      .def_readonly("vertices", &Result::vertices, "(k, 3), the input's dtype, local coordinates.")
-      .def_readonly("triangles", &Result::triangles, "(l, 3) int32.")
+                     "The mesh that decimate returns, and where each part of it came from.")
+      .def_readonly("vertices", &Result::vertices, "(k, 3) array of the input's dtype: local coordinates.")
+      .def_readonly("triangles", &Result::triangles, "(l, 3) int32: indices of `vertices`.")
       .def_readonly("vertex_map", &Result::vertex_map,
-                    "(n,) int32: the result vertex that each input vertex was merged into; -1: no triangle uses it.")
+                    "(n,) int32: the result vertex that each input vertex was merged into, or -1 if no triangle uses "
+                    "it.")
       .def_readonly("vertex_source", &Result::vertex_source,
                     "(k,) int32: the input vertex that each result vertex continues.")
       .def_readonly("triangle_source", &Result::triangle_source,
-                    "(l,) int32: the input triangle that each result triangle continues: unless edges around it were "
-                    "flipped, its\n"
-                    "corners are vertex_map of that triangle's corners, in order.")
-      .def_readonly("source_triangle", &Result::source_triangle,
-                    "(l, 3) int32: for each result corner the input triangle that its attributes are read from.")
-      .def_readonly("source_weights", &Result::source_weights, "(l, 3, 3) float64: the barycentric weights there.")
-      .def_readonly("report", &Result::report,
-                    "dict: triangles_in, triangles_out, seconds, stopped_by (\"tolerance\", \"target\", \"time\" or "
-                    "\"request\"), method,\n"
-                    "renderer, repairs (kind, count, message), locked (vertices by cause), outside (faces, first, "
-                    "reference_faces), warnings.");
+                    R"doc((l,) int32: the input triangle that each result triangle continues.
 
-  module.def(
-      "decimate", &decimate_arrays, py::arg("vertices"), py::arg("triangles"), py::arg("volume").none(true),
-      py::arg("to_world") = py::none(), py::arg("placement") = "optimal", py::arg("two_sided") = true,
-      py::arg("target_triangles") = 0, py::arg("locked") = py::none(), py::arg("shares") = py::none(),
-      py::arg("outside") = "error", py::arg("wedges") = py::none(), py::arg("effort") = "fast",
-      py::arg("max_seconds") = 0.0, py::arg("threads") = 0, py::arg("progress") = py::none(),
-      "Fewest triangles within the volume's tolerance: every point of the result within it of the reference and,\n"
-      "two_sided, every point of the reference within it of the result.\n\n"
-      "placement: \"optimal\" (fewest triangles) or \"subset\" (every surviving vertex is an original one, bit for\n"
-      "bit). target_triangles: stop there if the tolerance lets it get so far; 0: as few as possible. locked: (n,) "
-      "bool,\n"
-      "vertices that neither move nor vanish; an edge between two of them stays. shares: (n,) float64, 0 to 1, how "
-      "much\n"
-      "of the tolerance the new faces around a vertex may use: so near to the reference does the result stay there.\n"
-      "outside: \"error\", or \"keep\" the input faces that are not within the tolerance as they are. wedges: (m, 3)\n"
-      "labels from wedges(). effort: \"fast\", or \"thorough\": then vertices move and edges flip to make room for\n"
-      "further collapses, which leaves a seventh to a fifth fewer triangles in two to five times the processor time, "
-      "at\n"
-      "0.1 % five to seven times. max_seconds (0: none) ends either effort with what is proved by then, which depends "
-      "on\n"
-      "the machine's speed. It does not cut short the preparation, in which the mesh is set up and the input "
-      "certified:\n"
-      "about 0.7 us a triangle, and 2 us where the input is not the reference itself. volume None: no tolerance at "
-      "all,\n"
-      "for comparison; a target is needed.\n"
-      "Raises InvalidInput and Cancelled. Cost of \"fast\": 4 to 6 us a triangle at 1 % on one thread, without the "
-      "grid.\n"
-      "Quadric error metric: M. Garland, P. Heckbert, 1997.");
+The corners of a result triangle are vertex_map of the corners of that input triangle, in order, unless edges around it
+were flipped.)doc")
+      .def_readonly("source_triangle", &Result::source_triangle,
+                    "(l, 3) int32: for each corner of the result the input triangle that its attributes are read from.")
+      .def_readonly("source_weights", &Result::source_weights,
+                    "(l, 3, 3) float64: for each corner of the result the barycentric weights in that input triangle.")
+      .def_readonly("report", &Result::report, R"doc(A dict with these entries:
+
+triangles_in, triangles_out : the number of triangles before and after
+seconds : the time that the call took
+stopped_by : "tolerance", "target", "time" or "request"
+method, renderer : which check was used, and what computed it
+repairs : a list of dicts with `kind`, `count` and `message`
+locked : a dict from a cause to the number of vertices that could not move
+outside : a dict of `faces`, the number of input faces that were outside and were kept, `first`, the first of them, and
+    `reference_faces`, the number of reference faces that were beyond the tolerance of the input
+warnings : a list of sentences)doc");
+
+  module.def("decimate", &decimate_arrays, py::arg("vertices"), py::arg("triangles"), py::arg("volume").none(true),
+             py::kw_only(), py::arg("to_world") = py::none(), py::arg("placement") = "optimal",
+             py::arg("two_sided") = true, py::arg("target_triangles") = py::none(), py::arg("locked") = py::none(),
+             py::arg("shares") = py::none(), py::arg("outside") = "error", py::arg("wedges") = py::none(),
+             py::arg("effort") = "fast", py::arg("max_seconds") = py::none(), py::arg("threads") = py::none(),
+             py::arg("progress") = py::none(),
+             R"doc(Reduce a mesh to few triangles within the tolerance of a volume.
+
+Every point of the result is within the tolerance of the reference and, with two_sided, every point of the reference is
+within the tolerance of the result. Both are proved.
+
+Parameters
+----------
+vertices : (n, 3) float32 or float64 array
+    Local coordinates.
+triangles : (m, 3) integer array
+volume : ToleranceVolume or None
+    None decimates without a tolerance, for comparison. This needs target_triangles.
+placement : {"optimal", "subset"}
+    "optimal" leaves the fewest triangles. With "subset" every vertex of the result is an original one, bit for bit.
+two_sided : bool
+    Whether the reference, too, is kept within the tolerance of the result.
+target_triangles : int, optional
+    Stop at this many triangles, if the tolerance permits so few. None goes on to as few as it permits.
+locked : (n,) bool array, optional
+    Vertices that neither move nor vanish. An edge between two of them stays.
+shares : (n,) float64 array, optional
+    From 0 to 1: the share of the tolerance that the new faces around a vertex may use.
+outside : {"error", "keep"}
+    What happens if input faces are not within the tolerance: an error, or they stay as they are.
+wedges : (m, 3) integer array, optional
+    Labels of corners, from the function wedges. Seams between corners of different labels are kept.
+effort : {"fast", "thorough"}
+    "thorough" then moves vertices and flips edges to make room for further collapses. It leaves a seventh to a fifth
+    fewer triangles in two to five times the processor time, at a tolerance of 0.1 % in five to seven times.
+max_seconds : float, optional
+    Stop after this time with what is proved by then, which depends on the speed of the machine. The time does not cut
+    short the preparation, in which the mesh is set up and the input is certified: about 0.7 us a triangle, and 2 us if
+    the input is not the reference itself.
+to_world, threads, progress
+    See help(tolvol).
+
+Returns
+-------
+DecimationResult
+
+Raises
+------
+InvalidInput
+    If an argument or the mesh is not valid, if the stored type cannot hold the tolerance, or if the input is outside.
+Cancelled
+
+Notes
+-----
+Cost of "fast": 4 to 6 us a triangle at a tolerance of 1 % on one thread, without the grid of the volume.
+
+The order of the collapses is that of M. Garland, P. Heckbert, Surface Simplification Using Quadric Error Metrics, 1997.)doc");
   module.def("wedges", &wedges, py::arg("triangles"), py::arg("corners"),
-             "(m, 3) int32 labels: two corners have the same label exactly when they are at the same vertex and all "
-             "their values\n"
-             "are equal. corners: (m, 3, k) float32, for example UVs.");
+             R"doc(Return labels that tell the corners with different values at one vertex apart.
+
+Two corners have the same label if and only if they are at the same vertex and all their values are equal.
+
+Parameters
+----------
+triangles : (m, 3) integer array
+corners : (m, 3, k) float32 array
+    The values of each corner, for example its UV coordinates.
+
+Returns
+-------
+(m, 3) int32 array
+
+Raises
+------
+InvalidInput)doc");
 }
 
 }  // namespace tolvol::python

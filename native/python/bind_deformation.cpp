@@ -132,14 +132,14 @@ py::dict make_report(const DeformationResult& r, double seconds) {
   return report;
 }
 
-Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, const py::object& triangles,
+Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, const py::object& faces,
                      const Volume* volume, const py::object& to_world, const std::string& mode,
-                     const std::string& outside, int threads, Progress* progress) {
+                     const std::string& outside, std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   int corners = 3;
-  std::vector<std::uint32_t> faces;
-  if (!triangles.is_none()) faces = to_faces(triangles, "triangles", corners);
-  if (volume && triangles.is_none()) throw InvalidInput("with a volume triangles are needed, to be kept within it");
+  std::vector<std::uint32_t> indices;
+  if (!faces.is_none()) indices = to_faces(faces, "faces", corners);
+  if (volume && faces.is_none()) throw InvalidInput("with a volume faces are needed, to be kept within it");
   const StoredSpace placed(to_matrix(to_world), v.storage);
   DeformationOptions options;
   options.mode = to_mode(mode);
@@ -151,7 +151,7 @@ Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, c
   {
     const Interruptible call(progress);
     const auto start = std::chrono::steady_clock::now();
-    r = deform(v.values, faces, corners, placed, volume ? &volume->native : nullptr, lattice.native, options);
+    r = deform(v.values, indices, corners, placed, volume ? &volume->native : nullptr, lattice.native, options);
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
   return {from_vertices(r.vertices, v.storage), make_report(r, seconds)};
@@ -161,71 +161,121 @@ Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, c
 
 void bind_deformation(py::module_& module) {
   py::class_<PythonLattice>(module, "Lattice", py::module_local(),
-                            "Control points of a trivariate NURBS function that deforms the space of a box.\n\n"
-                            "At rest the points are the regular grid of the box (lattice_points), and then nothing is "
-                            "deformed, whatever the\n"
-                            "degree and the knots.")
-      .def(py::init(&make_lattice), py::arg("points"), py::arg("domain") = py::none(), py::arg("degree") = py::none(),
-           py::arg("weights") = py::none(), py::arg("knots") = py::none(),
-           "points: (nu, nv, nw, 3), where the control points are now, world units, at least 2 along each axis. "
-           "domain: (4, 4),\n"
-           "maps the unit cube to the box in the world, origin + 3 edges; None is the unit cube. degree: an integer "
-           "or three, from\n"
-           "1 to the number of points less 1, which is Bernstein's (at most 15); None is 3, or as much as the points "
-           "allow.\n"
-           "weights: (nu, nv, nw), positive; None is all equal. knots: for each axis an array of points + degree + 1 "
-           "values,\n"
-           "clamped, or None, which is uniform. Raises InvalidInput.\n"
-           "T. W. Sederberg, S. R. Parry, Free-form deformation of solid geometric models, 1986; L. Piegl, W. Tiller, "
-           "The NURBS\n"
-           "Book, 1997.")
+                            R"doc(Control points of a trivariate NURBS function that deforms the space of a box.
+
+At rest the points are the regular grid of the box (see lattice_points). Nothing is then deformed, whatever the degree
+and the knots are.)doc")
+      .def(py::init(&make_lattice), py::arg("points"), py::arg("domain") = py::none(), py::kw_only(),
+           py::arg("degree") = py::none(), py::arg("weights") = py::none(), py::arg("knots") = py::none(),
+           R"doc(Make a lattice.
+
+Parameters
+----------
+points : (nu, nv, nw, 3) array
+    Where the control points are now, in world units; at least 2 along each axis.
+domain : (4, 4) array, optional
+    Maps the unit cube to the box in the world: origin + 3 edges. None is the unit cube.
+degree : int or three ints, optional
+    From 1 to the number of points less 1, where the functions are Bernstein's; at most 15. None is 3, or as much as the
+    points permit.
+weights : (nu, nv, nw) array, optional
+    Positive weights of the control points. None makes all equal.
+knots : three arrays or Nones, optional
+    For each axis (points + degree + 1,) values, clamped, or None for uniform knots.
+
+Raises
+------
+InvalidInput
+
+References
+----------
+T. W. Sederberg, S. R. Parry, Free-form deformation of solid geometric models, 1986.
+L. Piegl, W. Tiller, The NURBS Book, 1997.)doc")
       .def_property_readonly(
           "shape", [](const PythonLattice& l) { return py::make_tuple(l.size.x, l.size.y, l.size.z); },
-          "Control points along each axis.")
+          "The number of control points along each axis.")
       .def_property_readonly(
           "degree", [](const PythonLattice& l) { return py::make_tuple(l.degree.x, l.degree.y, l.degree.z); },
-          "Along each axis.");
+          "The degree along each axis.");
 
   module.def("lattice_points", &lattice_points, py::arg("shape"), py::arg("domain") = py::none(),
-             "(nu, nv, nw, 3) float64: the control points of a Lattice at rest. shape: an integer or three, at least "
-             "2. domain: as for\n"
-             "Lattice. Raises InvalidInput.");
+             R"doc(Return the control points of a Lattice at rest.
 
-  py::class_<Result>(module, "DeformationResult", py::module_local(), "A deformed mesh.")
-      .def_readonly("vertices", &Result::vertices, "(n, 3), the input's dtype, local coordinates.")
-      .def_readonly(
-          "report", &Result::report,
-          "dict: permitted_fraction (0 to 1: the share of the way at which the whole mesh is certified to be inside, "
-          "found by\n"
-          "bisection to a thousandth; 1 without a volume; None where vertices were pulled back instead), leaving "
-          "(faces, first: of the\n"
-          "deformation as wished, not certified to be inside), outside (faces, first: outside to begin with and kept "
-          "as they\n"
-          "are), outside_lattice (vertices that are not in the box), moved and held_back (vertices of the result that "
-          "are not\n"
-          "where they were, or not where they were to go), largest_motion (world units), method, renderer, seconds, "
-          "warnings.");
+Parameters
+----------
+shape : int or three ints
+    The number of points along each axis, at least 2.
+domain : (4, 4) array, optional
+    As for Lattice.
 
-  module.def(
-      "deform", &deform_arrays, py::arg("vertices"), py::arg("lattice"), py::arg("triangles") = py::none(),
-      py::arg("volume").none(true) = py::none(), py::arg("to_world") = py::none(), py::arg("mode") = "blocked",
-      py::arg("outside") = "error", py::arg("threads") = 0, py::arg("progress") = py::none(),
-      "Deforms the space in the box of `lattice`, and with it the mesh; vertices outside of the box stay where "
-      "they are.\n\n"
-      "vertices: (n, 3) float32 or float64, local. triangles: (m, 3) integers, or (m, 4) for quads in every "
-      "triangulation\n"
-      "(a triangle among them repeats a corner); needed with a volume. volume: a ToleranceVolume that the result "
-      "has to stay\n"
-      "in, or None. mode: what becomes of a deformation that is not certified inside as a whole: \"blocked\" "
-      "(nothing moves;\n"
-      "the report says how far it may go), \"farthest\" (every vertex goes that permitted share of its way) or "
-      "\"pull_back\"\n"
-      "(each vertex goes as far as it may, see constrain). outside: \"error\", or \"keep\" the vertices of "
-      "faces that are\n"
-      "outside to begin with where they are. Raises InvalidInput and Cancelled. Cost: about 0.4 us a vertex, "
-      "and with a\n"
-      "volume one check; when that fails some twelve, or constrain.\n"
-      "M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.");
+Returns
+-------
+(nu, nv, nw, 3) float64 array
+    World units.
+
+Raises
+------
+InvalidInput)doc");
+
+  py::class_<Result>(module, "DeformationResult", py::module_local(), "The mesh that deform returns.")
+      .def_readonly("vertices", &Result::vertices, "(n, 3) array of the input's dtype: local coordinates.")
+      .def_readonly("report", &Result::report, R"doc(A dict with these entries:
+
+permitted_fraction : from 0 to 1, the share of the way at which the whole mesh is certified to be inside, found by
+    bisection to a thousandth; 1 without a volume; None if vertices were pulled back instead
+leaving : a dict of `faces`, the number of faces that the deformation as wished would not leave certified inside, and
+    `first`, the first of them
+outside : the same for faces that were outside before the deformation and were kept as they are
+outside_lattice : the number of vertices that are not in the box
+moved : the number of vertices of the result that are not where they were
+held_back : the number of vertices of the result that are not where they were to go
+largest_motion : the longest way of a vertex, in world units
+method, renderer : which check was used, and what computed it
+seconds : the time that the call took
+warnings : a list of sentences)doc");
+
+  module.def("deform", &deform_arrays, py::arg("vertices"), py::arg("lattice"), py::arg("faces") = py::none(),
+             py::arg("volume").none(true) = py::none(), py::kw_only(), py::arg("to_world") = py::none(),
+             py::arg("mode") = "blocked", py::arg("outside") = "error", py::arg("threads") = py::none(),
+             py::arg("progress") = py::none(),
+             R"doc(Deform the space in the box of a lattice, and with it a mesh, within the tolerance of a volume.
+
+Vertices outside of the box stay where they are.
+
+Parameters
+----------
+vertices : (n, 3) float32 or float64 array
+    Local coordinates.
+lattice : Lattice
+faces : (m, k) integer array, optional
+    k is 1 (points), 2 (segments), 3 (triangles) or 4 (quads, which are kept inside in every triangulation). A triangle
+    among quads repeats a corner. With a volume the faces are needed.
+volume : ToleranceVolume, optional
+    The result has to stay in it.
+mode : {"blocked", "farthest", "pull_back"}
+    What happens to a deformation that is not certified inside as a whole. "blocked" moves nothing, and the report says
+    how far the deformation may go. "farthest" moves every vertex that permitted share of its way. "pull_back" moves each
+    vertex as far as it may go, as constrain does.
+outside : {"error", "keep"}
+    What happens if faces are outside before the deformation: an error, or their vertices stay where they are.
+to_world, threads, progress
+    See help(tolvol).
+
+Returns
+-------
+DeformationResult
+
+Raises
+------
+InvalidInput
+    If an argument is not valid, if the stored type cannot hold the tolerance, or if faces are outside before.
+Cancelled
+
+Notes
+-----
+Cost: about 0.4 us a vertex, and with a volume one check. If that check fails: some twelve checks, or constrain.
+
+After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.)doc");
 }
 
 }  // namespace tolvol::python

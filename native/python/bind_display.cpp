@@ -44,7 +44,8 @@ py::array_t<double> to_frame(const Display& display) {
 }
 
 std::vector<double> shares(const Display& display, const py::object& vertices, const py::object& triangles,
-                           std::vector<double> edges, const py::object& to_world, int threads, Progress* progress) {
+                           std::vector<double> edges, const py::object& to_world, std::optional<int> threads,
+                           Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const StoredSpace space = StoredSpace(to_matrix(to_world), v.storage).in(display.frame);
@@ -63,48 +64,85 @@ std::vector<double> shares(const Display& display, const py::object& vertices, c
 }  // namespace
 
 void bind_display(py::module_& module) {
-  py::class_<Display>(
-      module, "DisplayTree", py::module_local(),
-      "The triangles of a volume's reference in a tree of boxes, with which shaders/surface_distance.glsl computes the "
-      "distance\n"
-      "of every pixel. The tree is the same for every tolerance. It serves to show a mesh and proves nothing.")
-      .def(py::init(&make_display), py::arg("volume"), py::arg("progress") = py::none(),
-           "Raises InvalidInput (more than 16,777,216 triangles), Cancelled. Cost: about 0.1 s for 270,000 triangles.")
+  py::class_<Display>(module, "DisplayTree", py::module_local(),
+                      R"doc(The triangles of a volume's reference in a tree of boxes, for a shader.
+
+With it shaders/surface_distance.glsl computes the distance of every pixel. The tree is the same for every tolerance. It
+serves to show a mesh and proves nothing.)doc")
+      .def(py::init(&make_display), py::arg("volume"), py::kw_only(), py::arg("progress") = py::none(),
+           R"doc(Build the tree.
+
+Parameters
+----------
+volume : ToleranceVolume
+progress : Progress, optional
+
+Raises
+------
+InvalidInput
+    If the reference has more than 16,777,216 triangles.
+Cancelled
+
+Notes
+-----
+Cost: about 0.1 s for 270,000 triangles.)doc")
       .def_property_readonly(
           "nodes",
           [](const py::object& self) {
             const auto& nodes = py::cast<const Display&>(self).native.nodes;
             return texels(self, &nodes[0].lower.x, 2 * nodes.size());
           },
-          "(4 leaves, 4) float32, a read-only view, two rows a node: its box in the frame, with the first of its "
-          "triangles and the\n"
-          "one after the last in the fourth column. The halves of node i are 2 i and 2 i + 1, the root is 1.")
+          R"doc((4 l, 4) float32 for l leaves: two rows a node, read-only.
+
+The first three columns are the two corners of the node's box in the frame. The fourth column holds the first of its
+triangles and the one after the last. The halves of node i are the nodes 2 i and 2 i + 1, and the root is node 1.)doc")
       .def_property_readonly(
           "corners",
           [](const py::object& self) {
             const auto& corners = py::cast<const Display&>(self).native.corners;
             return texels(self, &corners[0].x, corners.size());
           },
-          "(3 m, 4) float32, a read-only view: the corners of the triangles in the frame, turned so that their fronts "
-          "are outside.")
-      .def_property_readonly("to_frame", &to_frame, "(4, 4) float64: from the world to the frame.")
+          "(3 m, 4) float32: the corners of the triangles in the frame, turned so that their fronts are outside; "
+          "read-only.")
+      .def_property_readonly("to_frame", &to_frame, "(4, 4) float64: maps the world to the frame.")
       .def_property_readonly(
-          "scale", [](const Display& d) { return d.frame.scale(); }, "Frame length of a world length of 1.")
+          "scale", [](const Display& d) { return d.frame.scale(); }, "The length in the frame of 1 world unit.")
       .def_property_readonly_static(
           "ROUNDING", [](const py::object&) { return DisplayTree::kRounding; },
-          "Frame length that a distance in a shader may be off by: what is nearer is shown as no distance.")
+          "The rounding of a distance in a shader, as a length in the frame. What is nearer is shown as no distance.")
       .def_property_readonly(
           "closed", [](const Display& d) { return d.native.closed; },
-          "Whether the reference has an inside: every edge has two faces that agree on it. Elsewhere signs are a "
+          "Whether the reference has an inside: every edge has two faces that agree on it. Otherwise signs are a "
           "guess.")
-      .def("shares", &shares, py::arg("vertices"), py::arg("triangles"), py::arg("edges"),
-           py::arg("to_world") = py::none(), py::arg("threads") = 0, py::arg("progress") = py::none(),
-           "The shares of a mesh's area, 0 to 1, whose signed distance lies between ascending `edges` (world units): "
-           "len(edges) + 1\n"
-           "numbers, from beyond the first to beyond the last; what is farther than all edges on either side is in the "
-           "last. By one\n"
-           "sample a triangle and 65,536 more. Raises InvalidInput, Cancelled. About 0.3 s of one thread for 270,000 "
-           "triangles.");
+      .def("shares", &shares, py::arg("vertices"), py::arg("triangles"), py::arg("edges"), py::kw_only(),
+           py::arg("to_world") = py::none(), py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+           R"doc(Return the shares of a mesh's area whose signed distance lies between given edges.
+
+Parameters
+----------
+vertices : (n, 3) float32 or float64 array
+    Local coordinates.
+triangles : (m, 3) integer array
+edges : sequence of k floats
+    Ascending, in world units.
+to_world, threads, progress
+    See help(tolvol).
+
+Returns
+-------
+list of k + 1 floats
+    From 0 to 1: from the share beyond the first edge to the share beyond the last one. What is farther away than all
+    edges, on either side, is in the last share.
+
+Raises
+------
+InvalidInput
+Cancelled
+
+Notes
+-----
+The shares are estimates by one sample a triangle and 65,536 more. Cost: about 0.3 s of one thread for 270,000
+triangles.)doc");
 }
 
 }  // namespace tolvol::python

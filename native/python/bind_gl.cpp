@@ -29,10 +29,22 @@ void shutdown() {}
 
 void bind_gl(py::module_& module) {
   module.def("renderer", &renderer,
-             "Name, GL version and vendor of what draws pictures and runs the GL checks. Starts it on first use.\n"
-             "Raises GlUnavailable, with the reason, where there is no OpenGL 4.5; everything else works without.");
+             R"doc(Return name, GL version and vendor of what draws pictures and runs the GL checks.
+
+The first call starts OpenGL.
+
+Returns
+-------
+str
+
+Raises
+------
+GlUnavailable
+    If there is no OpenGL 4.5. Everything but pictures and the GL checks works without.)doc");
   module.def("shutdown", &shutdown,
-             "Ends the thread that owns the GL context, and frees what it holds. The next use starts anew.");
+             R"doc(End the thread that owns the GL context, and free what it holds.
+
+The next call that needs OpenGL starts it again.)doc");
   // Before the interpreter goes: a driver that is unloaded under a living context crashes.
   py::module_::import("atexit").attr("register")(module.attr("shutdown"));
 }

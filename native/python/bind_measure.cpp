@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/stl.h>
 
+#include <algorithm>
+
 #include "measure/deviation.h"
 #include "measure/hausdorff.h"
 #include "python/arrays.h"
@@ -32,95 +34,200 @@ py::array_t<double> ranges_of(const std::vector<Estimate>& estimates) {
   return ranges;
 }
 
+/// What hausdorff found: each direction, and the larger one of the two.
+struct BothWays {
+  HausdorffInterval forward, backward;
+};
+
 }  // namespace
 
 void bind_measure(py::module_& module) {
-  py::class_<HausdorffInterval>(module, "HausdorffInterval", py::module_local(), "What hausdorff found.")
-      .def_readonly("lower", &HausdorffInterval::lower)
-      .def_readonly("upper", &HausdorffInterval::upper)
+  py::class_<HausdorffInterval>(module, "DirectedHausdorffResult", py::module_local(),
+                                "The interval that directed_hausdorff found, in the units of the meshes.")
+      .def_readonly("lower", &HausdorffInterval::lower, "The largest distance is at least this.")
+      .def_readonly("upper", &HausdorffInterval::upper, "The largest distance is at most this.")
       .def_property_readonly(
           "position",
           [](const HausdorffInterval& i) { return py::make_tuple(i.position.x, i.position.y, i.position.z); },
-          "The point of a where the distance is at least `lower`.")
-      .def_readonly("triangle", &HausdorffInterval::triangle, "The triangle of a it lies on.");
+          "(x, y, z): a point of mesh a whose distance from mesh b is at least `lower`, up to rounding.")
+      .def_readonly("triangle", &HausdorffInterval::triangle, "The index of the triangle of mesh a with that point.");
+  py::class_<BothWays>(module, "HausdorffResult", py::module_local(),
+                       "The interval that hausdorff found, in the units of the meshes.")
+      .def_property_readonly(
+          "lower", [](const BothWays& b) { return std::max(b.forward.lower, b.backward.lower); },
+          "The Hausdorff distance is at least this.")
+      .def_property_readonly(
+          "upper", [](const BothWays& b) { return std::max(b.forward.upper, b.backward.upper); },
+          "The Hausdorff distance is at most this.")
+      .def_readonly("forward", &BothWays::forward, "The DirectedHausdorffResult from mesh a to mesh b.")
+      .def_readonly("backward", &BothWays::backward, "The DirectedHausdorffResult from mesh b to mesh a.");
   module.def(
-      "hausdorff",
+      "directed_hausdorff",
       [](const py::object& va, const py::object& ta, const py::object& vb, const py::object& tb,
-         std::optional<double> bound, int threads, Progress* progress) {
+         std::optional<double> bound, std::optional<int> threads, Progress* progress) {
         const TriangleMesh a = to_mesh(va, ta, "_a"), b = to_mesh(vb, tb, "_b");
         const Interruptible call(progress);
         return hausdorff(a, b, {bound, to_threads(threads), progress});
       },
-      py::arg("vertices_a"), py::arg("triangles_a"), py::arg("vertices_b"), py::arg("triangles_b"),
-      py::arg("bound") = py::none(), py::arg("threads") = 0, py::arg("progress") = py::none(),
-      "The largest distance of a point of a to b, as a certified interval: lower <= distance <= upper in exact "
-      "arithmetic. World\n"
-      "coordinates. Refined until it decides against `bound`, and until upper - lower <= 1 % of upper. Cost: about 2 "
-      "us a\n"
-      "triangle. Corners of b that are far away neither widen the interval nor cost time. Raises InvalidInput, "
-      "Cancelled.");
+      py::arg("vertices_a"), py::arg("triangles_a"), py::arg("vertices_b"), py::arg("triangles_b"), py::kw_only(),
+      py::arg("bound") = py::none(), py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+      R"doc(Return the largest distance of a point of mesh a from mesh b, as a certified interval.
 
-  py::class_<Sides>(module, "Sides", py::module_local(), "The two sides of a closed surface; outside is above 0.")
+The interval holds the directed Hausdorff distance of the two surfaces, over every point of every triangle and not over
+samples, in exact arithmetic on the coordinates as they are given: all rounding is inside the interval.
+
+Parameters
+----------
+vertices_a, vertices_b : (n, 3) float32 or float64 arrays
+    Coordinates in one space, as a rule the world. The result is in their unit.
+triangles_a, triangles_b : (m, 3) integer arrays
+bound : float, optional
+    A length to compare with. The search goes on until upper <= bound or lower > bound. It ends at once if
+    lower > bound; the interval may then be wide.
+threads, progress
+    See help(tolvol).
+
+Returns
+-------
+DirectedHausdorffResult
+    Its `upper` - `lower` is at most 0.1 % of `upper`, unless the distance is rounding itself or the search would need
+    many millions of pieces. The interval is true in every case.
+
+Raises
+------
+InvalidInput
+    If a mesh is not valid, or if bound is negative or not a number.
+Cancelled
+
+Notes
+-----
+Cost: below 1 us for each triangle of a and of b, then as much for each piece that a is cut into. The two directions
+between a scan of 270,000 triangles and its decimation to 200 take 0.1 s each.)doc");
+  module.def(
+      "hausdorff",
+      [](const py::object& va, const py::object& ta, const py::object& vb, const py::object& tb,
+         std::optional<double> bound, std::optional<int> threads, Progress* progress) {
+        const TriangleMesh a = to_mesh(va, ta, "_a"), b = to_mesh(vb, tb, "_b");
+        const HausdorffOptions options{bound, to_threads(threads), progress};
+        const Interruptible call(progress);
+        return BothWays{hausdorff(a, b, options), hausdorff(b, a, options)};
+      },
+      py::arg("vertices_a"), py::arg("triangles_a"), py::arg("vertices_b"), py::arg("triangles_b"), py::kw_only(),
+      py::arg("bound") = py::none(), py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+      R"doc(Return the Hausdorff distance of two meshes, as a certified interval.
+
+This is the larger one of the two directed distances. Parameters, errors and cost are those of directed_hausdorff, which
+this function calls for each direction.
+
+Returns
+-------
+HausdorffResult
+    The interval from `lower` to `upper`, and the DirectedHausdorffResult of each direction: `forward` from mesh a to
+    mesh b, and `backward` from mesh b to mesh a.)doc");
+
+  py::class_<Sides>(module, "Sides", py::module_local(),
+                    "The part of a DeviationResult that tells the two sides of a closed mesh b apart.\n\n"
+                    "Distances are above 0 outside of b and below 0 inside.")
       .def_property_readonly(
-          "mean", [](const Sides& s) { return s.mean.value; }, "With its sign, weighted by area.")
-      .def_property_readonly("mean_range", [](const Sides& s) { return to_pair(s.mean.range); })
+          "mean", [](const Sides& s) { return s.mean.value; }, "The mean of the signed distance, weighted by area.")
       .def_property_readonly(
-          "share_inside", [](const Sides& s) { return s.share_inside.value; }, "Of the area, 0 to 1.")
-      .def_property_readonly("share_inside_range", [](const Sides& s) { return to_pair(s.share_inside.range); })
+          "mean_range", [](const Sides& s) { return to_pair(s.mean.range); },
+          "(lower, upper): the true mean lies between them.")
+      .def_property_readonly(
+          "share_inside", [](const Sides& s) { return s.share_inside.value; },
+          "The share of the area of mesh a that is inside, from 0 to 1.")
+      .def_property_readonly(
+          "share_inside_range", [](const Sides& s) { return to_pair(s.share_inside.range); },
+          "(lower, upper): the true share lies between them.")
       .def_property_readonly(
           "inside", [](const Sides& s) { return to_pair(s.inside); },
-          "Range of the largest distance inside, 0 or more.")
+          "(lower, upper): the largest distance inside lies between them. Neither is negative.")
       .def_property_readonly(
-          "outside", [](const Sides& s) { return to_pair(s.outside); }, "The same outside.");
+          "outside", [](const Sides& s) { return to_pair(s.outside); },
+          "(lower, upper): the largest distance outside lies between them. Neither is negative.");
   py::class_<Deviation>(
-      module, "Deviation", py::module_local(),
-      "What deviation found; distances in the units of the meshes. A `..._range` is the interval that "
-      "the true number is in,\n"
-      "whatever lies between the samples.")
+      module, "DeviationResult", py::module_local(),
+      "The distances from mesh a to mesh b that deviation found, in the units of the meshes.\n\n"
+      "Each number is weighted by area. The attribute with the same name and `_range` is the interval that holds the\n"
+      "true number, whatever lies between the samples.")
       .def_property_readonly(
-          "mean", [](const Deviation& d) { return d.mean.value; }, "Weighted by area, as all of these.")
-      .def_property_readonly("mean_range", [](const Deviation& d) { return to_pair(d.mean.range); })
+          "mean", [](const Deviation& d) { return d.mean.value; }, "The mean distance.")
+      .def_property_readonly(
+          "mean_range", [](const Deviation& d) { return to_pair(d.mean.range); },
+          "(lower, upper): the true mean lies between them.")
       .def_readonly("mean_error", &Deviation::mean_error, "The standard error of the mean is at most this.")
-      .def_property_readonly("rms", [](const Deviation& d) { return d.rms.value; })
-      .def_property_readonly("rms_range", [](const Deviation& d) { return to_pair(d.rms.range); })
+      .def_property_readonly(
+          "rms", [](const Deviation& d) { return d.rms.value; }, "The root of the mean squared distance.")
+      .def_property_readonly(
+          "rms_range", [](const Deviation& d) { return to_pair(d.rms.range); },
+          "(lower, upper): the true RMS lies between them.")
       .def_property_readonly(
           "share_beyond", [](const Deviation& d) { return values_of(d.share_beyond); },
-          "(k,) float64: the share of the area that is farther than each bound, 0 to 1.")
+          "(k,) float64: for each bound the share of the area that is farther away, from 0 to 1.")
       .def_property_readonly(
-          "share_beyond_range", [](const Deviation& d) { return ranges_of(d.share_beyond); }, "(k, 2) float64.")
+          "share_beyond_range", [](const Deviation& d) { return ranges_of(d.share_beyond); },
+          "(k, 2) float64: the true shares lie between these.")
       .def_property_readonly(
           "percentiles", [](const Deviation& d) { return values_of(d.percentiles); },
-          "(p,) float64: the least distance that so many % of the area do not exceed.")
+          "(p,) float64: for each percentile the least distance that so many % of the area do not exceed.")
       .def_property_readonly(
-          "percentiles_range", [](const Deviation& d) { return ranges_of(d.percentiles); }, "(p, 2) float64.")
+          "percentiles_range", [](const Deviation& d) { return ranges_of(d.percentiles); },
+          "(p, 2) float64: the true percentiles lie between these.")
       .def_property_readonly(
           "distances", [](const Deviation& d) { return from_vector<double>(d.distances); },
-          "(samples,) float64, for histograms; below 0 inside, where b is closed.")
+          "(s,) float64: the distance of each sample, for histograms. It is below 0 inside of b, if b is closed.")
       .def_property_readonly(
           "weights", [](const Deviation& d) { return from_vector<double>(d.weights); },
-          "(samples,) float64: the share of the area that each sample stands for, together 1.")
-      .def_readonly("sides", &Deviation::sides, "Sides where b is closed, else None.")
-      .def_readonly("spacing", &Deviation::spacing, "Side of the square that a sample stands for, in the middle.");
+          "(s,) float64: the share of the area that each sample stands for. The sum is 1.")
+      .def_readonly("sides", &Deviation::sides, "A Sides object if b is closed, else None.")
+      .def_readonly("spacing", &Deviation::spacing,
+                    "The side of a square of the area that a sample stands for on average.");
   module.def(
       "deviation",
       [](const py::object& va, const py::object& ta, const py::object& vb, const py::object& tb,
-         const std::vector<double>& bounds, const std::vector<double>& percentiles, int threads, Progress* progress) {
+         const std::vector<double>& bounds, const std::vector<double>& percentiles, std::optional<int> threads,
+         Progress* progress) {
         const TriangleMesh a = to_mesh(va, ta, "_a"), b = to_mesh(vb, tb, "_b");
         const Interruptible call(progress);
         return deviation(a, b, {bounds, percentiles, to_threads(threads), progress});
       },
-      py::arg("vertices_a"), py::arg("triangles_a"), py::arg("vertices_b"), py::arg("triangles_b"),
-      py::arg("bounds") = std::vector<double>(), py::arg("percentiles") = std::vector<double>(), py::arg("threads") = 0,
+      py::arg("vertices_a"), py::arg("triangles_a"), py::arg("vertices_b"), py::arg("triangles_b"), py::kw_only(),
+      py::arg("bounds") = py::tuple(), py::arg("percentiles") = py::tuple(), py::arg("threads") = py::none(),
       py::arg("progress") = py::none(),
-      "Mean, RMS, percentiles (0 to 100) and shares beyond bounds of the distance from a to b, over the area of a, "
-      "each "
-      "with the\n"
-      "range that it is certainly in. Refined until the range of the mean is no wider than 0.1 % of the largest "
-      "distance "
-      "or than rounding, or there\n"
-      "are half a million samples (four for each triangle where that is more), or\n"
-      "the search has taken 256 steps for each of so many, as between crowded needles: the ranges are then wider, and\n"
-      "as certain. World coordinates, deterministic. Cost: 2 to 10 us a sample. Raises InvalidInput, Cancelled.");
+      R"doc(Return mean, RMS, percentiles and shares of the distance from mesh a to mesh b, over the area of mesh a.
+
+Each number comes with a range that certainly holds the true one. The result is deterministic.
+
+Parameters
+----------
+vertices_a, vertices_b : (n, 3) float32 or float64 arrays
+    Coordinates in one space, as a rule the world. The result is in their unit.
+triangles_a, triangles_b : (m, 3) integer arrays
+bounds : sequence of k floats, optional
+    Lengths of 0 or more. For each the result holds the share of the area that is farther away.
+percentiles : sequence of p floats, optional
+    Percentages from 0 to 100.
+threads, progress
+    See help(tolvol).
+
+Returns
+-------
+DeviationResult
+
+Raises
+------
+InvalidInput
+    If a mesh is not valid, or if a bound or a percentile is out of range.
+Cancelled
+
+Notes
+-----
+Mesh a is cut into pieces, and each piece holds one sample. The cutting ends as soon as the range of the mean is no wider
+than 0.1 % of the largest distance or than rounding. It ends earlier at half a million samples (four for each triangle if
+that is more), and after 256 steps of search for each of so many samples, as between crowded needles: the ranges are then
+wider, and as certain.
+
+Cost: 2 to 10 us a sample.)doc");
 }
 
 }  // namespace tolvol::python

@@ -105,7 +105,7 @@ Camera camera_or_framing(const std::optional<Camera>& camera, const Vertices& v,
 py::array_t<std::uint8_t> render_distance(const py::object& vertices, const py::object& triangles, const Volume& volume,
                                           const std::optional<Camera>& camera, const Size& size,
                                           const std::string& transfer, const py::object& to_world, bool edges,
-                                          int samples, int threads, Progress* progress) {
+                                          int samples, std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const StoredSpace space(to_matrix(to_world), v.storage);
@@ -130,7 +130,7 @@ using Cut = std::pair<Vector, Vector>;
 py::array_t<std::uint8_t> render_volume(const Volume& volume, const std::optional<Camera>& camera, const Size& size,
                                         const py::object& vertices, const py::object& triangles,
                                         const py::object& to_world, const std::optional<Cut>& cut, int samples,
-                                        int threads, Progress* progress) {
+                                        std::optional<int> threads, Progress* progress) {
   if (vertices.is_none() != triangles.is_none()) {
     throw InvalidInput("vertices and triangles must both be given, or neither for the reference itself");
   }
@@ -171,64 +171,158 @@ py::array_t<std::uint8_t> render_volume(const Volume& volume, const std::optiona
 
 void bind_picture(py::module_& module) {
   py::class_<Camera>(module, "Camera", py::module_local(),
-                     "From where a picture is taken, in perspective; world units.")
-      .def(py::init(&make_camera), py::arg("eye"), py::arg("target"), py::arg("up") = vector(Framing().up),
-           py::arg("angle") = Framing().angle,
-           "eye, target, up: three numbers each. angle: the height of the picture in degrees. Raises InvalidInput when "
-           "there is no\n"
-           "such view.")
-      .def_static("framing", &frame_mesh, py::arg("vertices"), py::arg("triangles"), py::arg("size") = Size{1024, 1024},
-                  py::arg("direction") = vector(Framing().direction), py::arg("up") = vector(Framing().up),
-                  py::arg("angle") = Framing().angle, py::arg("room") = 0.0, py::arg("to_world") = py::none(),
-                  "The camera that sees all of a mesh, as large as a picture of `size` (width, height) can show it, "
-                  "from `direction`,\n"
-                  "which leads from the mesh to the eye. room: kept around the mesh, world units.")
-      .def_property_readonly("eye", [](const Camera& c) { return vector(c.eye); })
-      .def_property_readonly("target", [](const Camera& c) { return vector(c.target); })
-      .def_property_readonly("up", [](const Camera& c) { return vector(c.up); })
-      .def_readonly("angle", &Camera::angle, "Degrees.");
+                     "The place from which a picture is taken, in perspective and in world units.")
+      .def(py::init(&make_camera), py::arg("eye"), py::arg("target"), py::kw_only(),
+           py::arg("up") = vector(Framing().up), py::arg("angle") = Framing().angle,
+           R"doc(Make a camera.
+
+Parameters
+----------
+eye, target, up : three floats each
+angle : float
+    The height of the picture in degrees, between 0 and 180.
+
+Raises
+------
+InvalidInput
+    If there is no such view.)doc")
+      .def_static("framing", &frame_mesh, py::arg("vertices"), py::arg("triangles"), py::kw_only(),
+                  py::arg("size") = Size{1024, 1024}, py::arg("direction") = vector(Framing().direction),
+                  py::arg("up") = vector(Framing().up), py::arg("angle") = Framing().angle, py::arg("margin") = 0.0,
+                  py::arg("to_world") = py::none(),
+                  R"doc(Return the camera that sees all of a mesh, as large as a picture can show it.
+
+Parameters
+----------
+vertices : (n, 3) float32 or float64 array
+    Local coordinates.
+triangles : (m, 3) integer array
+size : two ints
+    Width and height of the picture.
+direction : three floats
+    Leads from the mesh to the eye.
+up, angle
+    As for Camera.
+margin : float
+    The distance that is kept free around the mesh, in world units.
+to_world
+    See help(tolvol).
+
+Raises
+------
+InvalidInput)doc")
+      .def_property_readonly(
+          "eye", [](const Camera& c) { return vector(c.eye); }, "The place of the eye, three floats.")
+      .def_property_readonly(
+          "target", [](const Camera& c) { return vector(c.target); }, "The place that the eye looks at, three floats.")
+      .def_property_readonly(
+          "up", [](const Camera& c) { return vector(c.up); }, "The direction that is up in the picture, three floats.")
+      .def_readonly("angle", &Camera::angle, "The height of the picture in degrees.");
 
   module.def("transfer_colours", &colours, py::arg("transfer") = "signed",
-             "(256, 3) uint8: the colours of a picture from one end of its range to the other, for a legend.\n"
-             "\"signed\": from -tolerance (inside) to the tolerance, Moreland's cool to warm. \"magnitude\": from 0 to "
-             "the tolerance,\n"
-             "viridis.");
+             R"doc(Return the colours of a picture from one end of its range to the other, for a legend.
+
+Parameters
+----------
+transfer : {"signed", "magnitude"}
+    "signed" goes from -tolerance (inside) to the tolerance in Moreland's cool to warm, "magnitude" from 0 to the
+    tolerance in viridis.
+
+Returns
+-------
+(256, 3) uint8 array
+
+Raises
+------
+InvalidInput)doc");
   const auto list = [](const glm::u8vec3& c) { return py::make_tuple(c.x, c.y, c.z); };
   module.attr("OUTSIDE_COLOURS") = py::make_tuple(list(kOutsideColour), list(kOutsideStripe));
 #ifdef TOLVOL_GL
   module.def("render_distance", &render_distance, py::arg("vertices"), py::arg("triangles"), py::arg("volume"),
-             py::arg("camera") = py::none(), py::arg("size") = Size{1024, 1024}, py::arg("transfer") = "signed",
-             py::arg("to_world") = py::none(), py::arg("edges") = false, py::arg("samples") = 2, py::arg("threads") = 0,
-             py::arg("progress") = py::none(),
-             "A picture of a mesh, each pixel coloured by its distance to the volume's reference: (height, width, 4) "
-             "uint8, RGBA, top\n"
-             "row first, transparent where there is no mesh. What is farther than the tolerance is striped.\n\n"
-             "camera: a Camera; None frames the mesh. size: (width, height). transfer: \"signed\" or \"magnitude\", "
-             "see\n"
-             "transfer_colours. edges: draw the mesh's edges too. samples: samples * samples a pixel, 1 to 8.\n"
-             "Distances are read from a grid of 4 nodes per tolerance (fewer where 256 MB or GL do not hold it) and "
-             "interpolated: off by\n"
-             "under 2 % of the tolerance where the reference is smooth, by 22 % at the worst. A picture proves "
-             "nothing.\n"
-             "Raises InvalidInput, GlUnavailable. Cost: at the first picture of a volume about 0.5 s for its grid, "
-             "which is kept; then\n"
-             "without a GPU about 0.1 s for 270,000 triangles with samples=1.\n"
-             "After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 3.");
-  module.def("render_volume", &render_volume, py::arg("volume"), py::arg("camera") = py::none(),
+             py::kw_only(), py::arg("camera") = py::none(), py::arg("size") = Size{1024, 1024},
+             py::arg("transfer") = "signed", py::arg("to_world") = py::none(), py::arg("edges") = false,
+             py::arg("samples") = 2, py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+             R"doc(Draw a mesh, with each pixel coloured by its distance from the reference of a volume.
+
+What is farther away than the tolerance is striped. A picture proves nothing.
+
+Parameters
+----------
+vertices : (n, 3) float32 or float64 array
+    Local coordinates.
+triangles : (m, 3) integer array
+volume : ToleranceVolume
+camera : Camera, optional
+    None frames the mesh.
+size : two ints
+    Width and height.
+transfer : {"signed", "magnitude"}
+    See transfer_colours.
+edges : bool
+    Whether the edges of the mesh are drawn too.
+samples : int
+    From 1 to 8: a pixel has samples * samples of them.
+to_world, threads, progress
+    See help(tolvol).
+
+Returns
+-------
+(height, width, 4) uint8 array
+    RGBA, the top row first, transparent where there is no mesh.
+
+Raises
+------
+InvalidInput
+GlUnavailable
+Cancelled
+
+Notes
+-----
+Distances are interpolated in a grid of 4 nodes per tolerance, or fewer if 256 MB or OpenGL do not hold it. They are off by
+less than 2 % of the tolerance where the reference is smooth, and by 22 % at the worst.
+
+Cost: the first picture of a volume takes about 0.5 s for the grid, which is kept. Without a GPU a picture then takes about
+0.1 s for 270,000 triangles with samples=1.
+
+After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 3.)doc");
+  module.def("render_volume", &render_volume, py::arg("volume"), py::kw_only(), py::arg("camera") = py::none(),
              py::arg("size") = Size{1024, 1024}, py::arg("vertices") = py::none(), py::arg("triangles") = py::none(),
              py::arg("to_world") = py::none(), py::arg("cut") = py::none(), py::arg("samples") = 2,
-             py::arg("threads") = 0, py::arg("progress") = py::none(),
-             "A picture of the tolerance volume as a translucent shell with a mesh inside (by default the reference): "
-             "(height, width,\n"
-             "4) uint8, RGBA, top row first, transparent where there is neither.\n\n"
-             "camera, size, samples: as for render_distance. cut: a plane (point, normal) that takes the volume away "
-             "on the side its\n"
-             "normal points to and shows the distances in the section. Raises InvalidInput, GlUnavailable. Cost: "
-             "seconds without a GPU.\n"
-             "After figure 1 of the same paper.");
+             py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+             R"doc(Draw a tolerance volume as a translucent shell with a mesh inside.
+
+A picture proves nothing.
+
+Parameters
+----------
+volume : ToleranceVolume
+vertices, triangles : optional
+    The mesh inside. None is the reference itself.
+cut : (point, normal), optional
+    A plane of three floats each, in world units. The volume is taken away on the side that the normal points to, and the
+    section shows the distances.
+camera, size, samples, to_world, threads, progress
+    As for render_distance.
+
+Returns
+-------
+(height, width, 4) uint8 array
+    RGBA, the top row first, transparent where there is neither.
+
+Raises
+------
+InvalidInput
+GlUnavailable
+Cancelled
+
+Notes
+-----
+Cost: seconds without a GPU.
+
+After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, figure 1.)doc");
 #else
-  module.def("render_distance", &no_pictures, "Needs a module built with TOLVOL_GL=ON.");
-  module.def("render_volume", &no_pictures, "Needs a module built with TOLVOL_GL=ON.");
+  module.def("render_distance", &no_pictures, "Raise GlUnavailable: this module was built without TOLVOL_GL.");
+  module.def("render_volume", &no_pictures, "Raise GlUnavailable: this module was built without TOLVOL_GL.");
 #endif
 }
 

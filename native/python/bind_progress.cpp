@@ -6,22 +6,25 @@ namespace tolvol::python {
 
 void bind_progress(pybind11::module_& module) {
   namespace py = pybind11;
-  py::class_<Progress>(
-      module, "Progress", py::module_local(),
-      "What a long call shows to another thread, and how that thread stops it. Poll it; there are no callbacks.")
-      .def(py::init<>())
-      .def_property_readonly("fraction", &Progress::fraction, "Share of the current stage that is done, 0 to 1.")
-      .def_property_readonly("stage", &Progress::stage, "What is being done, in a few words.")
-      .def_property_readonly("count", &Progress::count, "What the stage counts: for decimation the triangles left.")
-      .def_property_readonly("cancelled", &Progress::cancelled)
-      .def("cancel", &Progress::cancel,
-           "Asks the call to stop; it then raises Cancelled within 0.2 s. Ctrl-C in a call on the main thread does the "
-           "same, "
-           "with KeyboardInterrupt or\n"
-           "whatever the handler of the signal raises.")
-      .def_property_readonly("finishing", &Progress::finishing)
+  py::class_<Progress>(module, "Progress", py::module_local(),
+                       R"doc(Shows to another thread how far a long call is, and lets that thread stop it.
+
+There are no callbacks: the other thread reads the attributes from time to time. Use a new object for each call.)doc")
+      .def(py::init<>(), "Make an object for one call.")
+      .def_property_readonly("fraction", &Progress::fraction,
+                             "The share of the current stage that is done, from 0 to 1.")
+      .def_property_readonly("stage", &Progress::stage, "The name of the current stage, in a few words.")
+      .def_property_readonly("count", &Progress::count,
+                             "A number that belongs to the stage: in decimation the triangles that are left.")
+      .def_property_readonly("cancelled", &Progress::cancelled, "Whether cancel() was called.")
+      .def("cancel", &Progress::cancel, R"doc(Ask the call to stop. It then raises Cancelled within 0.2 s.
+
+Ctrl-C stops a call on the main thread as well, with KeyboardInterrupt or whatever the handler of the signal raises.)doc")
+      .def_property_readonly("finishing", &Progress::finishing, "Whether finish() was called.")
       .def("finish", &Progress::finish,
-           "Asks a call that improves its result step by step, decimate() in stage \"refining\", for the one it has.");
+           R"doc(Ask a call that improves its result step by step for the result that it has.
+
+This is decimate in the stage "refining". Other calls go on.)doc");
 }
 
 }  // namespace tolvol::python

@@ -29,8 +29,8 @@ bool is_second(const std::string& value, const char* name, const char* first, co
 Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, const Volume* volume,
                        const py::object& to_world, std::int64_t iterations, const std::string& kind,
                        const std::string& weights, const std::string& boundary, const py::object& locked,
-                       const py::object& strength, const std::string& mode, const std::string& outside, int threads,
-                       Progress* progress) {
+                       const py::object& strength, const std::string& mode, const std::string& outside,
+                       std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const StoredSpace space(to_matrix(to_world), v.storage);
@@ -91,37 +91,70 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
 }  // namespace
 
 void bind_smoothing(py::module_& module) {
-  py::class_<Smoothed>(module, "Smoothed", py::module_local(), "What smooth found.")
-      .def_readonly("vertices", &Smoothed::vertices, "(n, 3), the type of the input, local.")
-      .def_readonly("report", &Smoothed::report,
-                    "held_back (vertices, for each iteration), largest_motion (world units), welded (vertices treated "
-                    "as one with an\n"
-                    "earlier one at the same place), fixed {boundary, non-manifold}, outside {faces, first}, method, "
-                    "renderer, warnings,\n"
-                    "seconds.");
-  module.def(
-      "smooth", &smooth_arrays, py::arg("vertices"), py::arg("triangles"), py::arg("volume") = py::none(),
-      py::arg("to_world") = py::none(), py::arg("iterations") = 10, py::arg("operator") = "bilaplacian",
-      py::arg("weights") = "cotangent", py::arg("boundary") = "fixed", py::arg("locked") = py::none(),
-      py::arg("strength") = py::none(), py::arg("mode") = "pull_back", py::arg("outside") = "error",
-      py::arg("threads") = 0, py::arg("progress") = py::none(),
-      "Smooths a mesh within the volume's tolerance, or without bound when there is none; every face ends inside."
-      "\n\n"
-      "operator: \"laplacian\" or \"bilaplacian\" (keeps curvature better). weights: \"uniform\" (also evens out "
-      "the triangles) or\n"
-      "\"cotangent\" (keeps them), measured in the world. boundary: \"fixed\", or \"along\" to smooth it along "
-      "itself. locked:\n"
-      "(n,) bool, vertices that stay. strength: (n,) float64, 0 to 1, of a full step. mode: \"pull_back\" along "
-      "the step until\n"
-      "the faces around are inside, or \"reset\", where a vertex stays for this iteration instead. outside: "
-      "\"error\", or \"keep\"\n"
-      "the input faces that are not within the tolerance as they are. Vertices of edges with more than two "
-      "faces stay.\n"
-      "Raises InvalidInput and Cancelled. Cost: about 0.3 us an iteration and vertex, and some us for each that "
-      "is held back.\n"
-      "After M. Desbrun et al., Implicit Fairing of Irregular Meshes using Diffusion and Curvature Flow, 1999; "
-      "reset: M. Botsch\n"
-      "et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.");
+  py::class_<Smoothed>(module, "SmoothingResult", py::module_local(), "The mesh that smooth returns.")
+      .def_readonly("vertices", &Smoothed::vertices, "(n, 3) array of the input's dtype: local coordinates.")
+      .def_readonly("report", &Smoothed::report, R"doc(A dict with these entries:
+
+held_back : for each iteration the number of vertices that did not go all the way
+largest_motion : the longest way of a vertex from the input to the result, in world units
+welded : the number of vertices that were treated as one with an earlier vertex at the same place
+fixed : a dict of `boundary` and `non-manifold`, the number of vertices that stay for that cause
+outside : a dict of `faces`, the number of input faces that were outside and were kept, and `first`, the first of them
+method, renderer : which check was used, and what computed it
+warnings : a list of sentences
+seconds : the time that the call took)doc");
+  module.def("smooth", &smooth_arrays, py::arg("vertices"), py::arg("triangles"), py::arg("volume") = py::none(),
+             py::kw_only(), py::arg("to_world") = py::none(), py::arg("iterations") = 10,
+             py::arg("operator") = "bilaplacian", py::arg("weights") = "cotangent", py::arg("boundary") = "fixed",
+             py::arg("locked") = py::none(), py::arg("strength") = py::none(), py::arg("mode") = "pull_back",
+             py::arg("outside") = "error", py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+             R"doc(Smooth a mesh within the tolerance of a volume.
+
+Every iteration ends with all faces inside. Vertices at an edge with more than two faces stay where they are.
+
+Parameters
+----------
+vertices : (n, 3) float32 or float64 array
+    Local coordinates.
+triangles : (m, 3) integer array
+volume : ToleranceVolume, optional
+    None smooths without a bound.
+iterations : int
+    0 or more.
+operator : {"bilaplacian", "laplacian"}
+    "bilaplacian" keeps curvature better.
+weights : {"cotangent", "uniform"}
+    "cotangent", measured in the world, keeps the shapes of the triangles; "uniform" evens them out.
+boundary : {"fixed", "along"}
+    Boundary vertices stay where they are, or are smoothed along the boundary.
+locked : (n,) bool array, optional
+    Vertices that stay where they are.
+strength : (n,) float64 array, optional
+    From 0 to 1: the share of a full step that each vertex goes.
+mode : {"pull_back", "reset"}
+    A vertex that would leave the tolerance is pulled back along its step until the faces around it are inside, or stays
+    where it is for this iteration.
+outside : {"error", "keep"}
+    What happens if input faces are not within the tolerance: an error, or they stay as they are.
+to_world, threads, progress
+    See help(tolvol).
+
+Returns
+-------
+SmoothingResult
+
+Raises
+------
+InvalidInput
+    If an argument or the mesh is not valid, if the stored type cannot hold the tolerance, or if the input is outside.
+Cancelled
+
+Notes
+-----
+Cost: about 0.3 us for each vertex in each iteration, and some us for each vertex that is held back.
+
+After M. Desbrun et al., Implicit Fairing of Irregular Meshes using Diffusion and Curvature Flow, 1999. "reset" is from
+M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.)doc");
 }
 
 }  // namespace tolvol::python

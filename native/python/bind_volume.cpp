@@ -23,7 +23,7 @@ Field to_field(const std::string& name) {
 
 std::unique_ptr<Volume> make_volume(const py::object& vertices, const py::object& triangles, double tolerance,
                                     const py::object& to_world, std::optional<double> precision,
-                                    const std::string& field, int threads, Progress* progress) {
+                                    const std::string& field, std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const StoredSpace space(to_matrix(to_world), v.storage);
@@ -38,12 +38,12 @@ std::unique_ptr<Volume> make_volume(const py::object& vertices, const py::object
 }
 
 struct CheckResult {
-  py::array_t<std::uint8_t> verdict;
+  py::array_t<std::uint8_t> verdicts;
   std::string method, renderer;
 };
 
 CheckResult check(const Volume& volume, const py::object& points, const py::object& faces, const py::object& to_world,
-                  const py::object& groups, const std::string& method, int threads, Progress* progress) {
+                  const py::object& groups, const std::string& method, std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(points, "points");
   int corners = 3;
   const std::vector<std::uint32_t> indices = to_faces(faces, "faces", corners);
@@ -77,16 +77,16 @@ double distance_to(const ToleranceVolume& volume, const StoredSpace& space, cons
   const glm::dvec3 at = space.frame(stored);
   if (finite(at)) return volume.hierarchy().nearest(at).distance / frame.scale();
   const std::string name = "point " + std::to_string(i);
-  if (!finite(stored)) throw InvalidInput(name + " is not finite");
+  if (!finite(stored)) throw InvalidInput(name + " is not finite", "invalid_mesh");
   const glm::dvec3 world = space.world(stored);
-  if (!finite(world)) throw InvalidInput(name + " is too far away for double precision under to_world");
+  if (!finite(world)) throw InvalidInput(name + " is too far away for double precision under to_world", "too_far");
   // So much farther than the reference is large that the reference is a point.
   const glm::dvec3 away = world - frame.to_world(glm::dvec3(0));
   return std::hypot(away.x, away.y, away.z);
 }
 
-py::array_t<double> distance(const Volume& volume, const py::object& points, const py::object& to_world, int threads,
-                             Progress* progress) {
+py::array_t<double> distance(const Volume& volume, const py::object& points, const py::object& to_world,
+                             std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(points, "points");
   const StoredSpace space = StoredSpace(to_matrix(to_world), v.storage).in(volume.native.frame());
   std::vector<double> result(v.values.size());
@@ -129,94 +129,190 @@ py::tuple grid(const py::object& self, bool with_signs, Progress* progress) {
 
 void bind_volume(py::module_& module) {
   py::class_<CheckResult>(module, "CheckResult", py::module_local(), "What ToleranceVolume.check found.")
-      .def_readonly("verdict", &CheckResult::verdict,
-                    "(m,) uint8: 0 outside (proved), 1 unproved (counts as outside), 2 inside (proved).")
-      .def_readonly("method", &CheckResult::method)
-      .def_readonly("renderer", &CheckResult::renderer);
+      .def_readonly("verdicts", &CheckResult::verdicts,
+                    "(m,) uint8: the Verdict of each face. Compare with Verdict.INSIDE: everything below counts as "
+                    "outside.")
+      .def_readonly("method", &CheckResult::method, "The name of the check, as reports give it.")
+      .def_readonly("renderer", &CheckResult::renderer, "What computed it: \"CPU\" or the name of a GL renderer.");
 
   py::class_<Volume>(module, "ToleranceVolume", py::module_local(),
-                     "All points within a tolerance of a reference mesh, and fast ways to ask about them.")
-      .def(py::init(&make_volume), py::arg("vertices"), py::arg("triangles"), py::arg("tolerance"),
+                     "All points within a tolerance of a reference mesh, with what makes questions about them fast.")
+      .def(py::init(&make_volume), py::arg("vertices"), py::arg("triangles"), py::arg("tolerance"), py::kw_only(),
            py::arg("to_world") = py::none(), py::arg("precision") = py::none(), py::arg("field") = "scatter",
-           py::arg("threads") = 0, py::arg("progress") = py::none(),
-           "vertices: (n, 3) float32 or float64, local. triangles: (m, 3) integers. tolerance: world units, at most "
-           "the size of the\n"
-           "reference. precision: grid nodes per tolerance; None takes the finest of 1, 1/2, 1/4, ... that fits 256 "
-           "MB. field:\n"
-           "what fills the grid: \"scatter\" (exact distances) or \"fast_marching\" (the paper's way, signed, for "
-           "comparison). Both change\n"
-           "speed and never a verdict's truth. Raises InvalidInput (bad mesh or tolerance; the first offender is "
-           "named) and\n"
-           "ResourceLimit (a precision that does not fit). Cost: about 0.1 s for 70,000 triangles.\n"
-           "After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 2.")
-      .def("check", &check, py::arg("points"), py::arg("faces"), py::arg("to_world") = py::none(),
-           py::arg("groups") = py::none(), py::arg("method") = "certificate", py::arg("threads") = 0,
+           py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+           R"doc(Build the volume of a reference mesh.
+
+Parameters
+----------
+vertices : (n, 3) float32 or float64 array
+    Local coordinates.
+triangles : (m, 3) integer array
+tolerance : float
+    A positive length in world units, at most the diagonal of the reference.
+precision : float, optional
+    Grid nodes per tolerance. None takes the finest of 1, 1/2, 1/4, ... that fits 256 MB.
+field : {"scatter", "fast_marching"}
+    What fills the grid: exact distances, or the method of the paper, which is signed, for comparison.
+to_world, threads, progress
+    See help(tolvol).
+
+Raises
+------
+InvalidInput
+    If the mesh or the tolerance is not valid. The message names the first offender.
+ResourceLimit
+    If the grid of this precision does not fit. The message names a precision that does.
+Cancelled
+
+Notes
+-----
+Precision and field change the speed of checks, and never make a proof wrong.
+
+Cost: about 0.1 s for 70,000 triangles.
+
+After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 2.)doc")
+      .def("check", &check, py::arg("points"), py::arg("faces"), py::kw_only(), py::arg("to_world") = py::none(),
+           py::arg("groups") = py::none(), py::arg("method") = "certificate", py::arg("threads") = py::none(),
            py::arg("progress") = py::none(),
-           "Whether faces are within the tolerance, as a whole and not only at their corners. points: (k, 3) float32 "
-           "or float64.\n"
-           "faces: (m, c) integers, c from 1 (points) to 4 (quads, in every triangulation). groups: (m,) integers; "
-           "every face gets\n"
-           "the worst verdict of its group. Returns a CheckResult. method:\n"
-           "\"certificate\": exact witnesses, on the CPU, at any precision; the only one that proves outside. About "
-           "0.1 us "
-           "a small face.\n"
-           "\"gl_certificate\": the same in a compute shader, for batches of small faces; what it cannot prove is "
-           "unproved.\n"
-           "\"occlusion_query\": interpolated distances at a lattice on each face, drawn and counted; the grid must "
-           "have "
-           "a precision\n"
-           "of 2 or more, 4 is good. With groups one query each: slow for small groups, fast for a single one.\n"
-           "\"paper\", \"paper_half_h\": the check as it was published, with a margin of (sqrt(3)/2) h or h/2 for the "
-           "grid "
-           "spacing h;\n"
-           "NOT conservative: what it calls inside may be outside.\n"
-           "Raises GlUnavailable, with nothing accepted, where a GL method finds no OpenGL 4.5 or fails on the way.\n"
-           "After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 4.")
-      .def("distance", &distance, py::arg("points"), py::arg("to_world") = py::none(), py::arg("threads") = 0,
-           py::arg("progress") = py::none(),
-           "(k,) float64: the exact unsigned distance of (k, 3) points to the reference, in world units. Raises "
-           "InvalidInput,\n"
-           "Cancelled. Cost: about 1 us a point.")
+           R"doc(Decide for each face whether all of its points are within the tolerance.
+
+Parameters
+----------
+points : (n, 3) float32 or float64 array
+    Local coordinates.
+faces : (m, k) integer array
+    k is 1 (points), 2 (segments), 3 (triangles) or 4 (quads, in every triangulation).
+groups : (m,) integer array, optional
+    Every face gets the worst verdict of the faces with its label.
+method : {"certificate", "gl_certificate", "occlusion_query", "paper", "paper_half_h"}
+    "certificate" finds exact witnesses on the CPU, at any precision. It alone proves Verdict.OUTSIDE.
+    "gl_certificate" does so in a compute shader, for batches of small faces. What it cannot prove is Verdict.UNPROVED.
+    "occlusion_query" draws a lattice of samples of each face and counts those that an interpolated distance shows to be
+    outside. The volume needs a precision of 2 or more; 4 is good. With groups it makes one query for each: this is slow
+    for small groups and fast for a single one.
+    "paper" and "paper_half_h" are the check as it was published, with a margin of sqrt(3)/2 or 1/2 of the grid spacing.
+    They are not conservative: a face that they call inside may be outside.
+to_world, threads, progress
+    See help(tolvol).
+
+Returns
+-------
+CheckResult
+
+Raises
+------
+InvalidInput
+    If an argument is not valid, or if the method cannot use this volume.
+GlUnavailable
+    If a GL method finds no OpenGL 4.5, or if OpenGL fails on the way. No face is accepted then.
+Cancelled
+
+Notes
+-----
+Cost of "certificate": about 0.1 us for a small face.
+
+After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 4.)doc")
+      .def("distance", &distance, py::arg("points"), py::kw_only(), py::arg("to_world") = py::none(),
+           py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+           R"doc(Return the exact unsigned distance of points from the reference.
+
+Parameters
+----------
+points : (n, 3) float32 or float64 array
+    Local coordinates.
+to_world, threads, progress
+    See help(tolvol).
+
+Returns
+-------
+(n,) float64 array
+    World units.
+
+Raises
+------
+InvalidInput
+Cancelled
+
+Notes
+-----
+Cost: about 1 us a point.)doc")
       .def("grid", &grid, py::kw_only(), py::arg("signed") = false, py::arg("progress") = py::none(),
-           "The distance grid as (distances, origin, spacing, unit): distances is a read-only float32 array (nz, ny, "
-           "nx) in units of\n"
-           "`unit` world lengths, capped at the band; origin and spacing are in world units. A view, unsigned with "
-           "field=\"scatter\". signed:\n"
-           "negative inside, by angle-weighted pseudonormals, a copy made in about a quarter of the field's time; the "
-           "field "
-           "\"fast_marching\" is\n"
-           "signed anyway. Of an open reference the boundary is extruded, and signed values jump across that.")
+           R"doc(Return the distance grid of the volume.
+
+Parameters
+----------
+signed : bool
+    Whether distances inside are negative, by angle-weighted pseudonormals. The boundary of an open reference is
+    extruded for this, and signed values jump across the extrusion. A volume with field="fast_marching" is signed anyway.
+progress : Progress, optional
+
+Returns
+-------
+distances : (nz, ny, nx) float32 array
+    In units of `unit`, capped at the width of the band. It is read-only, and a view of the volume's memory unless
+    `signed` makes a copy.
+origin : tuple of three floats
+    The place of the first node, in world units.
+spacing : float
+    The distance between two nodes, in world units.
+unit : float
+    A distance of 1 in world units.
+
+Raises
+------
+Cancelled
+
+Notes
+-----
+Cost: none for the view. Signs take about a quarter of the time that the field takes.)doc")
       .def_property_readonly(
-          "tolerance", [](const Volume& v) { return v.native.tolerance(); }, "World units.")
+          "tolerance", [](const Volume& v) { return v.native.tolerance(); }, "The tolerance, in world units.")
       .def_property_readonly(
-          "size", [](const Volume& v) { return v.native.diagonal(); },
-          "What 100 % is, world units: the longest box diagonal of the reference.")
+          "diagonal", [](const Volume& v) { return v.native.diagonal(); },
+          "The size of the reference as the function diagonal gives it, in world units.")
       .def_property_readonly(
-          "precision", [](const Volume& v) { return v.native.precision(); }, "Grid nodes per tolerance.")
+          "precision", [](const Volume& v) { return v.native.precision(); }, "The number of grid nodes per tolerance.")
       .def_property_readonly(
           "field", [](const Volume& v) { return v.native.field() == Field::scatter ? "scatter" : "fast_marching"; },
           "What filled the distance grid.")
       .def_property_readonly(
           "spacing", [](const Volume& v) { return v.native.grid().spacing / v.native.frame().scale(); },
-          "Between grid nodes, world units.")
+          "The distance between two grid nodes, in world units.")
       .def_property_readonly(
-          "memory", [](const Volume& v) { return v.native.memory(); }, "Bytes held.")
-      .def_readonly("vertex_count", &Volume::vertices)
-      .def_readonly("triangle_count", &Volume::triangles)
-      .def_readonly("seconds", &Volume::seconds, "Time it took to build.");
+          "memory", [](const Volume& v) { return v.native.memory(); }, "The number of bytes that the volume holds.")
+      .def_readonly("vertex_count", &Volume::vertices, "The number of vertices of the reference.")
+      .def_readonly("triangle_count", &Volume::triangles, "The number of triangles of the reference.")
+      .def_readonly("seconds", &Volume::seconds, "The time that it took to build the volume.");
 
   module.def(
-      "size",
+      "diagonal",
       [](const py::object& vertices, const py::object& triangles, const py::object& to_world) {
         const Vertices v = to_vertices(vertices, "vertices");
         const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
         validate(v.values, t);
         return longest_diagonal(v.values, t, StoredSpace(to_matrix(to_world), v.storage).to_world());
       },
-      py::arg("vertices"), py::arg("triangles"), py::arg("to_world") = py::none(),
-      "What 100 % means, world units: the longest of the four diagonals of the local bounding box of the used "
-      "vertices, after\n"
-      "to_world.");
+      py::arg("vertices"), py::arg("triangles"), py::kw_only(), py::arg("to_world") = py::none(),
+      R"doc(Return the size of a mesh, of which a tolerance in percent is taken.
+
+This is the longest of the four diagonals of the local bounding box of the vertices that a triangle uses, after to_world.
+
+Parameters
+----------
+vertices : (n, 3) float32 or float64 array
+    Local coordinates.
+triangles : (m, 3) integer array
+to_world
+    See help(tolvol).
+
+Returns
+-------
+float
+    World units.
+
+Raises
+------
+InvalidInput)doc");
 }
 
 }  // namespace tolvol::python

@@ -32,8 +32,8 @@ struct Volume {
     checks.erase(method);
   }
 
-  mutable std::mutex mutex;
-  mutable std::map<std::string, std::shared_ptr<const ToleranceCheck>> checks;
+  mutable std::mutex mutex{};
+  mutable std::map<std::string, std::shared_ptr<const ToleranceCheck>> checks{};
   mutable std::mutex drawing{};  ///< held while a picture is drawn: one at a time
   mutable std::shared_ptr<Pictures> pictures{};
 };

@@ -31,9 +31,11 @@ def test_occlusion_queries_say_what_the_certificate_says():
     volume = native.module.ToleranceVolume(*surface, TOLERANCE, precision=4)
     found = volume.check(*surface, method="occlusion_query")
     assert found.renderer == native.module.renderer()
-    assert (found.verdict == 2).all() and (volume.check(*surface).verdict == 2).all()
+    assert (found.verdicts == native.module.Verdict.INSIDE).all() and (
+        volume.check(*surface).verdicts == native.module.Verdict.INSIDE
+    ).all()
     far = surface[0] + (0, 0, 3 * TOLERANCE)
-    assert not (volume.check(far, surface[1], method="occlusion_query").verdict == 2).all()
+    assert not (volume.check(far, surface[1], method="occlusion_query").verdicts == native.module.Verdict.INSIDE).all()
 
 
 def test_a_picture_shows_the_mesh():

@@ -50,7 +50,7 @@ def judged(ob, reference, tolerance=TOLERANCE):
     arrays = mesh_io.read_mesh(scratch)
     bpy.data.meshes.remove(scratch)
     vertices = mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world))
-    found = native.module.hausdorff(vertices, arrays.triangles, *reference, bound=tolerance)
+    found = native.module.directed_hausdorff(vertices, arrays.triangles, *reference, bound=tolerance)
     return found.lower / tolerance, found.upper / tolerance
 
 
@@ -353,7 +353,7 @@ def evaluated(ob, reference):
     surface = ob.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
     arrays = mesh_io.read_mesh(surface)
     vertices = mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world))
-    found = native.module.hausdorff(vertices, arrays.triangles, *reference, bound=TOLERANCE)
+    found = native.module.directed_hausdorff(vertices, arrays.triangles, *reference, bound=TOLERANCE)
     return found.lower / TOLERANCE, found.upper / TOLERANCE
 
 

@@ -46,10 +46,12 @@ def roughness(ob):
 def test_stays_within_the_tolerance_in_the_world(matrix):
     ob = torus(matrix=matrix, noise=0.02)
     reference, rough = world_triangles(ob), roughness(ob)
-    tolerance = 0.01 * native.module.size(coordinates(ob), reference[1], to_world=mesh_io.matrix_array(ob.matrix_world))
+    tolerance = 0.01 * native.module.diagonal(
+        coordinates(ob), reference[1], to_world=mesh_io.matrix_array(ob.matrix_world)
+    )
     bpy.ops.tolvol.smooth(iterations=60, method="LAPLACIAN")
     stored = world_triangles(ob)
-    judged = native.module.hausdorff(*stored, *reference, bound=tolerance)
+    judged = native.module.directed_hausdorff(*stored, *reference, bound=tolerance)
     assert 0.9 * tolerance < judged.upper <= tolerance
     assert roughness(ob) < 0.8 * rough
     measured = measurements.measurement_of(ob)
@@ -97,18 +99,20 @@ def test_vertex_group_is_the_strength():
 def test_bent_quads_stay_within_however_they_are_cut():
     ob = torus(noise=0.02)
     reference, faces = world_triangles(ob), [list(face.vertices) for face in ob.data.polygons]
-    tolerance = 0.01 * native.module.size(*reference)
+    tolerance = 0.01 * native.module.diagonal(*reference)
     bpy.ops.tolvol.smooth(iterations=40, method="LAPLACIAN")
     vertices = world_triangles(ob)[0]
     inside = np.ones(len(faces), bool)
     for corners in ([0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]):
         cut = np.array(faces, np.int32)[:, corners]
-        before = [native.module.hausdorff(reference[0], face[None], *reference).upper <= tolerance for face in cut]
+        before = [
+            native.module.directed_hausdorff(reference[0], face[None], *reference).upper <= tolerance for face in cut
+        ]
         inside &= before
     assert inside.sum() > 0.8 * len(faces)  # Quads that were outside in the other triangulation stay as they are.
     for corners in ([0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]):
         cut = np.array(faces, np.int32)[inside][:, corners]
-        assert native.module.hausdorff(vertices, cut, *reference, bound=tolerance).upper <= tolerance
+        assert native.module.directed_hausdorff(vertices, cut, *reference, bound=tolerance).upper <= tolerance
 
 
 def test_loose_edges_stay_attached():
@@ -174,13 +178,13 @@ def test_in_edit_mode_the_selected_vertices_are_smoothed_in_one_undo_step():
     ob, chosen = in_edit_mode(lambda: torus(noise=0.02), lambda co: co[:, 0] > 0)
     bpy.ops.ed.undo_push(message="selected")
     reference, before = world_triangles(ob), coordinates(ob)
-    tolerance = 0.01 * native.module.size(*reference)
+    tolerance = 0.01 * native.module.diagonal(*reference)
     assert bpy.ops.tolvol.smooth("EXEC_DEFAULT", True, iterations=60, method="LAPLACIAN") == {"FINISHED"}
     assert ob.mode == "EDIT"
     after = stored(ob)
     assert np.array_equal(after[~chosen], before[~chosen])
     assert (after != before).any(1)[chosen].mean() > 0.9
-    judged = native.module.hausdorff(*world_triangles(ob), *reference, bound=tolerance)
+    judged = native.module.directed_hausdorff(*world_triangles(ob), *reference, bound=tolerance)
     assert 0.9 * tolerance < judged.upper <= tolerance
     assert [vertex.select for vertex in bmesh.from_edit_mesh(ob.data).verts] == chosen.tolist()
     bpy.ops.ed.undo()
@@ -247,8 +251,8 @@ def test_in_edit_mode_all_edited_meshes_with_a_selection_are_smoothed():
     after = [stored(ob) for ob in objects]
     assert [(now != then).any() for now, then in zip(after, before)] == [True, True, False]
     for ob, reference, percent in zip(objects[:2], references, (1, 0.2)):  # Each object has a tolerance of its own.
-        tolerance = percent / 100 * native.module.size(*reference)
-        judged = native.module.hausdorff(*world_triangles(ob), *reference, bound=tolerance)
+        tolerance = percent / 100 * native.module.diagonal(*reference)
+        judged = native.module.directed_hausdorff(*world_triangles(ob), *reference, bound=tolerance)
         assert 0.5 * tolerance < judged.upper <= tolerance
         assert ob.tolvol.snapshot is not None and ob.tolvol.smooth.iterations == 60
     assert objects[2].tolvol.snapshot is None

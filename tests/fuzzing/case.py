@@ -32,7 +32,7 @@ class Case:
         return vertices.astype(np.float64) if self.to_world is None else meshes.transform(self.to_world, vertices)
 
     def size(self):
-        """Returns the diagonal of the used vertices in the world. It is at least half of tolvol.size."""
+        """Returns the diagonal of the used vertices in the world. It is at least half of tolvol.diagonal."""
         if not len(self.triangles):
             return 0.0
         return float(np.linalg.norm(np.ptp(self.world(self.vertices[self.triangles.ravel()]), axis=0)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Judges results by code that the operations do not use: tolvol.hausdorff, CGAL and NumPy."""
+"""Judges results by code that the operations do not use: tolvol.directed_hausdorff, CGAL and NumPy."""
 
 import subprocess
 
@@ -23,7 +23,7 @@ def within(run, of, to, tolerance, what):
     # If the case has a matrix, its vertices were rounded once more when they were mapped to the world.
     largest = max(np.abs(of[0]).max(), np.abs(to[0]).max())
     slack = 0 if run.case.to_world is None else 1e-15 * largest
-    interval = run.call("hausdorff", lambda: tolvol.hausdorff(*of, *to, bound=tolerance + slack, threads=1))
+    interval = run.call("hausdorff", lambda: tolvol.directed_hausdorff(*of, *to, bound=tolerance + slack, threads=1))
     if interval.lower > tolerance + slack:
         raise Finding(
             f"beyond: {what}", f"{what}: at least {interval.lower / tolerance} tolerances, {interval.position}"

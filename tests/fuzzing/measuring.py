@@ -25,7 +25,7 @@ def check(run):
             points, pieces, to_world=case.to_world, threads=threads, progress=progress, **more
         )
 
-    verdict = run.repeated("check", call(faces), ("verdict",)).verdict
+    verdict = run.repeated("check", call(faces), ("verdicts",)).verdicts
     if verdict.shape != (len(faces),) or not np.isin(verdict, (0, 1, 2)).all():
         raise Finding("verdict", f"verdicts {verdict.shape} {verdict.dtype}")
     if "motion" not in case.arrays and case.options["corners"] < 4 and (verdict != 2).any():
@@ -34,13 +34,15 @@ def check(run):
         )
     reference = case.world(case.vertices), case.triangles
     placed = case.world(points)
-    within_as_pieces(run, placed, faces[verdict == 2], reference)
-    for face in faces[verdict == 0][:5]:
+    within_as_pieces(run, placed, faces[verdict == tolvol.Verdict.INSIDE], reference)
+    for face in faces[verdict == tolvol.Verdict.OUTSIDE][:5]:
         # If a quad is outside, one of its four triangles must be.
         corners = face[[[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]] if len(face) == 4 else [np.resize(face, 3)]
         far = run.call(
             "hausdorff",
-            lambda c=corners: tolvol.hausdorff(placed, np.array(c), *reference, bound=case.tolerance, threads=1),
+            lambda c=corners: tolvol.directed_hausdorff(
+                placed, np.array(c), *reference, bound=case.tolerance, threads=1
+            ),
         )
         if far.upper < case.tolerance * (1 - 1e-9):
             raise Finding(
@@ -48,10 +50,10 @@ def check(run):
             )
     labels = np.arange(len(faces)) // 3
     least = np.minimum.reduceat(verdict, np.arange(0, len(faces), 3))[labels]
-    grouped = run.call("check", lambda: call(faces, groups=labels)(1, None)).verdict
+    grouped = run.call("check", lambda: call(faces, groups=labels)(1, None)).verdicts
     if not np.array_equal(grouped, least):
         raise Finding("groups", "a group has not the worst verdict of its faces")
-    inside = faces[verdict == 2]
+    inside = faces[verdict == tolvol.Verdict.INSIDE]
     for k in range(1, faces.shape[1]):
         parts = proved_inside(run, points, np.ascontiguousarray(inside[:, :k]), volume)
         if not parts.all():
@@ -77,7 +79,9 @@ def distance(run):
     reference, placed = (case.world(case.vertices), case.triangles), case.world(points)
     slack = 1e-12 * (np.abs(placed).max() + np.abs(reference[0]).max())
     for v in np.linspace(0, len(points) - 1, 10).astype(int):
-        far = run.call("hausdorff", lambda v=v: tolvol.hausdorff(placed, np.array([[v, v, v]]), *reference, threads=1))
+        far = run.call(
+            "hausdorff", lambda v=v: tolvol.directed_hausdorff(placed, np.array([[v, v, v]]), *reference, threads=1)
+        )
         if not far.lower - slack <= found[v] <= far.upper + slack:
             raise Finding("distance", f"point {v} is at {found[v]} and, by hausdorff, {far.lower} to {far.upper}")
 
@@ -106,7 +110,7 @@ def hausdorff(run):
     a, b = _pair(run)
 
     def call(threads, progress):
-        return _Interval(tolvol.hausdorff(*a, *b, threads=threads, progress=progress))
+        return _Interval(tolvol.directed_hausdorff(*a, *b, threads=threads, progress=progress))
 
     found = run.repeated("hausdorff", call, ("lower", "upper", "position", "triangle"))
     together = np.concatenate([a[0], b[0]]).astype(np.float64)
@@ -121,7 +125,7 @@ def hausdorff(run):
     if found.lower > 1e-6 * size:
         bounds.append(found.lower * (1 - 1e-6))
     for bound in bounds:
-        judged = run.call("hausdorff", lambda bound=bound: tolvol.hausdorff(*a, *b, bound=bound, threads=1))
+        judged = run.call("hausdorff", lambda bound=bound: tolvol.directed_hausdorff(*a, *b, bound=bound, threads=1))
         if judged.lower > found.upper * (1 + 1e-12) or judged.upper < found.lower * (1 - 1e-12):
             raise Finding(
                 "bound", f"{found.lower} to {found.upper}, but {judged.lower} to {judged.upper} with {bound=}"
@@ -146,7 +150,7 @@ def deviation(run):
         return tolvol.deviation(*a, *b, bounds=bounds, percentiles=percentiles, threads=threads, progress=progress)
 
     found = run.repeated("deviation", call, ("mean", "rms", "percentiles", "share_beyond", "distances", "weights"))
-    largest = run.call("hausdorff", lambda: tolvol.hausdorff(*a, *b, threads=1))
+    largest = run.call("hausdorff", lambda: tolvol.directed_hausdorff(*a, *b, threads=1))
     slack = 1e-9 * np.abs(np.concatenate([a[0], b[0]]).astype(np.float64)).max()
     if abs(found.weights.sum() - 1) > 1e-6 or len(found.weights) != len(found.distances):
         raise Finding("weights", f"{len(found.weights)} weights of together {found.weights.sum()}")

@@ -37,8 +37,8 @@ def proved_inside(run, vertices, triangles, volume):
     """Returns for each face whether the check proves it to be inside."""
     verdicts = run.call(
         "check", lambda: volume.check(vertices, triangles, to_world=run.case.to_world, threads=1)
-    ).verdict
-    return verdicts == 2
+    ).verdicts
+    return verdicts == tolvol.Verdict.INSIDE
 
 
 def within_as_pieces(run, vertices, faces, reference):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Judges the promise of a decimation on the stored result by tolvol.hausdorff, which the decimation does not use."""
+"""Judges the promise of a decimation on the stored result by tolvol.directed_hausdorff, which the decimation does not use."""
 
 import numpy as np
 import tolvol
@@ -19,7 +19,8 @@ def distances(vertices, triangles, result, to_world=None, bound=None):
     m = np.eye(4) if to_world is None else to_world
     a = (transform(m, result.vertices), result.triangles)
     b = (transform(m, vertices), triangles)
-    return tolvol.hausdorff(*a, *b, bound=bound), tolvol.hausdorff(*b, *a, bound=bound)
+    both = tolvol.hausdorff(*a, *b, bound=bound)
+    return both.forward, both.backward
 
 
 def assert_promise(vertices, triangles, result, tolerance, to_world=None, two_sided=True):

@@ -36,7 +36,7 @@ CHAIN = (decimate, smooth, deform, decimate, smooth)
 def test_one_reference_for_the_whole_chain_keeps_it_inside_and_one_a_step_does_not(shape, percent):
     vertices, triangles = meshes.torus(noise=0.002) if shape == "torus" else meshes.spike()
     reference = vertices.astype(np.float32), triangles
-    tolerance = percent / 100 * tolvol.size(*reference)
+    tolerance = percent / 100 * tolvol.diagonal(*reference)
     volume = tolvol.ToleranceVolume(*reference, tolerance)
     one, each = reference, reference
     drift = []
@@ -44,9 +44,9 @@ def test_one_reference_for_the_whole_chain_keeps_it_inside_and_one_a_step_does_n
         one = step(*one, volume)
         each = step(*each, tolvol.ToleranceVolume(*each, tolerance))
         assert one[0].dtype == np.float32
-        bounded = tolvol.hausdorff(*one, *reference, bound=tolerance).upper
+        bounded = tolvol.directed_hausdorff(*one, *reference, bound=tolerance).upper
         assert bounded <= tolerance, step.__name__
-        drift.append((step.__name__, bounded, tolvol.hausdorff(*each, *reference).lower))
+        drift.append((step.__name__, bounded, tolvol.directed_hausdorff(*each, *reference).lower))
     print(f"\n{shape}, {percent} %: distance from the reference in tolerances")
     for name, bounded, drifted in drift:
         print(
@@ -61,11 +61,11 @@ def test_what_one_step_left_inside_the_next_takes_in_any_form():
     vertices, triangles = meshes.sphere(4)
     rng = np.random.default_rng(3)
     vertices = vertices * (1 + 0.1 * rng.standard_normal((len(vertices), 1)))
-    volume = tolvol.ToleranceVolume(vertices, triangles, 0.04 * tolvol.size(vertices, triangles))
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.04 * tolvol.diagonal(vertices, triangles))
     forms = ([0, 1, 2], [0, 1, 2, 0], [1, 2, 2, 0], [2, 1, 0], [0, 1], [2, 0, 2], [1, 2], [0, 0, 1, 2], [1, 2, 0])
     for form in forms:
         wish = vertices + 3 * volume.tolerance * rng.standard_normal(vertices.shape)
         vertices = tolvol.constrain(vertices, wish, triangles, volume).vertices
         faces = np.ascontiguousarray(triangles[:, form])
-        assert (volume.check(vertices, faces).verdict == 2).all(), form
+        assert (volume.check(vertices, faces).verdicts == tolvol.Verdict.INSIDE).all(), form
         tolvol.constrain(vertices, vertices, faces, volume, outside="error")

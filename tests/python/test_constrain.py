@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tolvol.constrain and tolvol.Guard, judged by tolvol.hausdorff on what they return."""
+"""tolvol.constrain and tolvol.Guard, judged by tolvol.directed_hausdorff on what they return."""
 
 import gc
 
@@ -23,7 +23,7 @@ def noisy(vertices=SINGLE, deviation=0.6, seed=1):
 def deviation(vertices, to_world=None):
     m = np.eye(4) if to_world is None else to_world
     now, then = meshes.transform(m, vertices), meshes.transform(m, SINGLE)
-    return tolvol.hausdorff(now, TRIANGLES, then, TRIANGLES, bound=TOLERANCE).upper
+    return tolvol.directed_hausdorff(now, TRIANGLES, then, TRIANGLES, bound=TOLERANCE).upper
 
 
 @pytest.mark.parametrize("mode", ["pull_back", "reset"])

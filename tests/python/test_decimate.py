@@ -38,7 +38,7 @@ PLACES = {
 def test_promise_both_ways(name, placement, dtype):
     vertices, triangles = SOLIDS[name]
     vertices = vertices.astype(dtype)
-    tolerance = 0.01 * tolvol.size(vertices, triangles)
+    tolerance = 0.01 * tolvol.diagonal(vertices, triangles)
     result = decimate(vertices, triangles, tolerance, placement=placement)
 
     assert result.vertices.dtype == dtype
@@ -57,7 +57,7 @@ def test_promise_holds_in_the_world(name):
     to_world = PLACES[name]
     vertices, triangles = meshes.torus(64, 32, noise=0.002)
     vertices = vertices.astype(np.float32)
-    tolerance = 0.01 * tolvol.size(vertices, triangles, to_world)
+    tolerance = 0.01 * tolvol.diagonal(vertices, triangles, to_world=to_world)
     result = decimate(vertices, triangles, tolerance, to_world)
     assert len(result.triangles) < len(triangles) / 4
     assert_promise(vertices, triangles, result, tolerance, to_world)
@@ -68,7 +68,7 @@ def test_promise_holds_in_the_world(name):
 def test_stored_coordinates_of_any_scale(scale):
     vertices, triangles = meshes.torus(64, 32, noise=0.002)
     vertices = (scale * vertices).astype(np.float32)
-    tolerance = 0.01 * tolvol.size(vertices, triangles)
+    tolerance = 0.01 * tolvol.diagonal(vertices, triangles)
     result = decimate(vertices, triangles, tolerance)
     assert len(result.triangles) < len(triangles) / 4
     assert_promise(vertices, triangles, result, tolerance)
@@ -78,7 +78,7 @@ def test_stored_coordinates_far_from_the_origin():
     # Rounding to float32 moves a coordinate by up to 0.001 here, which is 3 % of the tolerance. This causes only a warning.
     vertices, triangles = meshes.torus(64, 32)
     vertices = (vertices + [20000, 0, 0]).astype(np.float32)
-    tolerance = 0.01 * tolvol.size(vertices, triangles)
+    tolerance = 0.01 * tolvol.diagonal(vertices, triangles)
     result = decimate(vertices, triangles, tolerance)
     assert_promise(vertices, triangles, result, tolerance)
     assert result.report["warnings"]
@@ -96,20 +96,20 @@ def test_a_degenerate_face_does_not_stand_for_the_face_beside_it():
     triangles = np.concatenate([*sides, np.delete(triangles, np.s_[::13], 0), *flat]).astype(np.int32)
     vertices = np.concatenate([vertices, tips])
     for share in (0.01, 0.03):
-        tolerance = share * tolvol.size(vertices, triangles)
+        tolerance = share * tolvol.diagonal(vertices, triangles)
         assert_promise(vertices, triangles, decimate(vertices, triangles, tolerance), tolerance)
 
 
 def test_fewer_triangles_at_a_larger_tolerance():
     vertices, triangles = meshes.torus(noise=0.001)
-    size = tolvol.size(vertices, triangles)
+    size = tolvol.diagonal(vertices, triangles)
     counts = [len(decimate(vertices, triangles, share * size).triangles) for share in (0.001, 0.003, 0.01, 0.03)]
     assert counts == sorted(counts, reverse=True) and len(set(counts)) == 4
 
 
 def test_no_crack_opens_between_the_triangles_of_a_soup():
     vertices, triangles = meshes.soup(*meshes.torus(64, 32))
-    result = decimate(vertices, triangles, 0.01 * tolvol.size(vertices, triangles))
+    result = decimate(vertices, triangles, 0.01 * tolvol.diagonal(vertices, triangles))
     _, weld = np.unique(result.vertices, axis=0, return_inverse=True)
     edges = np.sort(weld.reshape(-1)[result.triangles][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), 1)
     _, count = np.unique(edges, axis=0, return_counts=True)
@@ -119,7 +119,7 @@ def test_no_crack_opens_between_the_triangles_of_a_soup():
 @pytest.mark.parametrize("mesh, kind", [("soup", "weld"), ("non-manifold", "duplicate"), ("degenerate", "degenerate")])
 def test_repairs_are_counted(mesh, kind):
     vertices, triangles = SOLIDS[mesh]
-    report = decimate(vertices, triangles, 0.01 * tolvol.size(vertices, triangles)).report
+    report = decimate(vertices, triangles, 0.01 * tolvol.diagonal(vertices, triangles)).report
     repair = [r for r in report["repairs"] if kind in r["kind"]]
     assert repair and repair[0]["count"] > 0 and repair[0]["message"]
     clean = decimate(*SOLIDS["sphere"], 0.02).report
@@ -136,7 +136,7 @@ def test_the_input_is_left_alone():
 
 def test_decimating_twice_against_one_reference_stays_within_it():
     vertices, triangles = meshes.torus(noise=0.001)
-    tolerance = 0.01 * tolvol.size(vertices, triangles)
+    tolerance = 0.01 * tolvol.diagonal(vertices, triangles)
     volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
     once = tolvol.decimate(vertices, triangles, volume, target_triangles=2000)
     twice = tolvol.decimate(once.vertices, once.triangles, volume)
@@ -156,14 +156,14 @@ def test_another_mesh_than_the_reference():
 
 def test_sources_point_where_the_corner_is():
     vertices, triangles = meshes.torus(noise=0.002)
-    tolerance = 0.01 * tolvol.size(vertices, triangles)
+    tolerance = 0.01 * tolvol.diagonal(vertices, triangles)
     result = decimate(vertices, triangles, tolerance, placement="optimal")
     assert assert_sources(vertices, triangles, result, tolerance) <= 1.5 * tolerance
 
 
 def test_distances_are_as_the_report_says():
     vertices, triangles = meshes.torus(noise=0.002)
-    tolerance = 0.01 * tolvol.size(vertices, triangles)
+    tolerance = 0.01 * tolvol.diagonal(vertices, triangles)
     result = decimate(vertices, triangles, tolerance)
     forward, backward = distances(vertices, triangles, result)
     assert 0.5 * tolerance < max(forward.upper, backward.upper) <= tolerance

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tolvol.deform, Lattice and lattice_points: compared with the formula, and judged by tolvol.hausdorff on the result."""
+"""tolvol.deform, Lattice and lattice_points: compared with the formula, and judged by tolvol.directed_hausdorff on the result."""
 
 from math import comb
 
@@ -30,7 +30,7 @@ def volume():
 
 def judged(before, after, triangles, to_world=None, bound=None):
     m = np.eye(4) if to_world is None else to_world
-    return tolvol.hausdorff(
+    return tolvol.directed_hausdorff(
         meshes.transform(m, after), triangles, meshes.transform(m, before), triangles, bound=bound
     ).upper
 
@@ -125,8 +125,11 @@ def test_blocked_and_as_far_as_permitted(volume):
     blocked = tolvol.deform(vertices, lifted(0.2), triangles, volume)
     assert np.array_equal(blocked.vertices, vertices)
     assert 0.247 <= blocked.report["permitted_fraction"] <= 0.25
-    verdict = volume.check(tolvol.deform(vertices, lifted(0.2)).vertices, triangles).verdict
-    assert blocked.report["leaving"] == {"faces": (verdict < 2).sum(), "first": np.argmax(verdict < 2)}
+    verdict = volume.check(tolvol.deform(vertices, lifted(0.2)).vertices, triangles).verdicts
+    assert blocked.report["leaving"] == {
+        "faces": (verdict < tolvol.Verdict.INSIDE).sum(),
+        "first": np.argmax(verdict < tolvol.Verdict.INSIDE),
+    }
     assert blocked.report["held_back"] == len(vertices)
     farthest = tolvol.deform(vertices, lifted(0.2), triangles, volume, mode="farthest")
     assert farthest.report["permitted_fraction"] == blocked.report["permitted_fraction"]
@@ -145,7 +148,7 @@ def test_hostile_meshes_stay_within_as_stored(seed):
     world = meshes.transform(to_world, vertices[np.unique(triangles)])
     low, size = world.min(0), np.ptp(world, axis=0)
     domain = meshes.matrix(np.diag(size * 1.1), low - 0.05 * size)
-    tolerance = 0.01 * tolvol.size(vertices, triangles, to_world)
+    tolerance = 0.01 * tolvol.diagonal(vertices, triangles, to_world=to_world)
     volume = tolvol.ToleranceVolume(vertices, triangles, tolerance, to_world=to_world)
     lattice = bent(tolerance * 12, domain=domain, seed=seed)
     result = tolvol.deform(vertices, lattice, triangles, volume, to_world=to_world, mode="farthest")
@@ -169,7 +172,7 @@ def test_pulled_back_each_vertex_goes_as_far_as_it_may(volume):
 def test_what_is_outside_to_begin_with_can_be_kept(volume):
     vertices, triangles = TORUS[0].copy(), TORUS[1]
     vertices[40] *= 1.3
-    outside = volume.check(vertices, triangles).verdict < 2
+    outside = volume.check(vertices, triangles).verdicts < tolvol.Verdict.INSIDE
     kept = tolvol.deform(vertices, lifted(0.02), triangles, volume, outside="keep")
     assert kept.report["outside"] == {"faces": outside.sum(), "first": outside.argmax()}
     frozen = np.unique(triangles[outside])
@@ -242,12 +245,12 @@ def test_bad_arguments_are_refused(volume):
     broken = vertices.copy()
     broken[7, 1] = np.inf
     refused("vertex 7 is not finite", broken, lattice)
-    refused("with a volume triangles are needed", vertices, lattice, volume=volume)
+    refused("with a volume faces are needed", vertices, lattice, volume=volume)
     refused("no faces", vertices, lattice, triangles[:0], volume)
     refused("face 2014 uses vertex 2047, but there are only 2047", vertices[:-1], lattice, triangles, volume)
     refused('mode must be "blocked"', vertices, lattice, triangles, volume, mode="push")
     refused('outside must be "error" or "keep"', vertices, lattice, triangles, volume, outside="ignore")
-    refused("threads must not be negative", vertices, lattice, threads=-1)
+    refused("threads must be at least 1", vertices, lattice, threads=0)
     refused("too far to be stored", vertices.astype(np.float32), lifted(1e39))
     with pytest.raises(tolvol.InvalidInput, match="needs at least 2"):
         tolvol.lattice_points((4, 1, 4))
@@ -256,7 +259,7 @@ def test_bad_arguments_are_refused(volume):
 def test_a_mesh_that_is_outside_already_is_refused(volume):
     vertices, triangles = TORUS[0].copy(), TORUS[1]
     vertices[40] *= 1.3
-    outside = volume.check(vertices, triangles).verdict < 2
+    outside = volume.check(vertices, triangles).verdicts < tolvol.Verdict.INSIDE
     message = (
         f"^{outside.sum()} faces are not within the tolerance of the reference, the first is face {outside.argmax()};"
     )

@@ -10,7 +10,7 @@ import meshes
 
 def display(mesh=None, tolerance=0.1, to_world=None, **options):
     mesh = mesh or meshes.sphere(3)
-    return tolvol.DisplayTree(tolvol.ToleranceVolume(*mesh, tolerance, to_world), **options)
+    return tolvol.DisplayTree(tolvol.ToleranceVolume(*mesh, tolerance, to_world=to_world), **options)
 
 
 @pytest.mark.parametrize("scale", [1, -2])

@@ -9,7 +9,7 @@ import judge
 import meshes
 
 FIELDS = ["scatter", "fast_marching"]
-INSIDE = 2
+INSIDE = tolvol.Verdict.INSIDE
 
 
 def node_positions(volume):
@@ -47,7 +47,7 @@ def test_fast_marching_is_signed_and_scatter_on_demand():
 def test_negative_is_inside_in_the_world(field, scale):
     radius = abs(scale[0])
     to_world = meshes.matrix(np.diag(scale), (7, 8, 9))
-    volume = tolvol.ToleranceVolume(*meshes.sphere(3), 0.1 * radius, to_world, precision=2, field=field)
+    volume = tolvol.ToleranceVolume(*meshes.sphere(3), 0.1 * radius, to_world=to_world, precision=2, field=field)
     values = volume.grid(signed=True)[0]
     from_centre = np.linalg.norm(node_positions(volume) - [7, 8, 9], axis=-1) / radius
     assert (values[from_centre < 0.96] < 0).all() and (values[from_centre > 1.01] > 0).all()
@@ -63,7 +63,7 @@ def test_verdicts_are_the_same_for_both_fields():
         corner = vertices[triangles[rng.integers(0, len(triangles), 3000)]].mean(1)
         points = corner[:, None] + 0.1 * 10 ** rng.uniform(-1, 1, (3000, 1, 1)) * rng.standard_normal((3000, 3, 3))
         faces = np.arange(9000, dtype=np.int32).reshape(-1, 3)
-        verdicts = [volume.check(points.reshape(-1, 3), faces).verdict for volume in volumes]
+        verdicts = [volume.check(points.reshape(-1, 3), faces).verdicts for volume in volumes]
         assert 300 < (verdicts[0] == INSIDE).sum() < 2700
         assert np.array_equal(*verdicts)
 
@@ -72,7 +72,7 @@ def test_verdicts_are_the_same_for_both_fields():
     "mesh", [meshes.torus(64, 32, noise=0.005), meshes.plate(33, bump=0.2)], ids=["torus", "plate"]
 )
 def test_decimation_keeps_its_promise_on_a_marched_field(mesh):
-    tolerance = 0.02 * tolvol.size(*mesh)
+    tolerance = 0.02 * tolvol.diagonal(*mesh)
     counts = []
     for field in FIELDS:
         volume = tolvol.ToleranceVolume(*mesh, tolerance, precision=1.1, field=field)

@@ -23,10 +23,10 @@ def calls(vertices=VERTICES, triangles=TRIANGLES):
     """Every function that takes a mesh, called with this one."""
     return {
         "ToleranceVolume": lambda: tolvol.ToleranceVolume(vertices, triangles, TOLERANCE),
-        "size": lambda: tolvol.size(vertices, triangles),
+        "diagonal": lambda: tolvol.diagonal(vertices, triangles),
         "decimate": lambda: tolvol.decimate(vertices, triangles, VOLUME),
-        "hausdorff from": lambda: tolvol.hausdorff(vertices, triangles, VERTICES, TRIANGLES),
-        "hausdorff to": lambda: tolvol.hausdorff(VERTICES, TRIANGLES, vertices, triangles),
+        "hausdorff from": lambda: tolvol.directed_hausdorff(vertices, triangles, VERTICES, TRIANGLES),
+        "hausdorff to": lambda: tolvol.directed_hausdorff(VERTICES, TRIANGLES, vertices, triangles),
         "deviation from": lambda: tolvol.deviation(vertices, triangles, VERTICES, TRIANGLES),
         "deviation to": lambda: tolvol.deviation(VERTICES, TRIANGLES, vertices, triangles),
     }
@@ -55,6 +55,10 @@ BAD_MESHES = {
     "vertices in the other byte order": (VERTICES.astype(">f8"), TRIANGLES, r"vertices.*float32.*>f8"),
     "vertices None": (None, TRIANGLES, r"vertices"),
 }
+
+
+UNUSABLE = {name for name in BAD_MESHES if name.startswith(("no ", "NaN", "infinite", "index"))}
+SHIFTED = (VERTICES + [1e6, 0, 0]).astype(np.float32)
 
 
 @pytest.mark.parametrize("function", calls())
@@ -116,7 +120,7 @@ def test_bad_precisions(precision):
 def test_bad_to_world(to_world, message):
     for call in (
         lambda: tolvol.ToleranceVolume(VERTICES, TRIANGLES, TOLERANCE, to_world=to_world),
-        lambda: tolvol.size(VERTICES, TRIANGLES, to_world=to_world),
+        lambda: tolvol.diagonal(VERTICES, TRIANGLES, to_world=to_world),
         lambda: VOLUME.check(VERTICES, TRIANGLES, to_world=to_world),
         lambda: VOLUME.distance(VERTICES, to_world=to_world),
         lambda: tolvol.decimate(VERTICES, TRIANGLES, VOLUME, to_world=to_world),
@@ -130,8 +134,10 @@ def test_bad_to_world(to_world, message):
     [
         ({"placement": "fastest"}, "placement.*optimal.*subset.*fastest"),
         ({"outside": "ignore"}, "outside.*error.*keep.*ignore"),
-        ({"target_triangles": -5}, "target_triangles.*negative"),
-        ({"threads": -1}, "threads.*negative"),
+        ({"target_triangles": 0}, "target_triangles.*at least 1.*None"),
+        ({"max_seconds": 0}, "max_seconds.*positive.*None"),
+        ({"max_seconds": np.nan}, "max_seconds.*positive"),
+        ({"threads": 0}, "threads.*at least 1.*None"),
         ({"locked": np.zeros(5, bool)}, "locked.*each vertex"),
         ({"locked": np.zeros(288, np.float64)}, "locked.*bool"),
         ({"shares": np.ones(5)}, "shares.*each vertex"),
@@ -153,15 +159,15 @@ def test_unknown_options_are_refused():
         tolvol.decimate(VERTICES, TRIANGLES, VOLUME, tolerence=1)
 
 
-def test_negative_threads_everywhere():
+def test_no_threads_everywhere():
     for call in (
-        lambda: tolvol.ToleranceVolume(VERTICES, TRIANGLES, TOLERANCE, threads=-2),
-        lambda: VOLUME.check(VERTICES, TRIANGLES, threads=-2),
-        lambda: VOLUME.distance(VERTICES, threads=-2),
-        lambda: tolvol.hausdorff(VERTICES, TRIANGLES, VERTICES, TRIANGLES, threads=-2),
-        lambda: tolvol.deviation(VERTICES, TRIANGLES, VERTICES, TRIANGLES, threads=-2),
+        lambda: tolvol.ToleranceVolume(VERTICES, TRIANGLES, TOLERANCE, threads=0),
+        lambda: VOLUME.check(VERTICES, TRIANGLES, threads=0),
+        lambda: VOLUME.distance(VERTICES, threads=0),
+        lambda: tolvol.directed_hausdorff(VERTICES, TRIANGLES, VERTICES, TRIANGLES, threads=0),
+        lambda: tolvol.deviation(VERTICES, TRIANGLES, VERTICES, TRIANGLES, threads=0),
     ):
-        with pytest.raises(tolvol.InvalidInput, match="threads.*negative"):
+        with pytest.raises(tolvol.InvalidInput, match="threads must be at least 1, or None"):
             call()
 
 
@@ -196,7 +202,7 @@ def test_other_bad_arguments_of_check():
 @pytest.mark.parametrize("bound", [-1, np.nan])
 def test_bad_bounds(bound):
     with pytest.raises(tolvol.InvalidInput, match="bound"):
-        tolvol.hausdorff(VERTICES, TRIANGLES, VERTICES, TRIANGLES, bound=bound)
+        tolvol.directed_hausdorff(VERTICES, TRIANGLES, VERTICES, TRIANGLES, bound=bound)
     with pytest.raises(tolvol.InvalidInput, match="bound"):
         tolvol.deviation(VERTICES, TRIANGLES, VERTICES, TRIANGLES, bounds=(0.1, bound))
 
@@ -230,10 +236,67 @@ def test_a_mesh_outside_its_reference_names_count_and_first():
         tolvol.decimate(VERTICES + [9, 0, 0], TRIANGLES, VOLUME)
 
 
+LINES = np.stack([TRIANGLES[:, 0], TRIANGLES[:, 0], TRIANGLES[:, 1]], 1).astype(np.int32)
+REFUSED = {
+    "invalid_argument": (
+        lambda: tolvol.decimate(VERTICES, TRIANGLES, VOLUME, placement="fastest"),
+        lambda: tolvol.diagonal(VERTICES[:, :2].copy(), TRIANGLES),
+        lambda: tolvol.ToleranceVolume(VERTICES, TRIANGLES, 0),
+        lambda: tolvol.Camera((0, 0, 0), (0, 0, 0)),
+    ),
+    "invalid_mesh": (
+        *(lambda mesh=mesh: tolvol.diagonal(*mesh[:2]) for name, mesh in BAD_MESHES.items() if name in UNUSABLE),
+        lambda: tolvol.diagonal(0 * VERTICES, TRIANGLES),
+        lambda: tolvol.decimate(VERTICES, LINES, tolvol.ToleranceVolume(VERTICES, LINES, TOLERANCE)),
+        lambda: VOLUME.check(VERTICES, TRIANGLES + 1),
+        lambda: VOLUME.distance(changed(VERTICES, (2, 0), np.inf)),
+        lambda: tolvol.constrain(VERTICES, changed(VERTICES, (2, 0), np.inf), TRIANGLES, VOLUME),
+        lambda: tolvol.deform(changed(VERTICES, (2, 0), np.inf), tolvol.Lattice(tolvol.lattice_points(2))),
+    ),
+    "invalid_transform": (
+        lambda: tolvol.diagonal(VERTICES, TRIANGLES, to_world=np.diag([1, 1, 0, 1])),
+        lambda: tolvol.diagonal(VERTICES, TRIANGLES, to_world=changed(EYE, (3, 0), 0.5)),
+    ),
+    "tolerance_too_large": (lambda: tolvol.ToleranceVolume(VERTICES, TRIANGLES, 50),),
+    "tolerance_too_small": (
+        lambda: tolvol.ToleranceVolume(VERTICES + [1e12, 0, 0], TRIANGLES, 1e-5),
+        lambda: tolvol.decimate(SHIFTED, TRIANGLES, tolvol.ToleranceVolume(SHIFTED, TRIANGLES, TOLERANCE)),
+    ),
+    "too_far": (lambda: VOLUME.distance(1e308 * VERTICES, to_world=np.diag([1e300, 1e300, 1e300, 1])),),
+    "input_outside": (
+        lambda: tolvol.decimate(VERTICES + [9, 0, 0], TRIANGLES, VOLUME),
+        lambda: tolvol.smooth(VERTICES + [9, 0, 0], TRIANGLES, VOLUME),
+        lambda: tolvol.constrain(VERTICES + [9, 0, 0], VERTICES, TRIANGLES, VOLUME),
+    ),
+    "reference_outside": (lambda: tolvol.decimate(VERTICES, TRIANGLES[100:], VOLUME),),
+    "too_large": (lambda: tolvol.ToleranceVolume(VERTICES, TRIANGLES, 0.001, precision=1000),),
+    "cancelled": (lambda: tolvol.decimate(VERTICES, TRIANGLES, VOLUME, progress=stopped()),),
+}
+
+
+def stopped():
+    progress = tolvol.Progress()
+    progress.cancel()
+    return progress
+
+
+@pytest.mark.parametrize(("code", "call"), [(code, call) for code, calls in REFUSED.items() for call in calls])
+def test_errors_carry_a_code(code, call):
+    with pytest.raises(tolvol.TolvolError) as refused:
+        call()
+    error = refused.value
+    assert error.code == code and f'"{code}"' in tolvol.TolvolError.__doc__
+    if code.endswith("_outside"):
+        assert str(error).startswith(f"{error.count} faces") and f"face {error.first};" in str(error)
+    else:
+        assert error.count is None and error.first is None
+
+
 def test_errors_are_what_python_expects():
     assert issubclass(tolvol.InvalidInput, tolvol.TolvolError) and issubclass(tolvol.InvalidInput, ValueError)
     assert issubclass(tolvol.ResourceLimit, tolvol.TolvolError)
     assert issubclass(tolvol.Cancelled, tolvol.TolvolError)
+    assert tolvol.Cancelled("cancelled").code == "cancelled" and tolvol.GlUnavailable.code == "gl_unavailable"
     assert tolvol.__version__.count(".") == 2
 
 

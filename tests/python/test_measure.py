@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tolvol.hausdorff, tolvol.deviation and tolvol.wedges against known answers."""
+"""tolvol.hausdorff, directed_hausdorff, deviation and wedges against known answers."""
 
 import numpy as np
 import pytest
@@ -13,25 +13,39 @@ def raised(mesh, height):
 
 
 def test_parallel_plates():
-    result = tolvol.hausdorff(*raised(meshes.plate(9), 0.25), *meshes.plate(5))
+    result = tolvol.directed_hausdorff(*raised(meshes.plate(9), 0.25), *meshes.plate(5))
     assert result.lower <= 0.25 <= result.upper
-    assert result.upper - result.lower <= 0.01 * result.upper
+    assert result.upper - result.lower <= 0.001 * result.upper
     assert result.position[2] == pytest.approx(0.25)
 
 
 def test_the_two_directions_differ():
     whole, half = meshes.plate(9), meshes.plate(9, side=0.5)
-    there = tolvol.hausdorff(*whole, *half)
-    back = tolvol.hausdorff(*half, *whole)
+    there = tolvol.directed_hausdorff(*whole, *half)
+    back = tolvol.directed_hausdorff(*half, *whole)
     assert there.lower <= np.sqrt(0.5) <= there.upper
     assert back.upper < 1e-12
     assert there.position == pytest.approx([1, 1, 0], abs=0.02)
     assert 1 in np.round(whole[0][whole[1][there.triangle]].max(0)[:2], 6)
 
 
+def test_hausdorff_is_the_larger_one_of_the_two_directions():
+    whole, half = meshes.plate(9), meshes.plate(9, side=0.5)
+    for a, b in ((whole, half), (half, whole)):
+        both = tolvol.hausdorff(*a, *b)
+        ways = tolvol.directed_hausdorff(*a, *b), tolvol.directed_hausdorff(*b, *a)
+        for found, alone in zip((both.forward, both.backward), ways):
+            assert (found.lower, found.upper, found.position, found.triangle) == (
+                (alone.lower, alone.upper, alone.position, alone.triangle)
+            )
+        assert both.lower == max(way.lower for way in ways) <= np.sqrt(0.5)
+        assert both.upper == max(way.upper for way in ways) >= np.sqrt(0.5)
+    assert tolvol.hausdorff(*half, *whole, bound=0.3).lower > 0.3
+
+
 def test_concentric_spheres():
     outer, inner = meshes.sphere(5, 1.1), meshes.sphere(5, 1.0)
-    result = tolvol.hausdorff(*outer, *inner)
+    result = tolvol.directed_hausdorff(*outer, *inner)
     # A sphere of edge length e sags by less than e ** 2 / 4 here.
     sag = (np.pi / 2 / 2**5) ** 2 / 4
     assert 0.1 - 1e-9 <= result.upper and result.lower <= 0.1 + 2 * sag
@@ -42,43 +56,43 @@ def test_against_brute_force():
     for _ in range(5):
         a, b = rng.standard_normal((2, 30, 3))
         ta, tb = rng.integers(0, 30, (2, 20, 3)).astype(np.int32)
-        result = tolvol.hausdorff(a, ta, b, tb)
+        result = tolvol.directed_hausdorff(a, ta, b, tb)
         weights = rng.dirichlet([0.5, 0.5, 0.5], 300)
         samples = np.concatenate([weights @ a[t] for t in ta])
         # No sample of b is nearer than b itself, so the distance to dense samples is an upper bound of the true distance.
         dense = np.concatenate([rng.dirichlet([0.7, 0.7, 0.7], 2000) @ b[t] for t in tb])
         reach = max(np.sqrt(((dense - p) ** 2).sum(1).min()) for p in samples[::20])
         assert result.upper <= max(reach, result.lower) * 1.15
-        exact = tolvol.ToleranceVolume(b, tb, 0.1 * tolvol.size(b, tb)).distance(samples)
+        exact = tolvol.ToleranceVolume(b, tb, 0.1 * tolvol.diagonal(b, tb)).distance(samples)
         assert exact.max() <= result.upper
         assert exact.max() >= 0.8 * result.lower
 
 
 def test_bound_decides():
     a, b = raised(meshes.plate(9), 0.25), meshes.plate(9)
-    assert tolvol.hausdorff(*a, *b, bound=0.2500001).upper <= 0.2500001
-    assert tolvol.hausdorff(*a, *b, bound=0.2499999).lower > 0.2499999
+    assert tolvol.directed_hausdorff(*a, *b, bound=0.2500001).upper <= 0.2500001
+    assert tolvol.directed_hausdorff(*a, *b, bound=0.2499999).lower > 0.2499999
 
 
 def test_identical_and_subdivided_surfaces_are_at_zero():
     vertices, triangles = meshes.torus()
-    assert tolvol.hausdorff(vertices, triangles, vertices, triangles).upper < 1e-12
+    assert tolvol.directed_hausdorff(vertices, triangles, vertices, triangles).upper < 1e-12
     fine = meshes.subdivide(vertices, triangles)
-    assert tolvol.hausdorff(*fine, vertices, triangles).upper < 1e-12
+    assert tolvol.directed_hausdorff(*fine, vertices, triangles).upper < 1e-12
 
 
 def test_segments_and_points_count():
     plate = meshes.plate(5)
     segment = np.array([[0.5, 0.5, 0], [0.5, 0.5, 2]]), np.array([[0, 1, 1]], np.int32)
     point = np.array([[0.5, 0.5, -3.0]]), np.array([[0, 0, 0]], np.int32)
-    assert tolvol.hausdorff(*segment, *plate).upper == pytest.approx(2, rel=0.01)
-    assert tolvol.hausdorff(*point, *plate).lower == pytest.approx(3, rel=0.01)
-    assert tolvol.hausdorff(*plate, *point).upper == pytest.approx(np.sqrt(9.5), rel=0.011)
+    assert tolvol.directed_hausdorff(*segment, *plate).upper == pytest.approx(2, rel=0.01)
+    assert tolvol.directed_hausdorff(*point, *plate).lower == pytest.approx(3, rel=0.01)
+    assert tolvol.directed_hausdorff(*plate, *point).upper == pytest.approx(np.sqrt(9.5), rel=0.011)
 
 
-def test_hausdorff_gives_the_same_on_any_number_of_threads():
+def test_directed_hausdorff_gives_the_same_on_any_number_of_threads():
     a, b = meshes.torus(noise=0.003), meshes.torus()
-    results = [tolvol.hausdorff(*a, *b, threads=n) for n in (1, 2, 3)]
+    results = [tolvol.directed_hausdorff(*a, *b, threads=n) for n in (1, 2, 3)]
     assert len({(r.lower, r.upper, tuple(r.position), r.triangle) for r in results}) == 1
 
 

@@ -14,7 +14,7 @@ import tolvol
 
 import meshes
 
-INSIDE, UNPROVED, OUTSIDE = 2, 1, 0
+OUTSIDE, UNPROVED, INSIDE = tolvol.Verdict
 LABELS = {
     "certificate": "certificate",
     "gl_certificate": "gl_certificate",
@@ -45,15 +45,15 @@ def test_each_method_sees_both_sides_and_names_itself(method):
     points = (corners[None] + np.array([0, 0.05, 0.101, 0.3])[:, None, None] * [0, 0, 1]).reshape(-1, 3)
     faces = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
     result = volume.check(points, faces, method=method)
-    assert (result.verdict == INSIDE).tolist() == [True, True, False, False]
+    assert (result.verdicts == INSIDE).tolist() == [True, True, False, False]
     assert result.method == LABELS[method]
     assert result.renderer == ("CPU" if method == "certificate" else tolvol.renderer())
     # Only two kinds of methods have the verdict outside: the certificate, which proves it, and the paper's check, which has
     # no verdict unproved.
     says_outside = method in ("certificate", "paper", "paper_half_h")
-    assert result.verdict[3] == (OUTSIDE if says_outside else UNPROVED)
+    assert result.verdicts[3] == (OUTSIDE if says_outside else UNPROVED)
     grouped = volume.check(points, faces, groups=np.array([1, 1, 0, 1], np.int32), method=method)
-    assert (grouped.verdict == INSIDE).tolist() == [False] * 4
+    assert (grouped.verdicts == INSIDE).tolist() == [False] * 4
 
 
 @pytest.mark.parametrize("method", GL_METHODS)
@@ -63,10 +63,10 @@ def test_gl_methods_take_what_the_certificate_takes(method, dtype):
     quad = np.array([[0.2, 0.2, 0], [0.8, 0.2, 0], [0.8, 0.8, 0], [0.2, 0.8, 0]], dtype)
     for corners in (2, 3, 4):
         face = np.arange(corners, dtype=np.int64)[None]
-        assert volume.check(quad, face, method=method).verdict.tolist() == [INSIDE]
+        assert volume.check(quad, face, method=method).verdicts.tolist() == [INSIDE]
         lift = meshes.matrix(np.eye(3), (0, 0, 0.2))
-        assert volume.check(quad, face, to_world=lift, method=method).verdict.tolist() != [INSIDE]
-    assert volume.check(quad, np.empty((0, 3), np.int32), method=method).verdict.shape == (0,)
+        assert volume.check(quad, face, to_world=lift, method=method).verdicts.tolist() != [INSIDE]
+    assert volume.check(quad, np.empty((0, 3), np.int32), method=method).verdicts.shape == (0,)
 
 
 def test_an_unknown_method_is_refused_with_the_names_of_the_others():
@@ -80,7 +80,7 @@ def test_a_grid_too_coarse_to_interpolate_is_refused_with_the_precision_that_wil
         coarse.check(*TORUS, method="occlusion_query")
     precision = float(re.search(r"precision=(\S+)", str(error.value))[1])
     fine = tolvol.ToleranceVolume(*TORUS, TOLERANCE, precision=precision)
-    assert (fine.check(*TORUS, method="occlusion_query").verdict == INSIDE).all()
+    assert (fine.check(*TORUS, method="occlusion_query").verdicts == INSIDE).all()
 
 
 @pytest.mark.parametrize("method", GL_METHODS)
@@ -96,13 +96,13 @@ def test_two_threads_get_what_one_gets(shared):
     volumes = [torus_volume()] * 2 if shared else [torus_volume(), torus_volume()]
     points = [moved(1, 1.5), moved(2, 1.5)]
     methods = ["occlusion_query", "gl_certificate"]
-    expected = [v.check(p, TORUS[1], method=m).verdict for v, p, m in zip(volumes, points, methods)]
+    expected = [v.check(p, TORUS[1], method=m).verdicts for v, p, m in zip(volumes, points, methods)]
     assert all(len(np.unique(e)) > 1 for e in expected)
     results = [[], []]
 
     def work(i):
         for _ in range(8):
-            results[i].append(volumes[i].check(points[i], TORUS[1], method=methods[i]).verdict)
+            results[i].append(volumes[i].check(points[i], TORUS[1], method=methods[i]).verdicts)
 
     threads = [threading.Thread(target=work, args=(i,)) for i in range(2)]
     for thread in threads:
@@ -117,11 +117,11 @@ def test_two_threads_get_what_one_gets(shared):
 def test_what_was_shut_down_says_so_once_and_starts_again():
     volume = torus_volume()
     for method in GL_METHODS:
-        assert (volume.check(*TORUS, method=method).verdict == INSIDE).any()
+        assert (volume.check(*TORUS, method=method).verdicts == INSIDE).any()
         tolvol.shutdown()
         with pytest.raises(tolvol.GlUnavailable, match="^GL unavailable: "):
             volume.check(*TORUS, method=method)
-        assert (volume.check(*TORUS, method=method).verdict == INSIDE).any()
+        assert (volume.check(*TORUS, method=method).verdicts == INSIDE).any()
 
 
 def resident():
@@ -135,7 +135,7 @@ def test_a_thousand_volumes_leave_nothing_in_memory():
         for _ in range(count):
             volume = tolvol.ToleranceVolume(vertices, triangles, 0.2, precision=3, threads=1)
             for method in GL_METHODS:
-                assert (volume.check(vertices, triangles, method=method).verdict == INSIDE).any()
+                assert (volume.check(vertices, triangles, method=method).verdicts == INSIDE).any()
 
     use(100)
     before = resident()
@@ -154,7 +154,7 @@ for method in ("gl_certificate", "occlusion_query", "paper", "paper_half_h"):
         raise SystemExit(method + " answered")
     except tolvol.GlUnavailable as error:
         assert str(error).startswith("GL unavailable: "), error
-assert (volume.check(*meshes.plate(9)).verdict == 2).all()
+assert (volume.check(*meshes.plate(9)).verdicts == tolvol.Verdict.INSIDE).all()
 print("certificate alone")
 """
 

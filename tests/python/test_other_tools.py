@@ -21,7 +21,7 @@ import tool_worker  # noqa: E402
 def torus():
     vertices, triangles = meshes.torus(noise=0.004)
     vertices = vertices.astype(np.float32)
-    return other_tools.Mesh("torus", vertices, triangles, other_tools.tolvol.size(vertices, triangles))
+    return other_tools.Mesh("torus", vertices, triangles, other_tools.tolvol.diagonal(vertices, triangles))
 
 
 def falling(edge):

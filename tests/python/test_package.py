@@ -69,8 +69,8 @@ def test_example_keeps_the_tolerance(example, tmp_path, tolerance):
     assert len(result[1]) < len(triangles) / 4
     reference = vertices.astype(np.float64), triangles
     stored = result[0].astype(np.float64), result[1]
-    assert tolvol.hausdorff(*stored, *reference, bound=tolerance).upper <= tolerance
-    assert tolvol.hausdorff(*stored, *reference).upper > 0.5 * tolerance, "the tolerance is used"
+    assert tolvol.directed_hausdorff(*stored, *reference, bound=tolerance).upper <= tolerance
+    assert tolvol.directed_hausdorff(*stored, *reference).upper > 0.5 * tolerance, "the tolerance is used"
 
 
 def test_example_says_what_is_missing(example, tmp_path):

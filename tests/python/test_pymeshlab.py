@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tolvol.deviation and tolvol.hausdorff agree with the Hausdorff filter of MeshLab, which samples at random.
+"""tolvol.deviation and tolvol.directed_hausdorff agree with the Hausdorff filter of MeshLab, which samples at random.
 
 Only this test needs PyMeshLab: pip install -r tests/python/extras.txt.
 """
@@ -56,7 +56,7 @@ def test_agrees_within_the_sampling_error(pair, backward):
     error = 4 * np.hypot(np.sqrt((ours.rms**2 - ours.mean**2) / count), ours.mean_error) + 1e-6
     fourth = (ours.weights * ours.distances**4).sum()
     square_error = 4 * np.sqrt((fourth - ours.rms**4) / count) + 1e-6
-    largest = tolvol.hausdorff(*a, *b)
+    largest = tolvol.directed_hausdorff(*a, *b)
     print(
         f"\n{pair}, {'back' if backward else 'there'}: mean {ours.mean:.6f} and {theirs['mean']:.6f} (+- {error:.6f}), "
         f"RMS {ours.rms:.6f} and {theirs['RMS']:.6f} (square +- {square_error:.2g}), "

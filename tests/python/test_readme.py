@@ -31,7 +31,7 @@ def block_with(word):
 
 def distance(names, bound):
     triangles = names["triangles"]
-    return tolvol.hausdorff(names["positions"], triangles, names["vertices"], triangles, bound=bound)
+    return tolvol.directed_hausdorff(names["positions"], triangles, names["vertices"], triangles, bound=bound)
 
 
 def test_they_run_one_after_the_other(gl):
@@ -41,7 +41,7 @@ def test_they_run_one_after_the_other(gl):
 def test_decimation_is_within_one_percent():
     names = run(block_with("tolvol.decimate"))
     assert len(names["result"].triangles) < len(names["triangles"]) / 4
-    assert names["forward"].upper <= 0.01 * tolvol.size(names["vertices"], names["triangles"])
+    assert names["distance"].upper <= 0.01 * tolvol.diagonal(names["vertices"], names["triangles"])
 
 
 def test_five_lines_keep_a_smoothing_loop_within_the_tolerance():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tolvol.smooth: each option has a test that fails when it is ignored; distances are judged by tolvol.hausdorff."""
+"""tolvol.smooth: each option has a test that fails when it is ignored; distances are judged by tolvol.directed_hausdorff."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def smooth(vertices=VERTICES, volume=None, **options):
 def deviation(vertices, to_world=None):
     m = np.eye(4) if to_world is None else to_world
     now, then = meshes.transform(m, vertices), meshes.transform(m, VERTICES)
-    return tolvol.hausdorff(now, TRIANGLES, then, TRIANGLES, bound=TOLERANCE).upper
+    return tolvol.directed_hausdorff(now, TRIANGLES, then, TRIANGLES, bound=TOLERANCE).upper
 
 
 def motion(vertices):
@@ -34,7 +34,7 @@ def test_the_result_is_inside(mode, operator, weights):
     result = tolvol.smooth(VERTICES, TRIANGLES, VOLUME, operator=operator, weights=weights, mode=mode)
     assert deviation(smooth(operator=operator, weights=weights)) > TOLERANCE
     assert deviation(result.vertices) <= TOLERANCE
-    assert (VOLUME.check(result.vertices, TRIANGLES).verdict == 2).all()
+    assert (VOLUME.check(result.vertices, TRIANGLES).verdicts == tolvol.Verdict.INSIDE).all()
     report = result.report
     assert len(report["held_back"]) == 10 and report["held_back"][-1] > 0
     assert report["largest_motion"] == pytest.approx(np.linalg.norm(result.vertices - VERTICES, axis=1).max(), rel=1e-5)
@@ -101,19 +101,19 @@ def test_outside():
     kept = (TRIANGLES == 100).any(1)
     assert result.report["outside"] == {"faces": 6, "first": np.flatnonzero(kept)[0]}
     assert np.array_equal(result.vertices[TRIANGLES[kept]], vertices[TRIANGLES[kept]])
-    assert np.isin(VOLUME.check(result.vertices, TRIANGLES[~kept]).verdict, 2).all()
+    assert np.isin(VOLUME.check(result.vertices, TRIANGLES[~kept]).verdicts, 2).all()
 
 
 @pytest.mark.parametrize("mesh", [meshes.non_manifold(), meshes.degenerate(), meshes.needles(), meshes.misoriented()])
 def test_hostile_meshes(mesh):
     vertices, triangles = mesh[0].astype(np.float32), mesh[1]
-    tolerance = 0.002 * tolvol.size(vertices, triangles)
+    tolerance = 0.002 * tolvol.diagonal(vertices, triangles)
     volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
     for options in ({}, {"weights": "uniform", "operator": "laplacian", "boundary": "along"}):
         result = tolvol.smooth(vertices, triangles, volume, **options).vertices
         then, now = vertices.astype(np.float64), result.astype(np.float64)
         assert np.isfinite(now).all()
-        assert tolvol.hausdorff(now, triangles, then, triangles, bound=tolerance).upper <= tolerance
+        assert tolvol.directed_hausdorff(now, triangles, then, triangles, bound=tolerance).upper <= tolerance
 
 
 def test_a_soup_stays_closed():

@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Checks format and lint, and builds the Python package by pip. The tools are from Debian and from requirements.txt here.
-# tests/runners/clang_tidy.py runs clang-tidy.
+# Checks format and lint, builds the Python package by pip, and checks the types of the examples in the documentation. The
+# tools are from Debian and from requirements.txt here. tests/runners/clang_tidy.py runs clang-tidy.
 set -eu
 cd "$(dirname "$0")/../.."
 
@@ -82,11 +82,20 @@ assert len(result.triangles) < 1000
 '
 }
 
+types() {
+  # The installed package brings its types along, so that a missing file of it is found here too.
+  rm -rf build/examples
+  "$venv/bin/python" tests/style/examples.py build/examples &&
+    "$venv/bin/mypy" --strict --cache-dir build/mypy --package tolvol &&
+    "$venv/bin/mypy" --strict --cache-dir build/mypy build/examples/*.py
+}
+
 check licence
 check rooms
 check clang_format
 check ruff
 check pip_install
+check types
 
 [ -z "$failed" ] || { echo "style: failed:$failed" && exit 1; }
-echo "style: licence lines, rooms, clang-format, ruff and pip install are in order"
+echo "style: licence lines, rooms, clang-format, ruff, pip install and types are in order"

@@ -61,7 +61,9 @@ def coordinates():
 
 def forward(reference):
     """Returns the certified largest distance from the reference, in tolerances."""
-    return native.module.hausdorff(*scenes.world_triangles(ob()), *reference, bound=TOLERANCE).upper / TOLERANCE
+    return (
+        native.module.directed_hausdorff(*scenes.world_triangles(ob()), *reference, bound=TOLERANCE).upper / TOLERANCE
+    )
 
 
 def stroke(*points):
@@ -290,7 +292,7 @@ def deformed(reference):
     """Returns the same as forward(), for the mesh that the viewport shows."""
     arrays = mesh_io.read_mesh(ob().evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh())
     vertices = mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob().matrix_world))
-    return native.module.hausdorff(vertices, arrays.triangles, *reference, bound=TOLERANCE).upper / TOLERANCE
+    return native.module.directed_hausdorff(vertices, arrays.triangles, *reference, bound=TOLERANCE).upper / TOLERANCE
 
 
 def test_guard_lattice_by_keys():

@@ -52,9 +52,9 @@ def stored():
 
 def assert_proved(ob, reference, percent):
     now = scenes.world_triangles(ob)
-    tolerance = percent / 100 * native.module.size(*reference)
+    tolerance = percent / 100 * native.module.diagonal(*reference)
     for pair in ((now, reference), (reference, now)):
-        assert native.module.hausdorff(*pair[0], *pair[1], bound=tolerance).upper <= tolerance
+        assert native.module.directed_hausdorff(*pair[0], *pair[1], bound=tolerance).upper <= tolerance
     scenes.assert_within(now, reference, tolerance)
 
 
@@ -106,7 +106,7 @@ def test_tolerance_from_the_presets_and_decimation_by_menu_search():
     screenshot("menu search")
     key("Return")
     yield from finished(lambda: len(ob.data.polygons) < 500)
-    assert_proved(ob, reference, 5 / native.module.size(*reference))
+    assert_proved(ob, reference, 5 / native.module.diagonal(*reference))
 
 
 def test_adjust_last_operation():

@@ -19,7 +19,7 @@ def test_pictures_and_queries_leave_the_window_alone():
         view()[1].tag_redraw()
         yield 0.2
         assert np.array_equal(native.module.render_distance(*surface, volume, size=(60, 40)), first)
-        assert (volume.check(*surface, method="occlusion_query").verdict == 2).all()
+        assert (volume.check(*surface, method="occlusion_query").verdicts == 2).all()
     screenshot("gl 1 window beside pictures")
     addon.unregister()
     yield 0.5

@@ -1,30 +1,45 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tolerance volumes: keep a triangle mesh within a tolerance of a reference surface, proved.
 
-Vertices are (n, 3) float32 or float64 arrays in local coordinates; to_world is a (4, 4) matrix that maps them to world
-units, in which tolerances and distances are given. Triangles are (m, 3) integer arrays. Long calls release the GIL and
-take progress= (a Progress) and threads= (0: one per core; the result never depends on it).
+A ToleranceVolume holds all points within a tolerance of a reference mesh. The functions decimate, smooth, deform and
+constrain and the class Guard keep a mesh in it. hausdorff, directed_hausdorff and deviation measure the distances of two
+meshes. They share no bounds with the functions before, whose results they judge.
+
+These conventions hold for every function:
+
+- Vertices are (n, 3) float32 or float64 arrays in local coordinates. Results have the dtype of the input.
+- to_world is a (4, 4) matrix that maps local coordinates to world units, in which tolerances and distances are given.
+  None is the identity. Functions without to_world take coordinates in one common space.
+- triangles is an (m, 3) integer array of indices of vertices. Functions that also take points, segments and quads call it
+  faces: (m, k), with k from 1 to 4.
+- threads is the number of threads, or None for one per core. The result never depends on it.
+- progress is a Progress, by which another thread follows the call and stops it, or None. Long calls release the GIL.
+- None stands for "no limit" and for "not given". All options after the first few arguments are given by name.
+- Errors are TolvolErrors. What is wrong with an argument is an InvalidInput, which is a ValueError too.
 """
+
+import enum
 
 from ._native import (
     OUTSIDE_COLOURS,
     Camera,
     Cancelled,
     CheckResult,
-    Constrained,
+    ConstrainResult,
     DecimationResult,
     DeformationResult,
-    Deviation,
+    DeviationResult,
+    DirectedHausdorffResult,
     DisplayTree,
     GlUnavailable,
     Guard,
-    HausdorffInterval,
+    HausdorffResult,
     InvalidInput,
     Lattice,
     Progress,
     ResourceLimit,
     Sides,
-    Smoothed,
+    SmoothingResult,
     ToleranceVolume,
     TolvolError,
     __version__,
@@ -32,13 +47,14 @@ from ._native import (
     decimate,
     deform,
     deviation,
+    diagonal,
+    directed_hausdorff,
     hausdorff,
     lattice_points,
     render_distance,
     render_volume,
     renderer,
     shutdown,
-    size,
     smooth,
     transfer_colours,
     wedges,
@@ -49,35 +65,49 @@ __all__ = [
     "Camera",
     "Cancelled",
     "CheckResult",
-    "Constrained",
+    "ConstrainResult",
     "DecimationResult",
     "DeformationResult",
-    "Deviation",
+    "DeviationResult",
+    "DirectedHausdorffResult",
     "DisplayTree",
     "GlUnavailable",
     "Guard",
-    "HausdorffInterval",
+    "HausdorffResult",
     "InvalidInput",
     "Lattice",
     "Progress",
     "ResourceLimit",
     "Sides",
-    "Smoothed",
+    "SmoothingResult",
     "ToleranceVolume",
     "TolvolError",
+    "Verdict",
     "__version__",
     "constrain",
     "decimate",
     "deform",
     "deviation",
+    "diagonal",
+    "directed_hausdorff",
     "hausdorff",
     "lattice_points",
     "render_distance",
     "render_volume",
     "renderer",
     "shutdown",
-    "size",
     "smooth",
     "transfer_colours",
     "wedges",
 ]
+
+
+class Verdict(enum.IntEnum):
+    """What a check found out about a face. A greater verdict is a better one."""
+
+    OUTSIDE = 0
+    """It is proved that some point of the face is farther away than the tolerance."""
+    UNPROVED = 1
+    """Neither was proved. The face counts as outside."""
+    INSIDE = 2
+    """It is proved that every point of the face is within the tolerance."""
