@@ -410,7 +410,7 @@ TEST(Decimation, FlatPlatesEndAtAnyTolerance) {
 
 TEST(Decimation, LargePlatesBecomeTwoTriangles) {
   // A face of the result lies near tens of thousands of triangles of the reference: more than a proof looks at.
-  for (const unsigned n : {across(128), across(150)}) {
+  for (const unsigned n : {128u, 150u}) {
     const Case c{shapes::stored(shapes::grid(n)), glm::dmat4(1), Storage::float32, 0.03};
     const DecimationResult r = run(c);
     expect_within(c, r);
