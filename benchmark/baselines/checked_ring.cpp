@@ -5,7 +5,7 @@
 
 namespace tolvol::baselines {
 
-void CheckedRing::begin(const TriangleMesh&, double mapping_error) { mapping_error_ = mapping_error; }
+void CheckedRing::begin(const TriangleMesh&, const StoredSpace& space) { space_ = space; }
 
 class CheckedRing::Asking final : public Trial {
  public:
@@ -19,11 +19,11 @@ class CheckedRing::Asking final : public Trial {
       groups_.push_back(0);
       for (const glm::dvec3& corner : face.corners) {
         indices_.push_back(static_cast<std::uint32_t>(points_.size()));
-        points_.push_back(corner);
+        points_.push_back(ring_.space_->store(corner));
       }
     }
     const std::vector<Verdict> verdicts =
-        ring_.check_->check_groups({points_, indices_, 3, ring_.mapping_error_}, groups_, {.threads = 1});
+        ring_.check_->check_groups({points_, *ring_.space_, indices_}, groups_, {.threads = 1});
     return verdicts.empty() || verdicts.front() == Verdict::inside;
   }
   void commit(const Change&) override {}

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "check/tolerance_check.h"
 #include "decimation/ring_check.h"
@@ -14,7 +15,7 @@ class CheckedRing final : public RingCheck {
   /// Keeps a reference to `check`.
   explicit CheckedRing(const ToleranceCheck& check) : check_(&check) {}
 
-  void begin(const TriangleMesh& mesh, double mapping_error) override;
+  void begin(const TriangleMesh& mesh, const StoredSpace& space) override;
   /// Its trials ask the check one question for each collapse, its new faces a group, as [Botsch04, §5] has it.
   std::unique_ptr<Trial> trial() override;
   std::string method() const override { return check_->method(); }
@@ -24,7 +25,7 @@ class CheckedRing final : public RingCheck {
   class Asking;
 
   const ToleranceCheck* check_;
-  double mapping_error_ = 0;
+  std::optional<StoredSpace> space_;
 };
 
 }  // namespace tolvol::baselines

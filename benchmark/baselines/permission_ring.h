@@ -17,7 +17,7 @@ class PermissionRing final : public RingCheck {
   /// Keeps a reference to `grid`, which is of the reference in its frame.
   explicit PermissionRing(const PermissionGrid& grid) : grid_(&grid) {}
 
-  void begin(const TriangleMesh&, double) override {}
+  void begin(const TriangleMesh&, const StoredSpace&) override {}
   std::unique_ptr<Trial> trial() override;
   std::string method() const override { return "permission_grid"; }
 

@@ -8,7 +8,7 @@
 
 namespace tolvol::baselines {
 
-void VertexSamples::begin(const TriangleMesh& mesh, double) {
+void VertexSamples::begin(const TriangleMesh& mesh, const StoredSpace&) {
   points_.vertices = mesh.vertices;
   for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) points_.triangles.emplace_back(v);
   samples_.emplace(points_, tolerance_, mesh.triangles.size());

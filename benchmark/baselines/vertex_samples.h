@@ -21,7 +21,7 @@ class VertexSamples final : public RingCheck {
   /// `tolerance` in the frame.
   explicit VertexSamples(double tolerance) : tolerance_(tolerance) {}
 
-  void begin(const TriangleMesh& mesh, double mapping_error) override;
+  void begin(const TriangleMesh& mesh, const StoredSpace& space) override;
   std::unique_ptr<Trial> trial() override;
   std::string method() const override { return "vertex_samples"; }
 

@@ -270,21 +270,17 @@ Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::
   return covers_segment(*reference_, *hierarchy_, a, b, limit_) ? Verdict::inside : Verdict::unproved;
 }
 
-std::vector<Verdict> Certificate::check(const Pieces& pieces, const Options& options) const {
-  const Call call(options.progress);
-  require_valid(pieces);
-  const double limit = volume_->provable(pieces.mapping_error), beyond = volume_->refutable(pieces.mapping_error);
-  const TriangleCertificate certificate(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), limit, beyond);
-  if (options.progress) options.progress->begin("checking");
+std::vector<Verdict> Certificate::verdicts(const PlacedPieces& pieces, const Options& options) const {
+  const ToleranceVolume& volume = this->volume();
+  const double limit = volume.provable(pieces.mapping_error), beyond = volume.refutable(pieces.mapping_error);
+  const TriangleCertificate certificate(volume.witnesses(), volume.grid(), volume.hierarchy(), limit, beyond);
 
   // The used points first: their distances settle most faces, inside (short edges) or outside, and are shared.
-  std::vector<bool> used(pieces.points.size(), false);
-  for (const std::uint32_t i : pieces.indices) used[i] = true;
   std::vector<TriangleCertificate::PointBound> nearest(pieces.points.size());
   constexpr std::size_t kBlock = 128;
   parallel_for(nearest.size(), kBlock, options.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      if (used[i]) nearest[i] = certificate.nearest(pieces.points[i], beyond);
+      if (pieces.used[i]) nearest[i] = certificate.nearest(pieces.points[i], beyond);
     }
   });
 

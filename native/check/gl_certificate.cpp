@@ -49,7 +49,7 @@ void require_room(std::size_t bytes, const char* what) {
 }
 
 /// Nine coordinates a triangle of the pieces from `begin` on.
-std::vector<float> corners_to_send(const Pieces& pieces, std::size_t begin, std::size_t count, double magnitude,
+std::vector<float> corners_to_send(const PlacedPieces& pieces, std::size_t begin, std::size_t count, double magnitude,
                                    unsigned threads) {
   const std::span<const PieceTriangle> triangles = triangles_of(pieces.corners);
   std::vector<float> result(9 * count * triangles.size());
@@ -73,7 +73,7 @@ std::vector<float> corners_to_send(const Pieces& pieces, std::size_t begin, std:
 
 }  // namespace
 
-GlCertificate::GlCertificate(const ToleranceVolume& volume) : volume_(&volume), renderer_(gl::renderer().name()) {
+GlCertificate::GlCertificate(const ToleranceVolume& volume) : ToleranceCheck(volume), renderer_(gl::renderer().name()) {
   const std::vector<std::uint32_t>& nodes = volume.grid().triangle;
   const std::vector<WitnessTriangle>& reference = volume.witnesses();
   const auto coordinates = [&](glm::dvec3 WitnessTriangle::*member) {
@@ -96,13 +96,10 @@ GlCertificate::GlCertificate(const ToleranceVolume& volume) : volume_(&volume), 
   });
 }
 
-std::vector<Verdict> GlCertificate::check(const Pieces& pieces, const Options& options) const {
-  const Call call(options.progress);
-  require_valid(pieces);
+std::vector<Verdict> GlCertificate::verdicts(const PlacedPieces& pieces, const Options& options) const {
   std::vector<Verdict> verdicts(pieces.size(), Verdict::unproved);
-  const double tolerance = volume_->frame_tolerance(), magnitude = 1 + 2 * tolerance;
-  const double limit = volume_->provable(pieces.mapping_error) - float_error(magnitude);
-  if (options.progress) options.progress->begin("checking");
+  const double tolerance = volume().frame_tolerance(), magnitude = 1 + 2 * tolerance;
+  const double limit = volume().provable(pieces.mapping_error) - float_error(magnitude);
   if (!(limit > 0.5 * tolerance) || pieces.size() == 0) return verdicts;
 
   const std::size_t per_piece = triangles_of(pieces.corners).size(), per_batch = kBatch / per_piece,
@@ -117,7 +114,7 @@ std::vector<Verdict> GlCertificate::check(const Pieces& pieces, const Options& o
   const auto look_at = [&](std::span<const std::uint32_t> candidates, int tries, int budget) {
     // All state anew: between two of these, others may have used the context.
     const gl::Program& program = gl::of_context<CertificateProgram>();
-    const DistanceGrid& grid = volume_->grid();
+    const DistanceGrid& grid = volume().grid();
     program.use();
     program.set("open_count", static_cast<unsigned>(candidates.size()));
     program.set("origin", glm::vec3(grid.origin));

@@ -7,24 +7,25 @@
 
 namespace tolvol {
 
+/// A verdict is `inside`, as certain as that of Certificate, or `unproved`, never `outside`. A piece is unproved if it
+/// is outside; if the grid names no near triangle for it, because nothing here searches for the closest one (this
+/// concerns pieces at nearly the tolerance on a coarse grid, and all pieces in the marched part of a grid, which has no
+/// ids); or if it would take more than a few thousand parts. All pieces are unproved if float32 would cost more than
+/// half of the tolerance, which is so for a tolerance below about 1e-5 of the reference. A check throws GlUnavailable
+/// if the context was lost, and then nothing is known. A few million small pieces take a second on two cores without a
+/// GPU.
 class GlCertificate final : public ToleranceCheck {
  public:
-  /// Puts the grid's ids and the reference on the GPU: 4 bytes a node, 36 a triangle. Keeps a reference to `volume`,
-  /// which must outlive this. Throws ResourceLimit when this GL takes no buffer that large, GlUnavailable.
+  /// Puts the grid's ids, 4 bytes a node, and the reference, 36 bytes a triangle, on the GPU. Keeps a reference to
+  /// `volume`, which must outlive this. Throws ResourceLimit if this GL takes no buffer that large, and GlUnavailable.
   explicit GlCertificate(const ToleranceVolume& volume);
 
-  /// Verdicts are `inside`, as certain as those of Certificate, or `unproved`; never `outside`. Unproved is what is
-  /// outside, what the grid names no near triangle for (there is no search for the closest one: on a coarse grid pieces
-  /// at nearly the tolerance; all of them in the marched part of a grid that has no ids), what would take more than a
-  /// few thousand parts, and everything when float32 would cost more than half of the tolerance (one below about 1e-5
-  /// of the reference). Throws GlUnavailable, and then nothing is known. A second for a few million small pieces on two
-  /// cores without a GPU.
-  std::vector<Verdict> check(const Pieces& pieces, const Options& options) const override;
   std::string method() const override { return "gl_certificate"; }
   std::string renderer() const override { return renderer_; }
 
  private:
-  const ToleranceVolume* volume_;
+  std::vector<Verdict> verdicts(const PlacedPieces& pieces, const Options& options) const override;
+
   std::string renderer_;
   gl::Buffer nodes_, a_, ab_, ac_;
 };

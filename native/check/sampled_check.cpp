@@ -57,19 +57,16 @@ SampledCheck::Programs::Programs(std::string_view sample_counts)
                 {GL_FRAGMENT_SHADER, {"samples.glsl", sample_counts, "count_samples.frag"}}}) {}
 
 SampledCheck::SampledCheck(const ToleranceVolume& volume, float margin)
-    : volume_(&volume), margin_(margin), renderer_(gl::renderer().name()) {}
+    : ToleranceCheck(volume), margin_(margin), renderer_(gl::renderer().name()) {}
 
-std::vector<Verdict> SampledCheck::check(const Pieces& pieces, const Options& options) const {
-  require_valid(pieces);
+std::vector<Verdict> SampledCheck::verdicts(const PlacedPieces& pieces, const Options& options) const {
   std::vector<std::uint32_t> each(pieces.size());
   std::iota(each.begin(), each.end(), 0u);
   return decide(pieces, each, each, false, options);
 }
 
-std::vector<Verdict> SampledCheck::check_groups(const Pieces& pieces, std::span<const std::int32_t> groups,
-                                                const Options& options) const {
-  require_valid(pieces);
-  if (groups.size() != pieces.size()) throw InvalidInput("groups must have one label for each face");
+std::vector<Verdict> SampledCheck::group_verdicts(const PlacedPieces& pieces, std::span<const std::int32_t> groups,
+                                                  const Options& options) const {
   std::vector<std::uint32_t> order(pieces.size()), labels(pieces.size());
   std::iota(order.begin(), order.end(), 0u);
   if (!std::is_sorted(groups.begin(), groups.end())) {
@@ -81,11 +78,9 @@ std::vector<Verdict> SampledCheck::check_groups(const Pieces& pieces, std::span<
   return decide(pieces, order, labels, true, options);
 }
 
-std::vector<Verdict> SampledCheck::decide(const Pieces& pieces, std::span<const std::uint32_t> order,
+std::vector<Verdict> SampledCheck::decide(const PlacedPieces& pieces, std::span<const std::uint32_t> order,
                                           std::span<const std::uint32_t> labels, bool queries,
                                           const Options& options) const {
-  const Call call(options.progress);
-  if (options.progress) options.progress->begin("checking");
   const float bound = this->bound(pieces.mapping_error);
   std::vector<Sum> sums(order.empty() ? 0 : labels[order.back()] + 1);
   std::future<void> drawing;  // of one batch, while the next is made
@@ -107,7 +102,7 @@ std::vector<Verdict> SampledCheck::decide(const Pieces& pieces, std::span<const 
 }
 
 /// Of the pieces from `next` on, which is moved past them.
-SampledCheck::Batch SampledCheck::make_batch(const Pieces& pieces, std::span<const std::uint32_t> order,
+SampledCheck::Batch SampledCheck::make_batch(const PlacedPieces& pieces, std::span<const std::uint32_t> order,
                                              std::span<const std::uint32_t> labels, std::size_t& next) const {
   Batch batch;
   batch.triangles.reserve(std::min(kBatchTriangles, 4 * (order.size() - next)));
@@ -128,9 +123,9 @@ SampledCheck::Batch SampledCheck::make_batch(const Pieces& pieces, std::span<con
   return batch;
 }
 
-bool SampledCheck::add_piece(const Pieces& pieces, std::size_t piece, std::uint32_t counter,
+bool SampledCheck::add_piece(const PlacedPieces& pieces, std::size_t piece, std::uint32_t counter,
                              std::vector<SampledTriangle>& triangles) const {
-  const DistanceGrid& grid = volume_->grid();
+  const DistanceGrid& grid = volume().grid();
   const double per_spacing = 1 / grid.spacing;
   const std::size_t corners = static_cast<std::size_t>(pieces.corners);
   const std::span<const std::uint32_t> corner = pieces.indices.subspan(piece * corners, corners);

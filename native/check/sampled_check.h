@@ -18,12 +18,6 @@ namespace tolvol {
 
 class SampledCheck : public ToleranceCheck {
  public:
-  /// Occlusion queries for many pieces at a time; where one finds that not all are inside, a counter a piece in shader
-  /// storage. O(samples).
-  std::vector<Verdict> check(const Pieces& pieces, const Options& options) const override;
-  /// One occlusion query a label, many of them in flight.
-  std::vector<Verdict> check_groups(const Pieces& pieces, std::span<const std::int32_t> groups,
-                                    const Options& options) const override;
   std::string renderer() const override { return renderer_; }
 
  protected:
@@ -58,9 +52,14 @@ class SampledCheck : public ToleranceCheck {
   /// `counted`: samples that are inside, of `points` samples.
   virtual Verdict verdict(std::uint64_t counted, std::uint64_t points) const = 0;
 
-  const ToleranceVolume& volume() const { return *volume_; }
-
  private:
+  /// Asks occlusion queries about many pieces at a time. Where a query finds that not all of its pieces are inside,
+  /// each of them gets a counter in shader storage. O(samples).
+  std::vector<Verdict> verdicts(const PlacedPieces& pieces, const Options& options) const override;
+  /// Asks one occlusion query for each label, many of them in flight.
+  std::vector<Verdict> group_verdicts(const PlacedPieces& pieces, std::span<const std::int32_t> groups,
+                                      const Options& options) const override;
+
   struct Batch;
   /// Of one label: samples that are inside, and samples drawn. Both are 0 where a query has shown all of them inside.
   struct Sum {
@@ -71,18 +70,17 @@ class SampledCheck : public ToleranceCheck {
       return *this;
     }
   };
-  std::vector<Verdict> decide(const Pieces& pieces, std::span<const std::uint32_t> order,
+  std::vector<Verdict> decide(const PlacedPieces& pieces, std::span<const std::uint32_t> order,
                               std::span<const std::uint32_t> labels, bool queries, const Options& options) const;
-  Batch make_batch(const Pieces& pieces, std::span<const std::uint32_t> order, std::span<const std::uint32_t> labels,
-                   std::size_t& next) const;
-  bool add_piece(const Pieces& pieces, std::size_t piece, std::uint32_t counter,
+  Batch make_batch(const PlacedPieces& pieces, std::span<const std::uint32_t> order,
+                   std::span<const std::uint32_t> labels, std::size_t& next) const;
+  bool add_piece(const PlacedPieces& pieces, std::size_t piece, std::uint32_t counter,
                  std::vector<SampledTriangle>& triangles) const;
   void draw(const Batch& batch, float bound, bool queries, std::vector<Sum>& sums) const;
   template <class Found>
   void count_by_query(const Batch& batch, std::span<const std::size_t> ends, Found&& found) const;
   void count_each(const Batch& batch, std::vector<Sum>& sums) const;
 
-  const ToleranceVolume* volume_;
   float margin_;
   std::string renderer_;
 };

@@ -12,11 +12,15 @@ namespace tolvol {
 
 namespace {
 
-/// Of the frame: the reference is within 1 of its centre and no tolerance is larger than 2, so that a point twice as
-/// far from either is refuted.
+/// A coordinate in the frame. The reference is within 1 of its centre and no tolerance is larger than 2, so that a
+/// point this far away is outside.
 constexpr double kFar = 8;
 
 bool finite(const glm::dvec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
+
+void require_labels(std::size_t labels, std::size_t pieces) {
+  if (labels != pieces) throw InvalidInput("groups must have one label for each face");
+}
 
 }  // namespace
 
@@ -27,59 +31,76 @@ std::span<const PieceTriangle> triangles_of(int corners) {
   return kTriangles[corners - 1];
 }
 
-PlacedPoints::PlacedPoints(std::span<const glm::dvec3> stored, const StoredSpace& space,
-                           const ToleranceVolume& volume) {
+PlacedPieces::PlacedPieces(const Pieces& pieces, const ToleranceVolume& volume)
+    : points(pieces.points.size(), glm::dvec3(0)),
+      used(pieces.points.size(), false),
+      indices(pieces.indices),
+      corners(pieces.corners) {
+  if (corners < 1 || corners > 4) throw InvalidInput("a face must have 1 to 4 corners; triangulate larger ones");
+  if (indices.size() % static_cast<std::size_t>(corners) != 0) {
+    throw InvalidInput("the face array is not a whole number of faces");
+  }
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    poll_at(i);
+    if (indices[i] >= points.size()) {
+      throw InvalidInput("faces[" + std::to_string(i / static_cast<std::size_t>(corners)) + "] uses point " +
+                             std::to_string(indices[i]) + ", but there are only " + std::to_string(points.size()),
+                         "invalid_mesh");
+    }
+    used[indices[i]] = true;
+  }
   const Frame& frame = volume.frame();
-  const StoredSpace world = space.in(Frame()), placed = space.in(frame);
+  const StoredSpace world = pieces.space.in(Frame()), placed = pieces.space.in(frame);
   const glm::dvec3 centre = frame.to_world(glm::dvec3(0));
-  points.reserve(stored.size());
-  std::vector<glm::dvec3> near;
-  near.reserve(stored.size());
-  for (const glm::dvec3& p : stored) {
+  glm::dvec3 extent(0);  // the largest coordinates of the points whose mapping error counts
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    poll_at(i);
+    const glm::dvec3& p = pieces.points[i];
+    if (!finite(p)) throw InvalidInput("point " + std::to_string(i) + " is not finite", "invalid_mesh");
+    if (!used[i]) continue;
     const glm::dvec3 at = placed.frame(p);
     if (glm::all(glm::lessThanEqual(glm::abs(at), glm::dvec3(kFar)))) {
-      near.push_back(p), points.push_back(at);
+      points[i] = at;
+      extent = glm::max(extent, glm::abs(p));
       continue;
     }
-    const std::string name = "point " + std::to_string(points.size());
-    if (!finite(p)) throw InvalidInput(name + " is not finite", "invalid_mesh");
-    // In the world: a point may leave the range of double by the frame's scale alone.
+    // This compares in the world because the frame's scale alone may take a point out of the range of double.
     const glm::dvec3 away = glm::abs(world.world(p) - centre);
-    const double certain = kFar / frame.scale() + world.mapping_error(std::span(&p, 1));
+    const double certain = kFar / frame.scale() + world.mapping_error({&p, 1});
     if (!(std::max({away.x, away.y, away.z}) > certain)) {
-      throw InvalidInput(name + " is too far away for double precision under to_world; move it nearer to the origin",
+      throw InvalidInput("point " + std::to_string(i) +
+                             " is too far away for double precision under to_world; move it nearer to the origin",
                          "too_far");
     }
-    points.push_back(glm::clamp(at, -kFar, kFar));
+    points[i] = glm::clamp(at, -kFar, kFar);
   }
-  mapping_error = placed.mapping_error(near);
+  mapping_error = placed.mapping_error({&extent, 1});
 }
 
-void require_valid(const Pieces& pieces) {
-  if (pieces.corners < 1 || pieces.corners > 4) {
-    throw InvalidInput("a face must have 1 to 4 corners; triangulate larger ones");
-  }
-  const std::size_t corners = static_cast<std::size_t>(pieces.corners);
-  if (pieces.indices.size() % corners != 0) throw InvalidInput("the face array is not a whole number of faces");
-  for (std::size_t i = 0; i < pieces.indices.size(); ++i) {
-    poll_at(i);
-    if (pieces.indices[i] < pieces.points.size()) continue;
-    throw InvalidInput("faces[" + std::to_string(i / corners) + "] uses point " + std::to_string(pieces.indices[i]) +
-                           ", but there are only " + std::to_string(pieces.points.size()),
-                       "invalid_mesh");
-  }
+std::vector<Verdict> ToleranceCheck::check(const Pieces& pieces, const Options& options) const {
+  const Call call(options.progress);
+  if (options.progress) options.progress->begin("checking");
+  return verdicts(PlacedPieces(pieces, *volume_), options);
 }
 
 std::vector<Verdict> ToleranceCheck::check_groups(const Pieces& pieces, std::span<const std::int32_t> groups,
                                                   const Options& options) const {
   const Call call(options.progress);
-  std::vector<Verdict> verdicts = check(pieces, options);
-  combine_groups(verdicts, groups);
-  return verdicts;
+  if (options.progress) options.progress->begin("checking");
+  const PlacedPieces placed(pieces, *volume_);
+  require_labels(groups.size(), placed.size());
+  return group_verdicts(placed, groups, options);
+}
+
+std::vector<Verdict> ToleranceCheck::group_verdicts(const PlacedPieces& pieces, std::span<const std::int32_t> groups,
+                                                    const Options& options) const {
+  std::vector<Verdict> result = verdicts(pieces, options);
+  combine_groups(result, groups);
+  return result;
 }
 
 void combine_groups(std::span<Verdict> verdicts, std::span<const std::int32_t> groups) {
-  if (groups.size() != verdicts.size()) throw InvalidInput("groups must have one label for each face");
+  require_labels(groups.size(), verdicts.size());
   std::unordered_map<std::int32_t, Verdict> least;
   for (std::size_t i = 0; i < groups.size(); ++i) {
     poll_at(i);

@@ -21,14 +21,12 @@ enum class Verdict : std::uint8_t {
   inside = 2,    ///< proved: every point is within the tolerance
 };
 
-/// Pieces of one array of points, all in the volume's frame.
+/// Pieces of one array of points as they are stored.
 struct Pieces {
   std::span<const glm::dvec3> points;
-  std::span<const std::uint32_t> indices;  ///< `corners` a piece
-  int corners = 3;                         ///< 1 point, 2 segment, 3 triangle, 4 quad in both of its triangulations
-  double mapping_error = 0;                ///< StoredSpace::mapping_error() of the points
-
-  std::size_t size() const { return indices.size() / static_cast<std::size_t>(corners); }
+  StoredSpace space;                       ///< places the points in the world, or in any frame
+  std::span<const std::uint32_t> indices;  ///< a piece has `corners` indices of points
+  int corners = 3;                         ///< 1: points, 2: segments, 3: triangles, 4: quads in both triangulations
 };
 
 /// The places of a triangle's corners among the corners of its piece.
@@ -38,15 +36,21 @@ using PieceTriangle = std::array<std::uint8_t, 3>;
 /// the four triangles of both of its triangulations.
 std::span<const PieceTriangle> triangles_of(int corners);
 
-/// Points as they are stored, placed in the frame of a volume for a check.
-struct PlacedPoints {
-  /// Throws InvalidInput, naming the first offender, for a point that is not finite, and for one of which double
-  /// precision cannot tell under its matrix where it is. Points that are certainly farther away than any tolerance are
-  /// drawn near to where they are still outside, so that what mapping costs them is not charged to the others.
-  PlacedPoints(std::span<const glm::dvec3> stored, const StoredSpace& space, const ToleranceVolume& volume);
+/// Pieces in the frame of a volume, with the error that their placing makes.
+struct PlacedPieces {
+  /// Keeps a reference to the indices of `pieces`. Throws InvalidInput, naming the first offender, unless the pieces
+  /// have 1 to 4 corners, their number is whole, every index has a point, every point is finite, and double precision
+  /// can tell under the matrix where each used point is. A point that is certainly farther away than any tolerance is
+  /// drawn nearer, to where it is still outside, so that its mapping error is not charged to the other points.
+  PlacedPieces(const Pieces& pieces, const ToleranceVolume& volume);
+
+  std::size_t size() const { return indices.size() / static_cast<std::size_t>(corners); }
 
   std::vector<glm::dvec3> points;
-  double mapping_error;  ///< of all but those
+  std::vector<bool> used;  ///< tells which points the pieces use; the others are at the origin
+  std::span<const std::uint32_t> indices;
+  int corners;
+  double mapping_error;  ///< StoredSpace::mapping_error() of the used points, except those that were drawn nearer
 };
 
 class ToleranceCheck {
@@ -57,21 +61,30 @@ class ToleranceCheck {
   };
 
   virtual ~ToleranceCheck() = default;
-  /// A verdict for each piece. Throws InvalidInput for pieces that are not valid, Cancelled.
-  virtual std::vector<Verdict> check(const Pieces& pieces, const Options& options) const = 0;
+  /// A verdict for each piece. Throws InvalidInput for pieces that PlacedPieces refuses, and Cancelled.
+  std::vector<Verdict> check(const Pieces& pieces, const Options& options) const;
   /// The same, but every piece gets the least verdict of the pieces with its label. Throws InvalidInput also unless
   /// there is a label for each.
-  virtual std::vector<Verdict> check_groups(const Pieces& pieces, std::span<const std::int32_t> groups,
-                                            const Options& options) const;
-  /// As reports name it; one whose verdicts are no proofs says "(not conservative)".
+  std::vector<Verdict> check_groups(const Pieces& pieces, std::span<const std::int32_t> groups,
+                                    const Options& options) const;
+  /// The name in reports. The name of a method whose verdicts are no proofs ends in "(not conservative)".
   virtual std::string method() const = 0;
-  /// What computed it: "CPU", or the name of a GL renderer.
+  /// What computes the verdicts: "CPU", or the name of a GL renderer.
   virtual std::string renderer() const = 0;
-};
 
-/// Throws InvalidInput, naming the first offender, unless there are 1 to 4 corners, a whole number of pieces, and a
-/// point for every index.
-void require_valid(const Pieces& pieces);
+ protected:
+  /// Keeps a reference to `volume`, which must outlive this.
+  explicit ToleranceCheck(const ToleranceVolume& volume) : volume_(&volume) {}
+  const ToleranceVolume& volume() const { return *volume_; }
+
+ private:
+  virtual std::vector<Verdict> verdicts(const PlacedPieces& pieces, const Options& options) const = 0;
+  /// Is given a label for each piece.
+  virtual std::vector<Verdict> group_verdicts(const PlacedPieces& pieces, std::span<const std::int32_t> groups,
+                                              const Options& options) const;
+
+  const ToleranceVolume* volume_;
+};
 
 /// Gives every piece the least verdict of the pieces with the same label. Throws InvalidInput unless there is a label
 /// for each.

@@ -118,7 +118,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   const double mapping_error = space_.mapping_error(used);
   const double provable = volume_->provable(mapping_error), limit = provable * (1 - kHeadroom);
   if (options_.baseline) {
-    options_.baseline->begin({positions_, cut_.triangles}, mapping_error);
+    options_.baseline->begin({positions_, cut_.triangles}, space_);
     report_.method = options_.baseline->method(), report_.renderer = options_.baseline->renderer();
     return options_.baseline;
   }
@@ -129,7 +129,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
     element_of_.assign(triangles_.size(), kNone);
     for (std::uint32_t t = 0; t < cut_.triangle_input.size(); ++t) element_of_[cut_.triangle_input[t]] = t;
   }
-  if (!identical_) certify_input(certificate, mapping_error);
+  if (!identical_) certify_input(certificate);
 
   forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), limit,
                    volume_->refutable(mapping_error));
@@ -153,13 +153,12 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   return &certified_.emplace(directions, positions_, cut_.triangles.size(), identical_);
 }
 
-void DecimationInput::certify_input(const Certificate& certificate, double mapping_error) {
-  const std::vector<glm::dvec3> in_frame = space_.frame(vertices_);
+void DecimationInput::certify_input(const Certificate& certificate) {
   std::vector<std::uint32_t> indices;
   indices.reserve(3 * triangles_.size());
   for (const glm::uvec3& t : triangles_) indices.insert(indices.end(), {t.x, t.y, t.z});
   const std::vector<Verdict> verdicts =
-      certificate.check({in_frame, indices, 3, mapping_error}, {options_.threads, options_.progress});
+      certificate.check({vertices_, space_, indices}, {options_.threads, options_.progress});
   for (std::uint32_t i = 0; i < verdicts.size(); ++i) {
     if (verdicts[i] == Verdict::inside) continue;
     ++report_.outside_faces;

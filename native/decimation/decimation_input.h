@@ -68,7 +68,7 @@ class DecimationInput {
   void pin(std::uint32_t vertex, const std::string& cause);
   bool input_is_reference() const;
   Bounds* set_bounds(Team& team);
-  void certify_input(const Certificate& certificate, double mapping_error);
+  void certify_input(const Certificate& certificate);
   void cover(double provable);
 
   std::span<const glm::dvec3> vertices_;

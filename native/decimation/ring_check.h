@@ -5,6 +5,7 @@
 #include <string>
 
 #include "decimation/bounds.h"
+#include "geometry/frame.h"
 #include "geometry/triangle_mesh.h"
 
 namespace tolvol {
@@ -12,10 +13,9 @@ namespace tolvol {
 /// The decimation runs on one thread, and asks it about one change after another.
 class RingCheck : public Bounds {
  public:
-  /// Is called once, before the first trial, with the mesh that is decimated, in the volume's frame. Its triangles are
-  /// the elements of the changes. `mapping_error` is StoredSpace::mapping_error() of all points that the questions may
-  /// be about.
-  virtual void begin(const TriangleMesh& mesh, double mapping_error) = 0;
+  /// Is called once, before the first trial, with the mesh that is decimated, in the volume's frame. The triangles of
+  /// the mesh are the elements of the changes. `space` is where their positions are stored.
+  virtual void begin(const TriangleMesh& mesh, const StoredSpace& space) = 0;
 
   virtual std::string method() const = 0;
   /// The name of what computes the answers: "CPU", or a GL renderer.

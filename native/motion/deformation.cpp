@@ -197,13 +197,8 @@ class Deformation {
   /// The given faces that are not certified to be inside, ascending.
   std::vector<std::uint32_t> not_inside(std::span<const glm::dvec3> stored,
                                         std::span<const std::uint32_t> faces) const {
-    std::vector<glm::dvec3> points(stored.size());
-    parallel_for(points.size(), kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) points[i] = space_.frame(stored[i]);
-    });
     const std::vector<Verdict> verdicts =
-        certificate_->check({points, faces, static_cast<int>(corners_), space_.mapping_error(stored)},
-                            {options_.threads, options_.progress});
+        certificate_->check({stored, space_, faces, static_cast<int>(corners_)}, {options_.threads, options_.progress});
     std::vector<std::uint32_t> result;
     for (std::uint32_t i = 0; i < verdicts.size(); ++i) {
       if (verdicts[i] != Verdict::inside) result.push_back(i);

@@ -85,8 +85,7 @@ void ModToleranceT<MeshT>::initialize() {
     for (const auto v : mesh.fv_range(f)) indices.push_back(static_cast<std::uint32_t>(v.idx()));
   }
   mapping_error_ = space_->mapping_error(points);
-  const std::vector<Verdict> verdicts =
-      Certificate(*volume_).check({space_->frame(points), indices, 3, mapping_error_}, {});
+  const std::vector<Verdict> verdicts = Certificate(*volume_).check({points, *space_, indices, 3}, {});
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     if (verdicts[i] == Verdict::inside) continue;
     throw InvalidInput("face " + std::to_string(faces[i]) + " is not within the tolerance of the reference; " +

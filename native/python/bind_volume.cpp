@@ -55,8 +55,7 @@ CheckResult check(const Volume& volume, const py::object& points, const py::obje
   std::vector<Verdict> verdicts;
   {
     const Interruptible call(progress);
-    const PlacedPoints placed(v.values, space, volume.native);
-    const Pieces pieces{placed.points, indices, corners, placed.mapping_error};
+    const Pieces pieces{v.values, space, indices, corners};
     by = volume.check(method);
     try {
       verdicts = groups.is_none() ? by->check(pieces, options) : by->check_groups(pieces, labels, options);

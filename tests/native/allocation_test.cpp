@@ -146,12 +146,10 @@ TEST(Allocation, VolumeAndChecks) {
     EXPECT_GT(fail_allocations([&] { return distances(threads); }), 10);
   }
   const auto verdicts = [&](unsigned threads) {
-    const PlacedPoints placed(scene.wish, kStored, scene.volume);
     std::vector<std::int32_t> groups(scene.mesh.triangles.size());
     for (std::size_t i = 0; i < groups.size(); ++i) groups[i] = std::int32_t(i / 2);
     const std::vector<Verdict> found =
-        Certificate(scene.volume)
-            .check_groups({placed.points, scene.faces, 3, placed.mapping_error}, groups, {threads, nullptr});
+        Certificate(scene.volume).check_groups({scene.wish, kStored, scene.faces}, groups, {threads, nullptr});
     Numbers numbers;
     for (const Verdict verdict : found) numbers.push_back(double(verdict));
     return numbers;

@@ -44,7 +44,7 @@ ToleranceVolume volume_of(const TriangleMesh& mesh) {
 
 struct Fixed final : RingCheck {
   explicit Fixed(bool answer) : answer(answer) {}
-  void begin(const TriangleMesh& mesh, double) override { triangles = mesh.triangles.size(); }
+  void begin(const TriangleMesh& mesh, const StoredSpace&) override { triangles = mesh.triangles.size(); }
   struct Asking final : Trial {
     explicit Asking(Fixed& fixed) : fixed(fixed) {}
     bool accepts(const Change& change) override {

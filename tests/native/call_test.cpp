@@ -79,7 +79,7 @@ std::vector<NamedCall> calls() {
       {"DisplayGrid", [] { DisplayGrid(wavy(), false, kTolerance, {.threads = 1}); }},
       {"check",
        [] {
-         Certificate(volume()).check({moved, faces, 3, 0}, {1, nullptr});
+         Certificate(volume()).check({moved, space, faces}, {1, nullptr});
        }},
       {"decimate", [] { decimated([](DecimationOptions&) {}); }},
       {"decimate one way", [] { decimated([](DecimationOptions& o) { o.two_sided = false; }); }},
@@ -139,12 +139,11 @@ TEST(Call, IsHeardInsideOneFace) {
   // The face lies where hardly a part of it is nearer than the tolerance or farther: it takes the whole budget.
   const TriangleMesh waves = shapes::squares(
       100, [](const glm::dvec3& p) { return glm::dvec3(p.x, p.y, 0.01 * std::sin(60 * p.x) * std::sin(60 * p.y)); });
-  const ToleranceVolume around(waves.vertices, waves.triangles, StoredSpace(glm::dmat4(1), Storage::float64), 0.00995);
-  const Frame& frame = around.frame();
-  const std::vector<glm::dvec3> corners{frame.from_world({0.02, 0.02, 0}), frame.from_world({0.98, 0.02, 0}),
-                                        frame.from_world({0.98, 0.98, 0})};
+  const StoredSpace space(glm::dmat4(1), Storage::float64);
+  const ToleranceVolume around(waves.vertices, waves.triangles, space, 0.00995);
+  const std::vector<glm::dvec3> corners{{0.02, 0.02, 0}, {0.98, 0.02, 0}, {0.98, 0.98, 0}};
   const std::vector<std::uint32_t> face{0, 1, 2};
-  const auto check = [&] { Certificate(around).check({corners, face, 3, 0}, {1, nullptr}); };
+  const auto check = [&] { Certificate(around).check({corners, space, face}, {1, nullptr}); };
   const std::size_t polls = polls_of(check);
   ASSERT_GE(polls, 20u);
   const Counted part(polls / 2);
@@ -160,7 +159,8 @@ TEST(Call, IsHeardInsideOneSearch) {
 TEST(Call, CancelledAtTheEndOfACheckLeavesNoVerdicts) {
   const std::vector<std::uint32_t> faces = indices();
   const Certificate certificate(volume());
-  const auto check = [&] { certificate.check({volume().reference().vertices, faces, 3, 0}, {1, nullptr}); };
+  const StoredSpace space(glm::dmat4(1), Storage::float64);
+  const auto check = [&] { certificate.check({wavy().vertices, space, faces}, {1, nullptr}); };
   const Counted part(polls_of(check));
   EXPECT_THROW(check(), Cancelled);
 }

@@ -25,11 +25,8 @@ inline std::vector<std::uint32_t> corners(std::size_t count) {
   return indices;
 }
 
-inline std::vector<Verdict> ask(const ToleranceCheck& check, const ToleranceVolume& volume, const Points& points,
-                                int of = 3) {
-  const StoredSpace placed = kIdentity.in(volume.frame());
-  const std::vector<dvec3> in_frame = placed.frame(points);
-  return check.check({in_frame, corners(points.size()), of, placed.mapping_error(points)}, {1, nullptr});
+inline std::vector<Verdict> ask(const ToleranceCheck& check, const Points& points, int of = 3) {
+  return check.check({points, kIdentity, corners(points.size()), of}, {1, nullptr});
 }
 
 class Maker {

@@ -28,10 +28,7 @@ struct Candidates {
 };
 
 std::vector<Verdict> check(const ToleranceVolume& volume, const Candidates& candidates, unsigned threads = 1) {
-  const StoredSpace placed = kIdentity.in(volume.frame());
-  const std::vector<dvec3> in_frame = placed.frame(candidates.points);
-  return Certificate(volume).check({in_frame, candidates.indices, 3, placed.mapping_error(candidates.points)},
-                                   {threads, nullptr});
+  return Certificate(volume).check({candidates.points, kIdentity, candidates.indices}, {threads, nullptr});
 }
 
 /// Candidates near the surface: a point of the reference moved by up to 2 epsilon along a random direction, two more
@@ -221,12 +218,10 @@ TEST(Certificate, ProbesFindWhatHasNoProofAndNothingElse) {
 TEST(Certificate, PointsSegmentsAndQuads) {
   const TriangleMesh plane = shapes::grid(4);
   const ToleranceVolume volume(plane.vertices, plane.triangles, kIdentity, 0.1);
-  const StoredSpace placed = kIdentity.in(volume.frame());
   const auto verdict = [&](const std::vector<dvec3>& points) {
     std::vector<std::uint32_t> indices(points.size());
     for (std::uint32_t i = 0; i < indices.size(); ++i) indices[i] = i;
-    const std::vector<dvec3> in_frame = placed.frame(points);
-    return Certificate(volume).check({in_frame, indices, int(points.size()), placed.mapping_error(points)}, {})[0];
+    return Certificate(volume).check({points, kIdentity, indices, int(points.size())}, {})[0];
   };
   EXPECT_EQ(verdict({{0.5, 0.5, 0.09}}), Verdict::inside);
   EXPECT_EQ(verdict({{0.5, 0.5, 0.11}}), Verdict::outside);
@@ -236,12 +231,10 @@ TEST(Certificate, PointsSegmentsAndQuads) {
   // Within in one triangulation, outside in the other: a quad is judged in both.
   const TriangleMesh roof{{{0, 0, 0}, {1, 0, 0.5}, {1, 1, 0}, {0, 1, 0.5}}, {{0, 1, 3}, {1, 2, 3}}};
   const ToleranceVolume over(roof.vertices, roof.triangles, kIdentity, 0.1);
-  const StoredSpace there = kIdentity.in(over.frame());
-  const std::vector<dvec3> corners = there.frame(roof.vertices);
   const std::vector<std::uint32_t> quad{0, 1, 2, 3}, halves{0, 1, 3, 1, 2, 3};
-  EXPECT_EQ(Certificate(over).check({corners, quad, 4, 0}, {})[0], Verdict::outside);
-  EXPECT_EQ(Certificate(over).check({corners, halves, 3, 0}, {})[0], Verdict::inside);
-  EXPECT_THROW(Certificate(over).check({corners, quad, 5, 0}, {}), InvalidInput);
+  EXPECT_EQ(Certificate(over).check({roof.vertices, kIdentity, quad, 4}, {})[0], Verdict::outside);
+  EXPECT_EQ(Certificate(over).check({roof.vertices, kIdentity, halves, 3}, {})[0], Verdict::inside);
+  EXPECT_THROW(Certificate(over).check({roof.vertices, kIdentity, quad, 5}, {}), InvalidInput);
 }
 
 /// Triangles of a rough mesh whose corners have moved apart until the proof that is left is the last: a little farther
@@ -279,11 +272,12 @@ TEST(Certificate, WhatIsProvedOfAPieceIsProvedOfItsParts) {
     const ToleranceVolume volume(reference.vertices, reference.triangles, kIdentity, tolerance);
     const TriangleCertificate certificate(volume.witnesses(), volume.grid(), volume.hierarchy(), volume.provable(0),
                                           volume.refutable(0));
-    const std::vector<dvec3> points = barely_inside(volume, certificate, many(30'000), 17);
+    std::vector<dvec3> points = barely_inside(volume, certificate, many(30'000), 17);
+    for (dvec3& p : points) p = volume.frame().to_world(p);
     const Certificate check(volume);
     std::vector<std::uint32_t> whole(points.size());
     std::iota(whole.begin(), whole.end(), 0u);
-    const std::vector<Verdict> verdicts = check.check({points, whole, 3, 0}, {});
+    const std::vector<Verdict> verdicts = check.check({points, kIdentity, whole}, {});
     std::size_t inside = 0;
     for (const std::vector<std::uint32_t>& part : std::vector<std::vector<std::uint32_t>>{
              {0},          {1},          {2},          {0, 1},       {1, 0},      {1, 2},       {2, 1},
@@ -295,7 +289,8 @@ TEST(Certificate, WhatIsProvedOfAPieceIsProvedOfItsParts) {
         if (verdicts[i / 3] != Verdict::inside) continue;
         for (const std::uint32_t corner : part) indices.push_back(i + corner);
       }
-      const std::vector<Verdict> of_parts = check.check({points, indices, static_cast<int>(part.size()), 0}, {});
+      const std::vector<Verdict> of_parts =
+          check.check({points, kIdentity, indices, static_cast<int>(part.size())}, {});
       inside = of_parts.size();
       EXPECT_EQ(std::count(of_parts.begin(), of_parts.end(), Verdict::inside), static_cast<std::ptrdiff_t>(inside))
           << testing::PrintToString(part) << " at " << tolerance;

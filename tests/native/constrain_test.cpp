@@ -55,9 +55,7 @@ auto noise(double deviation, unsigned seed = 1) {
 
 std::vector<Verdict> verdicts(const ToleranceVolume& volume, const StoredSpace& space, const Points& points,
                               const std::vector<std::uint32_t>& faces, int corners = 3) {
-  const StoredSpace placed = space.in(volume.frame());
-  const Points in_frame = placed.frame(points);
-  return Certificate(volume).check({in_frame, faces, corners, placed.mapping_error(points)}, {1, nullptr});
+  return Certificate(volume).check({points, space, faces, corners}, {1, nullptr});
 }
 
 bool all_inside(const std::vector<Verdict>& verdicts) {

@@ -26,16 +26,15 @@ ToleranceVolume volume_of(const TriangleMesh& mesh, double tolerance, std::optio
 }
 
 /// Pieces of `corners` consecutive points each.
-std::vector<Verdict> check(const ToleranceCheck& method, const ToleranceVolume& volume,
-                           const std::vector<dvec3>& points, int corners = 3, Progress* progress = nullptr) {
+std::vector<Verdict> check(const ToleranceCheck& method, const std::vector<dvec3>& points, int corners = 3,
+                           Progress* progress = nullptr) {
   std::vector<std::uint32_t> indices(points.size());
   for (std::uint32_t i = 0; i < indices.size(); ++i) indices[i] = i;
-  const StoredSpace placed = kIdentity.in(volume.frame());
-  return method.check({placed.frame(points), indices, corners, placed.mapping_error(points)}, {1, progress});
+  return method.check({points, kIdentity, indices, corners}, {1, progress});
 }
 
 Verdict check_one(const ToleranceVolume& volume, const std::vector<dvec3>& points) {
-  return check(GlCertificate(volume), volume, points, static_cast<int>(points.size())).at(0);
+  return check(GlCertificate(volume), points, static_cast<int>(points.size())).at(0);
 }
 
 dvec3 direction(std::mt19937& engine) {
@@ -88,7 +87,7 @@ TriangleMesh needles(double height, const dvec3& offset) {
 void expect_no_wrong_accept(const TriangleMesh& reference, double tolerance, const std::vector<dvec3>& points,
                             std::optional<double> precision = {}) {
   const ToleranceVolume volume = volume_of(reference, tolerance, precision);
-  const std::vector<Verdict> verdicts = check(GlCertificate(volume), volume, points);
+  const std::vector<Verdict> verdicts = check(GlCertificate(volume), points);
   const candidates::Points inside = candidates::accepted(points, verdicts);
   EXPECT_GT(inside.size() / 3, verdicts.size() / 20);
   EXPECT_EQ(candidates::farther(inside, reference, tolerance), 0);
@@ -151,8 +150,8 @@ TEST_F(GlCertificates, ProvesWhatDecimationMakes) {
         points.push_back(reference.vertices[t[k]] + dvec3(normal(engine), normal(engine), normal(engine)));
       }
     }
-    const std::vector<Verdict> ours = check(GlCertificate(volume), volume, points),
-                               reached = check(Certificate(volume), volume, points);
+    const std::vector<Verdict> ours = check(GlCertificate(volume), points),
+                               reached = check(Certificate(volume), points);
     std::size_t inside = 0, proved = 0;
     for (std::size_t i = 0; i < ours.size(); ++i) {
       inside += reached[i] == Verdict::inside;
@@ -186,8 +185,8 @@ TEST_F(GlCertificates, TouchesTheToleranceFromBothSides) {
       above.push_back(place({x + s, y + t, side * (1 + (i % 3 ? 1e-6 : 1e-9))}));
     }
   }
-  for (const Verdict v : check(method, volume, below)) ASSERT_EQ(v, Verdict::inside);
-  for (const Verdict v : check(method, volume, above)) ASSERT_EQ(v, Verdict::unproved);
+  for (const Verdict v : check(method, below)) ASSERT_EQ(v, Verdict::inside);
+  for (const Verdict v : check(method, above)) ASSERT_EQ(v, Verdict::unproved);
 }
 
 TEST_F(GlCertificates, LargeAndBentPieces) {
@@ -231,9 +230,13 @@ TEST_F(GlCertificates, OddCoordinatesAreUnproved) {
     for (int axis = 0; axis < 3; ++axis) {
       dvec3 p(0);
       p[axis] = odd;
-      const std::vector<dvec3> points = {dvec3(0), {0.1, 0, 0}, p};  // in the frame
+      const std::vector<dvec3> points = {dvec3(0), {0.1, 0, 0}, p};
       const std::vector<std::uint32_t> indices = {0, 1, 2, 2, 2, 2, 2, 0, 1, 0, 2, 1, 0, 1, 0};
-      const std::vector<Verdict> verdicts = method.check({points, indices, 3, 0}, {});
+      if (!std::isfinite(odd)) {
+        EXPECT_THROW(method.check({points, kIdentity, indices}, {}), InvalidInput);
+        continue;
+      }
+      const std::vector<Verdict> verdicts = method.check({points, kIdentity, indices}, {});
       EXPECT_EQ(verdicts[4], Verdict::inside);
       for (int i = 0; i < 4; ++i) EXPECT_EQ(verdicts[i], Verdict::unproved) << odd;
     }
@@ -262,18 +265,18 @@ TEST_F(GlCertificates, BatchesDoNotShow) {
   const ToleranceVolume volume = volume_of(torus, 0.05);
   const GlCertificate method(volume);
   std::vector<dvec3> few = hostile(torus, 0.05, 4'000, 9);
-  const std::vector<Verdict> expected = check(method, volume, few), quads = check(method, volume, few, 4);
+  const std::vector<Verdict> expected = check(method, few), quads = check(method, few, 4);
   EXPECT_NE(std::count(expected.begin(), expected.end(), Verdict::inside), 0);
   std::vector<dvec3> many;
   for (int i = 0; i < 70; ++i) many.insert(many.end(), few.begin(), few.end());
   Progress progress;
-  const std::vector<Verdict> got = check(method, volume, many, 3, &progress);
+  const std::vector<Verdict> got = check(method, many, 3, &progress);
   for (std::size_t i = 0; i < got.size(); ++i) ASSERT_EQ(got[i], expected[i % expected.size()]);
   EXPECT_GT(progress.fraction(), 0.5);
   many.resize(30 * few.size());
-  const std::vector<Verdict> of_quads = check(method, volume, many, 4);
+  const std::vector<Verdict> of_quads = check(method, many, 4);
   for (std::size_t i = 0; i < of_quads.size(); ++i) ASSERT_EQ(of_quads[i], quads[i % quads.size()]);
-  EXPECT_TRUE(check(method, volume, {}).empty());
+  EXPECT_TRUE(check(method, {}).empty());
 }
 
 TEST_F(GlCertificates, AnswersTwoThreadsAtATime) {
@@ -281,11 +284,11 @@ TEST_F(GlCertificates, AnswersTwoThreadsAtATime) {
   const ToleranceVolume volume = volume_of(torus, 0.05);
   const GlCertificate method(volume);
   const std::vector<dvec3> first = hostile(torus, 0.05, 3'000, 1), second = hostile(torus, 0.05, 2'000, 2);
-  const std::vector<Verdict> of_first = check(method, volume, first), of_second = check(method, volume, second);
+  const std::vector<Verdict> of_first = check(method, first), of_second = check(method, second);
   std::thread other([&] {
-    for (int i = 0; i < 10; ++i) EXPECT_EQ(check(method, volume, second), of_second);
+    for (int i = 0; i < 10; ++i) EXPECT_EQ(check(method, second), of_second);
   });
-  for (int i = 0; i < 10; ++i) EXPECT_EQ(check(method, volume, first), of_first);
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(check(method, first), of_first);
   other.join();
 }
 
@@ -294,26 +297,26 @@ TEST_F(GlCertificates, IsCancelled) {
   const ToleranceVolume volume = volume_of(torus, 0.05);
   Progress progress;
   progress.cancel();
-  EXPECT_THROW(check(GlCertificate(volume), volume, torus.vertices, 1, &progress), Cancelled);
+  EXPECT_THROW(check(GlCertificate(volume), torus.vertices, 1, &progress), Cancelled);
 }
 
 TEST_F(GlCertificates, ALostContextAnswersNothing) {
   const TriangleMesh torus = shapes::torus(10);
   const ToleranceVolume volume = volume_of(torus, 0.05);
   const GlCertificate method(volume);
-  EXPECT_EQ(check(method, volume, torus.vertices, 1).at(0), Verdict::inside);
+  EXPECT_EQ(check(method, torus.vertices, 1).at(0), Verdict::inside);
   gl::shutdown();
-  EXPECT_THROW(check(method, volume, torus.vertices, 1), GlUnavailable);
-  EXPECT_EQ(check(GlCertificate(volume), volume, torus.vertices, 1).at(0), Verdict::inside);
+  EXPECT_THROW(check(method, torus.vertices, 1), GlUnavailable);
+  EXPECT_EQ(check(GlCertificate(volume), torus.vertices, 1).at(0), Verdict::inside);
 }
 
 TEST_F(GlCertificates, RefusesWhatIsNotValid) {
   const ToleranceVolume volume = volume_of(shapes::torus(10), 0.05);
   const std::vector<dvec3> points(10);
   const std::vector<std::uint32_t> indices = {0, 1, 10};
-  EXPECT_THROW(GlCertificate(volume).check({points, indices, 3, 0}, {}), InvalidInput);
-  EXPECT_THROW(GlCertificate(volume).check({points, indices, 5, 0}, {}), InvalidInput);
-  EXPECT_THROW(GlCertificate(volume).check({points, indices, 2, 0}, {}), InvalidInput);
+  EXPECT_THROW(GlCertificate(volume).check({points, kIdentity, indices, 3}, {}), InvalidInput);
+  EXPECT_THROW(GlCertificate(volume).check({points, kIdentity, indices, 5}, {}), InvalidInput);
+  EXPECT_THROW(GlCertificate(volume).check({points, kIdentity, indices, 2}, {}), InvalidInput);
 }
 
 }  // namespace

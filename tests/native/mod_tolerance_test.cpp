@@ -118,13 +118,15 @@ TYPED_TEST(ModTolerance, RefusesWhatItCannotProve) {
   decimater.module(tolerance).set_volume(volume);
   const auto corner = mesh.vertex_handle(7);
   const auto kept = mesh.point(corner);
-  for (const double bad : {1.0, std::numeric_limits<double>::quiet_NaN()}) {
+  const std::pair<double, const char*> moves[] = {{1.0, "face "},
+                                                  {std::numeric_limits<double>::quiet_NaN(), "point 7 "}};
+  for (const auto& [bad, named] : moves) {
     mesh.set_point(corner, kept + typename TypeParam::Point(0, 0, bad));
     try {
       decimater.initialize();
       ADD_FAILURE() << "a vertex was moved by " << bad;
     } catch (const InvalidInput& error) {
-      EXPECT_NE(std::string(error.what()).find("face "), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find(named), std::string::npos) << error.what();
     }
   }
   mesh.set_point(corner, kept);

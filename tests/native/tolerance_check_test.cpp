@@ -45,7 +45,7 @@ class ProvingCheck : public testing::TestWithParam<const char*> {
   }
   std::vector<Verdict> ask_about(const TriangleMesh& reference, const Points& points, int corners = 3) {
     const std::unique_ptr<ToleranceVolume> volume = make_volume(reference);
-    return ask(*make_check(GetParam(), *volume), *volume, points, corners);
+    return ask(*make_check(GetParam(), *volume), points, corners);
   }
   bool inside(const TriangleMesh& reference, const Points& points) {
     return ask_about(reference, points, int(points.size())).at(0) == Verdict::inside;
@@ -134,7 +134,7 @@ TEST_P(ProvingCheck, NeedlesOfTheReferenceDoNotMislead) {
     const double tolerance = 0.05;
     const std::unique_ptr<ToleranceVolume> volume = make_volume(needles, tolerance);
     const Points points = Maker(needles, tolerance, 7).all_kinds(4'000);
-    const Points in = candidates::accepted(points, ask(*make_check(GetParam(), *volume), *volume, points));
+    const Points in = candidates::accepted(points, ask(*make_check(GetParam(), *volume), points));
     EXPECT_GT(in.size(), 300u) << height;
     EXPECT_EQ(candidates::farther(in, needles, tolerance), 0) << height;
   }
@@ -146,7 +146,7 @@ TEST_P(ProvingCheck, RandomAndHostileCandidates) {
   for (const auto& [name, reference] : references) {
     const std::unique_ptr<ToleranceVolume> volume = make_volume(reference);
     const Points points = Maker(reference, kTolerance, 3).all_kinds(20'000);
-    const Points in = candidates::accepted(points, ask(*make_check(GetParam(), *volume), *volume, points));
+    const Points in = candidates::accepted(points, ask(*make_check(GetParam(), *volume), points));
     EXPECT_GT(in.size(), 3 * 3'000u) << name;
     EXPECT_EQ(candidates::farther(in, reference, kTolerance), 0) << name;
   }
@@ -161,7 +161,7 @@ TEST_P(ProvingCheck, AFieldByFastMarchingDoesNotMislead) {
   options.field = Field::fast_marching;
   const ToleranceVolume volume(torus.vertices, torus.triangles, kIdentity, tolerance, options);
   const Points points = Maker(torus, tolerance, 3).all_kinds(5'000);
-  const Points in = candidates::accepted(points, ask(*make_check(GetParam(), volume), volume, points));
+  const Points in = candidates::accepted(points, ask(*make_check(GetParam(), volume), points));
   EXPECT_GT(in.size(), 0u);
   EXPECT_EQ(candidates::farther(in, torus, tolerance), 0);
 }
@@ -203,18 +203,16 @@ TEST_P(ProvingCheck, GroupsTakeTheLeastVerdictInAnyOrder) {
   const std::unique_ptr<ToleranceVolume> volume = make_volume(torus);
   const std::unique_ptr<ToleranceCheck> check = make_check(GetParam(), *volume);
   const Points points = Maker(torus, kTolerance, 9).all_kinds(3'000);
-  const StoredSpace placed = kIdentity.in(volume->frame());
-  const std::vector<dvec3> in_frame = placed.frame(points);
   const std::vector<std::uint32_t> indices = candidates::corners(points.size());
-  const Pieces pieces{in_frame, indices, 3, placed.mapping_error(points)};
-  std::vector<std::int32_t> groups(pieces.size());
+  const Pieces pieces{points, kIdentity, indices};
+  std::vector<std::int32_t> groups(points.size() / 3);
   std::mt19937 engine(1);
   for (std::int32_t& g : groups) g = std::int32_t(std::int64_t(engine() % 1'000) * 4'000'000 - 2'000'000'000);
   std::vector<Verdict> expected = check->check(pieces, {});
   combine_groups(expected, groups);
   EXPECT_EQ(check->check_groups(pieces, groups, {}), expected);
   EXPECT_GT(std::count(expected.begin(), expected.end(), Verdict::inside), 100);
-  const std::vector<std::int32_t> one(pieces.size(), -7);
+  const std::vector<std::int32_t> one(points.size() / 3, -7);
   EXPECT_NE(check->check_groups(pieces, one, {}).at(17), Verdict::inside);
   EXPECT_THROW(check->check_groups(pieces, std::span(one).first(5), {}), InvalidInput);
 }
@@ -225,22 +223,39 @@ TEST_P(ProvingCheck, RefusesPiecesThatAreNot) {
   const std::unique_ptr<ToleranceCheck> check = make_check(GetParam(), *volume);
   const Points points(4, dvec3(0));
   const std::vector<std::uint32_t> indices{0, 1, 2, 3, 4, 0};
-  EXPECT_THROW(check->check({points, indices, 3, 0}, {}), InvalidInput);
-  EXPECT_THROW(check->check({points, std::span(indices).first(4), 3, 0}, {}), InvalidInput);
-  EXPECT_THROW(check->check({points, indices, 6, 0}, {}), InvalidInput);
-  EXPECT_THROW(check->check({points, indices, 0, 0}, {}), InvalidInput);
-  EXPECT_TRUE(check->check({points, {}, 3, 0}, {}).empty());
+  EXPECT_THROW(check->check({points, kIdentity, indices, 3}, {}), InvalidInput);
+  EXPECT_THROW(check->check({points, kIdentity, std::span(indices).first(4), 3}, {}), InvalidInput);
+  EXPECT_THROW(check->check({points, kIdentity, indices, 6}, {}), InvalidInput);
+  EXPECT_THROW(check->check({points, kIdentity, indices, 0}, {}), InvalidInput);
+  EXPECT_TRUE(check->check({points, kIdentity, {}, 3}, {}).empty());
 }
 
-TEST_P(ProvingCheck, AMappingErrorCountsAgainstTheTolerance) {
+TEST_P(ProvingCheck, TheMappingErrorOfUsedPointsCountsAgainstTheTolerance) {
   const TriangleMesh plane = shapes::grid(2);
   const std::unique_ptr<ToleranceVolume> volume = make_volume(plane);
   const std::unique_ptr<ToleranceCheck> check = make_check(GetParam(), *volume);
-  const std::vector<dvec3> point{volume->frame().from_world({0.5, 0.5, 0.6 * kTolerance})};
   const std::vector<std::uint32_t> index{0};
-  EXPECT_EQ(check->check({point, index, 1, 0}, {}).at(0), Verdict::inside);
-  EXPECT_NE(check->check({point, index, 1, 0.45 * volume->frame_tolerance()}, {}).at(0), Verdict::inside);
-  EXPECT_THROW(check->check({point, index, 1, volume->frame_tolerance()}, {}), InvalidInput);
+  // The point is stored so far from its origin that placing it may err by this share of the tolerance.
+  const auto verdict = [&](double share) {
+    const double far = std::round(share * kTolerance / (22 * kUnitRoundoff));
+    glm::dmat4 to_world(1);
+    to_world[3].x = far;
+    const Points points{{-far, 0.5, 0.6 * kTolerance}, {2 * far, 0, 0}};
+    return check->check({points, StoredSpace(to_world, Storage::float64), index, 1}, {}).at(0);
+  };
+  EXPECT_EQ(verdict(0), Verdict::inside);
+  EXPECT_EQ(verdict(0.01), Verdict::inside) << "the second point is not used";
+  EXPECT_NE(verdict(0.45), Verdict::inside);
+  EXPECT_THROW(verdict(1), InvalidInput);
+}
+
+TEST_P(ProvingCheck, APointFarAwayCostsTheOthersNothing) {
+  const TriangleMesh plane = shapes::grid(2);
+  const std::unique_ptr<ToleranceVolume> volume = make_volume(plane);
+  const Points points{{0.5, 0.5, 0.6 * kTolerance}, {1e300, 0.5, 0}};
+  const std::vector<Verdict> verdicts = ask(*make_check(GetParam(), *volume), points, 1);
+  EXPECT_EQ(verdicts[0], Verdict::inside);
+  EXPECT_NE(verdicts[1], Verdict::inside);
 }
 
 TEST_P(ProvingCheck, CanBeCancelledAndNamesItself) {
@@ -250,8 +265,7 @@ TEST_P(ProvingCheck, CanBeCancelledAndNamesItself) {
   const Points points = Maker(torus, kTolerance, 9).all_kinds(2'000);
   Progress progress;
   progress.cancel();
-  const std::vector<dvec3> in_frame = kIdentity.in(volume->frame()).frame(points);
-  EXPECT_THROW(check->check({in_frame, candidates::corners(points.size()), 3, 0}, {1, &progress}), Cancelled);
+  EXPECT_THROW(check->check({points, kIdentity, candidates::corners(points.size())}, {1, &progress}), Cancelled);
   EXPECT_EQ(check->method(), GetParam());
   EXPECT_EQ(check->renderer() == "CPU", check->method() == "certificate");
 }
