@@ -111,11 +111,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   for (const std::uint32_t i : cut_.vertex_input) used.push_back(vertices_[i]);
   if (const auto warning = storage_warning(*volume_, space_, used)) report_.warnings.push_back(*warning);
   // Vertices may end up anywhere in the volume.
-  const double reach = 1 + volume_->frame_tolerance();
-  for (int corner = 0; corner < 8; ++corner) {
-    used.push_back(space_.store(reach * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1)));
-  }
-  const double mapping_error = space_.mapping_error(used);
+  const double mapping_error = space_.mapping_error(used, 1 + volume_->frame_tolerance());
   const double provable = volume_->provable(mapping_error), limit = provable * (1 - kHeadroom);
   if (options_.baseline) {
     options_.baseline->begin({positions_, cut_.triangles}, space_);

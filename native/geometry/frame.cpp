@@ -104,6 +104,15 @@ double StoredSpace::mapping_error(std::span<const glm::dvec3> stored) const {
   return 11 * kUnitRoundoff * largest * frame_.scale();
 }
 
+double StoredSpace::mapping_error(std::span<const glm::dvec3> stored, double reach) const {
+  // The error is convex in the position, so that it is largest at a corner of the cube.
+  std::vector<glm::dvec3> extremes(stored.begin(), stored.end());
+  for (int corner = 0; corner < 8; ++corner) {
+    extremes.push_back(store(reach * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1)));
+  }
+  return mapping_error(extremes);
+}
+
 double StoredSpace::storage_step(std::span<const glm::dvec3> stored) const {
   // A position is off by half a unit in the last place a coordinate; store()'s own arithmetic by less than
   // mapping_error() over the condition of the matrix, which only matters for float64 and is covered by its factor.

@@ -56,6 +56,8 @@ class StoredSpace {
 
   /// Bound, in frame lengths, on the difference between frame() and exact arithmetic, over the given points.
   double mapping_error(std::span<const glm::dvec3> stored) const;
+  /// The same over the given points and all that are stored for positions in the frame with coordinates up to `reach`.
+  double mapping_error(std::span<const glm::dvec3> stored, double reach) const;
   /// Bound, in frame lengths, on how far store() moves a point whose stored coordinates are no larger than these.
   double storage_step(std::span<const glm::dvec3> stored) const;
 

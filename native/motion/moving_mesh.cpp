@@ -116,20 +116,16 @@ void MovingMesh::make_rings(std::size_t vertex_count) {
 }
 
 MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress* progress) {
-  std::vector<glm::dvec3> extremes;  // The mapping error is computed for these.
+  std::vector<glm::dvec3> used;
   for (std::uint32_t v = 0; v < stored.size(); ++v) {
     poll_at(v);
     if (!finite(stored[v])) refuse("vertex", v, stored[v], "is not finite", "invalid_mesh");
-    if (!ring(v).empty()) extremes.push_back(stored[v]);
+    if (!ring(v).empty()) used.push_back(stored[v]);
   }
-  Start result{{}, storage_warning(*volume_, space_, extremes)};
+  Start result{{}, storage_warning(*volume_, space_, used)};
   // Vertices may end up anywhere in the volume. The error grows no faster than the distance, so that twice the volume
   // leaves no room for a point that only seems to be in it.
-  const double reach = 2 * (1 + volume_->frame_tolerance());
-  for (int corner = 0; corner < 8; ++corner) {
-    extremes.push_back(space_.store(reach * glm::dvec3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1)));
-  }
-  const double mapping_error = space_.mapping_error(extremes);
+  const double mapping_error = space_.mapping_error(used, 2 * (1 + volume_->frame_tolerance()));
   provable_ = volume_->provable(mapping_error);
   limit_ = provable_ * (1 - kHeadroom);
   certificates_.clear();

@@ -78,6 +78,28 @@ TEST(StoredSpace, MappingErrorCoversLongDouble) {
   EXPECT_GE(worst, bound / 100) << "the bound says nothing when it is that wide";
 }
 
+TEST(StoredSpace, MappingErrorCoversAllThatAMeshMayReach) {
+  std::mt19937 engine(3);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const StoredSpace space = StoredSpace(sheared(), Storage::float64).in(Frame(Box{{990, -60, 0}, {1010, -40, 6}}));
+  const std::vector<dvec3> none;
+  for (const double reach : {0.5, 1.0, 4.0}) {
+    const double bound = space.mapping_error(none, reach);
+    double largest = 0;
+    for (int i = 0; i < 1000; ++i) {
+      const dvec3 stored = space.store(reach * dvec3(u(engine), u(engine), u(engine)));
+      const double error = space.mapping_error({&stored, 1});
+      EXPECT_LE(error, bound);
+      largest = std::max(largest, error);
+    }
+    EXPECT_GT(largest, 0.9 * bound);
+    EXPECT_GT(space.mapping_error(none, 2 * reach), 1.01 * bound) << "the reach counts";
+    const dvec3 far = space.store(dvec3(100 * reach));
+    EXPECT_GE(space.mapping_error({&far, 1}, reach), space.mapping_error({&far, 1})) << "the points count";
+    EXPECT_GT(space.mapping_error({&far, 1}, reach), bound);
+  }
+}
+
 TEST(StoredSpace, RefusesWhatIsNotInvertible) {
   glm::dmat4 flat(1), projective(1), nan(1);
   flat[2] = {1, 1, 0, 0}, flat[1] = {1, -1, 0, 0};
