@@ -22,8 +22,8 @@ def run(*command, ok=True):
 
 
 @pytest.fixture(scope="module")
-def example(tmp_path_factory):
-    """Builds decimate_with_openmesh from a copy of examples/, which does not know this source tree."""
+def programs(tmp_path_factory):
+    """Builds the programs from a copy of examples/, which does not know this source tree."""
     folder = tmp_path_factory.mktemp("package")
     run("cmake", "--install", BUILD, "--prefix", folder / "installed")
     for source in (ROOT / "examples").iterdir():
@@ -42,13 +42,13 @@ def example(tmp_path_factory):
         "-DCMAKE_CXX_FLAGS=-Wall -Werror",
     )
     run("cmake", "--build", folder / "build")
-    return folder / "build" / "decimate_with_openmesh"
+    return folder / "build"
 
 
 def write_off(path, vertices, triangles):
     with open(path, "w") as file:
         file.write(f"OFF\n{len(vertices)} {len(triangles)} 0\n")
-        np.savetxt(file, vertices, fmt="%.9g")
+        np.savetxt(file, vertices, fmt="%.17g")
         np.savetxt(file, np.insert(triangles, 0, 3, axis=1), fmt="%d")
 
 
@@ -56,31 +56,56 @@ def read_off(path):
     words = Path(path).read_text().split()
     assert words[0] == "OFF"
     count, faces = int(words[1]), int(words[2])
-    vertices = np.array(words[4 : 4 + 3 * count], np.float32).reshape(count, 3)
+    vertices = np.array(words[4 : 4 + 3 * count], np.float64).reshape(count, 3)
     return vertices, np.array(words[4 + 3 * count :], np.int32).reshape(faces, 4)[:, 1:]
 
 
+def expect_kept(result, reference, tolerance):
+    upper = tolvol.directed_hausdorff(*result, *reference, bound=tolerance).upper
+    assert 0.5 * tolerance < upper <= tolerance, "the tolerance is kept, and used"
+
+
 @pytest.mark.parametrize("tolerance", [0.03, 0.01])
-def test_example_keeps_the_tolerance(example, tmp_path, tolerance):
+@pytest.mark.parametrize("name", ["decimate", "decimate_with_openmesh"])
+def test_decimate_keeps_the_tolerance(programs, tmp_path, name, tolerance):
     vertices, triangles = meshes.torus()
     write_off(tmp_path / "in.off", vertices, triangles)
-    run(example, tmp_path / "in.off", tmp_path / "out.off", tolerance)
+    run(programs / name, tmp_path / "in.off", tmp_path / "out.off", tolerance)
     result = read_off(tmp_path / "out.off")
     assert len(result[1]) < len(triangles) / 4
-    reference = vertices.astype(np.float64), triangles
-    stored = result[0].astype(np.float64), result[1]
-    assert tolvol.directed_hausdorff(*stored, *reference, bound=tolerance).upper <= tolerance
-    assert tolvol.directed_hausdorff(*stored, *reference).upper > 0.5 * tolerance, "the tolerance is used"
+    reference = read_off(tmp_path / "in.off")
+    expect_kept(result, reference, tolerance)
+    if name == "decimate":
+        assert tolvol.directed_hausdorff(*reference, *result, bound=tolerance).upper <= tolerance
 
 
-def test_example_says_what_is_missing(example, tmp_path):
-    run(example, tmp_path / "none.off", tmp_path / "out.off", 0.1, ok=False)
-    run(example, ok=False)
+def test_constrain_keeps_the_tolerance(programs, tmp_path):
+    vertices, triangles = meshes.torus()
+    write_off(tmp_path / "in.off", vertices, triangles)
+    run(programs / "constrain", tmp_path / "in.off", tmp_path / "out.off", 0.01)
+    result = read_off(tmp_path / "out.off")
+    assert np.array_equal(result[1], triangles)
+    expect_kept(result, read_off(tmp_path / "in.off"), 0.01)
 
 
-def test_headers_stand_alone(example, tmp_path):
+def test_hausdorff_prints_the_interval(programs, tmp_path):
+    vertices, triangles = meshes.torus()
+    write_off(tmp_path / "a.off", vertices, triangles)
+    write_off(tmp_path / "b.off", vertices + [0, 0, 0.01], triangles)
+    printed = run(programs / "hausdorff", tmp_path / "a.off", tmp_path / "b.off")
+    expected = tolvol.directed_hausdorff(*read_off(tmp_path / "a.off"), *read_off(tmp_path / "b.off"))
+    assert [float(word) for word in printed.split()] == [expected.lower, expected.upper]
+
+
+@pytest.mark.parametrize("name", ["decimate", "decimate_with_openmesh", "constrain", "hausdorff"])
+def test_programs_fail_without_their_files(programs, tmp_path, name):
+    run(programs / name, tmp_path / "none.off", tmp_path / "out.off", *[0.1] * (name != "hausdorff"), ok=False)
+    run(programs / name, ok=False)
+
+
+def test_headers_stand_alone(programs, tmp_path):
     """Each installed header compiles alone, with only the installed package."""
-    include = example.parents[1] / "installed" / "include"
+    include = programs.parent / "installed" / "include"
     headers = sorted(path.relative_to(include) for path in include.rglob("*.h*"))
     assert Path("tolvol/check/certificate.h") in headers and Path("tolvol/openmesh/ModToleranceT.hh") in headers
     source = tmp_path / "header.cpp"
@@ -95,7 +120,5 @@ def test_headers_stand_alone(example, tmp_path):
             "-fsyntax-only",
             "-I",
             include,
-            "-I",
-            include / "tolvol",
             source,
         )
