@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// How a long call stops wherever it is: whoever begins it opens a Call, and the loops deep inside, which are handed
-/// nothing, poll. Threads of a Team poll for the call they work for.
+/// A long call stops wherever it is: the function that begins it opens a Call, and the loops deep inside poll, without
+/// being handed anything. Threads of a Team poll for the call that they work for.
 #pragma once
 
 #include <algorithm>
@@ -16,22 +16,22 @@ namespace tolvol {
 
 class Call {
  public:
-  /// For as long as it lives, polls on this thread throw Cancelled once `progress` (may be null) is cancelled, once
-  /// `asks`, called at every poll on this thread, has returned true, or where polls of the call around it would.
+  /// For as long as the call lives, polls on this thread throw Cancelled once `progress` (may be null) is cancelled,
+  /// once `asks`, which is called at every poll on this thread, has returned true, or if polls of the outer call throw.
   explicit Call(const Progress* progress, std::function<bool()> asks = {});
   ~Call();
   Call(const Call&) = delete;
   Call& operator=(const Call&) = delete;
 
-  /// Whether `asks` has returned true.
+  /// Tells whether `asks` has returned true.
   bool stopped() const { return stopped_.load(std::memory_order_relaxed); }
-  /// Throws Cancelled as above.
+  /// Throws Cancelled in the cases above.
   void poll();
 
-  /// The innermost call that this thread works for; null for none.
+  /// Returns the innermost call that this thread works for, or null.
   static Call* current() { return current_; }
 
-  /// Has this thread work for another's call, or for none: nothing that may not end halfway polls then.
+  /// Lets this thread work for another thread's call, or for none, so that code that must not end halfway never throws.
   class Within {
    public:
     explicit Within(Call* call) : before_(current_) { current_ = call; }
@@ -53,20 +53,21 @@ class Call {
   Call* const outer_;
 };
 
-/// For loops of any length: once in at most a few hundred microseconds of work. A few nanoseconds. Throws Cancelled.
+/// Loops of any length call this once in at most a few hundred microseconds. It takes a few nanoseconds. Throws
+/// Cancelled.
 inline void poll() {
   if (Call* const call = Call::current()) call->poll();
 }
 
-/// For loops whose turns are too short for that: polls at every 4096th.
+/// Polls at every 4096th turn, for loops whose turns are too short for poll().
 inline void poll_at(std::size_t turn) {
   if (turn % 4096 == 0) poll();
 }
 
-/// Elements of a long array that are written between two polls: the system, too, takes its time to provide the memory.
+/// This many elements of a long array are written between two polls. The system takes time to provide their memory.
 inline constexpr std::size_t kFilledAtOnce = std::size_t{1} << 20;
 
-/// As values.assign(count, value), with polls in between.
+/// Does the same as values.assign(count, value), with polls in between.
 template <class Value>
 void fill(std::vector<Value>& values, std::size_t count, const Value& value) {
   values.clear();
@@ -77,7 +78,7 @@ void fill(std::vector<Value>& values, std::size_t count, const Value& value) {
   }
 }
 
-/// A copy of values, with polls in between.
+/// Returns a copy of values, with polls in between.
 template <class Value>
 std::vector<Value> copied(const std::vector<Value>& values) {
   std::vector<Value> copy;

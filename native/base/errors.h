@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The few things that native code throws. python/errors.cpp maps each to a Python exception of the same name.
+/// The exceptions of the native code. python/errors.cpp maps each to a Python exception of the same name.
 ///
 /// `code` is a short name of the reason, for programs: it stays the same from version to version. The message is for
 /// people. The codes and their meanings are listed in python/errors.cpp.
@@ -16,7 +16,7 @@ struct Error : std::runtime_error {
   const char* code;
 };
 
-/// An argument is wrong. The message names the first offender and, where there is one, the remedy.
+/// An argument is wrong. The message names the first offender and, if there is one, the remedy.
 struct InvalidInput : Error {
   explicit InvalidInput(const std::string& message, const char* code = "invalid_argument") : Error(code, message) {}
 };
@@ -33,8 +33,8 @@ struct ResourceLimit : Error {
   explicit ResourceLimit(const std::string& message) : Error("too_large", message) {}
 };
 
-/// There is no OpenGL 4.5 here, or it failed on the way: whatever was asked of it is unanswered. The message begins
-/// "GL unavailable: " and says why.
+/// There is no OpenGL 4.5 here, or it failed on the way, so that the call has no result. The message begins with
+/// "GL unavailable: " and gives the reason.
 struct GlUnavailable : Error {
   explicit GlUnavailable(const std::string& message) : Error("gl_unavailable", message) {}
 };

@@ -9,9 +9,9 @@
 namespace tolvol {
 namespace {
 
-/// Turns given to other threads before one goes to sleep: the next loop, or the end of this one, is often near.
+/// A thread yields this often before it goes to sleep, because the next loop or the end of this one is often near.
 constexpr int kPatience = 2000;
-/// Between two polls of a caller that waits for the others.
+/// A caller that waits for the other threads polls once in this time.
 constexpr std::chrono::milliseconds kBetweenPolls(20);
 
 template <class Condition>
@@ -22,8 +22,8 @@ void wait_a_little(Condition&& condition) {
 }  // namespace
 
 Team::Team(unsigned threads) {
-  // Those that do start, and the caller, do the work. An exception that left here would end the process, as threads
-  // that run are not to be destroyed.
+  // The threads that do start, and the caller, do the work. An exception that left here would end the process, because
+  // the destructor of a running thread does.
   try {
     for (unsigned i = 1; i < threads; ++i) helpers_.emplace_back([this] { help(); });
   } catch (const std::system_error&) {
@@ -83,7 +83,7 @@ void Team::work(Loop& loop) {
   }
 }
 
-/// With the exception that is being handled.
+/// Ends the loop with the exception that is being handled.
 void Team::fail(Loop& loop) {
   std::lock_guard lock(mutex_);
   if (!loop.error) loop.error = std::current_exception();

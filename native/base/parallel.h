@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Fork and join over an index range; what runs where never changes a result.
+/// Fork and join over an index range. The number of threads never changes a result.
 #pragma once
 
 #include <algorithm>
@@ -16,34 +16,36 @@
 
 namespace tolvol {
 
-/// Threads that wait for each other often gain nothing from more.
+/// A team has at most this many threads. Threads that often wait for each other gain nothing from more.
 inline constexpr unsigned kMostThreads = 16;
 
-/// 0 means one per core. More than there are cores, and more than kMostThreads, would only cost memory and time.
+/// Returns the number of threads to use. 0 means one for each core. More threads than cores, and more than
+/// kMostThreads, would only cost memory and time.
 inline unsigned thread_count(unsigned wanted) {
   const unsigned cores = std::max(1u, std::thread::hardware_concurrency());
   return wanted ? std::min(wanted, std::max(cores, kMostThreads)) : cores;
 }
 
-/// Threads that wait between the loops they share, for loops too short to start threads for. One caller at a time.
+/// Threads that wait between the loops that they share, for loops too short to start threads for. A team serves one
+/// caller at a time.
 class Team {
  public:
-  /// `threads`: the caller's among them. Fewer where the system starts no more, or has no memory for them.
+  /// `threads` includes the caller's. The team has fewer if the system starts no more or has no memory for them.
   explicit Team(unsigned threads);
   ~Team();
   Team(const Team&) = delete;
   Team& operator=(const Team&) = delete;
 
-  /// Threads, the caller's among them.
+  /// The number of threads, including the caller's.
   std::size_t size() const { return helpers_.size() + 1; }
   bool alone() const { return helpers_.empty(); }
 
-  /// Calls body(begin, end) for blocks of [0, count). Blocks are handed out in order, so body must write only to what
-  /// its own indices own. The first exception is rethrown after the join. Polls before each block, for the call that
-  /// the caller works for. About 1 us, and 50 us when the others sleep.
+  /// Calls body(begin, end) for blocks of [0, count), on several threads at once, so that body may write only to
+  /// elements of its own indices. The first exception is rethrown after the join. Each thread polls before each block,
+  /// for the call that the caller works for. A loop takes about 1 us, and 50 us if the other threads sleep.
   template <class Body>
   void run(std::size_t count, std::size_t block, Body&& body) {
-    // A body that is const comes back as it was.
+    // The cast back restores the type of `body`, const or not.
     Loop loop{count, block, const_cast<void*>(static_cast<const void*>(&body)),
               [](void* b, std::size_t begin, std::size_t end) {
                 (*static_cast<std::remove_reference_t<Body>*>(b))(begin, end);
@@ -68,14 +70,14 @@ class Team {
 
   std::mutex mutex_;
   std::condition_variable wake_, left_;
-  Loop* open_ = nullptr;                ///< a helper that wakes too late finds none
-  std::atomic<std::size_t> loops_{0};   ///< begun so far
-  std::atomic<std::size_t> inside_{0};  ///< helpers in the open loop
+  Loop* open_ = nullptr;                ///< is null once the loop is done, for a helper that wakes too late
+  std::atomic<std::size_t> loops_{0};   ///< counts the loops that were begun
+  std::atomic<std::size_t> inside_{0};  ///< counts the helpers in the open loop
   std::atomic<bool> ends_{false};
   std::vector<std::thread> helpers_;
 };
 
-/// One loop on up to `threads` threads, as Team::run().
+/// Runs one loop on up to `threads` threads, like Team::run().
 template <class Body>
 void parallel_for(std::size_t count, std::size_t block, unsigned threads, Body&& body) {
   const std::size_t blocks = (count + block - 1) / block;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// What a long call shows to another thread, and how that thread stops it: atomics that are polled, no callbacks.
+/// Shows the progress of a long call to another thread, and lets that thread stop it. Atomics are polled; there are no
+/// callbacks.
 #pragma once
 
 #include <atomic>
@@ -11,16 +12,16 @@ namespace tolvol {
 
 class Progress {
  public:
-  /// Share of the current stage that is done, 0 to 1.
+  /// The share of the current stage that is done, 0 to 1.
   double fraction() const { return fraction_.load(std::memory_order_relaxed); }
-  /// Name of the current stage, a string literal.
+  /// The name of the current stage, a string literal.
   const char* stage() const { return stage_.load(std::memory_order_relaxed); }
-  /// What the stage counts: for decimation the triangles left.
+  /// A number that the stage counts. In a decimation it is the number of triangles left.
   std::size_t count() const { return count_.load(std::memory_order_relaxed); }
   void set_count(std::size_t count) { count_.store(count, std::memory_order_relaxed); }
   bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
   void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
-  /// Asks a call that improves its result step by step for the one it has.
+  /// Asks a call that improves its result step by step to return the result that it has.
   void finish() { finishing_.store(true, std::memory_order_relaxed); }
   bool finishing() const { return finishing_.load(std::memory_order_relaxed); }
 
@@ -28,7 +29,7 @@ class Progress {
     fraction_.store(0, std::memory_order_relaxed);
     stage_.store(stage, std::memory_order_relaxed);
   }
-  /// Cheap enough for every few thousand steps. Throws Cancelled once cancel() was called.
+  /// Is cheap enough to be called every few thousand steps. Throws Cancelled once cancel() was called.
   void update(double fraction) {
     fraction_.store(fraction, std::memory_order_relaxed);
     if (cancelled()) throw Cancelled();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Which instructions the few hot kernels use. Each kernel is one always-inlined body in GCC vector types, instantiated
-/// once for any 64-bit machine and once for AVX2; without fused multiply-adds both give the same bits, so the choice is
-/// speed alone.
+/// The choice of instructions for the few hot kernels. Each kernel is one always-inlined body in GCC vector types,
+/// which is instantiated once for any 64-bit machine and once for AVX2. Without fused multiply-adds both give the same
+/// bits, so that the choice changes the speed alone.
 #pragma once
 
 #include <atomic>
@@ -26,7 +26,7 @@ inline Simd best_simd() {
   return Simd::portable;
 }
 
-/// The path in use, process-wide. Tests set it to force each; nothing else does.
+/// The path that the whole process uses. Only tests set it, to force each path.
 inline std::atomic<Simd>& simd_path() {
   static std::atomic<Simd> path{best_simd()};
   return path;

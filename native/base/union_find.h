@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Disjoint sets of indices.
+/// Holds disjoint sets of indices.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ class UnionFind {
  public:
   explicit UnionFind(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }
 
-  /// The lowest index of the set that holds i.
+  /// Returns the lowest index of the set that holds i.
   std::uint32_t find(std::uint32_t i) {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Cheapest reason first: short edges between corners known to be near; the triangle of the grid node nearest to the
-// piece's centre; those of the nodes around; the exact closest triangle by the hierarchy, which also proves "outside";
-// then what one triangle covers is cut off, or the piece is split. Parts are looked at breadth first, because the
-// centres of the large ones show soonest that a piece is outside.
+// A search tries the cheapest reason first: short edges between corners that are known to be near; the triangle of the
+// grid node nearest to the piece's centre; the triangles of the nodes around the centre; the exact closest triangle by
+// the hierarchy, which also proves "outside". Then it cuts the piece along an edge of a triangle, or splits it. It
+// looks at the parts breadth first, because the centres of large parts show soonest that a piece is outside.
 #include "check/certificate.h"
 
 #include <algorithm>
@@ -20,20 +20,33 @@
 namespace tolvol {
 namespace {
 
-// Parts this short are not split further, in tolerances. What operations leave unused is enough for shorter ones.
+// All lengths and distances among these constants are in tolerances.
+// A part this short is not split further, because the headroom that operations leave is enough for shorter parts.
 constexpr double kFloor = kHeadroom;
-constexpr double kQuickFloor = 0.02;           // the same in a quick search
-constexpr double kWorthCutting = 0.25;         // of the tolerance
-constexpr std::size_t kBudget = 1 << 20;       // parts looked at before a piece is left unproved,
-constexpr std::size_t kQuickBudget = 1 << 13;  // and where the answer is only one of many tries
-constexpr std::size_t kBetweenPolls = 256;     // parts
-constexpr double kProbeSpacing = 2.0;          // of the tolerance, along the longest edge of a triangle,
-constexpr int kMostProbes = 8;                 // and so many at most
-constexpr double kSmall = 2.0;             // of the tolerance: shorter pieces are worth trying against all eight nodes
-constexpr double kLong = 1.9;              // of the tolerance: longer pieces over small triangles are split at once
-constexpr double kExact = 0.7;             // of the tolerance: shorter pieces are worth an exact search
-constexpr double kRoomToLeave = 1.0 / 32;  // of the tolerance
-constexpr double kRoom = 0.7;              // of the tolerance: up to here the grid's guess of a distance does
+// A quick search does not split a part this short.
+constexpr double kQuickFloor = 0.02;
+// A part is cut along an edge only if both sides are at least this wide.
+constexpr double kWorthCutting = 0.25;
+// A search for a verdict looks at this many parts before it leaves the piece unproved.
+constexpr std::size_t kBudget = 1 << 20;
+// A search looks at this many parts if it is only one of many tries.
+constexpr std::size_t kQuickBudget = 1 << 13;
+// A search polls after this many parts.
+constexpr std::size_t kBetweenPolls = 256;
+// Probes of a triangle are this far apart along its longest edge.
+constexpr double kProbeSpacing = 2.0;
+// Probes divide an edge into at most this many steps.
+constexpr int kMostProbes = 8;
+// A piece shorter than this is tried against the triangles of all eight nodes around its centre.
+constexpr double kSmall = 2.0;
+// A piece longer than this over small triangles is split at once.
+constexpr double kLong = 1.9;
+// A piece shorter than this is worth an exact search.
+constexpr double kExact = 0.7;
+// bound_with_room() tries to leave this much of the tolerance.
+constexpr double kRoomToLeave = 1.0 / 32;
+// The grid's guess of a distance is used without a search up to this distance.
+constexpr double kRoom = 0.7;
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
@@ -42,7 +55,7 @@ bool comes_first(const glm::dvec3& p, const glm::dvec3& q) {
   return p.y != q.y ? p.y < q.y : p.z < q.z;
 }
 
-/// The corners in an order that follows from their positions alone, a segment as (a, b, b).
+/// Holds the corners in an order that follows from their positions alone. It holds a segment as (a, b, b).
 struct Ordered {
   Ordered(const glm::dvec3 (&from)[3], const glm::uvec3& hints_from) {
     const int second = comes_first(from[1], from[0]), third = comes_first(from[2], from[0]),
@@ -91,13 +104,13 @@ TriangleCertificate::PointBound TriangleCertificate::nearest(const glm::dvec3& p
 }
 
 std::optional<glm::dvec3> TriangleCertificate::nearby_point(const glm::dvec3& p) const {
-  constexpr double kNear = 0.3;  // of the tolerance: a point this near is near enough
+  constexpr double kNear = 0.3;  // a point within this many tolerances ends the search
   std::optional<glm::dvec3> nearest;
   double nearest2 = std::numeric_limits<double>::infinity();
   std::array<std::uint32_t, 8> seen;
   int count = 0;
   const glm::dvec3 cell = (p - grid_->origin) * (1 / grid_->spacing), low = glm::floor(cell);
-  const glm::ivec3 first(glm::greaterThan(cell - low, glm::dvec3(0.5)));  // the nearest node of the eight
+  const glm::ivec3 first(glm::greaterThan(cell - low, glm::dvec3(0.5)));  // the eight nodes start at the nearest
   for (int i = 0; i < 8 && nearest2 > kNear * kNear * limit2_; ++i) {
     const glm::ivec3 node = glm::ivec3(low) + (first ^ glm::ivec3(i & 1, (i >> 1) & 1, i >> 2));
     if (glm::any(glm::lessThan(node, glm::ivec3(0))) || glm::any(glm::greaterThanEqual(node, grid_->nodes))) continue;
@@ -120,9 +133,9 @@ bool TriangleCertificate::shows_outside(const glm::dvec3 (&corners)[3]) const {
   const int n = std::max(2, static_cast<int>(wanted));
   const glm::dvec3 u = (b - a) * (1.0 / n), v = (c - a) * (1.0 / n);
   for (int i = 0; i < n; ++i) {
-    for (int j = i == 0; i + j <= n && j < n; ++j) {  // all but the corners
+    for (int j = i == 0; i + j <= n && j < n; ++j) {  // this skips the corners
       const glm::dvec3 p = a + static_cast<double>(i) * u + static_cast<double>(j) * v;
-      // Any triangle within the bound will do.
+      // A triangle within the limit shows that the point is inside, even if it is not the nearest.
       if (!(distance_bound(p) <= limit_) && hierarchy_->common({&p, 1}, limit_, limit_).triangle == Hierarchy::kNone)
         return true;
     }
@@ -130,7 +143,7 @@ bool TriangleCertificate::shows_outside(const glm::dvec3 (&corners)[3]) const {
   return false;
 }
 
-/// From short edges between corners known to be near.
+/// Returns a bound if the edges are short and the corners are known to be near.
 inline double TriangleCertificate::bound_by_corners(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
   const auto& [a, b, c] = corners;
   // Every point of a triangle is within L / sqrt(3) of a corner, L its longest edge.
@@ -139,7 +152,7 @@ inline double TriangleCertificate::bound_by_corners(const glm::dvec3 (&corners)[
   return room > 0 && longest2 <= 3 * room * room ? corner + std::sqrt(longest2 * (1.0 / 3)) : kUnproved;
 }
 
-/// Sets `farthest` where the verdict is inside.
+/// Sets `farthest` if the verdict is inside.
 template <TriangleCertificate::Search kSearch>
 Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::uvec3& hints, double& farthest) const {
   constexpr bool kProve = kSearch == Search::verdict;
@@ -149,7 +162,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
   const double radius = kProve ? beyond_ : limit_;
   around.begin(*reference_, *hierarchy_, radius);
   Verdict result = Verdict::inside;
-  double farthest2 = 0;  // over the parts proved so far
+  double farthest2 = 0;  // the largest squared distance of the parts proved so far
   std::uint32_t hint = hints.x;
   for (std::size_t next = 0; next < queue.size(); ++next) {
     if (next == (kProve ? kBudget : kQuickBudget)) return Verdict::unproved;
@@ -159,11 +172,11 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
     const glm::dvec3 centre = (a + b + c) * (1.0 / 3);
     FourPoints points;
     points.set(a, b, c, centre);
-    double centre2 = std::numeric_limits<double>::infinity();  // best known squared distance of the centre
-    std::uint32_t below = DistanceGrid::kNone;                 // the triangle it is of
+    double centre2 = std::numeric_limits<double>::infinity();  // the best known squared distance of the centre
+    std::uint32_t below = DistanceGrid::kNone;                 // the triangle at this distance
     std::array<std::uint32_t, 13> tried;
     int tries = 0;
-    std::uint32_t exact = Hierarchy::kNone;  // the nearest triangle, once it was looked for
+    std::uint32_t exact = Hierarchy::kNone;  // the nearest triangle, after a search for it
     const auto covered_by = [&](std::uint32_t triangle) {
       if (triangle == DistanceGrid::kNone) return false;
       for (int i = 0; i < tries; ++i) {
@@ -173,7 +186,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       double d2[4];
       witness_distances((*reference_)[triangle], points, d2);
       if (d2[3] < centre2) centre2 = d2[3], below = triangle;
-      // Written so that NaN is not covered.
+      // A comparison with NaN is false, so that NaN is not covered.
       if (d2[0] <= limit2_ && d2[1] <= limit2_ && d2[2] <= limit2_) {
         farthest2 = std::max({farthest2, d2[0], d2[1], d2[2]});
         return true;
@@ -202,10 +215,10 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       if (nearest == Hierarchy::kNone) return Verdict::outside;
       hint = exact = nearest;
       if (covered_by(exact)) continue;
-      // Without a proof to look for, a centre outside ends it.
+      // A search that need not tell outside from unproved ends at a centre that is outside.
       if (!kProve && !(centre2 <= limit2_)) return Verdict::unproved;
     }
-    // Written so that NaN ends here.
+    // A comparison with NaN is false, so that NaN ends here.
     constexpr double kShortest = kSearch == Search::quick ? kQuickFloor : kFloor;
     if (!(longest2 > kShortest * kShortest * limit2_) || part.cuts == kMostCuts) {
       if (!kProve) return Verdict::unproved;
@@ -216,15 +229,15 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       return cut(part, (*reference_)[triangle], kWorthCutting * limit_, queue);
     };
     const WitnessTriangle& t = (*reference_)[below];
-    // Among triangles smaller than the tolerance a cut along an edge of one brings a long part no nearer to its end.
+    // If the triangles are smaller than the tolerance, a cut along an edge of one of them hardly shortens a long part.
     const bool long_over_small =
         longest2 > kLong * kLong * limit2_ && std::max(squared_length(t.ab), squared_length(t.ac)) <= limit2_;
     if (!long_over_small) {
       if (cut_along(below)) continue;
-      // Among slivers the triangle below the centre may be one that no node of the grid names.
+      // Among slivers it happens that no node of the grid names the triangle below the centre.
       if (exact == Hierarchy::kNone) {
         exact = around.nearest(part, centre, limit_, below);
-        // None: by rounding, where the centre is as far as it may be.
+        // By rounding there may be none, if the centre is as far away as it may be.
         const bool is_another = exact != below && exact != Hierarchy::kNone;
         if (is_another && (covered_by(exact) || cut_along(exact))) continue;
       }
@@ -275,7 +288,7 @@ std::vector<Verdict> Certificate::verdicts(const PlacedPieces& pieces, const Opt
   const double limit = volume.provable(pieces.mapping_error), beyond = volume.refutable(pieces.mapping_error);
   const TriangleCertificate certificate(volume.witnesses(), volume.grid(), volume.hierarchy(), limit, beyond);
 
-  // The used points first: their distances settle most faces, inside (short edges) or outside, and are shared.
+  // The distances of the used points come first: faces share them, and they settle most faces.
   std::vector<TriangleCertificate::PointBound> nearest(pieces.points.size());
   constexpr std::size_t kBlock = 128;
   parallel_for(nearest.size(), kBlock, options.threads, [&](std::size_t begin, std::size_t end) {
@@ -300,7 +313,7 @@ std::vector<Verdict> Certificate::verdicts(const PlacedPieces& pieces, const Opt
       for (const auto& [a, b, c] : triangles_of(pieces.corners)) verdicts[i] = std::min(verdicts[i], triangle(a, b, c));
     }
   });
-  poll();  // a call that was cancelled at its end has no verdicts, either
+  poll();  // a call that was cancelled at its end has no verdicts either
   return verdicts;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Most changes are settled without looking at a piece: if all pieces of an element are within e of it and its points
-// move by at most m, they are within e + m of what it becomes (the same barycentric combination is the witness). Only
-// when e + m passes the tolerance are the pieces measured again, which usually brings e down.
+// move by at most m, the pieces are within e + m of the moved element, because the same barycentric combination is the
+// witness. The pieces are measured again only if e + m exceeds the tolerance, and then e usually becomes smaller.
 #include "check/coverage.h"
 
 #include <algorithm>
@@ -13,16 +13,20 @@
 namespace tolvol {
 namespace {
 
-constexpr double kWorthCutting = 0.25;  // of the tolerance
-constexpr double kFloor = 0.1;          // of the tolerance: a shorter piece is not split further
-// Pieces that splitting may add before a change is refused; and those that assign() splits of one triangle.
+// A piece is cut along an edge only if both sides are at least this wide, in tolerances.
+constexpr double kWorthCutting = 0.25;
+// A piece shorter than this, in tolerances, is not split further.
+constexpr double kFloor = 0.1;
+// A change is refused once splitting has added this many pieces. find_witnesses() splits as many of one triangle.
 constexpr std::size_t kBudget = 1 << 12;
-constexpr std::size_t kBudgetOfPiece = 4;  // so many more for each piece that a change places
-constexpr std::size_t kMany = 64;          // candidates: of more, a piece looks at the nearest ones alone
-
-constexpr std::size_t kBetweenPolls = 64;  // parts of pieces, each of which may look at kMany candidates
-
-constexpr std::uint32_t kNeverWhole = 1u << 31;  // in split_into_: some of the triangle is out of reach
+// The budget grows by this many pieces for each piece that a change places.
+constexpr std::size_t kBudgetOfPiece = 4;
+// If there are more candidates than this, a piece looks only at the nearest.
+constexpr std::size_t kMany = 64;
+// A try polls after this many parts of pieces, each of which may look at kMany candidates.
+constexpr std::size_t kBetweenPolls = 64;
+// This bit of split_into_ marks a triangle some of which is out of reach.
+constexpr std::uint32_t kNeverWhole = 1u << 31;
 
 FourPoints with_centre(const Part& part) {
   const auto& [a, b, c] = part.corners;
@@ -122,7 +126,7 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
       double d2[4];
       witness_distances(trial.candidates_[i].witness, points, d2);
       if (d2[3] < centre2) centre2 = d2[3], below = i;
-      // Written so that NaN is not covered.
+      // A comparison with NaN is false, so that NaN is not covered.
       if (d2[0] <= limit2_ && d2[1] <= limit2_ && d2[2] <= limit2_) {
         trial.candidates_[i].distance =
             std::max(trial.candidates_[i].distance, std::sqrt(std::max({d2[0], d2[1], d2[2]})));
@@ -132,7 +136,7 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
       }
       return false;
     };
-    // The element that took the last piece is as likely as the one that follows from the change.
+    // The element that took the last piece is as likely a witness as the one that follows from the change.
     const std::uint32_t second = trial.last_;
     if (covered_by(first) || (second != first && covered_by(second))) continue;
     bool covered = false;
@@ -183,14 +187,14 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
     trial.candidates_[i].witness = {elements[i].corners[0], elements[i].corners[1], elements[i].corners[2]};
   }
   if (elements.size() > kMany) trial.hierarchy_.emplace(mesh_of(elements));
-  thread_local std::vector<std::uint32_t> gathered;  // per triangle of the reference, all 0 between calls
+  thread_local std::vector<std::uint32_t> gathered;  // has a count for each triangle of the reference, 0 between calls
   if (gathered.size() < split_into_.size()) gathered.resize(split_into_.size(), 0);
   const auto for_each_split = [&](auto&& call) {
     trial.for_each_replaced(lists_, [&](const Part& piece) {
       if (piece.cuts > 0) call(gathered[piece.of]);
     });
   };
-  // However the search ends, the next one finds no marks.
+  // The counts are cleared even if the search throws.
   const struct Clear {
     const decltype(for_each_split)& each;
     ~Clear() {
@@ -201,7 +205,7 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   return place_all(trial, gathered);
 }
 
-/// Places the pieces of what is replaced. `gathered`: how many there are of each triangle that was split.
+/// Places the pieces of all that is replaced. `gathered` counts them for each triangle that was split.
 bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) const {
   constexpr std::uint32_t kPlaced = 0xFFFFFFFFu;
   const auto place_list = [&](const std::vector<Part>& pieces, std::uint32_t first) {
@@ -214,7 +218,7 @@ bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) con
       return place(whole(piece.of), first, trial);
     });
   };
-  // What loses its element is the likeliest to fail.
+  // Pieces that lose their element are the likeliest to fail.
   for (const Trial::RemovedList& h : trial.removed_lists_) {
     if (!h.whole && !place_list(lists_[h.id].pieces, h.successor)) return false;
   }
@@ -231,7 +235,7 @@ bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) con
 }
 
 void Coverage::commit(const Trial& trial) {
-  // Up before down: no count is ever less than the pieces that there are.
+  // Counts grow before they shrink, so that no count is ever less than the number of pieces.
   for (const Moved& m : trial.moved_) {
     if (m.piece.cuts > 0) split_into_[m.piece.of].fetch_add(1, std::memory_order_relaxed);
   }
@@ -243,7 +247,7 @@ void Coverage::commit(const Trial& trial) {
     lists_[c.id].distance = c.distance;
   }
   for (const Trial::RemovedList& h : trial.removed_lists_) {
-    // Not clear(): the element is gone, and so goes its memory.
+    // This frees the memory of the element, which is gone; clear() would keep it.
     const std::vector<Part> pieces = std::exchange(lists_[h.id].pieces, {});
     std::vector<Part>& to = lists_[trial.candidates_[h.successor].id].pieces;
     if (h.whole) to.insert(to.end(), pieces.begin(), pieces.end());

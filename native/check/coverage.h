@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The backward direction: every piece of the reference has one element of the current mesh (a face; for boundaries an
-/// edge) that is its witness, so that every point of the reference stays within the tolerance of the result.
+/// The backward direction keeps every point of the reference within the tolerance of the result: every piece of the
+/// reference has one element of the current mesh (a face; for boundaries an edge) as its witness.
 ///
-/// The certificate with the roles exchanged: a piece whose three corners are within epsilon of one element is within
-/// epsilon of it as a whole. A change of the mesh must find a new witness for each piece of the elements it replaces,
-/// splitting pieces where one element does not do; one piece without a witness refuses the change. Where all pieces of
-/// a triangle of the reference are to find new witnesses, it is taken as a whole again.
+/// This is the certificate with the roles exchanged: a piece whose three corners are within epsilon of one element is
+/// within epsilon of it as a whole. A change of the mesh must find a new witness for each piece of the elements it
+/// replaces, and splits a piece that no single element covers. One piece without a witness refuses the change. If all
+/// pieces of a triangle of the reference need new witnesses, the search begins with the whole triangle again.
 #pragma once
 
 #include <algorithm>
@@ -27,33 +27,33 @@ class Coverage {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
-  /// An element as the change would leave it. Any point of it that the change carries along moves by at most `moved`.
+  /// An element as the change would leave it. A point of it that the change carries along moves by at most `moved`.
   struct Element {
     std::uint32_t id;
     glm::dvec3 corners[3];
     double moved;
   };
-  /// An element that the change removes: its points end up in the element at place `successor`, having moved by at most
-  /// `moved`.
+  /// An element that the change removes. Its points move by at most `moved`, to the element at index `successor` of the
+  /// change.
   struct Removed {
     std::uint32_t id;
     std::uint32_t successor;
     double moved;
   };
 
-  /// `limit`: the provable distance. Keeps a reference to `reference`.
+  /// `limit` is the provable distance in the frame. Keeps a reference to `reference`.
   Coverage(const TriangleMesh& reference, double limit, std::size_t element_count);
 
-  /// A triangle of the reference that is the element itself.
+  /// Makes the element the witness of a triangle of the reference that coincides with it.
   void set_witness(std::uint32_t element, std::uint32_t triangle);
 
-  /// Finds witnesses for a triangle of the reference among the triangles of a hierarchy; `ids[i]` is the element that
-  /// triangle i there is, kNone for one that never changes. Pieces farther than `provable` from all of them count no
-  /// further; the nearest triangles are added to `nearest`. Returns whether all of it is covered.
+  /// Finds witnesses for a triangle of the reference among the triangles of a hierarchy. `ids[i]` is the element that
+  /// triangle i of the hierarchy is, or kNone if it never changes. A piece farther than `provable` from all triangles
+  /// gets no witness, and the triangle nearest to it is added to `nearest`. Returns whether every piece has a witness.
   bool find_witnesses(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids,
                       double provable, std::vector<std::uint32_t>& nearest);
 
-  /// Points that stand for the pieces of an element, every `stride`-th of them.
+  /// A point that stands for a piece. sample() adds one for every `stride`-th piece of the element.
   struct Sample {
     glm::dvec3 point;
     double area;
@@ -61,16 +61,16 @@ class Coverage {
   void sample(std::uint32_t element, std::size_t stride, std::vector<Sample>& out) const;
 
   class Trial;
-  /// Whether all pieces of the elements named have witnesses among `elements`; only reads. Nothing changes until
-  /// commit().
+  /// Tells whether all pieces of the elements of a change have witnesses among `elements`. Only reads: nothing changes
+  /// until commit().
   bool try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial) const;
-  /// Carries out the last change tried, which must have succeeded on this state.
+  /// Carries out the last change that was tried, which must have succeeded on this state.
   void commit(const Trial& trial);
 
  private:
   struct List {
     std::vector<Part> pieces;
-    double distance = 0;  ///< every piece is within this of the element
+    double distance = 0;  ///< no piece is farther than this from the element
   };
   struct Moved {
     Part piece;
@@ -84,17 +84,17 @@ class Coverage {
   const TriangleMesh* reference_;
   double limit_, limit2_;
   std::vector<List> lists_;
-  /// Per triangle of the reference: the pieces that it was split into, none while it is whole. A count changes while
-  /// others read it, yet never looks as if a piece that is elsewhere did not exist.
+  /// Counts for each triangle of the reference the pieces that it was split into, 0 while it is whole. Other threads
+  /// may read a count while it changes, but it is never less than the number of pieces that exist.
   std::vector<std::atomic<std::uint32_t>> split_into_;
 };
 
-/// What a try found, and its scratch; one a thread.
+/// Holds what a try found, and its scratch memory. Each thread has a trial of its own.
 class Coverage::Trial {
  public:
-  /// Starts a series of tries around one place: what they find depends on nothing before.
+  /// Starts a series of tries around one place. Their results do not depend on earlier series.
   void begin() { failed_last_ = 0, looked_at_ = 0; }
-  /// Parts of pieces that the series has looked at.
+  /// The number of parts of pieces that the series has looked at.
   std::size_t looked_at() const { return looked_at_; }
 
  private:
@@ -103,11 +103,11 @@ class Coverage::Trial {
     std::uint32_t id;
     WitnessTriangle witness;
     double distance;
-    bool replaced;  ///< its own pieces were looked at one by one
+    bool replaced;  ///< tells whether its own pieces are placed anew
   };
   struct RemovedList {
     std::uint32_t id, successor;
-    bool whole;  ///< passed on as it is
+    bool whole;  ///< tells whether the list is passed on as it is
   };
   /// Calls call(piece) for all pieces that the change places anew.
   template <class Call>
@@ -124,11 +124,11 @@ class Coverage::Trial {
   std::vector<RemovedList> removed_lists_;
   std::vector<Moved> moved_;
   std::vector<Part> stack_;
-  std::optional<Hierarchy> hierarchy_;  ///< of the candidates, where there are too many to look at each
-  std::size_t budget_ = 0;              ///< pieces that this change may still add
+  std::optional<Hierarchy> hierarchy_;  ///< holds the candidates if there are too many to look at each
+  std::size_t budget_ = 0;              ///< is the number of pieces that this change may still add
   std::size_t looked_at_ = 0;
-  std::uint32_t last_ = 0;         ///< the candidate that took the last piece
-  std::uint32_t failed_last_ = 0;  ///< the one whose pieces failed last: tried first, to be refused soon
+  std::uint32_t last_ = 0;         ///< is the candidate that took the last piece
+  std::uint32_t failed_last_ = 0;  ///< is the candidate whose pieces failed last; it comes first, to be refused soon
 };
 
 }  // namespace tolvol

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Differs from certificate.cpp in what a GPU is bad at: no hierarchy, hence no proof of "outside"; parts are walked
-// depth first by counting, without a stack. Candidates that the nearest triangle does not settle are collected and
-// looked at again, so that the many quick ones never wait for the few slow ones beside them.
+// This leaves out the parts of certificate.cpp that a GPU is bad at: it has no hierarchy, hence no proof of "outside",
+// and it walks the parts depth first by counting, without a stack. Candidates that the nearest triangle does not settle
+// are collected and looked at again, so that the many quick candidates never wait for the few slow ones beside them.
 #include "check/gl_certificate.h"
 
 #include <algorithm>
@@ -20,24 +20,33 @@
 namespace tolvol {
 namespace {
 
-constexpr std::size_t kBatch = 1 << 17;     // triangles on the GPU at a time, 6 MB
-constexpr std::size_t kSlowBatch = 1 << 6;  // of those that may take the whole budget each, to begin with,
-constexpr double kQuick = 0.04;             // and seconds below which the next batch may be larger
-constexpr int kBudget = 1 << 12;            // parts looked at before a triangle is left unproved
-constexpr int kTries = 8;                   // nodes around a part's centre
-constexpr double kShortest = 1.0 / 16;      // of the tolerance: a part this short is not split further
-constexpr GLuint kGroup = 64;               // local_size_x of certificate.comp
-constexpr float kFar = 16;                  // a coordinate far from any reference, whose are below 1, and tolerance
+// The GPU holds this many triangles at a time, in 6 MB.
+constexpr std::size_t kBatch = 1 << 17;
+// The first step of candidates that may each take the whole budget has this many triangles.
+constexpr std::size_t kSlowBatch = 1 << 6;
+// After a step that took fewer seconds than this the next step is larger.
+constexpr double kQuick = 0.04;
+// A triangle is left unproved after this many parts.
+constexpr int kBudget = 1 << 12;
+// A part is tried against the triangles of this many nodes around its centre.
+constexpr int kTries = 8;
+// A part this short, in tolerances, is not split further.
+constexpr double kShortest = 1.0 / 16;
+// This is local_size_x of certificate.comp.
+constexpr GLuint kGroup = 64;
+// A point with this coordinate, in the frame, is farther than any tolerance from any reference.
+constexpr float kFar = 16;
 
-/// A squared distance in floating point, at most this, is of a distance of at most `limit`: the two sums, the squares
-/// and this number's own rounding each change it by a factor of at most 1 + 2^-23, and there is room for twice as many.
+/// Returns a threshold: if a squared distance in floating point is not larger, the distance is at most `limit`. The two
+/// sums, the squares and the rounding of the threshold each change it by a factor of at most 1 + 2^-23, and there is
+/// room for twice as many factors.
 float threshold(double limit) { return static_cast<float>(limit * limit * (1 - 0x1p-20)); }
 
 struct CertificateProgram : gl::Program {
   CertificateProgram() : Program({{GL_COMPUTE_SHADER, {"witness.glsl", "split.glsl", "certificate.comp"}}}) {}
 };
 
-/// Throws ResourceLimit unless GL takes a buffer of that many bytes. On the GL thread.
+/// Throws ResourceLimit unless GL takes a buffer of that many bytes. Must run on the GL thread.
 void require_room(std::size_t bytes, const char* what) {
   GLint64 limit = 0;
   glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &limit);
@@ -48,7 +57,7 @@ void require_room(std::size_t bytes, const char* what) {
   throw ResourceLimit(text.str());
 }
 
-/// Nine coordinates a triangle of the pieces from `begin` on.
+/// Returns nine coordinates for each triangle of `count` pieces from `begin` on.
 std::vector<float> corners_to_send(const PlacedPieces& pieces, std::size_t begin, std::size_t count, double magnitude,
                                    unsigned threads) {
   const std::span<const PieceTriangle> triangles = triangles_of(pieces.corners);
@@ -61,7 +70,7 @@ std::vector<float> corners_to_send(const PlacedPieces& pieces, std::size_t begin
         for (const std::uint8_t corner : triangle) {
           const glm::dvec3& p = pieces.points[pieces.indices[i * static_cast<std::size_t>(pieces.corners) + corner]];
           for (int k = 0; k < 3; ++k) {
-            // Written so that NaN is far as well: GLSL promises nothing of it.
+            // Larger numbers would cost precision, and GLSL promises nothing for NaN.
             *to++ = std::abs(p[k]) <= magnitude ? static_cast<float>(p[k]) : kFar;
           }
         }
@@ -112,7 +121,7 @@ std::vector<Verdict> GlCertificate::verdicts(const PlacedPieces& pieces, const O
   });
   std::vector<std::uint32_t> open, proved;
   const auto look_at = [&](std::span<const std::uint32_t> candidates, int tries, int budget) {
-    // All state anew: between two of these, others may have used the context.
+    // This sets all state anew, because other code may have used the context since the last call.
     const gl::Program& program = gl::of_context<CertificateProgram>();
     const DistanceGrid& grid = volume().grid();
     program.use();
@@ -148,7 +157,7 @@ std::vector<Verdict> GlCertificate::verdicts(const PlacedPieces& pieces, const O
       look_at(open, 1, 1);
     });
     std::erase_if(open, [&](std::uint32_t i) { return proved[i] == 1; });
-    // In steps, for a cancel is seen, and a GPU serves its screen, only between them.
+    // This goes in steps, because only between them a cancel is seen and a GPU serves its screen.
     std::size_t step = kSlowBatch;
     for (std::span<const std::uint32_t> rest = open; !rest.empty();) {
       update();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The witness certificate (check/certificate.h) in a compute shader, in float32: for batches of many small pieces.
+/// The witness certificate (check/certificate.h) in a compute shader, in float32. It is for batches of many small
+/// pieces.
 #pragma once
 
 #include "check/tolerance_check.h"
@@ -30,20 +31,24 @@ class GlCertificate final : public ToleranceCheck {
   gl::Buffer nodes_, a_, ab_, ac_;
 };
 
-/// What float32 may hide, u = 2^-24: if the shader accepts a piece at the threshold t, every point of the piece is
-/// within t + float_error(M) of the triangle, M the largest coordinate magnitude of piece and triangle.
+/// Bounds the rounding of float32, u = 2^-24: if the shader accepts a piece at the threshold t, every point of the
+/// piece is within t + float_error(M) of the triangle, where M is the largest coordinate magnitude of piece and
+/// triangle.
 ///
-/// Derivation. Values sent are rounded to nearest, an error of u. GLSL promises for `precise` +, - and * a correctly
-/// rounded result in an unspecified direction, 2u, and for a * b + c one or two such roundings; it promises less for
-/// division and dot(), and these only ever choose parameters. Subnormals may be flushed: far below u M here. Per
-/// coordinate, in units of u M, all points and corners at most M and differences of two at most 2 M:
-/// - the part's corner, an exact convex combination of sent corners: sent 1, its products 2, two sums 4;
-/// - the triangle's corner a, sent: 1; ab and ac, sent, together with their parameters: 2;
-/// - x, the corner as seen from a: 4;
-/// - for the foot: s ab + t ac has products 4; s + t <= 1 as computed may be 1 + 2u: 4; two subtractions 8;
-/// - for the edge bc instead: x - ab 4, bc = ac - ab 4, the product 4, the subtraction 4.
-/// Either way 30; three coordinates: times sqrt(3), below 52. What the sum of squares and the threshold's own rounding
-/// add comes off the threshold, see threshold() in the .cpp. 64 leaves room and is a power of two.
+/// This is the derivation. Values are rounded to nearest when they are sent, an error of u. GLSL promises for `precise`
+/// +, - and * a correctly rounded result in an unspecified direction, 2u, and for a * b + c one or two such roundings.
+/// It promises less for division and dot(), which only choose parameters. Flushed subnormals are far below u M here.
+/// Points and corners are at most M and differences of two at most 2 M. So the errors per coordinate, in units of u M,
+/// are:
+/// - 1 for sending the part's corner, an exact convex combination of sent corners, 2 for its products, 4 for two sums;
+/// - 1 for sending the triangle's corner a, and 2 for sending ab and ac, together with their parameters;
+/// - 4 for x, the corner as seen from a;
+/// - for the foot, 4 for the products of s ab + t ac, 4 because s + t <= 1 may be 1 + 2u, and 8 for two subtractions;
+/// - for the edge bc instead, 4 each for x - ab, for bc = ac - ab, for the product and for the subtraction.
+///
+/// Either way this is 30, and below 52 for the length over three coordinates, which is sqrt(3) times as much. The
+/// errors of the sum of squares and of the threshold come off the threshold (threshold() in the .cpp). 64 is a power of
+/// two.
 inline double float_error(double magnitude) { return 64 * 0x1p-24 * magnitude; }
 
 }  // namespace tolvol

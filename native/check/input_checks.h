@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// What every operation says about input that it cannot keep its promise for.
+/// The messages of all operations about input for which they cannot keep their promise.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@
 
 namespace tolvol {
 
-/// What the stored type costs at these coordinates: a warning from 1 % of the tolerance on; throws InvalidInput from 50
-/// % on. `space` is in the volume's frame.
+/// Returns a warning if the stored type rounds these coordinates by more than 1 % of the tolerance. Throws InvalidInput
+/// if it rounds them by more than 50 %. `space` must be in the volume's frame.
 std::optional<std::string> storage_warning(const ToleranceVolume& volume, const StoredSpace& space,
                                            std::span<const glm::dvec3> stored);
 

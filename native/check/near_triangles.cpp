@@ -10,12 +10,15 @@
 namespace tolvol {
 namespace {
 
-constexpr std::size_t kSearches = 8;        // most pieces of a fine mesh need fewer, and would not gain by a list
-constexpr std::size_t kLongest = 256;       // triangles in a list; a part with more has its own parts try again
-constexpr std::size_t kMostKept = 1 << 22;  // in all lists of a piece, 16 MiB; then parts keep the list they inherit
-/// Of distances in a frame: more than a thousand times what rounding costs here, and in the hierarchy, whose corners
-/// are not those of the witnesses to the last bit. Where the answer is nearer than this to another, the hierarchy gives
-/// it.
+// A piece gets its first list after this many searches. Most pieces of a fine mesh need fewer, and would not gain by
+// it.
+constexpr std::size_t kSearches = 8;
+// A list has at most this many triangles. If a part has more, its own parts try again.
+constexpr std::size_t kLongest = 256;
+// The lists of a piece hold at most this many triangles, in 16 MiB. After that a part keeps the list that it inherits.
+constexpr std::size_t kMostKept = 1 << 22;
+// If two distances in the frame differ by less than this, the hierarchy decides. This is more than a thousand times the
+// rounding here and in the hierarchy, whose corners may differ from those of the witnesses in the last bits.
 constexpr double kRounding = 0x1p-40;
 constexpr double kNothing = std::numeric_limits<double>::infinity();
 
@@ -47,7 +50,7 @@ std::uint32_t NearTriangles::search(const glm::dvec3& centre, double radius, std
   return hierarchy_->nearest(centre, radius, hint).triangle;
 }
 
-/// Whatever is within the radius of some point of the part is within this of its centre.
+/// Returns a distance: a triangle within the radius of some point of the part is within this distance of its centre.
 double NearTriangles::reach(const Part& part, const glm::dvec3& centre) const {
   double farthest2 = 0;
   for (const glm::dvec3& corner : part.corners) {
@@ -70,7 +73,7 @@ void NearTriangles::look_at(std::uint32_t triangle, const glm::dvec3& centre, do
   }
 }
 
-/// Makes a list from the hierarchy; false where it would be too long, or was for a part that was hardly larger.
+/// Makes a list from the hierarchy. Returns false if the list is too long, or was too long for a part hardly larger.
 bool NearTriangles::gather(Part& part, const glm::dvec3& centre) {
   const double reach = this->reach(part, centre), reach2 = reach * reach;
   const std::size_t begin = pool_.size();
@@ -90,7 +93,7 @@ bool NearTriangles::gather(Part& part, const glm::dvec3& centre) {
   return true;
 }
 
-/// Makes a list from the one that the part has.
+/// Makes a list from the list that the part has.
 void NearTriangles::narrow(Part& part, const glm::dvec3& centre) {
   const double reach = this->reach(part, centre), reach2 = reach * reach;
   const List from = lists_[part.of];

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The nearest triangles to the parts of one piece. Where boxes of large triangles overlap, every search of the
-/// hierarchy looks at a share of all triangles; what is near to a part is near to the part it was cut from, so that it
-/// need only be sought among the triangles found there.
+/// Finds the nearest triangles to the parts of one piece. If boxes of large triangles overlap, every search of the
+/// hierarchy looks at a share of all triangles. A triangle near a part is also near the part that it was cut from, so
+/// that the search for it need only look at the triangles that were found there.
 #pragma once
 
 #include <cstddef>
@@ -15,23 +15,23 @@
 
 namespace tolvol {
 
-/// For one thread. Reused from piece to piece, so that its memory is.
+/// Each thread has one of its own, and uses it for one piece after another, so that its memory is reused.
 class NearTriangles {
  public:
-  /// Begins with a piece, the whole of which has of = 0. Keeps references. `hierarchy`: of the triangles, which have
-  /// the size of a frame. `radius`: the largest that will be asked for.
+  /// Begins with a new piece, whose whole has of = 0. Keeps references. `hierarchy` holds the triangles, which must be
+  /// as large as in a frame. `radius` is the largest radius that nearest() will be asked for.
   void begin(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, double radius);
 
-  /// hierarchy.nearest(centre, radius, hint).triangle, exactly, for the centre of a part. Writes part.of, which its
-  /// parts inherit: the list of what is near to all of it.
+  /// Returns exactly hierarchy.nearest(centre, radius, hint).triangle for the centre of a part. Writes part.of, which
+  /// names the list of triangles near the part, and which its parts inherit.
   std::uint32_t nearest(Part& part, const glm::dvec3& centre, double radius, std::uint32_t hint);
 
-  /// How often the hierarchy was asked since begin().
+  /// The number of searches of the hierarchy since begin().
   std::size_t searches() const { return searches_; }
 
  private:
   struct List {
-    std::size_t begin, end;  // in pool_
+    std::size_t begin, end;  // are indices into pool_
   };
 
   double reach(const Part& part, const glm::dvec3& centre) const;
@@ -44,10 +44,10 @@ class NearTriangles {
   const Hierarchy* hierarchy_ = nullptr;
   double radius_ = 0;
   std::size_t searches_ = 0;
-  double too_far_ = 0;               // the least reach() for which a list became too long
-  std::vector<std::uint32_t> pool_;  // the lists, one after the other
-  std::vector<List> lists_;          // by Part::of; the first stands for all triangles
-  double best2_ = 0, second2_ = 0;   // squared distances of the two nearest that were looked at
+  double too_far_ = 0;               // is the least reach() for which a list became too long
+  std::vector<std::uint32_t> pool_;  // holds the lists, one after the other
+  std::vector<List> lists_;          // is indexed by Part::of; the first list stands for all triangles
+  double best2_ = 0, second2_ = 0;   // are the squared distances of the two nearest triangles that were looked at
   std::uint32_t best_ = Hierarchy::kNone;
 };
 

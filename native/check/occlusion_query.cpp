@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Based on [Botsch04, §4] and deviates from it where that is not conservative. The paper's triangle of edge n leaves
-// out the candidate's corners, and a small one draws no pixel at all: here the pixels are samples that include them.
-// The paper counts pixels outside, so that one that is missing is good: here the good ones are counted. The paper
-// interpolates in hardware, signed, in 8 bits: here in the shader, unsigned, in float32. Candidates larger than a cell
-// of the framebuffer are cut, because what a framebuffer cuts off nobody misses.
+// This is based on [Botsch04, §4] and deviates from it where it is not conservative. The paper's triangle of edge n
+// leaves out the candidate's corners, and a small triangle draws no pixel at all; here the pixels are samples that
+// include the corners. The paper counts pixels outside, so that a missing pixel passes for inside; here the pixels
+// inside are counted. The paper interpolates signed distances in hardware, in 8 bits; here the shader interpolates
+// unsigned distances in float32. Candidates larger than a cell of the framebuffer are cut up, because the framebuffer
+// would clip them.
 //
-// Why a candidate is inside when D(x) <= eps' at every sample x, D the interpolated distance. Let d be the
-// distance to the reference; it changes by no more than the way. A point p of the candidate is in one of the
-// triangles between the samples, no edge of which is longer than h, hence within h / sqrt(3) of a sample x. D(x) is a
-// mean of values of at least d(v_i) >= d(x) - |x - v_i| at the eight nodes v_i around x, with weights of which x is the
-// mean of the nodes; the mean of |x - v_i| is at most the root of the mean of its square, sum over the axes of h^2 t (1
-// - t) <= (3/4) h^2. So d(p) <= D(x) + (sqrt(3)/2) h + h / sqrt(3). By way of the nearest node v alone it is d(p) <=
-// d(v) + |x - v| + h / sqrt(3); that is tried first.
+// A candidate is inside if D(x) <= eps' at every sample x, where D is the interpolated distance, for this reason. Let d
+// be the distance from the reference, which changes by no more than the way from one point to another. A point p of the
+// candidate is in one of the triangles between the samples, no edge of which is longer than h, hence within h / sqrt(3)
+// of a sample x. D(x) is a mean of values of at least d(v_i) >= d(x) - |x - v_i| at the eight nodes v_i around x, and
+// with the same weights x is the mean of the nodes. The mean of |x - v_i| is at most the root of the mean of its
+// square, which is the sum over the axes of h^2 t (1 - t) <= (3/4) h^2. So d(p) <= D(x) + (sqrt(3)/2) h + h / sqrt(3).
+// The nearest node v alone gives d(p) <= d(v) + |x - v| + h / sqrt(3), which is tried first.
 #include "check/occlusion_query.h"
 
 #include <algorithm>
@@ -27,15 +28,18 @@
 namespace tolvol {
 namespace {
 
-constexpr float kMargin = 1.5f;      // half way between the last sample and the next pixel
-constexpr double kLargestPart = 62;  // subdivisions: with the margin it fits a cell of 64 pixels
-
-constexpr double kInterpolationLoss = 0.8660254037844387;  // spacings that interpolation may lose
+// The edge of a drawn triangle is this many pixels longer than n: it ends half way between the last sample and the next
+// pixel.
+constexpr float kMargin = 1.5f;
+// A part has at most this many subdivisions. With the margin it fits a cell of 64 pixels.
+constexpr double kLargestPart = 62;
+// Interpolation may underestimate a distance by this many grid spacings, sqrt(3) / 2.
+constexpr double kInterpolationLoss = 0.8660254037844387;
 
 float rounded_down(double x) { return std::nextafter(static_cast<float>(x), 0.0f); }
 
-/// Upper bounds on the distances of the nodes, float32 rounded up. Never the grid's own distances: those are rounded
-/// either way and, at needles, guesses. Nodes without an id are taken for farther than anything in the grid.
+/// Returns upper bounds on the distances of the nodes, rounded up to float32. It does not use the grid's own distances,
+/// which are rounded either way and are guesses at needles. Nodes without an id get a distance larger than the grid.
 std::vector<float> upper_bounds(const ToleranceVolume& volume) {
   const DistanceGrid& grid = volume.grid();
   const float far = static_cast<float>(2 * grid.spacing * glm::length(glm::dvec3(grid.nodes)));
@@ -63,7 +67,7 @@ std::vector<float> upper_bounds(const ToleranceVolume& volume) {
 }  // namespace
 
 OcclusionQuery::OcclusionQuery(const ToleranceVolume& volume) : SampledCheck(volume, kMargin) {
-  bound(0);  // throws before any work when the grid is too coarse
+  bound(0);  // this throws before any work if the grid is too coarse
   const std::vector<float> bounds = upper_bounds(volume);
   gl::run([&] {
     texture_.emplace(volume.grid(), bounds, volume.frame_tolerance(), TextureFormat::float32);
@@ -71,15 +75,15 @@ OcclusionQuery::OcclusionQuery(const ToleranceVolume& volume) : SampledCheck(vol
   });
 }
 
-// What float32 hides, u = 2^-24, G the largest number of nodes along an axis. GLSL rounds sums and products correctly
-// but to either side: by 2u. In grid spacings, per coordinate: the corner is sent with an error of u G, the edges,
-// because i/n + j/n <= 1, together with u G; their multiplication rounds by 2u G together, the two sums by 2u G each.
-// 8 u G in three coordinates is below 14 u G h; doubles, which bring the corners into the grid, and n, which they
-// round, are far below the 16 counted here. The way from a node is exact. In the interpolation every term is a product
-// of non-negative factors: three weights, three products and eight sums round by 2u of the result each, 28 u of at most
-// epsilon; 32 leave room for the bound's own rounding. By way of one node, the way's square rounds by 8u, and half of
-// that counts, room and its square by 4u: below 10 u. What the witnesses behind the nodes hide is in provable()
-// already.
+// The bound leaves room for the rounding of float32. Let u = 2^-24 and G be the largest number of nodes along an axis.
+// GLSL rounds sums and products correctly but to either side, by 2u. Per coordinate and in grid spacings, the corner is
+// sent with an error of u G, and the edges together with u G, because i/n + j/n <= 1. Their multiplication rounds by 2u
+// G together, and the two sums by 2u G each. These 8 u G in three coordinates are below 14 u G h. The doubles that
+// bring the corners into the grid and that round n err by far less than the rest of the 16 counted here. The way from a
+// node is exact. In the interpolation every term is a product of non-negative factors: three weights, three products
+// and eight sums round by 2u of the result each, 28 u of at most epsilon, and 32 leave room for the bound's own
+// rounding. By one node alone, the square of the way rounds by 8u, half of which counts, and the room and its square by
+// 4u, which is together below 10 u. provable() already covers the rounding of the witnesses behind the nodes.
 float OcclusionQuery::bound(double mapping_error) const {
   constexpr double kUnit = 0x1p-24;
   const DistanceGrid& grid = volume().grid();
@@ -87,7 +91,7 @@ float OcclusionQuery::bound(double mapping_error) const {
                rounding = kUnit * (16 * h * largest + 32 * volume().frame_tolerance());
   const double bound = volume().provable(mapping_error) - h / std::sqrt(3.0) - kInterpolationLoss * h - rounding;
   if (!(bound > 0)) {
-    constexpr int kGood = 4;  // more than a third of the tolerance goes to what samples stand for
+    constexpr int kGood = 4;  // at this precision, in nodes per tolerance, 1.44 h are about a third of the tolerance
     std::ostringstream text;
     text << "the method occlusion_query needs a finer grid: at a precision of " << volume().precision()
          << " what its samples stand for is larger than the tolerance; take precision=" << kGood;
@@ -98,10 +102,10 @@ float OcclusionQuery::bound(double mapping_error) const {
 
 bool OcclusionQuery::add_triangle_samples(const Corners& corners, std::uint32_t counter,
                                           std::vector<SampledTriangle>& triangles) const {
-  // A cell away from the grid's border no rounding leads out of it; and there nothing is within the tolerance.
+  // Nothing in the outermost cells is within the tolerance, and from the other cells no rounding leads out of the grid.
   const glm::dvec3 last = glm::dvec3(volume().grid().nodes) - 2.0;
   for (const glm::dvec3& p : corners) {
-    // Written so that NaN fails as well.
+    // A comparison with NaN is false, so that NaN fails as well.
     if (!(p.x >= 1 && p.y >= 1 && p.z >= 1 && p.x <= last.x && p.y <= last.y && p.z <= last.z)) return false;
   }
   const glm::dvec3 along = corners[1] - corners[0], across = corners[2] - corners[0];
@@ -117,7 +121,7 @@ bool OcclusionQuery::add_triangle_samples(const Corners& corners, std::uint32_t 
     for (int j = 0; i + j < count; ++j) {
       const glm::dvec3 corner = corners[0] + static_cast<double>(i) * step1 + static_cast<double>(j) * step2;
       triangles.push_back({corner, n, edge1, counter, edge2, 0});
-      // Between this one and the next on the diagonal lies one that points the other way.
+      // Between this part and the next on the diagonal lies a part that points the other way.
       if (i + j + 1 < count) triangles.push_back({corner + step1 + step2, n, -edge1, counter, -edge2, 0});
     }
   }

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// The paper's check by occlusion queries [Botsch04, §4], made conservative.
 ///
-/// A candidate is drawn so that its pixels are evenly spaced samples of it, n subdivisions an edge, spacing at most
-/// that of the grid; the points at which the interpolated distance is at most eps' are counted. Inside only if all of
-/// them were: whatever is not drawn is not proved. The rest is unproved; outside is never claimed. A node counts with
-/// the exact distance of the triangle that the grid names for it; of a grid filled by fast marching, which names few,
-/// little is proved.
+/// A candidate is drawn so that its pixels are evenly spaced samples of it. An edge has n subdivisions, and their
+/// spacing is at most that of the grid. The samples at which the interpolated distance is at most eps' are counted. A
+/// candidate is inside only if all samples were counted, so that nothing is proved that was not drawn. Any other
+/// candidate is unproved; the verdict is never outside. The distance at a node is the exact distance of the triangle
+/// that the grid names for it. A grid that was filled by fast marching names few triangles, so that little is proved
+/// with it.
 #pragma once
 
 #include <optional>
@@ -17,9 +18,9 @@ namespace tolvol {
 
 class OcclusionQuery final : public SampledCheck {
  public:
-  /// Keeps a reference to `volume`, which must outlive this. Throws InvalidInput when the grid is too coarse, naming
-  /// the precision that will do: eps' is eps - 1.44 h less the rounding of float32, so 4 is good and 1.45 useless;
-  /// ResourceLimit when the grid is too large for a texture; GlUnavailable. O(nodes).
+  /// Keeps a reference to `volume`, which must outlive this. Throws InvalidInput if the grid is too coarse, and names a
+  /// sufficient precision: eps' is eps - 1.44 h less the rounding of float32, so that 4 is good and 1.45 useless.
+  /// Throws ResourceLimit if the grid is too large for a texture, and GlUnavailable. O(nodes).
   explicit OcclusionQuery(const ToleranceVolume& volume);
   std::string method() const override { return "occlusion_query"; }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// [Botsch04, §4] as printed, but for what is larger than a framebuffer: that stays unproved. Its distances are those of
-// the volume's grid, whichever way it was filled, with signs.
+// This follows [Botsch04, §4] as printed, except that a candidate larger than a framebuffer stays unproved. The
+// distances are those of the volume's grid, whichever way it was filled, with signs.
 #include "check/paper.h"
 
 #include <algorithm>
@@ -13,14 +13,14 @@
 namespace tolvol {
 namespace {
 
-/// Pixels along an edge of what is drawn of a large candidate with a corner beyond the grid: all of them there, hence
-/// outside, as the candidate is whatever its other pixels are.
+/// A large candidate with a corner beyond the grid is outside whatever its other pixels are, so that only its pixels at
+/// the corner are drawn, this many along an edge.
 constexpr float kCorner = 16;
 
 }  // namespace
 
 Paper::Paper(const ToleranceVolume& volume, Margin margin) : SampledCheck(volume, 0), margin_(margin) {
-  bound(0);  // throws before any work when the grid is too coarse
+  bound(0);  // this throws before any work if the grid is too coarse
   const std::vector<float> distances = volume.signed_distance();
   gl::run([&] {
     texture_.emplace(volume.grid(), distances, volume.frame_tolerance(), TextureFormat::normalised8);
@@ -53,9 +53,9 @@ bool Paper::add_triangle_samples(const Corners& corners, std::uint32_t counter,
   const double longest =
       std::sqrt(std::max({glm::dot(along, along), glm::dot(across, across), glm::dot(third, third)}));
   const double l = std::ceil(longest);
-  // Written so that NaN fails as well.
+  // A comparison with NaN is false, so that NaN fails as well.
   if (!(l + 2 <= largest_)) return false;
-  // Of a candidate that is one point nothing is drawn; the division must not be by zero.
+  // A candidate that is one point draws nothing, but the division must not be by zero.
   const double steps = std::max(l, 1.0);
   if (l > kCorner) {
     const glm::dvec3 last = glm::dvec3(volume().grid().nodes) - 1.0;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The check as it was published [Botsch04, §4]: fast, and not conservative. For comparison; occlusion_query.h is the
-/// one that proves.
+/// The check as it was published [Botsch04, §4] is fast, and not conservative. It is here for comparison;
+/// occlusion_query.h is the check that proves.
 ///
 /// A candidate is drawn as the triangle (0, 0), (l, 0), (0, l), l = ceil(longest edge / h), with an 8-bit distance
-/// texture that the hardware interpolates, and pixels farther than eps' are counted; any is outside. Wrong accepts come
-/// from what is not drawn (corners; whole candidates of one pixel), from samples as far apart as h / sqrt(3) from what
-/// they stand for, and, with half_spacing, from the interpolation.
+/// texture that the hardware interpolates. Pixels farther than eps' are counted, and a candidate with one such pixel is
+/// outside. Candidates are accepted wrongly because corners and whole candidates of one pixel are not drawn, because
+/// points are up to h / sqrt(3) away from their samples and, with half_spacing, because of the interpolation.
 #pragma once
 
 #include <optional>
@@ -17,12 +17,12 @@ namespace tolvol {
 
 class Paper final : public SampledCheck {
  public:
-  /// What the interpolation may under-estimate, taken off the tolerance: (sqrt(3)/2) h, or the h/2 that "turned out to
-  /// be sufficient".
+  /// The margin is taken off the tolerance, because the interpolation may underestimate the distance. It is
+  /// (sqrt(3)/2) h, or the h/2 that "turned out to be sufficient".
   enum class Margin { half_diagonal, half_spacing };
 
-  /// Keeps a reference to `volume`, which must outlive this. Throws InvalidInput when the margin leaves nothing of the
-  /// tolerance, naming the precision that will do; ResourceLimit when the grid is too large for a texture;
+  /// Keeps a reference to `volume`, which must outlive this. Throws InvalidInput if the margin leaves nothing of the
+  /// tolerance, and names a sufficient precision; ResourceLimit if the grid is too large for a texture; and
   /// GlUnavailable.
   Paper(const ToleranceVolume& volume, Margin margin);
   std::string method() const override;
@@ -36,7 +36,7 @@ class Paper final : public SampledCheck {
   Verdict verdict(std::uint64_t counted, std::uint64_t points) const override;
 
   Margin margin_;
-  double largest_ = 0;  // side of a framebuffer
+  double largest_ = 0;  // the largest side of a framebuffer, in pixels
   std::optional<DistanceTexture> texture_;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Halving and quartering alone need pieces as small as the room that is left wherever a piece crosses from one triangle
-// of the other surface to the next. Cut along the edge between the two, each side has a triangle that covers it.
+// of the other surface to the next. After a cut along the edge between the two, a triangle covers each side.
 #include "check/part.h"
 
 #include <algorithm>
@@ -11,7 +11,7 @@ namespace {
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
-/// From p, the nearer to which errs less, towards q.
+/// Returns the point at share t of the way from p to q. It starts from the nearer of the two, which errs less.
 glm::dvec3 between(const glm::dvec3& p, const glm::dvec3& q, double t) {
   return t <= 0.5 ? p + t * (q - p) : q + (1 - t) * (p - q);
 }
@@ -24,7 +24,8 @@ double longest_squared(const Part& part) {
 }
 
 void split(const Part& part, std::vector<Part>& out) {
-  constexpr double kNeedle2 = 4;  // squared longest edge over the shortest: quarters of a needle are needles
+  // The longest squared edge of a needle is more than this many times its shortest. Quarters of a needle are needles.
+  constexpr double kNeedle2 = 4;
   const auto& [a, b, c] = part.corners;
   const double ab2 = squared_length(b - a), bc2 = squared_length(c - b), ca2 = squared_length(a - c);
   const double longest2 = std::max({ab2, bc2, ca2});
@@ -50,7 +51,8 @@ void split(const Part& part, std::vector<Part>& out) {
 
 bool cut(const Part& part, const WitnessTriangle& t, double least, std::vector<Part>& out) {
   double best = least, distance[3];
-  // `gradient`: of what is 0 on the plane of an edge and grows inwards, `at_a`: its value at a.
+  // A linear function is 0 on the plane of an edge and grows inwards. `gradient` is its gradient, `at_a` its value at
+  // a.
   const auto consider = [&](const glm::dvec3& gradient, double at_a) {
     const double scale = 1 / glm::length(gradient);
     double d[3], high = 0, low = 0;
@@ -62,14 +64,14 @@ bool cut(const Part& part, const WitnessTriangle& t, double least, std::vector<P
     best = std::min(high, low);
     std::copy_n(d, 3, distance);
   };
-  if (t.gs == glm::dvec3(0) && t.gt == glm::dvec3(0)) {  // a segment: across its ends
+  if (t.gs == glm::dvec3(0) && t.gt == glm::dvec3(0)) {  // the triangle is a segment: this cuts across its ends
     const glm::dvec3& along = squared_length(t.ab) > squared_length(t.ac) ? t.ab : t.ac;
     consider(along, 0), consider(-along, squared_length(along));
   } else {
     consider(t.gs, 0), consider(t.gt, 0), consider(-t.gs - t.gt, 1);
   }
   if (!(best > least)) return false;
-  // p is on one side, q and r on the other or on the edge.
+  // The corner p is on one side; q and r are on the other or on the edge.
   const int inside = (distance[0] > 0) + (distance[1] > 0) + (distance[2] > 0);
   const bool odd = inside == 1;
   const int alone = (distance[1] > 0) == odd ? 1 : (distance[2] > 0) == odd ? 2 : 0;

@@ -12,22 +12,22 @@ namespace tolvol {
 
 struct Part {
   glm::dvec3 corners[3];
-  std::uint32_t cuts = 0;  ///< made since it was whole; past kMostCuts rounding would no longer be within the bounds
-  std::uint32_t of = 0;    ///< what it is a part of, for whoever wants to know
+  std::uint32_t cuts = 0;  ///< counts the cuts that made it; after more than kMostCuts the bounds would not hold
+  std::uint32_t of = 0;    ///< names what it is a part of; split() and cut() hand it on
 };
 
-/// A cut puts a corner up to 3u |x| from where it should be, u = 2^-53, and a part of a part inherits that: every point
-/// of the whole is within so many times 3u |x| of the parts. |x| <= sqrt(3) R + d: 32 cuts are below 32 * 5.2 u (R +
-/// d), for which witness_error() has room.
+/// A cut puts a corner up to 3u |x| from its exact place, u = 2^-53, and a part of a part inherits the error, so that
+/// after n cuts every point of the whole is within 3 n u |x| of the parts. Since |x| <= sqrt(3) R + d, 32 cuts err by
+/// less than 32 * 5.2 u (R + d), for which witness_error() has room.
 inline constexpr std::uint32_t kMostCuts = 32;
 
 double longest_squared(const Part& part);
 
-/// Appends the halves of a needle, or four quarters. A segment is (a, b, b), and so are its parts.
+/// Appends the halves of a needle, or four quarters. A segment is (a, b, b), and its parts have the same form.
 void split(const Part& part, std::vector<Part>& out);
 
-/// Cuts a part where an edge of a triangle runs below it, and appends both sides: of the three edges the one that
-/// leaves most on both. False, and nothing done, where none leaves a strip of width `least` on both.
+/// Cuts a part where an edge of a triangle runs below it, and appends both sides. Of the three edges it takes the one
+/// whose narrower side is the widest. Returns false and does nothing if both sides are not wider than `least`.
 bool cut(const Part& part, const WitnessTriangle& triangle, double least, std::vector<Part>& out);
 
 }  // namespace tolvol

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Based on [Botsch04, §4]. Candidates are not all drawn in one corner: each has a cell of a framebuffer of several, so
-// that a renderer that deals tiles out to its processors can use more than one. The framebuffer has no attachments:
-// nothing is written but the counts.
+// This is based on [Botsch04, §4]. Candidates are not all drawn in one corner: the framebuffer has several cells, and
+// each candidate has one of them, so that a renderer that deals tiles out to its processors can use more than one. The
+// framebuffer has no attachments, because nothing is written but the counts.
 #include "check/sampled_check.h"
 
 #include <algorithm>
@@ -18,10 +18,14 @@
 namespace tolvol {
 namespace {
 
-constexpr int kSmallestCell = 64;      // pixels: tiles of renderers that have them are not larger
-constexpr int kSmallestSide = 256;     // pixels: 16 cells keep some processors busy, more make a query dear
-constexpr std::size_t kChunk = 1024;   // triangles drawn before a flush: more leave the caches of a tiled renderer
-constexpr std::size_t kInFlight = 64;  // queries begun before the result of the first is waited for
+// A side of a cell has at least this many pixels. The tiles of renderers are not larger.
+constexpr int kSmallestCell = 64;
+// A side of the framebuffer has at least this many pixels. 16 cells keep some processors busy; more make a query slow.
+constexpr int kSmallestSide = 256;
+// A flush follows after this many triangles. More would leave the caches of a tiled renderer.
+constexpr std::size_t kChunk = 1024;
+// This many queries are begun before the result of the first is read.
+constexpr std::size_t kInFlight = 64;
 // A batch ends with the piece that reaches either of these. The first keeps a buffer below the 128 MB that every GL
 // allows, the second the wait for a cancelled call below a tenth of a second.
 constexpr std::size_t kBatchTriangles = std::size_t{1} << 15;
@@ -42,12 +46,12 @@ void draw_triangles(std::size_t begin, std::size_t end) {
 
 }  // namespace
 
-/// Triangles to draw together, those that add to one counter side by side.
+/// Triangles to draw together. The triangles that add to one counter are side by side.
 struct SampledCheck::Batch {
   std::vector<SampledTriangle> triangles;
-  std::vector<std::size_t> ends;         // per counter: where its triangles end
-  std::vector<std::uint32_t> labels;     // per counter: the label whose sum it is part of
-  std::vector<std::uint32_t> not_drawn;  // of pieces that cannot be
+  std::vector<std::size_t> ends;         // holds for each counter where its triangles end
+  std::vector<std::uint32_t> labels;     // holds for each counter the label whose sum it is part of
+  std::vector<std::uint32_t> not_drawn;  // holds the labels of pieces that cannot be drawn
 };
 
 SampledCheck::Programs::Programs(std::string_view sample_counts)
@@ -83,7 +87,7 @@ std::vector<Verdict> SampledCheck::decide(const PlacedPieces& pieces, std::span<
                                           const Options& options) const {
   const float bound = this->bound(pieces.mapping_error);
   std::vector<Sum> sums(order.empty() ? 0 : labels[order.back()] + 1);
-  std::future<void> drawing;  // of one batch, while the next is made
+  std::future<void> drawing;  // draws one batch while the next is made
   for (std::size_t next = 0; next < order.size();) {
     poll();
     if (options.progress) options.progress->update(static_cast<double>(next) / static_cast<double>(order.size()));
@@ -101,7 +105,7 @@ std::vector<Verdict> SampledCheck::decide(const PlacedPieces& pieces, std::span<
   return verdicts;
 }
 
-/// Of the pieces from `next` on, which is moved past them.
+/// Makes a batch of the pieces from `next` on, and moves `next` past them.
 SampledCheck::Batch SampledCheck::make_batch(const PlacedPieces& pieces, std::span<const std::uint32_t> order,
                                              std::span<const std::uint32_t> labels, std::size_t& next) const {
   Batch batch;
@@ -140,7 +144,7 @@ void SampledCheck::draw(const Batch& batch, float bound, bool queries, std::vect
   if (batch.triangles.empty()) return;
   float largest = 0;
   for (const SampledTriangle& triangle : batch.triangles) largest = std::max(largest, triangle.subdivisions);
-  // A pixel more on both sides than the margin needs.
+  // The cell is a pixel larger on both sides than the margin needs.
   const int cell =
       static_cast<int>(std::bit_ceil(std::max<unsigned>(kSmallestCell, static_cast<unsigned>(largest) + 2)));
   const int side = std::max(cell, kSmallestSide);

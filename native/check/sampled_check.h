@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The common part of the checks that draw pieces with the distance texture and count their pixels, each of which is a
+/// The common part of the checks that draw pieces with the distance texture and count their pixels. Each pixel is a
 /// sample of a piece [Botsch04, §4].
 #pragma once
 
@@ -21,35 +21,35 @@ class SampledCheck : public ToleranceCheck {
   std::string renderer() const override { return renderer_; }
 
  protected:
-  /// A triangle to draw, as samples.vert reads it; lengths in grid spacings, from node (0, 0, 0).
+  /// A triangle to draw, as samples.vert reads it. Lengths are in grid spacings and start from node (0, 0, 0).
   struct SampledTriangle {
     glm::vec3 corner;
     float subdivisions;
-    glm::vec3 edge1;  ///< divided by the subdivisions, like edge2
+    glm::vec3 edge1;  ///< is divided by the subdivisions, like edge2
     std::uint32_t counter;
     glm::vec3 edge2;
     float unused;
   };
-  using Corners = std::array<glm::dvec3, 3>;  ///< of a triangle, in grid spacings from node (0, 0, 0)
+  using Corners = std::array<glm::dvec3, 3>;  ///< Lengths are in grid spacings and start from node (0, 0, 0).
 
   struct Programs {
-    /// `sample_counts`: the file that defines sample_counts().
+    /// `sample_counts` is the file that defines sample_counts().
     explicit Programs(std::string_view sample_counts);
     gl::Program query, counting;
   };
 
-  /// `margin`: see samples.vert. Throws GlUnavailable.
+  /// samples.vert explains `margin`, which is in pixels. Throws GlUnavailable.
   SampledCheck(const ToleranceVolume& volume, float margin);
 
-  /// The distance, in the frame, that samples are compared with. Throws InvalidInput when there is none.
+  /// Returns the distance, in the frame, that samples are compared with. Throws InvalidInput if nothing is left of it.
   virtual float bound(double mapping_error) const = 0;
-  /// Appends what to draw for a triangle; false when it cannot be drawn, and nothing is then known of it.
+  /// Appends the triangles to draw for a triangle. Returns false if it cannot be drawn; it is then left unproved.
   virtual bool add_triangle_samples(const Corners& corners, std::uint32_t counter,
                                     std::vector<SampledTriangle>& triangles) const = 0;
-  /// Binds texture and uniforms; on the GL thread.
+  /// Binds texture and uniforms. Runs on the GL thread.
   virtual void use(const gl::Program& program, float bound) const = 0;
   virtual const Programs& programs() const = 0;
-  /// `counted`: samples that are inside, of `points` samples.
+  /// Returns the verdict for a piece of which `counted` of `points` samples were counted.
   virtual Verdict verdict(std::uint64_t counted, std::uint64_t points) const = 0;
 
  private:
@@ -61,7 +61,7 @@ class SampledCheck : public ToleranceCheck {
                                       const Options& options) const override;
 
   struct Batch;
-  /// Of one label: samples that are inside, and samples drawn. Both are 0 where a query has shown all of them inside.
+  /// Numbers of the counted and of the drawn samples of one label. Both are 0 if a query has shown that all are inside.
   struct Sum {
     std::uint64_t counted = 0, points = 0;
     bool drawn = true;

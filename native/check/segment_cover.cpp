@@ -12,14 +12,15 @@ namespace tolvol {
 namespace {
 
 constexpr std::size_t kMostIntervals = 1 << 20;
-constexpr int kHalvings = 60;  // of an interval: its end is known as well as double precision can say it
+// After this many halvings the end of an interval is known as well as double precision can hold it.
+constexpr int kHalvings = 60;
 
 }  // namespace
 
 bool covers_segment(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, const glm::dvec3& a,
                     const glm::dvec3& b, double limit) {
   const double reach = limit + kCoverShare * witness_error(1 + 2 * limit), reach2 = reach * reach;
-  // From the nearer end, which errs less and is exact at both.
+  // A point is placed from the nearer end, which errs less and is exact at both ends.
   const auto at = [&](double t) { return t <= 0.5 ? a + t * (b - a) : b + (1 - t) * (a - b); };
   const auto covered = [&](const WitnessTriangle& triangle, double t) {
     return closest_point(at(t), triangle.a, triangle.a + triangle.ab, triangle.a + triangle.ac).distance_squared <=
@@ -29,7 +30,7 @@ bool covers_segment(const std::vector<WitnessTriangle>& triangles, const Hierarc
   for (std::size_t interval = 0; interval < kMostIntervals; ++interval) {
     if (interval % 64 == 0) poll();
     double end = -1;
-    // The search compares distances by themselves: a little more, so that it passes over no triangle that counts.
+    // The search computes distances in another way. The radius is a little larger, so that it misses no triangle.
     hierarchy.for_each_within(at(begin), reach * (1 + 1e-12), [&](std::uint32_t i) {
       const WitnessTriangle& triangle = triangles[i];
       if ((end >= 0 && !covered(triangle, end)) || !covered(triangle, begin)) return true;

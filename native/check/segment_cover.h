@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Whether triangles cover a segment one after the other: a search for a proof that finds one wherever there is one.
+/// A search that tells whether triangles cover a segment one after the other. It finds a proof wherever there is one.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -10,21 +10,21 @@
 
 namespace tolvol {
 
-/// The share of witness_error() by which a cover along a segment may exceed the provable distance: the error of a
-/// distance is 47 u (R + d) as derived there, and a point of the segment is placed once, not cut 32 times, 5.2 u more.
-/// Of the 256 u this leaves 203.
+/// A cover along a segment may exceed the provable distance by this share of witness_error(). The error of a distance
+/// is 47 u (R + d) as derived there, and a point of the segment is placed once, not cut 32 times, which errs by 5.2 u
+/// more. This leaves 203 of the 256 u.
 ///
-/// It is needed to find again what another search has proved. Parts of a larger piece lie up to 32 * 3 u (1 + d) from
-/// the piece, where |x| <= 1 + d as in a frame, and have witnesses whose distance errs by 47 u: 143 u together. The
-/// rest of the 192 u is for the error of the distances looked at here.
+/// The share is needed to find again what another search has proved. Parts of a larger piece lie up to 32 * 3 u (1 + d)
+/// from the piece, where |x| <= 1 + d as in a frame, and the distances of their witnesses err by 47 u, together 143 u.
+/// The rest of the 192 u is for the error of the distances that are computed here.
 inline constexpr double kCoverShare = 0.75;
 
-/// Whether every point of the segment from a to b is within the tolerance of one of the triangles, `limit` being the
-/// provable distance (ToleranceVolume::provable). True wherever parts of any larger piece of the frame prove it, as
-/// long as these were at most 2^20. `hierarchy`: of the triangles. The distance to a triangle is convex along the
-/// segment, so each covers one interval; of those that cover a point, the one that reaches farthest is followed to its
-/// end, and so on. No more intervals than those of any other cover; each costs about 0.1 us for each triangle near its
-/// beginning.
+/// Tells whether every point of the segment from a to b is within the tolerance of one of the triangles, which are in
+/// `hierarchy`. `limit` is the provable distance (ToleranceVolume::provable). The result is true wherever parts of a
+/// larger piece in the frame prove it, if they are at most 2^20. The distance to a triangle is convex along the
+/// segment, so that each triangle covers one interval. The search follows, of the intervals that cover a point, the one
+/// that reaches farthest to its end, and so on. No other cover has fewer intervals. Each interval costs about 0.1 us
+/// for each triangle near its beginning.
 bool covers_segment(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, const glm::dvec3& a,
                     const glm::dvec3& b, double limit);
 

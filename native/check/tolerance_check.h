@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The question every operation asks: are these pieces within the tolerance?
+/// The question that every operation asks: are these pieces within the tolerance?
 #pragma once
 
 #include <array>
@@ -14,11 +14,11 @@
 
 namespace tolvol {
 
-/// Ordered: the verdict of a group is the least of its pieces.
+/// Verdicts are ordered: the verdict of a group is the least verdict of its pieces.
 enum class Verdict : std::uint8_t {
-  outside = 0,   ///< proved: some point is farther than the tolerance
-  unproved = 1,  ///< neither was proved; counts as outside wherever something is promised
-  inside = 2,    ///< proved: every point is within the tolerance
+  outside = 0,   ///< it is proved that some point is farther than the tolerance
+  unproved = 1,  ///< neither was proved; this counts as outside wherever something is promised
+  inside = 2,    ///< it is proved that every point is within the tolerance
 };
 
 /// Pieces of one array of points as they are stored.
@@ -32,8 +32,8 @@ struct Pieces {
 /// The places of a triangle's corners among the corners of its piece.
 using PieceTriangle = std::array<std::uint8_t, 3>;
 
-/// The triangles that a piece of 1 to 4 corners is checked as: a point and a segment as degenerate triangles, a quad as
-/// the four triangles of both of its triangulations.
+/// Returns the triangles as which a piece of 1 to 4 corners is checked. A point and a segment are degenerate triangles.
+/// A quad is the four triangles of both of its triangulations.
 std::span<const PieceTriangle> triangles_of(int corners);
 
 /// Pieces in the frame of a volume, with the error that their placing makes.

@@ -24,7 +24,7 @@ std::vector<glm::dvec3> used_only(std::span<const glm::dvec3> vertices, std::spa
   return result;
 }
 
-/// use(the reference with its faces as they run in the world).
+/// Calls use() with the reference, its faces turned as they are in the world.
 template <class Use>
 auto in_the_world(const TriangleMesh& reference, bool mirrored, Use&& use) {
   if (!mirrored) return use(reference);
@@ -55,14 +55,14 @@ ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span
   frame_ = Frame(world);
   const StoredSpace placed = space.in(frame_);
   mapping_error_ = placed.mapping_error(used);
-  provable(0);  // throws before any work when the tolerance cannot be held
+  provable(0);  // this throws before any work if double precision cannot hold the tolerance
   reference_.vertices = placed.frame(vertices);
   reference_.triangles.assign(triangles.begin(), triangles.end());
 
   Box box;
   for (const glm::dvec3& p : used) box.add(placed.frame(p));
   grid_ = layout_grid(box, frame_tolerance(), options.precision);
-  // Side by side: neither needs the other.
+  // The two parts run at the same time, because neither needs the other.
   parallel_for(2, 1, options.threads, [&](std::size_t part, std::size_t) {
     if (part == 0 && field_ == Field::scatter) {
       scatter(reference_, grid_, options.threads, options.progress);
@@ -83,7 +83,7 @@ std::vector<float> ToleranceVolume::signed_distance() const {
 }
 
 std::size_t ToleranceVolume::memory() const {
-  constexpr std::size_t kHierarchy = 150;  // bytes a triangle, see hierarchy.h
+  constexpr std::size_t kHierarchy = 150;  // the hierarchy has this many bytes for each triangle (hierarchy.h)
   return reference_.vertices.size() * sizeof(glm::dvec3) +
          reference_.triangles.size() * (sizeof(glm::uvec3) + sizeof(WitnessTriangle) + kHierarchy) + grid_.memory();
 }
@@ -91,7 +91,7 @@ std::size_t ToleranceVolume::memory() const {
 double ToleranceVolume::provable(double mapping_error) const {
   const double epsilon = frame_tolerance();
   const double left = epsilon - mapping_error_ - mapping_error -
-                      witness_error(1 + 2 * epsilon);  // result faces, too, serve as witnesses
+                      witness_error(1 + 2 * epsilon);  // faces of the result, too, serve as witnesses
   if (!(left > 0.5 * epsilon)) {
     std::ostringstream text;
     text << "the tolerance " << tolerance_ << " is too small for double precision at these coordinates; "

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// All points within the tolerance of a reference: the reference in its frame, and what makes asking fast.
+/// All points within the tolerance of a reference. It holds the reference in its frame, and a grid and a hierarchy that
+/// make checks fast.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -16,25 +17,26 @@
 
 namespace tolvol {
 
-/// The share of the tolerance that operations leave unused, so that an independent measure, with rounding of its own,
-/// proves a result in finite time. Costs no triangles to speak of.
+/// Operations leave this share of the tolerance unused, so that an independent measure, with rounding of its own,
+/// proves a result in finite time. The share costs hardly any triangles.
 inline constexpr double kHeadroom = 1e-4;
 
-/// What fills the distance grid: field/scatter.h (exact), or field/fast_marching.h (the paper's way, for comparison).
+/// Says what fills the distance grid: field/scatter.h (exact), or field/fast_marching.h (the paper's way, for
+/// comparison).
 enum class Field { scatter, fast_marching };
 
 class ToleranceVolume {
  public:
   struct Options {
-    std::optional<double> precision;  ///< grid nodes per tolerance; empty: the finest that fits kGridBudget
-    unsigned threads = 0;             ///< 0: one per core
+    std::optional<double> precision;  ///< is in grid nodes per tolerance; if empty, the finest that fits kGridBudget
+    unsigned threads = 0;             ///< 0 means one for each core
     Progress* progress = nullptr;
-    Field field = Field::scatter;  ///< never changes a verdict's truth
+    Field field = Field::scatter;  ///< never makes a verdict wrong
   };
 
-  /// `tolerance` in world units. Throws InvalidInput for a bad mesh or for a tolerance that is not finite and positive,
-  /// that is larger than the reference, or that double precision cannot hold at this distance from the origin;
-  /// ResourceLimit for a precision whose grid does not fit. O(m log m + nodes in the band).
+  /// `tolerance` is in world units. Throws InvalidInput for a bad mesh, and for a tolerance that is not finite and
+  /// positive, that is larger than the reference, or that double precision cannot hold at this distance from the
+  /// origin. Throws ResourceLimit for a precision whose grid does not fit. O(m log m + nodes in the band).
   ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
                   double tolerance, const Options& options);
   ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
@@ -45,26 +47,27 @@ class ToleranceVolume {
   ToleranceVolume& operator=(const ToleranceVolume&) = delete;
 
   const Frame& frame() const { return frame_; }
-  const TriangleMesh& reference() const { return reference_; }                  ///< in the frame, every input vertex
-  const std::vector<WitnessTriangle>& witnesses() const { return witnesses_; }  ///< of the reference, prepared
+  const TriangleMesh& reference() const { return reference_; }                  ///< has all input vertices
+  const std::vector<WitnessTriangle>& witnesses() const { return witnesses_; }  ///< are of the reference
   const Hierarchy& hierarchy() const { return *hierarchy_; }
   const DistanceGrid& grid() const { return grid_; }
-  bool mirrored() const { return mirrored_; }  ///< the reference's triangles run the other way round
-  /// field/signs.h: the grid's distances, negative inside the reference as it is in the world, mirrored or not.
+  bool mirrored() const { return mirrored_; }  ///< tells whether the space turns the front of triangles to the back
+  /// Returns the grid's distances, negative inside the reference as it is in the world, mirrored or not
+  /// (field/signs.h).
   std::vector<float> signed_distance() const;
 
-  double tolerance() const { return tolerance_; }  ///< world units
+  double tolerance() const { return tolerance_; }  ///< is in world units
   double frame_tolerance() const { return tolerance_ * frame_.scale(); }
-  double diagonal() const { return diagonal_; }  ///< longest_diagonal() of the reference: world units, what 100 % means
+  double diagonal() const { return diagonal_; }  ///< is the reference's longest_diagonal(), 100 %, in world units
   Field field() const { return field_; }
   double precision() const { return frame_tolerance() / grid_.spacing; }
-  std::size_t memory() const;  ///< bytes held
+  std::size_t memory() const;  ///< is in bytes
 
-  /// The distance, in the frame, up to which a witness found in floating point proves a piece inside: the tolerance
-  /// less all that rounding may hide, of the witness arithmetic and of mapping both sides into the frame. Throws
-  /// InvalidInput when less than half of the tolerance is left.
+  /// Returns the distance, in the frame, up to which a witness found in floating point proves a piece inside. It is the
+  /// tolerance less all rounding, of the witness arithmetic and of mapping both sides into the frame. Throws
+  /// InvalidInput if it is not more than half of the tolerance.
   double provable(double mapping_error) const;
-  /// The distance beyond which a computed one proves a point outside.
+  /// Returns the distance, in the frame, beyond which a computed distance proves that a point is outside.
   double refutable(double mapping_error) const { return 2 * frame_tolerance() - provable(mapping_error); }
 
  private:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Branch-free closest point after C. Ericson, Real-Time Collision Detection, 2005, §5.1, in four lanes of double: the
-// nearest points of the three edges and, where it falls inside, the foot of the perpendicular as a barycentric
-// combination. Each is built as a point and measured as a distance between points; a plane distance is never used.
+// This finds closest points without branches after C. Ericson, Real-Time Collision Detection, 2005, §5.1, in four lanes
+// of double. It tries the nearest points of the three edges and, if it falls inside, the foot of the perpendicular as a
+// barycentric combination. Each is built as a point and measured as a distance between points, never from a plane.
 #include "check/witness.h"
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace {
 using Lanes = double __attribute__((vector_size(32)));
 using LaneMasks = std::int64_t __attribute__((vector_size(32)));
 
-/// 0 where there is no finite inverse: a parameter of 0 is still a point of the triangle.
+/// Returns 0 if there is no finite inverse. A parameter of 0 still gives a point of the triangle.
 double inverse_or_zero(double x) {
   const double inverse = 1 / x;
   return x > 0 && inverse < 1e300 ? inverse : 0;
@@ -37,7 +37,7 @@ TOLVOL_INLINE Lanes load(const double (&lanes)[4]) {
 
 TOLVOL_INLINE Lanes squared(Lanes x, Lanes y, Lanes z) { return x * x + y * y + z * z; }
 
-/// Squared distance to the nearest point of the edge o + w e, 0 <= w <= 1; points relative to o.
+/// Returns the squared distances from the edge o + w e, 0 <= w <= 1, of points that are relative to o.
 TOLVOL_INLINE Lanes edge(Lanes x, Lanes y, Lanes z, const glm::dvec3& e, double inverse) {
   const Lanes w = clamp01((x * e.x + y * e.y + z * e.z) * inverse);
   return squared(x - w * e.x, y - w * e.y, z - w * e.z);

@@ -12,7 +12,7 @@
 namespace tolvol {
 namespace {
 
-constexpr double kCoarser = 0.8;  // a step towards a grid that fits
+constexpr double kCoarser = 0.8;  // multiplies the precision until the grid fits
 
 }  // namespace
 

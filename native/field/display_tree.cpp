@@ -15,11 +15,11 @@
 namespace tolvol {
 namespace {
 
-constexpr std::size_t kLeaf = 4;  // triangles in a leaf, at most
-constexpr double kTie = 2e-6;     // frame lengths; the same in surface_distance.glsl
+constexpr std::size_t kLeaf = 4;  // a leaf has at most this many triangles
+constexpr double kTie = 2e-6;     // is in frame lengths, and the same in surface_distance.glsl
 constexpr double kTiny = 1e-30;
 constexpr double kSamples = 1 << 16;
-// Samples of a triangle, or the first ones of neighbouring triangles, are spread evenly by these steps [M. Roberts, The
+// These steps spread the samples of a triangle, or the first samples of neighbouring triangles, evenly [M. Roberts, The
 // Unreasonable Effectiveness of Quasirandom Sequences, 2018].
 constexpr double kStepU = 0.7548776662466927, kStepV = 0.5698402909980532;
 
@@ -34,7 +34,7 @@ class Split {
     }
   }
 
-  /// leaves: how many this range is cut into, a power of two.
+  /// `leaves` is the number of leaves into which this range is cut, a power of two.
   void cut(std::size_t first_leaf, std::size_t leaves, std::size_t all_leaves) {
     if (leaves == 1) return;
     const std::size_t half = leaves / 2;
@@ -45,7 +45,7 @@ class Split {
     for (auto i = begin; i != end; ++i) box.add(centres_[*i]);
     const glm::dvec3 side = box.upper - box.lower;
     const int axis = side.x >= side.y && side.x >= side.z ? 0 : side.y >= side.z ? 1 : 2;
-    // Equal centres in the order of their numbers: the same tree on every machine.
+    // Equal centres keep the order of their numbers, so that the tree is the same on every machine.
     std::nth_element(begin, middle, end, [&](std::uint32_t i, std::uint32_t j) {
       const double u = centres_[i][axis], v = centres_[j][axis];
       return u != v ? u < v : i < j;
@@ -113,7 +113,7 @@ double DisplayTree::distance(const glm::dvec3& place, double reach) const {
   double found = reach, steepest = 0, side = 1;
   std::size_t i = 1;
   if (from_box(i) > found) return found;
-  // The triangles in the nearer half of the nearer half are near: a bound to begin with, whatever the reach.
+  // Descending to the nearer half at each node leads to near triangles, which give a first bound whatever the reach is.
   while (i < leaves) i = from_box(2 * i) <= from_box(2 * i + 1) ? 2 * i : 2 * i + 1;
   for (auto t = static_cast<std::size_t>(nodes[i].begin); t < static_cast<std::size_t>(nodes[i].end); ++t) {
     found = std::min(found, glm::length(from_triangle(t)));
@@ -130,12 +130,12 @@ double DisplayTree::distance(const glm::dvec3& place, double reach) const {
         const glm::dvec3 a(corners[3 * t]), b(corners[3 * t + 1]), c(corners[3 * t + 2]);
         const glm::dvec3 away = from_triangle(t), normal = glm::cross(b - a, c - a);
         const double d = glm::length(away), across = glm::dot(away, normal) / std::max(glm::length(normal), kTiny);
-        // Of two faces at an edge that it is equally far from, the one that it is more above tells the side.
+        // If the place is equally far from two faces at an edge, the face whose plane is farther away tells the side.
         if (!(d < found + kTie) || (d > found - kTie && std::abs(across) < steepest)) continue;
         found = std::min(d, found), steepest = std::abs(across), side = across < 0 ? -1 : 1;
       }
     }
-    // The next part that is not within this one: up as long as this is the second half, then to the other half.
+    // Go to the next node that is not within this one: up while this is the second half, then to the other half.
     for (++i; i % 2 == 0; i /= 2) {
     }
   } while (i != 1);
@@ -157,7 +157,7 @@ std::vector<double> area_shares(const DisplayTree& tree, std::span<const glm::dv
   if (!(whole > 0)) return shares;
   double reach = 0;
   for (const double edge : edges) reach = std::max(reach, 1.001 * std::abs(edge) + 2 * DisplayTree::kRounding);
-  // A sum for each block, added in order: the same for any number of threads.
+  // Each block has a sum, and the sums are added in order, so that the result is the same for any number of threads.
   constexpr std::size_t kBlock = 1024;
   std::vector<double> sums((triangles.size() + kBlock - 1) / kBlock * bins, 0);
   parallel_for(triangles.size(), kBlock, threads, [&](std::size_t begin, std::size_t end) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Signed distances from a reference, to show a mesh by in a viewport: exact at every place but for rounding, whatever
-/// the tolerance. Nothing is interpolated, so that a thin or open sheet shows no more than there is; never for a check.
+/// Signed distances from a reference, by which a viewport shows a mesh. They are exact up to rounding at every place,
+/// whatever the tolerance. Nothing is interpolated, so that a thin or open sheet is shown as it is. No check uses them.
 #pragma once
 
 #include <cstdint>
@@ -14,41 +14,41 @@
 namespace tolvol {
 
 struct DisplayTree {
-  /// The box of the triangles from `begin` to `end`, which are whole numbers: two texels of a shader.
+  /// The box of the triangles from `begin` to `end`, which are whole numbers. A node is two texels of a shader.
   struct Node {
     glm::vec3 lower;
     float begin;
     glm::vec3 upper;
     float end;
   };
-  /// Largest number of triangles: what a float counts exactly.
+  /// The largest number of triangles, up to which a float counts exactly.
   static constexpr std::size_t kMost = std::size_t{1} << 24;
-  /// Bound, in frame lengths, on the rounding of a distance in a shader near a reference of a size of about 1. What is
-  /// nearer than this cannot be told from the reference.
+  /// A bound, in frame lengths, on the rounding of a distance in a shader near a reference of a size of about 1. A
+  /// place that is nearer than this cannot be told from the reference.
   static constexpr double kRounding = 1e-6;
 
-  bool closed;  ///< every edge of the reference has two faces, that agree on what is outside
-  /// A full binary tree: the root is nodes[1], the halves of nodes[i] are nodes[2 i] and nodes[2 i + 1], the leaves are
-  /// the last half. nodes[0] is not used.
+  bool closed;  ///< tells whether every edge of the reference has two faces, which agree on the outside
+  /// A full binary tree. The root is nodes[1], the halves of nodes[i] are nodes[2 i] and nodes[2 i + 1], and the leaves
+  /// are the last half. nodes[0] is not used.
   std::vector<Node> nodes;
-  /// Three corners of each triangle, in the frame, in the order of the leaves, with the outside on their left-hand
-  /// turn; w is 0.
+  /// The three corners of each triangle, in the frame and in the order of the leaves, with the outside on their
+  /// left-hand turn. Their w is 0.
   std::vector<glm::vec4> corners;
 
-  /// For a valid reference in its frame, whose triangles run the other way round if it is `mirrored`. Of a closed
-  /// reference the inside is what it encloses, whichever way its faces run. Throws InvalidInput above kMost triangles,
-  /// Cancelled. O(m log m), 0.1 s for 270,000 triangles.
+  /// The reference must be valid and in its frame. Its triangles run the other way round if it is `mirrored`. The
+  /// inside of a closed reference is the space that it encloses, whichever way its faces run. Throws InvalidInput above
+  /// kMost triangles, and Cancelled. O(m log m), 0.1 s for 270,000 triangles.
   DisplayTree(const TriangleMesh& reference, bool mirrored, Progress* progress = nullptr);
 
-  /// The distance of a place in the frame, as shaders/surface_distance.glsl has it; `reach` where the reference is at
-  /// least that far away. O(log m) for a place near the surface, about 1 us.
+  /// Returns the distance of a place in the frame as shaders/surface_distance.glsl computes it, or `reach` if the
+  /// reference is at least that far away. O(log m) for a place near the surface, about 1 us.
   double distance(const glm::dvec3& place, double reach) const;
 };
 
-/// Shares of the area of a mesh, its vertices given in the frame, with distances in the intervals that `edges`
-/// (ascending) part: edges.size() + 1 numbers, together 1, or all 0 for a mesh without area. What is farther than all
-/// edges on either side is in the last. By one sample a triangle and some 65,536 more. O(m log m), 0.3 s of one thread
-/// for 270,000 triangles.
+/// Returns the shares of the area of a mesh, whose vertices are in the frame, with distances in the intervals that
+/// `edges` (ascending) separate. These are edges.size() + 1 numbers whose sum is 1, or all 0 for a mesh without area.
+/// Area that is farther than all edges on either side counts to the last interval. There is one sample for each
+/// triangle and about 65,536 more. O(m log m), 0.3 s of one thread for 270,000 triangles.
 std::vector<double> area_shares(const DisplayTree& tree, std::span<const glm::dvec3> vertices,
                                 std::span<const glm::uvec3> triangles, std::span<const double> edges,
                                 unsigned threads = 0);

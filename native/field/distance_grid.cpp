@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One spacing h = tolerance / precision for all axes. The paper prints h = D / R as well, but its own grids (Table 1)
-// are those of h = epsilon / rho.
+// All axes have the spacing h = tolerance / precision. The paper prints h = D / R as well, but its own grids (Table 1)
+// follow h = epsilon / rho.
 #include "field/distance_grid.h"
 
 #include <cmath>
@@ -11,9 +11,9 @@
 namespace tolvol {
 namespace {
 
-constexpr double kFinestPrecision = 1;  // finer costs field time and saves the certificate none
+constexpr double kFinestPrecision = 1;  // in nodes per tolerance; finer grids cost time and save the certificate none
 
-// Node counts as doubles: a precision far too fine must not overflow an integer before it is refused.
+// Returns node counts as doubles, because a precision far too fine must not overflow an integer before it is refused.
 struct Layout {
   double h, band, x, y, z, pitch;
   double bytes() const { return pitch * y * z * (sizeof(float) + sizeof(std::uint32_t)); }
@@ -22,7 +22,7 @@ struct Layout {
 Layout layout(const Box& box, double tolerance, double precision) {
   const double h = tolerance / precision;
   // A point within the tolerance is less than (sqrt(3)/2) h from its nearest node, and all eight nodes of its cell are
-  // within sqrt(3) h of it: with this band each of them has an id.
+  // within sqrt(3) h of it, so that with this band each of them has an id.
   const double band = tolerance + std::sqrt(3.0) * h;
   const glm::dvec3 n = glm::ceil((box.upper - box.lower + 2 * band) / h) + 1.0;
   return {h, band, n.x, n.y, n.z, std::ceil(n.x / DistanceGrid::kLanes) * DistanceGrid::kLanes};
@@ -32,7 +32,7 @@ Layout layout(const Box& box, double tolerance, double precision) {
 
 double precision_that_fits(const Box& box, double tolerance, double finest) {
   double precision = finest;
-  // Ends: a coarser grid has fewer nodes, down to the few of a band around a box smaller than a cell.
+  // This ends because a coarser grid has fewer nodes, down to the few of a band around a box smaller than a cell.
   while (layout(box, tolerance, precision).bytes() > kGridBudget) precision /= 2;
   return precision;
 }

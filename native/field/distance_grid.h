@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Distances to the reference at the nodes of a regular grid, with the closest triangle of each node [Botsch04, §2].
+/// Distances from the reference at the nodes of a regular grid, with the closest triangle of each node [Botsch04, §2].
 #pragma once
 
 #include <cstdint>
@@ -11,18 +11,18 @@
 
 namespace tolvol {
 
-/// Memory for distances and ids together; a constant, so that results do not depend on the machine.
+/// The most bytes for distances and ids together. It is a constant, so that results do not depend on the machine.
 inline constexpr std::size_t kGridBudget = std::size_t{256} << 20;
 
 struct DistanceGrid {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
-  glm::dvec3 origin{0};    ///< position of node (0, 0, 0)
-  double spacing = 0;      ///< h, the same along each axis
-  glm::ivec3 nodes{0};     ///< number of nodes along x, y, z
-  int pitch = 0;           ///< nodes from one row to the next, padded(nodes.x)
-  double band = 0;         ///< nodes farther than this from the reference hold the band and kNone
-  bool is_signed = false;  ///< distances are negative inside the reference; otherwise none is
+  glm::dvec3 origin{0};    ///< is the position of node (0, 0, 0)
+  double spacing = 0;      ///< is h, the same along each axis
+  glm::ivec3 nodes{0};     ///< are the numbers of nodes along x, y, z
+  int pitch = 0;           ///< is the number of nodes from one row to the next, padded(nodes.x)
+  double band = 0;         ///< is the distance up to which nodes hold more than the band and kNone
+  bool is_signed = false;  ///< tells whether distances are negative inside the reference; otherwise none is negative
   std::vector<float> distance;
   std::vector<std::uint32_t> triangle;
 
@@ -32,13 +32,13 @@ struct DistanceGrid {
   static constexpr int padded(int row) { return (row + kLanes - 1) / kLanes * kLanes; }
   std::size_t memory() const { return distance.size() * (sizeof(float) + sizeof(std::uint32_t)); }
 
-  /// Whether p is nearer to a node than to where the next would be outside the grid. Written so that NaN is not.
+  /// Tells whether p is nearer to a node than to the place of a next node outside the grid. It is false for NaN.
   bool contains(const glm::dvec3& p) const {
     const glm::dvec3 c = (p - origin) * (1 / spacing) + 0.5;
     return c.x >= 0 && c.y >= 0 && c.z >= 0 && c.x < nodes.x && c.y < nodes.y && c.z < nodes.z;
   }
-  /// The triangle of the node nearest to p, kNone outside the grid: after scatter() a closest one of that node or none
-  /// within the band. O(1).
+  /// Returns the triangle of the node nearest to p, or kNone outside the grid. After scatter() it is a closest triangle
+  /// of that node, or kNone if there is none within the band. O(1).
   std::uint32_t triangle_near(const glm::dvec3& p) const {
     if (!contains(p)) return kNone;
     const glm::dvec3 c = (p - origin) * (1 / spacing) + 0.5;
@@ -46,12 +46,12 @@ struct DistanceGrid {
   }
 };
 
-/// The finest of `finest`, `finest` / 2, `finest` / 4, ... whose grid fits kGridBudget.
+/// Returns the finest of `finest`, `finest` / 2, `finest` / 4, ... whose grid fits kGridBudget.
 double precision_that_fits(const Box& box, double tolerance, double finest);
 
-/// The grid of a reference: its box enlarged by the band, spacing tolerance / precision. `precision` empty: the finest
-/// of 1, 1/2, 1/4, ... that fits kGridBudget. Allocates nothing. Throws ResourceLimit, naming the precision that fits,
-/// when a precision is asked for that does not.
+/// Lays out the grid of a reference: its box enlarged by the band, with the spacing tolerance / precision. If
+/// `precision` is empty it is the finest of 1, 1/2, 1/4, ... that fits kGridBudget. Allocates nothing. Throws
+/// ResourceLimit, naming a precision that fits, for a precision that does not.
 DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double> precision);
 
 }  // namespace tolvol

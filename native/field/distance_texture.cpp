@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// As in [Botsch04, §3], but for the power of two, which GL stopped asking for, and for the float and 16-bit formats.
+// This follows [Botsch04, §3], except that sizes need not be powers of two and that there are float and 16-bit formats.
 #include "field/distance_texture.h"
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace {
 void require_size(const DistanceGrid& grid, double limit) {
   const int largest = gl::Texture::largest_3d(), nodes = std::max({grid.nodes.x, grid.nodes.y, grid.nodes.z});
   if (nodes <= largest) return;
-  // Nodes are proportional to the precision, but for the band's few.
+  // The number of nodes is proportional to the precision, except for the few of the band.
   const double precision = limit / grid.spacing * largest / nodes;
   std::ostringstream text;
   text.precision(2);
@@ -24,7 +24,7 @@ void require_size(const DistanceGrid& grid, double limit) {
   throw ResourceLimit(text.str());
 }
 
-/// Unsigned integers of [-limit, limit].
+/// Maps [-limit, limit] to unsigned integers.
 template <class T>
 std::vector<T> normalise(std::span<const float> distance, double limit) {
   constexpr double kLargest = std::numeric_limits<T>::max();

@@ -10,22 +10,22 @@
 
 namespace tolvol {
 
-/// normalised: of the range [-limit, limit], what lies beyond takes the nearer end.
+/// Normalised formats hold the range [-limit, limit]. A distance beyond it takes the nearer end.
 enum class TextureFormat { normalised8, normalised16, float32 };
 
 class DistanceTexture {
  public:
-  /// `distance`: one value a node, in the grid's order and pitch, signed or not; usually grid.distance. Made on the GL
-  /// thread. Throws ResourceLimit, naming the precision that fits, when the grid is larger than GL_MAX_3D_TEXTURE_SIZE
-  /// along an axis; GlUnavailable, also when the driver is out of memory.
+  /// `distance` has one value for each node, in the grid's order and pitch, signed or not; usually it is grid.distance.
+  /// Must be called on the GL thread. Throws ResourceLimit, naming a precision that fits, if the grid is larger than
+  /// GL_MAX_3D_TEXTURE_SIZE along an axis, and GlUnavailable, also if the driver is out of memory.
   DistanceTexture(const DistanceGrid& grid, std::span<const float> distance, double limit, TextureFormat format);
 
   const gl::Texture& texture() const { return texture_; }
   void filter_linearly() { texture_.filter_linearly(); }
-  /// What a texel holds is `scale` * its value + `offset`, in frame lengths: 1 and 0 for float32.
+  /// A texel stands for the distance `scale` * its value + `offset`, in frame lengths. For float32 these are 1 and 0.
   float scale() const { return scale_; }
   float offset() const { return offset_; }
-  /// Largest difference between a texel and a node's distance within the limit.
+  /// The largest difference between a texel and a node's distance within the limit.
   double quantisation() const { return quantisation_; }
 
  private:
@@ -34,8 +34,8 @@ class DistanceTexture {
   double quantisation_ = 0;
 };
 
-/// The texture coordinate of a position is (p - origin) * scale + offset, component by component: GL puts coordinates
-/// at the centres of texels, the grid has its values at the nodes, so node i is at (i + 1/2) / nodes.
+/// The texture coordinate of a position is (p - origin) * scale + offset, component by component. GL has values at the
+/// centres of texels and the grid has them at the nodes, so that node i is at (i + 1/2) / nodes.
 struct TextureCoordinates {
   glm::dvec3 scale, offset;
   explicit TextureCoordinates(const DistanceGrid& grid)

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Based on [Botsch04, §2] and, for the marching, on J. Sethian, A fast marching level set method for monotonically
-// advancing fronts, 1996. Three deviations:
-// - The paper takes all nodes of the triangles' enlarged boxes for known. Here only those within one cell of the
-// surface
-//   are: to a node farther away than its triangle's box was enlarged another triangle, whose box does not reach it, may
-//   be nearer. So every initial value is exact, and scatter() with a band of one cell is this phase.
-// - Normals at edges are pseudonormals, not interpolated (geometry/pseudonormals.h).
-// - Open and closed meshes are marched alike, without a sign. On a closed mesh it is that of the node from which the
-// front
-//   came: the surface is between known nodes only. On others it is estimated as in the initial phase, against the
-//   triangle from which the front came.
+// This is based on [Botsch04, §2] and, for the marching, on J. Sethian, A fast marching level set method for
+// monotonically advancing fronts, 1996. There are three deviations:
+// - The paper takes all nodes of the triangles' enlarged boxes for known. Here only the nodes within one cell of the
+//   surface are known, because a triangle whose box does not reach a node may be nearer to it than one whose box does.
+//   So every initial value is exact, and scatter() with a band of one cell computes them.
+// - Normals at edges are pseudonormals, not interpolated normals (geometry/pseudonormals.h).
+// - Open and closed meshes are marched alike, without a sign. A node of a closed mesh then gets the sign of the node
+//   from which the front came, because the surface is between known nodes only. For other meshes the sign is estimated
+//   as in the initial phase, against the triangle from which the front came.
 #include "field/fast_marching.h"
 
 #include <algorithm>
@@ -26,7 +24,8 @@
 namespace tolvol {
 namespace {
 
-// Cells; a little more than one, so that both ends of every grid edge that meets the surface are in for certain.
+// The initial band, in cells, is a little more than one, so that it holds both ends of every grid edge that meets the
+// surface.
 constexpr double kInitialBand = 1.001;
 
 class Front {
@@ -54,7 +53,7 @@ class Front {
   }
 
   void march(double stop, Progress* progress) {
-    constexpr std::size_t kBetween = 1 << 12;  // nodes from one look at the progress to the next
+    constexpr std::size_t kBetween = 1 << 12;  // is the number of nodes from one look at the progress to the next
     float reached = 0;
     for (std::size_t count = 1; !heap_.empty() && !(static_cast<double>(reached) > stop); ++count) {
       std::pop_heap(heap_.begin(), heap_.end(), std::greater());
@@ -65,14 +64,14 @@ class Front {
         if (progress) progress->update(std::min(1.0, static_cast<double>(reached) / stop));
       }
       const std::uint32_t node = static_cast<std::uint32_t>(top);
-      if (known_[node]) continue;  // an older entry of a node that came nearer
+      if (known_[node]) continue;  // this is an older entry of a node that came nearer
       reached = std::bit_cast<float>(static_cast<std::uint32_t>(top >> 32));
       conquer(node, reached);
     }
   }
 
  private:
-  /// visit(axis, position, index) for the up to six nodes beside one.
+  /// Calls visit(axis, position, index) for the up to six nodes beside a node.
   template <class Visit>
   void for_neighbours(const glm::ivec3& at, Visit&& visit) const {
     const std::size_t node = grid_.index(at.x, at.y, at.z);
@@ -84,8 +83,8 @@ class Front {
     }
   }
 
-  /// The distance at a node from the known ones beside it: the solution u of sum over the axes of max(0, u - d)^2 =
-  /// h^2, d the lesser distance of the two nodes along an axis.
+  /// Returns the distance at a node by the known nodes beside it. It is the solution u of sum over the axes of
+  /// max(0, u - d)^2 = h^2, where d is the lesser distance of the two nodes along an axis.
   void relax(const glm::ivec3& at) {
     constexpr double kFar = std::numeric_limits<double>::infinity();
     double d[3] = {kFar, kFar, kFar};
@@ -94,7 +93,7 @@ class Front {
     });
     std::sort(d, d + 3);
     const double h = grid_.spacing, b = d[1] - d[0], c = d[2] - d[0];
-    double u = h;  // beyond d[0]
+    double u = h;  // is relative to d[0]
     if (u > b) u = (b + std::sqrt(2 * h * h - b * b)) / 2;
     if (u > c) u = (b + c + std::sqrt((b + c) * (b + c) - 3 * (b * b + c * c - h * h))) / 3;
     const float distance = static_cast<float>(d[0] + u);
@@ -108,7 +107,7 @@ class Front {
   void conquer(std::uint32_t node, float distance) {
     const std::size_t row = node / strides_[1];
     const glm::ivec3 at(node % strides_[1], row % grid_.nodes.y, row / grid_.nodes.y);
-    std::size_t from = node;  // of the known nodes beside it the nearest to the surface
+    std::size_t from = node;  // becomes the known node beside it that is nearest to the surface
     for_neighbours(at, [&](int, const glm::ivec3&, std::size_t other) {
       if (!known_[other]) return;
       if (from == node || std::abs(grid_.distance[other]) < std::abs(grid_.distance[from])) from = other;
@@ -133,9 +132,9 @@ class Front {
   const Pseudonormals& normals_;
   DistanceGrid& grid_;
   std::vector<std::uint8_t>& known_;
-  std::vector<std::uint32_t> origin_;  // of each known node: the triangle from which the front came
+  std::vector<std::uint32_t> origin_;  // holds for each known node the triangle from which the front came
   const std::size_t strides_[3];
-  // The bits of a distance, which order like it, above those of the node: equal distances go by index.
+  // An entry has the bits of a distance, which order like it, above those of the node, so that ties go by index.
   std::vector<std::uint64_t> heap_;
 };
 
@@ -162,7 +161,7 @@ void fast_marching(const TriangleMesh& reference, DistanceGrid& grid, double sto
   Front(reference, normals, grid, known).march(stop, progress);
   for (std::size_t i = 0; i < known.size(); ++i) {
     poll_at(i);
-    if (!known[i]) grid.distance[i] = far;  // what the front had only touched
+    if (!known[i]) grid.distance[i] = far;  // the front had only touched this node
   }
   spread_signs(grid, std::move(known), grid.distance);
 }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Based on the initial band of [Botsch04, §2]: each triangle writes exact distances to the nodes of its enlarged box,
-// the smallest stays. Here the box is enlarged by the whole band, so that no marching is needed and every value is
-// exact, and nodes are taken eight along x at once. Of a small triangle nearly all nodes in the band have a nearer one:
-// eight of them are passed over where a ball around it is too far to be nearest. Of a large triangle only those nodes
-// of a row are looked at that are near its plane and near the part of it beside the row: the box of a needle across the
-// axes is nearly empty.
+// This is based on the initial band of [Botsch04, §2]: each triangle writes exact distances to the nodes of its
+// enlarged box, and the smallest distance stays. Here the box is enlarged by the whole band, so that no marching is
+// needed and every value is exact. Eight nodes along x are computed at once. Nearly all nodes in the box of a small
+// triangle have a nearer triangle, so that eight nodes are skipped if a ball around the triangle is too far away to be
+// nearest. In the box of a large triangle only the nodes of a row near its plane and near the part of it beside the row
+// are looked at, because the box of a needle across the axes is nearly empty.
 #include "field/scatter.h"
 
 #include <algorithm>
@@ -20,25 +20,29 @@ namespace tolvol {
 namespace {
 
 constexpr int kLanes = DistanceGrid::kLanes;
-constexpr int kWide = 3 * kLanes;            // nodes: a longer row of a triangle's box is cut to what is in the band
-constexpr std::size_t kBetweenPolls = 1024;  // rows of nodes, and triangles
-constexpr double kSlack = 1e-5;              // of a distance: float32 rounds it by less
-constexpr double kBeyond = 1.001;            // bands: what is skipped of a row is farther than that
+// A row of a triangle's box with more nodes than this is cut to the nodes in the band.
+constexpr int kWide = 3 * kLanes;
+// This many rows of nodes, or triangles, are between two polls.
+constexpr std::size_t kBetweenPolls = 1024;
+// float32 rounds a distance by less than this share of it.
+constexpr double kSlack = 1e-5;
+// Nodes that are skipped in a row are farther than this many bands.
+constexpr double kBeyond = 1.001;
 using Floats = float __attribute__((vector_size(4 * kLanes)));
 using Masks = std::int32_t __attribute__((vector_size(4 * kLanes)));
 
-/// A triangle prepared for many nodes; everything relative to corner a.
+/// A triangle prepared for many nodes. All its positions are relative to corner a.
 struct Prepared {
   glm::dvec3 a;
   std::array<glm::dvec3, 3> corner;
   Box box;
   glm::vec3 ab, ac, bc;
-  glm::vec3 gs, gt;  ///< gradients of the barycentric coordinates of b and c
-  glm::vec3 normal;  ///< unit, zero when degenerate
-  glm::vec3 middle;  ///< of the box
+  glm::vec3 gs, gt;  ///< are the gradients of the barycentric coordinates of b and c
+  glm::vec3 normal;  ///< is of unit length, or zero if the triangle is degenerate
+  glm::vec3 middle;  ///< is the middle of the box
   float inverse_ab, inverse_ac, inverse_bc;
-  float radius;  ///< of a ball about that middle which holds the triangle, with room for rounding
-  float slab;    ///< |normal . p| of the band about the plane, with the rounding of float32; infinite when degenerate
+  float radius;  ///< is the radius of a ball about this middle that holds the triangle, with room for rounding
+  float slab;    ///< bounds |normal . p| in the band, with the rounding of float32; infinite for degenerate triangles
 };
 
 float safe_inverse(double x) { return x > 0 ? static_cast<float>(std::min(1 / x, 1e30)) : 0.0f; }
@@ -58,14 +62,14 @@ Prepared prepare(const TriangleMesh& mesh, std::uint32_t id, double band) {
   r.corner = {glm::dvec3(0), ab, ac};
   r.ab = ab, r.ac = ac, r.bc = bc;
   r.inverse_ab = safe_inverse(ab2), r.inverse_ac = safe_inverse(ac2), r.inverse_bc = safe_inverse(glm::dot(bc, bc));
-  // A needle whose height float32 cannot hold is left to its edges: their distances are never too small.
+  // A needle whose height float32 cannot hold is left to its edges, because their distances are never too small.
   constexpr double kThinnestSine = 1e-4;
   if (nn > kThinnestSine * kThinnestSine * ab2 * ac2 && nn > 0) {
     r.gs = glm::cross(ac, n) / nn, r.gt = glm::cross(n, ab) / nn, r.normal = n / std::sqrt(nn);
     r.slab = static_cast<float>(band * kBeyond);
   } else {
     r.gs = r.gt = glm::vec3(std::numeric_limits<float>::quiet_NaN()),
-    r.normal = glm::vec3(0);  // never compares as inside
+    r.normal = glm::vec3(0);  // no foot of a perpendicular is then inside
     r.slab = std::numeric_limits<float>::infinity();
   }
   return r;
@@ -83,14 +87,14 @@ TOLVOL_INLINE Floats clamp01(Floats x) {
   return x < one ? x : one;
 }
 
-/// Squared distance to the edge o + u e, 0 <= u <= 1, for points (x, y, z) relative to o.
+/// Returns the squared distance from the edge o + u e, 0 <= u <= 1, of points (x, y, z) relative to o.
 TOLVOL_INLINE Floats edge_distance(Floats x, float y, float z, const glm::vec3& e, float inverse) {
   const Floats u = clamp01((x * e.x + (y * e.y + z * e.z)) * inverse);
   const Floats dx = x - u * e.x, dy = y - u * e.y, dz = z - u * e.z;
   return dx * dx + dy * dy + dz * dz;
 }
 
-/// The box of the part of the triangle whose coordinate k differs from `at` by no more than `reach`.
+/// Returns the box of the part of the triangle whose coordinate k differs from `at` by no more than `reach`.
 TOLVOL_INLINE Box part_beside(const Prepared& t, int k, double at, double reach) {
   Box part;
   for (int i = 0; i < 3; ++i) {
@@ -107,7 +111,7 @@ TOLVOL_INLINE Box part_beside(const Prepared& t, int k, double at, double reach)
   return part;
 }
 
-/// One triangle over the nodes of its box in rows z0 <= z < z1.
+/// Writes the distances of one triangle to the nodes of its box in rows z0 <= z < z1.
 TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid, int z0, int z1) {
   const double h = grid.spacing;
   const float band = static_cast<float>(grid.band), band2 = band * band, hf = static_cast<float>(h);
@@ -165,7 +169,7 @@ TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid
       const float my = py - t.middle.y, mz = pz - t.middle.z, to_middle = my * my + mz * mz;
       const std::size_t row = grid.index(0, y, z);
       for (int next = xbegin; next <= xend; next += kLanes) {
-        const int x = std::min(next, grid.pitch - kLanes);  // no vector runs into the next row
+        const int x = std::min(next, grid.pitch - kLanes);  // so that no vector runs into the next row
         const Floats px = (first.x + static_cast<float>(x) * hf) + lane;
         Floats old;
         __builtin_memcpy(&old, &grid.distance[row + x], sizeof old);
@@ -216,7 +220,7 @@ TOLVOL_TARGET_AVX2 void splat_avx2(const TriangleMesh& mesh, DistanceGrid& grid,
   splat_all(mesh, grid, z0, z1, progress);
 }
 
-/// Slabs of z that hold about equally many triangles; each is owned by one thread.
+/// Returns slabs of z that hold about equally many triangles. Each slab is written by one thread.
 std::vector<int> slab_bounds(const TriangleMesh& mesh, const DistanceGrid& grid, unsigned slabs) {
   std::vector<int> bounds{0};
   std::vector<double> heights(mesh.triangles.size());

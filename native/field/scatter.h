@@ -7,10 +7,10 @@
 
 namespace tolvol {
 
-/// Fills a grid laid out by layout_grid(): the unsigned distance and the closest triangle, both to float32 rounding, at
-/// every node within the band; where rounded distances tie the lower index stays, so that the result depends neither on
-/// the number of threads nor on the instructions used. The certificate needs the ids alone, trilinear interpolation the
-/// distances. O(nodes in the bands).
+/// Fills a grid laid out by layout_grid() with the unsigned distance and the closest triangle, both up to the rounding
+/// of float32, at every node within the band. If rounded distances tie, the lower index stays, so that the result
+/// depends neither on the number of threads nor on the instructions. The certificate needs only the ids; trilinear
+/// interpolation needs the distances. O(nodes in the bands).
 void scatter(const TriangleMesh& reference, DistanceGrid& grid, unsigned threads = 0, Progress* progress = nullptr);
 
 }  // namespace tolvol

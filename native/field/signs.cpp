@@ -31,7 +31,7 @@ void sign_by_triangle(const TriangleMesh& reference, const Pseudonormals& normal
 
 void spread_signs(const DistanceGrid& grid, std::vector<std::uint8_t> known, std::span<float> distance) {
   const std::size_t strides[] = {1, grid.index(0, 1, 0), grid.index(0, 0, 1)};
-  // Sweeps towards +x, +y, +z and back: what is ahead of a known node is reached by the first, the rest by the second.
+  // The first sweep goes towards +x, +y, +z and reaches the nodes ahead of a known node. The second goes back.
   for (const bool back : {false, true}) {
     const auto at = [&](int i, int count) { return back ? count - 1 - i : i; };
     for (int k = 0; k < grid.nodes.z; ++k) {

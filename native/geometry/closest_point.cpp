@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// After C. Ericson, Real-Time Collision Detection, 2005, §5.1.5 (walk the Voronoi regions of corners, edges, face),
-// which solves the normal equations of the plane: their error grows with the square of the aspect ratio. Three
-// deviations:
-// - a triangle lower than a tenth of its longest edge takes nearest_of_thin: the best of the three clamped edges and of
-// the
-//   foot in an orthogonal frame on the longest edge, whose error does not grow with the aspect ratio;
-// - the foot of a well-shaped triangle is improved by one step of iterative refinement;
-// - lengths outside 1e-60 .. 1e60 are scaled by a power of two first, because the fourth powers below would leave the
-// range.
+// This follows C. Ericson, Real-Time Collision Detection, 2005, §5.1.5, which walks the Voronoi regions of corners,
+// edges and face, and solves the normal equations of the plane, whose error grows with the square of the aspect ratio.
+// There are three deviations:
+// - A triangle lower than a tenth of its longest edge takes nearest_of_thin, the best of the three clamped edges and of
+//   the foot in an orthogonal frame on the longest edge, whose error does not grow with the aspect ratio.
+// - One step of iterative refinement improves the foot of a well-shaped triangle.
+// - Lengths outside 1e-60 .. 1e60 are scaled by a power of two first, because the fourth powers below would leave the
+//   range of double.
 //
-// is_beyond tries the normal of the plane and, for needles side by side in one plane, the direction in it across the
-// longest edge. For any n the triangle is at least m / |n| away, m being the least n . (p - x) over its corners x, so
-// that a normal of few right bits costs sharpness and no truth. With coordinates up to M and u = 2^-53, a difference p
-// - x is at most 4 M long, and a dot product errs by at most 4 u 4 M |n|; the witness of closest_point errs by 20 u M
-// and its distance by 4 u 4 M more. All that is less than e = 64 u M, and twice that is taken. With s the square root
-// of `squared`, (s + e)^2 <= s^2 (1 + 1e-6) + e^2 (1 + 1e6) <= s^2 (1 + 1e-6) + 2e6 e^2.
+// is_beyond tries the normal of the plane and, for needles side by side in one plane, the direction in the plane across
+// the longest edge. For any n the triangle is at least m / |n| away, where m is the least n . (p - x) over its corners
+// x, so that an inaccurate normal costs sharpness but never truth. With coordinates up to M and u = 2^-53, a difference
+// p - x is at most 4 M long, and a dot product errs by at most 4 u 4 M |n|. The witness of closest_point errs by 20 u M
+// and its distance by 4 u 4 M more. All this is less than e = 64 u M, and the code takes twice as much. With s the
+// square root of `squared`, (s + e)^2 <= s^2 (1 + 1e-6) + e^2 (1 + 1e6) <= s^2 (1 + 1e-6) + 2e6 e^2.
 #include "geometry/closest_point.h"
 
 #include <algorithm>
@@ -26,10 +25,10 @@
 namespace tolvol {
 namespace {
 
-constexpr double kThin = 0.01;  // squared height over squared longest edge
+constexpr double kThin = 0.01;  // a triangle is thin below this ratio of its squared height to its squared longest edge
 constexpr double kSmallest = 1e-60, kLargest = 1e60;
-constexpr double kApart = 1e-6, kNoise = 128 * kUnitRoundoff;  // derived above
-constexpr double kFlat = 1e-200;  // the square of a normal whose products may have lost their bits
+constexpr double kApart = 1e-6, kNoise = 128 * kUnitRoundoff;  // both are derived above
+constexpr double kFlat = 1e-200;  // the products of a normal with a smaller square may have lost their bits
 
 double largest(const glm::dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
@@ -38,21 +37,21 @@ ClosestPoint at(const glm::dvec3& p, const glm::dvec3& q, const glm::dvec3& weig
   return {q, weights, glm::dot(r, r)};
 }
 
-/// Weight of `b` at the point of the segment a, b that is nearest to p. A point when a equals b.
+/// Returns the weight of `b` at the point of the segment a, b that is nearest to p. The two may be equal.
 double segment_weight(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) {
   const glm::dvec3 ab = b - a;
   const double length2 = glm::dot(ab, ab);
   return length2 > 0 ? std::clamp(glm::dot(p - a, ab) / length2, 0.0, 1.0) : 0.0;
 }
 
-/// a + t (b - a), from the nearer end: exact at both.
+/// Returns a + t (b - a), computed from the nearer end, so that it is exact at both ends.
 glm::dvec3 on_segment(const glm::dvec3& a, const glm::dvec3& b, double t) {
   return t <= 0.5 ? a + t * (b - a) : b - (1 - t) * (b - a);
 }
 
 ClosestPoint nearest_of_thin(const glm::dvec3& p, const glm::dvec3 (&corner)[3]) {
   ClosestPoint best{glm::dvec3(0), glm::dvec3(0), std::numeric_limits<double>::infinity()};
-  int base = 0;  // the longest edge runs from corner[base] to the next one
+  int base = 0;  // the longest edge runs from corner[base] to the next corner
   double longest2 = -1;
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3;
@@ -67,9 +66,9 @@ ClosestPoint nearest_of_thin(const glm::dvec3& p, const glm::dvec3 (&corner)[3])
   const int i = base, j = (base + 1) % 3, k = (base + 2) % 3;
   const glm::dvec3 edge = corner[j] - corner[i];
   glm::dvec3 height = corner[k] - corner[i];
-  double foot = 0;  // of corner k on the edge, as a share of it
+  double foot = 0;  // the place of the foot of corner k, as a share of the edge
   if (longest2 > 0) {
-    for (int pass = 0; pass < 2; ++pass) {  // the second pass makes up for the cancellation in the first
+    for (int pass = 0; pass < 2; ++pass) {  // the second pass corrects the cancellation in the first
       const double s = glm::dot(height, edge) / longest2;
       height -= s * edge;
       foot += s;
@@ -131,7 +130,7 @@ ClosestPoint nearest_in_range(const glm::dvec3& p, const glm::dvec3& a, const gl
 ClosestPoint closest_point(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
   const double length = std::max({largest(p - a), largest(b - a), largest(c - a)});
   if (length >= kSmallest && length <= kLargest) return nearest_in_range(p, a, b, c);
-  // Half of each first: a difference of the whole may overflow.
+  // Both are halved first, because the difference may overflow.
   const double half = std::max({largest(0.5 * p - 0.5 * a), largest(0.5 * b - 0.5 * a), largest(0.5 * c - 0.5 * a)});
   if (half == 0) return at(p, a, {1, 0, 0});
   if (!std::isfinite(half)) return {a, {1, 0, 0}, std::numeric_limits<double>::quiet_NaN()};

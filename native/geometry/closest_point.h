@@ -7,20 +7,21 @@
 namespace tolvol {
 
 struct ClosestPoint {
-  glm::dvec3 point;         ///< the witness: weights.x * a + weights.y * b + weights.z * c, up to rounding
-  glm::dvec3 weights;       ///< barycentric, all >= 0, their sum 1 up to rounding
-  double distance_squared;  ///< |p - point|^2, from `point` itself and never from a plane equation: on needles and
-                            ///< degenerate triangles it is still the distance to a point of the triangle
+  glm::dvec3 point;    ///< is the witness, weights.x * a + weights.y * b + weights.z * c, up to rounding
+  glm::dvec3 weights;  ///< are barycentric and at least 0, and their sum is 1 up to rounding
+  double
+      distance_squared;  ///< is |p - point|^2, from `point` itself and never from a plane equation, so that it is the
+                         /// < distance to a point of the triangle even for needles and degenerate triangles
 };
 
-/// Degenerate triangles are the segments or points they are. The corners are finite; of a p that is
-/// not, the distance is not finite either. O(1).
-/// After C. Ericson, Real-Time Collision Detection, 2005, §5.1.5, made safe for degenerate input.
+/// Returns the nearest point after C. Ericson, Real-Time Collision Detection, 2005, §5.1.5, made safe for degenerate
+/// triangles, which count as the segments or points that they are. The corners must be finite. If p is not finite, the
+/// distance is not finite either. O(1).
 ClosestPoint closest_point(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);
 
-/// True only where closest_point(p, a, b, c).distance_squared is above `squared`, as the plane of the triangle or the
-/// one across it through the longest edge shows at a fraction of the cost. It may be false there too: for what the
-/// other edges and the corners decide, for a triangle that is nearly degenerate, and where the difference is within
+/// Returns true only if closest_point(p, a, b, c).distance_squared is above `squared`, which the plane of the triangle
+/// or the plane across it through the longest edge shows at a fraction of the cost. It may return false then too: if
+/// the other edges and the corners decide, if the triangle is nearly degenerate, and if the difference is within
 /// rounding of the coordinates. O(1).
 bool is_beyond(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double squared);
 

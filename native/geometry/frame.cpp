@@ -23,7 +23,7 @@ Frame::Frame(const Box& world) {
   const glm::dvec3 half = world.upper * 0.5 - world.lower * 0.5;
   const double largest = std::max({half.x, half.y, half.z});
   if (!(largest > 0)) return;
-  // Normalise by the largest side first: the square of a huge or tiny half diagonal would leave the range of double.
+  // The half diagonal is divided by the largest side first, because its square might leave the range of double.
   const double radius = largest * glm::length(half / largest);
   int exponent = 0;
   std::frexp(radius, &exponent);
@@ -41,7 +41,7 @@ StoredSpace::StoredSpace(const glm::dmat4& to_world, Storage storage, const Fram
       throw InvalidInput("to_world is not affine: its last row must be 0 0 0 1", "invalid_transform");
     }
   }
-  // Columns of length one first: the determinant of a matrix of tiny scales would underflow.
+  // The columns are scaled to length one first, because the determinant of a matrix of tiny scales would underflow.
   glm::dmat3 linear(to_world);
   glm::dvec3 lengths{0};
   for (int column = 0; column < 3; ++column) {
@@ -98,9 +98,9 @@ double StoredSpace::mapping_error(std::span<const glm::dvec3> stored) const {
     largest = std::max(largest, std::abs(to_world_[0][row]) * extent.x + std::abs(to_world_[1][row]) * extent.y +
                                     std::abs(to_world_[2][row]) * extent.z + std::abs(to_world_[3][row]));
   }
-  // A row is three products and three sums, hence an error of at most 4u (1 + 4u) times the sum of magnitudes; taking
-  // the centre off adds one more u of at most twice that magnitude; scaling by a power of two adds none. Six u a
-  // coordinate, times sqrt(3) for the length.
+  // A row is three products and three sums, hence an error of at most 4u (1 + 4u) times the sum of magnitudes. Taking
+  // the centre off adds u of at most twice that magnitude, and scaling by a power of two adds nothing. This is six u
+  // for each coordinate, and sqrt(3) times as much for the length.
   return 11 * kUnitRoundoff * largest * frame_.scale();
 }
 
@@ -114,8 +114,8 @@ double StoredSpace::mapping_error(std::span<const glm::dvec3> stored, double rea
 }
 
 double StoredSpace::storage_step(std::span<const glm::dvec3> stored) const {
-  // A position is off by half a unit in the last place a coordinate; store()'s own arithmetic by less than
-  // mapping_error() over the condition of the matrix, which only matters for float64 and is covered by its factor.
+  // A coordinate is off by half a unit in the last place. The arithmetic of store() errs by less than mapping_error()
+  // over the condition of the matrix, which only matters for float64 and is covered by the factor of 8.
   const double half_ulp = storage_ == Storage::float32 ? 0x1p-24 : 8 * kUnitRoundoff;
   glm::dvec3 extent{0};
   for (const glm::dvec3& p : stored) extent = glm::max(extent, glm::abs(p));

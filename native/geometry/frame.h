@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// From coordinates as they are stored (float32 or float64, local, with a 4x4 matrix) to the frame in which everything
-/// is decided, and back: the frame is the world, centred on the reference and scaled by a power of two to a size of
+/// Maps coordinates as they are stored (float32 or float64, local, with a 4x4 matrix) to the frame in which everything
+/// is decided, and back. The frame is the world, centred on the reference and scaled by a power of two to a size of
 /// about 1, so that neither a far origin nor a tiny or huge scale costs accuracy.
 #pragma once
 
@@ -12,18 +12,19 @@
 
 namespace tolvol {
 
-/// Unit roundoff of double precision.
+/// The unit roundoff of double precision.
 inline constexpr double kUnitRoundoff = 0x1p-53;
 
 class Frame {
  public:
   Frame() = default;
-  /// Centred on a box of the world, its half diagonal scaled into (1/2, 1] (a point: scale 1). Exact: a power of two.
+  /// The frame is centred on a box of the world. A power of two, which is exact, scales the half diagonal of the box
+  /// into (1/2, 1]. For a box that is a point the scale is 1.
   explicit Frame(const Box& world);
 
   glm::dvec3 from_world(const glm::dvec3& p) const { return (p - centre_) * scale_; }
   glm::dvec3 to_world(const glm::dvec3& p) const { return p / scale_ + centre_; }
-  /// Frame length of a world length of 1.
+  /// The frame length of a world length of 1.
   double scale() const { return scale_; }
 
  private:
@@ -33,35 +34,37 @@ class Frame {
 
 enum class Storage { float32, float64 };
 
-/// The float32 nearest to x. A plain cast there and back is not enough: GCC 12 drops the pair when it vectorises a loop
-/// or a constructor of several.
+/// Returns the float32 nearest to x. A plain cast there and back is not enough: GCC 12 drops the two casts when it
+/// vectorises a loop or a constructor of several numbers.
 double rounded_to_float32(double x);
 glm::dvec3 rounded_to_float32(const glm::dvec3& p);
 
-/// Where one array of vertices lives.
+/// The space in which one array of vertices is stored, and its place in the world and in a frame.
 class StoredSpace {
  public:
   /// Throws InvalidInput unless `to_world` is finite, affine and invertible.
   StoredSpace(const glm::dmat4& to_world, Storage storage, const Frame& frame = {});
 
-  /// The same array seen from another frame.
+  /// Returns the same space with another frame.
   StoredSpace in(const Frame& frame) const;
 
   glm::dvec3 world(const glm::dvec3& stored) const;
   glm::dvec3 frame(const glm::dvec3& stored) const { return frame_.from_world(world(stored)); }
   std::vector<glm::dvec3> frame(std::span<const glm::dvec3> stored) const;
 
-  /// The stored value nearest to a position in the frame: rounded to the stored type. Map it back before judging it.
+  /// Returns the stored value nearest to a position in the frame, rounded to the stored type. frame() of this value is
+  /// the position to judge.
   glm::dvec3 store(const glm::dvec3& in_frame) const;
 
-  /// Bound, in frame lengths, on the difference between frame() and exact arithmetic, over the given points.
+  /// Returns a bound, in frame lengths, on the difference between frame() and exact arithmetic over the given points.
   double mapping_error(std::span<const glm::dvec3> stored) const;
   /// The same over the given points and all that are stored for positions in the frame with coordinates up to `reach`.
   double mapping_error(std::span<const glm::dvec3> stored, double reach) const;
-  /// Bound, in frame lengths, on how far store() moves a point whose stored coordinates are no larger than these.
+  /// Returns a bound, in frame lengths, on the motion by store() of a point whose stored coordinates are no larger than
+  /// those of the given points.
   double storage_step(std::span<const glm::dvec3> stored) const;
 
-  /// Whether `to_world` turns the faces' front to their back.
+  /// Tells whether `to_world` turns the front of faces to the back.
   bool mirrors() const { return mirrors_; }
   const glm::dmat4& to_world() const { return to_world_; }
   Storage storage() const { return storage_; }
@@ -74,8 +77,8 @@ class StoredSpace {
   Frame frame_;
 };
 
-/// What 100 % means: the longest of the four diagonals of the local bounding box of the used vertices, after
-/// `to_world`. Throws InvalidInput when it is zero (all vertices at one point).
+/// Returns the length that 100 % stands for, in world units: the longest of the four diagonals of the local bounding
+/// box of the used vertices, after `to_world`. Throws InvalidInput if all these vertices are at one point.
 double longest_diagonal(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> triangles,
                         const glm::dmat4& to_world);
 

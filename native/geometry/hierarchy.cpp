@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tree after C. Lauterbach et al., Fast BVH Construction on GPUs, 2009 (sort by Morton code, split where the highest
-// bit changes), collapsed to eight children a node whose boxes are tested together, after I. Wald, C. Benthin, S.
-// Boulos, Getting Rid of Packets, 2008. A triangle is a child like any other: there are no leaf lists.
+// The tree follows C. Lauterbach et al., Fast BVH Construction on GPUs, 2009 (sort by Morton code, split where the
+// highest bit changes). It is collapsed to nodes of eight children whose boxes are tested together, after I. Wald, C.
+// Benthin, S. Boulos, Getting Rid of Packets, 2008. A triangle is a child like any other: there are no leaf lists.
 //
-// Coordinates. "Scaled" is the mesh times a power of two: exact. "Local" is scaled minus the centre, each coordinate
-// rounded once, so that the boxes can be float wherever the mesh lies; |x| <= 1 on the mesh. Boxes only decide what is
-// looked at; the distances themselves come from the scaled corners in double.
+// Scaled coordinates are those of the mesh times a power of two, which is exact. Local coordinates are scaled
+// coordinates minus the centre, each rounded once, so that the boxes can be float wherever the mesh lies; |x| <= 1 on
+// the mesh. Boxes only decide which triangles are looked at. The distances come from the scaled corners in double.
 //
-// A needle across the axes fills little of its box, and a search among many of them would look at most: where boxes
-// turned along the triangles are smaller by half, a node has these instead (geometry/oriented_boxes).
+// A needle across the axes fills little of its box, and a search among many needles would look at most of them. A node
+// has boxes turned along the triangles instead if these are smaller by half (geometry/oriented_boxes).
 //
-// Margins. A box may be skipped only when none of its triangles can be within the bound, equality included (ties go to
-// the lower index). A local coordinate x has a relative error of at most 2^-53. Rounded to float and moved away
-// by 2.4e-7 |x| + 1e-37 (both the faces of the box and the two ends that stand for the point: 2^-24 for the rounding,
-// one more for the movement, below 4 * 2^-24 = 2.38e-7), the difference of the two is at most the true one, before its
-// own rounding of 2^-24. The square of the box distance thus exceeds the true one by less than 6 roundings of
-// 2^-24, 3.6e-7, and the bound is raised by 1e-6 before it becomes a float (one rounding more, and the difference
-// between a computed distance and the true one, 1e-15). 1e-37 covers underflow, also where the processor flushes
-// subnormal numbers to zero. Points beyond kFloatReach half sizes are compared in double: there the spread of 2^-24
-// would exceed details of the mesh. The relative error of a squared box distance is then below 16 * 2^-53, against
-// 1e-13. Points beyond kReach are moved towards the centre to that distance R for the search. Of two points of the mesh
-// (half size 1) the nearer one as seen from there is nearer to the point itself too, up to 2 / R, which is below one
-// rounding of the distance, R or more.
+// The margins are as follows. A box may be skipped only if none of its triangles can be within the bound, equality
+// included, because ties go to the lower index. A local coordinate x has a relative error of at most 2^-53. The faces
+// of the box and the two ends that stand for the point are rounded to float and moved away by 2.4e-7 |x| + 1e-37: 2^-24
+// is for the rounding and one more for the movement, below 4 * 2^-24 = 2.38e-7. So the difference of the two is at most
+// the true one before its own rounding of 2^-24. The square of the box distance exceeds the true one by less than 6
+// roundings of 2^-24, 3.6e-7, and the bound is raised by 1e-6 before it becomes a float, which also covers that
+// rounding and the difference of 1e-15 between a computed and a true distance. 1e-37 covers underflow, also if the
+// processor flushes subnormal numbers to zero. Points beyond kFloatReach half sizes are compared in double, because
+// there the spread of 2^-24 would exceed details of the mesh. The relative error of a squared box distance is then
+// below 16 * 2^-53, against 1e-13. Points beyond kReach are moved towards the centre to that distance R for the search.
+// If of two points of the mesh (half size 1) one is nearer as seen from there, it is nearer to the point itself too, up
+// to 2 / R, which is below one rounding of the distance, R or more.
 #include "geometry/hierarchy.h"
 
 #include <algorithm>
@@ -36,7 +36,7 @@ struct Key {
   std::uint32_t triangle;
 };
 
-/// Least significant digit first: stable, so equal codes stay in the order of their index.
+/// Sorts by the least significant digit first, which is stable, so that equal codes stay in the order of their index.
 void radix_sort(std::vector<Key>& keys) {
   constexpr int kBits = 11;
   std::vector<Key> other(keys.size());
@@ -52,7 +52,7 @@ void radix_sort(std::vector<Key>& keys) {
   }
 }
 
-/// The lowest 21 bits of x, two zeros between them.
+/// Returns the lowest 21 bits of x with two zeros between them.
 std::uint64_t spread_bits(std::uint64_t x) {
   x &= 0x1FFFFF;
   x = (x | x << 32) & 0x1F00000000FFFF;
@@ -100,16 +100,16 @@ struct Hierarchy::Build {
     std::uint32_t begin, end;
   };
 
-  std::vector<double> taken{};  // twice the area of the triangles sorted before a place: a rectangle around each
+  std::vector<double> taken{};  // holds twice the area of the triangles sorted before a place
 
   /// Leaves the first of each set of triangles with exactly the same corners in the same order, and chains the others
-  /// to it: a thousand copies would otherwise be a thousand ties to look at in every search.
+  /// to it, because a thousand copies would be a thousand ties to look at in every search.
   void join_twins(const TriangleMesh& mesh) {
     const auto corner = [&](const Key& key, int k) -> const glm::dvec3& {
       return mesh.vertices[mesh.triangles[key.triangle][k]];
     };
     std::size_t compared = 0;
-    const auto order = [&](const Key& x, const Key& y) {  // -1, 0, 1
+    const auto order = [&](const Key& x, const Key& y) {  // returns -1, 0 or 1
       poll_at(++compared);
       for (int i = 0; i < 9; ++i) {
         const double u = corner(x, i / 3)[i % 3], v = corner(y, i / 3)[i % 3];
@@ -152,7 +152,7 @@ struct Hierarchy::Build {
     return box;
   }
 
-  /// Where the highest bit that differs within the range changes; the middle when all codes are equal.
+  /// Returns where the highest bit that differs within the range changes, or the middle if all codes are equal.
   std::uint32_t split(Range range) const {
     const std::uint64_t first = keys[range.begin].code, last = keys[range.end - 1].code;
     if (first == last) return range.begin + (range.end - range.begin) / 2;
@@ -172,8 +172,8 @@ struct Hierarchy::Build {
     }
   }
 
-  /// Gives the node, whose box is `whole`, oriented boxes where its boxes along the axes overlap or are empty for the
-  /// most part, and where oriented boxes are smaller by half.
+  /// Gives the node, whose box is `whole`, oriented boxes if its boxes along the axes overlap or are mostly empty, and
+  /// if oriented boxes are smaller by half.
   void orient(std::uint32_t index, const FloatBox& whole, Range range, std::span<const Range> parts) {
     constexpr double kLarge = 4, kSmaller = 0.5;
     const auto half_area = [](double x, double y, double z) { return x * y + y * z + z * x; };
@@ -198,7 +198,8 @@ struct Hierarchy::Build {
     tree.oriented_.push_back(boxes);
   }
 
-  /// Makes the node of a range and those below it; returns its box. At most 95 deep, see walk_in.
+  /// Makes the node of a range and the nodes below it, and returns its box. walk_in explains why this is at most 95
+  /// deep.
   FloatBox make(Range range) {
     std::array<Range, kWidth> parts{range};
     int count = 1;
@@ -218,7 +219,7 @@ struct Hierarchy::Build {
     FloatBox whole;
     for (int i = 0; i < kWidth; ++i) {
       FloatBox box;
-      std::uint32_t child = kTriangle;  // never followed when empty: its box lies infinitely far
+      std::uint32_t child = kTriangle;  // an empty child is never followed, because its box is infinitely far
       if (i < count) {
         const bool is_triangle = parts[i].end - parts[i].begin == 1;
         child = is_triangle ? kTriangle | parts[i].begin : std::uint32_t(tree.nodes_.size());
@@ -242,7 +243,7 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh) {
   if (box.empty()) return;
   const glm::dvec3 half = 0.5 * box.upper - 0.5 * box.lower;
   const double size = std::max({half.x, half.y, half.z});
-  // A point in space (size 0) is as large as its coordinates, so that these do not overflow.
+  // A mesh that is one point counts as large as its coordinates, so that these do not overflow.
   const glm::dvec3 far = glm::max(glm::abs(box.lower), glm::abs(box.upper));
   const double unit = size > 0 ? size : std::max({far.x, far.y, far.z});
   scale_ = unit > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(unit) + 1, -1000, 1000)) : 1;
@@ -287,12 +288,12 @@ glm::dvec3 Hierarchy::local(const glm::dvec3& p, bool& beyond_reach) const {
   if (farthest <= kReach) return at;
   beyond_reach = true;
   const glm::dvec3 towards =
-      0.5 * p - 0.5 * (centre_ / scale_);  // halves: p or the difference may be near the largest double
+      0.5 * p - 0.5 * (centre_ / scale_);  // halved, because p or the difference may be near the largest double
   return towards * (kReach / std::max({std::abs(towards.x), std::abs(towards.y), std::abs(towards.z)}));
 }
 
 Hierarchy::Nearest Hierarchy::seen_from(const glm::dvec3& p, std::uint32_t triangle) const {
-  // From far away the mesh is small, and it is p that must not overflow.
+  // From far away the mesh is small, and only p might overflow.
   const double far = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z), std::numeric_limits<double>::min()});
   const double scale = std::min(scale_, std::ldexp(1.0, -std::clamp(std::ilogb(far), -1000, 1000)));
   const double ratio = scale / scale_;
@@ -329,7 +330,7 @@ Hierarchy::Common Hierarchy::common_of(std::span<const glm::dvec3> points, doubl
     if (squared == best_squared && best != kNone && triangle_[place] > triangle_[best]) return;
     best = place;
     best_squared = squared;
-    bound = squared <= enough_squared ? -1 : std::min(bound, squared);  // -1: nothing is worth looking at any more
+    bound = squared <= enough_squared ? -1 : std::min(bound, squared);  // -1 ends the search
   };
   if (hint < place_.size()) attempt(place_[hint]);
   if (bound >= 0) walk<Count>(at, bound, attempt);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Bounding volume hierarchy over a triangle mesh, for exact nearest points.
+/// A bounding volume hierarchy over a triangle mesh, for exact nearest points.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,8 @@
 
 namespace tolvol {
 
-/// Immutable once built: any number of threads may ask at the same time. Deterministic, whatever the machine.
+/// A hierarchy is immutable once it is built, so that any number of threads may search it at the same time. Its results
+/// are the same on every machine.
 class Hierarchy {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
@@ -27,9 +28,9 @@ class Hierarchy {
   struct Nearest {
     std::uint32_t triangle = kNone;  ///< kNone: nothing within the radius
     glm::dvec3 point{0};
-    glm::dvec3 weights{0};  ///< barycentric in `triangle`
+    glm::dvec3 weights{0};  ///< are barycentric in `triangle`
     double distance = std::numeric_limits<double>::infinity();
-    std::uint32_t nodes = 0;  ///< of the tree that were visited: what the search cost, the same on every machine
+    std::uint32_t nodes = 0;  ///< counts the nodes that were visited, the same on every machine
   };
 
   struct Common {
@@ -37,15 +38,15 @@ class Hierarchy {
     double distance = std::numeric_limits<double>::infinity();
   };
 
-  /// Copies what it needs of a valid mesh (geometry/triangle_mesh.h), about 150 bytes a triangle, 330 where nearly all
-  /// are needles. O(m), 30 ms for 270,000 triangles; O(m log m) for needles. Degenerate triangles are kept as the
-  /// segments or points they are.
+  /// Copies the triangles of a valid mesh (geometry/triangle_mesh.h), with about 150 bytes for each, or 330 if nearly
+  /// all are needles. O(m), 30 ms for 270,000 triangles; O(m log m) for needles. Degenerate triangles are kept as the
+  /// segments or points that they are.
   explicit Hierarchy(const TriangleMesh& mesh);
 
-  /// The nearest point of the mesh within `radius` (inclusive). Ties go to the lower triangle index, so that the answer
-  /// does not depend on the shape of the tree. `hint`: a triangle tried first, to shrink the search; kNone for none.
-  /// About 1 us for a point near the surface of a scan, about half of that with a good hint. The coordinates of p are
-  /// finite.
+  /// Returns the nearest point of the mesh within `radius` (inclusive). Ties go to the lower triangle index, so that
+  /// the result does not depend on the shape of the tree. `hint` is a triangle that is tried first, to shorten the
+  /// search, or kNone. A search takes about 1 us for a point near the surface of a scan, and half of that with a good
+  /// hint. The coordinates of p must be finite.
   Nearest nearest(const glm::dvec3& p, double radius = std::numeric_limits<double>::infinity(),
                   std::uint32_t hint = kNone) const {
     return nearest_if(
@@ -57,16 +58,17 @@ class Hierarchy {
   Nearest nearest_if(const glm::dvec3& p, Accept&& accept, double radius = std::numeric_limits<double>::infinity(),
                      std::uint32_t hint = kNone) const;
 
-  /// The one triangle whose distance from the farthest of `points` (1 to 4 of them) is least, when that is within
-  /// `radius`; ties go to the lower index. By convexity that distance holds for the whole convex hull of the points.
-  /// The search ends early at any triangle that is within `enough` of all points. Where a point is farther from the
-  /// mesh than 2^27 times its size, a triangle that is worse by 2^-26 of the distance may be taken; `distance` is true
-  /// of the triangle that is returned.
+  /// Returns the triangle whose distance from the farthest of `points` (1 to 4 of them) is least, if this distance is
+  /// within `radius`. Ties go to the lower index. By convexity the distance holds for the whole convex hull of the
+  /// points. The search ends early at any triangle that is within `enough` of all points. If a point is farther from
+  /// the mesh than 2^27 times its size, the triangle may be worse than the best by 2^-26 of the distance; `distance` is
+  /// true for the triangle that is returned.
   Common common(std::span<const glm::dvec3> points, double radius = std::numeric_limits<double>::infinity(),
                 double enough = -1, std::uint32_t hint = kNone) const;
 
-  /// visit(index) for every triangle within `radius` (inclusive) of p, and for some that are not: those whose box is.
-  /// A visit that returns false is the last one; it may also return nothing. Returns how many nodes were visited.
+  /// Calls visit(index) for every triangle whose box is within `radius` (inclusive) of p, and so for every triangle
+  /// that is. A visit that returns false is the last one; it may also return nothing. Returns the number of visited
+  /// nodes.
   template <class Visit>
   std::size_t for_each_within(const glm::dvec3& p, double radius, Visit&& visit) const;
 
@@ -74,30 +76,30 @@ class Hierarchy {
 
  private:
   static constexpr int kWidth = OrientedBoxes::kWidth;
-  static constexpr std::uint32_t kTriangle = 0x80000000u;        // child: a place in the sorted order and no node
-  static constexpr double kFloatReach = 64, kReach = 134217728;  // in half sizes, see hierarchy.cpp
+  static constexpr std::uint32_t kTriangle = 0x80000000u;        // marks a place in the sorted order
+  static constexpr double kFloatReach = 64, kReach = 134217728;  // are in half sizes (hierarchy.cpp)
 
   struct alignas(32) Node {
-    float lower[3][kWidth], upper[3][kWidth];  // local, rounded outwards; an empty child lies infinitely far
+    float lower[3][kWidth], upper[3][kWidth];  // are local and rounded outwards; an empty child lies infinitely far
     std::uint32_t child[kWidth];
   };
   using Corners = OrientedBoxes::Corners;
 
   struct Build;
   glm::dvec3 scaled(const glm::dvec3& p) const { return p * scale_; }
-  /// The local point at which the search for the nearest triangle to p (in the mesh's units) is made.
+  /// Returns the local point from which the triangle nearest to p (in the mesh's units) is searched.
   glm::dvec3 local(const glm::dvec3& p, bool& beyond_reach) const;
   static Nearest unscaled(std::uint32_t triangle, const ClosestPoint& q, double scale) {
     return {triangle, q.point * (1 / scale), q.weights, std::sqrt(q.distance_squared) * (1 / scale)};
   }
-  /// The point of a triangle nearest to p, however far away p is.
+  /// Returns the point of a triangle nearest to p, however far away p is.
   Nearest seen_from(const glm::dvec3& p, std::uint32_t triangle) const;
-  /// The next triangle with exactly the same corners; kNone after the last one.
+  /// Returns the next triangle with exactly the same corners, or kNone after the last one.
   std::uint32_t twin(std::uint32_t triangle) const { return twin_.empty() ? kNone : twin_[triangle]; }
 
-  /// Shows `attempt(place)` the triangles whose box is within the bound, which attempt lowers as it finds better ones:
-  /// `bound` is the square of a scaled distance. Points are local.
-  /// Returns how many nodes it visited.
+  /// Calls attempt(place) for the triangles whose box is within the bound, which `attempt` lowers when it finds a
+  /// better triangle. `bound` is the square of a scaled distance, and points are local. Returns the number of visited
+  /// nodes.
   template <int Count, class Attempt>
   std::size_t walk(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const;
   template <class Real, int Count, class Attempt>
@@ -105,22 +107,22 @@ class Hierarchy {
   const OrientedBoxes* oriented_boxes(std::uint32_t node) const {
     return turned_.empty() || turned_[node] == kNone ? nullptr : &oriented_[turned_[node]];
   }
-  /// Squared distances of the eight boxes of a node from the box `from`, `to`. Apart from walk_in, so that they stay
-  /// vectorised.
+  /// Computes the squared distances of the eight boxes of a node from the box `from`, `to`. This is a function of its
+  /// own because the compiler does not vectorise it within walk_in.
   template <class Real>
   static void box_distances(const Node& node, const Real (&from)[3], const Real (&to)[3], Real (&squared)[kWidth]);
   template <int Count>
   Common common_of(std::span<const glm::dvec3> points, double radius, double enough, std::uint32_t hint) const;
 
   std::vector<Node> nodes_;              // nodes_[0] is the root
-  std::vector<std::uint32_t> turned_;    // node -> its oriented boxes, kNone: it has none; empty when none has any
-  std::vector<OrientedBoxes> oriented_;  // instead of the boxes of the nodes that have them
-  std::vector<Corners> corners_;         // scaled, in the sorted order; of equal triangles only the first
-  std::vector<std::uint32_t> triangle_;  // place in the sorted order -> index in the mesh
-  std::vector<std::uint32_t> place_;     // index in the mesh -> place in the sorted order
-  std::vector<std::uint32_t> twin_;      // see twin(); empty when no two triangles are equal
-  glm::dvec3 centre_{0};                 // scaled
-  double scale_ = 1;                     // a power of two: half the size of the mesh becomes 1/2 to 1
+  std::vector<std::uint32_t> turned_;    // maps a node to its oriented boxes or kNone; it is empty if no node has any
+  std::vector<OrientedBoxes> oriented_;  // replace the boxes of some nodes
+  std::vector<Corners> corners_;         // are scaled, in the sorted order, with only the first of equal triangles
+  std::vector<std::uint32_t> triangle_;  // maps a place in the sorted order to an index in the mesh
+  std::vector<std::uint32_t> place_;     // maps an index in the mesh to a place in the sorted order
+  std::vector<std::uint32_t> twin_;      // is used by twin(), and empty if no two triangles are equal
+  glm::dvec3 centre_{0};                 // is scaled
+  double scale_ = 1;                     // is a power of two that makes half the size of the mesh 1/2 to 1
 };
 
 template <class Accept>
@@ -131,8 +133,8 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
   std::uint32_t best = kNone;
   ClosestPoint closest{glm::dvec3(0), glm::dvec3(0), std::numeric_limits<double>::infinity()};
   const double reach = beyond_reach ? closest.distance_squared : radius * scale_;
-  double bound = reach * reach * (1 + 1e-12);  // generous: the distance itself is compared at the end
-  constexpr unsigned kCrowd = 16;  // triangles; a search on a usual surface looks at fewer, and gains nothing by planes
+  double bound = reach * reach * (1 + 1e-12);  // is a little larger; the end compares the distance
+  constexpr unsigned kCrowd = 16;              // triangles; most searches look at fewer, and gain nothing by planes
   unsigned tried = 0;
   auto attempt = [&](std::uint32_t place) {
     const Corners& t = corners_[place];
@@ -141,7 +143,7 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
     if (candidate.distance_squared > closest.distance_squared) return;
     std::uint32_t triangle = triangle_[place];
     while (triangle != kNone && !accept(triangle)) triangle = twin(triangle);
-    // At a tie the lower index; kNone is above them all.
+    // A tie goes to the lower index; kNone is above all indices.
     if (triangle == kNone || (candidate.distance_squared == closest.distance_squared && triangle > best)) return;
     best = triangle;
     closest = candidate;
@@ -179,7 +181,7 @@ std::size_t Hierarchy::for_each_within(const glm::dvec3& p, double radius, Visit
       for (std::uint32_t triangle = triangle_[place]; more && triangle != kNone; triangle = twin(triangle)) {
         more = goes_on(triangle);
       }
-      if (!more) bound = -1;  // nothing is within it
+      if (!more) bound = -1;  // this ends the search
     });
   }
   return 0;
@@ -199,7 +201,7 @@ std::size_t Hierarchy::walk(const std::array<glm::dvec3, Count>& points, double&
 
 template <class Real, int Count, class Attempt>
 std::size_t Hierarchy::walk_in(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const {
-  // Margins: hierarchy.cpp.
+  // hierarchy.cpp derives the margins.
   constexpr bool kSingle = sizeof(Real) == sizeof(float);
   constexpr double kMargin = kSingle ? 1 + 1e-6 : 1 + 1e-13;
   constexpr Real kSpread = kSingle ? Real(2.4e-7) : Real(0), kTiny = kSingle ? Real(1e-37) : Real(0);
@@ -219,11 +221,11 @@ std::size_t Hierarchy::walk_in(const std::array<glm::dvec3, Count>& points, doub
     Real squared;
     std::uint32_t child;
   };
-  // A binary split ends after 63 bits of the code and 32 halvings; each of the at most 95 levels leaves 7 siblings.
+  // A binary split ends after 63 bits of the code and 32 halvings. Each of the at most 95 levels leaves 7 siblings.
   std::array<Entry, 7 * 96 + kWidth> stack;
   int height = 0;
   stack[height++] = {Real(0), 0};
-  constexpr unsigned kBetweenPolls = 1024;  // nodes; nearly all searches visit fewer
+  constexpr unsigned kBetweenPolls = 1024;  // is in nodes; nearly all searches visit fewer
   std::size_t visited = 0;
   while (height > 0) {
     if (++visited % kBetweenPolls == 0) poll();

@@ -2,10 +2,10 @@
 // The axes are chosen as by T. Larsson, L. Kallberg, Fast Computation of Tight-Fitting Oriented Bounding Boxes, 2011:
 // from the most distant points, here of one edge, and from the point that is farthest from their line.
 //
-// Margins. An axis is shortened by kShorter before its coordinates are rounded to float, so that the three together
-// lengthen no vector: what is measured along them is at most the true distance. The products are in double: for |x| <=
-// 2 their sums are off by less than 1e-15, for any p by less than 1e-15 of its largest coordinate; kSlack covers both.
-// The faces of the boxes are rounded outwards by more than the rounding to float.
+// The margins are as follows. An axis is shortened by kShorter before its coordinates are rounded to float, so that the
+// three axes together lengthen no vector: a length measured along them is at most the true length. The products are in
+// double. For |x| <= 2 their sums are off by less than 1e-15, and for any p by less than 1e-15 of its largest
+// coordinate. kSlack covers both. The faces of the boxes are rounded outwards by more than the rounding to float.
 #include "geometry/oriented_boxes.h"
 
 #include <algorithm>
@@ -17,10 +17,10 @@
 namespace tolvol {
 namespace {
 
-constexpr double kShorter = 3e-7;  // of an axis; rounding its coordinates lengthens it by at most 1.1e-7
+constexpr double kShorter = 3e-7;  // shortens an axis, which rounding its coordinates lengthens by at most 1.1e-7
 constexpr double kSlack = 4e-15;
-constexpr double kShortest = 1e-200;  // squared: the direction of a shorter edge is lost in subnormal numbers
-constexpr double kNarrowest = 1e-20;  // squared, of the longest edge: the direction across is rounding
+constexpr double kShortest = 1e-200;  // an edge of a smaller square has no direction, because of subnormal numbers
+constexpr double kNarrowest = 1e-20;  // below this squared ratio to the longest edge, the direction across is rounding
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 glm::dvec3 any_perpendicular(const glm::dvec3& d) {
@@ -39,7 +39,7 @@ OrientedBoxes::OrientedBoxes() {
 }
 
 double OrientedBoxes::fit(int i, std::span<const Corners> triangles, const glm::dvec3& centre) {
-  // n + 1: most calls have a few triangles and need no poll of their own.
+  // This polls at n + 1, because most calls have a few triangles and need no poll.
   glm::dvec3 along(1, 0, 0), start(triangles[0][0]);
   double longest = kShortest;
   for (std::size_t n = 0; n < triangles.size(); ++n) {

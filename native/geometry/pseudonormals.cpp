@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// As [Baerentzen and Aanaes 2005] define them for closed manifolds; what to do elsewhere is this file's own. Faces at
-// an edge are found among the half-edges of its lower end.
+// [Baerentzen and Aanaes 2005] define the normals for closed manifolds; the rules for other meshes are this file's own.
+// The faces at an edge are found among the half-edges of its lower end.
 #include "geometry/pseudonormals.h"
 
 #include <algorithm>
@@ -14,19 +14,19 @@
 namespace tolvol {
 namespace {
 
-// Of the largest coordinate: mapping into the frame moves a corner by up to 1e-15 of it, which turns the normal of a
-// face of this height by a thousandth.
+// A face lower than this share of the largest coordinate is flat. Mapping into the frame moves a corner by up to 1e-15
+// of that coordinate, which turns the normal of a face of this height by a thousandth.
 constexpr double kFlat = 1e-12;
 
 struct HalfEdge {
-  std::uint32_t other;  ///< the higher end
-  std::uint32_t place;  ///< 3 * triangle + corner it starts from
+  std::uint32_t other;  ///< is the higher end
+  std::uint32_t place;  ///< is 3 * triangle + the corner at which it starts
 
   std::uint32_t triangle() const { return place / 3; }
   std::uint32_t corner() const { return place % 3; }
 };
 
-/// Half-edges by their lower end: those of v are [first[v], first[v + 1]), sorted by the other.
+/// Holds half-edges by their lower end. Those of v are [first[v], first[v + 1]), sorted by the higher end.
 struct HalfEdges {
   std::vector<std::uint32_t> first;
   std::vector<HalfEdge> sorted;
@@ -60,7 +60,7 @@ HalfEdges half_edges(const std::vector<glm::uvec3>& corners, std::size_t vertice
   return result;
 }
 
-/// visit(span of the half-edges at one edge) for every edge whose ends differ.
+/// Calls visit() with the span of the half-edges at one edge, for every edge whose ends differ.
 template <class Visit>
 void for_edges(const HalfEdges& edges, Visit&& visit) {
   for (std::uint32_t v = 0; v + 1 < edges.first.size(); ++v) {
@@ -72,7 +72,7 @@ void for_edges(const HalfEdges& edges, Visit&& visit) {
   }
 }
 
-/// Of a triangle at its corner k.
+/// Returns the angle of a triangle at its corner k.
 double angle(const TriangleMesh& mesh, const glm::uvec3& t, int k) {
   const glm::dvec3 p = mesh.vertices[t[k]], a = mesh.vertices[t[(k + 1) % 3]] - p,
                    b = mesh.vertices[t[(k + 2) % 3]] - p;
@@ -119,7 +119,7 @@ Pseudonormals::Pseudonormals(const TriangleMesh& mesh)
   }
   if (std::find(flat.begin(), flat.end(), true) == flat.end()) return;
 
-  // Flat faces that share an edge form one group: a crease between the faces around it.
+  // Flat faces that share an edge form one group, a crease between the faces around it.
   UnionFind group(corners_.size());
   const auto flat_at = [&](std::span<const HalfEdge> edge) {
     return std::find_if(edge.begin(), edge.end(), [&](const HalfEdge& e) { return flat[e.triangle()]; });
@@ -129,7 +129,7 @@ Pseudonormals::Pseudonormals(const TriangleMesh& mesh)
       if (flat[e.triangle()]) group.join(flat_at(edge)->triangle(), e.triangle());
     }
   });
-  // Each face around it counts by the length of its edge: both sides weigh the same, however they are divided.
+  // Each face around a crease counts by the length of its edge, so that both sides weigh the same however they are cut.
   std::vector<glm::dvec3> crease(corners_.size(), glm::dvec3(0));
   for_edges(edges, [&](std::span<const HalfEdge> edge) {
     const auto found = flat_at(edge);
@@ -143,7 +143,8 @@ Pseudonormals::Pseudonormals(const TriangleMesh& mesh)
     const glm::dvec3 normal = crease[group.find(flat_at(edge)->triangle())];
     for (const HalfEdge& e : edge) edge_[e.triangle()][e.corner()] = normal;
   });
-  // A vertex in the middle of an edge of a flat face lies within the crease; at its ends nothing is missing.
+  // A vertex in the middle of an edge of a flat face lies within the crease. At the ends of the edge nothing is
+  // missing.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> within;
   for (std::uint32_t i = 0; i < corners_.size(); ++i) {
     if (!flat[i]) continue;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// A triangle mesh as plain arrays, and what must hold before anything is computed from one.
+/// A triangle mesh as plain arrays, and the conditions that must hold before anything is computed from one.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ struct TriangleMesh {
   std::vector<glm::uvec3> triangles;
 };
 
-/// An axis-aligned box; empty until something is added.
+/// An axis-aligned box. It is empty until a point is added.
 struct Box {
   glm::dvec3 lower{std::numeric_limits<double>::infinity()};
   glm::dvec3 upper{-std::numeric_limits<double>::infinity()};
@@ -31,14 +31,14 @@ struct Box {
 /// `vertices.size()` and every coordinate is finite (unused vertices too). O(n + m).
 void validate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles);
 
-/// For each vertex whether a triangle uses it. O(n + m).
+/// Tells for each vertex whether a triangle uses it. O(n + m).
 std::vector<bool> used_vertices(std::size_t vertex_count, std::span<const glm::uvec3> triangles);
 
-/// Six times the volume that a closed mesh encloses, negative where its faces run the other way round. O(m).
+/// Returns six times the volume that a closed mesh encloses, negative if its faces run the other way round. O(m).
 double enclosed_volume(const TriangleMesh& mesh);
 
-/// For each vertex the first vertex with exactly the same coordinates (itself when it is alone). Equal as numbers: -0
-/// is 0. O(n) expected.
+/// Returns for each vertex the first vertex with exactly the same coordinates, which may be itself. Coordinates are
+/// equal if they are equal numbers, so that -0 is 0. O(n) expected.
 std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vertices);
 
 }  // namespace tolvol

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Entry points come through libepoxy, which looks them up when they are first called: nothing here needs libEGL or
-// libGL to be present when the program starts. It ends the process when a library is missing, so that is asked before.
+// Entry points come through libepoxy, which looks them up when they are first called, so that neither libEGL nor libGL
+// need be present when the program starts. libepoxy ends the process if a library is missing; so this looks for it
+// first.
 #include "gl/context.h"
 
 #include <dlfcn.h>
@@ -34,7 +35,7 @@ bool can_load(const char* library) {
   return handle != nullptr;
 }
 
-/// The displays to try, hardware before software.
+/// Returns the displays to try, hardware before software.
 std::vector<EGLDisplay> displays() {
   const char* const client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
   std::vector<EGLDisplay> found;
@@ -58,7 +59,7 @@ std::vector<EGLDisplay> displays() {
 
 std::atomic<unsigned> generations{0};
 
-/// A current context for as long as it lives; made, used and destroyed on the GL thread.
+/// A context that is current for as long as it lives. It is made, used and destroyed on the GL thread.
 class Context {
  public:
   Context() {
@@ -83,7 +84,7 @@ class Context {
   bool lost() const { return lost_; }
   unsigned generation() const { return generation_; }
 
-  /// Runs work and turns what went wrong in GL meanwhile into an exception.
+  /// Runs the work, and throws an exception if GL reported an error meanwhile.
   void run(const std::function<void()>& work) {
     error_.clear();
     work();
@@ -138,15 +139,15 @@ class Context {
   const unsigned generation_ = ++generations;
   bool lost_ = false;
   Renderer renderer_;
-  std::string error_;  // the first since run() began
+  std::string error_;  // is the first error since run() began
 };
 
-/// The thread, its queue and, in it, the context.
+/// The thread with its queue and its context.
 class Worker {
  public:
   Worker() : thread_([this] { serve(); }) {}
 
-  /// False, and the work is dropped, once it was stopped.
+  /// Returns false and drops the work if the thread was stopped.
   bool submit(std::function<void()> work) {
     {
       const std::lock_guard lock(mutex_);
@@ -156,7 +157,7 @@ class Worker {
     wake_.notify_one();
     return true;
   }
-  /// After what is queued.
+  /// Stops the thread after the work in the queue.
   void stop() {
     {
       const std::lock_guard lock(mutex_);
@@ -167,7 +168,7 @@ class Worker {
   }
   bool is_of_this_process() const { return process_ == getpid(); }
 
-  /// On the thread alone; made on first use, so that a failure is thrown to whoever asked.
+  /// Must be called on the thread itself. Makes the context on first use, so that a failure is thrown to the caller.
   Context& context() {
     if (context_ && context_->lost()) context_.reset();
     if (!context_) context_ = std::make_unique<Context>();
@@ -184,10 +185,10 @@ class Worker {
   std::deque<std::function<void()>> queue_;
   bool stopping_ = false;
   std::unique_ptr<Context> context_;
-  std::thread thread_;  // last: it uses the others
+  std::thread thread_;  // comes last because it uses the other members
 };
 
-thread_local Worker* here = nullptr;  // on a GL thread its worker
+thread_local Worker* here = nullptr;  // is the worker of a GL thread
 
 void Worker::serve() {
   here = this;
@@ -210,7 +211,7 @@ struct Process {
   std::shared_ptr<Worker> worker;
 };
 
-// Never destroyed: a program that ends without shutdown() leaves the thread waiting, which harms nobody.
+// This is never destroyed. A program that ends without shutdown() leaves the thread waiting, which does no harm.
 Process& process() {
   static Process& instance = *new Process;
   return instance;

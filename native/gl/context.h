@@ -13,23 +13,24 @@ struct Renderer {
   std::string name() const { return renderer + ", GL " + version + " (" + vendor + ")"; }
 };
 
-/// Runs `work` on the GL thread and waits for it; what it throws is thrown here. Called on the GL thread it runs at
-/// once. Never call it while holding a lock that the work needs, nor Python's GIL.
-/// Throws GlUnavailable, and then nothing that `work` computed may be used, when there is no EGL, libGL or GL 4.5, when
-/// a call in it was a GL error, or when the context was lost.
+/// Runs `work` on the GL thread and waits for it. An exception of `work` is thrown here. On the GL thread it runs at
+/// once. Never call this while holding a lock that the work needs, nor while holding Python's GIL. Throws GlUnavailable
+/// if there is no EGL, libGL or GL 4.5, if a call in `work` was a GL error, or if the context was lost. Nothing that
+/// `work` computed may be used then.
 void run(const std::function<void()>& work);
 
-/// Hands `work` to the GL thread and returns at once; for destructors. Dropped when there is no context any more.
+/// Hands `work` to the GL thread and returns at once, for destructors. The work is dropped if there is no context any
+/// more.
 void post(std::function<void()> work) noexcept;
 
-/// What draws. Throws GlUnavailable like run().
+/// The renderer. Throws GlUnavailable like run().
 Renderer renderer();
 
-/// Ends the thread and its context; objects made in it become unusable and say so. A later run() starts anew.
+/// Ends the thread and its context. Using an object that was made in it then throws. A later run() starts anew.
 void shutdown() noexcept;
 
-/// Which context is current, counted from 1; on the GL thread alone. Objects remember it: names of a context that is
-/// gone may be those of other objects in the next.
+/// Returns the number of the current context, counted from 1. Must be called on the GL thread. Objects remember it,
+/// because names of a context that is gone may belong to other objects in the next context.
 unsigned generation();
 
 }  // namespace tolvol::gl

@@ -30,7 +30,7 @@ Buffer::Buffer(std::size_t bytes, const void* data) : bytes_(bytes) {
   GLuint name = 0;
   glCreateBuffers(1, &name);
   object_ = Object(name, [](GLuint n) { glDeleteBuffers(1, &n); });
-  // GL refuses an empty buffer; one byte that is never used does no harm.
+  // GL refuses an empty buffer. One byte that is never used does no harm.
   glNamedBufferStorage(name, static_cast<GLsizeiptr>(std::max<std::size_t>(bytes, 1)), bytes ? data : nullptr,
                        GL_DYNAMIC_STORAGE_BIT);
 }

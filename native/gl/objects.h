@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// GL objects that delete themselves. Made and used on the GL thread (inside run()); destroyed on any. Using one whose
-/// context is gone throws GlUnavailable.
+/// GL objects that delete themselves. They are made and used on the GL thread (inside run()), and destroyed on any
+/// thread. Using an object whose context is gone throws GlUnavailable.
 #pragma once
 
 #include <epoxy/gl.h>
@@ -18,7 +18,7 @@
 
 namespace tolvol::gl {
 
-/// The name of one GL object; movable.
+/// The name of one GL object. It can be moved.
 class Object {
  public:
   using Delete = void (*)(GLuint);
@@ -32,7 +32,7 @@ class Object {
   }
   ~Object();
 
-  /// Throws GlUnavailable when it is empty or its context is gone.
+  /// Throws GlUnavailable if it is empty or its context is gone.
   GLuint name() const;
 
  private:
@@ -71,8 +71,8 @@ class Buffer {
 class Texture {
  public:
   Texture() = default;
-  /// `target` GL_TEXTURE_1D, _2D or _3D; size components beyond its dimension are 1. `row` pixels lie from one row of
-  /// `data` to the next (0: size.x); data may be null.
+  /// `target` is GL_TEXTURE_1D, _2D or _3D. Components of the size beyond its dimension are 1. `row` is the number of
+  /// pixels from one row of `data` to the next, 0 for size.x. `data` may be null.
   Texture(GLenum target, GLenum internal_format, const glm::ivec3& size, GLenum format, GLenum type, const void* data,
           int row = 0);
 
@@ -86,12 +86,12 @@ class Texture {
   Object object_;
 };
 
-/// Vertex and fragment, or compute, from the sources in shaders/.
+/// A program of a vertex and a fragment shader, or of a compute shader, from the sources in shaders/.
 class Program {
  public:
   struct Stage {
     GLenum type;
-    std::initializer_list<std::string_view> files;  ///< joined in this order
+    std::initializer_list<std::string_view> files;  ///< are joined in this order
   };
 
   Program() = default;
@@ -114,11 +114,12 @@ class Program {
   Object object_;
 };
 
-/// Counts samples, or only whether there are any.
+/// Counts samples, or tells only whether there are any.
 class Query {
  public:
   Query() = default;
-  /// GL_SAMPLES_PASSED or GL_ANY_SAMPLES_PASSED, for good: a name takes the target of its first use.
+  /// The target is GL_SAMPLES_PASSED or GL_ANY_SAMPLES_PASSED. It never changes, because GL keeps that of the first
+  /// use.
   explicit Query(GLenum target);
 
   void begin() const;
@@ -131,7 +132,7 @@ class Query {
   GLenum target_ = 0;
 };
 
-/// A framebuffer without attachments, which counts what would be drawn, or with colour (RGBA8) and depth.
+/// A framebuffer with colour (RGBA8) and depth, or one without attachments, for queries that count samples.
 class Framebuffer {
  public:
   Framebuffer() = default;
@@ -139,9 +140,9 @@ class Framebuffer {
   static Framebuffer with_colour(int width, int height);
 
   void bind() const;
-  /// RGBA, bottom row first. Waits for the GPU.
+  /// Reads RGBA pixels, bottom row first. Waits for the GPU.
   std::vector<std::uint8_t> read_pixels() const;
-  /// The largest side of one without attachments: the smaller of framebuffer and viewport limits.
+  /// The largest side of a framebuffer without attachments, which is the smaller of framebuffer and viewport limits.
   static int largest();
 
  private:
@@ -160,10 +161,11 @@ class VertexArray {
   Object object_;
 };
 
-/// The one T of the current context, made on first use, on the GL thread: for programs, which take long to compile.
+/// Returns the one T of the current context, which is made on first use. Must be called on the GL thread. It is for
+/// programs, which take long to compile.
 template <class T>
 T& of_context() {
-  // Never destroyed at the end of the process, when the driver may be gone before.
+  // This is never destroyed, because at the end of the process the driver may be gone first.
   static T* kept = nullptr;
   static unsigned made_in = 0;
   if (!kept || made_in != generation()) {

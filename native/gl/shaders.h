@@ -6,7 +6,8 @@
 
 namespace tolvol::gl {
 
-/// By file name, as in "samples.vert"; without a #version line. Throws std::logic_error for a name that is not there.
+/// Returns a file by its name, as in "samples.vert", without a #version line. Throws std::logic_error for an unknown
+/// name.
 std::string_view shader_source(std::string_view file);
 
 }  // namespace tolvol::gl

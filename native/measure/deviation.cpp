@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Stratified sampling: pieces that are refined where the bounds on the mean over a piece are far apart, and in each one
-// point that is as good as random. The middle of each piece would do where the pieces are short beside the distances;
-// where they are not it misses most of the folds of the distance, and the mean came out 0.5 % of the largest too low
-// between a scan and its decimation within 0.1 %. Which pieces are refined must not depend on their points, or else
-// these are no longer random: the bounds are from the middle. Every statistic is one of a distribution by area: of the
-// distances at the points for the estimate, of the lower and of the upper bounds of the pieces for the ends of its
-// range.
+// This is stratified sampling: pieces are refined if the bounds on the mean over a piece are far apart, and each piece
+// has one point that is as good as random. The middle of each piece would be good enough if the pieces are short beside
+// the distances. If not, it misses most of the folds of the distance, and the mean came out 0.5 % of the largest
+// distance too low between a scan and its decimation within 0.1 %. The choice of the pieces to refine must not depend
+// on their points, which would no longer be random; so the bounds are from the middle. Every statistic is one of a
+// distribution by area. The distances at the points give the estimate, and the lower and the upper bounds of the pieces
+// give the ends of its range.
 //
-// Rounding. The bounds of a piece hold it already, and leave more room between them than the sums of weighted bounds
-// err by. Weights are added in another order for each distribution, so that equal shares may differ in the last bits:
-// where the ends of a range depend on shares alone, kShareRounding is between them.
+// The bounds of a piece include their own rounding, and leave more room between them than the error of the sums of
+// weighted bounds. Weights are added in another order for each distribution, so that equal shares may differ in the
+// last bits. If the ends of a range depend on shares alone, kShareRounding is between them.
 #include "measure/deviation.h"
 
 #include <algorithm>
@@ -32,15 +32,16 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kPieces = 65536;        // at first; a spacing of about 0.4 % of the size of a scan
-constexpr std::size_t kBudget = 524288;  // pieces when it ends, or kBudgetPerTriangle for each triangle
+constexpr double kPieces = 65536;        // is the first number of pieces, about 0.4 % of the size of a scan apart
+constexpr std::size_t kBudget = 524288;  // is the most pieces, or kBudgetPerTriangle for each triangle if that is more
 constexpr std::size_t kBudgetPerTriangle = 4;
-constexpr double kEnough = 0.001;               // of the largest distance: the width of the range of the mean
-constexpr double kNoise = 256 * kUnitRoundoff;  // a range of the mean that is no wider is rounding
+constexpr double kEnough = 0.001;               // is the width of the range of the mean over the largest distance
+constexpr double kNoise = 256 * kUnitRoundoff;  // in frame lengths; a range of the mean no wider than this is rounding
 constexpr double kShareRounding = 32 * kUnitRoundoff;
-constexpr std::size_t kChunk = 4096, kBlock = 64;  // pieces between two looks at the progress; for one thread at once
+constexpr std::size_t kChunk = 4096;  // pieces are handled between two looks at the progress
+constexpr std::size_t kBlock = 64;    // pieces are handed to a thread at once
 
-/// What a piece weighs in the averages, by the number of corners of the pieces.
+/// Returns the weight of a piece in the averages. It depends on the number of corners of the pieces.
 enum Measure { number = 1, length = 2, area = 3 };
 
 double measure_of(const Simplex& s) {
@@ -49,7 +50,7 @@ double measure_of(const Simplex& s) {
   return s.corners == length ? glm::distance(p[0], p[1]) : 1;
 }
 
-/// The triangle itself, its longest edge or its first corner.
+/// Returns the triangle itself, its longest edge or its first corner.
 Simplex simplex_of(const std::array<dvec3, 3>& p, Measure measure) {
   Simplex s{p, measure};
   if (measure != length) return s;
@@ -60,7 +61,7 @@ Simplex simplex_of(const std::array<dvec3, 3>& p, Measure measure) {
   return s;
 }
 
-/// visit(piece) for k parts along a segment or k x k equal triangles.
+/// Calls visit(piece) for k parts of a segment or k x k equal parts of a triangle.
 template <class Visit>
 void cut(const Simplex& s, int k, Visit&& visit) {
   const auto& p = s.corner;
@@ -80,7 +81,8 @@ void cut(const Simplex& s, int k, Visit&& visit) {
   }
 }
 
-/// 0 <= u < 1, as good as random (the finaliser of SplitMix64 on the n-th odd multiple of the golden ratio).
+/// Returns 0 <= u < 1 that is as good as random: the finaliser of SplitMix64 on the n-th odd multiple of the golden
+/// ratio.
 double uniform(std::uint64_t n) {
   n = (n + 1) * 0x9E3779B97F4A7C15u;
   n = (n ^ (n >> 30)) * 0xBF58476D1CE4E5B9u;
@@ -88,7 +90,7 @@ double uniform(std::uint64_t n) {
   return double((n ^ (n >> 31)) >> 11) * 0x1p-53;
 }
 
-/// The n-th point, evenly spread over the piece.
+/// Returns the n-th point, evenly spread over the piece.
 dvec3 point_in(const Simplex& s, std::uint64_t n) {
   if (s.corners == number) return s.corner[0];
   const double u = uniform(2 * n), v = uniform(2 * n + 1);
@@ -101,14 +103,14 @@ struct Piece {
   Simplex simplex;
   double weight = 0;
   DistanceBounds bounds;
-  double distance = 0;  // of its point
-  bool inside = false;  // its point, where b is closed
+  double distance = 0;  // is that of its point
+  bool inside = false;  // tells whether its point is inside, if b is closed
 
   double signed_distance() const { return inside ? -distance : distance; }
   double gap() const { return weight * (bounds.mean.upper - bounds.mean.lower); }
 };
 
-/// Sum without the error that grows with the number of terms (Neumaier).
+/// A sum without the error that grows with the number of terms (Neumaier).
 class Sum {
  public:
   void add(double x) {
@@ -122,7 +124,7 @@ class Sum {
   double sum_ = 0, lost_ = 0;
 };
 
-/// How one number is spread over the weight of all pieces.
+/// The distribution of one number over the weight of all pieces.
 class Distribution {
  public:
   template <class Number>
@@ -158,12 +160,12 @@ class Distribution {
 
  private:
   struct Step {
-    double value, weight;  ///< the weight of this and all before it
+    double value, weight;  ///< weight is that of this value and all before it
   };
   std::vector<Step> steps_;
 };
 
-/// Inside or outside of a closed mesh; nothing is inside of another.
+/// Tells inside from outside of a closed mesh. Nothing is inside of an open mesh.
 class SideOf {
  public:
   explicit SideOf(const TriangleMesh& b) : normals_(b) {
@@ -229,8 +231,8 @@ class Cover {
   }
 
  private:
-  /// Bounds and points of these pieces, the first of which is the `first` of all; returns of how many. Where all steps
-  /// are made it ends, or bounds the rest loosely where it must take `all`.
+  /// Computes the bounds and points of these pieces, the first of which has the number `first`. Returns how many pieces
+  /// it did. If all steps are used up it stops, or bounds the other pieces loosely if it must do `all`.
   std::size_t evaluate(std::span<Piece> pieces, std::size_t first, bool all) {
     std::size_t done = 0;
     while (done < pieces.size() && (all || steps_ < most_steps_)) {
@@ -266,7 +268,7 @@ class Cover {
     return done;
   }
 
-  /// Cuts the worst pieces; false when there is nothing more to gain or to spend.
+  /// Cuts the worst pieces. Returns false if there is nothing more to gain or to spend.
   bool refine() {
     poll();
     Sum gap;
@@ -280,7 +282,7 @@ class Cover {
     const double enough = std::max(kEnough * largest, kNoise) * total_.value();
     const std::size_t room = (budget_ - pieces_.size()) / 2;  // a piece leaves two or three
     if (gap.value() <= enough || room == 0 || steps_ >= most_steps_) return false;
-    // Those above the average that is wanted, the worst first where there is no room for all.
+    // The pieces above the wanted average are cut, the worst of them first if there is no room for all.
     std::vector<std::size_t> worst;
     for (std::size_t i = 0; i < pieces_.size(); ++i) {
       poll_at(i);
@@ -297,7 +299,7 @@ class Cover {
     }
     poll();
     std::vector<Piece> parts;
-    std::vector<std::size_t> cut, end;  // those that have parts, and where these end
+    std::vector<std::size_t> cut, end;  // holds the pieces that have parts, and the ends of their parts
     for (const std::size_t i : worst) {
       poll_at(parts.size());
       halve(pieces_[i], [&](const Simplex& part) { parts.push_back({part, measure_of(part), {}, 0, false}); });
@@ -344,20 +346,20 @@ Estimate estimate(double value, double lower, double upper) {
   return {std::clamp(value, lower, upper), {lower, upper}};
 }
 
-/// All of the area and none of it are not sums, and stay as they are.
+/// Widens a share by rounding. The shares 0 and 1 are not sums, and stay as they are.
 Estimate estimated_share(double value, double lower, double upper) {
   if (lower < 1) lower = std::max(0.0, lower - kShareRounding);
   if (upper > 0) upper = std::min(1.0, upper + kShareRounding);
   return estimate(value, lower, upper);
 }
 
-/// In the frame.
+/// Returns the sides in the frame.
 Sides sides_of(const std::vector<Piece>& pieces) {
   Sum weight, mean, mean_lower, mean_upper, inside, inside_lower, inside_upper;
   Sides sides;
   for (const Piece& piece : pieces) {
     const Range &value = piece.bounds.value, &average = piece.bounds.mean;
-    // A piece that is nowhere at 0 is on one side.
+    // A piece whose distance is nowhere 0 is on one side.
     const bool crosses = !(value.lower > 0);
     weight.add(piece.weight);
     mean.add(piece.weight * piece.signed_distance());
@@ -396,7 +398,7 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
   }
   const Call call(options.progress);
   if (options.progress) options.progress->begin("averaging");
-  const PlacedPair pair(a, b, PlacedPair::Target::whole);  // cut, a closed b would be open
+  const PlacedPair pair(a, b, PlacedPair::Target::whole);  // a closed b that is cut would be open
   const double scale = pair.frame.scale();
   Cover cover(pair.a, pair.b, options);
   cover.measure();
@@ -408,7 +410,7 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
     const DistanceBounds& of = piece.bounds;
     const double d = piece.distance, width = of.value.upper - of.value.lower;
     weight.add(piece.weight);
-    variance.add(piece.weight * piece.weight * width * width / 4);  // at most, of any numbers in an interval
+    variance.add(piece.weight * piece.weight * width * width / 4);  // is the largest variance of numbers in an interval
     mean.add(piece.weight * d);
     mean_lower.add(piece.weight * of.mean.lower);
     mean_upper.add(piece.weight * of.mean.upper);

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Let c be the centroid of the piece, p_i its corners, r the largest |p_i - c| and d(x) the distance to b.
 //
-// - Above. The distance to the triangle T nearest to c is convex, and so is its square: over the piece they are at most
-//   the largest of their values at the corners, and on average at most the mean of these. d is nowhere larger.
-// - Below. The triangle nearest to any point of the piece is within d(c) + 2 r of c. For each such triangle there are
-//   linear functions that its distance nowhere falls below, one for each plane that separates it from c; the least of
-//   one such function for each triangle is concave, so that over the piece it is at least the least of its values at
-//   the corners, and on average at least their mean. Two planes are tried: the one at the point nearest to c, and the
-//   one parallel to that of T, without which the triangles beside T would seem to come nearer.
-// - Below, where that is too many triangles, because the surfaces are far apart for their size: for x = sum w_i p_i and
-//   every y, |x - y|^2 = sum w_i |p_i - y|^2 - sum w_i |p_i - x|^2 (Lagrange), hence d(x)^2 >= sum w_i d(p_i)^2 -
-//   sum w_i |p_i - x|^2. For k corners the last term is at most r^2, and sum |p_i - c|^2 / (k + 1) on average.
+// - The upper ends: the distance to the triangle T nearest to c is convex, and so is its square. Over the piece they
+//   are at most the largest of their values at the corners, and on average at most the mean of these. d is nowhere
+//   larger.
+// - The lower ends: the triangle nearest to any point of the piece is within d(c) + 2 r of c. The distance to each such
+//   triangle is nowhere below a linear function for each plane that separates it from c. The least of one such function
+//   for each triangle is concave, so that over the piece it is at least the least of its values at the corners, and on
+//   average at least their mean. Two planes are tried: the plane at the point nearest to c, and the plane parallel to
+//   T, without which the triangles beside T would seem to come nearer.
+// - The lower ends if this takes too many triangles, because the surfaces are far apart for their size: for x = sum w_i
+//   p_i and every y, |x - y|^2 = sum w_i |p_i - y|^2 - sum w_i |p_i - x|^2 (Lagrange), hence d(x)^2 >= sum w_i d(p_i)^2
+//   - sum w_i |p_i - x|^2. For k corners the last term is at most r^2, and sum |p_i - c|^2 / (k + 1) on average.
 //
-// Rounding. u = 2^-53; every point has |x| <= 1. The distance from a point to the witness on T exceeds the true
-// distance to the mesh by nothing and falls short of the distance to T by at most 20 u (measure/hausdorff.cpp derives
-// it). A plane never takes its offset from a distance: a short difference has the direction of its rounding, and T may
-// reach far to the other side of a plane that is turned by it. The offset is the least over the corners of T, which
-// errs by 16 u whatever the direction is, and by 8 u more at a corner of the piece. Placing both meshes errs by 2 u,
-// the centroid and the mean of the corners by 4 u each. kRounding is above the sum, so that both ends lie outside of
-// it.
+// Rounding is covered as follows, with u = 2^-53 and |x| <= 1 for every point. The computed distance from a point to
+// the witness on T falls short of the distance to T by at most 20 u (measure/hausdorff.cpp derives this). A plane never
+// takes its offset from a distance, because a short difference has the direction of its rounding, and T may reach far
+// to the other side of a plane that is turned by it. The offset is the least over the corners of T, which errs by 16 u
+// whatever the direction is, and by 8 u more at a corner of the piece. Placing both meshes errs by 2 u, and the
+// centroid and the mean of the corners by 4 u each. kRounding is above the sum.
 #include "measure/distance_bounds.h"
 
 #include <algorithm>
@@ -30,29 +30,30 @@ namespace tolvol {
 namespace {
 
 using glm::dvec3;
-using Values = std::array<double, 3>;  // at the corners of a piece
+using Values = std::array<double, 3>;  // are the values at the corners of a piece
 
-// Triangles whose planes are worth asking for: more of them cost more than another four pieces.
+// Planes are used for at most this many triangles. More of them would cost more than another four pieces.
 constexpr int kMostTriangles = 64;
-// Of the distance: a piece that is so short is known well enough by one point, as nothing changes faster than one to
-// one.
+// One point is enough for a piece shorter than this share of the distance, because the distance changes by at most the
+// way.
 constexpr double kShort = 1e-4;
-constexpr double kRounding = 64 * kUnitRoundoff;  // derived above
+constexpr double kRounding = 64 * kUnitRoundoff;  // is in frame lengths, and derived above
 
 using Corners = std::array<dvec3, 3>;
 
 dvec3 direction(const dvec3& v) {
   const double length = glm::length(v);
-  return length < 1e-150 ? dvec3(0) : v / length;  // the square of a shorter one has lost its bits
+  return length < 1e-150 ? dvec3(0) : v / length;  // the square of a shorter vector has lost its bits
 }
 
-/// How far p is on the side that `normal`, of length 1 or 0, points to from all of t; below 0 where it is not.
+/// Returns how far p is from all of t on the side to which `normal`, of length 1 or 0, points, or less than 0 if it is
+/// not.
 double gap(const dvec3& p, const Corners& t, const dvec3& normal) {
   return std::min({glm::dot(normal, p - t[0]), glm::dot(normal, p - t[1]), glm::dot(normal, p - t[2])});
 }
 
-/// The normal of the plane that separates p from t best: of the one at `nearest`, the point of t nearest to p, and of
-/// the one parallel to t, which stays sharp where p is within rounding of t.
+/// Returns the normal of the plane that separates p from t best. The choice is between the plane at `nearest`, the
+/// point of t nearest to p, and the plane parallel to t, which stays sharp if p is within rounding of t.
 dvec3 apart(const dvec3& p, const Corners& t, const dvec3& nearest) {
   const dvec3 towards = direction(p - nearest);
   const dvec3 face = direction(glm::cross(t[1] - t[0], t[2] - t[0]));
@@ -65,7 +66,7 @@ Corners corners(const TriangleMesh& b, std::uint32_t triangle) {
   return {b.vertices[t.x], b.vertices[t.y], b.vertices[t.z]};
 }
 
-/// The upper ends, from the distances of the corners to one triangle of b.
+/// Returns the upper ends by the distances of the corners from one triangle of b.
 DistanceBounds above(const Simplex& piece, const TriangleMesh& b, std::uint32_t triangle) {
   const Corners t = corners(b, triangle);
   const int k = piece.corners;
@@ -80,10 +81,10 @@ DistanceBounds above(const Simplex& piece, const TriangleMesh& b, std::uint32_t 
   return bounds;
 }
 
-/// At each corner of a piece the least value of linear functions as above, one for each triangle.
+/// Holds at each corner of a piece the least value of the linear functions above, one for each triangle.
 class Below {
  public:
-  /// `nearest`: the point of t, the triangle nearest to the centroid, that is nearest to it.
+  /// `nearest` is the point nearest to the centroid of the nearest triangle t.
   Below(const Simplex& piece, const dvec3& centroid, const Corners& t, const dvec3& nearest)
       : piece_(piece), centroid_(centroid), apart_(apart(centroid, t, nearest)), least_(values(t, apart_)) {}
 
@@ -103,7 +104,7 @@ class Below {
   }
 
  private:
-  /// Of the distance from the plane that touches t and has the unit vector `normal`.
+  /// Returns the values of the distance from the plane that touches t and has the unit vector `normal`.
   Values values(const Corners& t, const dvec3& normal) const {
     const double at_centroid = gap(centroid_, t, normal);
     Values result{};
@@ -113,7 +114,7 @@ class Below {
     return result;
   }
 
-  /// By how much `least_` would fall.
+  /// Returns by how much `least_` would fall.
   double loss(const Values& v) const {
     double sum = 0;
     for (int i = 0; i < piece_.corners; ++i) sum += std::max(0.0, least_[i] - v[i]);
@@ -125,7 +126,7 @@ class Below {
   Values least_;
 };
 
-/// The ranges with what their arithmetic may be off by.
+/// Widens the ranges by the rounding of their arithmetic.
 DistanceBounds rounded_outwards(DistanceBounds bounds) {
   const double square = kRounding * (2 * bounds.mean.upper + kRounding);
   for (Range* range : {&bounds.value, &bounds.mean}) range->lower -= kRounding, range->upper += kRounding;
@@ -188,7 +189,7 @@ DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, cons
     bounds.value.lower = std::max(d - r, std::sqrt(std::max(0.0, least - r * r)));
     bounds.value.lower = std::max(0.0, bounds.value.lower);
     bounds.mean_square.lower = std::max(0.0, sum - spread / (k + 1));
-    // d = d^2 / d, and d is nowhere larger than value.upper.
+    // This holds because d = d^2 / d, and d is nowhere larger than value.upper.
     bounds.mean.lower = std::max(bounds.value.lower, bounds.mean_square.lower / bounds.value.upper);
   }
   bounds.mean_square.lower = std::max(bounds.mean_square.lower, bounds.mean.lower * bounds.mean.lower);

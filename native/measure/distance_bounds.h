@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Bounds on the distance to a mesh over a whole point, segment or triangle, and on its mean there.
+/// Bounds on the distance from a mesh over a whole point, segment or triangle, and on the mean distance there.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ struct Range {
   double lower = 0, upper = 0;
 };
 
-/// The convex hull of the first `corners` of three points: 1 a point, 2 a segment, 3 a triangle.
+/// The convex hull of the first `corners` of three points: a point for 1, a segment for 2, a triangle for 3.
 struct Simplex {
   std::array<glm::dvec3, 3> corner{};
   int corners = 3;
@@ -22,20 +22,20 @@ struct Simplex {
 };
 
 struct DistanceBounds {
-  std::uint32_t nearest;           ///< the triangle of b nearest to the centroid
-  std::uint32_t steps = 0;         ///< nodes of the hierarchy and triangles that were looked at: what the bounds cost
-  Range value, mean, mean_square;  ///< of the distance over the piece
+  std::uint32_t nearest;           ///< is the triangle of b nearest to the centroid
+  std::uint32_t steps = 0;         ///< counts the nodes of the hierarchy and triangles that were looked at
+  Range value, mean, mean_square;  ///< are of the distance over the piece
 };
 
-/// What holds of the distance from the points of `piece` to the mesh b of `hierarchy`, both in a frame where |x| <= 1:
-/// the ranges are widened by what rounding may have done to them, so that lower < upper. They are narrower than the
-/// piece is long by one order: by the product of its length and the angle between the two surfaces near it. `hint`: a
-/// triangle of b that may be near, or Hierarchy::kNone; it does not change the result. Cost: 2 to 10 us.
+/// Returns bounds on the distance from the points of `piece` to the mesh b of `hierarchy`, both in a frame where |x| <=
+/// 1. The ranges are widened by the largest rounding error, so that lower < upper. Their width is of the order of the
+/// length of the piece times the angle between the two surfaces near it. `hint` is a triangle of b that may be near, or
+/// Hierarchy::kNone; it does not change the result. A call costs 2 to 10 us.
 DistanceBounds distance_bounds(const Simplex& piece, const TriangleMesh& b, const Hierarchy& hierarchy,
                                std::uint32_t hint);
 
-/// The same from what is known of one point of the piece alone, without a search: `nearest` is found there, and the
-/// distance falls by at most the way to another point. The ranges are as wide as the piece is long.
+/// The same from one point of the piece alone, without a search: `nearest` is known for that point, and the distance
+/// changes by at most the way to another point. The ranges are as wide as the piece is long.
 DistanceBounds bounds_around(const glm::dvec3& point, const Hierarchy::Nearest& nearest, const Simplex& piece,
                              const TriangleMesh& b);
 

@@ -1,32 +1,33 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Branch and bound over pieces of a, after M. Tang, M. Lee, Y. Kim, Interactive Hausdorff Distance Computation for
-// General Polygonal Models, 2009, with a sharper bound, a way to split that ends, and rounding inside the interval.
+// This is branch and bound over pieces of a, after M. Tang, M. Lee, Y. Kim, Interactive Hausdorff Distance Computation
+// for General Polygonal Models, 2009, with a sharper bound, a way to split that ends, and rounding inside the interval.
 //
-// - Upper bound of a piece (a triangle). The distance to one triangle T of b is convex, so over the piece it is largest
-//   at a corner: U = min over T of the largest distance of a corner to T, found by one search of the hierarchy.
-// - Lower bound. The distance to b at any point of a.
-// - Splitting. Halving the longest edge brings a piece to the size of the triangles near it. From there it is cut along
-//   the edges of the nearest one, by planes perpendicular to it: what lies above T has its largest distance to T at a
-//   corner, and the corner is a point of a, so both bounds meet at once. Halving alone would never end along the edges
-//   of b where two surfaces touch.
-// - Order. The pieces with the largest upper bounds first, in batches of a fixed size, each piece of a batch seeing the
-//   lower bound from before it: nothing depends on which thread is faster.
+// - The upper bound of a piece, a triangle: the distance to one triangle T of b is convex, so that over the piece it is
+//   largest at a corner. U = min over T of the largest distance of a corner to T is found by one search of the
+//   hierarchy.
+// - The lower bound is the distance to b at any point of a.
+// - Splitting: halving the longest edge brings a piece to the size of the triangles near it. Then the piece is cut
+//   along the edges of the nearest triangle T, by planes perpendicular to T. A part above T has its largest distance to
+//   T at a corner, and the corner is a point of a, so that both bounds meet at once. Halving alone would never end
+//   along the edges of b if the two surfaces touch.
+// - The order: pieces with the largest upper bounds come first, in batches of a fixed size. Each piece of a batch sees
+//   the lower bound from before the batch, so that nothing depends on which thread is faster.
 //
-// Rounding. u = 2^-53; every point has |x| <= 1 in the frame, so that a difference of two is at most 2 long. One
-// operation on the three coordinates of a vector (sum, difference, product with a number) errs by at most u times the
-// length of its result. Powers of two, by which frame and hierarchy scale, are exact.
-// - Placing a vertex of a errs by u, one of b that is cut off by 4 u (measure/near_part.h), so the distance between the
-//   surfaces changes by at most 5 u.
-// - The true pieces tile the triangle, so Piece::error, kSplitError for each split on the way, bounds how far their
-//   corners are from the stored ones.
-// - A witness a + v ab + w ac errs by 2 u (v + w) for the differences, as much for the products, and 2 u for the sums;
-//   v + w may exceed 1 by 2 u, which puts it 4 u outside: 10 u. Its distance, at most 2, has a relative error below
-//   4 u: 8 u. Together: true distance <= U + error + 23 u, kUpperMargin.
-// - For `lower` the nearest distance itself is not trusted, as a witness need not be the nearest point.
+// Rounding is covered as follows, with u = 2^-53. Every point has |x| <= 1 in the frame, so that a difference of two is
+// at most 2 long. One operation on the three coordinates of a vector (sum, difference, product with a number) errs by
+// at most u times the length of its result. Powers of two, by which frame and hierarchy scale, are exact.
+// - Placing a vertex of a errs by u, and a vertex of b that is cut off by 4 u (measure/near_part.h), so that the
+//   distance between the surfaces changes by at most 5 u.
+// - The true pieces tile the triangle. Piece::error, kSplitError for each split on the way, bounds the distance of
+//   their corners from the stored corners.
+// - A witness a + v ab + w ac errs by 2 u (v + w) for the differences, as much for the products, and 2 u for the sums.
+//   v + w may exceed 1 by 2 u, which puts the witness 4 u outside; this is 10 u together. Its distance, at most 2, has
+//   a relative error below 4 u, which is 8 u. So the true distance is at most U + error + 23 u, kUpperMargin.
+// - The computed nearest distance is not a lower bound, because a witness need not be the nearest point.
 //   certified_distance separates p from each triangle T near it by a plane: |p - x| >= v . (p - x) / |v| for all x in T
-//   and any v, least at a corner. The difference and the dot product err by 4 u |v| 2, |v| and the quotient by 4 u 2:
-//   16 u. The point p is off by the error of its piece, 3 u more for a centroid, and 5 u for placing. Together:
-//   kLowerMargin, 27 u.
+//   and any v, least at a corner. The difference and the dot product err by 4 u |v| 2, and |v| and the quotient by 4 u
+//   2, together 16 u. The point p is off by the error of its piece, 3 u more for a centroid, and 5 u for placing. All
+//   this is kLowerMargin, 27 u.
 #include "measure/hausdorff.h"
 
 #include <algorithm>
@@ -47,31 +48,31 @@ namespace {
 using glm::dvec3;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kGap = 0.001;                       // of upper: when the interval is narrow
-constexpr double kUpperMargin = 23 * kUnitRoundoff;  // derived above, like the next
+constexpr double kGap = 0.001;                       // is the width over `upper` at which an interval is narrow
+constexpr double kUpperMargin = 23 * kUnitRoundoff;  // is derived above, like the next constant
 constexpr double kLowerMargin = 27 * kUnitRoundoff;
-// An interval or a piece shorter than this is rounding: no use in going on.
+// The search ends at an interval or a piece shorter than this, in frame lengths, because it is within rounding.
 constexpr double kNoise = 256 * kUnitRoundoff;
-// A piece whose middle corner is nearer to the segment between the other two counts as that segment. As much again,
-// in the error of the piece, is more than the rounding of this distance.
+// A piece whose middle corner is nearer than this, in frame lengths, to the segment between the other two counts as
+// that segment. Its error grows by twice as much, which is more than the rounding of the distance.
 constexpr double kFlat = 8 * kUnitRoundoff;
-// Triangles asked for a first lower bound.
+// This many triangles give a first lower bound.
 constexpr std::size_t kSeeds = 4096;
-// A prime: its multiples modulo a smaller number visit each of the numbers below it once, far from the one before.
+// The multiples of this prime modulo a smaller number visit each number below that once, in jumps.
 constexpr std::size_t kSpread = 1'000'003;
-// Pieces that see the same lower bound, and those of them that are handed to a thread at once.
+// This many pieces see the same lower bound, and this many of them are handed to a thread at once.
 constexpr std::size_t kChunk = 16384, kBlock = 64, kBatch = 512, kSmallBlock = 8;
-// The budget: an edge of b that crosses a triangle of a costs a few pieces, so that a subdivided copy needs about ten
-// for each of its triangles. 1 us and, while waiting, 100 bytes each.
+// The budget, in pieces. An edge of b that crosses a triangle of a costs a few pieces, so that a subdivided copy needs
+// about ten for each of its triangles. A piece costs 1 us and, while it waits, 100 bytes.
 constexpr std::size_t kPieces = 4'000'000, kPiecesPerTriangle = 16;
 
 struct Piece {
   std::array<dvec3, 3> corner;
   double error = 0;
   double upper = 0;
-  std::uint32_t triangle = 0;                // of a
-  std::uint32_t common = Hierarchy::kNone;   // triangle of b that gives `upper`
-  std::uint32_t nearest = Hierarchy::kNone;  // triangle of b nearest to the centroid
+  std::uint32_t triangle = 0;                // is a triangle of a
+  std::uint32_t common = Hierarchy::kNone;   // is the triangle of b that gives `upper`
+  std::uint32_t nearest = Hierarchy::kNone;  // is the triangle of b nearest to the centroid
 };
 
 struct Smaller {
@@ -116,7 +117,7 @@ class Search {
   const Sample& farthest() const { return farthest_; }
 
  private:
-  /// Pieces whose upper bound is no larger need no more work.
+  /// Pieces whose upper bound is no larger than this need no more work.
   double cutoff() const {
     const double narrow = lower_ / (1 - kGap);
     return std::max(lower_ <= bound_ ? std::min(bound_, narrow) : narrow, lower_ + kNoise);
@@ -131,8 +132,8 @@ class Search {
     if (options_.progress) options_.progress->update(fraction);
   }
 
-  /// A first lower bound from triangles spread over the mesh: the better it is, the more pieces end at once. The first
-  /// few bound the searches of the others.
+  /// Finds a first lower bound from triangles spread over the mesh. The better it is, the more pieces end at once. The
+  /// first few triangles shorten the searches of the others.
   void seed() {
     const std::size_t count = std::min(a_.triangles.size(), kSeeds);
     for (std::size_t first = 0; first < count;) {
@@ -156,8 +157,8 @@ class Search {
     }
   }
 
-  /// The triangle of b nearest to p, or any that shows that p does not raise the lower bound: where many triangles are
-  /// about as near, the search for the nearest looks at all of them.
+  /// Returns the triangle of b nearest to p, or any triangle that shows that p does not raise the lower bound, because
+  /// the search for the nearest of many triangles that are about as near looks at all of them.
   Hierarchy::Common far_from(const dvec3& p, std::uint32_t hint) const {
     return hierarchy_.common(std::array{p}, kInfinity, lower_ + kUpperMargin, hint);
   }
@@ -199,7 +200,7 @@ class Search {
       for (std::size_t i = begin; i < end; ++i) {
         children[i] = split(batch[i]);
         for (int k = 0; k < children[i].count; ++k) {
-          children[i].piece[k].common = batch[i].nearest;  // the piece cut off above that triangle ends with this guess
+          children[i].piece[k].common = batch[i].nearest;  // this guess ends the piece above that triangle
           samples[i].improve(evaluate(children[i].piece[k]));
         }
       }
@@ -222,8 +223,8 @@ class Search {
     }
   }
 
-  /// Sets upper, common and nearest of a piece; `common` is a guess before. Returns the best lower bound seen,
-  /// uncertified; none for a piece that is settled.
+  /// Sets upper, common and nearest of a piece, whose `common` is a guess before. Returns the best lower bound it
+  /// finds, not certified, or none for a piece that is settled.
   Sample evaluate(Piece& piece) const {
     const double margin = kUpperMargin + piece.error, enough = cutoff();
     const Hierarchy::Common common = hierarchy_.common(piece.corner, kInfinity, enough - margin, piece.common);
@@ -259,19 +260,20 @@ class Search {
     return bound;
   }
 
-  /// At most the distance of p from triangle t: the best of some separating planes, or the first that shows `enough`.
+  /// Returns a lower bound on the distance of p from triangle t, by the best of some separating planes or the first
+  /// that shows `enough`.
   static double separation(const dvec3& p, const std::array<dvec3, 3>& t, double enough) {
     double best = 0;
     const auto along = [&](const dvec3& v) {
       const double length = glm::length(v);
-      if (length < 1e-150) return;  // its square has lost its bits
+      if (length < 1e-150) return;  // the square of a shorter vector has lost its bits
       best = std::max(best, std::min({glm::dot(v, p - t[0]), glm::dot(v, p - t[1]), glm::dot(v, p - t[2])}) / length);
     };
     const dvec3 r = p - closest_point(p, t[0], t[1], t[2]).point;
     along(r);
     if (best >= enough) return best;
-    // A short r has the direction of its rounding. Orthogonal to the edge (or the face) that the witness lies on it is
-    // sharp.
+    // A short r has the direction of its rounding. The part of it that is orthogonal to the edge or face of the witness
+    // is sharp.
     const std::array<dvec3, 3> edge{t[1] - t[0], t[2] - t[1], t[0] - t[2]};
     int longest = 0;
     for (int i = 0; i < 3; ++i) {
@@ -283,7 +285,7 @@ class Search {
     return best;
   }
 
-  /// A piece that is as flat as rounding becomes the segment it is, whose parts do not overlap.
+  /// Makes a piece that is flat within rounding a segment, whose parts do not overlap.
   static Piece flattened(Piece piece) {
     for (int i = 0; i < 3; ++i) {
       dvec3 &p = piece.corner[i], &q = piece.corner[(i + 1) % 3], &middle = piece.corner[(i + 2) % 3];
@@ -297,7 +299,7 @@ class Search {
     return piece;
   }
 
-  /// None when the piece is too small.
+  /// Returns no part if the piece is too small.
   Children split(const Piece& whole) const {
     const Piece piece = flattened(whole);
     const Parts parts = tolvol::split(piece.corner, corners(b_, piece.nearest));
@@ -313,8 +315,8 @@ class Search {
   Hierarchy hierarchy_;
   double bound_;
   const HausdorffOptions& options_;
-  std::vector<Piece> queue_;  // a heap, the largest upper bound in front
-  double settled_ = 0;        // the largest upper bound of all pieces that left the queue
+  std::vector<Piece> queue_;  // is a heap with the largest upper bound in front
+  double settled_ = 0;        // is the largest upper bound of all pieces that left the queue
   double lower_ = 0;
   Sample farthest_;
   std::size_t pieces_ = 0;
@@ -330,7 +332,7 @@ HausdorffInterval hausdorff(const TriangleMesh& a, const TriangleMesh& b, const 
   const Frame& frame = pair.frame;
   Search search(pair.a, pair.b, options.bound ? *options.bound * frame.scale() : kInfinity, options);
   search.run();
-  // One step outwards for the quotient: it is exact, but for results below the smallest normal number.
+  // A step outwards covers the quotient, which is exact except for results below the smallest normal number.
   const Sample& farthest = search.farthest();
   return {std::max(0.0, std::nextafter(search.lower() / frame.scale(), -kInfinity)),
           std::nextafter(search.upper() / frame.scale(), kInfinity), frame.to_world(farthest.point), farthest.triangle};

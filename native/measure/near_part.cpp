@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Let c be the middle of a box around a, r half its diagonal and y any vertex of b: no point of a is farther than
-// r + |c - y| from b, so that what is nearest to it is within R = 2 r + |c - y| of c. What a plane keeps farther away
-// than that is not needed.
+// Let c be the middle of a box around a, r half its diagonal and y any vertex of b. No point of a is farther than
+// r + |c - y| from b, so that the point of b nearest to it is within R = 2 r + |c - y| of c. A part of b that a plane
+// keeps farther away than R is not needed.
 //
-// Rounding. All is decided in the frame of a. Placing a corner there errs by u times its size, and so do the dot
-// products with unit vectors, which are compared with R: kSlack times the size of the corner is more than both. R is
-// raised by 1e-6, which is more than its own rounding. A cut at any share between 0 and 1 is on the edge, so the share
-// needs no care.
+// Rounding is covered as follows. All is decided in the frame of a. Placing a corner there errs by u times its size,
+// and so do the dot products with unit vectors, which are compared with R. kSlack times the size of the corner is more
+// than both. R is raised by 1e-6, which is more than its own rounding. A cut at any share between 0 and 1 is on the
+// edge, so that the share needs no care.
 #include "measure/near_part.h"
 
 #include <algorithm>
@@ -26,10 +26,11 @@ namespace {
 using glm::dvec3;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kNear = 8, kCut = 32;  // in R: corners within it are near; how far from them far edges are cut
+constexpr double kNear = 8;  // corners within this many R are near
+constexpr double kCut = 32;  // far edges are cut this many R from their near corners
 constexpr double kSlack = 64 * kUnitRoundoff;
 
-/// Without the square of a huge number.
+/// Computes the length without the square of a huge number.
 double norm(const dvec3& v) {
   const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
   return largest > 0 && largest < kInfinity ? largest * glm::length(v / largest) : largest;
@@ -50,7 +51,7 @@ Box box_of(const TriangleMesh& mesh) {
   return box;
 }
 
-/// How far from the origin of the frame something in the box can be.
+/// Returns the largest distance of a point of the box from the origin of the frame.
 double extent(const Box& box, const Frame& frame) {
   return norm(glm::max(glm::abs(frame.from_world(box.lower)), glm::abs(frame.from_world(box.upper))));
 }
@@ -69,7 +70,7 @@ class Cutter {
       if (!beyond({p[0], p[1], p[2]})) keep(t);
       return;
     }
-    // From here on a is the only near corner, or c the only far one.
+    // From here on a is the only near corner, or c is the only far corner.
     int first = 0;
     while (count == 1 ? !near[first] : near[(first + 2) % 3]) ++first;
     const std::uint32_t a = t[first], b = t[(first + 1) % 3], c = t[(first + 2) % 3];
@@ -86,10 +87,10 @@ class Cutter {
   NearPart part() && { return std::move(part_); }
 
  private:
-  /// Where a triangle ends along one of its edges.
+  /// The end of a triangle along one of its edges.
   struct End {
     std::uint32_t from, to;
-    double share;  ///< 1: at `to` itself
+    double share;  ///< is 1 at `to` itself
     dvec3 point;
   };
 
@@ -104,7 +105,7 @@ class Cutter {
     return {from, to, cut.share, cut.in(frame_, b_)};
   }
 
-  /// Neighbours share the vertex.
+  /// Returns the vertex of a cut, which neighbours share.
   std::uint32_t vertex(const End& end) {
     if (end.share == 1) return end.to;
     const auto next = std::uint32_t(b_.vertices.size() + part_.cuts.size());
@@ -113,7 +114,7 @@ class Cutter {
     return place->second;
   }
 
-  /// Whether the convex hull of the points is proved to be farther than `reach` from the origin.
+  /// Tells whether it is proved that the convex hull of the points is farther than `reach` from the origin.
   bool beyond(std::initializer_list<dvec3> points) const {
     const auto shown_by = [&](const dvec3& normal) {
       return std::all_of(points.begin(), points.end(),
@@ -121,7 +122,7 @@ class Cutter {
     };
     const dvec3* const p = points.begin();
     const dvec3 edge = direction(p[1] - p[0]);
-    const dvec3 across = p[0] - glm::dot(p[0], edge) * edge;  // from the origin to the line of the cut
+    const dvec3 across = p[0] - glm::dot(p[0], edge) * edge;  // leads from the origin to the line of the cut
     if (shown_by(direction(p[0])) || shown_by(direction(across))) return true;
     for (int k = 0; k < 3; ++k) {
       dvec3 axis(0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Two meshes in one frame, where both are about 1 large: what every measurement starts with.
+/// Two meshes in one frame, in which both together have a size of about 1. Every measurement starts with such a pair.
 #pragma once
 
 #include <cmath>
@@ -16,11 +16,11 @@ struct PlacedPair {
   Frame frame;
   TriangleMesh a, b;
 
-  /// `near` leaves of b what can be nearest to a point of a (measure/near_part.h), `whole` all of it.
+  /// `near` takes the part of b that can be nearest to a point of a (measure/near_part.h), `whole` takes all of b.
   enum class Target { whole, near };
 
-  /// The frame fits the vertices that triangles use; the others may lie anywhere. Throws InvalidInput when a mesh is
-  /// not valid, or when both together are smaller than 1e-307.
+  /// The frame fits the vertices that triangles use. Other vertices may lie anywhere. Throws InvalidInput if a mesh is
+  /// not valid, or if both together are smaller than 1e-307.
   PlacedPair(const TriangleMesh& world_a, const TriangleMesh& world_b, Target target) {
     for (const TriangleMesh* mesh : {&world_a, &world_b}) validate(mesh->vertices, mesh->triangles);
     const NearPart part = target == Target::near ? near_part(world_a, world_b) : NearPart{world_b.triangles, {}};

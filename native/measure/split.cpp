@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Halving alone would never end along the edges of the other surface where the two touch; cutting alone would go round
-// in circles far from it.
+// Halving alone would never end along the edges of the other surface if the two surfaces touch. Cutting alone would go
+// round in circles far from the other surface.
 //
-// Rounding, u = 2^-53: a point at t <= 1/2 from the nearer end, p + t (q - p), with |p|, |q| <= 1 errs by t 2 u for the
-// difference, as much for the product and u for the sum: kSplitError, 3 u.
+// This derives kSplitError, with u = 2^-53. A point p + t (q - p) at t <= 1/2 from the nearer end, with |p|, |q| <= 1,
+// errs by t 2 u for the difference, as much for the product, and u for the sum, which is 3 u.
 #include "measure/split.h"
 
 #include <algorithm>
@@ -14,14 +14,14 @@ namespace {
 
 using glm::dvec3;
 
-// A piece so many times longer than the triangle near it is halved, not cut.
+// A piece this many times longer than the triangle near it is halved, not cut.
 constexpr double kCoarse = 4;
-// A piece, or what would be cut off it, that is thinner than this is rounding.
+// A piece or a part thinner than this, in frame lengths, is as small as rounding.
 constexpr double kNoise = 256 * kUnitRoundoff;
 
 dvec3 between(const dvec3& p, const dvec3& q, double t) { return t <= 0.5 ? p + t * (q - p) : q + (1 - t) * (p - q); }
 
-/// Two parts, apart at the point s of the edge from corner i to the next.
+/// Returns two parts, which are divided at the point s of the edge from corner i to the next.
 Parts halves(const TriangleCorners& p, int i, double s) {
   const int j = (i + 1) % 3;
   Parts parts{{p, p, p}, 2};
@@ -29,7 +29,7 @@ Parts halves(const TriangleCorners& p, int i, double s) {
   return parts;
 }
 
-/// None when no edge of t divides the piece.
+/// Returns no part if no edge of t divides the piece.
 Parts cut_along(const TriangleCorners& p, const TriangleCorners& t) {
   const dvec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
   std::array<double, 3> side{};
@@ -48,7 +48,7 @@ Parts cut_along(const TriangleCorners& p, const TriangleCorners& t) {
     if (std::abs(s) <= kNoise) s = 0;
   }
   const auto share = [&](int i, int j) { return side[i] / (side[i] - side[j]); };
-  int alone = 0;  // the corner on the one side
+  int alone = 0;  // is the only corner on its side
   for (int i = 0; i < 3; ++i) {
     if (side[i] == 0) return halves(p, (i + 1) % 3, share((i + 1) % 3, (i + 2) % 3));
     if (side[i] * side[(i + 1) % 3] < 0 && side[i] * side[(i + 2) % 3] < 0) alone = i;
@@ -61,7 +61,7 @@ Parts cut_along(const TriangleCorners& p, const TriangleCorners& t) {
   return {{{{p[i], on_j, on_k}, {on_j, p[j], on_k}, {on_k, p[j], p[k]}}}, 3};
 }
 
-/// The point that divides the segment from p to q best.
+/// Returns the point that divides the segment from p to q best.
 dvec3 cut_of_segment(const dvec3& p, const dvec3& q, const TriangleCorners& t, bool coarse) {
   const Parts parts = coarse ? Parts{} : cut_along({p, q, q}, t);
   return parts.count > 0 ? parts.corners[0][1] : between(p, q, 0.5);
@@ -82,7 +82,7 @@ Parts split(const TriangleCorners& piece, const TriangleCorners& t) {
   const bool coarse = length[longest] > kCoarse * reach;
   for (int i = 0; i < 3; ++i) {
     if (length[i] > 0) continue;
-    // Divided as a triangle it would leave three parts, two of them over the same half, and so on with each.
+    // If a segment were divided as a triangle, two of its three parts would cover the same half, and so on with each.
     const dvec3 &p = piece[i], &q = piece[(i + 2) % 3], at = cut_of_segment(p, q, t, coarse);
     return {{{{p, at, at}, {at, q, q}}}, 2};
   }

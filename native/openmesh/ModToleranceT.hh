@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// A module for OpenMesh's decimaters that keeps the mesh within a tolerance of a reference, certified. For other
-/// people's programs: the header of tolvol::openmesh, in the style of OpenMesh's own modules.
+/// A module for OpenMesh's decimaters that keeps the mesh within a tolerance of a reference, certified. It is the
+/// header of tolvol::openmesh for other people's programs, in the style of OpenMesh's own modules.
 #pragma once
 
 #include <OpenMesh/Tools/Decimater/ModBaseT.hh>
@@ -15,7 +15,7 @@
 
 namespace tolvol {
 
-/// How an OpenMesh mesh stores its points: as they are, in the world.
+/// Returns the space of an OpenMesh mesh, whose points are stored as they are in the world.
 template <class Mesh>
 StoredSpace space_of(const Mesh&) {
   constexpr bool kSingle = std::is_same_v<typename Mesh::Scalar, float>;
@@ -27,8 +27,8 @@ glm::dvec3 to_dvec3(const Point& p) {
   return {p[0], p[1], p[2]};
 }
 
-/// All points within `tolerance`, in the mesh's units, of a triangle mesh as it is now. Throws what ToleranceVolume
-/// throws.
+/// Returns the volume of all points within `tolerance`, in the mesh's units, of a triangle mesh as it is now. Throws
+/// what ToleranceVolume throws.
 template <class Mesh>
 ToleranceVolume volume_of(const Mesh& mesh, double tolerance) {
   std::vector<glm::dvec3> vertices;
@@ -42,10 +42,11 @@ ToleranceVolume volume_of(const Mesh& mesh, double tolerance) {
   return ToleranceVolume(vertices, triangles, space_of(mesh), tolerance);
 }
 
-/// Binary: forbids every half-edge collapse after which a face would not be proved to be within the tolerance of the
-/// reference. So every point of the result is within it; the reference may be farther from the result, for which
-/// tolvol::decimate has two_sided. Any number of runs, with other modules and other changes between them that are
-/// checked too, keep the one tolerance as long as they use the same volume. About 1 us a collapse asked about.
+/// A binary module that forbids every half-edge collapse after which a face would not be proved to be within the
+/// tolerance of the reference. So every point of the result is within it. The reference may be farther from the result;
+/// for this direction tolvol::decimate has two_sided. Any number of runs with the same volume keep the one tolerance,
+/// also with other modules and with other changes between them, which are checked too. About 1 us for each collapse
+/// asked about.
 template <class MeshT>
 class ModToleranceT : public OpenMesh::Decimater::ModBaseT<MeshT> {
  public:
@@ -53,14 +54,14 @@ class ModToleranceT : public OpenMesh::Decimater::ModBaseT<MeshT> {
 
   explicit ModToleranceT(MeshT& mesh) : Base(mesh, true) {}
 
-  /// Keeps a reference to `volume`. To be called before the decimater's initialize().
+  /// Keeps a reference to `volume`. Must be called before the decimater's initialize().
   void set_volume(const ToleranceVolume& volume) { volume_ = &volume; }
 
-  /// Throws InvalidInput without a volume, for a mesh with faces that are not within the tolerance, and where the mesh
-  /// is too far from its origin for the tolerance.
+  /// Throws InvalidInput without a volume, for a mesh with points that are not finite or faces that are not within the
+  /// tolerance, and if the mesh is too far from its origin for the tolerance.
   void initialize() override;
   float collapse_priority(const CollapseInfo& collapse) override;
-  /// From now on within this share, 0 to 1, of the tolerance; faces that are farther already stay.
+  /// Collapses from now on keep within this share, 0 to 1, of the tolerance. Faces that are farther already stay.
   void set_error_tolerance_factor(double factor) override;
 
  private:

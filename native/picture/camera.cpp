@@ -10,17 +10,17 @@
 namespace tolvol {
 namespace {
 
-constexpr double kMargin = 1.04;     // of the picture around what is framed
-constexpr double kNearest = 1.0e-4;  // of the far plane's distance: a 32-bit depth buffer still tells surfaces apart
+constexpr double kMargin = 1.04;     // the picture is this many times larger than the framed mesh
+constexpr double kNearest = 1.0e-4;  // the near plane's distance over the far plane's, for a 32-bit depth buffer
 
 bool finite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
-/// Of unit length; the squares of the tiniest and the hugest components are never taken.
+/// Returns a vector of unit length. It never squares the tiniest and the hugest components.
 glm::dvec3 unit(const glm::dvec3& v) {
   return glm::normalize(v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}));
 }
 
-/// Right, above and forward of a direction of view, all of unit length.
+/// The directions right, above and forward of a view, all of unit length.
 struct Axes {
   glm::dvec3 right, above, forward;
 
@@ -31,7 +31,7 @@ struct Axes {
 };
 
 void require_direction(const glm::dvec3& along, const glm::dvec3& up) {
-  // NaN, that of a zero vector, fails as well.
+  // NaN, which a zero vector gives, fails as well.
   if (!(glm::length(glm::cross(unit(along), unit(up))) > 1e-6)) {
     throw InvalidInput("the camera's up direction must not be zero nor along its view");
   }
@@ -64,7 +64,7 @@ Camera framing(std::span<const glm::dvec3> world, std::span<const glm::uvec3> tr
   const Axes axes(-how.direction, how.up);
   const glm::dmat3 to_view = glm::transpose(glm::dmat3(axes.right, axes.above, axes.forward));
   const std::vector<bool> used = used_vertices(world.size(), triangles);
-  Box box;  // in view axes
+  Box box;  // is in the axes of the view
   for (std::size_t i = 0; i < world.size(); ++i) {
     if (used[i]) box.add(to_view * world[i]);
   }
@@ -77,7 +77,7 @@ Camera framing(std::span<const glm::dvec3> world, std::span<const glm::uvec3> tr
     const double z = p.z - how.margin;
     distance = std::max({distance, (std::abs(p.x) + how.margin) / right - z, (std::abs(p.y) + how.margin) / above - z});
   }
-  // A flat mesh seen edge on would have the eye within it.
+  // The eye would be within a flat mesh that is seen edge on.
   const glm::dvec3 extent = box.upper - box.lower;
   distance = std::max({distance, extent.x, extent.y, extent.z});
   if (!(distance > 0)) distance = 1;
@@ -99,7 +99,7 @@ View::View(const Camera& camera, const Frame& frame, double aspect, const Box& b
     const double z = glm::dot(p - eye, forward);
     nearest = std::min(nearest, z), farthest = std::max(farthest, z);
   }
-  if (!(farthest > 0)) farthest = 1;  // behind the eye: any planes do
+  if (!(farthest > 0)) farthest = 1;  // the box is behind the eye, so that any planes will do
   farthest *= 1.001;
   nearest = std::max(0.999 * nearest, kNearest * farthest);
   to_clip = glm::perspective(glm::radians(camera.angle), aspect, nearest, farthest) *

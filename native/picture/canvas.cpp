@@ -12,7 +12,7 @@
 namespace tolvol {
 namespace {
 
-constexpr int kMostSamples = 8;  // 64 a pixel: more cannot be told apart in 8 bits
+constexpr int kMostSamples = 8;  // along an axis of a pixel; more than 64 in all cannot be told apart in 8 bits
 
 /// Averages the samples of a tile into its pixels of the image.
 void resolve(const std::vector<std::uint8_t>& drawn, int row, const glm::ivec2& from, const glm::ivec2& count,
@@ -70,7 +70,7 @@ gl::Texture transfer_texture(Transfer transfer) {
 Image Canvas::draw(const Resolution& r, int tile, const std::function<void(const glm::vec2&)>& draw,
                    Progress* progress) {
   require(r);
-  const int pixels = std::max(1, tile / r.samples);  // a side of a tile
+  const int pixels = std::max(1, tile / r.samples);  // is the side of a tile
   const glm::ivec2 side = glm::min(glm::ivec2(pixels), r.size), tiles = (r.size + side - 1) / side;
   Image image{r.size.x, r.size.y,
               std::vector<std::uint8_t>(std::size_t{4} * static_cast<std::size_t>(r.size.x) *
@@ -83,7 +83,7 @@ Image Canvas::draw(const Resolution& r, int tile, const std::function<void(const
     const glm::ivec2 from = glm::ivec2(i % tiles.x, i / tiles.x) * side, count = glm::min(side, r.size - from);
     std::vector<std::uint8_t> drawn;
     gl::run([&, asked = Call::current()] {
-      const Call::Within within(asked);  // polls of the thread that draws are for this call
+      const Call::Within within(asked);  // the thread that draws polls for this call
       if (tile_ != side * r.samples) {
         tile_ = glm::ivec2(0);
         framebuffer_ = gl::Framebuffer::with_colour(side.x * r.samples, side.y * r.samples);
@@ -92,7 +92,7 @@ Image Canvas::draw(const Resolution& r, int tile, const std::function<void(const
       framebuffer_.bind();
       const glm::ivec2 first = from * r.samples;
       glViewport(-first.x, -first.y, r.size.x * r.samples, r.size.y * r.samples);
-      // A tile that was cancelled left any of these set.
+      // A tile that was cancelled may have left any of these set.
       glDisable(GL_BLEND);
       glDisable(GL_POLYGON_OFFSET_LINE);
       glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);

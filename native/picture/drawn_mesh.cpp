@@ -10,10 +10,10 @@
 namespace tolvol {
 namespace {
 
-constexpr GLsizei kDrawnAtOnce = 3 << 15;  // corners, between two polls
-constexpr double kReach = 1e9;  // in nodes: beyond it the products of float32 matrices overflow before they are clipped
+constexpr GLsizei kDrawnAtOnce = 3 << 15;  // is the number of corners between two polls
+constexpr double kReach = 1e9;  // is in nodes; beyond it products of float32 matrices overflow before clipping
 
-/// Room for a mesh of about the same size: one that changes every frame is not allotted anew.
+/// Leaves room for a mesh of about the same size, so that a mesh that changes every frame is not allotted anew.
 void write_into(gl::Buffer& buffer, std::size_t bytes, const void* data) {
   if (buffer.bytes() < bytes || buffer.bytes() / 2 > bytes) buffer = gl::Buffer(bytes, nullptr);
   buffer.write(0, bytes, data);
@@ -55,7 +55,7 @@ void MeshBuffers::write(const DrawnMesh& mesh) {
 
 void MeshBuffers::draw() const {
   array_.bind();
-  // Not at once: a renderer without a GPU takes a second for the edges of a million triangles.
+  // The mesh is not drawn at once, because without a GPU the edges of a million triangles take a second.
   for (GLsizei first = 0; first < count_; first += kDrawnAtOnce) {
     poll();
     const std::size_t offset = static_cast<std::size_t>(first) * sizeof(GLuint);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The signed distances that pictures are drawn from, as a 3D texture [Botsch04, §3]; never for a check.
+/// The signed distances from which pictures are drawn, as a 3D texture [Botsch04, §3]. No check uses them.
 #pragma once
 
 #include <glm/glm.hpp>
@@ -14,27 +14,27 @@ namespace tolvol {
 
 class PictureField {
  public:
-  /// Grid nodes per tolerance, where GL and the memory budget of grids allow that many.
+  /// Is in grid nodes per tolerance, if GL and the memory budget of grids allow that many.
   static constexpr double kPrecision = 4;
 
-  /// Arguments and cost as for DisplayGrid. A cell whose distances contradict their signs is shown unsigned, so that
-  /// open, misoriented and intersecting references have no places that only seem near. What a picture shows differs
-  /// from the distance by at most (sqrt(3)/2) / precision() of the tolerance, and by far less where the reference is
-  /// smooth. Not on the GL thread. Throws GlUnavailable.
+  /// The arguments and the cost are those of DisplayGrid. A cell whose distances contradict their signs is shown
+  /// unsigned, so that open, misoriented and intersecting references have no places that only seem near. A picture
+  /// differs from the distance by at most (sqrt(3)/2) / precision() of the tolerance, and by far less where the
+  /// reference is smooth. Must not be called on the GL thread. Throws GlUnavailable.
   PictureField(const TriangleMesh& reference, bool mirrored, double tolerance, unsigned threads = 0,
                Progress* progress = nullptr);
 
-  const gl::Texture& texture() const { return texture_->texture(); }  ///< in units of spacing()
-  const Box& box() const { return box_; }                             ///< of the reference
+  const gl::Texture& texture() const { return texture_->texture(); }  ///< has units of spacing()
+  const Box& box() const { return box_; }                             ///< is the box of the reference
   const glm::dvec3& origin() const { return grid_.origin; }
   double spacing() const { return grid_.spacing; }
   const glm::ivec3& nodes() const { return grid_.nodes; }
   double tolerance() const { return tolerance_; }
   double precision() const { return tolerance_ / grid_.spacing; }
 
-  /// Where a place of the frame is among the nodes.
+  /// Maps a place from the frame to the nodes.
   glm::vec3 node(const glm::dvec3& p) const { return glm::vec3((p - grid_.origin) / grid_.spacing); }
-  /// From nodes to the frame.
+  /// Maps a place from the nodes to the frame.
   glm::dmat4 to_frame() const {
     return glm::scale(glm::translate(glm::dmat4(1), grid_.origin), glm::dvec3(grid_.spacing));
   }
@@ -42,7 +42,7 @@ class PictureField {
  private:
   double tolerance_;
   Box box_;
-  DistanceGrid grid_;  // without its values
+  DistanceGrid grid_;  // has no values
   std::optional<DistanceTexture> texture_;
 };
 

@@ -6,8 +6,8 @@
 namespace tolvol {
 namespace {
 
-constexpr int kTile = 1024;    // samples: a wish to stop is heeded between tiles
-constexpr float kStripe = 12;  // pixels from one stripe to the next
+constexpr int kTile = 1024;    // is in samples; a call can be cancelled between tiles
+constexpr float kStripe = 12;  // is in pixels, from one stripe to the next
 
 }  // namespace
 

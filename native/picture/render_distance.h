@@ -15,16 +15,16 @@ class DistanceRenderer {
  public:
   struct Options {
     Transfer transfer = Transfer::signed_distance;
-    bool edges = false;  ///< draw the mesh's edges as well
+    bool edges = false;  ///< says whether to draw the mesh's edges as well
     Resolution resolution;
     Progress* progress = nullptr;
   };
 
-  /// Keeps a reference to `field`, which must outlive this. Not on the GL thread. Throws GlUnavailable.
+  /// Keeps a reference to `field`, which must outlive this. Must not be called on the GL thread. Throws GlUnavailable.
   explicit DistanceRenderer(const PictureField& field);
 
-  /// Lit from the eye; where it faces the eye, a place has exactly the transfer function's colour. What is farther than
-  /// the tolerance is striped. Throws like Canvas::draw(), and GlUnavailable. O(triangles + samples).
+  /// The light is at the eye, so that a place that faces the eye has exactly the transfer function's colour. Places
+  /// farther than the tolerance are striped. Throws like Canvas::draw(), and GlUnavailable. O(triangles + samples).
   Image render(const DrawnMesh& mesh, const Camera& camera, const Frame& frame, const Options& options);
 
  private:

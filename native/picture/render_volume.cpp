@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Each ray ends on the mesh or on a backdrop, so that neither order nor depth textures matter: the mesh's depth is
-// drawn first, then the rays to what is visible of it, then those that pass it by.
+// Each ray ends on the mesh or on a backdrop, so that neither order nor depth textures matter. The mesh's depth is
+// drawn first, then the rays to its visible parts, then the rays that miss it.
 #include "picture/render_volume.h"
 
 #include <algorithm>
@@ -12,8 +12,8 @@
 namespace tolvol {
 namespace {
 
-constexpr int kTile = 256;     // samples: a wish to stop is heeded between tiles
-constexpr int kFarNodes = 40;  // along the longest side; more cost more to fill than they save in steps
+constexpr int kTile = 256;     // is in samples; a call can be cancelled between tiles
+constexpr int kFarNodes = 40;  // along the longest side; more nodes cost more to fill than they save in steps
 
 glm::vec4 plane_in_nodes(const VolumeRenderer::Cut& cut, const Frame& frame, const PictureField& field) {
   const glm::dvec3 normal =
@@ -95,7 +95,7 @@ Image VolumeRenderer::render(const DrawnMesh& mesh, const Camera& camera, const 
         backdrop_.set("forward", glm::vec3(view.forward));
         backdrop_.set("right", glm::vec3(view.right));
         backdrop_.set("above", glm::vec3(view.above));
-        // Beyond the box from wherever the eye is.
+        // This is beyond the box wherever the eye is.
         const glm::vec3 nodes(field_->nodes());
         backdrop_.set("end", glm::length(eye - nodes / 2.0f) + glm::length(nodes));
         no_vertices_.bind();

@@ -14,7 +14,7 @@ namespace tolvol {
 
 class VolumeRenderer {
  public:
-  /// Away with the volume on the side that `normal` points to; world.
+  /// The volume is cut away on the side to which `normal` points. The plane is in the world.
   struct Cut {
     glm::dvec3 point, normal;
   };
@@ -24,16 +24,17 @@ class VolumeRenderer {
     Progress* progress = nullptr;
   };
 
-  /// `hierarchy` of the reference, in its frame; used here alone. Keeps a reference to `field`. Not on the GL thread.
-  /// Throws GlUnavailable. About 50 ms.
+  /// `hierarchy` is of the reference in its frame, and is only used here. Keeps a reference to `field`. Must not be
+  /// called on the GL thread. Throws GlUnavailable. Takes about 50 ms.
   VolumeRenderer(const PictureField& field, const Hierarchy& hierarchy, unsigned threads = 0);
 
-  /// Throws InvalidInput for a cut that is no plane, and like Canvas::draw(); GlUnavailable. Seconds without a GPU.
+  /// Throws InvalidInput for a cut that is no plane, throws like Canvas::draw(), and throws GlUnavailable. A picture
+  /// takes seconds without a GPU.
   Image render(const DrawnMesh& mesh, const Camera& camera, const Frame& frame, const Options& options);
 
  private:
   const PictureField* field_;
-  double far_spacing_ = 0;  // in nodes
+  double far_spacing_ = 0;  // is in nodes
   Canvas canvas_;
   MeshBuffers mesh_;
   gl::VertexArray no_vertices_;

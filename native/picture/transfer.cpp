@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t kKnots = 33;
 
-// Every eighth of the published 256 values; between them the maps are straight to within 2 % of the range.
+// These are every eighth of the published 256 values. Between them the maps are linear within 2 % of the range.
 constexpr glm::u8vec3 kCoolWarm[kKnots] = {
     {59, 76, 192},   {68, 90, 204},   {78, 104, 216},  {88, 117, 225},  {98, 130, 234},  {108, 143, 241},
     {119, 154, 247}, {130, 166, 251}, {141, 176, 254}, {152, 185, 255}, {163, 194, 254}, {174, 201, 252},
@@ -16,7 +16,7 @@ constexpr glm::u8vec3 kCoolWarm[kKnots] = {
     {235, 211, 198}, {241, 205, 185}, {244, 197, 173}, {247, 187, 160}, {247, 177, 148}, {247, 166, 135},
     {244, 154, 123}, {241, 141, 111}, {236, 127, 99},  {229, 112, 88},  {222, 97, 77},   {213, 80, 66},
     {203, 62, 56},   {192, 40, 47},   {180, 4, 38}};
-// From its light end: what is near the reference, usually most of a picture, then shows its shape.
+// This starts at the light end, so that places near the reference, usually most of a picture, show their shape.
 constexpr glm::u8vec3 kViridis[kKnots] = {
     {253, 231, 37}, {234, 229, 26}, {213, 226, 26}, {192, 223, 37}, {170, 220, 50}, {149, 216, 64}, {130, 211, 77},
     {110, 206, 88}, {92, 200, 99},  {77, 194, 108}, {62, 188, 116}, {49, 181, 123}, {39, 173, 129}, {33, 166, 133},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Which colour a distance has.
+/// The colours of distances.
 #pragma once
 
 #include <cstdint>
@@ -8,17 +8,19 @@
 
 namespace tolvol {
 
-/// signed_distance: from -tolerance (inside the reference) blue over grey to red; magnitude: from 0 to the tolerance.
+/// signed_distance goes from -tolerance (inside the reference), blue, over grey to the tolerance, red. magnitude goes
+/// from 0 to the tolerance.
 enum class Transfer { signed_distance, magnitude };
 
-/// `count` (at least 2) colours at equal steps from one end of the range to the other, 8 bits a channel. Both maps are
-/// perceptually even and readable for the colour-blind: the diverging "cool to warm" of [K. Moreland, Diverging Color
-/// Maps for Scientific Visualization, ISVC 2009] and "viridis" of [S. van der Walt, N. Smith, matplotlib 1.5, 2015].
+/// Returns `count` (at least 2) colours at equal steps from one end of the range to the other, with 8 bits a channel.
+/// Both maps are perceptually even and readable for the colour-blind: the diverging "cool to warm" of [K. Moreland,
+/// Diverging Color Maps for Scientific Visualization, ISVC 2009] and "viridis" of [S. van der Walt, N. Smith,
+/// matplotlib 1.5, 2015].
 std::vector<glm::u8vec3> transfer_colours(Transfer transfer, std::size_t count);
 
-inline constexpr std::size_t kTransferColours = 256;  ///< as many as pictures and legends use
+inline constexpr std::size_t kTransferColours = 256;  ///< is the number that pictures and legends use
 
-/// What marks a place that is out of tolerance: stripes of these two, which no colour map has.
+/// A place out of tolerance is marked by stripes of these two colours, which no colour map has.
 inline constexpr glm::u8vec3 kOutsideColour{236, 0, 140}, kOutsideStripe{84, 0, 62};
 
 }  // namespace tolvol

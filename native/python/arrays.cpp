@@ -30,7 +30,7 @@ py::array to_array(const py::object& object, const std::string& name, const char
   throw InvalidInput(name + " must be " + expected + ", not " + std::string(py::str(array.dtype())));
 }
 
-/// Any integer array as int64, C order.
+/// Returns any integer array as int64 in C order.
 py::array_t<std::int64_t, py::array::c_style | py::array::forcecast> to_integers(const py::array& array,
                                                                                  const std::string& name) {
   const char kind = array.dtype().kind();
@@ -39,7 +39,7 @@ py::array_t<std::int64_t, py::array::c_style | py::array::forcecast> to_integers
 }
 
 std::uint32_t to_index(std::int64_t value, py::ssize_t row, const std::string& name) {
-  // The highest index is left to kNone.
+  // No index is the highest number, because that is kNone.
   if (value < 0 || value >= std::numeric_limits<std::uint32_t>::max()) {
     std::ostringstream text;
     text << name << "[" << row << "] has the index " << value << ", which is out of range";

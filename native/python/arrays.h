@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// NumPy arrays in and out, checked at the border: dtype, shape, index range. Errors name the argument and what it
-/// should be.
+/// Converts NumPy arrays and checks their dtype, shape and index range. Errors name the argument and the form that it
+/// should have.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -19,23 +19,23 @@ namespace tolvol::python {
 
 namespace py = pybind11;
 
-/// (n, 3) float32 or float64.
+/// Takes an (n, 3) array of float32 or float64.
 struct Vertices {
   std::vector<glm::dvec3> values;
   Storage storage;
 };
 Vertices to_vertices(const py::object& array, const std::string& name);
 
-/// (m, 3) of any integer type; negative values are refused, large ones by the native validation.
+/// Takes an (m, 3) array of any integer type. This refuses negative values; the native validation refuses large values.
 std::vector<glm::uvec3> to_triangles(const py::object& array, const std::string& name);
 
-/// (m, k) of any integer type, k from 1 to 4, flat; `corners` is set to k.
+/// Takes an (m, k) array of any integer type, k from 1 to 4, and returns it flat. Sets `corners` to k.
 std::vector<std::uint32_t> to_faces(const py::object& array, const std::string& name, int& corners);
 
-/// (n,) of any integer type.
+/// Takes an (n,) array of any integer type.
 std::vector<std::int32_t> to_labels(const py::object& array, const std::string& name);
 
-/// (n,) of one type exactly, in one piece.
+/// Takes an (n,) array of exactly one type and returns it in C order.
 template <class T>
 py::array_t<T, py::array::c_style> to_values(const py::object& array, const char* expected) {
   if (!py::isinstance<py::array_t<T>>(array) || py::reinterpret_borrow<py::array>(array).ndim() != 1) {
@@ -44,10 +44,10 @@ py::array_t<T, py::array::c_style> to_values(const py::object& array, const char
   return py::array_t<T, py::array::c_style>(py::reinterpret_borrow<py::array>(array));
 }
 
-/// None becomes 0, one per core. Throws InvalidInput below 1.
+/// Returns 0, which means one for each core, for None. Throws InvalidInput below 1.
 unsigned to_threads(std::optional<int> threads);
 
-/// (4, 4), row-major as NumPy writes it; None is the identity.
+/// Takes a (4, 4) array, row-major as NumPy writes it. None is the identity.
 glm::dmat4 to_matrix(const py::object& array, const std::string& name = "to_world");
 
 py::array from_vertices(const std::vector<glm::dvec3>& values, Storage storage);

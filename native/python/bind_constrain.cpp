@@ -63,7 +63,7 @@ Constrained constrain_arrays(const py::object& before, const py::object& after, 
   return result;
 }
 
-/// (n, 3) float32; copied only where it does not lie in memory as a whole.
+/// An (n, 3) float32 array in C order. to_positions() copies an array only if it is in another order.
 using Positions = py::array_t<float, py::array::c_style>;
 
 Positions to_positions(const py::object& array) {

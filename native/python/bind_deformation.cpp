@@ -16,7 +16,7 @@ namespace {
 
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-/// Any array of numbers as float64 in C order.
+/// Returns any array of numbers as float64 in C order.
 Doubles to_doubles(const py::object& object, const std::string& name, const std::string& expected) {
   if (!py::isinstance<py::array>(object)) throw InvalidInput(name + " must be a NumPy array, " + expected);
   const char kind = py::reinterpret_borrow<py::array>(object).dtype().kind();
@@ -38,7 +38,7 @@ unsigned to_unsigned(const py::handle& object, const std::string& name) {
   return static_cast<unsigned>(value);
 }
 
-/// One value for all axes, or three.
+/// Takes one value for all axes, or three values.
 glm::uvec3 to_three(const py::object& object, const std::string& name) {
   if (!py::isinstance<py::sequence>(object)) return glm::uvec3(to_unsigned(object, name));
   const auto sequence = py::reinterpret_borrow<py::sequence>(object);

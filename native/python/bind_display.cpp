@@ -13,7 +13,7 @@
 namespace tolvol::python {
 namespace {
 
-/// A DisplayTree, and where it is.
+/// A DisplayTree and its frame.
 struct Display {
   DisplayTree native;
   Frame frame;

@@ -45,7 +45,7 @@ GlUnavailable
              R"doc(End the thread that owns the GL context, and free what it holds.
 
 The next call that needs OpenGL starts it again.)doc");
-  // Before the interpreter goes: a driver that is unloaded under a living context crashes.
+  // GL ends before the interpreter does, because a driver that is unloaded under a living context crashes.
   py::module_::import("atexit").attr("register")(module.attr("shutdown"));
 }
 

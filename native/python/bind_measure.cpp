@@ -34,7 +34,7 @@ py::array_t<double> ranges_of(const std::vector<Estimate>& estimates) {
   return ranges;
 }
 
-/// What hausdorff found: each direction, and the larger one of the two.
+/// The result of the Python function hausdorff: both directions, and the larger of the two.
 struct BothWays {
   HausdorffInterval forward, backward;
 };

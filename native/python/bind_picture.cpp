@@ -18,7 +18,7 @@
 namespace tolvol::python {
 
 #ifdef TOLVOL_GL
-/// What the GPU keeps of a volume between two pictures.
+/// The data of a volume that the GPU keeps between two pictures.
 struct Pictures {
   PictureField field;
   std::optional<DistanceRenderer> distance;
@@ -29,7 +29,7 @@ struct Pictures {
 namespace {
 
 using Vector = std::array<double, 3>;
-using Size = std::array<int, 2>;  // width, height
+using Size = std::array<int, 2>;  // holds width and height
 
 glm::dvec3 vector(const Vector& v) { return {v[0], v[1], v[2]}; }
 Vector vector(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
@@ -69,7 +69,7 @@ py::array_t<std::uint8_t> colours(const std::string& transfer) {
 }
 
 #ifdef TOLVOL_GL
-/// The image that draw(pictures) returns. Called without the GIL.
+/// Returns the image of draw(pictures). Must be called without the GIL.
 template <class Draw>
 Image draw_picture(const Volume& volume, unsigned threads, Progress* progress, Draw&& draw) {
   const std::lock_guard lock(volume.drawing);
@@ -82,7 +82,7 @@ Image draw_picture(const Volume& volume, unsigned threads, Progress* progress, D
     }
     return draw(*volume.pictures);
   } catch (const GlUnavailable&) {
-    volume.pictures.reset();  // made anew the next time
+    volume.pictures.reset();  // the next picture makes them anew
     throw;
   }
 }

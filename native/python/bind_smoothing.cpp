@@ -18,7 +18,7 @@ struct Smoothed {
   py::dict report;
 };
 
-/// The place of `value` among the two that there are.
+/// Returns the index of `value` among the two values.
 bool is_second(const std::string& value, const char* name, const char* first, const char* second) {
   if (value != first && value != second) {
     throw InvalidInput(std::string(name) + " must be \"" + first + "\" or \"" + second + "\", not \"" + value + "\"");

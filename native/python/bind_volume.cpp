@@ -67,7 +67,7 @@ CheckResult check(const Volume& volume, const py::object& points, const py::obje
   return {from_vector<std::uint8_t>(verdicts), by->method(), by->renderer()};
 }
 
-/// Of point `i`, in world units; infinity where that is more than a double holds.
+/// Returns the distance of point `i` in world units, or infinity if a double cannot hold it.
 double distance_to(const ToleranceVolume& volume, const StoredSpace& space, const glm::dvec3& stored, std::size_t i) {
   const auto finite = [](const glm::dvec3& p) {
     return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
@@ -79,7 +79,7 @@ double distance_to(const ToleranceVolume& volume, const StoredSpace& space, cons
   if (!finite(stored)) throw InvalidInput(name + " is not finite", "invalid_mesh");
   const glm::dvec3 world = space.world(stored);
   if (!finite(world)) throw InvalidInput(name + " is too far away for double precision under to_world", "too_far");
-  // So much farther than the reference is large that the reference is a point.
+  // The point is so far away that the reference counts as a point.
   const glm::dvec3 away = world - frame.to_world(glm::dvec3(0));
   return std::hypot(away.x, away.y, away.z);
 }

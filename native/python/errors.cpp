@@ -63,7 +63,7 @@ void bind_errors(py::module_& module) {
                                     "There is no OpenGL 4.5 here, or it failed on the way. The message says why.");
   static auto cancelled =
       make(module, "Cancelled", base, "cancelled", "The call was stopped by the method cancel of its Progress.");
-  // Module-local: a second copy of the module in the same process must not translate with the classes of the first.
+  // This is local to the module, because a second copy of it in the same process has classes of its own.
   py::register_local_exception_translator([](std::exception_ptr pointer) {
     try {
       if (pointer) std::rethrow_exception(pointer);
@@ -74,7 +74,7 @@ void bind_errors(py::module_& module) {
     } catch (const GlUnavailable& error) {
       set(gl_unavailable, error);
     } catch (const Cancelled& error) {
-      // After a signal the exception of its handler is set already.
+      // After a signal, the exception of its handler is already set.
       if (!PyErr_Occurred()) set(cancelled, error);
     }
   });

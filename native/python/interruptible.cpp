@@ -6,10 +6,10 @@ namespace {
 
 namespace py = pybind11;
 
-/// Between two looks for signals: taking the GIL may cost its switch interval, 5 ms.
+/// A call looks for signals once in this time, because taking the GIL may cost its switch interval, 5 ms.
 constexpr std::chrono::milliseconds kBetweenLooks(50);
 
-/// Python runs signal handlers on its main thread alone.
+/// Python runs signal handlers only on its main thread.
 bool on_main_thread() {
   const auto threading = py::module_::import("threading");
   return threading.attr("get_ident")().equal(threading.attr("main_thread")().attr("ident"));
@@ -21,13 +21,13 @@ Interruptible::Interruptible(const Progress* progress)
     : call_(progress, on_main_thread() ? std::function<bool()>([this] { return handle_signals(); }) : nullptr),
       released_(PyEval_SaveThread()) {}
 
-// pybind11's guard does the same, by code that may throw.
+// pybind11's guard does the same with code that may throw.
 Interruptible::~Interruptible() {
   PyEval_RestoreThread(released_);
   if (type_) PyErr_Restore(type_, value_, traceback_);
 }
 
-/// Whether a handler has raised an exception.
+/// Tells whether a handler has raised an exception.
 bool Interruptible::handle_signals() {
   const auto now = std::chrono::steady_clock::now();
   if (now - last_ < kBetweenLooks) return false;

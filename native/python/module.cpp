@@ -5,7 +5,7 @@
 
 namespace {
 
-// NumPy 2 moved fields that an older pybind11 reads: it would take wrong sizes without an error.
+// NumPy 2 moved fields that an older pybind11 reads, so that pybind11 would take wrong sizes without an error.
 void refuse_newer_numpy() {
 #if PYBIND11_VERSION_HEX < 0x020C0000
   const auto version = pybind11::module_::import("numpy").attr("__version__").cast<std::string>();
@@ -16,9 +16,8 @@ void refuse_newer_numpy() {
 #endif
 }
 
-// An object that __new__ made without __init__ holds nothing. Where a call needs what it should
-// hold, pybind11 would allocate that and leave it uninitialised; it asks the class for the memory, and gets this
-// answer.
+// An object that __new__ made without __init__ holds nothing. If a call needs its value, pybind11 would allocate the
+// value and leave it uninitialised. pybind11 asks the class for the memory, and this function refuses.
 void* refuse_uninitialised(std::size_t) {
   throw pybind11::type_error(
       "this object was never initialised: make one by calling its class, or the function that "
@@ -38,7 +37,7 @@ void refuse_uninitialised_objects(const pybind11::module_& module) {
 PYBIND11_MODULE(_native, module) {
   refuse_newer_numpy();
   module.doc() = "The compiled part of the package tolvol.";
-  // Classes, errors and signatures take their module's name from here: users know the package alone.
+  // Classes, errors and signatures take their module's name from here, because users know only the package.
   const pybind11::object name = module.attr("__name__");
   module.attr("__name__") = "tolvol";
   module.attr("__version__") = TOLVOL_VERSION;

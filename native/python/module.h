@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// One function per part of the module; each adds its classes and functions to the module.
+/// Each of these functions adds the classes and functions of one part to the module.
 #pragma once
 
 #include <pybind11/pybind11.h>

@@ -12,21 +12,22 @@
 
 namespace tolvol::python {
 
-struct Pictures;  // bind_picture.cpp
+struct Pictures;  // is defined in bind_picture.cpp
 
 struct Volume {
   ToleranceVolume native;
   std::size_t vertices, triangles;
-  double seconds = 0;  ///< to build
+  double seconds = 0;  ///< is the time that building took
 
-  /// Made on first use and kept: those of GL hold textures and buffers. From any thread, without the GIL.
+  /// Makes a check on first use and keeps it, because checks by GL hold textures and buffers. May be called from any
+  /// thread, without the GIL.
   std::shared_ptr<const ToleranceCheck> check(const std::string& method) const {
     const std::lock_guard lock(mutex);
     const auto kept = checks.find(method);
     if (kept != checks.end()) return kept->second;
     return checks[method] = make_check(method, native);
   }
-  /// One whose GL failed is made anew the next time.
+  /// Forgets a check whose GL failed, so that the next use makes it anew.
   void forget(const std::string& method) const {
     const std::lock_guard lock(mutex);
     checks.erase(method);
@@ -34,7 +35,7 @@ struct Volume {
 
   mutable std::mutex mutex{};
   mutable std::map<std::string, std::shared_ptr<const ToleranceCheck>> checks{};
-  mutable std::mutex drawing{};  ///< held while a picture is drawn: one at a time
+  mutable std::mutex drawing{};  ///< is held while a picture is drawn, so that one is drawn at a time
   mutable std::shared_ptr<Pictures> pictures{};
 };
 

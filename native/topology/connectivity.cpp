@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Face by face the kernel looks for each edge around its vertex, and links the boundary anew; here each side knows its
-// mate, and the boundary is linked once.
+// When faces are added one by one, the kernel searches each edge around its vertex and links the boundary anew. Here
+// each side knows its mate, and the boundary is linked once.
 #include "topology/connectivity.h"
 
 #include <atomic>
@@ -75,7 +75,7 @@ void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, std::s
     if (mates[s] != kNone) continue;
     mesh.set_next_halfedge_handle(mesh.opposite_halfedge_handle(halfedge[s]), mesh.halfedge_handle(vertex(from(s))));
   }
-  // A walk around a vertex sees one fan of faces: no vertex may have another.
+  // A walk around a vertex sees one fan of faces, and no vertex may have a second fan.
   std::atomic<std::size_t> seen = 0;
   team.run(vertices, 4096, [&](std::size_t begin, std::size_t end) {
     std::size_t here = 0;
@@ -96,8 +96,8 @@ void collapse(OpenMesh::TriConnectivity& mesh, OpenMesh::HalfedgeHandle h) {
   const auto left = mesh.to_vertex_handle(hn), right = mesh.to_vertex_handle(on);
   const bool has_left = mesh.face_handle(h).is_valid(), has_right = mesh.face_handle(o).is_valid();
 
-  // A vertex on the boundary names the one boundary halfedge that leaves it; any other names the one that the kernel's
-  // own collapse ends with.
+  // A vertex on the boundary names the one boundary halfedge that leaves it. Any other vertex names the halfedge with
+  // which the kernel's own collapse ends.
   const auto on_boundary = [&](auto vertex) { return mesh.is_boundary(mesh.halfedge_handle(vertex)); };
   HalfedgeHandle out = on_boundary(kept)   ? mesh.halfedge_handle(kept)
                        : on_boundary(gone) ? mesh.halfedge_handle(gone)
@@ -125,7 +125,7 @@ void collapse(OpenMesh::TriConnectivity& mesh, OpenMesh::HalfedgeHandle h) {
   mesh.set_isolated(gone);
   mesh.status(gone).set_deleted(true);
 
-  // What is left of a triangle beside the edge are two sides between the same vertices: one of these edges goes.
+  // A triangle beside the edge becomes two sides between the same vertices, and one of their edges is removed.
   const auto remove_triangle = [&](HalfedgeHandle goes, HalfedgeHandle stays) {
     const auto triangle = mesh.face_handle(goes);
     const HalfedgeHandle beyond = mesh.opposite_halfedge_handle(goes);

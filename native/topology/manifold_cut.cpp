@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The "local" method of Guéziec et al.: mark the edges to cut, then let the corners that stay connected through uncut
-// edges, a fan each, form the vertices. Deviations: edges are matched in two passes (index, then position), orientation
-// is made consistent on the way, and triangles are cut off whole in the rare case that two distinct edges would end in
-// the same two vertices.
+// This is the "local" method of Guéziec et al.: mark the edges to cut, then let each fan of corners that stay connected
+// through uncut edges form a vertex. It deviates in three ways. Edges are matched in two passes, by index and then by
+// position. Orientation is made consistent on the way. Triangles are cut off whole in the rare case that two distinct
+// edges would end in the same two vertices.
 #include "topology/manifold_cut.h"
 
 #include <algorithm>
@@ -57,7 +57,7 @@ class Cutter {
   }
 
  private:
-  /// The weld representative of a corner's vertex, and the vertex itself. Corners in the input's order.
+  /// Return the weld representative of a corner's vertex, and the vertex itself. Corners are in the input's order.
   std::uint32_t welded(Side corner) const { return weld_[vertex(corner)]; }
   std::uint32_t vertex(Side corner) const { return input_[triangles_[corner / 3]][corner % 3]; }
 
@@ -88,7 +88,7 @@ class Cutter {
         degenerate.push_back(i);
         continue;
       }
-      if (renamed_) {  // else all that this would find is the same three vertices
+      if (renamed_) {  // otherwise this would find only the same three vertices
         std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
         turned.push_back({t, i});
       }
@@ -96,8 +96,8 @@ class Cutter {
       std::sort(t.begin(), t.end());
       same.push_back({t, i});
     }
-    // Positions that turn the same way, or the same three vertices either way: Blender, too, holds only one such face.
-    // The two sides of a sheet that has vertices of its own for each stay two.
+    // Two triangles are equal if their positions turn the same way, or if they have the same three vertices. Blender,
+    // too, holds only one such face. The two sides of a sheet stay two if each has vertices of its own.
     std::vector<std::uint32_t> first(input_.size(), kNone);
     find_first(turned, first);
     find_first(same, first);
@@ -113,7 +113,7 @@ class Cutter {
   }
 
   void sort_out_degenerate(const std::vector<std::uint32_t>& degenerate) {
-    std::unordered_map<std::uint64_t, std::uint32_t> holder;  // an edge, or a point as (p, p): a triangle that has it
+    std::unordered_map<std::uint64_t, std::uint32_t> holder;  // maps an edge, or a point as (p, p), to a triangle
     for (const std::uint32_t i : triangles_) {
       poll_at(i);
       for (int k = 0; k < 3; ++k) {
@@ -134,8 +134,8 @@ class Cutter {
     }
   }
 
-  /// Calls visit() once for all sides that have the same two ends, which it gets in ascending order. end_of(corner) is
-  /// the vertex there, a number below `vertices`.
+  /// Calls visit() once for each set of sides with the same two ends, and hands it the sides in ascending order.
+  /// end_of(corner) is the vertex of a corner, a number below `vertices`.
   template <class EndOf, class Visit>
   void by_ends(const std::vector<Side>& sides, std::size_t vertices, EndOf&& end_of, Visit&& visit) const {
     using Keyed = std::pair<std::uint64_t, Side>;
@@ -158,7 +158,7 @@ class Cutter {
 
   void join_sides() {
     for (const bool by_position : {false, true}) {
-      if (by_position && !renamed_) return;  // it would find what it has found
+      if (by_position && !renamed_) return;  // positions would give the same sides as indices
       std::vector<Side> open;
       for (Side s = 0; s < mate_.size(); ++s) {
         if (mate_[s] == kNone && !is_cut_[s]) open.push_back(s);
@@ -176,7 +176,7 @@ class Cutter {
     }
   }
 
-  /// Whether two sides run against each other, as those of neighbours should.
+  /// Tells whether two sides run against each other, as those of neighbours should.
   bool opposed(Side s, Side other) const { return welded(s) == welded(next_corner(other)); }
 
   void cut_side(Side s) {
@@ -211,7 +211,7 @@ class Cutter {
             flipped += flip;
             queue.push_back(other / 3);
           } else if (flip_[other / 3] != flip) {
-            cut_side(s);  // one-sided, like a Möbius strip
+            cut_side(s);  // the surface is one-sided, like a Möbius strip
           }
         }
       }
@@ -219,8 +219,8 @@ class Cutter {
     }
   }
 
-  /// Corners connected through uncut edges form the vertices. False when two different edges ended in the same two
-  /// vertices: their triangles were cut off, and the vertices must be formed anew.
+  /// Forms the vertices of corners that are connected through uncut edges. Returns false if two different edges ended
+  /// in the same two vertices: their triangles were cut off, and the vertices must be formed anew.
   bool form_vertices() {
     corner_vertex_.assign(mate_.size(), kNone);
     std::uint32_t count = 0;
@@ -231,7 +231,7 @@ class Cutter {
       for (const bool forth : {true, false}) walk(s, forth, count);
       ++count;
     }
-    // Vertices that stay what they were have no edges but those that join_sides() saw.
+    // Vertices that did not change have only edges that join_sides() saw.
     if (!renamed_ && cut_.cut_edges == 0) return true;
 
     std::vector<Side> all(mate_.size());
@@ -252,8 +252,8 @@ class Cutter {
     return offenders.empty();
   }
 
-  /// From triangle to triangle around a vertex, leaving each through the side that begins at its corner (`forth`) or
-  /// the one that ends there.
+  /// Walks from triangle to triangle around a vertex. It leaves each triangle through the side that begins at its
+  /// corner if `forth`, or else through the side that ends there.
   void walk(Side corner, bool forth, std::uint32_t name) {
     for (;;) {
       const Side through = forth ? corner : previous_corner(corner), other = mate_[through];
@@ -267,7 +267,7 @@ class Cutter {
 
   void write() {
     cut_.input_vertex.assign(weld_.size(), kNone);
-    std::vector<bool> several(weld_.size(), false);  // input vertices that became several
+    std::vector<bool> several(weld_.size(), false);  // tells which input vertices became several
     for (Side s = 0; s < mate_.size(); ++s) {
       poll_at(s);
       const std::uint32_t v = corner_vertex_[s];
@@ -278,7 +278,7 @@ class Cutter {
       if (of_input == kNone) of_input = v;
     }
     cut_.cause.assign(cut_.vertex_input.size(), CutCause::none);
-    std::unordered_set<std::uint32_t> tied;  // positions (weld representatives) of degenerate triangles set aside
+    std::unordered_set<std::uint32_t> tied;  // has the weld representatives of degenerate triangles set aside
     for (const std::uint32_t i : cut_.aside) {
       for (int k = 0; k < 3; ++k) tied.insert(weld_[input_[i][k]]);
     }
@@ -294,7 +294,7 @@ class Cutter {
     for (Side s = 0; s < mate_.size() && !tied.empty(); ++s) {
       if (tied.contains(welded(s))) cut_.cause[corner_vertex_[s]] = CutCause::degenerate;
     }
-    // Turned over, the last side of a triangle is its first.
+    // The last side of a triangle is the first if it is turned over.
     const auto turned = [&](Side s) { return flip_[s / 3] ? s - s % 3 + 2 - s % 3 : s; };
     cut_.mates.resize(mate_.size());
     for (Side s = 0; s < mate_.size(); ++s) cut_.mates[turned(s)] = mate_[s] == kNone ? kNone : turned(mate_[s]);
@@ -317,7 +317,8 @@ class Cutter {
     join_slots();
   }
 
-  /// Triangles set aside need vertices that outlive the decimation: tied ones of the manifold where there are any.
+  /// Triangles set aside need vertices that outlive the decimation. These are tied vertices of the manifold if there
+  /// are.
   void add_aside_vertices() {
     std::unordered_map<std::uint32_t, std::uint32_t> at_position;
     for (std::uint32_t v = 0; v < cut_.vertex_input.size(); ++v) {
@@ -362,13 +363,13 @@ class Cutter {
   Team& team_;
   std::span<const glm::uvec3> input_;
   std::vector<std::uint32_t> weld_;
-  bool renamed_ = false;                      // a vertex that is used is not its own representative
-  std::vector<std::uint32_t> triangles_;      // input triangles that go into the manifold
-  std::vector<Side> mate_;                    // per side: the side joined to it
-  std::vector<bool> is_cut_;                  // per side: cut, so that its vertices are tied
-  bool oriented_ = true;                      // all sides were opposed when they were joined
-  std::vector<bool> flip_;                    // per triangle: joined sides are opposed once these are turned over
-  std::vector<std::uint32_t> corner_vertex_;  // per corner, numbered in the order of their first ones
+  bool renamed_ = false;                      // tells whether some used vertex is not its own representative
+  std::vector<std::uint32_t> triangles_;      // are the input triangles that go into the manifold
+  std::vector<Side> mate_;                    // holds for each side the side joined to it
+  std::vector<bool> is_cut_;                  // tells for each side whether it is cut, so that its vertices are tied
+  bool oriented_ = true;                      // tells whether all sides were opposed when they were joined
+  std::vector<bool> flip_;                    // marks triangles to turn over, so that joined sides are opposed
+  std::vector<std::uint32_t> corner_vertex_;  // is the vertex of each corner, numbered by their first corners
   CutMesh cut_;
 };
 

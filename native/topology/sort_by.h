@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Sorting what a mesh has few of at each vertex: sides, triangles.
+/// Sorts things of which a mesh has few at each vertex, such as sides and triangles.
 #pragma once
 
 #include <algorithm>
@@ -13,9 +13,9 @@
 
 namespace tolvol {
 
-/// Puts things in the order of what `before` compares, which must begin with first(thing), a number below `groups`: one
-/// pass by that, and short sorts of those that share it, because a mesh has few sides or triangles that do. Each thread
-/// looks at all things and places those of a range of groups, about as many as the others.
+/// Sorts things by `before`, which must compare first(thing), a number below `groups`, before anything else. One pass
+/// sorts by this number, and short sorts order the few things that share it. Each thread looks at all things and places
+/// those of a range of groups, about as many as the other threads.
 template <class T, class First, class Before>
 void sort_by(std::vector<T>& things, std::size_t groups, Team& team, First&& first, Before&& before) {
   if (things.size() < 2) return;
@@ -38,7 +38,7 @@ void sort_by(std::vector<T>& things, std::size_t groups, Team& team, First&& fir
   }
   std::vector<T> sorted(things.size());
   in_ranges([&](std::size_t lower, std::size_t upper) {
-    if (lower == upper) return;  // end[lower] is another's
+    if (lower == upper) return;  // end[lower] belongs to another thread
     const auto at = [&](std::uint32_t i) { return sorted.begin() + static_cast<std::ptrdiff_t>(i); };
     std::uint32_t begin = end[lower];
     for (const T& t : things) {

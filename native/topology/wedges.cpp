@@ -11,7 +11,7 @@ namespace tolvol {
 
 std::vector<std::uint32_t> wedge_labels(std::span<const glm::uvec3> triangles, std::span<const float> values,
                                         std::size_t width) {
-  // Key: the vertex and the values, as bytes; -0 and 0 are one value.
+  // The key is the vertex and the values, as bytes. -0 and 0 are one value.
   std::vector<float> keys((width + 1) * triangles.size() * 3);
   std::unordered_map<std::string_view, std::uint32_t> first;
   first.reserve(triangles.size() * 3);
@@ -31,7 +31,7 @@ std::vector<std::uint32_t> wedge_labels(std::span<const glm::uvec3> triangles, s
 std::vector<std::uint32_t> island_labels(std::span<const glm::uvec3> triangles, std::span<const glm::uvec3> wedges) {
   struct Side {
     std::uint64_t edge;
-    std::uint32_t triangle, low, high;  // wedges at the lower and the higher vertex
+    std::uint32_t triangle, low, high;  // low and high are the wedges at the lower and the higher vertex
   };
   std::vector<Side> sides;
   sides.reserve(3 * triangles.size());
