@@ -8,13 +8,13 @@
 set -eu
 cd "$(dirname "$0")"
 
-packages="cmake ninja-build pkg-config g++ python3-dev pybind11-dev python3-numpy python3-matplotlib libopenmesh-dev libglm-dev libepoxy-dev libgtest-dev
+packages="cmake ninja-build pkg-config g++ python3-dev pybind11-dev python3-numpy python3-matplotlib libopenmesh-dev libglm-dev libcgal-dev libepoxy-dev libgtest-dev
   libegl1 libgl1 libgl1-mesa-dri blender"
 targets=extension
 case "${1-}" in
 "") ;;
 --tests)
-  packages="$packages python3-pytest python3-venv libcgal-dev ccache clang-format
+  packages="$packages python3-pytest python3-venv ccache clang-format
     clang-tidy xvfb xdotool imagemagick"
   targets="all extension"
   ;;

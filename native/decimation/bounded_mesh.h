@@ -15,6 +15,7 @@
 #include "base/parallel.h"
 #include "decimation/bounds.h"
 #include "decimation/occupied.h"
+#include "topology/new_crossings.h"
 
 namespace tolvol {
 
@@ -59,6 +60,8 @@ class BoundedMesh {
   /// The vertex that a vertex was merged into (itself when it survives).
   std::uint32_t survivor(std::uint32_t vertex) const;
   const glm::uvec3& triangle(std::uint32_t triangle) const { return triangles_[triangle]; }
+  /// The triangles, those that are gone among them, and the stored positions. Valid as long as the mesh.
+  MeshView stored_mesh() const { return {triangles_, stored_}; }
   const glm::dvec3& position(std::uint32_t vertex) const { return positions_[vertex]; }
   const glm::dvec3& stored(std::uint32_t vertex) const { return stored_[vertex]; }
   VertexPosition vertex_position(std::uint32_t vertex) const { return {stored_[vertex], positions_[vertex]}; }

@@ -14,7 +14,8 @@ bool is_finite(const VertexPosition& target) { return std::isfinite(glm::dot(tar
 
 }  // namespace
 
-ChangeTrial::ChangeTrial(const BoundedMesh& mesh, Proof proof) : change_(mesh), proof_(proof) {
+ChangeTrial::ChangeTrial(const BoundedMesh& mesh, Surroundings* around, Proof proof)
+    : change_(mesh), around_(around), proof_(proof) {
   if (!mesh.bounds()) return;
   bounds_ = proof == Proof::later ? mesh.certified()->trial_on_trust() : mesh.bounds()->trial();
 }
@@ -22,6 +23,7 @@ ChangeTrial::ChangeTrial(const BoundedMesh& mesh, Proof proof) : change_(mesh), 
 void ChangeTrial::begin() {
   prepared_ = met_another_ = false;
   if (bounds_) bounds_->begin();
+  crossings_.crossings.begin();
 }
 
 bool ChangeTrial::prepare_collapse(Halfedge h, const VertexPosition& target) {
@@ -41,11 +43,13 @@ bool ChangeTrial::prepare_flip(Edge e) {
 
 ChangeTrial::Outcome ChangeTrial::try_collapse(Halfedge h, const VertexPosition& target) {
   if (!is_finite(target)) return Outcome::refused;
+  if (around_ && !around_->reach(target)) return Outcome::impossible;
   return prepare_collapse(h, target) ? check() : Outcome::impossible;
 }
 
 ChangeTrial::Outcome ChangeTrial::try_relocate(std::uint32_t vertex, const VertexPosition& target) {
   if (!is_finite(target)) return Outcome::refused;
+  if (around_ && !around_->reach(target)) return Outcome::impossible;
   return prepare_relocate(vertex, target) ? check() : Outcome::impossible;
 }
 
@@ -56,14 +60,17 @@ ChangeTrial::Outcome ChangeTrial::check() {
     met_another_ = true;
     return Outcome::refused;
   }
-  const bool kept = !change_.folds_over() && (!bounds_ || bounds_->accepts(change_));
+  const bool kept = !change_.folds_over() && (!bounds_ || bounds_->accepts(change_)) &&
+                    (!around_ || proof_ == Proof::later || around_->allow(change_, crossings_));
   return kept ? Outcome::possible : Outcome::refused;
 }
 
-void ChangeTrial::carry_out(BoundedMesh& mesh) {
+Box ChangeTrial::carry_out(BoundedMesh& mesh) {
   assert(&mesh == &change_.mesh());
   if (bounds_) bounds_->commit(change_);
+  const Box changed = around_ && proof_ == Proof::now ? around_->follow(change_, crossings_) : Box();
   mesh.apply(change_);
+  return changed;
 }
 
 }  // namespace tolvol

@@ -11,6 +11,7 @@
 #include "decimation/bounded_mesh.h"
 #include "decimation/bounds.h"
 #include "decimation/change.h"
+#include "decimation/surroundings.h"
 
 namespace tolvol {
 
@@ -26,8 +27,9 @@ class ChangeTrial {
   /// vertex is.
   enum class Proof { now, later };
 
-  /// Keeps references to `mesh` and its bounds. Proofs of certificates alone can be left for later.
-  explicit ChangeTrial(const BoundedMesh& mesh, Proof proof = Proof::now);
+  /// Keeps references to `mesh` and its bounds, and to `around`, which is null where crossings are allowed. Proofs of
+  /// certificates alone can be left for later, and then crossings are.
+  explicit ChangeTrial(const BoundedMesh& mesh, Surroundings* around, Proof proof = Proof::now);
 
   /// Starts a series of tries around one place. What it finds depends on nothing before.
   void begin();
@@ -52,11 +54,17 @@ class ChangeTrial {
   /// Parts of the reference's pieces that the series of tries has looked at.
   std::size_t looked_at() const { return bounds_ ? bounds_->looked_at() : 0; }
 
-  /// Carries out the change on `mesh`, on which check() found it possible and which is as it was then.
-  void carry_out(BoundedMesh& mesh);
+  /// What the series of tries found of crossings depends on no face outside this box of stored positions.
+  const Box& read() const { return crossings_.crossings.read(); }
+
+  /// Carries out the change on `mesh`, on which check() found it possible and which is as it was then. Returns a box
+  /// of stored positions around all faces that it changes. The box is empty where crossings were not looked for.
+  Box carry_out(BoundedMesh& mesh);
 
  private:
   Change change_;
+  Surroundings* around_;  ///< Null where crossings are allowed.
+  Surroundings::Trial crossings_;
   Proof proof_;
   bool prepared_ = false;  ///< Whether a change of this series was prepared.
   bool met_another_ = false;

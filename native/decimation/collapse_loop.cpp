@@ -33,18 +33,25 @@ CollapseLoop::Shared::Shared(EdgeCollapse& c)
       stamps(c.mesh().connectivity().n_edges(), 0),
       refused(stamps.size()) {}
 
-CollapseLoop::CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t region, DeferredProof* later)
+CollapseLoop::CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t region, Surroundings* around,
+                           DeferredProof* later)
     : shared_(shared),
       collapse_(shared.collapse),
       mesh_(collapse_.mesh()),
       regions_(&regions),
       region_(region),
+      around_(around),
       later_(later),
       queue_(shared.stamps),
       tried_(1) {}
 
-CollapseLoop::CollapseLoop(Shared& shared, Team& team)
-    : shared_(shared), collapse_(shared.collapse), mesh_(collapse_.mesh()), queue_(shared.stamps), tried_(1) {
+CollapseLoop::CollapseLoop(Shared& shared, Surroundings* around, Team& team)
+    : shared_(shared),
+      collapse_(shared.collapse),
+      mesh_(collapse_.mesh()),
+      around_(around),
+      queue_(shared.stamps),
+      tried_(1) {
   // A try looks up copies, which are beyond the faces around its edge.
   if (team.alone() || mesh_.has_copies()) return;
   // Edges of the last batch, too, may still be waiting for their turn.
@@ -134,13 +141,14 @@ CollapseLoop::Tried* CollapseLoop::found(std::uint32_t edge) {
   const auto slot = ahead_.found(edge, std::array{mesh_.from(h), mesh_.to(h)});
   if (!slot) return nullptr;
   Tried& tried = tried_[*slot];
+  if (ahead_.changed_since(*slot, tried.read)) return nullptr;
   return tried.met_another || (tried.attempt && tried.attempt->trial.met_another()) ? nullptr : &tried;
 }
 
 std::unique_ptr<CollapseLoop::Attempt> CollapseLoop::take_attempt() {
   const std::lock_guard lock(idle_mutex_);
   if (idle_.empty())
-    return std::make_unique<Attempt>(mesh_, later_ ? ChangeTrial::Proof::later : ChangeTrial::Proof::now);
+    return std::make_unique<Attempt>(mesh_, around_, later_ ? ChangeTrial::Proof::later : ChangeTrial::Proof::now);
   std::unique_ptr<Attempt> last = std::move(idle_.back());
   idle_.pop_back();
   return last;
@@ -156,7 +164,7 @@ void CollapseLoop::try_now(std::uint32_t edge, Tried& tried) {
   give_back(std::move(tried.attempt));  // The attempt of an edge whose turn did not come.
   std::unique_ptr<Attempt> attempt = take_attempt();
   collapse_.attempt(edge, *attempt);
-  tried = {attempt->outcome, attempt->trial.looked_at(), attempt->trial.met_another(), nullptr};
+  tried = {attempt->outcome, attempt->trial.looked_at(), attempt->trial.met_another(), attempt->trial.read()};
   if (tried.outcome == EdgeCollapse::Outcome::possible) {
     tried.attempt = std::move(attempt);
   } else {
@@ -220,7 +228,8 @@ void CollapseLoop::carry_out(std::uint32_t edge, Tried& tried) {
         ring_.push_back(static_cast<std::uint32_t>(near.idx()));
       }
     }
-    const std::uint32_t kept = collapse_.carry_out(*tried.attempt);
+    const auto [kept, changed] = collapse_.carry_out(*tried.attempt);
+    ahead_.note_change(changed);
     const bool stayed = mesh_.position(kept) == before && !mesh_.joined(kept);
     if (stayed && mesh_.faces_around(kept) > kGreatMany) {
       renew_ring(kept);

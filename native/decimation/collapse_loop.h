@@ -33,10 +33,12 @@ class CollapseLoop {
     std::vector<std::uint32_t> stamps;       ///< For each edge, the stamp of the queues.
     std::vector<std::atomic<bool>> refused;  ///< Whether the edge waits for its neighbourhood to change.
   };
-  /// A loop over one region. If `later` is not null, collapses are noted there instead of being proved.
-  CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t region, DeferredProof* later);
+  /// A loop over one region. If `later` is not null, collapses are noted there instead of being proved. `around` is
+  /// null where crossings are allowed.
+  CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t region, Surroundings* around,
+               DeferredProof* later);
   /// A loop over the whole mesh, on the threads of `team`.
-  CollapseLoop(Shared& shared, Team& team);
+  CollapseLoop(Shared& shared, Surroundings* around, Team& team);
 
   /// Adds an edge and its cost, before run().
   void add(std::uint32_t edge, double cost);
@@ -54,9 +56,10 @@ class CollapseLoop {
   /// The outcome of trying an edge.
   struct Tried {
     EdgeCollapse::Outcome outcome = EdgeCollapse::Outcome::impossible;
-    std::size_t looked_at = 0;         ///< The number of parts of the reference's pieces that were looked at.
-    bool met_another = false;          ///< Whether a vertex was in the way that may have gone since.
-    std::unique_ptr<Attempt> attempt;  ///< Null unless the collapse is possible.
+    std::size_t looked_at = 0;           ///< The number of parts of the reference's pieces that were looked at.
+    bool met_another = false;            ///< Whether a vertex was in the way that may have gone since.
+    Box read{};                          ///< What was found of crossings depends on the faces in this box.
+    std::unique_ptr<Attempt> attempt{};  ///< Null unless the collapse is possible.
   };
 
   /// The tries at a vertex with many faces around it; each costs as much as there are faces.
@@ -90,6 +93,7 @@ class CollapseLoop {
   const BoundedMesh& mesh_;
   const Regions* regions_ = nullptr;  ///< Null for the whole mesh.
   std::uint32_t region_ = 0;
+  Surroundings* around_ = nullptr;
   DeferredProof* later_ = nullptr;
   CollapseQueue queue_;
   TriesAhead ahead_;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <iterator>
+#include <optional>
 #include <vector>
 
 #include "base/call.h"
@@ -15,6 +16,7 @@
 #include "decimation/deferred_proof.h"
 #include "decimation/edge_collapse.h"
 #include "decimation/regions.h"
+#include "decimation/surroundings.h"
 
 namespace tolvol {
 namespace {
@@ -37,8 +39,9 @@ constexpr double kTrustedCost = 1;
 
 class Rounds {
  public:
-  Rounds(BoundedMesh& mesh, Team& team, Progress* progress)
+  Rounds(BoundedMesh& mesh, NewCrossings* crossings, Team& team, Progress* progress)
       : mesh_(mesh),
+        crossings_(crossings),
         team_(team),
         collapse_(mesh),
         shared_(collapse_),
@@ -57,22 +60,26 @@ class Rounds {
       price();
       const double limit = std::max(cost_at(kRoundShare), on_trust ? trusted_cost() : 0);
       // The two shares take turns, so that the rims lie elsewhere in the next round.
-      const Regions parts =
-          regions(mesh_, std::min(kMostVertices, vertices / kLeastRegions), round % 2 == 0 ? 0.5 : 0.35, team_);
+      const Regions parts(mesh_, std::min(kMostVertices, vertices / kLeastRegions), round % 2 == 0 ? 0.5 : 0.35,
+                          crossings_ != nullptr, team_);
       const std::vector<Members> members = members_of(parts);
       std::atomic<std::size_t> taken_back = 0;
-      team_.run(parts.count, 1, [&](std::size_t i, std::size_t) {
+      team_.run(parts.count(), 1, [&](std::size_t i, std::size_t) {
+        const auto region = static_cast<std::uint32_t>(i);
+        std::optional<Surroundings> surroundings;
+        if (crossings_) surroundings.emplace(mesh_, *crossings_, members[i].met(), parts.cell(region));
+        Surroundings* const around = surroundings ? &*surroundings : nullptr;
         const auto work = [&](DeferredProof* later) {
-          CollapseLoop loop(shared_, parts, static_cast<std::uint32_t>(i), later);
+          CollapseLoop loop(shared_, parts, region, around, later);
           for (const std::uint32_t e : members[i].edges) loop.add(e, costs_[e]);
           loop.run({limit, 0}, progress_);
         };
         if (on_trust) {
-          DeferredProof later(collapse_, mesh_, members[i].vertices, members[i].faces, places_);
+          DeferredProof later(collapse_, mesh_, crossings_, members[i].vertices, members[i].faces, places_);
           if (later.possible()) {
             try {
               work(&later);
-              if (later.holds()) return;
+              if (later.holds(around)) return;
             } catch (const Cancelled&) {
               later.take_back();
               throw;
@@ -81,9 +88,10 @@ class Rounds {
             ++taken_back;
           }
         }
+        if (around) around->renew();
         work(nullptr);
       });
-      on_trust = on_trust && static_cast<double>(taken_back) <= kMostTakenBack * static_cast<double>(parts.count);
+      on_trust = on_trust && static_cast<double>(taken_back) <= kMostTakenBack * static_cast<double>(parts.count());
       const double left = static_cast<double>(mesh_.triangle_count()) / static_cast<double>(triangles);
       if (left > 1 - kLeastGain) return;
     }
@@ -92,7 +100,9 @@ class Rounds {
   void whole(std::size_t target) {
     if (mesh_.certified()) mesh_.keep_apart();
     price();
-    CollapseLoop loop(shared_, team_);
+    std::optional<Surroundings> around;
+    if (crossings_) around.emplace(mesh_, *crossings_, team_);
+    CollapseLoop loop(shared_, around ? &*around : nullptr, team_);
     for (std::uint32_t e = 0; e < costs_.size(); ++e) {
       poll_at(e);
       loop.add(e, costs_[e]);
@@ -132,29 +142,50 @@ class Rounds {
     std::vector<std::uint32_t> edges;  ///< Edges that can collapse.
     std::vector<std::uint32_t> vertices;
     std::vector<std::uint32_t> faces;  ///< The faces around the vertices.
+    /// The faces of no region that meet the region's cell, where crossings are looked for.
+    std::vector<std::uint32_t> still;
+
+    /// All faces that a change of the region may come to meet.
+    std::vector<std::uint32_t> met() const {
+      std::vector<std::uint32_t> all;
+      std::ranges::merge(faces, still, std::back_inserter(all));
+      return all;
+    }
   };
 
   std::vector<Members> members_of(const Regions& parts) const {
-    std::vector<Members> out(parts.count);
+    std::vector<Members> out(parts.count());
     for (std::uint32_t e = 0; e < costs_.size(); ++e) {
       poll_at(e);
       if (!(costs_[e] < EdgeCollapse::kNever)) continue;
       const std::uint32_t part = parts.of_edge(mesh_, e);
       if (part != Regions::kNone) out[part].edges.push_back(e);
     }
-    for (std::uint32_t v = 0; v < parts.of_vertex.size(); ++v) {
-      if (parts.of_vertex[v] != Regions::kNone) out[parts.of_vertex[v]].vertices.push_back(v);
+    for (std::uint32_t v = 0; v < mesh_.connectivity().n_vertices(); ++v) {
+      if (parts.of_vertex(v) != Regions::kNone) out[parts.of_vertex(v)].vertices.push_back(v);
     }
     for (std::uint32_t f = 0; f < mesh_.connectivity().n_faces(); ++f) {
       if (!mesh_.alive(f)) continue;
       const glm::uvec3& t = mesh_.triangle(f);
-      const std::uint32_t part = std::min({parts.of_vertex[t.x], parts.of_vertex[t.y], parts.of_vertex[t.z]});
-      if (part != Regions::kNone) out[part].faces.push_back(f);
+      const std::uint32_t part = std::min({parts.of_vertex(t.x), parts.of_vertex(t.y), parts.of_vertex(t.z)});
+      if (part != Regions::kNone) {
+        out[part].faces.push_back(f);
+      } else if (crossings_) {
+        add_still(f, parts, out);
+      }
     }
+    const auto count = static_cast<std::uint32_t>(mesh_.connectivity().n_faces());
+    for (std::uint32_t f = count; crossings_ && f < crossings_->face_count(); ++f) add_still(f, parts, out);
     return out;
   }
 
+  void add_still(std::uint32_t face, const Regions& parts, std::vector<Members>& out) const {
+    parts.for_each_meeting(box_of(crossings_->corners(face)),
+                           [&](std::uint32_t part) { out[part].still.push_back(face); });
+  }
+
   BoundedMesh& mesh_;
+  NewCrossings* crossings_;  ///< Null where crossings are allowed.
   Team& team_;
   EdgeCollapse collapse_;
   CollapseLoop::Shared shared_;
@@ -165,8 +196,8 @@ class Rounds {
 
 }  // namespace
 
-void collapse_edges(BoundedMesh& mesh, std::size_t target, Team& team, Progress* progress) {
-  Rounds rounds(mesh, team, progress);
+void collapse_edges(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target, Team& team, Progress* progress) {
+  Rounds rounds(mesh, crossings, team, progress);
   if (target == 0 && mesh.certified()) rounds.by_regions();
   rounds.whole(target);
 }

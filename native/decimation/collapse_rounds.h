@@ -12,12 +12,14 @@
 #include "base/parallel.h"
 #include "base/progress.h"
 #include "decimation/bounded_mesh.h"
+#include "topology/new_crossings.h"
 
 namespace tolvol {
 
 /// Collapses edges until none can collapse or `target` triangles are left. With a target other than 0 there are no
 /// rounds, because a target asks for the order of the whole mesh; nor are there rounds without certified bounds. O(n
 /// log n) without bounds. Throws Cancelled, and then leaves a mesh that is proved, with which the caller may go on.
-void collapse_edges(BoundedMesh& mesh, std::size_t target, Team& team, Progress* progress);
+/// `crossings` is null where crossings are allowed.
+void collapse_edges(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target, Team& team, Progress* progress);
 
 }  // namespace tolvol

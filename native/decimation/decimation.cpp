@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 
 #include "base/call.h"
 #include "base/parallel.h"
@@ -25,11 +26,16 @@ class Decimation {
 
   DecimationResult run() {
     BoundedMesh mesh(input_.take_mesh(), input_.bounds(), team_);
+    std::optional<NewCrossings> crossings;
+    if (mesh.certified() && options_.crossings == DecimationOptions::Crossings::keep_out) {
+      crossings.emplace(input_.stored_mesh(), mesh.stored_mesh(), input_.faces_aside());
+    }
+    NewCrossings* const kept_out = crossings ? &*crossings : nullptr;
     const std::size_t apart = input_.cut().aside.size();
     const std::size_t target = options_.target_triangles > apart ? options_.target_triangles - apart : 0;
-    collapse(mesh, target);
+    collapse(mesh, kept_out, target);
     if (mesh.certified() && options_.effort == DecimationOptions::Effort::thorough && !result_.stopped_at_time) {
-      Refinement(mesh, team_)
+      Refinement(mesh, kept_out, team_)
           .run(
               target, [&] { return ended_early(); }, options_.progress);
     }
@@ -46,10 +52,10 @@ class Decimation {
   }
 
   /// Collapses edges until none can be collapsed or the time is over. A try that is under way then is not carried out.
-  void collapse(BoundedMesh& mesh, std::size_t target) {
+  void collapse(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target) {
     const Call limited(nullptr, [this] { return out_of_time(); });
     try {
-      collapse_edges(mesh, target, team_, options_.progress);
+      collapse_edges(mesh, crossings, target, team_, options_.progress);
     } catch (const Cancelled&) {
       if (!limited.stopped()) throw;
       result_.stopped_at_time = true;

@@ -19,11 +19,15 @@ struct DecimationOptions {
   enum class Placement { optimal, subset };
   enum class Outside { error, keep };
   enum class Effort { fast, thorough };
+  enum class Crossings { keep_out, allow };
 
   /// optimal leaves the fewest triangles; subset lets every surviving vertex be an original one.
   Placement placement = Placement::optimal;
-  bool two_sided = true;             ///< Also keeps the whole reference within the tolerance of the result.
-  Effort effort = Effort::fast;      ///< See decimate() for what each costs.
+  bool two_sided = true;         ///< Also keeps the whole reference within the tolerance of the result.
+  Effort effort = Effort::fast;  ///< See decimate() for what each costs.
+  /// keep_out: two faces of the result may cross only where input faces that they stand for crossed
+  /// (topology/new_crossings.h). Ignored without a volume and where a baseline decides.
+  Crossings crossings = Crossings::allow;
   double max_seconds = 0;            ///< It stops then with what is proved; 0 is no limit.
   std::size_t target_triangles = 0;  ///< It stops at so many; 0 is as few as the tolerance allows.
   /// For each input vertex, or empty: it neither moves nor vanishes, and an edge between two such vertices stays.

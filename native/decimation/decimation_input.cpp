@@ -212,12 +212,23 @@ void DecimationInput::cover(double provable) {
   }
 }
 
+std::vector<Corners> DecimationInput::faces_aside() const {
+  std::vector<Corners> faces;
+  for (const std::uint32_t i : cut_.aside) {
+    const glm::uvec3& t = triangles_[i];
+    faces.push_back({vertices_[t.x], vertices_[t.y], vertices_[t.z]});
+  }
+  return faces;
+}
+
 BoundedMeshInput DecimationInput::take_mesh() {
   BoundedMeshInput input;
   input.triangles = cut_.triangles;
   input.mates = std::move(cut_.mates);
-  for (std::size_t v = 0; v < positions_.size(); ++v)
-    input.positions.push_back({vertices_[cut_.vertex_input[v]], positions_[v]});
+  for (std::size_t v = 0; v < positions_.size(); ++v) {
+    stored_.push_back(vertices_[cut_.vertex_input[v]]);
+    input.positions.push_back({stored_[v], positions_[v]});
+  }
   // What holds for a vertex holds for its copies.
   const std::vector<std::uint32_t>& slots = cut_.output_slot;
   std::vector<bool> pinned(positions_.size(), false);

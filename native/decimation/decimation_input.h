@@ -19,6 +19,7 @@
 #include "decimation/certified_bounds.h"
 #include "decimation/decimation.h"
 #include "topology/manifold_cut.h"
+#include "topology/new_crossings.h"
 
 namespace tolvol {
 
@@ -43,6 +44,10 @@ class DecimationInput {
   const CutMesh& cut() const { return cut_; }
   /// The positions of the cut mesh's vertices, in the frame.
   const std::vector<glm::dvec3>& positions() const { return positions_; }
+  /// The cut mesh, with positions as they are stored; valid after take_mesh().
+  MeshView stored_mesh() const { return {cut_.triangles, stored_}; }
+  /// The corners, as they are stored, of the triangles that no manifold holds.
+  std::vector<Corners> faces_aside() const;
   /// For each triangle of the cut mesh, the number of its island; valid after take_mesh(), empty without wedges.
   const std::vector<std::uint32_t>& islands() const { return islands_; }
 
@@ -80,6 +85,7 @@ class DecimationInput {
 
   CutMesh cut_;
   std::vector<glm::dvec3> positions_;
+  std::vector<glm::dvec3> stored_;
   std::vector<bool> pinned_;  ///< For each vertex of the cut mesh.
   std::vector<std::uint32_t> islands_;
   bool identical_ = false;  ///< Whether the input is the reference itself.

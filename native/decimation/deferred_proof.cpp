@@ -9,11 +9,13 @@
 
 namespace tolvol {
 
-DeferredProof::DeferredProof(EdgeCollapse& collapse, BoundedMesh& mesh, std::span<const std::uint32_t> vertices,
-                             std::span<const std::uint32_t> faces, std::vector<std::uint32_t>& places)
+DeferredProof::DeferredProof(EdgeCollapse& collapse, BoundedMesh& mesh, NewCrossings* crossings,
+                             std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces,
+                             std::vector<std::uint32_t>& places)
     : collapse_(collapse),
       mesh_(mesh),
       bounds_(*mesh.certified()),
+      crossings_(crossings),
       vertices_(vertices),
       faces_(faces),
       places_(places),
@@ -23,6 +25,8 @@ DeferredProof::DeferredProof(EdgeCollapse& collapse, BoundedMesh& mesh, std::spa
       successors_(faces.size()) {
   for (std::uint32_t i = 0; i < faces.size(); ++i) places_[faces[i]] = successors_[i] = i;
   for (const std::uint32_t v : vertices) quadrics_.push_back(collapse.quadric(v));
+  if (!crossings) return;
+  for (const std::uint32_t f : faces) origins_.push_back(crossings->origins().state(f));
 }
 
 bool DeferredProof::possible() const {
@@ -37,9 +41,10 @@ void DeferredProof::note(const Change& change) {
   }
   for (const Coverage::Removed& r : change.removed())
     successors_[places_[r.id]] = places_[change.elements()[r.successor].id];
+  if (crossings_) hand_over(change, *crossings_);
 }
 
-bool DeferredProof::holds() {
+bool DeferredProof::holds(Surroundings* around) {
   alive_.clear();
   rank_.assign(faces_.size(), 0);
   for (std::uint32_t i = 0; i < faces_.size(); ++i) {
@@ -47,7 +52,16 @@ bool DeferredProof::holds() {
     rank_[i] = static_cast<std::uint32_t>(alive_.size());
     alive_.push_back(i);
   }
-  return faces_hold() && (!bounds_.backward() || pieces_hold());
+  return faces_hold() && (!around || is_uncrossed(*around)) && (!bounds_.backward() || pieces_hold());
+}
+
+bool DeferredProof::is_uncrossed(Surroundings& around) const {
+  around.renew();
+  std::vector<std::uint32_t> changed;
+  for (const std::uint32_t i : alive_) {
+    if (changed_[i]) changed.push_back(faces_[i]);
+  }
+  return around.allow(changed);
 }
 
 bool DeferredProof::faces_hold() {
@@ -93,6 +107,7 @@ void DeferredProof::take_back() {
   mesh_.restore(saved_);
   bounds_.restore(saved_bounds_, vertices_, faces_);
   for (std::size_t i = 0; i < vertices_.size(); ++i) collapse_.set_quadric(vertices_[i], quadrics_[i]);
+  for (std::size_t i = 0; i < origins_.size(); ++i) crossings_->origins().restore(faces_[i], origins_[i]);
 }
 
 }  // namespace tolvol

@@ -154,11 +154,10 @@ EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) c
   return Outcome::refused;
 }
 
-std::uint32_t EdgeCollapse::carry_out(Attempt& a) {
+EdgeCollapse::Carried EdgeCollapse::carry_out(Attempt& a) {
   for (const Halfedge h : a.trial.change().collapses()) quadrics_[mesh_.to(h)] += quadrics_[mesh_.from(h)];
   const std::uint32_t kept = mesh_.to(a.halfedge);
-  a.trial.carry_out(mesh_);
-  return kept;
+  return {kept, a.trial.carry_out(mesh_)};
 }
 
 }  // namespace tolvol

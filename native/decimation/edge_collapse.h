@@ -34,8 +34,8 @@ class EdgeCollapse {
 
   /// The outcome of trying an edge, and the scratch of the try. Two threads must not share one.
   struct Attempt {
-    explicit Attempt(const BoundedMesh& mesh, ChangeTrial::Proof proof = ChangeTrial::Proof::now)
-        : trial(mesh, proof), fit(mesh) {}
+    Attempt(const BoundedMesh& mesh, Surroundings* around, ChangeTrial::Proof proof = ChangeTrial::Proof::now)
+        : trial(mesh, around, proof), fit(mesh) {}
     Outcome outcome = Outcome::impossible;
     Halfedge halfedge;  ///< Its start would merge into its end.
     ChangeTrial trial;
@@ -43,8 +43,12 @@ class EdgeCollapse {
   };
   /// Reads faces around the edge's two ends, and nothing else of the mesh that changes.
   void attempt(std::uint32_t edge, Attempt& a) const;
-  /// Carries out an attempt that is possible on the mesh as it is. Returns the vertex that stays.
-  std::uint32_t carry_out(Attempt& a);
+  /// Carries out an attempt that is possible on the mesh as it is.
+  struct Carried {
+    std::uint32_t vertex;  ///< The vertex that stays.
+    Box changed;           ///< The box that ChangeTrial::carry_out() returns.
+  };
+  Carried carry_out(Attempt& a);
 
   const Quadric& quadric(std::uint32_t vertex) const { return quadrics_[vertex]; }
   /// Puts a quadric back where collapses are taken back.

@@ -28,7 +28,7 @@ constexpr std::size_t kAhead = 8;
 
 }  // namespace
 
-Refinement::Refinement(BoundedMesh& mesh, Team& team)
+Refinement::Refinement(BoundedMesh& mesh, NewCrossings* crossings, Team& team)
     : mesh_(mesh),
       touched_(mesh.connectivity().n_vertices(), 1),
       relocated_(mesh.connectivity().n_vertices(), 0),
@@ -39,7 +39,8 @@ Refinement::Refinement(BoundedMesh& mesh, Team& team)
     const std::size_t vertices = mesh.connectivity().n_vertices(), edges = mesh.connectivity().n_edges();
     ahead_ = TriesAhead(team, 2 * kAhead, std::max(vertices, edges), vertices);
   }
-  while (attempts_.size() < ahead_.slot_count()) attempts_.emplace_back(mesh);
+  if (crossings) around_.emplace(mesh, *crossings, team);
+  while (attempts_.size() < ahead_.slot_count()) attempts_.emplace_back(mesh, around_ ? &*around_ : nullptr);
 }
 
 void Refinement::run(std::size_t target, const std::function<bool()>& expired, Progress* progress) {
@@ -97,7 +98,8 @@ Refinement::Attempt& Refinement::tried(const Kind& kind, std::span<const std::ui
   const auto found = [&](std::uint32_t step) -> Attempt* {
     if (ahead_.alone()) return nullptr;
     const auto slot = ahead_.found(step, (this->*kind.read)(step));
-    return slot && !attempts_[*slot].trial.met_another() ? &attempts_[*slot] : nullptr;
+    if (!slot || ahead_.changed_since(*slot, attempts_[*slot].trial.read())) return nullptr;
+    return attempts_[*slot].trial.met_another() ? nullptr : &attempts_[*slot];
   };
   if (Attempt* const a = found(steps[place])) return *a;
   const std::size_t ahead = ahead_.alone() ? 1 : kAhead;
@@ -117,7 +119,7 @@ void Refinement::apply(Attempt& a) {
       ahead_.note_change(v);
     }
   }
-  a.trial.carry_out(mesh_);
+  ahead_.note_change(a.trial.carry_out(mesh_));
   // A vertex that stays where it was has another share, distance and boundary, though its other faces are the same.
   const std::optional<std::uint32_t> kept = a.trial.change().vertex();
   if (!kept) return;

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -25,8 +26,9 @@ namespace tolvol {
 
 class Refinement {
  public:
-  /// Changes `mesh`, whose bounds are certified, and keeps references to both.
-  Refinement(BoundedMesh& mesh, Team& team);
+  /// Changes `mesh`, whose bounds are certified, and keeps references to all. `crossings` is null where crossings are
+  /// allowed.
+  Refinement(BoundedMesh& mesh, NewCrossings* crossings, Team& team);
 
   /// Runs until a few rounds collapse nothing, `target` triangles are left, or `expired`, which is asked before every
   /// step, returns true. Throws Cancelled.
@@ -37,7 +39,7 @@ class Refinement {
 
   /// The outcome of trying a step, and the scratch of the try.
   struct Attempt {
-    explicit Attempt(const BoundedMesh& mesh) : trial(mesh), fit(mesh) {}
+    Attempt(const BoundedMesh& mesh, Surroundings* around) : trial(mesh, around), fit(mesh) {}
     ChangeTrial trial;
     PositionFit fit;
     bool possible = false;
@@ -83,6 +85,7 @@ class Refinement {
                                   &Refinement::collapse};
 
   BoundedMesh& mesh_;
+  std::optional<Surroundings> around_;
   TriesAhead ahead_;
   std::vector<Attempt> attempts_;  ///< For each slot of ahead_.
   // A step that failed is not tried again until a face around it has changed. The times are those of ahead_.

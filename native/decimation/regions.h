@@ -10,21 +10,62 @@
 
 namespace tolvol {
 
-struct Regions {
+class Regions {
+ public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
-  /// For each vertex, the region that it and all its neighbours belong to; kNone for a joined vertex, and for one at
-  /// the rim of a region. As long as only edges within regions collapse, a collapse in one region changes nothing that
-  /// a collapse in another region changes or reads.
-  std::vector<std::uint32_t> of_vertex;
-  std::uint32_t count = 0;
 
-  /// The region that both ends of an edge belong to; kNone where there is no such region.
+  /// Cuts along the longest axis at a median, over and over, until no region has more than `most` vertices. The first
+  /// cut is at `first` of the vertices instead, by which the rims come to lie elsewhere. `apart` leaves vertices on the
+  /// border of their cell to no region, so that the faces of two regions cannot come to cross. O(n log n); the same
+  /// everywhere, on any number of threads.
+  Regions(const BoundedMesh& mesh, std::size_t most, double first, bool apart, Team& team);
+
+  std::uint32_t count() const { return static_cast<std::uint32_t>(cells_.size()); }
+
+  /// The region that a vertex and all its neighbours belong to. It is kNone at the rim of a region, on the border of
+  /// its cell, and for joined vertices. As long as only edges of a region collapse, nothing that a collapse changes or
+  /// looks at in the connectivity is changed by another region's.
+  std::uint32_t of_vertex(std::uint32_t vertex) const { return of_vertex_[vertex]; }
+  /// The region of an edge: that of its two ends.
   std::uint32_t of_edge(const BoundedMesh& mesh, std::uint32_t edge) const;
+
+  /// The box of stored positions that holds the region's vertices. The cells of two regions have no inner point in
+  /// common. Where regions are apart, their vertices lie strictly inside: as long as none leaves the inside of its
+  /// cell, faces that one region changes meet those that another changes only where they met before.
+  const Box& cell(std::uint32_t region) const { return cells_[region]; }
+  /// Calls visit(region) for those whose cell meets a box of stored positions.
+  template <class Visit>
+  void for_each_meeting(const Box& box, Visit&& visit) const;
+
+ private:
+  /// Of the tree of cuts. The cut is across `axis` at `at`; the parts are the nodes `below` and `below + 1`.
+  struct Node {
+    int axis = 0;
+    double at = 0;
+    std::uint32_t below = kNone;  ///< kNone: the node is not cut, it is `region`
+    std::uint32_t region = kNone;
+  };
+
+  void cut(const BoundedMesh& mesh, std::vector<std::uint32_t>& vertices, std::size_t most, double first, Team& team);
+
+  std::vector<std::uint32_t> of_vertex_;
+  std::vector<Box> cells_;
+  std::vector<Node> nodes_;
 };
 
-/// Cuts along the longest axis at the median, over and over, until no region has more than `most` vertices. The first
-/// cut leaves the share `first` of the vertices on one side instead, so that another share puts the rims elsewhere.
-/// O(n log n). The regions are the same on every machine, for any number of threads.
-Regions regions(const BoundedMesh& mesh, std::size_t most, double first, Team& team);
+template <class Visit>
+void Regions::for_each_meeting(const Box& box, Visit&& visit) const {
+  std::vector<std::uint32_t> stack{0};
+  while (!stack.empty()) {
+    const Node& node = nodes_[stack.back()];
+    stack.pop_back();
+    if (node.below == kNone) {
+      visit(node.region);
+      continue;
+    }
+    if (box.upper[node.axis] >= node.at) stack.push_back(node.below + 1);
+    if (box.lower[node.axis] <= node.at) stack.push_back(node.below);
+  }
+}
 
 }  // namespace tolvol

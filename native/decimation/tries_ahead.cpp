@@ -14,7 +14,7 @@ std::size_t TriesAhead::take(std::span<const std::uint32_t> steps) {
   const std::size_t first = next_;
   for (const std::uint32_t step : steps) {
     slot_of_[step] = static_cast<std::uint32_t>(next_);
-    slots_[next_] = {step, now_};
+    slots_[next_] = {step, now_, boxes_.size()};
     next_ = (next_ + 1) % slots_.size();
   }
   return first;
@@ -27,6 +27,12 @@ std::optional<std::size_t> TriesAhead::found(std::uint32_t step, std::span<const
   const bool changed =
       std::ranges::any_of(read, [&](std::uint32_t vertex) { return changed_[vertex] > slots_[slot].at; });
   return changed ? std::nullopt : std::optional(slot);
+}
+
+bool TriesAhead::changed_since(std::size_t slot, const Box& box) const {
+  if (alone()) return false;
+  const std::span<const Box> since = std::span(boxes_).subspan(slots_[slot].boxes);
+  return std::ranges::any_of(since, [&](const Box& changed) { return meet(changed, box); });
 }
 
 void TriesAhead::drop(std::uint32_t step) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol {
 
@@ -31,6 +32,13 @@ class TriesAhead {
   /// The time, which goes on with every change.
   std::uint64_t now() const { return now_; }
   void advance() { ++now_; }
+  /// Something in a box of space has changed now.
+  void note_change(const Box& box) {
+    if (!alone()) boxes_.push_back(box);
+  }
+  /// Whether something in the box has changed since the try in a slot.
+  bool changed_since(std::size_t slot, const Box& box) const;
+
   /// What a try reads around the vertex has changed now.
   void note_change(std::uint32_t vertex) {
     if (!alone()) changed_[vertex] = now_;
@@ -56,7 +64,8 @@ class TriesAhead {
   static constexpr std::uint32_t kNoStep = std::numeric_limits<std::uint32_t>::max();
   struct Slot {
     std::uint32_t step = kNoStep;
-    std::uint64_t at = 0;  ///< When it was tried.
+    std::uint64_t at = 0;   ///< When it was tried.
+    std::size_t boxes = 0;  ///< How many boxes had changed by then.
   };
 
   std::size_t take(std::span<const std::uint32_t> steps);
@@ -66,6 +75,7 @@ class TriesAhead {
   std::vector<Slot> slots_;
   std::vector<std::uint32_t> slot_of_;  ///< For each step: its slot, if that slot names the step.
   std::size_t next_ = 0;                ///< The slot that is taken next.
+  std::vector<Box> boxes_;              ///< The boxes in which something has changed, in order.
   std::vector<std::uint64_t> changed_;  ///< For each vertex: when what is around it changed last.
 };
 

@@ -24,8 +24,24 @@ struct Box {
     lower = glm::min(lower, p);
     upper = glm::max(upper, p);
   }
+  void add(const Box& box) {
+    lower = glm::min(lower, box.lower);
+    upper = glm::max(upper, box.upper);
+  }
   bool empty() const { return lower.x > upper.x; }
 };
+
+/// Whether two boxes have a point in common; one that is empty has none.
+inline bool meet(const Box& a, const Box& b) {
+  return a.lower.x <= b.upper.x && b.lower.x <= a.upper.x && a.lower.y <= b.upper.y && b.lower.y <= a.upper.y &&
+         a.lower.z <= b.upper.z && b.lower.z <= a.upper.z;
+}
+
+/// Whether a point lies in a box but on none of its sides.
+inline bool strictly_inside(const glm::dvec3& p, const Box& box) {
+  return box.lower.x < p.x && p.x < box.upper.x && box.lower.y < p.y && p.y < box.upper.y && box.lower.z < p.z &&
+         p.z < box.upper.z;
+}
 
 /// Throws InvalidInput, naming the first offender, unless there is at least one triangle, every index is below
 /// `vertices.size()` and every coordinate is finite (unused vertices too). O(n + m).

@@ -62,7 +62,8 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
                        const py::object& to_world, const std::string& placement, bool two_sided,
                        std::optional<std::int64_t> target_triangles, const py::object& locked, const py::object& shares,
                        const std::string& outside, const py::object& wedges, const std::string& effort,
-                       std::optional<double> max_seconds, std::optional<int> threads, Progress* progress) {
+                       const std::string& crossings, std::optional<double> max_seconds, std::optional<int> threads,
+                       Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const StoredSpace space(to_matrix(to_world), v.storage);
@@ -73,6 +74,8 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
       choose(outside, "outside", "error", DecimationOptions::Outside::error, "keep", DecimationOptions::Outside::keep);
   options.effort = choose(effort, "effort", "fast", DecimationOptions::Effort::fast, "thorough",
                           DecimationOptions::Effort::thorough);
+  options.crossings = choose(crossings, "crossings", "keep_out", DecimationOptions::Crossings::keep_out, "allow",
+                             DecimationOptions::Crossings::allow);
   if (max_seconds && !(*max_seconds > 0)) throw InvalidInput("max_seconds must be positive, or None for no limit");
   options.max_seconds = max_seconds.value_or(0);
   options.two_sided = two_sided;
@@ -175,8 +178,8 @@ warnings : a list of sentences)doc");
              py::kw_only(), py::arg("to_world") = py::none(), py::arg("placement") = "optimal",
              py::arg("two_sided") = true, py::arg("target_triangles") = py::none(), py::arg("locked") = py::none(),
              py::arg("shares") = py::none(), py::arg("outside") = "error", py::arg("wedges") = py::none(),
-             py::arg("effort") = "fast", py::arg("max_seconds") = py::none(), py::arg("threads") = py::none(),
-             py::arg("progress") = py::none(),
+             py::arg("effort") = "fast", py::arg("crossings") = "allow", py::arg("max_seconds") = py::none(),
+             py::arg("threads") = py::none(), py::arg("progress") = py::none(),
              R"doc(Reduce a mesh to few triangles within the tolerance of a volume.
 
 Every point of the result is within the tolerance of the reference and, with two_sided, every point of the reference is
@@ -206,6 +209,12 @@ wedges : (m, 3) integer array, optional
 effort : {"fast", "thorough"}
     "thorough" then moves vertices and flips edges to make room for further collapses. It leaves a seventh to a fifth
     fewer triangles in two to five times the processor time, at a tolerance of 0.1 % in five to seven times.
+crossings : {"keep_out", "allow"}
+    Two faces cross if they meet anywhere but in the corners and edges that they share. "keep_out" makes no new crossing:
+    each input face is stood for by one face of the result, and two faces of the result cross only if input faces that
+    they stand for crossed. Vertices where several sheets meet may then keep more triangles. So the number of crossing pairs never rises, and a mesh without crossings stays without.
+    Sheets that lie exactly on each other are exempt from each other. It is decided exactly for the coordinates of the
+    result as they are returned, takes a tenth to a third more time, and is ignored without a volume.
 max_seconds : float, optional
     Stop after this time with what is proved by then, which depends on the speed of the machine. The time does not cut
     short the preparation, in which the mesh is set up and the input is certified: about 0.7 us a triangle, and 2 us if

@@ -57,7 +57,7 @@ TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
   BoundedMesh mesh(std::move(input), &bounds, alone);
 
   const auto relocate = [&](const VertexPosition& target) {
-    ChangeTrial trial(mesh);
+    ChangeTrial trial(mesh, nullptr);
     trial.begin();
     const ChangeTrial::Outcome outcome = trial.try_relocate(kMiddle, target);
     return std::pair(outcome, trial.met_another());
@@ -68,7 +68,7 @@ TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
   EXPECT_EQ(relocate(taken), std::pair(ChangeTrial::Outcome::refused, true));
   EXPECT_EQ(relocate(here), std::pair(ChangeTrial::Outcome::possible, false)) << "where it is itself";
 
-  ChangeTrial away(mesh);
+  ChangeTrial away(mesh, nullptr);
   away.begin();
   const dvec3 aside = taken.position + dvec3(0.1 * limit, 0, 0);
   ASSERT_EQ(away.try_relocate(above, mesh.store(aside)), ChangeTrial::Outcome::possible);

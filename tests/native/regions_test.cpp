@@ -32,10 +32,39 @@ BoundedMesh mesh_of(const TriangleMesh& from, std::vector<std::uint32_t> slots =
 /// No vertex has vertices of two regions around it: then no face, and no fan of faces, is changed by two.
 void expect_apart(const BoundedMesh& mesh, const Regions& found) {
   for (const auto v : mesh.connectivity().vertices()) {
-    std::set<std::uint32_t> around{found.of_vertex[std::size_t(v.idx())]};
-    for (const auto near : mesh.connectivity().vv_range(v)) around.insert(found.of_vertex[std::size_t(near.idx())]);
+    std::set<std::uint32_t> around{found.of_vertex(std::uint32_t(v.idx()))};
+    for (const auto near : mesh.connectivity().vv_range(v)) around.insert(found.of_vertex(std::uint32_t(near.idx())));
     around.erase(Regions::kNone);
     ASSERT_LE(around.size(), 1u) << "vertex " << v.idx();
+  }
+}
+
+std::vector<std::uint32_t> labels(const BoundedMesh& mesh, const Regions& found) {
+  std::vector<std::uint32_t> all;
+  for (std::uint32_t v = 0; v < mesh.connectivity().n_vertices(); ++v) all.push_back(found.of_vertex(v));
+  return all;
+}
+
+/// Cells overlap in no inner point, a region's vertices are inside its own, and a search finds a box's cells.
+void expect_in_cells(const BoundedMesh& mesh, const Regions& found) {
+  for (std::uint32_t a = 0; a < found.count(); ++a) {
+    for (std::uint32_t b = 0; b < a; ++b) {
+      const glm::dvec3 lower = glm::max(found.cell(a).lower, found.cell(b).lower),
+                       upper = glm::min(found.cell(a).upper, found.cell(b).upper);
+      EXPECT_TRUE(lower.x >= upper.x || lower.y >= upper.y || lower.z >= upper.z) << a << ", " << b;
+    }
+  }
+  for (std::uint32_t v = 0; v < mesh.connectivity().n_vertices(); ++v) {
+    const std::uint32_t region = found.of_vertex(v);
+    if (region == Regions::kNone) continue;
+    EXPECT_TRUE(strictly_inside(mesh.stored(v), found.cell(region)));
+    const Box around{mesh.stored(v) - 0.1, mesh.stored(v) + 0.1};
+    std::set<std::uint32_t> met, expected;
+    found.for_each_meeting(around, [&](std::uint32_t cell) { EXPECT_TRUE(met.insert(cell).second); });
+    for (std::uint32_t cell = 0; cell < found.count(); ++cell) {
+      if (meet(around, found.cell(cell))) expected.insert(cell);
+    }
+    EXPECT_EQ(met, expected);
   }
 }
 
@@ -45,20 +74,21 @@ TEST(Regions, HaveNothingToDoWithEachOther) {
        {shapes::torus(60), shapes::grid(60), shapes::joined(shapes::box(20), shapes::grid(30))}) {
     const BoundedMesh mesh = mesh_of(shape);
     for (const double first : {0.5, 0.35}) {
-      const Regions found = regions(mesh, 300, first, team);
+      const Regions found(mesh, 300, first, true, team);
       Team alone(1);
-      EXPECT_EQ(found.of_vertex, regions(mesh, 300, first, alone).of_vertex);
+      EXPECT_EQ(labels(mesh, found), labels(mesh, Regions(mesh, 300, first, true, alone)));
       expect_apart(mesh, found);
-      std::vector<std::size_t> size(found.count, 0);
+      expect_in_cells(mesh, found);
+      std::vector<std::size_t> size(found.count(), 0);
       std::size_t inside = 0;
-      for (const std::uint32_t region : found.of_vertex) {
+      for (const std::uint32_t region : labels(mesh, found)) {
         if (region != Regions::kNone) ++size[region], ++inside;
       }
       EXPECT_LE(*std::max_element(size.begin(), size.end()), 300u);
-      EXPECT_GE(found.count * 300, shape.vertices.size());
+      EXPECT_GE(found.count() * 300, shape.vertices.size());
       EXPECT_GT(inside, shape.vertices.size() / 2) << "rims are the smaller part";
     }
-    EXPECT_NE(regions(mesh, 300, 0.5, team).of_vertex, regions(mesh, 300, 0.35, team).of_vertex);
+    EXPECT_NE(labels(mesh, Regions(mesh, 300, 0.5, true, team)), labels(mesh, Regions(mesh, 300, 0.35, true, team)));
   }
 }
 
@@ -72,10 +102,10 @@ TEST(Regions, LeaveOutWhatHasCopies) {
   const std::uint32_t vertex = 15 * 31 + 15, copy = vertex + 31 * 31;
   slots[copy] = vertex;
   const BoundedMesh mesh = mesh_of(shape, slots);
-  const Regions found = regions(mesh, 5000, 0.5, team);
-  EXPECT_EQ(found.count, 1u);
+  const Regions found(mesh, 5000, 0.5, true, team);
+  EXPECT_EQ(found.count(), 1u);
   for (std::uint32_t v = 0; v < slots.size(); ++v) {
-    EXPECT_EQ(found.of_vertex[v], v == vertex || v == copy ? Regions::kNone : 0u);
+    EXPECT_EQ(found.of_vertex(v), v == vertex || v == copy ? Regions::kNone : 0u);
   }
 }
 

@@ -216,3 +216,31 @@ def test_locks_of_a_dropped_face_hold_where_the_face_is_that_stands_in_for_it():
     edges = result.vertices[result.triangles[:, [0, 1, 1, 2, 2, 0]]].reshape(-1, 2, 3)
     ends = vertices[[a, b]]
     assert ((edges == ends).all((1, 2)) | (edges == ends[::-1]).all((1, 2))).any()
+
+
+def shell(wall):
+    """A sphere inside a sphere, both closed."""
+    outer, inner = meshes.sphere(4, 1), meshes.sphere(4, 1 - wall)
+    return meshes.join(outer, (inner[0], inner[1][:, ::-1]))
+
+
+def test_crossings_keep_out_leaves_thin_walls_uncrossed():
+    vertices, triangles = shell(0.01)
+    assert len(tolvol.crossing_pairs(vertices, triangles)) == 0
+    kept_out = decimate(vertices, triangles, 0.03, crossings="keep_out")
+    assert len(tolvol.crossing_pairs(kept_out.vertices, kept_out.triangles)) == 0
+    assert len(kept_out.triangles) < len(triangles) / 6
+    assert_promise(vertices, triangles, kept_out, 0.03)
+    allowed = decimate(vertices, triangles, 0.03)
+    assert len(tolvol.crossing_pairs(allowed.vertices, allowed.triangles)) > 10
+    with pytest.raises(tolvol.InvalidInput, match="crossings"):
+        decimate(vertices, triangles, 0.03, crossings="some")
+
+
+def test_crossing_pairs_end_at_most():
+    vertices, triangles = meshes.join(TORUS, (TORUS[0] + [0.3, 0.1, 0.05], TORUS[1]))
+    pairs = tolvol.crossing_pairs(vertices, triangles)
+    assert len(pairs) > 20 and pairs.dtype == np.int32 and (pairs[:, 0] < pairs[:, 1]).all()
+    assert np.array_equal(tolvol.crossing_pairs(vertices, triangles, most=7, threads=1), pairs[:7])
+    with pytest.raises(tolvol.InvalidInput, match="most"):
+        tolvol.crossing_pairs(vertices, triangles, most=0)

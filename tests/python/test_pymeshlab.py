@@ -4,14 +4,17 @@
 Only this test needs PyMeshLab: pip install -r tests/python/extras.txt.
 """
 
+import importlib.util
+
 import numpy as np
 import pytest
 import tolvol
 
 import meshes
 
-pymeshlab = pytest.importorskip(
-    "pymeshlab", reason="PyMeshLab is not installed: pip install -r tests/python/extras.txt"
+pytestmark = pytest.mark.skipif(
+    importlib.util.find_spec("pymeshlab") is None,
+    reason="PyMeshLab is not installed: pip install -r tests/python/extras.txt",
 )
 
 SAMPLES = 400_000
@@ -32,6 +35,8 @@ PAIRS = {
 
 def sampled(a, b):
     """Returns MeshLab's distances {"max", "mean", "RMS", ...} of random points of a from b."""
+    import pymeshlab
+
     both = pymeshlab.MeshSet()
     for vertices, triangles in (a, b):
         both.add_mesh(pymeshlab.Mesh(np.asarray(vertices, np.float64), triangles))

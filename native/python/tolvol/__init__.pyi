@@ -236,6 +236,7 @@ def decimate(
     outside: _Outside = "error",
     wedges: _Integers | None = None,
     effort: Literal["fast", "thorough"] = "fast",
+    crossings: Literal["keep_out", "allow"] = "allow",
     max_seconds: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -298,6 +299,14 @@ class HausdorffResult:
     @property
     def backward(self) -> DirectedHausdorffResult: ...
 
+def crossing_pairs(
+    vertices: _Vertices,
+    triangles: _Integers,
+    *,
+    most: int | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> NDArray[np.int32]: ...
 def directed_hausdorff(
     vertices_a: _Vertices,
     triangles_a: _Integers,

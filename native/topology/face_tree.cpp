@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "topology/face_tree.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace tolvol {
+namespace {
+
+bool same(const Box& a, const Box& b) { return a.lower == b.lower && a.upper == b.upper; }
+
+}  // namespace
+
+FaceTree::FaceTree(std::span<const std::uint32_t> faces, std::span<const Box> boxes, Team& team)
+    : faces_(faces.begin(), faces.end()), place_(faces.size()) {
+  if (faces.empty()) return;
+  struct Entry {
+    glm::dvec3 centre;
+    std::uint32_t index;  // among the faces
+  };
+  std::vector<Entry> entries(faces.size());
+  for (std::uint32_t i = 0; i < entries.size(); ++i) {
+    poll_at(i);
+    entries[i] = {0.5 * boxes[i].lower + 0.5 * boxes[i].upper, i};
+  }
+  leaves_ = std::bit_ceil((entries.size() + kLeaf - 1) / kLeaf);
+  // Level by level, each range of entries is cut in two at the median along the longest side of its centres' box.
+  // `border[i]` is where the range of the level's node i begins.
+  std::vector<std::size_t> border{0, entries.size()};
+  while (border.size() - 1 < leaves_) {
+    std::vector<std::size_t> next(2 * border.size() - 1);
+    team.run(border.size() - 1, 1, [&](std::size_t i, std::size_t) {
+      const std::span range(entries.begin() + static_cast<std::ptrdiff_t>(border[i]),
+                            entries.begin() + static_cast<std::ptrdiff_t>(border[i + 1]));
+      next[2 * i] = border[i], next[2 * i + 1] = border[i] + range.size() / 2;
+      Box box;
+      for (const Entry& e : range) box.add(e.centre);
+      const glm::dvec3 size = box.upper - box.lower;
+      const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+      std::nth_element(range.begin(), range.begin() + static_cast<std::ptrdiff_t>(range.size() / 2), range.end(),
+                       [axis](const Entry& a, const Entry& b) {
+                         return a.centre[axis] < b.centre[axis] ||
+                                (a.centre[axis] == b.centre[axis] && a.index < b.index);
+                       });
+    });
+    next.back() = entries.size();
+    border.swap(next);
+  }
+  slots_.resize(leaves_ * kLeaf);
+  nodes_.resize(2 * leaves_ - 1);
+  for (std::size_t leaf = 0; leaf < leaves_; ++leaf) {
+    for (std::size_t i = border[leaf], slot = leaf * kLeaf; i < border[leaf + 1]; ++i, ++slot) {
+      const std::uint32_t index = entries[i].index;
+      slots_[slot] = {boxes[index], faces[index]};
+      place_[index] = static_cast<std::uint32_t>(slot);
+    }
+    fit_leaf(leaf);
+  }
+  for (std::size_t node = leaves_ - 1; node-- > 0;) nodes_[node] = fitted(node);
+}
+
+void FaceTree::fit_leaf(std::size_t leaf) {
+  Box& box = nodes_[leaves_ - 1 + leaf];
+  box = {};
+  for (std::size_t i = leaf * kLeaf; i < (leaf + 1) * kLeaf; ++i) box.add(slots_[i].box);
+}
+
+Box FaceTree::fitted(std::size_t node) const {
+  Box box = nodes_[2 * node + 1];
+  box.add(nodes_[2 * node + 2]);
+  return box;
+}
+
+void FaceTree::change(std::uint32_t face, const Box& box) {
+  const auto index = static_cast<std::size_t>(std::lower_bound(faces_.begin(), faces_.end(), face) - faces_.begin());
+  const std::size_t slot = place_[index], leaf = slot / kLeaf;
+  slots_[slot].box = box;
+  fit_leaf(leaf);
+  for (std::size_t node = leaves_ - 1 + leaf; node > 0;) {
+    node = (node - 1) / 2;
+    const Box box_of_both = fitted(node);
+    if (same(box_of_both, nodes_[node])) return;
+    nodes_[node] = box_of_both;
+  }
+}
+
+}  // namespace tolvol

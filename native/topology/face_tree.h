@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The boxes of a mesh's faces, to find the faces near a place while faces change and vanish.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include "base/parallel.h"
+#include "geometry/triangle_mesh.h"
+
+namespace tolvol {
+
+/// A balanced tree of boxes, cut at medians. Several threads may search it at once while none changes it. Which faces a
+/// search finds depends on the boxes alone; their order also depends on the boxes that the tree was built with.
+class FaceTree {
+ public:
+  FaceTree() = default;
+  /// `faces` are the numbers of the faces, in rising order, and `boxes` their boxes. O(n log n), about 0.2 us and 120
+  /// bytes a face.
+  FaceTree(std::span<const std::uint32_t> faces, std::span<const Box> boxes, Team& team);
+
+  /// Gives a face of the constructor's another box; an empty one removes the face. O(log n).
+  void change(std::uint32_t face, const Box& box);
+
+  /// Calls visit(face) for every face whose box meets `box`, and for no other. A visit that returns false ends the
+  /// search.
+  template <class Visit>
+  void for_each_meeting(const Box& box, Visit&& visit) const;
+
+ private:
+  static constexpr std::size_t kLeaf = 4;  ///< the most faces in a leaf
+  struct Slot {
+    Box box;  ///< empty where the leaf has fewer faces
+    std::uint32_t face = 0;
+  };
+
+  void fit_leaf(std::size_t leaf);
+  Box fitted(std::size_t node) const;
+
+  std::size_t leaves_ = 0;            ///< a power of two, or 0 without faces
+  std::vector<Box> nodes_;            ///< the root first; the children of node i are 2 i + 1 and 2 i + 2; leaves last
+  std::vector<Slot> slots_;           ///< kLeaf for each leaf
+  std::vector<std::uint32_t> faces_;  ///< in rising order
+  std::vector<std::uint32_t> place_;  ///< per face of faces_: its slot
+};
+
+template <class Visit>
+void FaceTree::for_each_meeting(const Box& box, Visit&& visit) const {
+  if (leaves_ == 0) return;
+  std::array<std::uint32_t, 66> stack;  // at most one node a level waits beside the next: 32 levels
+  std::size_t height = 0;
+  stack[height++] = 0;
+  while (height > 0) {
+    const std::uint32_t node = stack[--height];
+    if (!meet(nodes_[node], box)) continue;
+    if (node + 1 < leaves_) {
+      stack[height++] = 2 * node + 2, stack[height++] = 2 * node + 1;
+      continue;
+    }
+    const std::size_t first = (node + 1 - leaves_) * kLeaf;
+    for (std::size_t i = first; i < first + kLeaf; ++i) {
+      if (!meet(slots_[i].box, box)) continue;
+      if constexpr (std::is_same_v<decltype(visit(slots_[i].face)), bool>) {
+        if (!visit(slots_[i].face)) return;
+      } else {
+        visit(slots_[i].face);
+      }
+    }
+  }
+}
+
+}  // namespace tolvol

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The promise that a changing mesh gets no new crossings: two faces may cross (topology/faces_cross.h) only where
+/// input faces that they stand for (topology/face_origins.h) crossed. As every input face is stood for by one face, the
+/// number of pairs of faces that cross never rises, and a mesh without crossings stays without.
+///
+/// The sheets of a double sheet (topology/double_sheets.h) are exempt from each other: they touch in all their points,
+/// and could not change one after the other.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <mutex>
+#include <span>
+#include <vector>
+
+#include "geometry/triangle_mesh.h"
+#include "topology/face_origins.h"
+#include "topology/face_tree.h"
+#include "topology/faces_cross.h"
+
+namespace tolvol {
+
+/// Triangles and positions that someone else holds.
+struct MeshView {
+  std::span<const glm::uvec3> triangles;
+  std::span<const glm::dvec3> vertices;
+
+  Corners corners(std::uint32_t triangle) const {
+    const glm::uvec3& t = triangles[triangle];
+    return {vertices[t.x], vertices[t.y], vertices[t.z]};
+  }
+};
+
+Box box_of(const Corners& corners);
+
+class NewCrossings {
+ public:
+  /// `input` and `now` are the mesh as it came in and as it is, with the same numbers of faces; positions are as they
+  /// are stored. Both are read whenever something is asked. `fixed` are further faces, which never change; their
+  /// numbers follow on the others'. O(n).
+  NewCrossings(const MeshView& input, const MeshView& now, std::vector<Corners> fixed);
+
+  /// A face as a change would leave it, with another shape than now.
+  struct Face {
+    std::uint32_t id;
+    Corners corners;
+  };
+  /// A face that a change removes, and the face that stands for it from then on.
+  struct Removed {
+    std::uint32_t id, successor;
+  };
+  /// What a try read, and its scratch; one for each thread.
+  class Trial {
+   public:
+    /// Starts a series of tries around one place.
+    void begin() { read_ = {}, met_last_ = kNone; }
+    /// What the series found depends on no face outside this box.
+    const Box& read() const { return read_; }
+
+   private:
+    friend class NewCrossings;
+    Box read_;
+    std::vector<Box> boxes_;
+    std::vector<std::uint32_t> replaced_;  ///< sorted
+    std::uint32_t met_last_ = kNone;       ///< the face that was in the way last, which likely still is
+  };
+
+  /// Whether the mesh would have no new crossing if `faces` replaced those of the same number and `removed` were gone,
+  /// and no face would become degenerate. `near` has to have every face whose box meets those of `faces`. Only reads;
+  /// several threads may ask at once. About 5 us for the faces around a vertex.
+  bool none(const FaceTree& near, std::span<const Face> faces, std::span<const Removed> removed, Trial& trial) const;
+
+  /// The same of changes that were carried out on trust: whether none of the `changed` faces, as they are now, is
+  /// degenerate or crosses any face anew. `near` has to have every face that meets them, as it is now. Several threads
+  /// may ask at once. About 3 us a face.
+  bool none(const FaceTree& near, std::span<const std::uint32_t> changed) const;
+
+  /// After a change was carried out.
+  void hand_over(std::span<const Removed> removed);
+
+  /// For those who put faces back.
+  FaceOrigins& origins() { return origins_; }
+
+  Corners corners(std::uint32_t face) const { return of(now_, face); }
+  /// The fixed faces among them.
+  std::size_t face_count() const { return now_.triangles.size() + fixed_.size(); }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+
+  Corners of(const MeshView& mesh, std::uint32_t face) const {
+    const std::size_t count = mesh.triangles.size();
+    return face < count ? mesh.corners(face) : fixed_[face - count];
+  }
+  std::vector<std::uint32_t> origins_of(std::uint32_t face, std::span<const Removed> removed) const;
+  bool inherited(std::uint32_t a, std::uint32_t b, std::span<const Removed> removed) const;
+  const std::vector<std::uint32_t>& sheets() const;
+
+  MeshView input_, now_;
+  std::vector<Corners> fixed_;
+  FaceOrigins origins_;
+  mutable std::once_flag sheets_known_;
+  mutable std::vector<std::uint32_t> sheets_;  ///< of the input, found when first needed
+};
+
+}  // namespace tolvol

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "topology/new_crossings.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "shapes.h"
+#include "topology/double_sheets.h"
+
+namespace {
+
+using glm::dvec3;
+using tolvol::box_of;
+using tolvol::Corners;
+using tolvol::FaceTree;
+using tolvol::NewCrossings;
+using tolvol::Team;
+using tolvol::TriangleMesh;
+using Face = NewCrossings::Face;
+using Removed = NewCrossings::Removed;
+
+/// A mesh, and what a change of it is asked about.
+struct Scene {
+  explicit Scene(TriangleMesh m, std::vector<Corners> fixed = {})
+      : input(std::move(m)),
+        now(input),
+        crossings({input.triangles, input.vertices}, {now.triangles, now.vertices}, std::move(fixed)) {}
+
+  FaceTree tree() const {
+    std::vector<std::uint32_t> faces(crossings.face_count());
+    std::iota(faces.begin(), faces.end(), 0u);
+    std::vector<tolvol::Box> boxes;
+    for (const std::uint32_t face : faces) boxes.push_back(box_of(crossings.corners(face)));
+    Team alone(1);
+    return FaceTree(faces, boxes, alone);
+  }
+  bool none(const std::vector<Face>& faces, const std::vector<Removed>& removed = {}) {
+    return crossings.none(tree(), faces, removed, trial);
+  }
+  /// Whether one vertex may go there.
+  bool may_move(std::uint32_t vertex, const dvec3& to) {
+    std::vector<Face> faces;
+    for (std::uint32_t i = 0; i < now.triangles.size(); ++i) {
+      Corners corners = crossings.corners(i);
+      bool has = false;
+      for (int k = 0; k < 3; ++k) {
+        if (now.triangles[i][k] == vertex) corners[k] = to, has = true;
+      }
+      if (has) faces.push_back({i, corners});
+    }
+    return none(faces);
+  }
+
+  TriangleMesh input, now;
+  NewCrossings crossings;
+  NewCrossings::Trial trial;
+};
+
+/// Two plates, a hair apart.
+TriangleMesh wall(double thickness, unsigned n = 4) {
+  TriangleMesh mesh = tolvol::shapes::grid(n);
+  const auto count = static_cast<unsigned>(mesh.vertices.size());
+  for (unsigned i = 0; i < count; ++i) mesh.vertices.push_back(mesh.vertices[i] + dvec3(0, 0, thickness));
+  const std::size_t faces = mesh.triangles.size();
+  for (std::size_t i = 0; i < faces; ++i) {
+    const glm::uvec3 t = mesh.triangles[i];
+    mesh.triangles.emplace_back(count + t.x, count + t.z, count + t.y);
+  }
+  return mesh;
+}
+
+constexpr unsigned kMiddle = 12;  // of 5 x 5 vertices
+
+}  // namespace
+
+TEST(NewCrossings, AVertexStopsAtTheOtherSideOfAWall) {
+  Scene scene(wall(0.01));
+  EXPECT_TRUE(scene.may_move(kMiddle, dvec3(0.52, 0.51, 0.0099)));
+  EXPECT_FALSE(scene.may_move(kMiddle, dvec3(0.52, 0.51, 0.01)));  // it touches
+  EXPECT_FALSE(scene.may_move(kMiddle, dvec3(0.5, 0.5, 0.5)));
+  EXPECT_TRUE(scene.may_move(kMiddle, dvec3(0.5, 0.5, -0.5)));
+}
+
+TEST(NewCrossings, FacesAroundAVertexMayNotFoldOntoEachOther) {
+  Scene scene(tolvol::shapes::grid(4));
+  EXPECT_TRUE(scene.may_move(kMiddle, dvec3(0.6, 0.55, 0)));
+  EXPECT_FALSE(scene.may_move(kMiddle, dvec3(0.9, 0.9, 0)));   // beyond its ring, in the plane
+  EXPECT_FALSE(scene.may_move(kMiddle, dvec3(0.75, 0.5, 0)));  // a face becomes degenerate
+}
+
+TEST(NewCrossings, FixedFacesAreInTheWay) {
+  Scene scene(tolvol::shapes::grid(4), {Corners{dvec3(0.4, 0.4, 0.2), dvec3(0.6, 0.4, 0.2), dvec3(0.5, 0.7, 0.2)}});
+  EXPECT_TRUE(scene.may_move(kMiddle, dvec3(0.5, 0.5, 0.19)));
+  EXPECT_FALSE(scene.may_move(kMiddle, dvec3(0.5, 0.5, 0.21)));
+}
+
+// A spike through a plate crosses it from the start; it may go on to do so, and nothing else may.
+TEST(NewCrossings, WhatCrossedMayGoOnToCross) {
+  TriangleMesh mesh = tolvol::shapes::grid(4);
+  const auto n = static_cast<unsigned>(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), {dvec3(0.6, 0.55, -1), dvec3(0.62, 0.55, 1), dvec3(0.61, 0.56, 1)});
+  mesh.triangles.emplace_back(n, n + 1, n + 2);
+  Scene scene(mesh);
+  EXPECT_TRUE(scene.may_move(kMiddle, dvec3(0.5, 0.5, 0.1)));  // the same face of the plate is pierced
+  EXPECT_TRUE(scene.may_move(n, dvec3(0.6, 0.55, -2)));
+  EXPECT_FALSE(scene.may_move(n, dvec3(0.2, 0.2, -2)));  // another face would be pierced
+}
+
+// What a removed face stood for is stood for by its successor, from the change on that removes it.
+TEST(NewCrossings, ARemovedFaceHandsOverWhatItCrossed) {
+  TriangleMesh mesh;
+  mesh.vertices = {dvec3(0, 0, 0),      dvec3(1, 0, 0),     dvec3(1, 1, 0),    dvec3(0, 1, 0),
+                   dvec3(0.2, 0.7, -1), dvec3(0.2, 0.7, 1), dvec3(0.2, 0.8, 1)};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}};
+  const Face larger{0, {dvec3(0, 0, 0), dvec3(1, 0, 0), dvec3(0, 1, 0)}};
+  {
+    Scene scene(mesh);
+    EXPECT_FALSE(scene.none({larger}));
+    EXPECT_TRUE(scene.none({larger}, {{1, 0}}));
+  }
+  Scene scene(mesh);
+  scene.crossings.hand_over(std::vector<Removed>{{1, 0}});
+  EXPECT_TRUE(scene.none({larger}, {{1, 0}}));
+}
+
+TEST(NewCrossings, SheetsThatLieOnEachOtherAreExempt) {
+  EXPECT_TRUE(Scene(wall(0)).may_move(kMiddle, dvec3(0.55, 0.55, 0)));
+  // But not from others.
+  TriangleMesh mesh = wall(0);
+  const auto n = static_cast<unsigned>(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), {dvec3(0.6, 0.55, 0.1), dvec3(0.62, 0.55, 1), dvec3(0.61, 0.56, 1)});
+  mesh.triangles.emplace_back(n, n + 1, n + 2);
+  EXPECT_FALSE(Scene(mesh).may_move(n, dvec3(0.6, 0.55, -0.1)));
+}
+
+TEST(NewCrossings, DoubleSheetsAreFoundByPosition) {
+  TriangleMesh mesh = wall(0);
+  const TriangleMesh apart = wall(0.5, 2);
+  const auto n = static_cast<unsigned>(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), apart.vertices.begin(), apart.vertices.end());
+  for (const glm::uvec3& t : apart.triangles) mesh.triangles.push_back(t + n);
+  for (dvec3& p : mesh.vertices) {
+    if (&p >= &mesh.vertices[n]) p += 5.0;
+  }
+  const std::vector<std::uint32_t> sheets = tolvol::double_sheets(mesh.vertices, mesh.triangles);
+  for (std::size_t i = 0; i < sheets.size(); ++i) EXPECT_EQ(sheets[i], i < 64 ? 0 : tolvol::kNoSheet);
+}
+
+TEST(NewCrossings, ReadsNoFaceOutsideItsBox) {
+  Scene scene(wall(0.01));
+  scene.trial.begin();
+  scene.may_move(kMiddle, dvec3(0.5, 0.5, 0.5));
+  scene.may_move(kMiddle, dvec3(0.5, 0.5, -0.25));
+  EXPECT_EQ(scene.trial.read().lower, dvec3(0.25, 0.25, -0.25));
+  EXPECT_EQ(scene.trial.read().upper, dvec3(0.75, 0.75, 0.5));
+  scene.trial.begin();
+  EXPECT_TRUE(scene.trial.read().empty());
+}
+
+// After a refusal the face that was in the way is asked first, which changes no answer.
+TEST(NewCrossings, AnswersDoNotDependOnThoseBefore) {
+  Scene scene(wall(0.01));
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_FALSE(scene.may_move(kMiddle, dvec3(0.5, 0.5, 0.5)));
+    EXPECT_TRUE(scene.may_move(kMiddle, dvec3(0.5, 0.5, -0.5)));
+    EXPECT_FALSE(scene.may_move(kMiddle, dvec3(0.9, 0.9, 0)));
+  }
+}
