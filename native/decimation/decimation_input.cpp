@@ -214,6 +214,7 @@ void DecimationInput::cover(double provable) {
 
 std::vector<Corners> DecimationInput::faces_aside() const {
   std::vector<Corners> faces;
+  faces.reserve(cut_.aside.size());
   for (const std::uint32_t i : cut_.aside) {
     const glm::uvec3& t = triangles_[i];
     faces.push_back({vertices_[t.x], vertices_[t.y], vertices_[t.z]});

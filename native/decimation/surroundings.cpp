@@ -84,6 +84,7 @@ Box Surroundings::follow(const Change& change, Trial& trial) {
 
 void hand_over(const Change& change, NewCrossings& crossings) {
   std::vector<NewCrossings::Removed> removed;
+  removed.reserve(change.removed().size());
   for (const Coverage::Removed& r : change.removed()) removed.push_back({r.id, change.elements()[r.successor].id});
   crossings.hand_over(removed);
 }

@@ -50,6 +50,7 @@ bool NewCrossings::inherited(std::uint32_t a, std::uint32_t b, std::span<const R
     return Input{face, corners, box_of(corners)};
   };
   std::vector<Input> inputs_of_b;
+  inputs_of_b.reserve(of_b.size());
   for (const std::uint32_t face : of_b) inputs_of_b.push_back(input(face));
   const std::vector<std::uint32_t>& sheet = sheets();
   return std::ranges::any_of(of_a, [&](std::uint32_t face) {
