@@ -41,7 +41,10 @@ void DeferredProof::note(const Change& change) {
   }
   for (const Coverage::Removed& r : change.removed())
     successors_[places_[r.id]] = places_[change.elements()[r.successor].id];
-  if (crossings_) hand_over(change, *crossings_);
+  if (!crossings_) return;
+  std::vector<NewCrossings::Removed> removed;
+  gather_removed(change, removed);
+  crossings_->hand_over(removed);
 }
 
 bool DeferredProof::holds(Surroundings* around) {

@@ -47,7 +47,7 @@ void Surroundings::renew(Team& team) {
 
 /// The faces that get another shape. One that moves by nothing may still have another vertex for a corner.
 void Surroundings::gather(const Change& change, Trial& trial) const {
-  trial.faces.clear(), trial.removed.clear();
+  trial.faces.clear();
   for (std::size_t i = 0; i < change.faces().size(); ++i) {
     const Change::Face& face = change.faces()[i];
     const std::uint32_t id = change.elements()[i].id;
@@ -56,9 +56,7 @@ void Surroundings::gather(const Change& change, Trial& trial) const {
     if (face.moves) corners[face.corner] = change.position().stored;
     if (corners != crossings_.corners(id)) trial.faces.push_back({id, corners});
   }
-  for (const Coverage::Removed& r : change.removed()) {
-    trial.removed.push_back({r.id, change.elements()[r.successor].id});
-  }
+  gather_removed(change, trial.removed);
 }
 
 bool Surroundings::allow(const Change& change, Trial& trial) const {
@@ -82,11 +80,9 @@ Box Surroundings::follow(const Change& change, Trial& trial) {
   return all;
 }
 
-void hand_over(const Change& change, NewCrossings& crossings) {
-  std::vector<NewCrossings::Removed> removed;
-  removed.reserve(change.removed().size());
+void gather_removed(const Change& change, std::vector<NewCrossings::Removed>& removed) {
+  removed.clear();
   for (const Coverage::Removed& r : change.removed()) removed.push_back({r.id, change.elements()[r.successor].id});
-  crossings.hand_over(removed);
 }
 
 }  // namespace tolvol

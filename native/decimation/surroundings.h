@@ -54,7 +54,7 @@ class Surroundings {
   FaceTree tree_;
 };
 
-/// What a change hands over to the faces that stay.
-void hand_over(const Change& change, NewCrossings& crossings);
+/// The faces that a change removes, and the faces that stand for them from then on.
+void gather_removed(const Change& change, std::vector<NewCrossings::Removed>& removed);
 
 }  // namespace tolvol

@@ -32,9 +32,9 @@ class TriesAhead {
   /// The time, which goes on with every change.
   std::uint64_t now() const { return now_; }
   void advance() { ++now_; }
-  /// Something in a box of space has changed now.
+  /// Something in a box of space has changed now. The box may be empty.
   void note_change(const Box& box) {
-    if (!alone()) boxes_.push_back(box);
+    if (!alone() && !box.empty()) boxes_.push_back(box);
   }
   /// Whether something in the box has changed since the try in a slot.
   bool changed_since(std::size_t slot, const Box& box) const;

@@ -12,14 +12,11 @@ namespace tolvol {
 
 Crossings crossings(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, std::size_t most,
                     Team& team, Progress* progress) {
-  const auto corners = [&](std::uint32_t i) -> Corners {
-    const glm::uvec3& t = triangles[i];
-    return {vertices[t.x], vertices[t.y], vertices[t.z]};
-  };
+  const MeshView mesh{triangles, vertices};
   std::vector<Box> boxes(triangles.size());
   for (std::uint32_t i = 0; i < triangles.size(); ++i) {
     poll_at(i);
-    for (const glm::dvec3& p : corners(i)) boxes[i].add(p);
+    boxes[i] = box_of(mesh.corners(i));
   }
   std::vector<std::uint32_t> faces(triangles.size());
   std::iota(faces.begin(), faces.end(), 0u);
@@ -35,10 +32,10 @@ Crossings crossings(std::span<const glm::dvec3> vertices, std::span<const glm::u
       pairs.clear();
       for (auto i = static_cast<std::uint32_t>(first + begin); i < first + end; ++i) {
         const std::size_t before = pairs.size();
-        const Corners own = corners(i);
+        const Corners own = mesh.corners(i);
         tree.for_each_meeting(boxes[i], [&](std::uint32_t j) {
           poll_at(j);
-          if (j > i && faces_cross(own, corners(j))) pairs.emplace_back(i, j);
+          if (j > i && faces_cross(own, mesh.corners(j))) pairs.emplace_back(i, j);
         });
         std::sort(pairs.begin() + static_cast<std::ptrdiff_t>(before), pairs.end(),
                   [](const glm::uvec2& a, const glm::uvec2& b) { return a.y < b.y; });

@@ -87,6 +87,12 @@ bool crosses_degenerate(const Points& t, const Points& degenerate, const Shared&
 
 }  // namespace
 
+Box box_of(const Corners& corners) {
+  Box box;
+  for (const glm::dvec3& p : corners) box.add(p);
+  return box;
+}
+
 bool is_degenerate(const Corners& t) {
   // Each difference has a relative error of at most u = 2^-53, so a component of the normal that is larger than 8 u
   // times its two products is not zero. The products are compared with kSmallest, below which they lose bits.

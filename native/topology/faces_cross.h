@@ -3,11 +3,28 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
+
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol {
 
 using Corners = std::array<glm::dvec3, 3>;
+
+/// Triangles and positions that someone else holds.
+struct MeshView {
+  std::span<const glm::uvec3> triangles;
+  std::span<const glm::dvec3> vertices;
+
+  Corners corners(std::uint32_t triangle) const {
+    const glm::uvec3& t = triangles[triangle];
+    return {vertices[t.x], vertices[t.y], vertices[t.z]};
+  }
+};
+
+Box box_of(const Corners& corners);
 
 /// Whether the corners lie on one line or in one point, decided exactly. O(1).
 bool is_degenerate(const Corners& t);

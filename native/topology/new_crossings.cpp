@@ -7,12 +7,6 @@
 
 namespace tolvol {
 
-Box box_of(const Corners& corners) {
-  Box box;
-  for (const glm::dvec3& p : corners) box.add(p);
-  return box;
-}
-
 NewCrossings::NewCrossings(const MeshView& input, const MeshView& now, std::vector<Corners> fixed)
     : input_(input), now_(now), fixed_(std::move(fixed)), origins_(input.triangles.size() + fixed_.size()) {}
 

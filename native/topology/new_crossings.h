@@ -20,19 +20,6 @@
 
 namespace tolvol {
 
-/// Triangles and positions that someone else holds.
-struct MeshView {
-  std::span<const glm::uvec3> triangles;
-  std::span<const glm::dvec3> vertices;
-
-  Corners corners(std::uint32_t triangle) const {
-    const glm::uvec3& t = triangles[triangle];
-    return {vertices[t.x], vertices[t.y], vertices[t.z]};
-  }
-};
-
-Box box_of(const Corners& corners);
-
 class NewCrossings {
  public:
   /// `input` and `now` are the mesh as it came in and as it is, with the same numbers of faces; positions are as they
