@@ -73,6 +73,19 @@ def decimate_settings(options=frozenset()):
             ),
             options=set(options),
         ),
+        "crossings": EnumProperty(
+            name="Crossings",
+            description="Whether faces may come to cross each other",
+            items=(
+                (
+                    "KEEP_OUT",
+                    "Keep Out",
+                    "No faces cross in the result that did not cross before. Thin walls keep more triangles",
+                ),
+                ("ALLOW", "Allow", "Faces may come to cross, as the two sides of a thin wall do"),
+            ),
+            options=set(options),
+        ),
         "max_seconds": FloatProperty(
             name="Time Limit",
             description="Seconds after which the decimation of an object ends with the result that is proved by then. 0 "

@@ -22,7 +22,7 @@ try:
     from addon.errors import NOT_PROVED, NotWritten, Refused
     from addon.files import file_io, safe_files, side_files
     from addon.mesh import mesh_io
-    from addon.proof import report
+    from addon.proof import report, solidity
     from addon.proof.certify import certify
     from addon.reference import snapshots
 except ImportError as error:  # After an uncaught exception Blender would end with exit code 0.
@@ -64,6 +64,13 @@ def arguments():
         default="fast",
         help="thorough: a seventh to a fifth fewer triangles in two to five times the processor time, at a tolerance of "
         "0.1%% in five to seven times (default: fast)",
+    )
+    parser.add_argument(
+        "--crossings",
+        choices=("keep_out", "allow"),
+        default="keep_out",
+        help="keep_out: no faces cross in the result that did not cross in IN; allow: they may, as the two sides of a thin "
+        "wall do (default: keep_out)",
     )
     parser.add_argument(
         "--max-seconds",
@@ -149,6 +156,7 @@ class Command:
         names = [ob.name for ob in source.objects]
         reference_objects = self._pair(source.objects, reference_file)
         references = [snapshots.surface_of(ob) for ob in reference_objects]
+        inputs = [snapshots.surface_of(ob) for ob in source.objects]
         tolerance, size = self._tolerance(references)
         working = tolerance - file_io.rounding(self.exported, source.objects)
         if working <= 0:
@@ -163,7 +171,7 @@ class Command:
             )
         ]
         repairs = source.repairs + (reference_file.repairs if reference_file else [])
-        whole = self._write(source, names, references, runs, tolerance, size)
+        whole = self._write(source, names, inputs, references, runs, tolerance, size)
         whole["input"] = whole_input
         whole["repairs"] = repairs + whole["repairs"]
         whole["seconds"]["total"] = time.perf_counter() - self.started
@@ -242,6 +250,7 @@ class Command:
                     tolerance_length_converted=repr(units.shortest(length)),
                     keep="ONE" if self.options.one_sided else "BOTH",
                     effort=self.options.effort.upper(),
+                    crossings=self.options.crossings.upper(),
                     max_seconds=self.options.max_seconds or 0,
                     outside=self.options.outside.upper(),
                     threads=self.options.threads or 0,
@@ -256,7 +265,7 @@ class Command:
         self._stage(f"decimated {ob.name}: {report.counts(run)}", start)
         return run
 
-    def _write(self, source, names, references, runs, tolerance, size):
+    def _write(self, source, names, inputs, references, runs, tolerance, size):
         """Writes OUT beside its place, reads the file back and certifies it. Returns the report of the whole file."""
         start = time.perf_counter()
         written = self._export(source.objects)
@@ -268,10 +277,19 @@ class Command:
                 self._certify(found[name], reference, tolerance, run["outside"]["faces"])
                 for name, reference, run in zip(names, references, runs)
             ]
+            before = sum(run["crossings"]["before"] for run in runs)
         else:  # The format holds only one object, so all objects were joined.
             kept = sum(run["outside"]["faces"] for run in runs)
-            judged = [self._certify(snapshots.joined(found.values()), snapshots.joined(references), tolerance, kept)]
+            found = {"": snapshots.joined(found.values())}
+            judged = [self._certify(found[""], snapshots.joined(references), tolerance, kept)]
+            before = self._crossing_count(snapshots.joined(inputs))
         whole = self._summary(names, runs, judged, tolerance, size)
+        whole["crossings"] = {"before": before, "after": sum(map(self._crossing_count, found.values()))}
+        if self.options.crossings == "keep_out" and whole["crossings"]["after"] > before:
+            whole["warnings"].append(
+                f"{whole['crossings']['after']:,} pairs of faces cross in the file, {before:,} did before: the file rounds "
+                "coordinates, and objects are decimated one by one"
+            )
         whole["output"] = {"file": self.options.output, **written.counts}
         for kind, count in source.extras.items():
             if lost := count - written.extras.get(kind, 0):
@@ -322,6 +340,9 @@ class Command:
 
     def _certify(self, surface, reference, tolerance, kept):
         return certify(surface, reference, tolerance, kept, self.options.threads)
+
+    def _crossing_count(self, surface):
+        return solidity.crossing_count(surface.arrays, self.options.threads)
 
     def _draw(self, result, reference, tolerance, size):
         surfaces = [(surface.world(), surface.arrays.triangles) for surface in (result, reference)]

@@ -15,7 +15,7 @@ from ..errors import NotProved, Refused
 from ..job import JobOperator, run_all
 from ..mesh import mesh_io, protect, transfer
 from ..operation_settings import PROTECTED, decimate_settings
-from ..proof import measure, report
+from ..proof import measure, report, solidity
 from ..proof.certify import certify
 from ..properties import PLACEMENTS, automatic_placement, tolerance_settings
 from ..reference import measurements, snapshots, tolerances, volumes
@@ -37,6 +37,11 @@ def draw_decimate_settings(layout, settings):
     sub = row.row()
     sub.active = settings.use_target
     sub.prop(settings, "target_triangles", text="")
+
+
+def draw_advanced_settings(layout, settings):
+    """Draws the settings of a decimation that hardly anybody changes, for the panel and for Adjust Last Operation."""
+    layout.prop(settings, "crossings")
 
 
 def draw_protect_settings(layout, settings, ob):
@@ -108,6 +113,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         draw_decimate_settings(layout, self)
         draw_protect_settings(layout, self, context.active_object)
         layout.prop(self, "outside")
+        draw_advanced_settings(layout, self)
 
     def targets(self, context):
         return targets(context)
@@ -188,6 +194,7 @@ object. An object without a reference gets one first, as by Set Reference"""
             "placement": placement.lower(),
             "two_sided": self.keep == "BOTH",
             "effort": self.effort.lower(),
+            "crossings": self.crossings.lower(),
             "max_seconds": self.max_seconds or None,
             "target_triangles": self.target_triangles if self.use_target else None,
             "outside": self.outside.lower(),
@@ -245,6 +252,10 @@ class _Task:
                 progress,
             )
             certified["outside"]["backward_before"] = before.upper
+        certified["crossings"] = {
+            when: solidity.crossing_count(mesh, threads, progress)
+            for when, mesh in (("before", arrays), ("after", decimated.arrays))
+        }
         clock.append(time.perf_counter())
         seconds = dict(zip(("field", "decimate", "certify"), np.diff(clock).tolist()))
         run = report.decimation_run(arrays, result, computed.report, built, certified, self.options, seconds)

@@ -4,7 +4,7 @@
 import bpy
 
 from . import menus
-from .decimate import TOLVOL_PT_decimate, TOLVOL_PT_protect
+from .decimate import TOLVOL_PT_advanced, TOLVOL_PT_decimate, TOLVOL_PT_protect
 from .deform import TOLVOL_PT_deform
 from .deviation import TOLVOL_PT_deviation, TOLVOL_PT_show_deviation
 from .guard import TOLVOL_PT_guard
@@ -18,6 +18,7 @@ _CLASSES = (
     TOLVOL_PT_show_deviation,
     TOLVOL_PT_decimate,
     TOLVOL_PT_protect,
+    TOLVOL_PT_advanced,
     TOLVOL_PT_smooth,
     TOLVOL_PT_modifiers,
     TOLVOL_PT_deform,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from ..operators.decimate import draw_decimate_settings, draw_protect_settings, targets
+from ..operators.decimate import draw_advanced_settings, draw_decimate_settings, draw_protect_settings, targets
 from ..proof import report
 from ..reference import measurements
 from .layout import SubPanel, say_blocked, text_lines
@@ -39,3 +39,15 @@ class TOLVOL_PT_protect(SubPanel, bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         draw_protect_settings(layout, context.active_object.tolvol, context.active_object)
+
+
+class TOLVOL_PT_advanced(SubPanel, bpy.types.Panel):
+    bl_label = "Advanced"
+    bl_parent_id = "TOLVOL_PT_decimate"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        draw_advanced_settings(layout, context.active_object.tolvol)

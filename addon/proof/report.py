@@ -18,7 +18,8 @@ def decimation_run(source, result, native_report, volume, certified, options, se
     """Returns the run of one decimation.
 
     source: the MeshArrays of the input; result: the Decimated; native_report: the report of the native decimate();
-    certified: the result of certify() for the mesh that will be stored; options: two_sided, placement, effort and
+    certified: the result of certify() for the mesh that will be stored, and "crossings", a dictionary of the numbers of
+    crossing pairs "before" and "after" (solidity.crossing_count()); options: two_sided, placement, effort and
     target_triangles as they were given.
     """
     # The native report lists unused vertices as removed, but Blender keeps them: this is not a repair here.
@@ -41,6 +42,7 @@ def decimation_run(source, result, native_report, volume, certified, options, se
         "precision": volume.precision,
         "forward": certified["forward"],
         "backward": certified["backward"],
+        "crossings": certified["crossings"],
         "seconds": seconds,
         "repairs": repairs,
         "locked": native_report["locked"],
@@ -75,7 +77,8 @@ def line(run, seconds=None):
 def counts(run):
     """Returns the numbers of triangles before and after a run as text, with remarks.
 
-    The remarks say why the run ended early or missed its target, and how many faces outside the tolerance were kept.
+    The remarks say why the run ended early or missed its target, how many faces outside the tolerance were kept, and how
+    many pairs of faces cross.
     """
     remarks = []
     if run["target_triangles"] and run["stopped_by"] != "target":
@@ -87,6 +90,9 @@ def counts(run):
         remarks.append("stopped at the time limit")
     if run["outside"]["faces"]:
         remarks.append(f"{run['outside']['faces']:,} faces outside kept")
+    pairs = run.get("crossings", {"after": 0})  # a file may keep a run of an earlier version
+    if pairs["after"]:
+        remarks.append(f"{pairs['after']:,} pairs of faces cross, before {pairs['before']:,}")
     remark = f" ({', '.join(remarks)})" if remarks else ""
     return f"{run['input']['triangles']:,} -> {run['output']['triangles']:,} triangles{remark}"
 

@@ -60,8 +60,7 @@ class Rounds {
       price();
       const double limit = std::max(cost_at(kRoundShare), on_trust ? trusted_cost() : 0);
       // The two shares take turns, so that the rims lie elsewhere in the next round.
-      const Regions parts(mesh_, std::min(kMostVertices, vertices / kLeastRegions), round % 2 == 0 ? 0.5 : 0.35,
-                          crossings_ != nullptr, team_);
+      const Regions parts(mesh_, std::min(kMostVertices, vertices / kLeastRegions), round % 2 == 0 ? 0.5 : 0.35, team_);
       const std::vector<Members> members = members_of(parts);
       std::atomic<std::size_t> taken_back = 0;
       team_.run(parts.count(), 1, [&](std::size_t i, std::size_t) {

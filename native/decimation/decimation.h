@@ -27,7 +27,7 @@ struct DecimationOptions {
   Effort effort = Effort::fast;  ///< See decimate() for what each costs.
   /// keep_out: two faces of the result may cross only where input faces that they stand for crossed
   /// (topology/new_crossings.h). Ignored without a volume and where a baseline decides.
-  Crossings crossings = Crossings::allow;
+  Crossings crossings = Crossings::keep_out;
   double max_seconds = 0;            ///< It stops then with what is proved; 0 is no limit.
   std::size_t target_triangles = 0;  ///< It stops at so many; 0 is as few as the tolerance allows.
   /// For each input vertex, or empty: it neither moves nor vanishes, and an edge between two such vertices stays.

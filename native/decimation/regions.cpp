@@ -73,7 +73,7 @@ void Regions::cut(const BoundedMesh& mesh, std::vector<std::uint32_t>& vertices,
   }
 }
 
-Regions::Regions(const BoundedMesh& mesh, std::size_t most, double first, bool apart, Team& team) {
+Regions::Regions(const BoundedMesh& mesh, std::size_t most, double first, Team& team) {
   const OpenMesh::TriConnectivity& connectivity = mesh.connectivity();
   of_vertex_.assign(connectivity.n_vertices(), kNone);
   std::vector<std::uint32_t> alive;
@@ -83,7 +83,7 @@ Regions::Regions(const BoundedMesh& mesh, std::size_t most, double first, bool a
   cut(mesh, alive, most, first, team);
   std::vector<std::uint32_t> rim;
   for (const std::uint32_t v : alive) {
-    if (mesh.joined(v) || (apart && !strictly_inside(mesh.stored(v), cells_[of_vertex_[v]]))) rim.push_back(v);
+    if (mesh.joined(v)) rim.push_back(v);
   }
   for (const auto e : connectivity.edges()) {
     const auto h = connectivity.halfedge_handle(e, 0);

@@ -15,23 +15,23 @@ class Regions {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
   /// Cuts along the longest axis at a median, over and over, until no region has more than `most` vertices. The first
-  /// cut is at `first` of the vertices instead, by which the rims come to lie elsewhere. `apart` leaves vertices on the
-  /// border of their cell to no region, so that the faces of two regions cannot come to cross. O(n log n); the same
-  /// everywhere, on any number of threads.
-  Regions(const BoundedMesh& mesh, std::size_t most, double first, bool apart, Team& team);
+  /// cut is at `first` of the vertices instead, by which the rims come to lie elsewhere. O(n log n); the same everywhere,
+  /// on any number of threads.
+  Regions(const BoundedMesh& mesh, std::size_t most, double first, Team& team);
 
   std::uint32_t count() const { return static_cast<std::uint32_t>(cells_.size()); }
 
-  /// The region that a vertex and all its neighbours belong to. It is kNone at the rim of a region, on the border of
-  /// its cell, and for joined vertices. As long as only edges of a region collapse, nothing that a collapse changes or
+  /// The region that a vertex and all its neighbours belong to. It is kNone at the rim of a region and for
+  /// joined vertices. As long as only edges of a region collapse, nothing that a collapse changes or
   /// looks at in the connectivity is changed by another region's.
   std::uint32_t of_vertex(std::uint32_t vertex) const { return of_vertex_[vertex]; }
   /// The region of an edge: that of its two ends.
   std::uint32_t of_edge(const BoundedMesh& mesh, std::uint32_t edge) const;
 
-  /// The box of stored positions that holds the region's vertices. The cells of two regions have no inner point in
-  /// common. Where regions are apart, their vertices lie strictly inside: as long as none leaves the inside of its
-  /// cell, faces that one region changes meet those that another changes only where they met before.
+  /// The box of stored positions that holds the region's vertices and their neighbours. The cells of two regions have
+  /// no inner point in common. As long as changes put vertices strictly inside their cell alone, faces that one region
+  /// changes meet those that another changes only where they met before: what a face has in common with the border of
+  /// the cell is spanned by its vertices there, and a change only takes some of these away.
   const Box& cell(std::uint32_t region) const { return cells_[region]; }
   /// Calls visit(region) for those whose cell meets a box of stored positions.
   template <class Visit>

@@ -73,10 +73,10 @@ Box Surroundings::follow(const Change& change, Trial& trial) {
     tree_.change(face.id, box);
   }
   for (const NewCrossings::Removed& r : trial.removed) {
-    all.add(box_of(crossings_.corners(r.id)));
+    all.add(box_of(crossings_.corners(r.id))), all.add(box_of(crossings_.corners(r.successor)));
     tree_.change(r.id, Box());
   }
-  crossings_.hand_over(trial.removed);
+  crossings_.hand_over(trial.removed, trial.crossings.given());
   return all;
 }
 

@@ -40,7 +40,8 @@ class Surroundings {
   bool allow(const Change& change, Trial& trial) const;
   /// Whether none of some faces that were changed on trust, as they are now, crosses others anew or is degenerate.
   bool allow(std::span<const std::uint32_t> changed) const { return crossings_.none(tree_, changed); }
-  /// Follows a change, before it is carried out on the mesh. Returns a box around all that it changes.
+  /// Follows a change, which `trial` was asked about last, before it is carried out on the mesh. Returns a box around
+  /// all that it changes: also around the faces that come to stand for others.
   Box follow(const Change& change, Trial& trial);
 
  private:

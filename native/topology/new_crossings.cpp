@@ -1,22 +1,79 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Faces around one vertex all meet in it, so that their boxes tell none of them apart. Two of them cross elsewhere only
+// if the edge of one that is opposite the vertex meets the other.
 #include "topology/new_crossings.h"
 
 #include <algorithm>
+#include <numeric>
+#include <optional>
 
-#include "topology/double_sheets.h"
+#include "topology/succession.h"
 
 namespace tolvol {
+namespace {
+
+/// With more changed faces than this they are searched in a tree.
+constexpr std::size_t kMany = 48;
+/// A change is refused where more pairs of input faces would have to be looked at to share them out.
+constexpr std::size_t kMostPairs = 1 << 17;
+
+/// A corner that all faces have.
+std::optional<glm::dvec3> common_corner(std::span<const NewCrossings::Face> faces) {
+  for (const glm::dvec3& corner : faces.front().corners) {
+    if (std::ranges::all_of(faces, [&](const NewCrossings::Face& face) {
+          return std::ranges::find(face.corners, corner) != face.corners.end();
+        })) {
+      return corner;
+    }
+  }
+  return std::nullopt;
+}
+
+/// Calls visit(i) for the changed faces whose box meets `box`, until it returns false. Returns whether it never did.
+template <class Visit>
+bool for_each_meeting(const Box& box, std::span<const Box> boxes, const FaceTree& ring, Visit&& visit) {
+  bool all = true;
+  if (boxes.size() > kMany) {
+    ring.for_each_meeting(box, [&](std::uint32_t i) { return all = visit(i); });
+    return all;
+  }
+  for (std::uint32_t i = 0; i < boxes.size() && all; ++i) {
+    if (meet(box, boxes[i])) all = visit(i);
+  }
+  return all;
+}
+
+/// Calls visit(i, k) for the pairs of changed faces that cross each other, until it returns false. Returns whether it
+/// never did. A pair may come twice.
+template <class Visit>
+bool for_each_crossing_within(std::span<const NewCrossings::Face> faces, std::span<const Box> boxes,
+                              const FaceTree& ring, Visit&& visit) {
+  if (faces.size() > kMany) {
+    const std::optional<glm::dvec3> common = common_corner(faces);
+    for (std::uint32_t i = 0; i < faces.size(); ++i) {
+      Box searched;
+      for (const glm::dvec3& corner : faces[i].corners) {
+        if (!common || corner != *common) searched.add(corner);
+      }
+      const bool all = for_each_meeting(searched, boxes, ring, [&](std::uint32_t k) {
+        return i == k || !faces_cross(faces[i].corners, faces[k].corners) || visit(i, k);
+      });
+      if (!all) return false;
+    }
+    return true;
+  }
+  for (std::uint32_t i = 0; i < faces.size(); ++i) {
+    for (std::uint32_t k = 0; k < i; ++k) {
+      if (meet(boxes[i], boxes[k]) && faces_cross(faces[i].corners, faces[k].corners) && !visit(i, k)) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
 
 NewCrossings::NewCrossings(const MeshView& input, const MeshView& now, std::vector<Corners> fixed)
-    : input_(input), now_(now), fixed_(std::move(fixed)), origins_(input.triangles.size() + fixed_.size()) {}
-
-const std::vector<std::uint32_t>& NewCrossings::sheets() const {
-  std::call_once(sheets_known_, [&] {
-    sheets_ = double_sheets(input_.vertices, input_.triangles);
-    sheets_.resize(face_count(), kNoSheet);
-  });
-  return sheets_;
-}
+    : now_(now), input_(input, std::move(fixed)), origins_(input_.face_count()) {}
 
 std::vector<std::uint32_t> NewCrossings::origins_of(std::uint32_t face, std::span<const Removed> removed) const {
   std::vector<std::uint32_t> found;
@@ -33,33 +90,13 @@ std::vector<std::uint32_t> NewCrossings::origins_of(std::uint32_t face, std::spa
 
 /// Whether input faces of both crossed, or are of sheets that lie on each other.
 bool NewCrossings::inherited(std::uint32_t a, std::uint32_t b, std::span<const Removed> removed) const {
-  const std::vector<std::uint32_t> of_a = origins_of(a, removed), of_b = origins_of(b, removed);
-  struct Input {
-    std::uint32_t face;
-    Corners corners;
-    Box box;
-  };
-  const auto input = [&](std::uint32_t face) {
-    const Corners corners = of(input_, face);
-    return Input{face, corners, box_of(corners)};
-  };
-  std::vector<Input> inputs_of_b;
-  inputs_of_b.reserve(of_b.size());
-  for (const std::uint32_t face : of_b) inputs_of_b.push_back(input(face));
-  const std::vector<std::uint32_t>& sheet = sheets();
-  return std::ranges::any_of(of_a, [&](std::uint32_t face) {
-    const Input one = input(face);
-    return std::ranges::any_of(inputs_of_b, [&](const Input& other) {
-      return (sheet[face] != kNoSheet && sheet[face] == sheet[other.face]) ||
-             (meet(one.box, other.box) && faces_cross(one.corners, other.corners));
-    });
-  });
+  return input_.any_crossed(origins_of(a, removed), origins_of(b, removed));
 }
 
 bool NewCrossings::none(const FaceTree& near, std::span<const Face> faces, std::span<const Removed> removed,
                         Trial& trial) const {
   Box all;
-  trial.boxes_.clear(), trial.replaced_.clear();
+  trial.boxes_.clear(), trial.replaced_.clear(), trial.given_.clear();
   for (const Face& face : faces) {
     trial.boxes_.push_back(box_of(face.corners));
     all.add(trial.boxes_.back());
@@ -68,45 +105,117 @@ bool NewCrossings::none(const FaceTree& near, std::span<const Face> faces, std::
   for (const Removed& r : removed) trial.replaced_.push_back(r.id);
   std::sort(trial.replaced_.begin(), trial.replaced_.end());
   trial.read_.add(all);
+  if (faces.size() > kMany) {
+    std::vector<std::uint32_t> places(faces.size());
+    std::iota(places.begin(), places.end(), 0u);
+    Team alone(1);
+    trial.ring_ = FaceTree(places, trial.boxes_, alone);
+  }
 
   for (const Face& face : faces) {
     if (is_degenerate(face.corners) && !is_degenerate(corners(face.id))) return false;
   }
   const auto crosses_any = [&](std::uint32_t other) {
     const Corners t = corners(other);
-    const Box box = box_of(t);
-    for (std::size_t i = 0; i < faces.size(); ++i) {
-      if (meet(trial.boxes_[i], box) && faces_cross(faces[i].corners, t) && !inherited(faces[i].id, other, removed)) {
-        return true;
-      }
-    }
-    return false;
+    return !for_each_meeting(box_of(t), trial.boxes_, trial.ring_, [&](std::uint32_t i) {
+      return !faces_cross(faces[i].corners, t) || inherited(faces[i].id, other, removed);
+    });
   };
   const auto stays = [&](std::uint32_t other) {
     return !std::binary_search(trial.replaced_.begin(), trial.replaced_.end(), other);
   };
-  for (std::size_t i = 0; i < faces.size(); ++i) {
-    for (std::size_t k = 0; k < i; ++k) {
-      if (meet(trial.boxes_[i], trial.boxes_[k]) && faces_cross(faces[i].corners, faces[k].corners) &&
-          !inherited(faces[i].id, faces[k].id, removed)) {
-        return false;
-      }
-    }
+  const bool alone = for_each_crossing_within(faces, trial.boxes_, trial.ring_, [&](std::uint32_t i, std::uint32_t k) {
+    return inherited(faces[i].id, faces[k].id, removed);
+  });
+  if (!alone) return false;
+  if (trial.met_last_ != kNone && stays(trial.met_last_) && crosses_any(trial.met_last_)) {
+    return share_out(near, faces, removed, trial);
   }
-  if (trial.met_last_ != kNone && stays(trial.met_last_) && crosses_any(trial.met_last_)) return false;
   trial.met_last_ = kNone;
   near.for_each_meeting(all, [&](std::uint32_t other) {
     if (stays(other) && crosses_any(other)) trial.met_last_ = other;
     return trial.met_last_ == kNone;
   });
-  return trial.met_last_ == kNone;
+  return trial.met_last_ == kNone || share_out(near, faces, removed, trial);
+}
+
+/// Whether the input faces that the changed and the removed faces stand for can be shared out among the changed faces
+/// so that every crossing is inherited, after one was found with `trial.met_last_` that is not. Notes in `trial` what
+/// has to be given then.
+bool NewCrossings::share_out(const FaceTree& near, std::span<const Face> faces, std::span<const Removed> removed,
+                             Trial& trial) const {
+  std::vector<std::uint32_t> of_met = origins_of(trial.met_last_, {});
+  input_.keep_crossing(of_met);
+  if (of_met.empty()) return false;  // as always in a mesh without crossings
+  struct Member {
+    std::uint32_t input_face, of;
+  };
+  std::vector<Member> members;
+  std::vector<std::uint32_t> owners;
+  const auto add_all = [&](std::uint32_t face, std::uint32_t of, std::uint32_t owner) {
+    std::vector<std::uint32_t> crossing = origins_of(face, {});
+    input_.keep_crossing(crossing);
+    for (const std::uint32_t i : crossing) members.push_back({i, of}), owners.push_back(owner);
+  };
+  for (std::uint32_t i = 0; i < faces.size(); ++i) add_all(faces[i].id, faces[i].id, i);
+  for (const Removed& r : removed) {
+    const auto at = std::ranges::find(faces, r.successor, &Face::id);
+    add_all(r.id, r.successor,
+            at == faces.end() ? Succession::kOutside : static_cast<std::uint32_t>(at - faces.begin()));
+  }
+  if (members.empty()) return false;
+
+  Succession succession(owners);
+  for_each_crossing_within(faces, trial.boxes_, trial.ring_, [&](std::uint32_t i, std::uint32_t k) {
+    for (std::uint32_t a = 0; a < members.size(); ++a) {
+      if (owners[a] != i) continue;
+      for (std::uint32_t b = 0; b < members.size(); ++b) {
+        if (owners[b] != k || !input_.crossed(members[a].input_face, members[b].input_face)) continue;
+        succession.keep(a), succession.keep(b);
+        return true;
+      }
+    }
+    return true;  // they are inherited, so that this is not reached
+  });
+  Box all;
+  for (const Box& box : trial.boxes_) all.add(box);
+  std::size_t pairs = 0;
+  bool possible = true;
+  near.for_each_meeting(all, [&](std::uint32_t other) {
+    if (std::binary_search(trial.replaced_.begin(), trial.replaced_.end(), other)) return true;
+    const Corners t = corners(other);
+    std::vector<std::uint32_t> crossing;
+    for_each_meeting(box_of(t), trial.boxes_, trial.ring_, [&](std::uint32_t i) {
+      if (faces_cross(faces[i].corners, t)) crossing.push_back(i);
+      return true;
+    });
+    if (crossing.empty()) return true;
+    std::vector<std::uint32_t> origins = origins_of(other, {});
+    input_.keep_crossing(origins);
+    pairs += origins.size() * members.size();
+    std::vector<std::uint32_t> of_other;
+    for (std::uint32_t m = 0; m < members.size() && pairs <= kMostPairs; ++m) {
+      if (input_.any_crossed({&members[m].input_face, 1}, origins)) of_other.push_back(m);
+    }
+    possible = !of_other.empty();
+    for (const std::uint32_t i : crossing) succession.need(i, of_other);
+    return possible;
+  });
+  if (!possible) return false;
+  const std::optional<std::vector<std::uint32_t>> found = succession.find();
+  if (!found) return false;
+  for (std::size_t m = 0; m < members.size(); ++m) {
+    if ((*found)[m] == owners[m]) continue;
+    trial.given_.push_back({members[m].input_face, members[m].of, faces[(*found)[m]].id});
+  }
+  return true;
 }
 
 bool NewCrossings::none(const FaceTree& near, std::span<const std::uint32_t> changed) const {
   return std::ranges::none_of(changed, [&](std::uint32_t face) {
     poll();
     const Corners own = corners(face);
-    if (is_degenerate(own) && !is_degenerate(of(input_, face))) return true;
+    if (is_degenerate(own) && !is_degenerate(input_.corners(face))) return true;
     bool crosses = false;
     near.for_each_meeting(box_of(own), [&](std::uint32_t other) {
       crosses = other != face && faces_cross(own, corners(other)) && !inherited(face, other, {});
@@ -116,8 +225,9 @@ bool NewCrossings::none(const FaceTree& near, std::span<const std::uint32_t> cha
   });
 }
 
-void NewCrossings::hand_over(std::span<const Removed> removed) {
+void NewCrossings::hand_over(std::span<const Removed> removed, std::span<const Given> given) {
   for (const Removed& r : removed) origins_.hand_over(r.id, r.successor);
+  for (const Given& g : given) origins_.give(g.input_face, g.from, g.to);
 }
 
 }  // namespace tolvol

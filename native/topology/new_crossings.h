@@ -9,7 +9,6 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
-#include <mutex>
 #include <span>
 #include <vector>
 
@@ -17,6 +16,7 @@
 #include "topology/face_origins.h"
 #include "topology/face_tree.h"
 #include "topology/faces_cross.h"
+#include "topology/input_crossings.h"
 
 namespace tolvol {
 
@@ -36,6 +36,11 @@ class NewCrossings {
   struct Removed {
     std::uint32_t id, successor;
   };
+  /// An input face that another face stands for after a change: `to` instead of `from`, which may be the successor of a
+  /// removed face.
+  struct Given {
+    std::uint32_t input_face, from, to;
+  };
   /// What a try read, and its scratch; one for each thread.
   class Trial {
    public:
@@ -43,18 +48,23 @@ class NewCrossings {
     void begin() { read_ = {}, met_last_ = kNone; }
     /// What the series found depends on no face outside this box.
     const Box& read() const { return read_; }
+    /// What the change that was asked about last, and may be carried out, has to give.
+    std::span<const Given> given() const { return given_; }
 
    private:
     friend class NewCrossings;
     Box read_;
     std::vector<Box> boxes_;
+    FaceTree ring_;                        ///< of the changed faces by their places in the change, if there are many
     std::vector<std::uint32_t> replaced_;  ///< sorted
     std::uint32_t met_last_ = kNone;       ///< the face that was in the way last, which likely still is
+    std::vector<Given> given_;
   };
 
   /// Whether the mesh would have no new crossing if `faces` replaced those of the same number and `removed` were gone,
   /// and no face would become degenerate. `near` has to have every face whose box meets those of `faces`. Only reads;
-  /// several threads may ask at once. About 5 us for the faces around a vertex.
+  /// several threads may ask at once. About 5 us for the faces around a vertex, and O(n log n) where n faces around a
+  /// vertex lie about it like a fan.
   bool none(const FaceTree& near, std::span<const Face> faces, std::span<const Removed> removed, Trial& trial) const;
 
   /// The same of changes that were carried out on trust: whether none of the `changed` faces, as they are now, is
@@ -62,32 +72,29 @@ class NewCrossings {
   /// may ask at once. About 3 us a face.
   bool none(const FaceTree& near, std::span<const std::uint32_t> changed) const;
 
-  /// After a change was carried out.
-  void hand_over(std::span<const Removed> removed);
+  /// After a change was carried out, with what none() found that it has to give.
+  void hand_over(std::span<const Removed> removed, std::span<const Given> given = {});
 
   /// For those who put faces back.
   FaceOrigins& origins() { return origins_; }
 
-  Corners corners(std::uint32_t face) const { return of(now_, face); }
+  Corners corners(std::uint32_t face) const {
+    return face < now_.triangles.size() ? now_.corners(face) : input_.corners(face);
+  }
   /// The fixed faces among them.
-  std::size_t face_count() const { return now_.triangles.size() + fixed_.size(); }
+  std::size_t face_count() const { return input_.face_count(); }
 
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
-  Corners of(const MeshView& mesh, std::uint32_t face) const {
-    const std::size_t count = mesh.triangles.size();
-    return face < count ? mesh.corners(face) : fixed_[face - count];
-  }
   std::vector<std::uint32_t> origins_of(std::uint32_t face, std::span<const Removed> removed) const;
   bool inherited(std::uint32_t a, std::uint32_t b, std::span<const Removed> removed) const;
-  const std::vector<std::uint32_t>& sheets() const;
+  bool share_out(const FaceTree& near, std::span<const Face> faces, std::span<const Removed> removed,
+                 Trial& trial) const;
 
-  MeshView input_, now_;
-  std::vector<Corners> fixed_;
+  MeshView now_;
+  InputCrossings input_;
   FaceOrigins origins_;
-  mutable std::once_flag sheets_known_;
-  mutable std::vector<std::uint32_t> sheets_;  ///< of the input, found when first needed
 };
 
 }  // namespace tolvol

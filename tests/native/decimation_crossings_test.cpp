@@ -31,10 +31,9 @@ TriangleMesh moved(TriangleMesh mesh, const glm::dmat4& by) {
   return shapes::stored(mesh);
 }
 
-/// With crossings kept out, unless the options say otherwise.
-Options keep_out() {
+Options allow() {
   Options options;
-  options.crossings = Options::Crossings::keep_out;
+  options.crossings = Options::Crossings::allow;
   return options;
 }
 
@@ -90,7 +89,7 @@ TEST(DecimationCrossings, ThinWallsDoNotCross) {
     ASSERT_EQ(count(c.mesh.vertices, c.mesh.triangles), 0u);
     for (const auto effort : {Options::Effort::fast, Options::Effort::thorough}) {
       for (const auto placement : {Options::Placement::optimal, Options::Placement::subset}) {
-        Options options = keep_out();
+        Options options;
         options.effort = effort, options.placement = placement;
         const DecimationResult r = run(c, options);
         EXPECT_TRUE(crossings_by_cgal({r.vertices, r.triangles}).empty());
@@ -98,7 +97,7 @@ TEST(DecimationCrossings, ThinWallsDoNotCross) {
         expect_within(c, r);
       }
     }
-    const DecimationResult r = run(c);
+    const DecimationResult r = run(c, allow());
     allowed += count(r.vertices, r.triangles);
   }
   EXPECT_GT(allowed, 100u) << "the meshes show nothing";
@@ -106,7 +105,7 @@ TEST(DecimationCrossings, ThinWallsDoNotCross) {
 
 TEST(DecimationCrossings, OptionsDoNotChangeThePromise) {
   Case c{hollow(10, 0.01)};
-  std::vector<Options> all(4, keep_out());
+  std::vector<Options> all(4);
   all[0].two_sided = false;
   all[1].target_triangles = 500;
   all[2].effort = Options::Effort::thorough, all[2].max_seconds = 0.3;
@@ -128,7 +127,7 @@ TEST(DecimationCrossings, AnyMatrixAndStorage) {
   for (const glm::dmat4& to_world : {sheared, mirrored, far_away}) {
     for (const Storage storage : {Storage::float32, Storage::float64}) {
       const Case c{hollow(9, 0.01), to_world, storage};
-      const DecimationResult r = run(c, keep_out());
+      const DecimationResult r = run(c);
       EXPECT_TRUE(crossings_by_cgal({r.vertices, r.triangles}).empty());
       EXPECT_LT(r.triangles.size(), c.mesh.triangles.size() / 2);
       expect_within(c, r);
@@ -139,9 +138,9 @@ TEST(DecimationCrossings, AnyMatrixAndStorage) {
 // Large enough for regions that are worked on side by side.
 TEST(DecimationCrossings, TheSameBitsForAnyNumberOfThreads) {
   const Case regions{hollow(many(24), 0.01)};
-  cases::expect_same_bits(regions, keep_out(), 2);
-  cases::expect_same_bits(regions, keep_out(), 4);
-  Options thorough = keep_out();
+  cases::expect_same_bits(regions, {}, 2);
+  cases::expect_same_bits(regions, {}, 4);
+  Options thorough;
   thorough.effort = Options::Effort::thorough;
   const Case few{hollow(8, 0.02)};
   cases::expect_same_bits(few, thorough, 3);
@@ -150,7 +149,7 @@ TEST(DecimationCrossings, TheSameBitsForAnyNumberOfThreads) {
 TEST(DecimationCrossings, AChainStaysLinked) {
   const Case c{chain(5)};
   ASSERT_EQ(count(c.mesh.vertices, c.mesh.triangles), 0u);
-  const DecimationResult r = run(c, keep_out());
+  const DecimationResult r = run(c);
   EXPECT_TRUE(crossings_by_cgal({r.vertices, r.triangles}).empty());
   expect_within(c, r);
 }
@@ -167,7 +166,7 @@ TEST(DecimationCrossings, TheirNumberNeverRises) {
     const Case c{shapes::stored(rough)};
     const std::size_t of_input = count(c.mesh.vertices, c.mesh.triangles);
     for (const auto effort : {Options::Effort::fast, Options::Effort::thorough}) {
-      Options options = keep_out();
+      Options options;
       options.effort = effort;
       const DecimationResult r = run(c, options);
       const std::size_t of_result = count(r.vertices, r.triangles);
@@ -185,7 +184,7 @@ TEST(DecimationCrossings, DoubleSheetsStillCollapse) {
   const TriangleMesh sheet =
       shapes::stored(shapes::squares(24, [](const dvec3& p) { return dvec3(p.x, p.y, 0.02 * std::sin(5 * p.x)); }));
   const Case c{shapes::joined(sheet, shapes::turned(sheet))};
-  const DecimationResult r = run(c, keep_out());
+  const DecimationResult r = run(c);
   EXPECT_LT(r.triangles.size(), 200u);
   expect_within(c, r);
 }
@@ -195,7 +194,7 @@ TEST(DecimationCrossings, SoupsAndJoinedSheets) {
   int number = 0;
   for (const Case& c : cases::all()) {
     const std::size_t before = count(c.mesh.vertices, c.mesh.triangles);
-    const DecimationResult r = run(c, keep_out());
+    const DecimationResult r = run(c);
     EXPECT_LE(count(r.vertices, r.triangles), before) << "case " << number;
     ++number;
   }

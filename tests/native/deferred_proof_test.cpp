@@ -66,7 +66,7 @@ struct Worked {
     mesh.emplace(std::move(input), &*bounds, alone);
     collapse.emplace(*mesh);
     shared.emplace(*collapse);
-    parts.emplace(*mesh, 1200, 0.5, false, alone);
+    parts.emplace(*mesh, 1200, 0.5, alone);
     vertices.resize(parts->count()), faces.resize(parts->count());
     for (std::uint32_t v = 0; v < reference.vertices.size(); ++v) {
       if (parts->of_vertex(v) != Regions::kNone) vertices[parts->of_vertex(v)].push_back(v);

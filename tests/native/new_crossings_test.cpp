@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numeric>
 
 #include "shapes.h"
@@ -13,6 +14,7 @@ namespace {
 using glm::dvec3;
 using tolvol::box_of;
 using tolvol::Corners;
+using tolvol::faces_cross;
 using tolvol::FaceTree;
 using tolvol::NewCrossings;
 using tolvol::Team;
@@ -122,6 +124,48 @@ TEST(NewCrossings, ARemovedFaceHandsOverWhatItCrossed) {
   Scene scene(mesh);
   scene.crossings.hand_over(std::vector<Removed>{{1, 0}});
   EXPECT_TRUE(scene.none({larger}, {{1, 0}}));
+}
+
+// A bar pierces both triangles of a square, and the edge between them is flipped: each new triangle needs an input face
+// that the bar crossed, and both stand for one. Where one triangle stands for all of them, it gives one away.
+TEST(NewCrossings, InputFacesAreSharedOutAsTheyAreNeeded) {
+  TriangleMesh mesh;
+  mesh.vertices = {dvec3(0, 0, 0), dvec3(1, 0, 0),      dvec3(1, 1, 0),     dvec3(0, 1, 0),    dvec3(2, 0, 0),
+                   dvec3(2, 1, 0), dvec3(0.4, 0.3, -1), dvec3(0.4, 0.3, 1), dvec3(0.4, 0.6, 0)};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}, {1, 4, 5}, {6, 7, 8}};
+  Scene scene(mesh);
+  ASSERT_TRUE(faces_cross(scene.crossings.corners(0), scene.crossings.corners(3)));
+  ASSERT_TRUE(faces_cross(scene.crossings.corners(1), scene.crossings.corners(3)));
+  const Face lower{0, {dvec3(0, 0, 0), dvec3(1, 0, 0), dvec3(0, 1, 0)}},
+      far{2, {dvec3(0.3, 0.45, -0.5), dvec3(2, 0, 0), dvec3(2, 1, 0.5)}};
+  // The face far away never crossed the bar. It may do so once it has what the removed triangle stood for.
+  ASSERT_TRUE(faces_cross(far.corners, scene.crossings.corners(3)));
+  EXPECT_FALSE(scene.none({far}));
+  EXPECT_FALSE(scene.none({lower, far}));
+  const std::vector<Removed> removed{{1, 0}};
+  const bool both = scene.none({lower, far}, removed);
+  EXPECT_EQ(both, !faces_cross(lower.corners, far.corners));
+  ASSERT_TRUE(both);
+  ASSERT_EQ(scene.trial.given().size(), 1u);
+  EXPECT_EQ(scene.trial.given()[0].to, 2u);
+  scene.crossings.hand_over(removed, scene.trial.given());
+  EXPECT_TRUE(scene.none({lower, far}, removed));
+  EXPECT_TRUE(scene.trial.given().empty()) << "each has what it needs by now";
+}
+
+// It has 800 million pairs of faces, of which hardly any is looked at.
+TEST(NewCrossings, FacesOfALargeFanAreToldApart) {
+  constexpr unsigned kFaces = 40000;
+  TriangleMesh fan;
+  fan.vertices.push_back(dvec3(0, 0, 1));
+  for (unsigned i = 0; i < kFaces; ++i) {
+    const double angle = 6.283185307179586 * i / kFaces;
+    fan.vertices.push_back(dvec3(std::cos(angle), std::sin(angle), 0));
+    fan.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % kFaces);
+  }
+  Scene scene(fan);
+  EXPECT_TRUE(scene.may_move(0, dvec3(0.1, 0.2, 0.9)));
+  EXPECT_FALSE(scene.may_move(0, dvec3(1.5, 0.2, 0)));  // it leaves the plane of the rim's inside
 }
 
 TEST(NewCrossings, SheetsThatLieOnEachOtherAreExempt) {

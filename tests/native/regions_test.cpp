@@ -45,7 +45,8 @@ std::vector<std::uint32_t> labels(const BoundedMesh& mesh, const Regions& found)
   return all;
 }
 
-/// Cells overlap in no inner point, a region's vertices are inside its own, and a search finds a box's cells.
+/// Cells overlap in no inner point, a region's vertices and their neighbours are in its own, and a search finds a box's
+/// cells.
 void expect_in_cells(const BoundedMesh& mesh, const Regions& found) {
   for (std::uint32_t a = 0; a < found.count(); ++a) {
     for (std::uint32_t b = 0; b < a; ++b) {
@@ -57,7 +58,11 @@ void expect_in_cells(const BoundedMesh& mesh, const Regions& found) {
   for (std::uint32_t v = 0; v < mesh.connectivity().n_vertices(); ++v) {
     const std::uint32_t region = found.of_vertex(v);
     if (region == Regions::kNone) continue;
-    EXPECT_TRUE(strictly_inside(mesh.stored(v), found.cell(region)));
+    EXPECT_TRUE(meet({mesh.stored(v), mesh.stored(v)}, found.cell(region)));
+    for (const auto near : mesh.connectivity().vv_range(BoundedMesh::handle(v))) {
+      const glm::dvec3& p = mesh.stored(std::uint32_t(near.idx()));
+      EXPECT_TRUE(meet({p, p}, found.cell(region)));
+    }
     const Box around{mesh.stored(v) - 0.1, mesh.stored(v) + 0.1};
     std::set<std::uint32_t> met, expected;
     found.for_each_meeting(around, [&](std::uint32_t cell) { EXPECT_TRUE(met.insert(cell).second); });
@@ -74,9 +79,9 @@ TEST(Regions, HaveNothingToDoWithEachOther) {
        {shapes::torus(60), shapes::grid(60), shapes::joined(shapes::box(20), shapes::grid(30))}) {
     const BoundedMesh mesh = mesh_of(shape);
     for (const double first : {0.5, 0.35}) {
-      const Regions found(mesh, 300, first, true, team);
+      const Regions found(mesh, 300, first, team);
       Team alone(1);
-      EXPECT_EQ(labels(mesh, found), labels(mesh, Regions(mesh, 300, first, true, alone)));
+      EXPECT_EQ(labels(mesh, found), labels(mesh, Regions(mesh, 300, first, alone)));
       expect_apart(mesh, found);
       expect_in_cells(mesh, found);
       std::vector<std::size_t> size(found.count(), 0);
@@ -88,7 +93,7 @@ TEST(Regions, HaveNothingToDoWithEachOther) {
       EXPECT_GE(found.count() * 300, shape.vertices.size());
       EXPECT_GT(inside, shape.vertices.size() / 2) << "rims are the smaller part";
     }
-    EXPECT_NE(labels(mesh, Regions(mesh, 300, 0.5, true, team)), labels(mesh, Regions(mesh, 300, 0.35, true, team)));
+    EXPECT_NE(labels(mesh, Regions(mesh, 300, 0.5, team)), labels(mesh, Regions(mesh, 300, 0.35, team)));
   }
 }
 
@@ -102,7 +107,7 @@ TEST(Regions, LeaveOutWhatHasCopies) {
   const std::uint32_t vertex = 15 * 31 + 15, copy = vertex + 31 * 31;
   slots[copy] = vertex;
   const BoundedMesh mesh = mesh_of(shape, slots);
-  const Regions found(mesh, 5000, 0.5, true, team);
+  const Regions found(mesh, 5000, 0.5, team);
   EXPECT_EQ(found.count(), 1u);
   for (std::uint32_t v = 0; v < slots.size(); ++v) {
     EXPECT_EQ(found.of_vertex(v), v == vertex || v == copy ? Regions::kNone : 0u);

@@ -224,14 +224,14 @@ def shell(wall):
     return meshes.join(outer, (inner[0], inner[1][:, ::-1]))
 
 
-def test_crossings_keep_out_leaves_thin_walls_uncrossed():
+def test_thin_walls_stay_uncrossed():
     vertices, triangles = shell(0.01)
     assert len(tolvol.crossing_pairs(vertices, triangles)) == 0
-    kept_out = decimate(vertices, triangles, 0.03, crossings="keep_out")
+    kept_out = decimate(vertices, triangles, 0.03)
     assert len(tolvol.crossing_pairs(kept_out.vertices, kept_out.triangles)) == 0
     assert len(kept_out.triangles) < len(triangles) / 6
     assert_promise(vertices, triangles, kept_out, 0.03)
-    allowed = decimate(vertices, triangles, 0.03)
+    allowed = decimate(vertices, triangles, 0.03, crossings="allow")
     assert len(tolvol.crossing_pairs(allowed.vertices, allowed.triangles)) > 10
     with pytest.raises(tolvol.InvalidInput, match="crossings"):
         decimate(vertices, triangles, 0.03, crossings="some")

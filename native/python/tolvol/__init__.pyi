@@ -236,7 +236,7 @@ def decimate(
     outside: _Outside = "error",
     wedges: _Integers | None = None,
     effort: Literal["fast", "thorough"] = "fast",
-    crossings: Literal["keep_out", "allow"] = "allow",
+    crossings: Literal["keep_out", "allow"] = "keep_out",
     max_seconds: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "topology/input_crossings.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "topology/double_sheets.h"
+
+namespace tolvol {
+
+void InputCrossings::find_sheets() const {
+  std::call_once(sheets_known_, [&] {
+    sheets_ = double_sheets(input_.vertices, input_.triangles);
+    sheets_.resize(face_count(), kNoSheet);
+  });
+}
+
+bool InputCrossings::crossed(std::uint32_t a, std::uint32_t b) const {
+  const Corners one = corners(a), other = corners(b);
+  if (meet(box_of(one), box_of(other)) && faces_cross(one, other)) return true;
+  find_sheets();
+  return sheets_[a] != kNoSheet && sheets_[a] == sheets_[b];
+}
+
+bool InputCrossings::any_crossed(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) const {
+  std::vector<std::uint32_t> some_a(a.begin(), a.end()), some_b(b.begin(), b.end());
+  keep_crossing(some_a);
+  if (some_a.empty()) return false;
+  keep_crossing(some_b);
+  if (some_b.empty()) return false;
+  struct Input {
+    std::uint32_t face;
+    Corners corners;
+    Box box;
+  };
+  const auto input = [&](std::uint32_t face) {
+    const Corners all = corners(face);
+    return Input{face, all, box_of(all)};
+  };
+  std::vector<Input> others;
+  others.reserve(some_b.size());
+  for (const std::uint32_t face : some_b) others.push_back(input(face));
+  find_sheets();
+  return std::ranges::any_of(some_a, [&](std::uint32_t face) {
+    const Input one = input(face);
+    return std::ranges::any_of(others, [&](const Input& other) {
+      return (sheets_[face] != kNoSheet && sheets_[face] == sheets_[other.face]) ||
+             (meet(one.box, other.box) && faces_cross(one.corners, other.corners));
+    });
+  });
+}
+
+void InputCrossings::keep_crossing(std::vector<std::uint32_t>& faces) const {
+  std::call_once(states_ready_, [&] {
+    std::vector<std::uint32_t> all(face_count());
+    std::iota(all.begin(), all.end(), 0u);
+    std::vector<Box> boxes;
+    boxes.reserve(all.size());
+    for (const std::uint32_t face : all) boxes.push_back(box_of(corners(face)));
+    Team alone(1);
+    tree_ = FaceTree(all, boxes, alone);
+    state_ = std::vector<std::atomic<std::uint8_t>>(all.size());
+  });
+  std::erase_if(faces, [&](std::uint32_t face) {
+    std::uint8_t state = state_[face].load(std::memory_order_relaxed);
+    if (state == unknown) {
+      state = crosses_another(face) ? crossing : clear;
+      state_[face].store(state, std::memory_order_relaxed);
+    }
+    return state == clear;
+  });
+}
+
+/// A face of a double sheet crosses the one that lies on it.
+bool InputCrossings::crosses_another(std::uint32_t face) const {
+  const Corners own = corners(face);
+  bool found = false;
+  tree_.for_each_meeting(box_of(own), [&](std::uint32_t other) {
+    found = other != face && faces_cross(own, corners(other));
+    return !found;
+  });
+  return found;
+}
+
+}  // namespace tolvol
