@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Counts the pairs of faces that cross before and after a decimation, with crossings kept out and allowed.
+
+blender --background --python benchmark/crossings.py -- [MESH...] [--tolerance 1%] [--write FILE.md]
+
+The meshes are hollow spheres of radius 1 with thin walls, made here, and each MESH. The tolerance of the spheres is 1 % of
+their size. Each pair of runs takes turns on one thread, and the processor time is the least of three. Every result is
+judged both ways by tolvol.directed_hausdorff. The script fails if a mesh has more crossing pairs with crossings kept out
+than before.
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+FOLDER = Path(__file__).resolve().parent
+ROOT = FOLDER.parent
+sys.path[:0] = [str(FOLDER), str(ROOT / "blender_scripts"), str(ROOT / "tests" / "python")]
+import meshes as shapes  # noqa: E402
+
+import command_line as cli  # noqa: E402
+import models  # noqa: E402
+import tables  # noqa: E402
+from addon.native import module as tolvol  # noqa: E402
+from common import machine  # noqa: E402
+
+WALLS = (0.05, 0.02, 0.01)
+LEVELS = 5  # of the spheres, which have 16,384 triangles then
+EFFORTS = ("fast", "thorough")
+RUNS = 3
+
+
+def hollow_sphere(wall):
+    vertices, triangles = shapes.sphere(LEVELS)
+    vertices, triangles = shapes.join((vertices, triangles), (vertices * (1 - wall), triangles[:, ::-1]))
+    return vertices.astype(np.float32), triangles
+
+
+def meshes(paths):
+    """Yields the name and the arrays of each mesh."""
+    for wall in WALLS:
+        yield (f"hollow sphere, wall {wall}", *hollow_sphere(wall))
+    for path in paths:
+        yield (Path(path).name, *models.read(path))
+
+
+def pairs(vertices, triangles):
+    return len(tolvol.crossing_pairs(vertices, triangles))
+
+
+def run(vertices, triangles, tolerance, effort):
+    """Returns (triangles left, crossing pairs, processor seconds) for each of crossings="keep_out" and "allow"."""
+    volume = tolvol.ToleranceVolume(vertices, triangles, tolerance, threads=1)
+    found, seconds = {}, {"keep_out": [], "allow": []}
+    for _ in range(RUNS):
+        for crossings, spent in seconds.items():  # in turns, so that a busy machine slows both
+            start = time.process_time()
+            found[crossings] = tolvol.decimate(
+                vertices, triangles, volume, effort=effort, crossings=crossings, threads=1
+            )
+            spent.append(time.process_time() - start)
+    for result in found.values():
+        pair = (result.vertices, result.triangles), (vertices, triangles)
+        for a, b in (pair, pair[::-1]):
+            if tolvol.directed_hausdorff(*a, *b, bound=tolerance).upper > tolerance:
+                raise SystemExit("a result is not within the tolerance both ways")
+    return [
+        (len(found[name].triangles), pairs(found[name].vertices, found[name].triangles), min(spent))
+        for name, spent in seconds.items()
+    ]
+
+
+def arguments():
+    parser = cli.Parser(
+        "benchmark/crossings.py", description=__doc__.split("\n\n")[0], epilog=__doc__.split("\n\n")[2]
+    )
+    parser.add_argument("meshes", metavar="MESH", nargs="*", help="a file that is decimated as well")
+    parser.add_argument(
+        "--tolerance", type=cli.length, default=cli.length("1%"), metavar="T", help="N%% of size, or a length (1%%)"
+    )
+    parser.add_argument("--write", metavar="FILE.md", help="put the table into this file")
+    return parser.parse()
+
+
+def main(options):
+    rows, worse = [], []
+    for name, vertices, triangles in meshes(options.meshes):
+        before = pairs(vertices, triangles)
+        tolerance = cli.in_units(options.tolerance, tolvol.diagonal(vertices, triangles))
+        for effort in EFFORTS:
+            (left, after, seconds), (left_allowed, allowed, seconds_allowed) = run(vertices, triangles, tolerance, effort)
+            if after > before:
+                worse.append(f"{name}, {effort}")
+            counts = (len(triangles), before, after, allowed, left, left_allowed)
+            rows.append(
+                [name, effort, *(f"{count:,}" for count in counts), f"{seconds:.2f}", f"{seconds_allowed:.2f}"]
+            )
+            print(*rows[-1], sep="\t", flush=True)
+    heads = [
+        "Mesh",
+        "Effort",
+        "Triangles",
+        "Crossing pairs before",
+        "after, kept out",
+        "after, allowed",
+        "Triangles left, kept out",
+        "allowed",
+        "Processor seconds, kept out",
+        "allowed",
+    ]
+    if options.write:
+        text = f"{machine()}\n\n{tables.table(heads, rows, 'll' + 'r' * (len(heads) - 2))}"
+        tables.write(options.write, "crossings", text)
+    if worse:
+        print("more crossing pairs than before:", ", ".join(worse))
+    return 1 if worse else 0
+
+
+if __name__ == "__main__":
+    cli.run(__file__, arguments, main)
