@@ -8,6 +8,7 @@
 #include "base/call.h"
 #include "base/errors.h"
 #include "check/input_checks.h"
+#include "topology/t_junctions.h"
 #include "topology/wedges.h"
 
 namespace tolvol {
@@ -48,6 +49,7 @@ DecimationInput::DecimationInput(std::span<const glm::dvec3> vertices, std::span
   positions_.resize(cut_.vertex_input.size());
   for (std::size_t v = 0; v < positions_.size(); ++v) positions_[v] = space_.frame(vertices_[cut_.vertex_input[v]]);
   pin();
+  pin_t_junctions(team);
   if (std::none_of(cut_.triangles.begin(), cut_.triangles.end(), [&](const glm::uvec3& t) {
         return glm::cross(positions_[t.y] - positions_[t.x], positions_[t.z] - positions_[t.x]) != glm::dvec3(0);
       })) {
@@ -70,6 +72,14 @@ void DecimationInput::pin() {
   for_holders([&](std::uint32_t of_input, std::uint32_t vertex) {
     if (options_.locked[of_input]) pin(vertex, "asked for");
   });
+}
+
+/// Faces that meet in a T-junction share no edge along which they could be kept together while it moves.
+void DecimationInput::pin_t_junctions(Team& team) {
+  std::vector<glm::dvec3> stored(cut_.vertex_input.size());
+  for (std::size_t v = 0; v < stored.size(); ++v) stored[v] = vertices_[cut_.vertex_input[v]];
+  const double unit = space_.storage() == Storage::float32 ? 0x1p-24 : 0x1p-53;
+  for (const std::uint32_t v : t_junctions(stored, cut_.boundary, unit, team)) pin(v, "T-junction");
 }
 
 /// Calls visit(input vertex, vertex of the manifold) for all vertices that hold an input vertex: the one that it

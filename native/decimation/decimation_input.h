@@ -68,6 +68,7 @@ class DecimationInput {
  private:
   Frame own_frame() const;
   void pin();
+  void pin_t_junctions(Team& team);
   template <class Visit>
   void for_holders(Visit&& visit) const;
   void pin(std::uint32_t vertex, const std::string& cause);

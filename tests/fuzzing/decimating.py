@@ -107,6 +107,8 @@ def _judge_decimation(run, result, vertices, triangles, volume, given, side):
     if given["two_sided"] and not report["outside"]["reference_faces"]:
         judges.within(run, reference, (placed, result.triangles), case.tolerance, "reference to result")
     before, after = (vertices, triangles), (result.vertices, result.triangles)
+    if len(tolvol.crossing_pairs(*after, most=1)) and not len(tolvol.crossing_pairs(*before, most=1)):
+        raise Finding("crossings", "faces cross in the result and did not before")
     judges.connected_alike(run, before, after)
     if not given["two_sided"] and vertices is case.vertices:
         judges.rims_alike(run, reference, (placed, result.triangles), case.tolerance)
