@@ -277,17 +277,19 @@ class Command:
                 self._certify(found[name], reference, tolerance, run["outside"]["faces"])
                 for name, reference, run in zip(names, references, runs)
             ]
-            before = sum(run["crossings"]["before"] for run in runs)
         else:  # The format holds only one object, so all objects were joined.
             kept = sum(run["outside"]["faces"] for run in runs)
-            found = {"": snapshots.joined(found.values())}
-            judged = [self._certify(found[""], snapshots.joined(references), tolerance, kept)]
-            before = self._crossing_count(snapshots.joined(inputs))
+            judged = [self._certify(snapshots.joined(found.values()), snapshots.joined(references), tolerance, kept)]
         whole = self._summary(names, runs, judged, tolerance, size)
-        whole["crossings"] = {"before": before, "after": sum(map(self._crossing_count, found.values()))}
-        if self.options.crossings == "keep_out" and whole["crossings"]["after"] > before:
+        before, after = (
+            solidity.facts(snapshots.joined(surfaces), self.options.threads) for surfaces in (inputs, found.values())
+        )
+        whole["solidity"] = {"before": before, "after": after, "change": solidity.change(after, before)}
+        pairs = {"before": before["crossing_pairs"], "after": after["crossing_pairs"]}
+        whole["crossings"] = pairs
+        if self.options.crossings == "keep_out" and pairs["after"] > pairs["before"]:
             whole["warnings"].append(
-                f"{whole['crossings']['after']:,} pairs of faces cross in the file, {before:,} did before: the file rounds "
+                f"{pairs['after']:,} pairs of faces cross in the file, {pairs['before']:,} did before: the file rounds "
                 "coordinates, and objects are decimated one by one"
             )
         whole["output"] = {"file": self.options.output, **written.counts}
@@ -297,6 +299,7 @@ class Command:
                 whole["repairs"].append({"kind": kind, "count": lost, "message": message})
         whole["seconds"]["certify"] += time.perf_counter() - start
         self._stage("certified both ways", start)
+        print(f"{self.exported.name}: {solidity.line(after)}")
         if not report.proved(whole):
             raise cli.Stop(
                 f"{NOT_PROVED}: {report.intervals(whole)}; {self.options.output} was not written", cli.NOT_PROVED
@@ -340,9 +343,6 @@ class Command:
 
     def _certify(self, surface, reference, tolerance, kept):
         return certify(surface, reference, tolerance, kept, self.options.threads)
-
-    def _crossing_count(self, surface):
-        return solidity.crossing_count(surface.arrays, self.options.threads)
 
     def _draw(self, result, reference, tolerance, size):
         surfaces = [(surface.world(), surface.arrays.triangles) for surface in (result, reference)]

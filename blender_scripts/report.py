@@ -14,7 +14,7 @@ try:
     import command_line as cli
     import pictures
     from addon.files import file_io, safe_files
-    from addon.proof import deviation, report
+    from addon.proof import deviation, report, solidity
     from addon.reference import snapshots
 except ImportError as error:  # After an uncaught exception Blender would end with exit code 0.
     print(f"report.py: Blender's Python lacks a package: {error}; install Debian's python3-numpy", file=sys.stderr)
@@ -23,11 +23,12 @@ except ImportError as error:  # After an uncaught exception Blender would end wi
 _DESCRIPTION = """\
 Measures the distances from the surface of A to that of B and from B to A: the largest distance as a certified interval, with its
 place; mean, root mean square and percentiles over the area; the share of the area that is farther than each bound; and the parts
-inside and outside, if the other surface is closed."""
+inside and outside, if the other surface is closed. Says of both whether they are closed, manifold, oriented and free of crossing
+faces, with the change of area and volume."""
 
 _EPILOG = """\
 Percentages are of the size of B, which is the longest diagonal of its bounding box. Exit codes: 0 measured; 2 bad usage or input;
-1 a file that could not be written, or a bug. Only with exit code 0 are reports and pictures written, all of them or none, and
+3 A lacks what --require asks for; 1 a file that could not be written, or a bug. Only with exit codes 0 and 3 are reports and pictures written, all of them or none, and
 never over a file that is read. Symbolic links are followed."""
 
 
@@ -36,6 +37,14 @@ def bounds(text):
     if not found:
         raise argparse.ArgumentTypeError("no bound is given")
     return found
+
+
+def requirements(text):
+    words = [word.strip() for word in text.split(",")]
+    for word in words:
+        if word not in solidity.REQUIREMENTS:
+            raise argparse.ArgumentTypeError(f"{word!r} is none of {', '.join(solidity.REQUIREMENTS)}")
+    return words
 
 
 def report_file(text):
@@ -72,6 +81,13 @@ def arguments():
         metavar="FILE",
         help=f"write the report to this file ({' '.join(deviation.EXTENSIONS)}); may be given more than once",
     )
+    parser.add_argument(
+        "--require",
+        type=requirements,
+        default=[],
+        metavar="WORD,WORD",
+        help=f"exit with code 3 unless A is all of this: {', '.join(solidity.REQUIREMENTS)}",
+    )
     parser.add_argument("--picture", metavar="FILE.png", help="draw A to this file, coloured by its distance from B")
     parser.add_argument("--threads", type=cli.whole_number(1), metavar="N", help="default: all cores")
     return parser.parse()
@@ -105,6 +121,8 @@ def _report(options, staged):
     lengths = [cli.in_units(bound, size) for bound in options.bounds]
     result = deviation.deviation(*surfaces, size, tolerance, lengths, options.unit, options.threads)
     result |= {"a": files[0], "b": files[1]}
+    for label, name in (("A", "a"), ("B", "b")):
+        print(f"{label}: {solidity.line(result['solidity'][name])}")
     for way, label in (("forward", "A from B"), ("backward", "B from A")):
         print(_line(result[way], label, size))
     drawn = _draw(surfaces, result, options)
@@ -113,7 +131,11 @@ def _report(options, staged):
     for path, target in zip(options.report, reports):
         staged.write(target, deviation.content(result, path, drawn))
     staged.publish()
-    return 0
+    lacking = solidity.lacking(result["solidity"]["a"])
+    missed = [f"not {word} ({lacking[word]})" for word in options.require if word in lacking]
+    if missed:
+        print(f"--require: A is {', '.join(missed)}", file=sys.stderr)
+    return cli.NOT_PROVED if missed else 0
 
 
 def _draw(surfaces, result, options):

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Registers the operators in bpy.ops.tolvol: set_tolerance, set_reference, clear_reference, check, select_outside,
-save_report, decimate, smooth, apply_modifier, fit_modifier and deform."""
+select_crossing, save_report, decimate, smooth, apply_modifier, fit_modifier and deform."""
 
 import bpy
 
 from .check import TOLVOL_OT_check, TOLVOL_OT_select_outside
+from .crossings import TOLVOL_OT_select_crossing
 from .decimate import TOLVOL_OT_decimate
 from .deform import TOLVOL_OT_deform
 from .modifiers import TOLVOL_OT_apply_modifier, TOLVOL_OT_fit_modifier
@@ -20,6 +21,7 @@ _CLASSES = (
     TOLVOL_OT_clear_reference,
     TOLVOL_OT_check,
     TOLVOL_OT_select_outside,
+    TOLVOL_OT_select_crossing,
     TOLVOL_OT_save_report,
     TOLVOL_OT_decimate,
     TOLVOL_OT_smooth,

@@ -22,6 +22,7 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("tolvol.check")
         row.operator("tolvol.select_outside")
+        layout.operator("tolvol.select_crossing")
         layout.operator("tolvol.save_report", text="Save Report...")
         if ob.tolvol.show_deviation and (reason := reasons.off()):
             text_lines(context, layout, f"The deviation is not shown: {reason}", "INFO")

@@ -8,6 +8,7 @@ number:
     version, method, unit, size   `size` is the length that is 100 %
     tolerance                     {absolute, percent}, or None
     a, b                          {name or file, vertices, triangles}
+    solidity                      {a, b}: facts about both (solidity.py); {change}: solidity.change(), a against b
     forward, backward             a from b, and b from a; each:
         largest, position, triangle, face               position: the point with the largest distance found, in this
                                                         triangle and face; face: the polygon, None for several objects
@@ -29,7 +30,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import native
-from . import deviation_page, measure
+from . import deviation_page, measure, solidity
 
 PERCENTILES = (50, 90, 95, 99, 99.9)
 EXTENSIONS = (".json", ".csv", ".html")
@@ -50,6 +51,7 @@ def deviation(a, b, size, tolerance=None, bounds=(), unit="", threads=None, prog
             *pair[0], *pair[1], bounds=bounds, percentiles=PERCENTILES, threads=threads, progress=progress
         )
         ways[way] = measure.largest_distance(*pair, tolerance, threads, progress), spread, surface.arrays.polygons
+    found = {name: solidity.facts(surface, threads, progress) for name, surface in (("a", a), ("b", b))}
     # Both histograms have the same scale, so that they can be compared.
     edges = _edges(max(largest.upper for largest, _, _ in ways.values()), tolerance)
     return {
@@ -58,7 +60,8 @@ def deviation(a, b, size, tolerance=None, bounds=(), unit="", threads=None, prog
         "unit": unit,
         "size": size,
         "tolerance": None if tolerance is None else {"absolute": tolerance, "percent": 100 * tolerance / size},
-        **{way: _way(*found, bounds, edges) for way, found in ways.items()},
+        "solidity": found | {"change": solidity.change(found["a"], found["b"])},
+        **{way: _way(*of_way, bounds, edges) for way, of_way in ways.items()},
     }
 
 
@@ -138,6 +141,10 @@ def table(run):
         rows += [("", "tolerance", "", run["tolerance"]["absolute"], "", "")]
     for name in ("a", "b"):
         rows += [("", f"{name} {key}", "", value, "", "") for key, value in run[name].items()]
+        facts = run["solidity"][name].items()
+        rows += [("", f"{name} {key}", "", "" if value is None else value, "", "") for key, value in facts]
+    change = run["solidity"]["change"].items()
+    rows += [("", f"change of {key}", "", "" if value is None else value, "", "") for key, value in change]
     for way in ("forward", "backward"):
         rows += [(way, *row) for row in _rows(run[way])]
     text = io.StringIO()

@@ -11,6 +11,8 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from html import escape
 from pathlib import Path
 
+from . import solidity
+
 _WITHIN, _BEYOND, _LINE = "#0072B2", "#D55E00", "#1a1a1a"
 
 _STYLE = f"""
@@ -61,6 +63,7 @@ def page(run, pictures=()):
 <h1>Deviation of {a} and {b}</h1>
 <p class="muted">{_counts(run["a"])}<br>{_counts(run["b"])}; size, which is 100&nbsp;%: {_length(run, run["size"])}</p>
 {_verdict(run)}
+<p>{a}: {escape(solidity.line(run["solidity"]["a"]))}<br>{b}: {escape(solidity.line(run["solidity"]["b"]))}{_change(run)}</p>
 <div class="ways">{articles}</div>
 {figures}
 <footer>{_notes(run)}</footer>
@@ -115,6 +118,12 @@ def _relative(run, value):
 
 def _of(run):
     return "of tolerance" if run["tolerance"] else "of size"
+
+
+def _change(run):
+    change = run["solidity"]["change"]
+    texts = [f"{name} {100 * value:+.3g}&nbsp;%" for name, value in change.items() if value is not None]
+    return f"<br>change: {', '.join(texts)}" if texts else ""
 
 
 def _verdict(run):

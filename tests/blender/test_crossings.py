@@ -61,6 +61,10 @@ def test_the_command_keeps_crossings_out_of_the_written_file(tmp_path):
         assert run["crossings"] == {"before": 0, "after": pairs(world(target))}
         assert (run["crossings"]["after"] > 0) == (choice == "allow")
         assert (match[3] is None) == (choice == "keep_out")
+        found = run["solidity"]
+        assert not found["before"]["closed"] and found["after"]["boundary_loops"] == found["before"]["boundary_loops"] == 2
+        assert found["after"]["crossing_pairs"] == run["crossings"]["after"]
+        assert found["change"]["area"] == found["after"]["area"] / found["before"]["area"] - 1
 
 
 def test_objects_that_come_to_cross_each_other_are_reported(tmp_path):

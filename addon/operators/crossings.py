@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Selects the faces of an object that cross each other."""
+
+import functools
+
+import bpy
+import numpy as np
+from bpy.props import IntProperty
+
+from .. import native, preferences
+from ..job import JobOperator
+from ..mesh import mesh_io
+from ..proof.solidity import MOST_PAIRS
+from ..reference import snapshots
+from .blocked import allowed, object_blocked
+
+
+class TOLVOL_OT_select_crossing(JobOperator, bpy.types.Operator):
+    """Switch to Edit Mode and select the faces that cross other faces, decided exactly: they meet anywhere but in the \
+corners and edges that they share"""
+
+    bl_idname = "tolvol.select_crossing"
+    bl_label = "Select Crossing Faces"
+    bl_options = {"REGISTER", "UNDO"}
+
+    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+
+    @classmethod
+    def poll(cls, context):
+        ob = context.active_object
+        reason = object_blocked(ob)
+        if not reason and not ob.data.polygons:
+            reason = f"{ob.name} has no faces"
+        return allowed(cls, reason)
+
+    def prepare(self, context):
+        context.view_layer.update()
+        threads = self.threads or preferences.threads(context)
+        return functools.partial(self.find, snapshots.surface_of(self.ob).arrays, threads)
+
+    @staticmethod
+    def find(arrays, threads, progress):
+        pairs = native.module.crossing_pairs(
+            arrays.vertices, arrays.triangles, most=MOST_PAIRS, threads=threads or None, progress=progress
+        )
+        polygons = arrays.polygons[pairs]
+        # A face that is not flat is several triangles, which are not compared with each other.
+        return polygons[polygons[:, 0] != polygons[:, 1]]
+
+    def finish(self, context, polygons):
+        mesh = self.ob.data
+        faces = np.zeros(len(mesh.polygons), bool)
+        faces[polygons] = True
+        if not faces.any():
+            self.report({"INFO"}, "No faces cross")
+            return
+        mesh_io.select_faces(mesh, faces)
+        context.tool_settings.mesh_select_mode = (False, False, True)
+        bpy.ops.object.mode_set(mode="EDIT")
+        self.report({"WARNING"}, f"{faces.sum():,} of {len(faces):,} faces cross others")

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The facts about a surface, what report.py requires of it, and Select Crossing Faces."""
+
+import json
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.mesh import mesh_io
+from addon.proof import solidity
+from addon.reference import snapshots
+from commands import command, save
+from scenes import activate, add_object, sheet, torus, torus_arrays
+
+CUBE = (
+    np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float32),
+    np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]),
+)
+
+
+def facts(*parts, matrix=None):
+    """The facts about parts, pairs (vertices, faces), as one object."""
+    first = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
+    faces = [[vertex + start for vertex in face] for (_, of_part), start in zip(parts, first) for face in of_part]
+    ob = add_object("parts", np.concatenate([vertices for vertices, _ in parts]), faces, matrix)
+    return solidity.facts(snapshots.surface_of(ob))
+
+
+def moved(part, by):
+    return part[0] + np.float32(by), part[1]
+
+
+def test_a_cube_is_a_solid():
+    found = facts(CUBE)
+    assert all(found[name] for name in solidity.REQUIREMENTS) and found["shells"] == 1
+    assert found["area"] == pytest.approx(6) and found["volume"] == pytest.approx(1)
+    assert solidity.line(found) == "closed, manifold, no crossings: printable"
+    assert facts(moved(CUBE, 100), matrix=np.diag([2.0, 1, 3, 1]))["volume"] == pytest.approx(6)
+
+
+def test_faces_with_vertices_of_their_own_hang_together_by_position():
+    vertices, faces = CUBE
+    alone = [(vertices[face], [[0, 1, 2, 3]]) for face in faces]
+    assert facts(*alone) == facts(CUBE)
+
+
+def test_holes_are_counted_as_loops():
+    vertices, faces = torus_arrays(noise=0)
+    found = facts((vertices, np.delete(faces, [0, 300, 301], axis=0)))
+    assert (found["closed"], found["boundary_loops"], found["open_edges"]) == (False, 2, 10)
+    assert found["manifold"] and found["oriented"] and found["volume"] is None
+    assert solidity.line(found) == "not printable: 2 boundary loops"
+
+
+def test_a_turned_face_is_found():
+    vertices, faces = CUBE
+    found = facts((vertices, [faces[0][::-1], *faces[1:]]))
+    assert (found["oriented"], found["misoriented_edges"], found["volume"]) == (False, 4, None) and found["closed"]
+
+
+def test_sheets_that_share_an_edge_or_a_vertex_are_no_manifold():
+    at_edge, at_vertex = facts(CUBE, moved(CUBE, [1, 1, 0])), facts(CUBE, moved(CUBE, 1))
+    assert (at_edge["non_manifold_edges"], at_edge["non_manifold_vertices"], at_edge["shells"]) == (1, 0, 1)
+    assert (at_vertex["non_manifold_edges"], at_vertex["non_manifold_vertices"], at_vertex["shells"]) == (0, 1, 2)
+    assert at_vertex["closed"] and not at_vertex["manifold"]
+    assert "1 vertex where sheets touch" in solidity.line(at_vertex)
+
+
+def test_crossing_shells_and_degenerate_triangles_are_counted():
+    found = facts(CUBE, moved(CUBE, [0.5, 0.4, 0.3]))
+    assert not found["uncrossed"] and found["crossing_pairs"] > 10 and found["shells"] == 2 and found["manifold"]
+    apart = facts(CUBE, moved(CUBE, 3))
+    assert apart["uncrossed"] and apart["volume"] == pytest.approx(2)
+    vertices = np.concatenate([CUBE[0], CUBE[0][:1]])
+    sliver = facts((vertices, [*CUBE[1], [0, 8, 1]]))
+    assert sliver["degenerate_triangles"] == 1 and sliver["closed"]
+
+
+def test_the_command_requires(tmp_path):
+    vertices, faces = torus_arrays(noise=0)
+    whole = save(tmp_path / "whole.ply", ("torus", vertices, faces))
+    holed = save(tmp_path / "holed.ply", ("torus", vertices, faces[1:]))
+    words = "closed,manifold,oriented,uncrossed"
+    code, out, err = command("report.py", whole, holed, "--require", words)
+    assert (code, err) == (0, "") and "A: closed, manifold, no crossings: printable" in out
+    reports = [tmp_path / f"report{extension}" for extension in (".json", ".html", ".csv")]
+    asked = [part for path in reports for part in ("--report", path)]
+    code, out, err = command("report.py", holed, whole, "--require", words, *asked)
+    assert code == 3 and "A is not closed (1 boundary loop)" in err and "B: closed, manifold" in out
+    found = json.loads(reports[0].read_text())["solidity"]
+    assert (found["a"]["closed"], found["b"]["closed"]) == (False, True)
+    assert found["change"]["area"] < 0 and found["change"]["volume"] is None
+    assert "not printable: 1 boundary loop" in reports[1].read_text()
+    assert ",a boundary_loops,,1,," in reports[2].read_text()
+    assert command("report.py", holed, whole, "--require", "manifold,uncrossed")[0] == 0
+    assert command("report.py", holed, whole, "--require", "solid")[0] == 2
+
+
+def test_select_crossing_faces():
+    vertices, faces = CUBE
+    both = np.concatenate([vertices, vertices * 0.5 + np.float32([0.75, 0.25, 0.25])])
+    ob = add_object("cubes", both, [*faces, *(faces + 8)])
+    activate(ob)
+    bpy.ops.tolvol.select_crossing()
+    assert ob.mode == "EDIT" and tuple(bpy.context.tool_settings.mesh_select_mode) == (False, False, True)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    selected = mesh_io.column(ob.data.polygons, "select", 1, bool)
+    at_one = (both[[*faces, *(faces + 8)]][:, :, 0] == 1).all(1)
+    assert selected[at_one].all() and selected.sum() == 5, "one face of the first cube, four of the second"
+    for whole in (torus(), sheet()):
+        activate(whole)
+        bpy.ops.tolvol.select_crossing()
+        assert whole.mode == "OBJECT"
