@@ -18,9 +18,8 @@ import numpy as np
 FOLDER = Path(__file__).resolve().parent
 ROOT = FOLDER.parent
 sys.path[:0] = [str(FOLDER), str(ROOT / "blender_scripts"), str(ROOT / "tests" / "python")]
-import meshes as shapes  # noqa: E402
-
 import command_line as cli  # noqa: E402
+import meshes as shapes  # noqa: E402
 import models  # noqa: E402
 import tables  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
@@ -73,9 +72,7 @@ def run(vertices, triangles, tolerance, effort):
 
 
 def arguments():
-    parser = cli.Parser(
-        "benchmark/crossings.py", description=__doc__.split("\n\n")[0], epilog=__doc__.split("\n\n")[2]
-    )
+    parser = cli.Parser("benchmark/crossings.py", description=__doc__.split("\n\n")[0], epilog=__doc__.split("\n\n")[2])
     parser.add_argument("meshes", metavar="MESH", nargs="*", help="a file that is decimated as well")
     parser.add_argument(
         "--tolerance", type=cli.length, default=cli.length("1%"), metavar="T", help="N%% of size, or a length (1%%)"
@@ -90,13 +87,13 @@ def main(options):
         before = pairs(vertices, triangles)
         tolerance = cli.in_units(options.tolerance, tolvol.diagonal(vertices, triangles))
         for effort in EFFORTS:
-            (left, after, seconds), (left_allowed, allowed, seconds_allowed) = run(vertices, triangles, tolerance, effort)
+            (left, after, seconds), (left_allowed, allowed, seconds_allowed) = run(
+                vertices, triangles, tolerance, effort
+            )
             if after > before:
                 worse.append(f"{name}, {effort}")
             counts = (len(triangles), before, after, allowed, left, left_allowed)
-            rows.append(
-                [name, effort, *(f"{count:,}" for count in counts), f"{seconds:.2f}", f"{seconds_allowed:.2f}"]
-            )
+            rows.append([name, effort, *(f"{count:,}" for count in counts), f"{seconds:.2f}", f"{seconds_allowed:.2f}"])
             print(*rows[-1], sep="\t", flush=True)
     heads = [
         "Mesh",

@@ -28,8 +28,8 @@ faces, with the change of area and volume."""
 
 _EPILOG = """\
 Percentages are of the size of B, which is the longest diagonal of its bounding box. Exit codes: 0 measured; 2 bad usage or input;
-3 A lacks what --require asks for; 1 a file that could not be written, or a bug. Only with exit codes 0 and 3 are reports and pictures written, all of them or none, and
-never over a file that is read. Symbolic links are followed."""
+3 A lacks what --require asks for; 1 a file that could not be written, or a bug. Only with exit codes 0 and 3 are reports and
+pictures written, all of them or none, and never over a file that is read. Symbolic links are followed."""
 
 
 def bounds(text):

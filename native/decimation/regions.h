@@ -15,8 +15,8 @@ class Regions {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
   /// Cuts along the longest axis at a median, over and over, until no region has more than `most` vertices. The first
-  /// cut is at `first` of the vertices instead, by which the rims come to lie elsewhere. O(n log n); the same everywhere,
-  /// on any number of threads.
+  /// cut is at `first` of the vertices instead, by which the rims come to lie elsewhere. O(n log n); the same
+  /// everywhere, on any number of threads.
   Regions(const BoundedMesh& mesh, std::size_t most, double first, Team& team);
 
   std::uint32_t count() const { return static_cast<std::uint32_t>(cells_.size()); }

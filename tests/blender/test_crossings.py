@@ -62,7 +62,9 @@ def test_the_command_keeps_crossings_out_of_the_written_file(tmp_path):
         assert (run["crossings"]["after"] > 0) == (choice == "allow")
         assert (match[3] is None) == (choice == "keep_out")
         found = run["solidity"]
-        assert not found["before"]["closed"] and found["after"]["boundary_loops"] == found["before"]["boundary_loops"] == 2
+        assert (
+            not found["before"]["closed"] and found["after"]["boundary_loops"] == found["before"]["boundary_loops"] == 2
+        )
         assert found["after"]["crossing_pairs"] == run["crossings"]["after"]
         assert found["change"]["area"] == found["after"]["area"] / found["before"]["area"] - 1
 

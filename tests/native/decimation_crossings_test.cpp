@@ -144,6 +144,10 @@ TEST(DecimationCrossings, TheSameBitsForAnyNumberOfThreads) {
   thorough.effort = Options::Effort::thorough;
   const Case few{hollow(8, 0.02)};
   cases::expect_same_bits(few, thorough, 3);
+  // Where faces cross already, tries also read which input faces others stand for.
+  const Case crossing{shapes::joined(shapes::torus(many(60)), moved(shapes::torus(many(50)), glm::dmat4(0.98)))};
+  ASSERT_GT(count(crossing.mesh.vertices, crossing.mesh.triangles), 100u);
+  cases::expect_same_bits(crossing, {}, 3);
 }
 
 TEST(DecimationCrossings, AChainStaysLinked) {

@@ -43,9 +43,7 @@ def test_no_more_triangles_are_left_than_recorded(name, percent):
     vertices, triangles = MODELS[name]
     vertices = vertices.astype(np.float32)
     tolerance = percent / 100 * np.linalg.norm(np.ptp(vertices.astype(float), axis=0))
-    volumes = [
-        tolvol.ToleranceVolume(vertices, triangles, share * tolerance) for share in SCATTERED.get(name, (1,))
-    ]
+    volumes = [tolvol.ToleranceVolume(vertices, triangles, share * tolerance) for share in SCATTERED.get(name, (1,))]
 
     def left(**options):
         return np.mean([len(tolvol.decimate(vertices, triangles, volume, **options).triangles) for volume in volumes])
