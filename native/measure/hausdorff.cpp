@@ -120,7 +120,8 @@ class Search {
   /// Pieces whose upper bound is no larger than this need no more work.
   double cutoff() const {
     const double narrow = lower_ / (1 - kGap);
-    return std::max(lower_ <= bound_ ? std::min(bound_, narrow) : narrow, lower_ + kNoise);
+    if (lower_ > bound_) return std::max(narrow, lower_ + kNoise);
+    return std::max(options_.narrow ? std::min(bound_, narrow) : bound_, lower_ + kNoise);
   }
 
   std::array<dvec3, 3> corners(const TriangleMesh& mesh, std::uint32_t i) const {

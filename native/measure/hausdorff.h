@@ -17,6 +17,7 @@ struct HausdorffOptions {
   std::optional<double> bound = {};
   unsigned threads = 0;          ///< 0 means one for each core; the result does not depend on it
   Progress* progress = nullptr;  ///< the call throws Cancelled once this is cancelled
+  bool narrow = true;            ///< false: the search ends as soon as upper <= bound or lower > bound
 };
 
 struct HausdorffInterval {

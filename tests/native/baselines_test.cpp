@@ -91,7 +91,8 @@ void expect_kept(const std::string& method) {
   baselines::CheckedRing ring(*check);
   const Decimated result = by(ring, mesh, volume);
   EXPECT_LT(result.mesh.triangles.size(), 600u) << method;
-  EXPECT_LE(hausdorff(result.mesh, mesh, {kTolerance, 1, nullptr}).upper, kTolerance) << method;
+  EXPECT_LE(hausdorff(result.mesh, mesh, {.bound = kTolerance, .threads = 1, .narrow = false}).upper, kTolerance)
+      << method;
   EXPECT_EQ(result.method, check->method());
   EXPECT_EQ(result.renderer, check->renderer());
 }
@@ -203,7 +204,7 @@ TEST(PermissionRing, KeepsTheTolerance) {
     const baselines::PermissionGrid grid(volume.reference(), volume.frame_tolerance(), precision);
     baselines::PermissionRing ring(grid);
     const Decimated result = by(ring, mesh, volume);
-    EXPECT_LE(hausdorff(result.mesh, mesh, {kTolerance, 1, nullptr}).upper, kTolerance);
+    EXPECT_LE(hausdorff(result.mesh, mesh, {.bound = kTolerance, .threads = 1, .narrow = false}).upper, kTolerance);
     EXPECT_LT(result.mesh.triangles.size(), before) << "a finer grid loses less of the tolerance";
     before = result.mesh.triangles.size();
   }

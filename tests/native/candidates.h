@@ -102,7 +102,7 @@ inline int farther(const Points& points, const TriangleMesh& reference, double t
   if (points.empty()) return 0;
   TriangleMesh mesh{points, {}};
   for (unsigned i = 0; i < points.size(); i += 3) mesh.triangles.emplace_back(i, i + 1, i + 2);
-  const HausdorffInterval distance = hausdorff(mesh, reference, {tolerance, 1, nullptr});
+  const HausdorffInterval distance = hausdorff(mesh, reference, {.bound = tolerance, .threads = 1, .narrow = false});
   if (distance.upper <= tolerance) return 0;
   if (points.size() == 3) return distance.lower > tolerance;
   const auto middle = points.begin() + std::ptrdiff_t(points.size() / 6 * 3);

@@ -68,7 +68,10 @@ void expect_inside(const Scene& scene, const ConstrainResult& r) {
     return TriangleMesh{points, scene.mesh.triangles};
   };
   const double tolerance = scene.tolerance();
-  EXPECT_LE(hausdorff(world(r.vertices), world(scene.mesh.vertices), {tolerance, 1, nullptr}).upper, tolerance);
+  EXPECT_LE(
+      hausdorff(world(r.vertices), world(scene.mesh.vertices), {.bound = tolerance, .threads = 1, .narrow = false})
+          .upper,
+      tolerance);
   EXPECT_TRUE(all_inside(verdicts(*scene.volume(), scene.space(), r.vertices, flat(scene.mesh.triangles))));
 }
 

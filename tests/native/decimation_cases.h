@@ -44,9 +44,11 @@ inline void expect_within(const Case& c, const DecimationResult& r, bool two_sid
   }
   const TriangleMesh result = c.world(r.vertices, r.triangles), reference = c.world(c.mesh.vertices, c.mesh.triangles);
   const double tolerance = c.tolerance();
-  EXPECT_LE(hausdorff(result, reference, {tolerance, 1, nullptr}).upper, tolerance) << "forward";
+  EXPECT_LE(hausdorff(result, reference, {.bound = tolerance, .threads = 1, .narrow = false}).upper, tolerance)
+      << "forward";
   if (two_sided) {
-    EXPECT_LE(hausdorff(reference, result, {tolerance, 1, nullptr}).upper, tolerance) << "backward";
+    EXPECT_LE(hausdorff(reference, result, {.bound = tolerance, .threads = 1, .narrow = false}).upper, tolerance)
+        << "backward";
   }
 }
 

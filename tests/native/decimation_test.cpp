@@ -103,8 +103,8 @@ TEST(Decimation, OneSidedKeepsTheBoundary) {
   const DecimationResult r = run(c, options);
   const TriangleMesh before = outline(c.mesh), after = outline({r.vertices, r.triangles});
   const double tolerance = c.tolerance();
-  EXPECT_LE(hausdorff(before, after, {tolerance, 1, nullptr}).upper, tolerance);
-  EXPECT_LE(hausdorff(after, before, {tolerance, 1, nullptr}).upper, tolerance);
+  EXPECT_LE(hausdorff(before, after, {.bound = tolerance, .threads = 1, .narrow = false}).upper, tolerance);
+  EXPECT_LE(hausdorff(after, before, {.bound = tolerance, .threads = 1, .narrow = false}).upper, tolerance);
   EXPECT_LE(r.triangles.size(), 20u);
 }
 
@@ -366,7 +366,8 @@ TEST(Decimation, OneSidedHoldsABoundaryThatTheReferenceDoesNotHave) {
   options.two_sided = false;
   const DecimationResult r = decimate(open.vertices, open.triangles, c.space(), volume.get(), options);
   const double tolerance = c.tolerance();
-  EXPECT_LE(hausdorff(open, {r.vertices, r.triangles}, {tolerance, 1, nullptr}).upper, tolerance);
+  EXPECT_LE(hausdorff(open, {r.vertices, r.triangles}, {.bound = tolerance, .threads = 1, .narrow = false}).upper,
+            tolerance);
   EXPECT_FALSE(r.locked.empty());
 }
 

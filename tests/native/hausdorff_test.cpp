@@ -355,6 +355,25 @@ TEST(Hausdorff, BoundDecides) {
   EXPECT_THROW(hausdorff(plate, above, {.bound = std::nan("")}), InvalidInput);
 }
 
+TEST(Hausdorff, NoMoreThanTheBoundIsDecidedOnRequest) {
+  shapes::Random random(7);
+  TriangleMesh rough = sphere(40, 1);
+  for (dvec3& p : rough.vertices) p += 0.02 * random.point();
+  for (const auto& [a, b] : {std::pair{sphere(17, 1), rough}, {rough, sphere(17, 1)}}) {
+    const HausdorffInterval narrow = measured(a, b, {}, 2);
+    for (const double share : {0.5, 0.99, 0.998, 1.002, 1.01, 1.5}) {
+      const double bound = share * (share < 1 ? narrow.lower : narrow.upper);
+      const HausdorffInterval found = measured(a, b, {.bound = bound, .narrow = false}, 2, false);
+      EXPECT_EQ(found.upper <= bound, share > 1) << share;
+      EXPECT_EQ(found.lower > bound, share < 1) << share;
+      EXPECT_LE(found.lower, narrow.upper);
+      EXPECT_GE(found.upper, narrow.lower);
+    }
+    const HausdorffInterval wide = hausdorff(a, b, {.bound = 3 * narrow.upper, .threads = 1, .narrow = false});
+    EXPECT_GT(wide.upper - wide.lower, 0.01 * wide.upper) << "more work than was asked for";
+  }
+}
+
 TEST(Hausdorff, SameForAnyNumberOfThreads) {
   shapes::Random random(6);
   TriangleMesh rough = sphere(50, 1);

@@ -252,7 +252,10 @@ TEST(Smoothing, EveryResultIsInsideOnEveryMesh) {
         return TriangleMesh{points, scene.mesh.triangles};
       };
       const double tolerance = scene.tolerance();
-      EXPECT_LE(hausdorff(world(r.vertices), world(scene.mesh.vertices), {tolerance, 1, nullptr}).upper, tolerance);
+      EXPECT_LE(
+          hausdorff(world(r.vertices), world(scene.mesh.vertices), {.bound = tolerance, .threads = 1, .narrow = false})
+              .upper,
+          tolerance);
       std::vector<std::uint32_t> indices;
       for (const glm::uvec3& t : scene.mesh.triangles) indices.insert(indices.end(), {t.x, t.y, t.z});
       for (const Verdict v : Certificate(volume).check({r.vertices, scene.space(), indices}, {1, nullptr}))
