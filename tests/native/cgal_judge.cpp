@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The largest distance of a point of one mesh to another, by CGAL, for tests/fuzz.py. Reads doubles: the number of
 // triangles of either mesh, the error that is allowed, and nine coordinates for each triangle. Prints the distance.
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Polygon_mesh_processing/distance.h>
-#include <CGAL/Surface_mesh.h>
-
-#include <array>
 #include <cstdio>
+#include <stdexcept>
 #include <vector>
 
-namespace {
+#include "distance_judge.h"
 
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using Surface = CGAL::Surface_mesh<Kernel::Point_3>;
+namespace {
 
 std::vector<double> read(std::size_t count) {
   std::vector<double> values(count);
@@ -21,20 +16,14 @@ std::vector<double> read(std::size_t count) {
   return values;
 }
 
-/// Every triangle with vertices of its own: a distance asks nothing of how they are connected, and so all meshes will
-/// do.
-Surface surface(std::size_t triangles) {
-  Surface result;
-  const std::vector<double> values = read(9 * triangles);
-  for (std::size_t i = 0; i < triangles; ++i) {
-    std::array<Surface::Vertex_index, 3> corners;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double* p = values.data() + 9 * i + 3 * k;
-      corners[k] = result.add_vertex({p[0], p[1], p[2]});
-    }
-    result.add_face(corners[0], corners[1], corners[2]);
+tolvol::TriangleMesh triangles(std::size_t count) {
+  const std::vector<double> values = read(9 * count);
+  tolvol::TriangleMesh mesh;
+  for (std::size_t i = 0; i < values.size(); i += 3) {
+    mesh.vertices.emplace_back(values[i], values[i + 1], values[i + 2]);
   }
-  return result;
+  for (std::uint32_t i = 0; i < mesh.vertices.size(); i += 3) mesh.triangles.emplace_back(i, i + 1, i + 2);
+  return mesh;
 }
 
 }  // namespace
@@ -42,10 +31,9 @@ Surface surface(std::size_t triangles) {
 int main() {
   try {
     const std::vector<double> head = read(3);
-    const Surface a = surface(static_cast<std::size_t>(head[0]));
-    const Surface b = surface(static_cast<std::size_t>(head[1]));
-    std::printf("%.17g\n",
-                CGAL::Polygon_mesh_processing::bounded_error_Hausdorff_distance<CGAL::Sequential_tag>(a, b, head[2]));
+    const tolvol::TriangleMesh a = triangles(static_cast<std::size_t>(head[0]));
+    const tolvol::TriangleMesh b = triangles(static_cast<std::size_t>(head[1]));
+    std::printf("%.17g\n", tolvol::distance_by_cgal(a, b, head[2]));
   } catch (const std::exception& error) {
     std::fprintf(stderr, "cgal_judge: %s\n", error.what());
     return 1;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "topology/crossings.h"
 
-#include <CGAL/Exact_predicates_exact_constructions_kernel.h>
-#include <CGAL/intersections.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,27 +24,6 @@ Pairs found(const TriangleMesh& mesh, unsigned threads = 2, std::size_t most = k
     pairs.emplace_back(pair.x, pair.y);
   }
   return pairs;
-}
-
-/// Whether two triangles cross, by their intersection, which is constructed exactly: it has to be a corner or an edge
-/// of both.
-bool intersection_is_more(const tolvol::Corners& a, const tolvol::Corners& b) {
-  using Exact = CGAL::Exact_predicates_exact_constructions_kernel;
-  const auto point = [](const glm::dvec3& p) { return Exact::Point_3(p.x, p.y, p.z); };
-  const auto triangle = [&](const tolvol::Corners& t) {
-    return Exact::Triangle_3(point(t[0]), point(t[1]), point(t[2]));
-  };
-  const auto shared = [&](const Exact::Point_3& p) {
-    const auto is_corner = [&](const tolvol::Corners& t) {
-      return std::any_of(t.begin(), t.end(), [&](const glm::dvec3& corner) { return point(corner) == p; });
-    };
-    return is_corner(a) && is_corner(b);
-  };
-  const auto common = CGAL::intersection(triangle(a), triangle(b));
-  if (!common) return false;
-  if (const auto* p = boost::get<Exact::Point_3>(&*common)) return !shared(*p);
-  if (const auto* s = boost::get<Exact::Segment_3>(&*common)) return !(shared(s->source()) && shared(s->target()));
-  return true;
 }
 
 }  // namespace
@@ -76,7 +53,7 @@ TEST(Crossings, AreThoseWhoseIntersectionIsMoreThanACornerOrAnEdge) {
         return tolvol::Corners{mesh.vertices[3 * t], mesh.vertices[3 * t + 1], mesh.vertices[3 * t + 2]};
       };
       for (std::uint32_t j = i + 1; j < mesh.triangles.size(); ++j) {
-        if (intersection_is_more(corners(i), corners(j))) expected.emplace_back(i, j);
+        if (tolvol::cross_by_cgal(corners(i), corners(j))) expected.emplace_back(i, j);
       }
     }
     EXPECT_EQ(pairs, expected) << seed;

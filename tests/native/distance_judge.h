@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The largest distance of a point of one mesh from another, by CGAL: a judge that shares nothing with this project.
+#pragma once
+
+#include "geometry/triangle_mesh.h"
+
+namespace tolvol {
+
+/// The distance of `a` from `b`, wrong by at most `error`. The triangles may be connected in any way.
+double distance_by_cgal(const TriangleMesh& a, const TriangleMesh& b, double error);
+
+}  // namespace tolvol
