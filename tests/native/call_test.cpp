@@ -27,7 +27,7 @@ namespace tolvol {
 namespace {
 
 const TriangleMesh& wavy() {
-  static const TriangleMesh mesh = shapes::torus(40, 0.004);
+  static const TriangleMesh mesh = shapes::torus(24, 0.004);
   return mesh;
 }
 
