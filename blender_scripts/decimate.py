@@ -62,8 +62,8 @@ def arguments():
         "--effort",
         choices=("fast", "thorough"),
         default="fast",
-        help="thorough: a seventh to a fifth fewer triangles in two to five times the processor time, at a tolerance of "
-        "0.1%% in five to seven times (default: fast)",
+        help="thorough: a third fewer triangles in 5 to 20 times the processor time, at a tolerance of 0.1%% in 20 to 50 "
+        "times (default: fast)",
     )
     parser.add_argument(
         "--crossings",

@@ -111,14 +111,26 @@ void Coverage::sample(std::uint32_t element, std::size_t stride, std::vector<Sam
   }
 }
 
+void Coverage::points(std::uint32_t element, std::size_t stride, std::vector<glm::dvec3>& out) const {
+  const std::vector<Part>& pieces = lists_[element].pieces;
+  for (std::size_t i = 0; i < pieces.size(); i += stride) {
+    const auto& [a, b, c] = pieces[i].corners;
+    for (const glm::dvec3& p : {(a + b + c) * (1.0 / 3), a, b, c}) out.push_back(p);
+  }
+}
+
 bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const {
   trial.stack_.assign(1, whole);
   trial.budget_ += kBudgetOfPiece;
   while (!trial.stack_.empty()) {
-    if (trial.stack_.size() > 1 && trial.budget_-- == 0) return false;
     if (++trial.looked_at_ % kBetweenPolls == 0) poll();
     const Part piece = trial.stack_.back();
     trial.stack_.pop_back();
+    const auto fail = [&] {
+      trial.failed_.push_back({piece, first});
+      return false;
+    };
+    if (!trial.stack_.empty() && trial.budget_-- == 0) return fail();
     const FourPoints points = with_centre(piece);
     double centre2 = std::numeric_limits<double>::infinity();
     std::uint32_t below = first;
@@ -151,7 +163,7 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
     }
     if (covered) continue;
     if (!(centre2 <= limit2_) || longest_squared(piece) <= kFloor * kFloor * limit2_ || piece.cuts == kMostCuts) {
-      return false;
+      return fail();
     }
     if (!cut(piece, trial.candidates_[below].witness, kWorthCutting * limit_, trial.stack_)) split(piece, trial.stack_);
   }
@@ -162,6 +174,7 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   trial.candidates_.clear();
   trial.removed_lists_.clear();
   trial.moved_.clear();
+  trial.failed_.clear();
   trial.last_ = 0;
   trial.hierarchy_.reset();
   trial.budget_ = kBudget;
@@ -209,29 +222,33 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
 bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) const {
   constexpr std::uint32_t kPlaced = 0xFFFFFFFFu;
   const auto place_list = [&](const std::vector<Part>& pieces, std::uint32_t first) {
+    const std::size_t enough = trial.failed_.size() + std::max<std::size_t>(trial.most_failures_, 1);
     return std::all_of(pieces.begin(), pieces.end(), [&](const Part& piece) {
-      if (piece.cuts == 0) return place(piece, first, trial);
+      if (piece.cuts == 0) return place(piece, first, trial) || trial.failed_.size() < enough;
       std::uint32_t& count = gathered[piece.of];
       if (count == kPlaced) return true;
-      if (count != split_into_[piece.of].load(std::memory_order_relaxed)) return place(piece, first, trial);
+      if (count != split_into_[piece.of].load(std::memory_order_relaxed)) {
+        return place(piece, first, trial) || trial.failed_.size() < enough;
+      }
       count = kPlaced;
-      return place(whole(piece.of), first, trial);
+      return place(whole(piece.of), first, trial) || trial.failed_.size() < enough;
     });
   };
+  const bool goes_on = trial.most_failures_ > 0;
   // Pieces that lose their element are the likeliest to fail.
   for (const Trial::RemovedList& h : trial.removed_lists_) {
-    if (!h.whole && !place_list(lists_[h.id].pieces, h.successor)) return false;
+    if (!h.whole && !place_list(lists_[h.id].pieces, h.successor) && !goes_on) return false;
   }
   const auto count = static_cast<std::uint32_t>(trial.candidates_.size());
   for (std::uint32_t k = 0; k < count; ++k) {
     const std::uint32_t i = (trial.failed_last_ + k) % count;
     if (!trial.candidates_[i].replaced) continue;
-    if (!place_list(lists_[trial.candidates_[i].id].pieces, i)) {
+    if (!place_list(lists_[trial.candidates_[i].id].pieces, i) && !goes_on) {
       trial.failed_last_ = i;
       return false;
     }
   }
-  return true;
+  return trial.failed_.empty();
 }
 
 void Coverage::commit(const Trial& trial) {

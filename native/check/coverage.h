@@ -60,6 +60,10 @@ class Coverage {
   };
   void sample(std::uint32_t element, std::size_t stride, std::vector<Sample>& out) const;
 
+  /// Adds the corners and centroids of every `stride`-th piece of the element.
+  void points(std::uint32_t element, std::size_t stride, std::vector<glm::dvec3>& out) const;
+  std::size_t piece_count(std::uint32_t element) const { return lists_[element].pieces.size(); }
+
   class Trial;
   /// Tells whether all pieces of the elements of a change have witnesses among `elements`. Only reads: nothing changes
   /// until commit().
@@ -94,6 +98,15 @@ class Coverage::Trial {
  public:
   /// Starts a series of tries around one place. Their results do not depend on earlier series.
   void begin() { failed_last_ = 0, looked_at_ = 0; }
+  /// A refused change has one part without a witness in failed(), or, if it is asked for, several of each element.
+  void look_for_failures(std::size_t of_each_element) { most_failures_ = of_each_element; }
+  /// The parts of pieces for which the last try found no witness, and the number of the element in the change that it
+  /// was sought at first.
+  struct Failure {
+    Part part;
+    std::uint32_t element;
+  };
+  std::span<const Failure> failed() const { return failed_; }
   /// The number of parts of pieces that the series has looked at.
   std::size_t looked_at() const { return looked_at_; }
 
@@ -123,6 +136,8 @@ class Coverage::Trial {
   std::vector<Candidate> candidates_;
   std::vector<RemovedList> removed_lists_;
   std::vector<Moved> moved_;
+  std::vector<Failure> failed_;
+  std::size_t most_failures_ = 0;  ///< of each element, after which the search goes on; 0 ends it at the first
   std::vector<Part> stack_;
   std::optional<Hierarchy> hierarchy_;  ///< holds the candidates if there are too many to look at each
   std::size_t budget_ = 0;              ///< is the number of pieces that this change may still add

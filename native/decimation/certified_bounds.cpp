@@ -82,8 +82,6 @@ class CertifiedBounds::FullTrial final : public VertexTrial {
   bool faces_are_inside(const Change& change);
   void gather_replaced_faces(const Change& change);
   void gather_boundary(const Change& change);
-  void boundary_of_collapse(const Change& change);
-  void boundary_of_relocation(const Change& change);
   bool boundary_is_inside(const Change& change);
 
   ReplacedFaces replaced_faces_;
@@ -161,16 +159,10 @@ void CertifiedBounds::FullTrial::gather_replaced_faces(const Change& change) {
   for (const Coverage::Removed& r : change.removed()) add(r.id);
 }
 
-/// Gathers the boundary edges as a collapse or a relocation would leave them.
+/// Gathers the boundary edges as a collapse would leave them.
 void CertifiedBounds::FullTrial::gather_boundary(const Change& change) {
   boundary_elements_.clear(), boundary_removed_.clear();
-  const BoundedMesh& mesh = change.mesh();
   if (!bounds_.bounds_boundaries()) return;
-  if (change.kind() == Change::Kind::collapse) boundary_of_collapse(change);
-  if (change.kind() == Change::Kind::relocate && mesh.on_boundary(*change.vertex())) boundary_of_relocation(change);
-}
-
-void CertifiedBounds::FullTrial::boundary_of_collapse(const Change& change) {
   const BoundedMesh& mesh = change.mesh();
   const OpenMesh::TriConnectivity& connectivity = mesh.connectivity();
   BoundedMesh::Halfedge edge = change.halfedge();
@@ -189,18 +181,6 @@ void CertifiedBounds::FullTrial::boundary_of_collapse(const Change& change) {
     boundary_elements_.push_back({s, {p, pc, pc}, std::max(moved_s, moved_t)});
     boundary_removed_.push_back({t, 1, moved_t});
   }
-}
-
-void CertifiedBounds::FullTrial::boundary_of_relocation(const Change& change) {
-  const BoundedMesh& mesh = change.mesh();
-  const OpenMesh::TriConnectivity& connectivity = mesh.connectivity();
-  const std::uint32_t v = *change.vertex();
-  // The kernel keeps the outgoing halfedge of a boundary vertex on the boundary.
-  const auto next = connectivity.halfedge_handle(BoundedMesh::handle(v));
-  const std::uint32_t a = mesh.from(connectivity.prev_halfedge_handle(next)), c = mesh.to(next);
-  const glm::dvec3 &p = change.position().position, &pa = mesh.position(a), &pc = mesh.position(c);
-  const double moved = glm::length(mesh.position(v) - p);
-  boundary_elements_ = {{a, {pa, p, p}, moved}, {v, {p, pc, pc}, moved}};
 }
 
 bool CertifiedBounds::FullTrial::boundary_is_inside(const Change& change) {

@@ -39,12 +39,16 @@ class CertifiedBounds final : public Bounds {
   /// Null if only the forward direction is asked for.
   Coverage* backward() const { return directions_.backward; }
   bool bounds_boundaries() const { return directions_.boundary_backward; }
+  /// The bounds of boundaries; null where they are not asked for.
+  const TriangleCertificate* boundary_forward() const { return directions_.boundary_forward; }
+  Coverage* boundary_backward() const { return directions_.boundary_backward; }
 
   /// Upper bounds on the distance to the reference: of a vertex, and of all points of a face (infinite where no bound
   /// is known).
   double distance(std::uint32_t vertex) const { return distance_[vertex]; }
   double face_distance(std::uint32_t triangle) const { return face_distance_[triangle]; }
-  /// Notes such a bound, which was proved for the face as it is.
+  /// Notes such a bound, which was proved for the vertex or the face as it is.
+  void note_distance(std::uint32_t vertex, double distance) { distance_[vertex] = distance; }
   void note_face_distance(std::uint32_t triangle, double distance) { face_distance_[triangle] = distance; }
 
   /// What is known of some vertices and faces, to go back to when the mesh does.

@@ -278,17 +278,6 @@ bool Change::slots_fit() {
 }
 
 bool Change::folds_over() const {
-  if (kind_ == Kind::flip) {
-    const auto normal = [&](std::uint32_t face) {
-      const glm::uvec3& t = mesh_->triangle(face);
-      const glm::dvec3& a = mesh_->position(t.x);
-      return glm::cross(mesh_->position(t.y) - a, mesh_->position(t.z) - a);
-    };
-    const glm::dvec3 before = normal(elements_[0].id) + normal(elements_[1].id);
-    return std::any_of(elements_.begin(), elements_.end(), [&](const Coverage::Element& e) {
-      return turns_too_far(before, glm::cross(e.corners[1] - e.corners[0], e.corners[2] - e.corners[0]));
-    });
-  }
   for (std::size_t i = 0; i < elements_.size(); ++i) {
     const auto& c = elements_[i].corners;
     const Face& face = faces_[i];

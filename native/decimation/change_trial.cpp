@@ -31,29 +31,11 @@ bool ChangeTrial::prepare_collapse(Halfedge h, const VertexPosition& target) {
   return change_.prepare_collapse(h, target);
 }
 
-bool ChangeTrial::prepare_relocate(std::uint32_t vertex, const VertexPosition& target) {
-  prepared_ = true;
-  return change_.prepare_relocate(vertex, target);
-}
-
-bool ChangeTrial::prepare_flip(Edge e) {
-  prepared_ = true;
-  return change_.prepare_flip(e);
-}
-
 ChangeTrial::Outcome ChangeTrial::try_collapse(Halfedge h, const VertexPosition& target) {
   if (!is_finite(target)) return Outcome::refused;
   if (around_ && !around_->reach(target)) return Outcome::impossible;
   return prepare_collapse(h, target) ? check() : Outcome::impossible;
 }
-
-ChangeTrial::Outcome ChangeTrial::try_relocate(std::uint32_t vertex, const VertexPosition& target) {
-  if (!is_finite(target)) return Outcome::refused;
-  if (around_ && !around_->reach(target)) return Outcome::impossible;
-  return prepare_relocate(vertex, target) ? check() : Outcome::impossible;
-}
-
-ChangeTrial::Outcome ChangeTrial::try_flip(Edge e) { return prepare_flip(e) ? check() : Outcome::impossible; }
 
 ChangeTrial::Outcome ChangeTrial::check() {
   if (change_.meets_another()) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Whether a change of a BoundedMesh may be carried out: it is possible, turns no face over, puts no vertex where
+/// Whether a collapse in a BoundedMesh may be carried out: it is possible, turns no face over, puts no vertex where
 /// another is, and keeps the bounds. A trial only reads the mesh until carry_out(), and holds all that it needs, so
-/// that a thread each can try different changes of one mesh.
+/// that a thread each can try different collapses in one mesh.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,6 @@ namespace tolvol {
 class ChangeTrial {
  public:
   using Halfedge = BoundedMesh::Halfedge;
-  using Edge = BoundedMesh::Edge;
 
   /// Ordered: what was refused at one position may succeed at another, what is impossible cannot.
   enum class Outcome { impossible, refused, possible };
@@ -35,14 +34,10 @@ class ChangeTrial {
   void begin();
 
   Outcome try_collapse(Halfedge h, const VertexPosition& target);
-  Outcome try_relocate(std::uint32_t vertex, const VertexPosition& target);
-  Outcome try_flip(Edge e);
 
-  // The steps of the above, for a search that wants to see the faces before it pays for the bounds. Each prepares the
-  // change and says whether it is possible at all; check() then asks for the bounds.
+  // The steps of the above, for a search that wants to see the faces before it pays for the bounds. The first prepares
+  // the change and says whether it is possible at all; check() then asks for the bounds.
   bool prepare_collapse(Halfedge h, const VertexPosition& target);
-  bool prepare_relocate(std::uint32_t vertex, const VertexPosition& target);
-  bool prepare_flip(Edge e);
   Outcome check();
 
   Proof proof() const { return proof_; }

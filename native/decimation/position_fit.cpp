@@ -56,15 +56,10 @@ void PositionFit::gather(const Change& change) {
   for (const Coverage::Element& e : change.elements()) backward->sample(e.id, kStride, samples_);
 }
 
-void PositionFit::prepare(const Change& change, bool changed) {
+void PositionFit::prepare(const Change& change) {
   faces_.clear();
   for (const Coverage::Element& e : change.elements()) {
-    if (changed) {
-      faces_.emplace_back(e.corners[0], e.corners[1], e.corners[2]);
-    } else {
-      const glm::uvec3& t = mesh_->triangle(e.id);
-      faces_.emplace_back(mesh_->position(t.x), mesh_->position(t.y), mesh_->position(t.z));
-    }
+    faces_.emplace_back(e.corners[0], e.corners[1], e.corners[2]);
   }
 }
 
@@ -113,7 +108,7 @@ void PositionFit::add_faces(const Change& change, double hopeless, Sums& sums) c
 PositionFit::Fit PositionFit::fit(const Change& change, const glm::dvec3& position, double hopeless) {
   const double limit = bounds_->forward().limit();
   Sums sums{1 / (limit * limit)};
-  prepare(change, true);
+  prepare(change);
   add_pieces(change, hopeless, sums);
   add_faces(change, hopeless, sums);
   const double trace = sums.m[0][0] + sums.m[1][1] + sums.m[2][2];
@@ -140,16 +135,6 @@ ChangeTrial::Outcome PositionFit::collapse(ChangeTrial& trial, Change::Halfedge 
     if (outcome != ChangeTrial::Outcome::refused) return outcome;
   }
   return ChangeTrial::Outcome::refused;
-}
-
-double PositionFit::energy_now(const Change& change) {
-  const double limit = bounds_->forward().limit();
-  Sums sums{1 / (limit * limit)};
-  prepare(change, false);
-  constexpr double kAll = std::numeric_limits<double>::infinity();
-  add_pieces(change, kAll, sums);
-  add_faces(change, kAll, sums);
-  return sums.energy;
 }
 
 }  // namespace tolvol

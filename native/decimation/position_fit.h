@@ -20,7 +20,7 @@ class PositionFit {
   explicit PositionFit(const BoundedMesh& mesh) : mesh_(&mesh), bounds_(mesh.certified()) {}
 
   /// Takes some of the pieces of the reference that the faces of a prepared change have to cover. They serve for any
-  /// position, and for the faces as they are now.
+  /// position.
   void gather(const Change& change);
 
   struct Fit {
@@ -35,12 +35,10 @@ class PositionFit {
   /// possible. It is refused where the deviation before a step, over the tolerance, is beyond the step's limit.
   ChangeTrial::Outcome collapse(ChangeTrial& trial, Change::Halfedge h, const glm::dvec3& start,
                                 std::span<const double> give_up_above);
-  /// The energy of the same faces as they are.
-  double energy_now(const Change& change);
 
  private:
   struct Sums;
-  void prepare(const Change& change, bool changed);
+  void prepare(const Change& change);
   void add_pieces(const Change& change, double hopeless, Sums& sums) const;
   void add_faces(const Change& change, double hopeless, Sums& sums) const;
 

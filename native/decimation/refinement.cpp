@@ -1,63 +1,53 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The idea to alternate relocations, flips and collapses is from H. Hoppe et al., "Mesh optimization", 1993. Here the
-// certificates of both directions decide which steps are allowed, and not an energy.
+// To alternate collapses, flips and moves of vertices is an idea of H. Hoppe et al., "Mesh optimization", 1993. Here
+// the certificates of both directions decide which steps are allowed, and not an energy; and what moves is a whole
+// neighbourhood at once, because a vertex alone soon finds no room at irregular valences.
 #include "decimation/refinement.h"
 
 #include <algorithm>
-#include <optional>
+#include <limits>
+#include <tuple>
 
 #include "base/call.h"
 
 namespace tolvol {
 namespace {
 
-/// The number of moves of one vertex in a row.
-constexpr int kMoves = 4;
-/// The number of lengths that are tried for a move, each half of the one before.
-constexpr int kHalvings = 3;
-/// A step that does not lower the energy below this share of it is not taken.
-constexpr double kGain = 0.999;
-/// The fit of a collapse takes so many steps from one start. It gives up before a step if the deviation, as a multiple
-/// of the tolerance, is beyond the number, because hardly a collapse succeeds then. Without these limits collapses take
-/// four times the time and find no more.
-constexpr double kGiveUpAbove[] = {2.5, 1.8, 1.5, 1.4, 1.3, 1.25, 1.2, 1.15};
-/// The number of rounds without a collapse before the end.
-constexpr int kPatience = 3;
-/// The number of steps that several threads try at once. More steps would come in each other's way.
-constexpr std::size_t kAhead = 8;
+/// Vertices less than so many edges away from a collapse move with it, in one round after another.
+constexpr int kRings[] = {2, 3, 4};
+/// A round ends after so many failures in a row, or this share of the edges if that is more.
+constexpr std::size_t kMostFailures = 40;
+constexpr double kMostFailuresShare = 0.125;
+/// An edge is not tried if the deviation with its vertex alone moved is beyond so many tolerances.
+constexpr double kMostLargest = 1.7;
+/// The number of steps that are tried at once, for each thread. More would often be in vain, because one before them
+/// succeeds near by.
+constexpr std::size_t kAhead = 2;
+/// An edge is not tried with more vertices moving if the deviation that it came to before is beyond so many tolerances;
+/// and edges that were not tried yet come before those that came to this one.
+constexpr double kMostReached = 1.2, kUntried = 1.1;
 
 }  // namespace
 
 Refinement::Refinement(BoundedMesh& mesh, NewCrossings* crossings, Team& team)
     : mesh_(mesh),
+      team_(team),
+      samples_(mesh, team),
       touched_(mesh.connectivity().n_vertices(), 1),
-      relocated_(mesh.connectivity().n_vertices(), 0),
-      flipped_(mesh.connectivity().n_edges(), 0),
-      collapsed_(mesh.connectivity().n_edges(), 0) {
+      tried_(mesh.connectivity().n_edges(), 0),
+      priced_(mesh.connectivity().n_edges(), 0),
+      prices_(mesh.connectivity().n_edges()),
+      reached_(mesh.connectivity().n_edges()) {
   // A try looks up copies, which are beyond the faces around its step.
   if (!team.alone() && !mesh.has_copies()) {
-    const std::size_t vertices = mesh.connectivity().n_vertices(), edges = mesh.connectivity().n_edges();
-    ahead_ = TriesAhead(team, 2 * kAhead, std::max(vertices, edges), vertices);
+    ahead_ =
+        TriesAhead(team, 2 * kAhead * team.size(), mesh.connectivity().n_edges(), mesh.connectivity().n_vertices());
   }
   if (crossings) around_.emplace(mesh, *crossings, team);
-  while (attempts_.size() < ahead_.slot_count()) attempts_.emplace_back(mesh, around_ ? &*around_ : nullptr);
+  while (attempts_.size() < ahead_.slot_count()) attempts_.emplace_back(mesh, samples_, around_ ? &*around_ : nullptr);
 }
 
 void Refinement::run(std::size_t target, const std::function<bool()>& expired, Progress* progress) {
-  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
-  std::vector<std::uint32_t> vertices, edges;
-  for (std::uint32_t v = 0; v < connectivity.n_vertices(); ++v) {
-    if (!connectivity.status(BoundedMesh::handle(v)).deleted() && !connectivity.is_isolated(BoundedMesh::handle(v)))
-      vertices.push_back(v);
-  }
-  for (std::uint32_t e = 0; e < connectivity.n_edges(); ++e) {
-    if (!connectivity.status(BoundedMesh::edge(e)).deleted()) edges.push_back(e);
-  }
-  const auto length2 = [&](std::uint32_t e) {
-    const Halfedge h = connectivity.halfedge_handle(BoundedMesh::edge(e), 0);
-    const glm::dvec3 d = mesh_.position(mesh_.from(h)) - mesh_.position(mesh_.to(h));
-    return glm::dot(d, d);
-  };
   const auto go_on = [&] {
     poll();
     if (progress) {
@@ -67,171 +57,115 @@ void Refinement::run(std::size_t target, const std::function<bool()>& expired, P
     return mesh_.triangle_count() > target && !expired();
   };
   if (progress) progress->begin("refining");
-  for (int patience = kPatience; patience > 0; --patience) {
-    const std::size_t before = mesh_.triangle_count();
-    if (!sweep(kRelocation, vertices, go_on) || !sweep(kFlip, edges, go_on)) return;
-    std::vector<std::pair<double, std::uint32_t>> order;
-    for (const std::uint32_t e : edges) {
-      if (!connectivity.status(BoundedMesh::edge(e)).deleted()) order.emplace_back(length2(e), e);
+  for (const int rings : kRings) {
+    rings_ = rings;
+    std::ranges::fill(tried_, 0);
+    for (std::size_t before = 0; before != mesh_.triangle_count();) {
+      before = mesh_.triangle_count();
+      if (!round(go_on)) return;
     }
-    std::sort(order.begin(), order.end());
-    edges.clear();
-    for (const auto& [length, e] : order) edges.push_back(e);
-    if (!sweep(kCollapse, edges, go_on)) return;
-    if (mesh_.triangle_count() < before) patience = kPatience + 1;
   }
 }
 
-/// Tries all steps of a kind, in order. Returns whether it came to the end.
-bool Refinement::sweep(const Kind& kind, std::span<const std::uint32_t> steps, const std::function<bool()>& go_on) {
+std::uint64_t Refinement::touched(std::uint32_t edge) const {
+  const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
+  return std::max(touched_[mesh_.from(h)], touched_[mesh_.to(h)]);
+}
+
+void Refinement::find_prices() {
+  constexpr std::size_t kBlock = 32;
+  team_.run(prices_.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    std::optional<PatchTrial> trial;
+    for (auto e = static_cast<std::uint32_t>(begin); e < end; ++e) {
+      if (!alive(e) || touched(e) <= priced_[e]) continue;
+      if (!trial) trial.emplace(mesh_, samples_, nullptr);
+      prices_[e] = trial->price(BoundedMesh::edge(e));
+      priced_[e] = ahead_.now();
+    }
+  });
+}
+
+/// The edges that may be worth a try, the cheapest first.
+std::vector<std::uint32_t> Refinement::order() const {
+  std::vector<std::tuple<double, double, std::uint32_t>> found;
+  for (std::uint32_t e = 0; e < prices_.size(); ++e) {
+    if (!wanted(e) || !prices_[e] || prices_[e]->largest > kMostLargest) continue;
+    // What was tried with fewer vertices moving comes by how near it came to success.
+    const bool was_tried = reached_[e].at >= touched(e);
+    if (was_tried && reached_[e].largest > kMostReached) continue;
+    found.emplace_back(was_tried ? reached_[e].largest : kUntried, prices_[e]->rise, e);
+  }
+  std::ranges::sort(found);
+  std::vector<std::uint32_t> edges;
+  for (const auto& [reached, rise, e] : found) edges.push_back(e);
+  return edges;
+}
+
+/// Tries the edges in the order of their prices, and returns whether it may go on.
+bool Refinement::round(const std::function<bool()>& go_on) {
+  find_prices();
+  const std::vector<std::uint32_t> steps = order();
+  const auto most_failures =
+      std::max(kMostFailures, static_cast<std::size_t>(kMostFailuresShare * static_cast<double>(steps.size())));
   ahead_.drop_all();
-  for (std::size_t place = 0; place < steps.size(); ++place) {
+  std::size_t failures = 0;
+  for (std::size_t place = 0; place < steps.size() && failures < most_failures; ++place) {
     if (!go_on()) return false;
-    if ((this->*kind.wanted)(steps[place])) (this->*kind.carry_out)(steps[place], tried(kind, steps, place));
+    if (!wanted(steps[place])) continue;
+    Attempt& a = tried(steps, place);
+    tried_[steps[place]] = ahead_.now();
+    reached_[steps[place]] = {ahead_.now(), a.reached};
+    ++failures;
+    if (!a.possible) continue;
+    carry_out(a);
+    failures = 0;
   }
   return true;
 }
 
+bool Refinement::wanted(std::uint32_t edge) const { return alive(edge) && touched(edge) > tried_[edge]; }
+
 /// The outcome that was found for the step at `place`, if it still holds. If not, the step is tried, and with it the
 /// steps that come next.
-Refinement::Attempt& Refinement::tried(const Kind& kind, std::span<const std::uint32_t> steps, std::size_t place) {
+Refinement::Attempt& Refinement::tried(std::span<const std::uint32_t> steps, std::size_t place) {
   const auto found = [&](std::uint32_t step) -> Attempt* {
-    if (ahead_.alone()) return nullptr;
-    const auto slot = ahead_.found(step, (this->*kind.read)(step));
-    if (!slot || ahead_.changed_since(*slot, attempts_[*slot].trial.read())) return nullptr;
-    return attempts_[*slot].trial.met_another() ? nullptr : &attempts_[*slot];
+    const auto slot = ahead_.slot_of(step);
+    if (!slot) return nullptr;
+    Attempt& a = attempts_[*slot];
+    if (ahead_.changed_since(*slot, a.read) || ahead_.changed_since(*slot, a.trial.read())) return nullptr;
+    return a.trial.met_another() ? nullptr : &a;
   };
   if (Attempt* const a = found(steps[place])) return *a;
-  const std::size_t ahead = ahead_.alone() ? 1 : kAhead;
+  const std::size_t ahead = ahead_.alone() ? 1 : kAhead * team_.size();
   std::vector<std::uint32_t> batch;
   for (std::size_t i = place; i < std::min(place + ahead, steps.size()); ++i) {
-    if ((this->*kind.wanted)(steps[i]) && !found(steps[i])) batch.push_back(steps[i]);
+    if (wanted(steps[i]) && !found(steps[i])) batch.push_back(steps[i]);
   }
-  return attempts_[ahead_.run(
-      batch, [&](std::uint32_t step, std::size_t slot) { (this->*kind.attempt)(step, attempts_[slot]); })];
+  return attempts_[ahead_.run(batch, [&](std::uint32_t step, std::size_t slot) { attempt(step, attempts_[slot]); })];
 }
 
-void Refinement::apply(Attempt& a) {
+void Refinement::attempt(std::uint32_t edge, Attempt& a) const {
+  const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
+  a.read = {mesh_.from(h), mesh_.to(h)};
+  const std::optional<PatchTrial::Price> price =
+      touched(edge) > priced_[edge] ? a.trial.price(BoundedMesh::edge(edge)) : prices_[edge];
+  a.reached = std::numeric_limits<double>::infinity();
+  a.possible = price && price->largest <= kMostLargest && a.trial.try_collapse(*price, rings_);
+  if (price && price->largest <= kMostLargest) a.reached = a.trial.reached();
+  for (const Patch::Vertex& v : a.trial.patch().vertices()) a.read.push_back(v.id);
+}
+
+void Refinement::carry_out(Attempt& a) {
   ahead_.advance();
-  for (const Change::Face& face : a.trial.change().faces()) {
-    for (const std::uint32_t v : face.vertices) {
-      touched_[v] = ahead_.now();
-      ahead_.note_change(v);
-    }
-  }
+  const auto note = [&](std::uint32_t v) {
+    touched_[v] = ahead_.now();
+    ahead_.note_change(v);
+  };
+  note(a.trial.vanished());
+  for (const Patch::Vertex& v : a.trial.patch().vertices()) note(v.id);
   ahead_.note_change(a.trial.carry_out(mesh_));
-  // A vertex that stays where it was has another share, distance and boundary, though its other faces are the same.
-  const std::optional<std::uint32_t> kept = a.trial.change().vertex();
-  if (!kept) return;
-  ahead_.note_change(*kept);
-  for (const auto v : mesh_.connectivity().vv_range(BoundedMesh::handle(*kept))) {
-    ahead_.note_change(static_cast<std::uint32_t>(v.idx()));
-  }
-}
-
-bool Refinement::relocation_wanted(std::uint32_t vertex) const {
-  return !mesh_.connectivity().status(BoundedMesh::handle(vertex)).deleted() && mesh_.movable(vertex) &&
-         touched_[vertex] > relocated_[vertex];
-}
-
-void Refinement::try_relocation(std::uint32_t vertex, Attempt& a) const {
-  a.trial.begin();
-  // Faces around a vertex that stays count as moving, because the fit is for the place where it could go.
-  a.possible = a.trial.prepare_relocate(vertex, mesh_.vertex_position(vertex));
-  if (!a.possible) return;
-  a.fit.gather(a.trial.change());
-  a.possible = find_move(vertex, a);
-}
-
-/// Tries one step towards the place where the vertex fits best.
-bool Refinement::find_move(std::uint32_t vertex, Attempt& a) const {
-  const glm::dvec3 from = mesh_.position(vertex);
-  a.trial.prepare_relocate(vertex, mesh_.vertex_position(vertex));
-  const PositionFit::Fit now = a.fit.fit(a.trial.change(), from);
-  double step = 1;
-  for (int i = 0; i < kHalvings; ++i, step *= 0.5) {
-    const VertexPosition target = mesh_.store(from + step * (now.position - from));
-    if (!a.trial.prepare_relocate(vertex, target)) return false;
-    if (!(a.fit.fit(a.trial.change(), target.position).energy < kGain * now.energy)) continue;
-    if (a.trial.check() == ChangeTrial::Outcome::possible) return true;
-  }
-  return false;
-}
-
-void Refinement::relocate(std::uint32_t vertex, Attempt& a) {
-  for (int moves = 1; a.possible; ++moves) {
-    apply(a);
-    a.possible = moves < kMoves && find_move(vertex, a);
-  }
-  relocated_[vertex] = ahead_.now();
-}
-
-std::uint64_t Refinement::at_ends(const std::vector<std::uint64_t>& times, std::uint32_t edge) const {
-  const Halfedge h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
-  return std::max(times[mesh_.from(h)], times[mesh_.to(h)]);
-}
-
-Refinement::Read Refinement::read_at_ends(std::uint32_t edge) const {
-  const Halfedge h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
-  const std::uint32_t from = mesh_.from(h), to = mesh_.to(h);
-  return {from, to, from, to};
-}
-
-/// Reads at the other diagonal as well: an edge may have come there.
-Refinement::Read Refinement::read_at_diagonals(std::uint32_t edge) const {
-  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
-  Read read = read_at_ends(edge);
-  for (unsigned side = 0; side < 2; ++side) {
-    const Halfedge h = connectivity.halfedge_handle(BoundedMesh::edge(edge), side);
-    if (!connectivity.is_boundary(h)) read[2 + side] = mesh_.to(connectivity.next_halfedge_handle(h));
-  }
-  return read;
-}
-
-bool Refinement::flip_wanted(std::uint32_t edge) const {
-  return !mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted() && at_ends(touched_, edge) > flipped_[edge];
-}
-
-void Refinement::try_flip(std::uint32_t edge, Attempt& a) const {
-  a.trial.begin();
-  a.possible = a.trial.prepare_flip(BoundedMesh::edge(edge));
-  if (!a.possible) return;
-  a.fit.gather(a.trial.change());
-  const double after = a.fit.fit(a.trial.change(), glm::dvec3(0)).energy;
-  const double before = a.fit.energy_now(a.trial.change());
-  a.possible = after < kGain * before && a.trial.check() == ChangeTrial::Outcome::possible;
-}
-
-void Refinement::flip(std::uint32_t edge, Attempt& a) {
-  if (a.possible) apply(a);
-  flipped_[edge] = ahead_.now();
-}
-
-bool Refinement::collapse_wanted(std::uint32_t edge) const {
-  return !mesh_.connectivity().status(BoundedMesh::edge(edge)).deleted() && at_ends(touched_, edge) > collapsed_[edge];
-}
-
-void Refinement::try_collapse(std::uint32_t edge, Attempt& a) const {
-  constexpr auto kPossible = ChangeTrial::Outcome::possible;
-  a.trial.begin();
-  a.possible = false;
-  const auto [freedom, h] = mesh_.merge(BoundedMesh::edge(edge));
-  const VertexPosition from = mesh_.vertex_position(mesh_.from(h)), to = mesh_.vertex_position(mesh_.to(h));
-  if (freedom == BoundedMesh::Freedom::anywhere) {
-    for (const glm::dvec3& start : {0.5 * (from.position + to.position), from.position, to.position}) {
-      a.possible = a.possible || a.fit.collapse(a.trial, h, start, kGiveUpAbove) == kPossible;
-    }
-  } else if (freedom != BoundedMesh::Freedom::none) {
-    a.possible = a.trial.try_collapse(h, to) == kPossible;
-    if (!a.possible && freedom == BoundedMesh::Freedom::either_way) {
-      a.possible = a.trial.try_collapse(mesh_.connectivity().opposite_halfedge_handle(h), from) == kPossible;
-    }
-  }
-}
-
-void Refinement::collapse(std::uint32_t edge, Attempt& a) {
-  collapsed_[edge] = ahead_.now();
-  if (a.possible) apply(a);
+  for (const Patch::Face& f : a.trial.patch().faces()) samples_.renew(mesh_, f.id);
+  for (const Coverage::Removed& r : a.trial.removed()) samples_.renew(mesh_, r.id);
 }
 
 }  // namespace tolvol

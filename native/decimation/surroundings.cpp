@@ -61,11 +61,15 @@ void Surroundings::gather(const Change& change, Trial& trial) const {
 
 bool Surroundings::allow(const Change& change, Trial& trial) const {
   gather(change, trial);
-  return crossings_.none(tree_, trial.faces, trial.removed, trial.crossings);
+  return allow(trial);
 }
 
 Box Surroundings::follow(const Change& change, Trial& trial) {
   gather(change, trial);
+  return follow(trial);
+}
+
+Box Surroundings::follow(const Trial& trial) {
   Box all;
   for (const NewCrossings::Face& face : trial.faces) {
     const Box box = box_of(face.corners);

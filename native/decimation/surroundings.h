@@ -26,6 +26,9 @@ class Surroundings {
   /// Whether a change may put a vertex there.
   bool reach(const VertexPosition& target) const { return strictly_inside(target.stored, cell_); }
 
+  /// The corners of a face as it is now.
+  Corners corners(std::uint32_t face) const { return crossings_.corners(face); }
+
   /// Takes all faces as they are now. O(n log n).
   void renew();
 
@@ -38,11 +41,15 @@ class Surroundings {
   /// Whether a change makes no new crossing and no degenerate face, given the faces as they are now. Several threads
   /// may ask at once.
   bool allow(const Change& change, Trial& trial) const;
+  /// The same for the faces and the removed faces that the trial names, for whatever reason they change.
+  bool allow(Trial& trial) const { return crossings_.none(tree_, trial.faces, trial.removed, trial.crossings); }
   /// Whether none of some faces that were changed on trust, as they are now, crosses others anew or is degenerate.
   bool allow(std::span<const std::uint32_t> changed) const { return crossings_.none(tree_, changed); }
   /// Follows a change, which `trial` was asked about last, before it is carried out on the mesh. Returns a box around
   /// all that it changes: also around the faces that come to stand for others.
   Box follow(const Change& change, Trial& trial);
+  /// The same for the faces and the removed faces that the trial names.
+  Box follow(const Trial& trial);
 
  private:
   void renew(Team& team);

@@ -20,13 +20,18 @@ std::size_t TriesAhead::take(std::span<const std::uint32_t> steps) {
   return first;
 }
 
+std::optional<std::size_t> TriesAhead::slot_of(std::uint32_t step) const {
+  if (alone() || slots_[slot_of_[step]].step != step) return std::nullopt;
+  return slot_of_[step];
+}
+
+bool TriesAhead::changed_since(std::size_t slot, std::span<const std::uint32_t> read) const {
+  return std::ranges::any_of(read, [&](std::uint32_t vertex) { return changed_[vertex] > slots_[slot].at; });
+}
+
 std::optional<std::size_t> TriesAhead::found(std::uint32_t step, std::span<const std::uint32_t> read) const {
-  if (alone()) return std::nullopt;
-  const std::size_t slot = slot_of_[step];
-  if (slots_[slot].step != step) return std::nullopt;
-  const bool changed =
-      std::ranges::any_of(read, [&](std::uint32_t vertex) { return changed_[vertex] > slots_[slot].at; });
-  return changed ? std::nullopt : std::optional(slot);
+  const std::optional<std::size_t> slot = slot_of(step);
+  return slot && changed_since(*slot, read) ? std::nullopt : slot;
 }
 
 bool TriesAhead::changed_since(std::size_t slot, const Box& box) const {

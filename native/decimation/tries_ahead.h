@@ -55,6 +55,9 @@ class TriesAhead {
   }
   /// The slot of what was found for a step, unless a vertex around which its try read has changed since.
   std::optional<std::size_t> found(std::uint32_t step, std::span<const std::uint32_t> read) const;
+  /// The slot of what was found for a step, and whether a vertex around which its try read has changed since.
+  std::optional<std::size_t> slot_of(std::uint32_t step) const;
+  bool changed_since(std::size_t slot, std::span<const std::uint32_t> read) const;
 
   /// What was found for a step, or for all of them, is not used again.
   void drop(std::uint32_t step);

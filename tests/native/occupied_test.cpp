@@ -56,25 +56,26 @@ TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
   CertifiedBounds bounds({certificate}, positions, both.triangles.size(), false);
   BoundedMesh mesh(std::move(input), &bounds, alone);
 
-  const auto relocate = [&](const VertexPosition& target) {
+  // The edge that runs along x to a vertex collapses into the vertex, which goes to a place.
+  const auto collapse = [&](std::uint32_t vertex, const VertexPosition& target, bool carry_out = false) {
+    const auto h = mesh.connectivity().find_halfedge(BoundedMesh::handle(vertex - 1), BoundedMesh::handle(vertex));
     ChangeTrial trial(mesh, nullptr);
     trial.begin();
-    const ChangeTrial::Outcome outcome = trial.try_relocate(kMiddle, target);
+    const ChangeTrial::Outcome outcome = trial.try_collapse(h, target);
+    if (carry_out) trial.carry_out(mesh);
     return std::pair(outcome, trial.met_another());
   };
   const VertexPosition taken = mesh.vertex_position(above), here = mesh.vertex_position(kMiddle);
-  EXPECT_EQ(relocate(taken), std::pair(ChangeTrial::Outcome::possible, false)) << "as long as nothing keeps them apart";
+  const auto to = [&](const VertexPosition& target) { return collapse(kMiddle, target); };
+  EXPECT_EQ(to(taken), std::pair(ChangeTrial::Outcome::possible, false)) << "as long as nothing keeps them apart";
   mesh.keep_apart();
-  EXPECT_EQ(relocate(taken), std::pair(ChangeTrial::Outcome::refused, true));
-  EXPECT_EQ(relocate(here), std::pair(ChangeTrial::Outcome::possible, false)) << "where it is itself";
+  EXPECT_EQ(to(taken), std::pair(ChangeTrial::Outcome::refused, true));
+  EXPECT_EQ(to(here), std::pair(ChangeTrial::Outcome::possible, false)) << "where it is itself";
 
-  ChangeTrial away(mesh, nullptr);
-  away.begin();
   const dvec3 aside = taken.position + dvec3(0.1 * limit, 0, 0);
-  ASSERT_EQ(away.try_relocate(above, mesh.store(aside)), ChangeTrial::Outcome::possible);
-  away.carry_out(mesh);
-  EXPECT_EQ(relocate(taken), std::pair(ChangeTrial::Outcome::possible, false)) << "the place is free again";
-  EXPECT_EQ(relocate(mesh.vertex_position(above)), std::pair(ChangeTrial::Outcome::refused, true));
+  ASSERT_EQ(collapse(above, mesh.store(aside), true).first, ChangeTrial::Outcome::possible);
+  EXPECT_EQ(to(taken), std::pair(ChangeTrial::Outcome::possible, false)) << "the place is free again";
+  EXPECT_EQ(to(mesh.vertex_position(above)), std::pair(ChangeTrial::Outcome::refused, true));
 }
 
 }  // namespace

@@ -169,8 +169,8 @@ TEST(Refinement, ThreadsDoNotChangeABit) {
 TEST(Refinement, WhatIsTriedAheadKnowsWhatAVertexThatStaysMayStillUse) {
   TriangleMesh fans;
   fans.vertices = {{0, 0, 0},         {-0.1, -0.0757, 0},  {6.1, -0.0043, 0},    {6.1, 0.0043, 0},
-                   {-0.1, 0.0757, 0}, {3, 0, 0.3},         {-7, -0.2, 0},        {-7, -0.36, 0},
-                   {0, -0.56, 0},     {-3.5, -0.28, 0.95}, {-0.505, -0.28, -0.2}};
+                   {-0.1, 0.0757, 0}, {3, 0, 0.02},        {-7, -0.2, 0},        {-7, -0.36, 0},
+                   {0, -0.56, 0},     {-3.5, -0.28, 0.05}, {-0.505, -0.28, -0.2}};
   const auto fan = [&](std::uint32_t middle, const std::vector<std::uint32_t>& rim) {
     for (std::size_t i = 0; i < rim.size(); ++i) fans.triangles.emplace_back(middle, rim[i], rim[(i + 1) % rim.size()]);
   };

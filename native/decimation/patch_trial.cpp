@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "decimation/patch_trial.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+#include "decimation/certified_bounds.h"
+
+namespace tolvol {
+namespace {
+
+constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+
+/// The number of steps that fit the vertex of a collapse alone.
+constexpr int kStepsOfPrice = 8;
+/// The number of steps by the lower power, then by the higher one, and after the certificates have named points.
+constexpr int kStepsOfSum = 14, kStepsOfLargest = 16, kStepsAfterRefusal = 10;
+/// Hardly ever does the higher power lead to success from a larger deviation, over the tolerance.
+constexpr double kWorthGoingOn = 1.25;
+/// The certificates are asked so many times.
+constexpr int kMostRefusals = 12;
+/// So many points of the pieces of one face are looked at after a refusal, and so many of them are held from then on,
+/// each with this weight.
+constexpr std::size_t kLookedAt = 24, kHeld = 4;
+constexpr double kHeldWeight = 0.05;
+/// A face that has no proof is looked at in so many points along an edge.
+constexpr int kFacePoints = 24;
+
+}  // namespace
+
+PatchTrial::PatchTrial(const BoundedMesh& mesh, const SurfaceSamples& samples, Surroundings* around)
+    : mesh_(mesh),
+      bounds_(*mesh.certified()),
+      samples_(samples),
+      around_(around),
+      change_(mesh),
+      relaxation_(bounds_.forward(), bounds_.forward().limit()) {
+  backward_.look_for_failures(kLookedAt);
+}
+
+/// Prepares a collapse and a patch around it, with its samples.
+bool PatchTrial::prepare(Halfedge h, const glm::dvec3& position, int rings) {
+  const VertexPosition target = mesh_.store(position);
+  if (!std::isfinite(glm::dot(target.position, glm::dvec3(1)))) return false;
+  if (!change_.prepare_collapse(h, target) || change_.folds_over()) return false;
+  patch_.gather(change_, rings, !bounds_.bounds_boundaries());
+  relaxation_.start(patch_);
+  for (std::uint32_t f = 0; f < patch_.faces().size(); ++f) relaxation_.add(samples_.of(patch_.faces()[f].id), f);
+  for (const Coverage::Removed& r : change_.removed()) relaxation_.add(samples_.of(r.id), r.successor);
+  relaxation_.renew();
+  return true;
+}
+
+std::optional<PatchTrial::Price> PatchTrial::price(BoundedMesh::Edge edge) {
+  std::optional<Price> best;
+  const auto [freedom, h] = mesh_.merge(edge);
+  if (freedom == BoundedMesh::Freedom::none) return best;
+  const auto offer = [&](Halfedge halfedge, const glm::dvec3& position) {
+    if (!prepare(halfedge, position, 1)) return;
+    // Neighbours that are free here would be at the rim of a patch.
+    double before = 0;
+    const auto add = [&](std::uint32_t face) { before += samples_.energy(face); };
+    for (const Patch::Face& f : patch_.faces()) add(f.id);
+    for (const Coverage::Removed& r : change_.removed()) add(r.id);
+    relaxation_.lower_sum(kStepsOfPrice, false);
+    const std::uint32_t kept = patch_.find_vertex(*change_.vertex());
+    const Relaxation::State now = relaxation_.state();
+    if (best && now.energy - before >= best->rise) return;
+    best = {now.energy - before, now.largest, halfedge, patch_.vertices()[kept].position};
+  };
+  const glm::dvec3 &from = mesh_.position(mesh_.from(h)), &to = mesh_.position(mesh_.to(h));
+  if (freedom == BoundedMesh::Freedom::anywhere) {
+    offer(h, 0.5 * (from + to));
+    if (!best) offer(h, from);
+  }
+  if (!best) offer(h, to);
+  if (freedom == BoundedMesh::Freedom::either_way) offer(mesh_.connectivity().opposite_halfedge_handle(h), from);
+  return best;
+}
+
+bool PatchTrial::try_collapse(const Price& price, int rings) {
+  crossings_.crossings.begin();
+  met_another_ = false;
+  vanished_ = mesh_.from(price.halfedge);
+  if (!prepare(price.halfedge, price.position, rings) || !relax()) return false;
+  for (int refusals = 0; refusals < kMostRefusals; ++refusals) {
+    learnt_ = false;
+    if (certify()) return true;
+    if (!learnt_) return false;
+    relaxation_.renew();
+    relaxation_.lower_largest(kStepsAfterRefusal);
+    if (!relaxation_.enough()) return false;
+  }
+  return false;
+}
+
+bool PatchTrial::relax() {
+  if (!relaxation_.lower_sum(kStepsOfSum, true)) return false;
+  if (!relaxation_.enough() && relaxation_.state().largest <= kWorthGoingOn) {
+    relaxation_.lower_largest(kStepsOfLargest);
+  }
+  return relaxation_.enough();
+}
+
+bool PatchTrial::certify() {
+  round_positions();
+  if (meets_another()) return false;
+  gather_elements();
+  return pieces_hold() && faces_hold() && boundary_holds() && uncrossed();
+}
+
+/// Puts the vertices where the stored type can hold them.
+void PatchTrial::round_positions() {
+  positions_.clear(), moved_.clear();
+  for (Patch::Vertex& v : patch_.vertices()) {
+    VertexPosition position = mesh_.vertex_position(v.id);
+    if (v.free) {
+      position = mesh_.store(v.position);
+    } else if (v.position != position.position) {
+      position = change_.position();  // It merges with the vertex that is kept, which is not free then.
+    }
+    moved_.push_back(position.position != mesh_.position(v.id));
+    v.position = position.position;
+    positions_.push_back(position);
+  }
+}
+
+bool PatchTrial::meets_another() {
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+    if (!patch_.vertices()[v].free) continue;
+    const std::uint32_t id = patch_.vertices()[v].id;
+    if (mesh_.meets_another(positions_[v], id, id == *change_.vertex() ? vanished_ : id)) met_another_ = true;
+    for (std::uint32_t w = 0; w < v; ++w) {
+      if (positions_[v].stored == positions_[w].stored) return true;
+    }
+  }
+  return met_another_;
+}
+
+bool PatchTrial::changed(std::uint32_t face) const {
+  const Patch::Face& f = patch_.faces()[face];
+  return f.changed || moved_[f.corners[0]] || moved_[f.corners[1]] || moved_[f.corners[2]];
+}
+
+void PatchTrial::gather_elements() {
+  elements_.clear(), removed_.clear();
+  for (std::uint32_t f = 0; f < patch_.faces().size(); ++f) {
+    elements_.push_back({patch_.faces()[f].id,
+                         {patch_.position(f, 0), patch_.position(f, 1), patch_.position(f, 2)},
+                         changed(f) ? kAnywhere : 0});
+  }
+  for (const Coverage::Removed& r : change_.removed()) removed_.push_back({r.id, r.successor, kAnywhere});
+}
+
+/// Whether every piece of the reference that a face of the patch was the witness of has a witness in the patch.
+bool PatchTrial::pieces_hold() {
+  const Coverage* const backward = bounds_.backward();
+  if (!backward || backward->try_change(elements_, removed_, backward_)) return true;
+  struct Named {
+    std::uint32_t element;
+    double deviation;
+    glm::dvec3 point;
+  };
+  std::vector<Named> named;
+  for (const Coverage::Trial::Failure& failure : backward_.failed()) {
+    const auto& [a, b, c] = failure.part.corners;
+    Named worst{failure.element, -1, {}};
+    for (const glm::dvec3& p : {(a + b + c) * (1.0 / 3), a, b, c}) {
+      std::uint32_t face = failure.element;
+      const double deviation = relaxation_.deviation(p, face);
+      if (deviation > worst.deviation) worst.deviation = deviation, worst.point = p;
+    }
+    named.push_back(worst);
+  }
+  std::ranges::sort(named, [](const Named& x, const Named& y) {
+    return x.element != y.element ? x.element < y.element : x.deviation > y.deviation;
+  });
+  for (std::size_t i = 0; i < named.size(); ++i) {
+    if (i >= kHeld && named[i - kHeld].element == named[i].element) continue;
+    const SurfaceSample sample{named[i].point, kHeldWeight, 0};
+    relaxation_.add({&sample, 1}, named[i].element);
+  }
+  learnt_ = true;
+  return false;
+}
+
+bool PatchTrial::faces_hold() {
+  vertex_distances_.clear(), face_distances_.clear();
+  const TriangleCertificate& forward = bounds_.forward();
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+    const std::uint32_t id = patch_.vertices()[v].id;
+    vertex_distances_.push_back(moved_[v] ? forward.nearest(positions_[v].position, forward.limit()).distance
+                                          : bounds_.distance(id));
+    const bool asked = moved_[v] || id == *change_.vertex();  // The vertex that is kept may have a smaller share now.
+    if (asked && !(vertex_distances_[v] <= patch_.vertices()[v].share * forward.limit())) return false;
+  }
+  bool hold = true;
+  for (std::uint32_t f = 0; f < elements_.size(); ++f) {
+    face_distances_.push_back(bounds_.face_distance(elements_[f].id));
+    if (!changed(f)) continue;
+    const auto& c = patch_.faces()[f].corners;
+    const auto share = [&](int k) { return patch_.vertices()[c[k]].share; };
+    face_distances_[f] =
+        forward.narrowed(std::min({share(0), share(1), share(2)}))
+            .bound_in_any_order(elements_[f].corners,
+                                {vertex_distances_[c[0]], vertex_distances_[c[1]], vertex_distances_[c[2]]});
+    if (face_distances_[f] != TriangleCertificate::kUnproved) continue;
+    hold = false;
+    add_face_points(f, kFacePoints);
+  }
+  return hold;
+}
+
+/// Adds the points of a face that are farthest from the reference, near each of its corners one, if they are beyond
+/// what is enough.
+void PatchTrial::add_face_points(std::uint32_t face, int steps) {
+  glm::dvec3 worst[3];
+  double largest[3] = {Relaxation::kEnough, Relaxation::kEnough, Relaxation::kEnough};
+  for (int i = 0; i <= steps; ++i) {
+    for (int j = 0; i + j <= steps; ++j) {
+      const glm::dvec3 weights = glm::dvec3(i, j, steps - i - j) / static_cast<double>(steps);
+      const double deviation = relaxation_.deviation_of(face, weights);
+      const int corner = weights.x >= weights.y ? (weights.x >= weights.z ? 0 : 2) : (weights.y >= weights.z ? 1 : 2);
+      if (deviation > largest[corner]) largest[corner] = deviation, worst[corner] = weights;
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    if (!(largest[k] > Relaxation::kEnough)) continue;
+    relaxation_.add_face_point(face, worst[k], kHeldWeight);
+    learnt_ = true;
+  }
+}
+
+/// Whether the boundary edges of the patch keep the bounds of boundaries, if there are any.
+bool PatchTrial::boundary_holds() {
+  boundary_elements_.clear(), boundary_removed_.clear();
+  if (!bounds_.bounds_boundaries()) return true;
+  const std::uint32_t kept = *change_.vertex();
+  std::optional<std::uint32_t> of_kept;
+  for (std::uint32_t f = 0; f < patch_.faces().size(); ++f) {
+    const Patch::Face& face = patch_.faces()[f];
+    for (int k = 0; k < 3; ++k) {
+      if (!face.boundary[k]) continue;
+      // The boundary runs against the face, and its edges have the names of their first vertices.
+      const std::uint32_t from = face.corners[(k + 1) % 3], to = face.corners[k];
+      const std::uint32_t name = patch_.vertices()[from].id;
+      const glm::dvec3 &a = positions_[from].position, &b = positions_[to].position;
+      if (name == kept) of_kept = static_cast<std::uint32_t>(boundary_elements_.size());
+      boundary_elements_.push_back({name, {a, b, b}, moved_[from] || moved_[to] ? kAnywhere : 0});
+    }
+  }
+  const Halfedge h = change_.halfedge();
+  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
+  if (connectivity.is_boundary(h) || connectivity.is_boundary(connectivity.opposite_halfedge_handle(h))) {
+    if (!of_kept) return false;
+    boundary_removed_.push_back({vanished_, *of_kept, kAnywhere});
+  } else if (mesh_.on_boundary(vanished_)) {
+    return false;
+  }
+  if (boundary_elements_.empty()) return true;
+  const glm::dvec3 unknown(kAnywhere);
+  for (const Coverage::Element& e : boundary_elements_) {
+    if (e.moved > 0 && bounds_.boundary_forward()->bound(e.corners, unknown) == TriangleCertificate::kUnproved) {
+      return false;
+    }
+  }
+  return bounds_.boundary_backward()->try_change(boundary_elements_, boundary_removed_, boundary_backward_);
+}
+
+bool PatchTrial::uncrossed() {
+  if (!around_) return true;
+  crossings_.faces.clear();
+  for (std::uint32_t f = 0; f < elements_.size(); ++f) {
+    const auto& c = patch_.faces()[f].corners;
+    const Corners corners{positions_[c[0]].stored, positions_[c[1]].stored, positions_[c[2]].stored};
+    if (corners != around_->corners(elements_[f].id)) crossings_.faces.push_back({elements_[f].id, corners});
+  }
+  crossings_.removed.clear();
+  for (const Coverage::Removed& r : change_.removed()) {
+    crossings_.removed.push_back({r.id, elements_[r.successor].id});
+  }
+  return around_->allow(crossings_);
+}
+
+Box PatchTrial::carry_out(BoundedMesh& mesh) {
+  assert(&mesh == &mesh_);
+  if (Coverage* const backward = bounds_.backward()) backward->commit(backward_);
+  if (!boundary_elements_.empty()) bounds_.boundary_backward()->commit(boundary_backward_);
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+    if (moved_[v]) bounds_.note_distance(patch_.vertices()[v].id, vertex_distances_[v]);
+  }
+  for (std::uint32_t f = 0; f < elements_.size(); ++f) {
+    bounds_.note_face_distance(elements_[f].id, face_distances_[f]);
+  }
+  const Box changed = around_ ? around_->follow(crossings_) : Box();
+
+  const std::uint32_t kept = patch_.find_vertex(*change_.vertex());
+  [[maybe_unused]] bool possible = change_.prepare_collapse(change_.halfedge(), positions_[kept]);
+  assert(possible);
+  mesh.apply(change_);
+  const OpenMesh::TriConnectivity& connectivity = mesh.connectivity();
+  for (const Patch::Flip& flip : patch_.flips()) {
+    const Halfedge h = connectivity.find_halfedge(BoundedMesh::handle(flip.from), BoundedMesh::handle(flip.to));
+    possible = change_.prepare_flip(connectivity.edge_handle(h));
+    assert(possible);
+    mesh.apply(change_);
+  }
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+    const std::uint32_t id = patch_.vertices()[v].id;
+    if (!patch_.vertices()[v].free || v == kept || positions_[v].stored == mesh.stored(id)) continue;
+    change_.prepare_relocate(id, positions_[v]);
+    mesh.apply(change_);
+  }
+  return changed;
+}
+
+}  // namespace tolvol

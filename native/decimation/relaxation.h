@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Moves all free vertices of a patch together, and flips its edges, to where points of the reference are near the
+/// patch's faces and points of these faces near the reference. The largest deviations count most. It steers a search
+/// and proves nothing.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "check/certificate.h"
+#include "decimation/patch.h"
+
+namespace tolvol {
+
+/// A point of the reference that a face of the mesh has to be near to.
+struct SurfaceSample {
+  glm::dvec3 point;
+  double weight;
+  double deviation;  ///< Its deviation from the face now, over the tolerance.
+};
+
+class Relaxation {
+ public:
+  /// `forward` finds the points of the reference that are near to points of faces. Deviations are in units of
+  /// `tolerance`, in the frame. Keeps a reference to `forward`.
+  Relaxation(const TriangleCertificate& forward, double tolerance)
+      : forward_(&forward), unit2_(1 / (tolerance * tolerance)) {}
+
+  /// Starts with the faces and positions of a patch. Keeps a reference to the patch until the next start.
+  void start(Patch& patch);
+  /// Adds points of the reference, which are nearest to `face` or to faces near by.
+  void add(std::span<const SurfaceSample> samples, std::uint32_t face);
+  /// Adds a point of a face, by its barycentric coordinates, to be held near the reference.
+  void add_face_point(std::uint32_t face, const glm::dvec3& weights, double weight);
+  /// Finds the deviations of all points that were added, as the patch is now. The other functions need it after points
+  /// were added or positions were changed.
+  void renew();
+
+  /// The sum of the weighted deviations to the power of 8, and the largest deviation.
+  struct State {
+    double energy = 0, largest = 0;
+  };
+  State state() const { return now_; }
+
+  /// Minimises the sum of deviations to the power of 8 by at most so many steps. If `flip`, it flips edges, too.
+  /// Before some of its steps it gives up, and returns false, if the largest deviation is beyond what a success has
+  /// been seen to come from.
+  bool lower_sum(int steps, bool flip);
+  /// Minimises the sum of deviations to the power of 24 by at most so many steps, and then of a still higher power,
+  /// which lowers the largest one.
+  void lower_largest(int steps);
+  /// Whether the largest deviation that is seen is at most kEnough. A point of the reference that was beyond it before
+  /// may stay where it was.
+  bool enough() const { return now_.largest <= kEnough; }
+
+  /// The deviation of a point of the reference from the patch, over the tolerance, and the face that is nearest.
+  /// `face` is where the search begins.
+  double deviation(const glm::dvec3& point, std::uint32_t& face) const;
+  /// The deviation of a point of a face from the reference, over the tolerance.
+  double deviation_of(std::uint32_t face, const glm::dvec3& weights) const;
+
+  /// Deviations up to this share of the tolerance are enough; the rest is for what the samples do not see.
+  static constexpr double kEnough = 0.994;
+
+ private:
+  struct FacePoint {
+    std::uint32_t vertices[3];
+    glm::dvec3 weights;
+    double weight;
+    double scale;  ///< 1 / share^2, by the least share of the tolerance that a vertex of the face may use.
+  };
+  /// A point of a face and the point beyond it that it has to come near to.
+  struct Term {
+    std::uint32_t face;   ///< The face that is nearest to a point of the reference.
+    glm::dvec3 weights;   ///< The barycentric coordinates of the point of the face.
+    glm::dvec3 residual;  ///< From the point of the face to the other one.
+    double square;        ///< The squared deviation, over the tolerance that the face may use.
+  };
+
+  void take_points_of_faces();
+  double scale_of(std::uint32_t face) const;
+  Term nearest(const glm::dvec3& point, std::uint32_t face, bool look_around) const;
+  Term at(const glm::dvec3& point, std::uint32_t face) const;
+  Term at(const glm::dvec3& point, std::uint32_t face, const glm::dvec3& a, const glm::dvec3& b,
+          const glm::dvec3& c) const;
+  Term toward_reference(const FacePoint& p) const;
+  void evaluate(bool look_around, std::vector<Term>& terms) const;
+  State sum(const std::vector<Term>& terms, int power) const;
+  const FacePoint& face_point(std::size_t i) const {
+    return i < own_points_.size() ? own_points_[i] : added_points_[i - own_points_.size()];
+  }
+  double weight(std::size_t term) const {
+    return term < points_.size() ? points_[term].weight : face_point(term - points_.size()).weight;
+  }
+
+  void minimise(int power, int steps, std::span<const double> give_up_above);
+  bool step(int power, bool look_around);
+  void assemble(int power);
+  bool solve();
+  bool place_unturned(std::vector<glm::dvec3>& places);
+  bool find_turned();
+  bool flip_edges(int power);
+  bool folds(const Patch::Flipped& flipped) const;
+  double energy_if(const Patch::Flipped& flipped, int power, double limit) const;
+  double energy_now(const Patch::Flipped& flipped, int power) const;
+
+  const TriangleCertificate* forward_;
+  double unit2_;  ///< It is 1 / tolerance^2.
+  Patch* patch_ = nullptr;
+  std::vector<SurfaceSample> points_;                 ///< of the reference
+  std::vector<FacePoint> own_points_, added_points_;  ///< Those of every vertex, edge and face; those that were added.
+  std::vector<Term> terms_, tried_;                   ///< Of points_, own_points_ and added_points_, in this order.
+  std::vector<std::uint32_t> unknown_;                ///< For each vertex: its place among the free ones, or kNone.
+  std::vector<std::uint32_t> free_;                   ///< The free vertices.
+  std::vector<double> matrix_, factor_, gradient_, move_;
+  std::vector<glm::dvec3> before_, normals_, new_normals_;
+  std::vector<bool> turned_;
+  std::vector<std::vector<std::uint32_t>> points_of_;  ///< For each face: the points that are nearest to it.
+  State now_;
+  double damping_ = 0, overstep_ = 0;
+  bool flips_ = false;  ///< Whether edges are flipped, too.
+};
+
+}  // namespace tolvol
