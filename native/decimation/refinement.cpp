@@ -97,6 +97,7 @@ std::vector<std::uint32_t> Refinement::order() const {
   }
   std::ranges::sort(found);
   std::vector<std::uint32_t> edges;
+  edges.reserve(found.size());
   for (const auto& [reached, rise, e] : found) edges.push_back(e);
   return edges;
 }

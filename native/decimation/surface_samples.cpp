@@ -74,6 +74,7 @@ void SurfaceSamples::renew(const BoundedMesh& mesh, std::uint32_t face) {
   const glm::uvec3& t = mesh.triangle(face);
   const glm::dvec3 &a = mesh.position(t.x), &b = mesh.position(t.y), &c = mesh.position(t.z);
   std::vector<Measured> measured;
+  measured.reserve(points.size());
   for (const glm::dvec3& p : points) measured.push_back({p, closest_point(p, a, b, c).distance_squared});
   thin(measured, 0.5 * glm::length(glm::cross(b - a, c - a)));
   const double weight = 1 / static_cast<double>(std::max(measured.size(), kLeastSamples));

@@ -38,7 +38,7 @@ std::vector<std::uint32_t> t_junctions(std::span<const glm::dvec3> vertices, std
   std::vector<std::uint32_t> ends;
   for (const glm::uvec2& e : edges) ends.insert(ends.end(), {e.x, e.y});
   std::ranges::sort(ends);
-  ends.erase(std::ranges::unique(ends).begin(), ends.end());
+  ends.erase(std::unique(ends.begin(), ends.end()), ends.end());
 
   std::vector<std::uint32_t> numbers(edges.size());
   std::iota(numbers.begin(), numbers.end(), 0u);

@@ -30,7 +30,7 @@ BoundedMesh::Halfedge edge_into(const BoundedMesh& mesh, std::uint32_t vertex) {
 /// The corners as vertices of the mesh, the least first.
 Corners turned(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
   Corners corners{a, b, c};
-  std::ranges::rotate(corners, std::ranges::min_element(corners));
+  std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
   return corners;
 }
 
