@@ -162,7 +162,10 @@ def test_protected_edges_stay_bit_for_bit(kind, effort):
             x, y = np.array([face.center[:2] for face in ob.data.polygons]).T
             between = np.arctan2(y, x) % (2 * np.pi) * 30 / (2 * np.pi)
             inside = column(ob.data.polygons, "material_index", 1, np.int32) == 1
-            assert (inside == ((between > 7) & (between < 20))).mean() > 0.99
+            # A face whose corners are all on a border has its centre within a hundredth of a square of the border.
+            beside = (np.abs(between - 7) > 0.01) & (np.abs(between - 20) > 0.01)
+            assert beside.mean() > 0.95
+            assert (inside == ((between > 7) & (between < 20)))[beside].all()
     assert left[False] < left[True] < len(ob.data.polygons) * 4
 
 
