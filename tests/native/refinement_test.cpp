@@ -76,7 +76,7 @@ TEST(Refinement, LockedVerticesStay) {
 }
 
 TEST(Refinement, EdgesBetweenLockedVerticesStay) {
-  const Case c = torus();
+  const Case c{shapes::torus(60, 0.002)};
   const auto locked = std::make_unique<bool[]>(c.mesh.vertices.size());
   std::vector<std::pair<std::uint32_t, std::uint32_t>> line;  // rings around the tube
   for (const glm::uvec3& t : c.mesh.triangles) {
