@@ -81,10 +81,12 @@ def native(runner, preset, name, program="tolvol_tests", only="*", environment=N
     return Task(runner, name, command, count_gtest, environment or {}, built, program)
 
 
-def shares(runner, preset, count):
-    """Tasks that each run every count-th of the native tests of a preset."""
+def shares(runner, preset, count, everything=False):
+    """Tasks that each run every count-th of the native tests of a preset, at full length with `everything`."""
     for index in range(count):
         environment = {"GTEST_TOTAL_SHARDS": str(count), "GTEST_SHARD_INDEX": str(index)}
+        if everything:
+            environment["TOLVOL_ALL_TESTS"] = "1"
         yield native(runner, preset, f"{index + 1}_of_{count}", environment=environment)
 
 
@@ -137,7 +139,7 @@ def tidy(everything):
 def planned(runners, everything):
     """Returns the tasks of these runners; with `everything` those of sh tests/run.sh --all."""
     tasks = {
-        "native": [*shares("native", "release", 4)],
+        "native": [*shares("native", "release", 4, everything)],
         "asan": [*shares("asan", "asan", 6)],
         "tsan": [*(shares("tsan", "tsan", 6) if everything else threaded())],
         "python": [*python(), *(python_with_addresses_checked() if everything else ())],
