@@ -130,7 +130,10 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
       trial.failed_.push_back({piece, first});
       return false;
     };
-    if (!trial.stack_.empty() && trial.budget_-- == 0) return fail();
+    if (!trial.stack_.empty()) {
+      if (trial.budget_ == 0) return fail();  // The search may go on with other pieces, without a budget still.
+      --trial.budget_;
+    }
     const FourPoints points = with_centre(piece);
     double centre2 = std::numeric_limits<double>::infinity();
     std::uint32_t below = first;

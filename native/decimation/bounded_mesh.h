@@ -5,6 +5,7 @@
 
 #include <OpenMesh/Core/Mesh/TriConnectivity.hh>
 #include <atomic>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
@@ -24,6 +25,9 @@ class Change;
 /// A position as it is stored, and the same position in the frame, which is mapped from the stored one.
 struct VertexPosition {
   glm::dvec3 stored, position;
+
+  /// Whether the stored type can hold it.
+  bool is_finite() const { return std::isfinite(glm::dot(position, glm::dvec3(1))); }
 };
 
 struct BoundedMeshInput {

@@ -2,17 +2,10 @@
 #include "decimation/change_trial.h"
 
 #include <cassert>
-#include <cmath>
 
 #include "decimation/certified_bounds.h"
 
 namespace tolvol {
-namespace {
-
-/// Whether the stored type can hold the position.
-bool is_finite(const VertexPosition& target) { return std::isfinite(glm::dot(target.position, glm::dvec3(1))); }
-
-}  // namespace
 
 ChangeTrial::ChangeTrial(const BoundedMesh& mesh, Surroundings* around, Proof proof)
     : change_(mesh), around_(around), proof_(proof) {
@@ -32,7 +25,7 @@ bool ChangeTrial::prepare_collapse(Halfedge h, const VertexPosition& target) {
 }
 
 ChangeTrial::Outcome ChangeTrial::try_collapse(Halfedge h, const VertexPosition& target) {
-  if (!is_finite(target)) return Outcome::refused;
+  if (!target.is_finite()) return Outcome::refused;
   if (around_ && !around_->reach(target)) return Outcome::impossible;
   return prepare_collapse(h, target) ? check() : Outcome::impossible;
 }

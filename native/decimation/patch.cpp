@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "decimation/patch.h"
 
-#include <algorithm>
-#include <cassert>
-
 namespace tolvol {
 
 std::uint32_t Patch::add_vertex(std::uint32_t id) {
@@ -16,36 +13,49 @@ std::uint32_t Patch::add_vertex(std::uint32_t id) {
   return at->second;
 }
 
-void Patch::gather(const Change& collapse, int rings, bool boundary_free) {
+bool Patch::gather(const Change& collapse, int rings, bool boundary_free) {
   mesh_ = &collapse.mesh();
   vertex_count_ = 0;
-  faces_.clear(), flips_.clear(), local_vertex_.clear(), local_face_.clear(), core_.clear(), outer_edges_.clear();
-  const OpenMesh::TriConnectivity& connectivity = mesh_->connectivity();
-
-  const auto add_core = [&](std::uint32_t v) {
-    if (std::find(core_.begin(), core_.end(), v) == core_.end()) core_.push_back(v);
-  };
-  for (const Change::Halfedge h : collapse.collapses()) add_core(mesh_->from(h)), add_core(mesh_->to(h));
-  for (const std::uint32_t v : collapse.carried()) add_core(v);
-  for (std::size_t begin = 0, ring = 1; ring < static_cast<std::size_t>(rings); ++ring) {
-    const std::size_t end = core_.size();
-    for (std::size_t i = begin; i < end; ++i) {
-      for (const auto v : connectivity.vv_range(BoundedMesh::handle(core_[i]))) {
-        add_core(static_cast<std::uint32_t>(v.idx()));
-      }
-    }
-    begin = end;
-  }
+  faces_.clear(), flips_.clear(), local_vertex_.clear(), local_face_.clear(), outer_edges_.clear();
+  if (collapse.elements().size() > kMostFaces || !gather_core(collapse, rings)) return false;
   // The faces of the change come first, in its order, so that their numbers are those of its elements.
   for (const Coverage::Element& e : collapse.elements()) add_face(collapse, e.id);
   for (const std::uint32_t v : core_) {
-    for (const auto f : connectivity.vf_range(BoundedMesh::handle(v))) {
+    for (const auto f : mesh_->connectivity().vf_range(BoundedMesh::handle(v))) {
+      if (faces_.size() == kMostFaces) return false;
       add_face(collapse, static_cast<std::uint32_t>(f.idx()));
     }
   }
   free_vertices(collapse, boundary_free);
   link();
   note_outer_edges();
+  return true;
+}
+
+/// Finds the vertices whose faces are taken. Returns whether they are not too many.
+bool Patch::gather_core(const Change& collapse, int rings) {
+  core_.clear();
+  const auto add = [&](std::uint32_t v) {
+    if (!in_core(v)) core_.push_back(v);
+    return core_.size() <= kMostVertices;
+  };
+  for (const Change::Halfedge h : collapse.collapses()) {
+    if (!add(mesh_->from(h)) || !add(mesh_->to(h))) return false;
+  }
+  for (const std::uint32_t v : collapse.carried()) {
+    if (!add(v)) return false;
+  }
+  std::size_t begin = 0;
+  for (int ring = 1; ring < rings; ++ring) {
+    const std::size_t end = core_.size();
+    for (std::size_t i = begin; i < end; ++i) {
+      for (const auto v : mesh_->connectivity().vv_range(BoundedMesh::handle(core_[i]))) {
+        if (!add(static_cast<std::uint32_t>(v.idx()))) return false;
+      }
+    }
+    begin = end;
+  }
+  return true;
 }
 
 void Patch::add_face(const Change& collapse, std::uint32_t id) {
@@ -70,7 +80,6 @@ void Patch::add_face(const Change& collapse, std::uint32_t id) {
 }
 
 void Patch::free_vertices(const Change& collapse, bool boundary_free) {
-  const auto in_core = [&](std::uint32_t id) { return std::find(core_.begin(), core_.end(), id) != core_.end(); };
   for (Vertex& v : vertices()) {
     v.free = in_core(v.id) && mesh_->movable(v.id) && (boundary_free || !mesh_->on_boundary(v.id));
   }
@@ -112,7 +121,7 @@ void Patch::note_outer_edges() {
   const OpenMesh::TriConnectivity& connectivity = mesh_->connectivity();
   for (std::uint32_t a = 0; a < vertex_count_; ++a) {
     const std::uint32_t id = vertices_[a].id;
-    if (std::find(core_.begin(), core_.end(), id) != core_.end()) continue;
+    if (in_core(id)) continue;
     for (const auto h : connectivity.voh_range(BoundedMesh::handle(id))) {
       const std::uint32_t b = find_vertex(mesh_->to(h));
       if (b == kNone) continue;
@@ -125,7 +134,6 @@ void Patch::note_outer_edges() {
   }
   std::sort(outer_edges_.begin(), outer_edges_.end());
   // All faces around a vertex of the core are here, so that its other edges without a second face are boundary edges.
-  const auto in_core = [&](std::uint32_t id) { return std::find(core_.begin(), core_.end(), id) != core_.end(); };
   for (Face& face : faces_) {
     for (int k = 0; k < 3; ++k) {
       if (face.across[k] != kNone) continue;

@@ -3,7 +3,7 @@
 /// flipped without changing the mesh. Nothing here knows of distances.
 #pragma once
 
-#include <array>
+#include <algorithm>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
@@ -19,6 +19,8 @@ namespace tolvol {
 class Patch {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+  /// Three rings around an edge have about 44 vertices, and the faces around these are about 110.
+  static constexpr std::size_t kMostVertices = 160, kMostFaces = 640;
 
   struct Vertex {
     std::uint32_t id;  ///< The vertex of the mesh.
@@ -43,8 +45,9 @@ class Patch {
 
   /// Takes the faces around all vertices that are less than `rings` edges away from the ends of a collapse that is
   /// possible. These vertices are free as far as the mesh lets them move; those on a boundary are free only where
-  /// `boundary_free`. O(faces) with a small factor.
-  void gather(const Change& collapse, int rings, bool boundary_free);
+  /// `boundary_free`. Returns false, and the patch is not to be used, if there are more than kMostVertices of them, or
+  /// more than kMostFaces faces: a Relaxation would take seconds, and its matrix gigabytes. O(faces).
+  bool gather(const Change& collapse, int rings, bool boundary_free);
 
   std::span<Vertex> vertices() { return std::span(vertices_).first(vertex_count_); }
   std::span<const Vertex> vertices() const { return std::span(vertices_).first(vertex_count_); }
@@ -74,6 +77,8 @@ class Patch {
     const auto at = map.find(id);
     return at == map.end() ? kNone : at->second;
   }
+  bool gather_core(const Change& collapse, int rings);
+  bool in_core(std::uint32_t id) const { return std::find(core_.begin(), core_.end(), id) != core_.end(); }
   std::uint32_t add_vertex(std::uint32_t id);
   void add_face(const Change& collapse, std::uint32_t id);
   void free_vertices(const Change& collapse, bool boundary_free);

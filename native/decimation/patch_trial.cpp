@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <limits>
 
 #include "decimation/certified_bounds.h"
@@ -43,9 +42,8 @@ PatchTrial::PatchTrial(const BoundedMesh& mesh, const SurfaceSamples& samples, S
 /// Prepares a collapse and a patch around it, with its samples.
 bool PatchTrial::prepare(Halfedge h, const glm::dvec3& position, int rings) {
   const VertexPosition target = mesh_.store(position);
-  if (!std::isfinite(glm::dot(target.position, glm::dvec3(1)))) return false;
-  if (!change_.prepare_collapse(h, target) || change_.folds_over()) return false;
-  patch_.gather(change_, rings, !bounds_.bounds_boundaries());
+  if (!target.is_finite() || !change_.prepare_collapse(h, target) || change_.folds_over()) return false;
+  if (!patch_.gather(change_, rings, !bounds_.bounds_boundaries())) return false;
   relaxation_.start(patch_);
   for (std::uint32_t f = 0; f < patch_.faces().size(); ++f) relaxation_.add(samples_.of(patch_.faces()[f].id), f);
   for (const Coverage::Removed& r : change_.removed()) relaxation_.add(samples_.of(r.id), r.successor);
@@ -208,19 +206,19 @@ bool PatchTrial::faces_hold() {
                                 {vertex_distances_[c[0]], vertex_distances_[c[1]], vertex_distances_[c[2]]});
     if (face_distances_[f] != TriangleCertificate::kUnproved) continue;
     hold = false;
-    add_face_points(f, kFacePoints);
+    add_face_points(f);
   }
   return hold;
 }
 
 /// Adds the points of a face that are farthest from the reference, near each of its corners one, if they are beyond
 /// what is enough.
-void PatchTrial::add_face_points(std::uint32_t face, int steps) {
+void PatchTrial::add_face_points(std::uint32_t face) {
   glm::dvec3 worst[3];
   double largest[3] = {Relaxation::kEnough, Relaxation::kEnough, Relaxation::kEnough};
-  for (int i = 0; i <= steps; ++i) {
-    for (int j = 0; i + j <= steps; ++j) {
-      const glm::dvec3 weights = glm::dvec3(i, j, steps - i - j) / static_cast<double>(steps);
+  for (int i = 0; i <= kFacePoints; ++i) {
+    for (int j = 0; i + j <= kFacePoints; ++j) {
+      const glm::dvec3 weights = glm::dvec3(i, j, kFacePoints - i - j) / static_cast<double>(kFacePoints);
       const double deviation = relaxation_.deviation_of(face, weights);
       const int corner = weights.x >= weights.y ? (weights.x >= weights.z ? 0 : 2) : (weights.y >= weights.z ? 1 : 2);
       if (deviation > largest[corner]) largest[corner] = deviation, worst[corner] = weights;
@@ -277,10 +275,7 @@ bool PatchTrial::uncrossed() {
     const Corners corners{positions_[c[0]].stored, positions_[c[1]].stored, positions_[c[2]].stored};
     if (corners != around_->corners(elements_[f].id)) crossings_.faces.push_back({elements_[f].id, corners});
   }
-  crossings_.removed.clear();
-  for (const Coverage::Removed& r : change_.removed()) {
-    crossings_.removed.push_back({r.id, elements_[r.successor].id});
-  }
+  gather_removed(change_, crossings_.removed);
   return around_->allow(crossings_);
 }
 

@@ -68,7 +68,7 @@ class PatchTrial {
   bool boundary_holds();
   bool uncrossed();
   void gather_elements();
-  void add_face_points(std::uint32_t face, int steps);
+  void add_face_points(std::uint32_t face);
 
   const BoundedMesh& mesh_;
   CertifiedBounds& bounds_;

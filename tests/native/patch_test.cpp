@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "certified_mesh.h"
@@ -107,6 +108,31 @@ TEST(Patch, FlipsAsTheMeshDoes) {
   for (const Patch::Face& face : patch.faces()) {
     const glm::uvec3& t = c.mesh->triangle(face.id);
     EXPECT_EQ(corners_of(patch, face), turned(t.x, t.y, t.z));
+  }
+}
+
+TEST(Patch, IsNotTakenAroundAVertexWithManyFaces) {
+  // A cone, flat but for its rim's waves: its apex has all faces.
+  const auto cone = [](unsigned sides) {
+    TriangleMesh mesh;
+    mesh.vertices.emplace_back(0, 0, 0);
+    for (unsigned i = 0; i < sides; ++i) {
+      const double angle = 2 * std::numbers::pi * i / sides;
+      mesh.vertices.emplace_back(std::cos(angle), std::sin(angle), 0.1 * (i % 2));
+      mesh.triangles.emplace_back(0, i + 1, (i + 1) % sides + 1);
+    }
+    return mesh;
+  };
+  for (const unsigned sides : {100u, 150u, 700u, 20000u}) {
+    const TriangleMesh mesh = cone(sides);
+    const CertifiedMesh c(mesh, mesh.vertices, 0.3);
+    Change change(*c.mesh);
+    const auto h = c.mesh->connectivity().find_halfedge(BoundedMesh::handle(1), BoundedMesh::handle(2));
+    ASSERT_TRUE(change.prepare_collapse(h, c.mesh->vertex_position(2)));
+    Patch patch;
+    EXPECT_TRUE(patch.gather(change, 1, true)) << "a collapse on the rim has few faces";
+    EXPECT_EQ(patch.gather(change, 2, true), sides <= 150) << sides << " sides around the apex";
+    EXPECT_EQ(patch.gather(change, 3, true), sides <= 150);
   }
 }
 
