@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <utility>
 
 #include "base/call.h"
@@ -184,6 +185,7 @@ std::vector<std::uint32_t> CollapseLoop::with_next(std::uint32_t edge) {
   const std::size_t most = std::clamp<std::size_t>(mesh_.triangle_count() / kTrianglesPerAttempt, 1, kMostAttempts);
   std::vector<CollapseQueue::Entry> next;
   ++batches_;
+  reserved_boxes_.clear();
   reserve_around(edge);
   while (next.size() + 1 < most) {
     const auto entry = queue_.pop();
@@ -198,10 +200,12 @@ std::vector<std::uint32_t> CollapseLoop::with_next(std::uint32_t edge) {
   return batch;
 }
 
-/// Reserves the vertices around the edge: once it is collapsed, nothing holds that was found for their edges.
+/// Reserves the vertices around the edge, and where crossings are kept out the space that its faces take up: once it is
+/// collapsed, nothing holds that was found for the edges there.
 void CollapseLoop::reserve_around(std::uint32_t edge) {
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
   const auto h = connectivity.halfedge_handle(BoundedMesh::edge(edge), 0);
+  if (around_) reserved_boxes_.push_back(box_around(edge));
   for (const std::uint32_t end : {mesh_.from(h), mesh_.to(h)}) {
     // Edges that come one after another often share an end that has many neighbours.
     if (std::exchange(surrounded_[end], batches_) == batches_) continue;
@@ -213,7 +217,25 @@ void CollapseLoop::reserve_around(std::uint32_t edge) {
 
 bool CollapseLoop::reserved(std::uint32_t edge) const {
   const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
-  return reserved_[mesh_.from(h)] == batches_ || reserved_[mesh_.to(h)] == batches_;
+  if (reserved_[mesh_.from(h)] == batches_ || reserved_[mesh_.to(h)] == batches_) return true;
+  if (!around_) return false;
+  const Box box = box_around(edge);
+  return std::ranges::any_of(reserved_boxes_, [&](const Box& other) { return meet(box, other); });
+}
+
+/// A box of stored positions around the faces at the ends of the edge; around everything where these are a great many.
+Box CollapseLoop::box_around(std::uint32_t edge) const {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
+  const auto h = connectivity.halfedge_handle(BoundedMesh::edge(edge), 0);
+  Box box;
+  for (const std::uint32_t end : {mesh_.from(h), mesh_.to(h)}) {
+    if (mesh_.faces_around(end) > kGreatMany) return {glm::dvec3(-kFar), glm::dvec3(kFar)};
+    for (const auto near : connectivity.vv_range(BoundedMesh::handle(end))) {
+      box.add(mesh_.stored(static_cast<std::uint32_t>(near.idx())));
+    }
+  }
+  return box;
 }
 
 void CollapseLoop::carry_out(std::uint32_t edge, Tried& tried) {

@@ -79,6 +79,7 @@ class CollapseLoop {
   void try_now(std::uint32_t edge, Tried& tried);
   void reserve_around(std::uint32_t edge);
   bool reserved(std::uint32_t edge) const;
+  Box box_around(std::uint32_t edge) const;
   void carry_out(std::uint32_t edge, Tried& tried);
   std::unique_ptr<Attempt> take_attempt();
   void give_back(std::unique_ptr<Attempt> attempt);
@@ -100,6 +101,7 @@ class CollapseLoop {
   std::vector<Tried> tried_;  ///< For each slot of ahead_.
   /// For each vertex, the last batch of tries in which a face around it could change before its turn.
   std::vector<std::uint32_t> reserved_;
+  std::vector<Box> reserved_boxes_;        ///< The boxes of space, in the last batch, in which a face could change so.
   std::vector<std::uint32_t> surrounded_;  ///< And the last batch in which its neighbours were noted so.
   std::uint32_t batches_ = 0;              ///< The number of batches so far.
   std::vector<std::uint32_t> ring_;        ///< The neighbours of the vertex that vanished last.

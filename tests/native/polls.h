@@ -2,6 +2,7 @@
 /// Polls of a call (base/call.h), counted: a measure of its work that is the same on every machine.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 
 #include "base/call.h"
@@ -10,7 +11,8 @@ namespace tolvol {
 
 /// From the `last`-th poll on the call is asked to stop.
 struct Counted {
-  std::size_t polls = 0, last;
+  std::atomic<std::size_t> polls = 0;  ///< Several threads poll.
+  std::size_t last;
   const Call call;
 
   explicit Counted(std::size_t last_poll = static_cast<std::size_t>(-1))

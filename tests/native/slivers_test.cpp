@@ -106,4 +106,25 @@ TEST(Slivers, TheWorkAtAFanGrowsHardlyFasterThanItsFaces) {
   }
 }
 
+TEST(Slivers, ThreadsTryLittleInVainAroundAVertexWithManyFaces) {
+  // Every change around the apex of a cone is in the space of every other.
+  TriangleMesh cone;
+  constexpr unsigned kSides = 1500;
+  cone.vertices.emplace_back(0, 0, 0.5);
+  for (unsigned i = 0; i < kSides; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kSides;
+    cone.vertices.emplace_back(std::cos(angle), std::sin(angle), i % 2 == 0 ? 0 : 0.05);
+    cone.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % kSides);
+  }
+  const Case c{shapes::stored(cone)};
+  const auto volume = c.volume();
+  const auto polls = [&](unsigned threads) {
+    Options options;
+    options.threads = threads;
+    return polls_of([&] { decimate(c.mesh.vertices, c.mesh.triangles, c.space(), volume.get(), options); });
+  };
+  const std::size_t one = polls(1), two = polls(2);
+  EXPECT_LE(two, 3 * one);
+}
+
 }  // namespace
