@@ -255,6 +255,7 @@ BoundedMeshInput DecimationInput::take_mesh() {
   }
   for (const CutCause cause : cut_.cause) input.joined.push_back(cause == CutCause::non_manifold);
   input.slots = slots;
+  input.touching = std::move(cut_.touching);
   if (!options_.wedges.empty()) {
     // Labels name wedges at one input vertex; vertices welded from several hold those of all of them.
     std::unordered_map<std::uint64_t, std::uint32_t> dense;

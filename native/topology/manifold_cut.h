@@ -27,6 +27,9 @@ struct CutMesh {
   std::vector<std::uint32_t> vertex_input;    ///< is the lowest input vertex that each vertex stands for
   std::vector<CutCause> cause;                ///< has one entry for each vertex
   std::vector<glm::uvec2> boundary;           ///< are open edges, in the direction of their triangle, without cut edges
+  /// Tells which vertices are where a vertex of another sheet is that merely touches theirs: the two are no copies, and
+  /// no edges from there lie on each other. May be empty.
+  std::vector<bool> touching;
   // These members lead back to the input.
   std::vector<std::uint32_t> output_slot;   ///< is equal for vertices that are one vertex of the result
   std::vector<std::uint32_t> input_vertex;  ///< is the manifold vertex of each input vertex, kNone if it is not used

@@ -88,7 +88,7 @@ inline std::vector<Case> all() {
           {shapes::torus(30), tiny},
           {shapes::torus(30), huge},
           {shapes::torus(40, 0.002), glm::dmat4(1), Storage::float32, 0.05},
-          {shapes::joined(shapes::box(6), shapes::grid(6)), glm::dmat4(1), Storage::float32, 10}};
+          {shapes::stored(shapes::joined(shapes::box(6), shapes::grid(6))), glm::dmat4(1), Storage::float32, 10}};
 }
 
 }  // namespace tolvol::cases

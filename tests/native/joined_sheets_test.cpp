@@ -9,6 +9,7 @@
 #include <memory>
 #include <numbers>
 
+#include "base/union_find.h"
 #include "decimation_cases.h"
 
 namespace {
@@ -67,6 +68,46 @@ Case beads(unsigned discs, unsigned rim) {
   return {shapes::stored(mesh)};
 }
 
+/// Every triangle of a grid, bent into a wave, has vertices of its own, and half of them are missing. Triangles that
+/// share an edge are one sheet then, and sheets touch in points.
+Case torn_wave(unsigned n) {
+  TriangleMesh mesh;
+  std::uint32_t random = 1;
+  const auto add = [&](glm::uvec2 a, glm::uvec2 b, glm::uvec2 c) {
+    random = random * 1664525 + 1013904223;
+    if (random >> 31) return;
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (const glm::uvec2& p : {a, b, c}) {
+      const double x = p.x / static_cast<double>(n), y = p.y / static_cast<double>(n);
+      mesh.vertices.emplace_back(x, y, 0.02 * std::sin(9 * x) * std::sin(7 * y));
+    }
+    mesh.triangles.emplace_back(first, first + 1, first + 2);
+  };
+  for (unsigned i = 0; i < n; ++i) {
+    for (unsigned j = 0; j < n; ++j) {
+      add({i, j}, {i + 1, j}, {i + 1, j + 1}), add({i, j}, {i + 1, j + 1}, {i, j + 1});
+    }
+  }
+  return {shapes::stored(mesh)};
+}
+
+/// The number of parts of a mesh. Triangles belong together if they have an edge between the same two positions.
+std::size_t parts_by_position(const TriangleMesh& mesh) {
+  const std::vector<std::uint32_t> weld = weld_equal_positions(mesh.vertices);
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> first_at;
+  UnionFind parts(mesh.triangles.size());
+  std::size_t count = mesh.triangles.size();
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t a = weld[mesh.triangles[t][k]], b = weld[mesh.triangles[t][(k + 1) % 3]];
+      const std::uint32_t other = first_at.try_emplace(std::minmax(a, b), t).first->second;
+      if (parts.find(t) != parts.find(other)) --count;
+      parts.join(t, other);
+    }
+  }
+  return count;
+}
+
 /// How many edges have so many faces, by the number of faces.
 std::map<std::size_t, std::size_t> edges_by_faces(const std::vector<glm::uvec3>& triangles) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> faces;
@@ -121,6 +162,19 @@ TEST(JoinedSheets, ThatTouchInAPointStayTogether) {
   cases::expect_within(c, r);
   EXPECT_LE(r.triangles.size(), 4 * 16u);
   EXPECT_EQ(parts(r.triangles, r.vertices.size()), 1u);
+}
+
+TEST(TouchingSheets, AreNotJoinedAlongAnEdge) {
+  const Case c = torn_wave(24);
+  const std::size_t before = parts_by_position(c.mesh);
+  for (const auto effort : {Options::Effort::fast, Options::Effort::thorough}) {
+    Options options;
+    options.effort = effort;
+    const DecimationResult r = run(c, options);
+    cases::expect_within(c, r);
+    EXPECT_LE(r.triangles.size(), 360u);  // of 560
+    EXPECT_EQ(parts_by_position({r.vertices, r.triangles}), before);
+  }
 }
 
 TEST(JoinedSheets, WhatHoldsForAVertexHoldsForItsCopies) {
