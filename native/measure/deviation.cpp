@@ -328,7 +328,8 @@ class Cover {
   void halve(const Piece& piece, Visit&& visit) const {
     if (measure_ == length) return cut(piece.simplex, 2, visit);
     const glm::uvec3& t = b_.triangles[piece.bounds.nearest];
-    const Parts parts = split(piece.simplex.corner, {b_.vertices[t.x], b_.vertices[t.y], b_.vertices[t.z]});
+    const TriangleCorners nearest{b_.vertices[t.x], b_.vertices[t.y], b_.vertices[t.z]};
+    const Parts parts = split(piece.simplex.corner, nearest, nearest);
     for (int i = 0; i < parts.count; ++i) visit(Simplex{parts.corners[i], area});
   }
 

@@ -18,7 +18,7 @@ struct DeviationOptions {
   std::span<const double> percentiles = {};  ///< are from 0 to 100
   unsigned threads = 0;                      ///< 0 means one for each core; the result does not depend on it
   Progress* progress = nullptr;              ///< the call throws Cancelled once this is cancelled
-  double steps = 256;                        ///< is the mean number of search steps of a piece at which cutting ends
+  double steps = 128;                        ///< is the mean number of search steps of a piece at which cutting ends
 };
 
 /// A number, and the range that holds the true number whatever lies between the samples.

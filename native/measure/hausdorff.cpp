@@ -9,7 +9,8 @@
 // - Splitting: halving the longest edge brings a piece to the size of the triangles near it. Then the piece is cut
 //   along the edges of the nearest triangle T, by planes perpendicular to T. A part above T has its largest distance to
 //   T at a corner, and the corner is a point of a, so that both bounds meet at once. Halving alone would never end
-//   along the edges of b if the two surfaces touch.
+//   along the edges of b if the two surfaces touch. Where two sheets of b are as near, which halving approaches in
+//   pieces as small as the interval is narrow, the piece is cut there.
 // - The order: pieces with the largest upper bounds come first, in batches of a fixed size. Each piece of a batch sees
 //   the lower bound from before the batch, so that nothing depends on which thread is faster.
 //
@@ -56,6 +57,8 @@ constexpr double kNoise = 256 * kUnitRoundoff;
 // A piece whose middle corner is nearer than this, in frame lengths, to the segment between the other two counts as
 // that segment. Its error grows by twice as much, which is more than the rounding of the distance.
 constexpr double kFlat = 8 * kUnitRoundoff;
+// A piece is split so often with regard to one triangle of b alone.
+constexpr int kSplitsWithOneTriangle = 8;
 // This many triangles give a first lower bound.
 constexpr std::size_t kSeeds = 4096;
 // The multiples of this prime modulo a smaller number visit each number below that once, in jumps.
@@ -300,10 +303,24 @@ class Search {
     return piece;
   }
 
+  /// Returns the triangle nearest to the corner of a piece that is farthest from piece.nearest. This takes as long as a
+  /// split, and most pieces end without it, so that it is found only after some splits.
+  std::uint32_t other_near(const Piece& piece) const {
+    if (piece.error < kSplitsWithOneTriangle * kSplitError) return piece.nearest;
+    const std::array<dvec3, 3> t = corners(b_, piece.nearest);
+    const dvec3* farthest = nullptr;
+    double most = -1;
+    for (const dvec3& corner : piece.corner) {
+      const double squared = closest_point(corner, t[0], t[1], t[2]).distance_squared;
+      if (squared > most) most = squared, farthest = &corner;
+    }
+    return hierarchy_.nearest(*farthest, kInfinity, piece.nearest).triangle;
+  }
+
   /// Returns no part if the piece is too small.
   Children split(const Piece& whole) const {
     const Piece piece = flattened(whole);
-    const Parts parts = tolvol::split(piece.corner, corners(b_, piece.nearest));
+    const Parts parts = tolvol::split(piece.corner, corners(b_, piece.nearest), corners(b_, other_near(piece)));
     Children children{{piece, piece, piece}, parts.count};
     for (int i = 0; i < parts.count; ++i) {
       children.piece[i].corner = parts.corners[i];

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Halving alone would never end along the edges of the other surface if the two surfaces touch. Cutting alone would go
-// round in circles far from the other surface.
+// Halving alone would never end along the edges of the other surface if the two surfaces touch, and it would need as many
+// pieces as fit along the line where two of its sheets are as near. Cutting alone would go round in circles far from the
+// other surface.
 //
 // This derives kSplitError, with u = 2^-53. A point p + t (q - p) at t <= 1/2 from the nearer end, with |p|, |q| <= 1,
 // errs by t 2 u for the difference, as much for the product, and u for the sum, which is 3 u.
@@ -9,6 +10,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/closest_point.h"
+
 namespace tolvol {
 namespace {
 
@@ -16,6 +19,8 @@ using glm::dvec3;
 
 // A piece this many times longer than the triangle near it is halved, not cut.
 constexpr double kCoarse = 4;
+// A piece is cut between two triangles only where both parts have at least this share of it, so that pieces shrink.
+constexpr double kWellInside = 0.125;
 // A piece or a part thinner than this, in frame lengths, is as small as rounding.
 constexpr double kNoise = 256 * kUnitRoundoff;
 
@@ -27,6 +32,23 @@ Parts halves(const TriangleCorners& p, int i, double s) {
   Parts parts{{p, p, p}, 2};
   parts.corners[0][j] = parts.corners[1][i] = between(p[i], p[j], s);
   return parts;
+}
+
+/// Returns the parts on the two sides of a line through the piece. The corners have these signed distances from it, which
+/// are of both signs.
+Parts cut_at(const TriangleCorners& p, const std::array<double, 3>& side) {
+  const auto share = [&](int i, int j) { return side[i] / (side[i] - side[j]); };
+  int alone = 0;  // is the only corner on its side
+  for (int i = 0; i < 3; ++i) {
+    if (side[i] == 0) return halves(p, (i + 1) % 3, share((i + 1) % 3, (i + 2) % 3));
+    if (side[i] * side[(i + 1) % 3] < 0 && side[i] * side[(i + 2) % 3] < 0) alone = i;
+  }
+  const int i = alone, j = (alone + 1) % 3, k = (alone + 2) % 3;
+  const dvec3 on_j = between(p[i], p[j], share(i, j)), on_k = between(p[i], p[k], share(i, k));
+  if (glm::distance(on_j, p[k]) < glm::distance(on_k, p[j])) {
+    return {{{{p[i], on_j, on_k}, {on_j, p[j], p[k]}, {on_j, p[k], on_k}}}, 3};
+  }
+  return {{{{p[i], on_j, on_k}, {on_j, p[j], on_k}, {on_k, p[j], p[k]}}}, 3};
 }
 
 /// Returns no part if no edge of t divides the piece.
@@ -47,18 +69,23 @@ Parts cut_along(const TriangleCorners& p, const TriangleCorners& t) {
   for (double& s : side) {
     if (std::abs(s) <= kNoise) s = 0;
   }
-  const auto share = [&](int i, int j) { return side[i] / (side[i] - side[j]); };
-  int alone = 0;  // is the only corner on its side
-  for (int i = 0; i < 3; ++i) {
-    if (side[i] == 0) return halves(p, (i + 1) % 3, share((i + 1) % 3, (i + 2) % 3));
-    if (side[i] * side[(i + 1) % 3] < 0 && side[i] * side[(i + 2) % 3] < 0) alone = i;
+  return cut_at(p, side);
+}
+
+/// Cuts where t and `other` are about as near, which is on a line if each is nearest with its plane. Returns no part if
+/// that is not well inside the piece.
+Parts cut_between(const TriangleCorners& p, const TriangleCorners& t, const TriangleCorners& other) {
+  const auto distance = [](const dvec3& x, const TriangleCorners& from) {
+    return std::sqrt(closest_point(x, from[0], from[1], from[2]).distance_squared);
+  };
+  std::array<double, 3> side;
+  for (int i = 0; i < 3; ++i) side[i] = distance(p[i], other) - distance(p[i], t);
+  const auto [least, most] = std::minmax({side[0], side[1], side[2]});
+  if (std::min(-least, most) <= std::max(kNoise, kWellInside * (most - least))) return {};
+  for (double& s : side) {
+    if (std::abs(s) <= kNoise) s = 0;
   }
-  const int i = alone, j = (alone + 1) % 3, k = (alone + 2) % 3;
-  const dvec3 on_j = between(p[i], p[j], share(i, j)), on_k = between(p[i], p[k], share(i, k));
-  if (glm::distance(on_j, p[k]) < glm::distance(on_k, p[j])) {
-    return {{{{p[i], on_j, on_k}, {on_j, p[j], p[k]}, {on_j, p[k], on_k}}}, 3};
-  }
-  return {{{{p[i], on_j, on_k}, {on_j, p[j], on_k}, {on_k, p[j], p[k]}}}, 3};
+  return cut_at(p, side);
 }
 
 /// Returns the point that divides the segment from p to q best.
@@ -69,7 +96,7 @@ dvec3 cut_of_segment(const dvec3& p, const dvec3& q, const TriangleCorners& t, b
 
 }  // namespace
 
-Parts split(const TriangleCorners& piece, const TriangleCorners& t) {
+Parts split(const TriangleCorners& piece, const TriangleCorners& t, const TriangleCorners& other) {
   const double reach = std::max({glm::distance(t[0], t[1]), glm::distance(t[1], t[2]), glm::distance(t[2], t[0])});
   int longest = 0;
   std::array<double, 3> length;
@@ -87,6 +114,7 @@ Parts split(const TriangleCorners& piece, const TriangleCorners& t) {
     return {{{{p, at, at}, {at, q, q}}}, 2};
   }
   if (!coarse) parts = cut_along(piece, t);
+  if (!coarse && parts.count == 0) parts = cut_between(piece, t, other);
   return parts.count > 0 ? parts : halves(piece, longest, 0.5);
 }
 

@@ -20,7 +20,7 @@ TEST(Split, PartsAreAllOfThePieceAndTurnedAlike) {
   int threes = 0;
   for (int i = 0; i < 2000; ++i) {
     const TriangleCorners piece{point(), point(), point()}, t{point(), point(), point()};
-    const Parts parts = split(piece, t);
+    const Parts parts = split(piece, t, t);
     ASSERT_GE(parts.count, 2);
     threes += parts.count == 3;
     dvec3 sum(0);
@@ -42,7 +42,7 @@ TEST(Split, CutsAlongTheEdges) {
   for (int round = 0; round < 3; ++round) {
     std::vector<TriangleCorners> next;
     for (const TriangleCorners& piece : open) {
-      const Parts parts = split(piece, t);
+      const Parts parts = split(piece, t, t);
       next.insert(next.end(), parts.corners.begin(), parts.corners.begin() + parts.count);
     }
     open.swap(next);
@@ -54,13 +54,28 @@ TEST(Split, CutsAlongTheEdges) {
   EXPECT_NEAR(above, 0.5, 1e-12);
 }
 
+// A piece that stands between two sheets is cut where both are as near, so that each part has one that is nearest.
+TEST(Split, CutsBetweenTwoSheets) {
+  const TriangleCorners below{dvec3(-9, -9, 0), dvec3(9, -9, 0), dvec3(0, 9, 0)};
+  TriangleCorners above = below;
+  for (dvec3& p : above) p.z = 1;
+  const TriangleCorners piece{dvec3(0), dvec3(2, 0, 0), dvec3(0, 1, 1)};
+  const Parts parts = split(piece, below, above);
+  ASSERT_EQ(parts.count, 3);
+  for (int i = 0; i < parts.count; ++i) {
+    const auto& p = parts.corners[i];
+    const auto [lowest, highest] = std::minmax({p[0].z, p[1].z, p[2].z});
+    EXPECT_TRUE(highest <= 0.5 || lowest >= 0.5);
+  }
+}
+
 // Whichever two corners are equal, and whether it is halved or cut.
 TEST(Split, SegmentsLeaveTwoThatDoNotOverlap) {
   const dvec3 p(0, 0, 0.1), q(1, 0, 0.1);
   const TriangleCorners beside{dvec3(0.3, -1, 0), dvec3(0.3, 1, 0), dvec3(9, 0, 0)}, tiny{p, p, p};
   for (const auto& [t, at] : {std::pair{beside, 0.3}, {tiny, 0.5}}) {
     for (const TriangleCorners& segment : {TriangleCorners{p, q, q}, {p, q, p}, {p, p, q}}) {
-      const Parts parts = split(segment, t);
+      const Parts parts = split(segment, t, t);
       ASSERT_EQ(parts.count, 2);
       double sum = 0;
       for (int k = 0; k < 2; ++k) {
@@ -75,11 +90,11 @@ TEST(Split, SegmentsLeaveTwoThatDoNotOverlap) {
 
 TEST(Split, LongPiecesAreHalvedAndTinyOnesLeft) {
   const TriangleCorners t{dvec3(0), dvec3(0.1, 0, 0), dvec3(0, 0.1, 0)};
-  const Parts halves = split({dvec3(0), dvec3(1, 0, 0), dvec3(0, 0.5, 0)}, t);
+  const Parts halves = split({dvec3(0), dvec3(1, 0, 0), dvec3(0, 0.5, 0)}, t, t);
   ASSERT_EQ(halves.count, 2);
   EXPECT_EQ(halves.corners[0][2], dvec3(0.5, 0.25, 0));  // the middle of the longest edge
-  EXPECT_EQ(split({dvec3(0.5), dvec3(0.5), dvec3(0.5)}, t).count, 0);
-  EXPECT_EQ(split({dvec3(0), dvec3(1, 0, 0), dvec3(0.5, 0, 0)}, {dvec3(0.2), dvec3(0.2), dvec3(0.2)}).count, 2);
+  EXPECT_EQ(split({dvec3(0.5), dvec3(0.5), dvec3(0.5)}, t, t).count, 0);
+  EXPECT_EQ(split({dvec3(0), dvec3(1, 0, 0), dvec3(0.5, 0, 0)}, {dvec3(0.2), dvec3(0.2), dvec3(0.2)}, t).count, 2);
 }
 
 }  // namespace
