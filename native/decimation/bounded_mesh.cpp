@@ -6,6 +6,7 @@
 
 #include "base/call.h"
 #include "decimation/change.h"
+#include "decimation/regions.h"
 #include "topology/connectivity.h"
 
 namespace tolvol {
@@ -107,15 +108,28 @@ BoundedMesh::Merge BoundedMesh::merge(Edge e) const {
 }
 
 void BoundedMesh::keep_apart() {
-  if (kept_apart_) return;
-  kept_apart_ = true;
+  occupied_.assign(1, {}), occupied_by_.assign(positions_.size(), 0);
   for (std::uint32_t v = 0; v < positions_.size(); ++v) {
-    if (!mesh_.status(handle(v)).deleted()) occupied_.add(stored_[v]);
+    if (!mesh_.status(handle(v)).deleted()) occupied_[0].add(stored_[v]);
+  }
+}
+
+void BoundedMesh::keep_apart(const Regions& regions) {
+  occupied_.assign(regions.count(), {}), occupied_by_.resize(positions_.size());
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+    occupied_by_[v] = regions.of_vertex(v);
+    if (mesh_.status(handle(v)).deleted()) continue;
+    Box point;
+    point.add(stored_[v]);
+    regions.for_each_meeting(point, [&](std::uint32_t region) { occupied_[region].add(stored_[v]); });
   }
 }
 
 void BoundedMesh::place(std::uint32_t vertex, const VertexPosition& target) {
-  if (kept_apart_) occupied_.remove(stored_[vertex]), occupied_.add(target.stored);
+  if (kept_apart()) {
+    Occupied& occupied = occupied_[occupied_by_[vertex]];
+    occupied.remove(stored_[vertex]), occupied.add(target.stored);
+  }
   touching_[vertex] = touching_[vertex] && target.stored == stored_[vertex];
   left_original_[vertex] = left_original_[vertex] || target.position != positions_[vertex];
   positions_[vertex] = target.position;
@@ -163,7 +177,7 @@ void BoundedMesh::apply(const Change& change) {
     for (const Halfedge h : change.collapses()) {
       const std::uint32_t merged = from(h), kept = to(h);
       merged_into_[merged] = kept;
-      if (kept_apart_) occupied_.remove(stored_[merged]);
+      if (kept_apart()) occupied_[occupied_by_[merged]].remove(stored_[merged]);
       if (!shares_.empty()) shares_[kept] = std::min(shares_[kept], shares_[merged]);
       faces_around_[kept].fetch_add(faces_around_[merged].exchange(0, std::memory_order_relaxed),
                                     std::memory_order_relaxed);
@@ -219,6 +233,11 @@ void BoundedMesh::restore(const Saved& saved) {
     if (has_wedges()) wedges_[s.face] = s.wedges;
   }
   for (const Saved::OfVertex& s : saved.vertices) {
+    if (kept_apart()) {
+      Occupied& occupied = occupied_[occupied_by_[s.vertex]];
+      if (!mesh_.status(handle(s.vertex)).deleted()) occupied.remove(stored_[s.vertex]);
+      occupied.add(s.position.stored);
+    }
     mesh_.status(handle(s.vertex)).set_deleted(false);
     positions_[s.vertex] = s.position.position, stored_[s.vertex] = s.position.stored;
     if (!shares_.empty()) shares_[s.vertex] = s.share;

@@ -21,6 +21,7 @@
 namespace tolvol {
 
 class Change;
+class Regions;
 
 /// A position as it is stored, and the same position in the frame, which is mapped from the stored one.
 struct VertexPosition {
@@ -132,10 +133,13 @@ class BoundedMesh {
 
   /// From now on no change puts a vertex where another is. Only one thread may apply changes then. O(n).
   void keep_apart();
+  /// From now on no change of a vertex of a region puts it where another vertex in the region's cell is. Each region
+  /// may have a thread that applies its changes. O(n).
+  void keep_apart(const Regions& regions);
   /// Whether the place of `target` belongs to a vertex other than these two, and vertices are kept apart.
   bool meets_another(const VertexPosition& target, std::uint32_t vertex, std::uint32_t other) const {
-    return kept_apart_ && target.stored != stored_[vertex] && target.stored != stored_[other] &&
-           occupied_.contains(target.stored);
+    return kept_apart() && target.stored != stored_[vertex] && target.stored != stored_[other] &&
+           occupied_[occupied_by_[vertex]].contains(target.stored);
   }
 
   /// Carries out a change that is possible on this mesh as it is. ChangeTrial, which decides about changes, calls it.
@@ -178,6 +182,7 @@ class BoundedMesh {
   void count_around(const glm::uvec3& triangle, std::int32_t change);
   void merge_copies(const Change& change);
   void place(std::uint32_t vertex, const VertexPosition& target);
+  bool kept_apart() const { return !occupied_.empty(); }
 
   OpenMesh::TriConnectivity mesh_;
   Bounds* bounds_;
@@ -195,8 +200,8 @@ class BoundedMesh {
       copies_;  ///< By slot, where a slot has several vertices.
   std::vector<glm::uvec3> wedges_, corner_source_;
   mutable std::vector<std::uint32_t> merged_into_;
-  bool kept_apart_ = false;
-  Occupied occupied_;  ///< The places of the vertices, if they are kept apart.
+  std::vector<Occupied> occupied_;          ///< The places of vertices, if these are kept apart: in each region.
+  std::vector<std::uint32_t> occupied_by_;  ///< For each vertex: which of these a change of it asks.
   std::atomic<std::size_t> triangle_count_ = 0;
 };
 

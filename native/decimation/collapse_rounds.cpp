@@ -62,6 +62,7 @@ class Rounds {
       // The two shares take turns, so that the rims lie elsewhere in the next round.
       const Regions parts(mesh_, std::min(kMostVertices, vertices / kLeastRegions), round % 2 == 0 ? 0.5 : 0.35, team_);
       const std::vector<Members> members = members_of(parts);
+      mesh_.keep_apart(parts);
       std::atomic<std::size_t> taken_back = 0;
       team_.run(parts.count(), 1, [&](std::size_t i, std::size_t) {
         const auto region = static_cast<std::uint32_t>(i);

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <numbers>
+#include <tuple>
 
 #include "base/union_find.h"
 #include "decimation_cases.h"
@@ -165,15 +166,15 @@ TEST(JoinedSheets, ThatTouchInAPointStayTogether) {
 }
 
 TEST(TouchingSheets, AreNotJoinedAlongAnEdge) {
-  const Case c = torn_wave(24);
-  const std::size_t before = parts_by_position(c.mesh);
-  for (const auto effort : {Options::Effort::fast, Options::Effort::thorough}) {
+  for (const auto& [c, effort, most] : {std::tuple{torn_wave(24), Options::Effort::fast, 0.65},
+                                        {torn_wave(24), Options::Effort::thorough, 0.65},
+                                        {torn_wave(80), Options::Effort::fast, 0.35}}) {  // is cut into regions
     Options options;
     options.effort = effort;
     const DecimationResult r = run(c, options);
     cases::expect_within(c, r);
-    EXPECT_LE(r.triangles.size(), 360u);  // of 560
-    EXPECT_EQ(parts_by_position({r.vertices, r.triangles}), before);
+    EXPECT_LE(static_cast<double>(r.triangles.size()), most * static_cast<double>(c.mesh.triangles.size()));
+    EXPECT_EQ(parts_by_position({r.vertices, r.triangles}), parts_by_position(c.mesh));
   }
 }
 
