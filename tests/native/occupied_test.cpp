@@ -6,6 +6,7 @@
 #include "check/certificate.h"
 #include "decimation/certified_bounds.h"
 #include "decimation/change_trial.h"
+#include "decimation/regions.h"
 #include "shapes.h"
 #include "topology/manifold_cut.h"
 
@@ -76,6 +77,13 @@ TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
   ASSERT_EQ(collapse(above, mesh.store(aside), true).first, ChangeTrial::Outcome::possible);
   EXPECT_EQ(to(taken), std::pair(ChangeTrial::Outcome::possible, false)) << "the place is free again";
   EXPECT_EQ(to(mesh.vertex_position(above)), std::pair(ChangeTrial::Outcome::refused, true));
+
+  const Regions regions(mesh, 120, 0.3, alone);
+  ASSERT_EQ(regions.count(), 2u);
+  ASSERT_NE(regions.of_vertex(kMiddle), Regions::kNone);
+  mesh.keep_apart(regions);
+  EXPECT_EQ(to(taken), std::pair(ChangeTrial::Outcome::possible, false)) << "in regions, the place is free";
+  EXPECT_EQ(to(mesh.vertex_position(above)), std::pair(ChangeTrial::Outcome::refused, true)) << "in regions";
 }
 
 }  // namespace
