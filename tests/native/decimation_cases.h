@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "decimation/decimation.h"
+#include "many.h"
 #include "measure/hausdorff.h"
 #include "placed_mesh.h"
 #include "shapes.h"
@@ -52,43 +53,46 @@ inline void expect_within(const Case& c, const DecimationResult& r, bool two_sid
   }
 }
 
+/// Meshes of every kind.
 inline std::vector<Case> all() {
   glm::dmat4 mirrored(1), sheared(1), far_away(1), tiny(1e-6), huge(1e6);
   mirrored[0][0] = -1;
   sheared[1][0] = 0.7, sheared[2][1] = -0.4, sheared[0][0] = 3;
   far_away[3] = {5000, -3000, 100, 1};
   tiny[3][3] = huge[3][3] = 1;
-  TriangleMesh fins = shapes::grid(12);  // a second sheet through the middle of the first
-  for (unsigned i = 0; i < 12; ++i) {
-    const unsigned a = i * 13 + 6, b = a + 13, n = unsigned(fins.vertices.size());
+  const unsigned side = across(12);
+  TriangleMesh fins = shapes::grid(side);  // a second sheet through the middle of the first
+  for (unsigned i = 0; i < side; ++i) {
+    const unsigned a = i * (side + 1) + side / 2, b = a + side + 1, c = unsigned(fins.vertices.size());
     fins.vertices.push_back(fins.vertices[a] + dvec3(0, 0, 0.2));
     fins.vertices.push_back(fins.vertices[b] + dvec3(0, 0, 0.2));
-    fins.triangles.emplace_back(a, b, n), fins.triangles.emplace_back(b, n + 1, n);
+    fins.triangles.emplace_back(a, b, c), fins.triangles.emplace_back(b, c + 1, c);
   }
-  TriangleMesh misoriented = shapes::torus(30);
+  TriangleMesh misoriented = shapes::torus(across(30));
   for (std::size_t i = 0; i < misoriented.triangles.size(); i += 3)
     std::swap(misoriented.triangles[i].y, misoriented.triangles[i].z);
-  TriangleMesh duplicates = shapes::box(8);
-  duplicates.triangles.insert(duplicates.triangles.end(), duplicates.triangles.begin(),
-                              duplicates.triangles.begin() + 100);
-  TriangleMesh slivers = shapes::grid(30);  // a plate squeezed to slivers, bent
+  TriangleMesh duplicates = shapes::box(across(8));
+  const auto tenth = static_cast<std::ptrdiff_t>(duplicates.triangles.size() / 10);
+  for (std::ptrdiff_t i = 0; i < tenth; ++i) duplicates.triangles.push_back(duplicates.triangles[std::size_t(i)]);
+  TriangleMesh slivers = shapes::grid(across(30));  // a plate squeezed to slivers, bent
   for (dvec3& p : slivers.vertices) p = rounded_to_float32(dvec3(p.x, p.y * 1e-3, 0.05 * std::sin(9 * p.x)));
-  return {{shapes::torus(40, 0.002)},
-          {shapes::torus(40, 0.02), glm::dmat4(1), Storage::float64},
-          {shapes::box(10)},
-          {shapes::stored(shapes::grid(30))},
-          {shapes::soup(shapes::torus(24))},
+  return {{shapes::torus(across(40), 0.002)},
+          {shapes::torus(across(40), 0.02), glm::dmat4(1), Storage::float64},
+          {shapes::box(across(10))},
+          {shapes::stored(shapes::grid(across(30)))},
+          {shapes::soup(shapes::torus(across(24)))},
           {shapes::stored(fins)},
           {misoriented},
           {duplicates},
           {slivers},
-          {shapes::torus(30), mirrored},
-          {shapes::torus(30), sheared},
-          {shapes::torus(30), far_away},
-          {shapes::torus(30), tiny},
-          {shapes::torus(30), huge},
-          {shapes::torus(40, 0.002), glm::dmat4(1), Storage::float32, 0.05},
-          {shapes::stored(shapes::joined(shapes::box(6), shapes::grid(6))), glm::dmat4(1), Storage::float32, 10}};
+          {shapes::torus(across(30)), mirrored},
+          {shapes::torus(across(30)), sheared},
+          {shapes::torus(across(30)), far_away},
+          {shapes::torus(across(30)), tiny},
+          {shapes::torus(across(30)), huge},
+          {shapes::torus(across(40), 0.002), glm::dmat4(1), Storage::float32, 0.05},
+          {shapes::stored(shapes::joined(shapes::box(across(6)), shapes::grid(across(6)))), glm::dmat4(1),
+           Storage::float32, 10}};
 }
 
 }  // namespace tolvol::cases

@@ -72,12 +72,10 @@ TriangleMesh chain(unsigned rings) {
 
 std::vector<Case> thin() {
   std::vector<Case> all;
-  for (const double wall : {0.002, 0.01, 0.03}) {
-    all.push_back({hollow(10, wall)});
-    all.back().percent = 1;
-  }
+  for (const double wall : {0.002, 0.01, 0.03}) all.push_back({hollow(10, wall)});
   all.push_back({links(1e-3)});
   all.push_back({roll(0.01)});
+  for (Case& c : all) c.percent = 2;
   return all;
 }
 
@@ -89,6 +87,8 @@ TEST(DecimationCrossings, ThinWallsDoNotCross) {
     ASSERT_EQ(count(c.mesh.vertices, c.mesh.triangles), 0u);
     for (const auto effort : {Options::Effort::fast, Options::Effort::thorough}) {
       for (const auto placement : {Options::Placement::optimal, Options::Placement::subset}) {
+        // Thorough with original positions alone makes the same tries, at less than all places.
+        if (effort == Options::Effort::thorough && placement == Options::Placement::subset && !is_full_run()) continue;
         Options options;
         options.effort = effort, options.placement = placement;
         const DecimationResult r = run(c, options);
@@ -142,7 +142,8 @@ TEST(DecimationCrossings, TheSameBitsForAnyNumberOfThreads) {
   cases::expect_same_bits(regions, {}, 4);
   Options thorough;
   thorough.effort = Options::Effort::thorough;
-  const Case few{hollow(8, 0.02)};
+  Case few{hollow(8, 0.02)};
+  few.percent = 3;
   cases::expect_same_bits(few, thorough, 3);
   // Where faces cross already, tries also read which input faces others stand for.
   const Case crossing{shapes::joined(shapes::torus(many(60)), moved(shapes::torus(many(50)), glm::dmat4(0.98)))};
@@ -170,6 +171,7 @@ TEST(DecimationCrossings, TheirNumberNeverRises) {
     const Case c{shapes::stored(rough)};
     const std::size_t of_input = count(c.mesh.vertices, c.mesh.triangles);
     for (const auto effort : {Options::Effort::fast, Options::Effort::thorough}) {
+      if (effort == Options::Effort::thorough && seed > 0 && !is_full_run()) continue;
       Options options;
       options.effort = effort;
       const DecimationResult r = run(c, options);

@@ -2,7 +2,12 @@
 /// How much of the same a test looks at.
 #pragma once
 
+#include <cstdlib>
+
 namespace tolvol {
+
+/// Whether this is the run of everything, in which tests are as long as they can be: sh tests/run.sh --all
+inline bool is_full_run() { return std::getenv("TOLVOL_ALL_TESTS") != nullptr; }
 
 /// So many, or an eighth under the sanitizers: they are ten times as slow, and what they look for any few show.
 constexpr int many(int count) {

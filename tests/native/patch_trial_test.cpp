@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <random>
 
 #include "certified_mesh.h"
@@ -38,7 +37,7 @@ std::vector<Hostile> hostile(unsigned seed) {
 }
 
 /// The number of tries: 200 in every run, 5,000 where the environment asks for all.
-int tries() { return std::getenv("TOLVOL_ALL_TESTS") ? 5000 : many(200); }
+int tries() { return is_full_run() ? 5000 : many(200); }
 
 TEST(PatchTrial, WhatItFindsPossibleKeepsBothDirections) {
   int tried = 0, possible = 0, judged = 0;

@@ -24,14 +24,18 @@ Options thorough() {
   return options;
 }
 
-Case torus() { return {shapes::torus(across(60), 0.002)}; }
+/// The time of thorough grows with the number of triangles that fast leaves.
+constexpr double kPercent = 3;
+
+Case torus() { return {shapes::torus(across(60), 0.002), glm::dmat4(1), Storage::float32, kPercent}; }
 
 TEST(Refinement, KeepsBothDirectionsOnEveryMeshAndAddsNoTriangle) {
   std::size_t fast = 0, fewer = 0;
-  const std::vector<Case> all = cases::all();
+  std::vector<Case> all = cases::all();
   for (std::size_t i = 0; i < all.size(); i += static_cast<std::size_t>(8 / many(8))) {
-    const Case& c = all[i];
+    Case& c = all[i];
     if (c.percent < 0.1) continue;  // takes long and shows nothing new
+    if (!is_full_run()) c.percent = std::max(c.percent, kPercent);
     const DecimationResult r = run(c, thorough());
     cases::expect_within(c, r);
     const std::size_t before = run(c).triangles.size();
@@ -44,7 +48,7 @@ TEST(Refinement, KeepsBothDirectionsOnEveryMeshAndAddsNoTriangle) {
 TEST(Refinement, KeepsTheOneDirectionThatIsAskedFor) {
   Options options = thorough();
   options.two_sided = false;
-  for (const Case& c : {torus(), Case{shapes::stored(shapes::grid(20))}}) {
+  for (const Case& c : {torus(), Case{shapes::stored(shapes::grid(20)), glm::dmat4(1), Storage::float32, kPercent}}) {
     const DecimationResult r = run(c, options);
     cases::expect_within(c, r, false);
     EXPECT_GT(r.triangles.size(), 0u);
@@ -101,7 +105,7 @@ TEST(Refinement, EdgesBetweenLockedVerticesStay) {
 }
 
 TEST(Refinement, SharesOfTheToleranceAreKeptAroundTheirVertices) {
-  const Case c{shapes::torus(across(48), 0.002)};
+  Case c = torus();
   std::vector<double> shares(c.mesh.vertices.size(), 1);
   for (std::size_t v = 0; v < shares.size(); ++v) {
     if (c.mesh.vertices[v].x < 0) shares[v] = 0.25;
@@ -150,7 +154,9 @@ TEST(Refinement, CornersOfAFaceKeepToOneSideOfASeam) {
 }
 
 TEST(Refinement, ThreadsDoNotChangeABit) {
-  for (const Case& c : {torus(), Case{shapes::stored(shapes::grid(20))}}) {
+  Case plate{shapes::stored(shapes::grid(20))};
+  plate.percent = kPercent;
+  for (const Case& c : {torus(), plate}) {
     std::vector<double> shares(c.mesh.vertices.size(), 1);
     const auto locked = std::make_unique<bool[]>(shares.size());
     for (std::size_t v = 0; v < shares.size(); v += 7) shares[v] = 0.5, locked[v] = v % 2 == 0;
