@@ -90,7 +90,7 @@ inline std::vector<Case> all() {
           {shapes::torus(across(30)), far_away},
           {shapes::torus(across(30)), tiny},
           {shapes::torus(across(30)), huge},
-          {shapes::torus(across(40), 0.002), glm::dmat4(1), Storage::float32, 0.05},
+          {shapes::torus(40, 0.002), glm::dmat4(1), Storage::float32, 0.05},
           {shapes::stored(shapes::joined(shapes::box(across(6)), shapes::grid(across(6)))), glm::dmat4(1),
            Storage::float32, 10}};
 }

@@ -322,13 +322,13 @@ TEST(Hausdorff, FansTakeLittleForEachTriangle) {
   for (const auto& [a, b] : {std::pair{fan, fan}, {moved, fan}, {fan, moved}}) EXPECT_LT(polls_of(a, b), 1000u);
 }
 
-// The distance grows up to the line where both sheets are as near. Pieces as small as the interval is narrow would be too
-// many along that line.
+// The distance grows up to the line where both sheets are as near. Pieces as small as the interval is narrow would be
+// too many along that line.
 TEST(Hausdorff, BetweenTwoSheetsTheIntervalIsNarrow) {
   for (const double gap : {1e-2, 1e-5, 1e-8}) {
-    const TriangleMesh sheets{{dvec3(-2, -3, 0), dvec3(2, -3, 0), dvec3(0, 4, 0), dvec3(-2, -3, gap), dvec3(2, -3, gap),
-                               dvec3(0, 4, gap)},
-                              {{0, 1, 2}, {3, 4, 5}}};
+    const TriangleMesh sheets{
+        {dvec3(-2, -3, 0), dvec3(2, -3, 0), dvec3(0, 4, 0), dvec3(-2, -3, gap), dvec3(2, -3, gap), dvec3(0, 4, gap)},
+        {{0, 1, 2}, {3, 4, 5}}};
     const TriangleMesh needle{{dvec3(0, 0, 0), dvec3(1, 0.1, 0), dvec3(0, 0, gap)}, {{0, 1, 2}}};
     const HausdorffInterval d = hausdorff(needle, sheets);
     EXPECT_LE(d.lower, gap / 2);

@@ -18,11 +18,11 @@ constexpr int many(int count) {
 #endif
 }
 
-/// So many squares along a side of a mesh, or three eighths of them under the sanitizers: the ordinary build holds the
+/// So many squares along a side of a mesh, or five eighths of them under the sanitizers: the ordinary build holds the
 /// full size.
 constexpr unsigned across(unsigned count) {
 #ifdef TOLVOL_SANITIZED
-  return count * 3 / 8;
+  return count * 5 / 8;
 #else
   return count;
 #endif
