@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Halving alone would never end along the edges of the other surface if the two surfaces touch, and it would need as many
-// pieces as fit along the line where two of its sheets are as near. Cutting alone would go round in circles far from the
-// other surface.
+// Halving alone would never end along the edges of the other surface if the two surfaces touch, and it would need as
+// many pieces as fit along the line where two of its sheets are as near. Cutting alone would go round in circles far
+// from the other surface.
 //
 // This derives kSplitError, with u = 2^-53. A point p + t (q - p) at t <= 1/2 from the nearer end, with |p|, |q| <= 1,
 // errs by t 2 u for the difference, as much for the product, and u for the sum, which is 3 u.
@@ -34,8 +34,8 @@ Parts halves(const TriangleCorners& p, int i, double s) {
   return parts;
 }
 
-/// Returns the parts on the two sides of a line through the piece. The corners have these signed distances from it, which
-/// are of both signs.
+/// Returns the parts on the two sides of a line through the piece. The corners have these signed distances from it,
+/// which are of both signs.
 Parts cut_at(const TriangleCorners& p, const std::array<double, 3>& side) {
   const auto share = [&](int i, int j) { return side[i] / (side[i] - side[j]); };
   int alone = 0;  // is the only corner on its side

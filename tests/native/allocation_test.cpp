@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every operation while the n-th allocation fails, for all n of its run (decimation: for n that grow by a tenth): the
-// exception comes out, what was there before is as it was, and the next call gives what it always gives.
+// Every operation while the n-th allocation fails, for all n of its run, or for n that grow by a share of themselves:
+// the exception comes out, what was there before is as it was, and the next call gives what it always gives.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,6 +13,7 @@
 #include "check/certificate.h"
 #include "decimation/decimation.h"
 #include "field/display_grid.h"
+#include "many.h"
 #include "measure/deviation.h"
 #include "measure/hausdorff.h"
 #include "motion/constrain.h"
@@ -104,10 +105,13 @@ struct Scene {
   }
 };
 
+constexpr double kLeastGrowth = kSanitized ? 0.5 : 0;
+
 /// Calls `operation` with the n-th allocation failing until a run has no n-th, and after each failure once more: it
-/// must give what it gave first. `growth`: n grows by so much of itself, for what takes long. Returns how many
-/// allocations there were, at least.
+/// must give what it gave first. `growth`: n grows by so much of itself, for what takes long; at least by kLeastGrowth.
+/// Returns how many allocations there were, at least.
 long fail_allocations(const std::function<Numbers()>& operation, double growth = 0) {
+  growth = std::max(growth, kLeastGrowth);
   const Numbers expected = operation();
   EXPECT_FALSE(expected.empty());
   for (long n = 0;; n += 1 + long(growth * double(n))) {

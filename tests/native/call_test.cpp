@@ -14,6 +14,7 @@
 #include "field/display_grid.h"
 #include "field/scatter.h"
 #include "field/signs.h"
+#include "many.h"
 #include "measure/deviation.h"
 #include "measure/hausdorff.h"
 #include "motion/constrain.h"
@@ -27,7 +28,7 @@ namespace tolvol {
 namespace {
 
 const TriangleMesh& wavy() {
-  static const TriangleMesh mesh = shapes::torus(24, 0.004);
+  static const TriangleMesh mesh = shapes::torus(across(24), 0.004);
   return mesh;
 }
 
@@ -105,7 +106,7 @@ std::vector<NamedCall> calls() {
        }},
       {"deviation",
        [] {
-         deviation({moved, wavy().triangles}, wavy(), {.threads = 1, .steps = 16});
+         deviation({moved, wavy().triangles}, wavy(), {.threads = 1, .steps = 1});
        }},
   };
 }

@@ -45,12 +45,13 @@ TriangleMesh hollow(unsigned n, double wall) {
 /// Two rings through each other, `apart` where they are nearest.
 TriangleMesh links(double apart) {
   const glm::dmat4 other({1, 0, 0, 0}, {0, 0, 1, 0}, {0, -1, 0, 0}, {1.2 - apart, 0, 0, 1});
-  return shapes::joined(shapes::torus(24), moved(shapes::torus(24), other));
+  return shapes::joined(shapes::torus(across(24)), moved(shapes::torus(across(24)), other));
 }
 
 /// A sheet rolled up, with layers so far apart.
 TriangleMesh roll(double apart) {
-  return shapes::stored(shapes::squares(50, [&](const dvec3& p) {
+  // An even number, so that the layers have their edges above each other.
+  return shapes::stored(shapes::squares(2 * across(25), [&](const dvec3& p) {
     const double turns = 2 * p.x, radius = 0.5 + apart * turns, angle = 2 * std::numbers::pi * turns;
     return dvec3(radius * std::cos(angle), radius * std::sin(angle), p.y);
   }));
@@ -72,7 +73,10 @@ TriangleMesh chain(unsigned rings) {
 
 std::vector<Case> thin() {
   std::vector<Case> all;
-  for (const double wall : {0.002, 0.01, 0.03}) all.push_back({hollow(10, wall)});
+  for (const double wall : {0.01, 0.002, 0.03}) {
+    all.push_back({hollow(10, wall)});
+    if (kSanitized) break;
+  }
   all.push_back({links(1e-3)});
   all.push_back({roll(0.01)});
   for (Case& c : all) c.percent = 2;
@@ -126,7 +130,7 @@ TEST(DecimationCrossings, AnyMatrixAndStorage) {
   far_away[3] = {5000, -3000, 100, 1};
   for (const glm::dmat4& to_world : {sheared, mirrored, far_away}) {
     for (const Storage storage : {Storage::float32, Storage::float64}) {
-      const Case c{hollow(9, 0.01), to_world, storage};
+      const Case c{hollow(9, 0.01), to_world, storage, 2};
       const DecimationResult r = run(c);
       EXPECT_TRUE(crossings_by_cgal({r.vertices, r.triangles}).empty());
       EXPECT_LT(r.triangles.size(), c.mesh.triangles.size() / 2);
@@ -171,7 +175,7 @@ TEST(DecimationCrossings, TheirNumberNeverRises) {
     const Case c{shapes::stored(rough)};
     const std::size_t of_input = count(c.mesh.vertices, c.mesh.triangles);
     for (const auto effort : {Options::Effort::fast, Options::Effort::thorough}) {
-      if (effort == Options::Effort::thorough && seed > 0 && !is_full_run()) continue;
+      if (effort == Options::Effort::thorough && (seed > 0 || kSanitized) && !is_full_run()) continue;
       Options options;
       options.effort = effort;
       const DecimationResult r = run(c, options);

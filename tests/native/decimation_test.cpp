@@ -229,7 +229,9 @@ TEST(Decimation, ThreadsAndInstructionsDoNotChangeABit) {
 }
 
 TEST(Decimation, TryingAheadChangesNothing) {
+  int number = 0;
   for (const Case& c : cases::all()) {
+    if (kSanitized && number++ % 4 > 0) continue;
     const auto volume = c.volume();
     for (const bool subset : {false, true}) {
       const auto with = [&](unsigned threads) {
@@ -411,7 +413,7 @@ TEST(Decimation, FlatPlatesEndAtAnyTolerance) {
 
 TEST(Decimation, LargePlatesBecomeTwoTriangles) {
   // A face of the result lies near tens of thousands of triangles of the reference: more than a proof looks at.
-  for (const unsigned n : {128u, 150u}) {
+  for (const unsigned n : {across(128), across(150)}) {
     const Case c{shapes::stored(shapes::grid(n)), glm::dmat4(1), Storage::float32, 0.03};
     const DecimationResult r = run(c);
     expect_within(c, r);

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "base/errors.h"
+#include "many.h"
 #include "measure/hausdorff.h"
 #include "shapes.h"
 
@@ -309,12 +310,15 @@ TEST(Deviation, EndsByItsStepsWhereNeedlesCrowd) {
 TEST(Deviation, SameForAnyNumberOfThreads) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal(0, 0.01);
-  TriangleMesh rough = plate(120, 0);
+  TriangleMesh rough = plate(across(120), 0);
   for (dvec3& p : rough.vertices) p.z += normal(random);
   const double bounds[] = {0.01};
-  const Deviation one = deviation(rough, plate(3, 0), {bounds, {}, 1, nullptr});
+  DeviationOptions options;
+  options.bounds = bounds, options.steps = 16, options.threads = 1;
+  const Deviation one = deviation(rough, plate(3, 0), options);
   for (const unsigned threads : {2u, 5u}) {
-    const Deviation many = deviation(rough, plate(3, 0), {bounds, {}, threads, nullptr});
+    options.threads = threads;
+    const Deviation many = deviation(rough, plate(3, 0), options);
     EXPECT_EQ(many.mean.value, one.mean.value);
     EXPECT_EQ(many.rms.range.upper, one.rms.range.upper);
     EXPECT_EQ(many.share_beyond[0].value, one.share_beyond[0].value);

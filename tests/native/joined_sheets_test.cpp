@@ -12,6 +12,7 @@
 
 #include "base/union_find.h"
 #include "decimation_cases.h"
+#include "many.h"
 
 namespace {
 
@@ -168,7 +169,7 @@ TEST(JoinedSheets, ThatTouchInAPointStayTogether) {
 TEST(TouchingSheets, AreNotJoinedAlongAnEdge) {
   for (const auto& [c, effort, most] : {std::tuple{torn_wave(24), Options::Effort::fast, 0.65},
                                         {torn_wave(24), Options::Effort::thorough, 0.65},
-                                        {torn_wave(80), Options::Effort::fast, 0.35}}) {  // is cut into regions
+                                        {torn_wave(across(80)), Options::Effort::fast, 0.35}}) {  // is cut into regions
     Options options;
     options.effort = effort;
     const DecimationResult r = run(c, options);

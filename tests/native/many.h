@@ -9,23 +9,17 @@ namespace tolvol {
 /// Whether this is the run of everything, in which tests are as long as they can be: sh tests/run.sh --all
 inline bool is_full_run() { return std::getenv("TOLVOL_ALL_TESTS") != nullptr; }
 
-/// So many, or an eighth under the sanitizers: they are ten times as slow, and what they look for any few show.
-constexpr int many(int count) {
 #ifdef TOLVOL_SANITIZED
-  return count / 8;
+inline constexpr bool kSanitized = true;
 #else
-  return count;
+inline constexpr bool kSanitized = false;
 #endif
-}
+
+/// So many, or an eighth under the sanitizers: they are ten times as slow, and what they look for any few show.
+constexpr int many(int count) { return kSanitized ? count / 8 : count; }
 
 /// So many squares along a side of a mesh, or five eighths of them under the sanitizers: the ordinary build holds the
 /// full size.
-constexpr unsigned across(unsigned count) {
-#ifdef TOLVOL_SANITIZED
-  return count * 5 / 8;
-#else
-  return count;
-#endif
-}
+constexpr unsigned across(unsigned count) { return kSanitized ? count * 5 / 8 : count; }
 
 }  // namespace tolvol

@@ -105,7 +105,7 @@ TEST(Refinement, EdgesBetweenLockedVerticesStay) {
 }
 
 TEST(Refinement, SharesOfTheToleranceAreKeptAroundTheirVertices) {
-  Case c = torus();
+  const Case c{shapes::torus(across(40), 0.002), glm::dmat4(1), Storage::float32, kPercent};
   std::vector<double> shares(c.mesh.vertices.size(), 1);
   for (std::size_t v = 0; v < shares.size(); ++v) {
     if (c.mesh.vertices[v].x < 0) shares[v] = 0.25;

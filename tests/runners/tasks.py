@@ -11,6 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 PYTHON = "/usr/bin/python3"
 RUNNERS = ("native", "asan", "tsan", "python", "fuzz", "blender", "ui", "style")
+FULL_LENGTH = {"TOLVOL_ALL_TESTS": "1"}  # the environment in which tests are as long as they can be
 # The tests of what several threads do, and of the proofs that are made after them. Each has a task of its own, because a
 # task in which no test ran fails: a suite that got another name is noticed. Left out are long tests without threads, and
 # those whose work "ThreadsDoNotChangeABit" does with more threads.
@@ -86,7 +87,7 @@ def shares(runner, preset, count, everything=False):
     for index in range(count):
         environment = {"GTEST_TOTAL_SHARDS": str(count), "GTEST_SHARD_INDEX": str(index)}
         if everything:
-            environment["TOLVOL_ALL_TESTS"] = "1"
+            environment |= FULL_LENGTH
         yield native(runner, preset, f"{index + 1}_of_{count}", environment=environment)
 
 
@@ -145,7 +146,7 @@ def planned(runners, everything):
         "python": [*python(), *(python_with_addresses_checked() if everything else ())],
         "fuzz": [*fuzz(300), *fuzz(300, first=300)],
         "blender": [*blender(4)],
-        "ui": [Task("ui", "ui", ("sh", "tests/ui/run.sh"), count_pytest)],
+        "ui": [Task("ui", "ui", ("sh", "tests/ui/run.sh"), count_pytest, FULL_LENGTH if everything else {})],
         "style": [Task("style", "checks", ("sh", "tests/style/run.sh"), count_checks), *tidy(everything)],
     }
     return [task for name in runners for task in tasks[name]]
