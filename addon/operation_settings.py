@@ -4,6 +4,8 @@
 Each function returns {name: property}. `options` are Blender's property options for all of these properties.
 """
 
+import math
+
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 PROTECTED = (
@@ -84,6 +86,16 @@ def decimate_settings(options=frozenset()):
                 ),
                 ("ALLOW", "Allow", "Faces may come to cross, as the two sides of a thin wall do"),
             ),
+            options=set(options),
+        ),
+        "max_normal_angle": FloatProperty(
+            name="Normals",
+            description="The largest angle between a face of the result and the faces of the reference that it stands for. "
+            "90 turns no face over, and 180 permits any angle",
+            default=math.pi / 2,
+            min=math.radians(1),
+            max=math.pi,
+            subtype="ANGLE",
             options=set(options),
         ),
         "max_seconds": FloatProperty(

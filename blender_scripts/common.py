@@ -34,6 +34,17 @@ def whole_number(least):
     return parse
 
 
+def angle(text):
+    """Parses an angle in degrees, from 1 to 180."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not 1 <= value <= 180:
+        raise argparse.ArgumentTypeError(f"{text!r} is not from 1 to 180")
+    return value
+
+
 def length(text):
     """Parses '1%' or '0.5'. Returns (number, whether it is in percent of size)."""
     match = re.fullmatch(rf"\s*({_NUMBER})\s*(%?)\s*", text, re.IGNORECASE)

@@ -6,6 +6,7 @@ blender --background --python blender_scripts/decimate.py -- IN OUT --tolerance 
 
 import io
 import json
+import math
 import sys
 import time
 from pathlib import Path
@@ -71,6 +72,14 @@ def arguments():
         default="keep_out",
         help="keep_out: no faces cross in the result that did not cross in IN; allow: they may, as the two sides of a thin "
         "wall do (default: keep_out)",
+    )
+    parser.add_argument(
+        "--max-normal-angle",
+        type=cli.angle,
+        default=90,
+        metavar="A",
+        help="the largest angle, in degrees from 1 to 180, between a face of the result and the faces of the reference that "
+        "it stands for; 180 permits any angle (default: 90, which turns no face over)",
     )
     parser.add_argument(
         "--max-seconds",
@@ -251,6 +260,7 @@ class Command:
                     keep="ONE" if self.options.one_sided else "BOTH",
                     effort=self.options.effort.upper(),
                     crossings=self.options.crossings.upper(),
+                    max_normal_angle=math.radians(self.options.max_normal_angle),
                     max_seconds=self.options.max_seconds or 0,
                     outside=self.options.outside.upper(),
                     threads=self.options.threads or 0,
@@ -380,6 +390,7 @@ class Command:
             "forward": forward,
             "backward": backward,
             "outside": outside,
+            "normals": _normals(runs),
             "seconds": {stage: sum(run["seconds"][stage] for run in runs) for stage in runs[0]["seconds"]},
             "repairs": [
                 {**repair, "message": f"{name}: {repair['message']}" if several else repair["message"]}
@@ -392,6 +403,15 @@ class Command:
             ],
             "objects": [{"name": name, **run} for name, run in zip(names, runs)],
         }
+
+
+def _normals(runs):
+    """Returns the normals of several runs as those of one. They are of the meshes before the file rounds coordinates."""
+    kept = [run["normals"] for run in runs if run["normals"]]
+    if not kept:
+        return None
+    counts = {key: sum(one[key] for one in kept) for key in ("exceeded_before", "exceeded_after")}
+    return {"largest": max(one["largest"] for one in kept), **counts}
 
 
 def _not_above(length):

@@ -4,6 +4,7 @@
 import contextlib
 import functools
 import json
+import math
 import time
 
 import bpy
@@ -42,6 +43,7 @@ def draw_decimate_settings(layout, settings):
 def draw_advanced_settings(layout, settings):
     """Draws the settings of a decimation that hardly anybody changes, for the panel and for Adjust Last Operation."""
     layout.prop(settings, "crossings")
+    layout.prop(settings, "max_normal_angle")
 
 
 def draw_protect_settings(layout, settings, ob):
@@ -195,6 +197,8 @@ object. An object without a reference gets one first, as by Set Reference"""
             "two_sided": self.keep == "BOTH",
             "effort": self.effort.lower(),
             "crossings": self.crossings.lower(),
+            # A property holds a float32, and 180 degrees in it are more than 180.
+            "max_normal_angle": min(round(math.degrees(self.max_normal_angle), 4), 180),
             "max_seconds": self.max_seconds or None,
             "target_triangles": self.target_triangles if self.use_target else None,
             "outside": self.outside.lower(),

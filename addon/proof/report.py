@@ -43,6 +43,7 @@ def decimation_run(source, result, native_report, volume, certified, options, se
         "forward": certified["forward"],
         "backward": certified["backward"],
         "crossings": certified["crossings"],
+        "normals": native_report["normals"],
         "seconds": seconds,
         "repairs": repairs,
         "locked": native_report["locked"],
@@ -66,19 +67,23 @@ def line(run, seconds=None):
     """Returns a run as one line of text. Every percentage is of the reference's size."""
     size = 100 * run["tolerance"]["absolute"] / run["tolerance"]["percent"]
     seconds = sum(run["seconds"].values()) if seconds is None else seconds
+    # Rounded up: a proved bound must not look smaller than it is.
+    normals = (
+        f", normals within {math.ceil(10 * run['normals']['largest']) / 10:g}\N{DEGREE SIGN}" if run["normals"] else ""
+    )
     return (
         f"{counts(run)}, "
         f"tolerance {run['tolerance']['percent']:.4g} % = {run['tolerance']['absolute']:.3g}, "
-        f"result within {percent(run['forward'][1], size)}, reference within {percent(run['backward'][1], size)} "
-        f"({'certified' if proved(run) else 'not proved'}), {duration(seconds)}"
+        f"result within {percent(run['forward'][1], size)}, reference within {percent(run['backward'][1], size)}"
+        f"{normals} ({'certified' if proved(run) else 'not proved'}), {duration(seconds)}"
     )
 
 
 def counts(run):
     """Returns the numbers of triangles before and after a run as text, with remarks.
 
-    The remarks say why the run ended early or missed its target, how many faces outside the tolerance were kept, and how
-    many pairs of faces cross.
+    The remarks say why the run ended early or missed its target, how many faces outside the tolerance were kept, how many
+    pairs of faces cross, and how many faces have a larger angle to the reference than they may have.
     """
     remarks = []
     if run["target_triangles"] and run["stopped_by"] != "target":
@@ -93,6 +98,9 @@ def counts(run):
     pairs = run.get("crossings", {"after": 0})  # a file may keep a run of an earlier version
     if pairs["after"]:
         remarks.append(f"{pairs['after']:,} pairs of faces cross, before {pairs['before']:,}")
+    turned = (run.get("normals") or {"exceeded_after": 0})["exceeded_after"]
+    if turned:
+        remarks.append(f"{turned:,} faces beyond the angle of Normals, before {run['normals']['exceeded_before']:,}")
     remark = f" ({', '.join(remarks)})" if remarks else ""
     return f"{run['input']['triangles']:,} -> {run['output']['triangles']:,} triangles{remark}"
 

@@ -12,6 +12,7 @@
 #include "base/call.h"
 #include "base/errors.h"
 #include "base/parallel.h"
+#include "check/facing.h"
 #include "check/near_triangles.h"
 #include "check/part.h"
 #include "check/segment_cover.h"
@@ -79,16 +80,18 @@ TriangleCertificate::TriangleCertificate(const std::vector<WitnessTriangle>& ref
       limit2_(limit * limit),
       beyond_(beyond) {}
 
-double TriangleCertificate::distance_bound(const glm::dvec3& p) const {
+TriangleCertificate::PointBound TriangleCertificate::point_bound(const glm::dvec3& p) const {
   const std::uint32_t triangle = grid_->triangle_near(p);
   if (triangle == DistanceGrid::kNone) {
-    return grid_->contains(p) ? hierarchy_->nearest(p, limit_).distance : std::numeric_limits<double>::infinity();
+    if (!grid_->contains(p)) return {};
+    const Hierarchy::Nearest nearest = hierarchy_->nearest(p, limit_);
+    return {nearest.distance, nearest.triangle};
   }
   FourPoints points;
   points.set(p, p, p, p);
   double d2[4];
   witness_distances((*reference_)[triangle], points, d2);
-  return std::sqrt(d2[0]);
+  return {std::sqrt(d2[0]), triangle};
 }
 
 bool TriangleCertificate::leaves_room(double distance) const { return distance <= kRoom * limit_; }
@@ -154,7 +157,8 @@ inline double TriangleCertificate::bound_by_corners(const glm::dvec3 (&corners)[
 
 /// Sets `farthest` if the verdict is inside.
 template <TriangleCertificate::Search kSearch>
-Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::uvec3& hints, double& farthest) const {
+Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::uvec3& hints, Facing* facing,
+                                    double& farthest) const {
   constexpr bool kProve = kSearch == Search::verdict;
   thread_local std::vector<Part> queue;
   thread_local NearTriangles around;
@@ -183,15 +187,26 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
         if (tried[i] == triangle) return false;
       }
       tried[tries++] = triangle;
+      if (facing && !facing->admits(triangle)) return false;
       double d2[4];
       witness_distances((*reference_)[triangle], points, d2);
       if (d2[3] < centre2) centre2 = d2[3], below = triangle;
       // A comparison with NaN is false, so that NaN is not covered.
       if (d2[0] <= limit2_ && d2[1] <= limit2_ && d2[2] <= limit2_) {
+        if (facing) facing->take(triangle);
         farthest2 = std::max({farthest2, d2[0], d2[1], d2[2]});
         return true;
       }
       return false;
+    };
+    // The nearest triangle that is admitted.
+    const auto find_nearest = [&](double within, std::uint32_t start) {
+      const std::uint32_t nearest = around.nearest(part, centre, within, start);
+      if (!facing || nearest == Hierarchy::kNone || facing->admits(nearest)) return nearest;
+      return hierarchy_
+          ->nearest_if(
+              centre, [&](std::uint32_t triangle) { return facing->admits(triangle); }, within)
+          .triangle;
     };
     const std::uint32_t guess = grid_->triangle_near(centre);
     if (covered_by(hints.x) || covered_by(hints.y) || covered_by(hints.z) || covered_by(guess)) continue;
@@ -211,7 +226,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
     }
     if (!(centre2 <= limit2_) || longest2 < kExact * kExact * limit2_) {
       if (hint == Hierarchy::kNone) hint = guess;
-      const std::uint32_t nearest = around.nearest(part, centre, radius, hint);
+      const std::uint32_t nearest = find_nearest(radius, hint);
       if (nearest == Hierarchy::kNone) return Verdict::outside;
       hint = exact = nearest;
       if (covered_by(exact)) continue;
@@ -236,7 +251,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       if (cut_along(below)) continue;
       // Among slivers it happens that no node of the grid names the triangle below the centre.
       if (exact == Hierarchy::kNone) {
-        exact = around.nearest(part, centre, limit_, below);
+        exact = find_nearest(limit_, below);
         // By rounding there may be none, if the centre is as far away as it may be.
         const bool is_another = exact != below && exact != Hierarchy::kNone;
         if (is_another && (covered_by(exact) || cut_along(exact))) continue;
@@ -248,38 +263,42 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
   return result;
 }
 
-double TriangleCertificate::bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                                  const glm::uvec3& hints) const {
-  return bound_by<Search::quick>(corners, bounds, hints);
+double TriangleCertificate::bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& hints,
+                                  Facing* facing) const {
+  return bound_by<Search::quick>(corners, bounds, hints, facing);
 }
 
 template <TriangleCertificate::Search kSearch>
-double TriangleCertificate::bound_by(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                                     const glm::uvec3& hints) const {
+double TriangleCertificate::bound_by(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& hints,
+                                     Facing* facing) const {
+  if (facing) facing->begin();
   double farthest = bound_by_corners(corners, bounds);
-  if (farthest != kUnproved) return farthest;
-  return search<kSearch>(corners, hints, farthest) == Verdict::inside ? farthest : kUnproved;
+  if (farthest != kUnproved && (!facing || facing->take_corners())) return farthest;
+  return search<kSearch>(corners, hints, facing, farthest) == Verdict::inside ? farthest : kUnproved;
 }
 
 double TriangleCertificate::bound_in_any_order(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                                               const glm::uvec3& hints) const {
+                                               const glm::uvec3& hints, Facing* facing) const {
   const Ordered ordered(corners, hints);
-  return bound_by<Search::fine>(ordered.corners, bounds, ordered.hints);
+  return bound_by<Search::fine>(ordered.corners, bounds, ordered.hints, facing);
 }
 
-double TriangleCertificate::bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const {
-  const double bounded = narrowed(1 - kRoomToLeave).bound(corners, bounds);
-  return bounded == kUnproved ? bound(corners, bounds) : bounded;
+double TriangleCertificate::bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
+                                            Facing* facing) const {
+  const glm::uvec3 no_hints(Hierarchy::kNone);
+  const double bounded = narrowed(1 - kRoomToLeave).bound(corners, bounds, no_hints, facing);
+  return bounded == kUnproved ? bound(corners, bounds, no_hints, facing) : bounded;
 }
 
-Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                                     const glm::uvec3& hints) const {
-  if (bound_by_corners(corners, bounds) != kUnproved) return Verdict::inside;
+Verdict TriangleCertificate::verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& hints,
+                                     Facing* facing) const {
+  if (facing) facing->begin();
+  if (bound_by_corners(corners, bounds) != kUnproved && (!facing || facing->take_corners())) return Verdict::inside;
   const Ordered ordered(corners, hints);
   double farthest = 0;
-  const Verdict found = search<Search::verdict>(ordered.corners, ordered.hints, farthest);
+  const Verdict found = search<Search::verdict>(ordered.corners, ordered.hints, facing, farthest);
   const auto& [a, b, c] = ordered.corners;
-  if (found != Verdict::unproved || b != c) return found;
+  if (found != Verdict::unproved || b != c || facing) return found;
   return covers_segment(*reference_, *hierarchy_, a, b, limit_) ? Verdict::inside : Verdict::unproved;
 }
 

@@ -21,6 +21,8 @@
 
 namespace tolvol {
 
+class Facing;
+
 class Certificate final : public ToleranceCheck {
  public:
   /// Keeps a reference to `volume`, which must outlive this. A check costs O(pieces) for small pieces: about 50 ns each
@@ -46,23 +48,25 @@ class TriangleCertificate {
 
   /// Returns an upper bound, at most limit(), on the distance of any point of the triangle from the reference, or
   /// kUnproved if no proof was found. `bounds` are upper bounds on the distances of the corners, by witnesses and never
-  /// by field values, or infinity if none is known. `hints` are triangles of the reference that are tried first.
+  /// by field values, or infinity if none is known. `hints` are triangles of the reference that are tried first. If
+  /// `facing` is not null, it admits and notes every witness, and names the triangles of `bounds`.
   double bound(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-               const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone)) const;
+               const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone), Facing* facing = nullptr) const;
 
   /// The same, but prefers a bound that leaves some of limit(), because the triangles that later take the place of this
   /// one may use what it leaves. If there is no such bound the cost is up to twice that of bound().
-  double bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
+  double bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, Facing* facing = nullptr) const;
 
   /// The same by a longer search, whose result does not depend on the order of the corners. A triangle that has a bound
   /// here has the verdict inside.
   double bound_in_any_order(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                            const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone)) const;
+                            const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone), Facing* facing = nullptr) const;
 
   /// Tells whether there is a proof in any order of the corners, and if not, whether a point outside proves that there
-  /// is none. The reference must be as large as in a frame, see witness_error().
+  /// is none. The reference must be as large as in a frame, see witness_error(). `facing` is as for bound(): a point is
+  /// then outside, too, if no triangle near it is admitted.
   Verdict verdict(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                  const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone)) const;
+                  const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone), Facing* facing = nullptr) const;
 
   struct PointBound {
     double distance = kUnproved;                ///< is an upper bound on the distance to the triangle
@@ -76,7 +80,8 @@ class TriangleCertificate {
 
   /// Returns an upper bound on the distance of p from the reference: by the grid's guess or, if the grid has none, by a
   /// search, which returns infinity if the distance exceeds limit().
-  double distance_bound(const glm::dvec3& p) const;
+  PointBound point_bound(const glm::dvec3& p) const;
+  double distance_bound(const glm::dvec3& p) const { return point_bound(p).distance; }
 
   /// Tells whether one of at most 42 points of the triangle is farther than limit(). This takes a hundredth of the time
   /// of a proof for a large triangle, and finds most triangles that have no proof.
@@ -99,9 +104,10 @@ class TriangleCertificate {
 
   double bound_by_corners(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
   template <Search kSearch>
-  double bound_by(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& hints) const;
+  double bound_by(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& hints,
+                  Facing* facing) const;
   template <Search kSearch>
-  Verdict search(const glm::dvec3 (&corners)[3], const glm::uvec3& hints, double& farthest) const;
+  Verdict search(const glm::dvec3 (&corners)[3], const glm::uvec3& hints, Facing* facing, double& farthest) const;
 
   const std::vector<WitnessTriangle>* reference_;
   const DistanceGrid* grid_;

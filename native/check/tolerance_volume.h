@@ -60,6 +60,7 @@ class ToleranceVolume {
   double frame_tolerance() const { return tolerance_ * frame_.scale(); }
   double diagonal() const { return diagonal_; }  ///< is the reference's longest_diagonal(), 100 %, in world units
   Field field() const { return field_; }
+  double mapping_error() const { return mapping_error_; }  ///< is of the reference, see StoredSpace::mapping_error()
   double precision() const { return frame_tolerance() / grid_.spacing; }
   std::size_t memory() const;  ///< is in bytes
 

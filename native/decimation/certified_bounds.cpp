@@ -10,50 +10,90 @@
 
 namespace tolvol {
 
-CertifiedBounds::CertifiedBounds(const Directions& directions, std::span<const glm::dvec3> positions,
-                                 std::size_t triangle_count, bool on_reference)
-    : directions_(directions),
-      distance_(positions.size(), 0),
-      face_distance_(triangle_count, on_reference ? 0 : TriangleCertificate::kUnproved) {
-  for (std::size_t i = 0; i < positions.size() && !on_reference; ++i) {
-    poll_at(i);
-    distance_[i] = forward().distance_bound(positions[i]);
+CertifiedBounds::CertifiedBounds(const Directions& directions, MeshView mesh,
+                                 std::span<const std::uint32_t> on_reference)
+    : directions_(directions), vertices_(mesh.vertices.size()), faces_(mesh.triangles.size()) {
+  for (std::size_t v = 0; v < vertices_.size() && on_reference.empty(); ++v) {
+    poll_at(v);
+    vertices_[v] = forward().point_bound(mesh.vertices[v]);
   }
+  for (std::size_t f = 0; f < on_reference.size(); ++f) {
+    faces_[f] = {0, 0};
+    for (int k = 0; k < 3; ++k) vertices_[mesh.triangles[f][k]] = {0, on_reference[f]};
+  }
+  if (!directions_.facing) return;
+  rules_.assign(faces_.size(), {directions_.facing->angle, false, false});
+  for (std::uint32_t f = 0; f < faces_.size(); ++f) {
+    const auto [a, b, c] = mesh.corners(f);
+    rules_[f].may_be_unsure = !sure_normal(a, b, c, directions_.facing->mesh_error);
+  }
+}
+
+bool CertifiedBounds::start(std::uint32_t triangle, const glm::dvec3 (&corners)[3],
+                            std::optional<Facing>& facing) const {
+  if (!must_face(triangle)) return true;
+  const std::optional<glm::dvec3> normal =
+      sure_normal(corners[0], corners[1], corners[2], directions_.facing->mesh_error);
+  const FaceRule& rule = rules_[triangle];
+  if (!normal) return rule.may_be_unsure;
+  facing.emplace(*directions_.facing, rule.reversed ? -*normal : *normal, rule.limit);
+  return true;
 }
 
 CertifiedBounds::Saved CertifiedBounds::save(std::span<const std::uint32_t> vertices,
                                              std::span<const std::uint32_t> faces) const {
   Saved saved;
-  for (const std::uint32_t v : vertices) saved.distance.push_back(distance_[v]);
-  for (const std::uint32_t f : faces) saved.face_distance.push_back(face_distance_[f]);
+  for (const std::uint32_t v : vertices) saved.vertices.push_back(vertices_[v]);
+  for (const std::uint32_t f : faces) saved.faces.push_back(faces_[f]);
   return saved;
 }
 
 void CertifiedBounds::restore(const Saved& saved, std::span<const std::uint32_t> vertices,
                               std::span<const std::uint32_t> faces) {
-  for (std::size_t i = 0; i < vertices.size(); ++i) distance_[vertices[i]] = saved.distance[i];
-  for (std::size_t i = 0; i < faces.size(); ++i) face_distance_[faces[i]] = saved.face_distance[i];
+  for (std::size_t i = 0; i < vertices.size(); ++i) vertices_[vertices[i]] = saved.vertices[i];
+  for (std::size_t i = 0; i < faces.size(); ++i) faces_[faces[i]] = saved.faces[i];
 }
 
 /// A trial that asks only where the vertex of a change is.
 class CertifiedBounds::VertexTrial : public Trial {
  public:
   explicit VertexTrial(CertifiedBounds& bounds) : bounds_(bounds) {}
-  bool accepts(const Change& change) override { return vertex_is_inside(change); }
+  bool accepts(const Change& change) override { return vertex_is_inside(change) && seems_to_face(change); }
   void commit(const Change& change) override {
-    for (const std::uint32_t v : change.carried()) bounds_.distance_[v] = vertex_distance_;
-    if (const auto v = change.vertex()) bounds_.distance_[*v] = vertex_distance_;
+    for (const std::uint32_t v : change.carried()) bounds_.note(v, vertex_bound_);
+    if (const auto v = change.vertex()) bounds_.note(*v, vertex_bound_);
   }
 
  protected:
   bool vertex_is_inside(const Change& change) {
-    vertex_distance_ = bounds_.forward().distance_bound(change.position().position);
-    return vertex_distance_ <= change.share() * bounds_.forward().limit();
+    vertex_bound_ = bounds_.forward().point_bound(change.position().position);
+    return vertex_bound_.distance <= change.share() * bounds_.forward().limit();
   }
 
+  bool seems_to_face(const Change& change) const;
+
   CertifiedBounds& bounds_;
-  double vertex_distance_ = 0;  ///< An upper bound on the vertex's distance to the reference.
+  PointBound vertex_bound_;  ///< An upper bound on the vertex's distance to the reference.
 };
+
+/// Whether each face is admitted by a triangle that bounds one of its corners. The proof of a whole region fails with
+/// one face that is turned too far, and then all of the region is done again: asking here makes this rare.
+bool CertifiedBounds::VertexTrial::seems_to_face(const Change& change) const {
+  for (std::size_t i = 0; i < change.elements().size(); ++i) {
+    const Coverage::Element& element = change.elements()[i];
+    if (element.moved == 0) continue;
+    std::optional<Facing> facing;
+    if (!bounds_.start(element.id, element.corners, facing)) return false;
+    if (!facing) continue;
+    const Change::Face& face = change.faces()[i];
+    const auto is_admitted = [&](int k) {
+      const std::uint32_t below = (k == face.corner ? vertex_bound_ : bounds_.vertex_bound(face.vertices[k])).triangle;
+      return below != Hierarchy::kNone && facing->admits(below);
+    };
+    if (!is_admitted(0) && !is_admitted(1) && !is_admitted(2)) return false;
+  }
+  return true;
+}
 
 /// A trial that asks for every bound, the cheapest question first.
 class CertifiedBounds::FullTrial final : public VertexTrial {
@@ -70,8 +110,8 @@ class CertifiedBounds::FullTrial final : public VertexTrial {
     VertexTrial::commit(change);
     if (Coverage* const backward = bounds_.backward()) backward->commit(backward_);
     if (!boundary_elements_.empty()) bounds_.directions_.boundary_backward->commit(boundary_backward_);
-    for (std::size_t i = 0; i < face_distances_.size(); ++i) {
-      bounds_.face_distance_[change.elements()[i].id] = face_distances_[i];
+    for (std::size_t i = 0; i < face_bounds_.size(); ++i) {
+      bounds_.note_face(change.elements()[i].id, face_bounds_[i]);
     }
   }
   std::size_t looked_at() const override { return backward_.looked_at(); }
@@ -80,6 +120,8 @@ class CertifiedBounds::FullTrial final : public VertexTrial {
   bool is_large(const Coverage::Element& e) const;
   bool shows_outside(const Change& change);
   bool faces_are_inside(const Change& change);
+  bool face_is_inside(const Change& change, std::size_t i);
+  double turn(const Change& change, std::size_t i, const Facing& facing) const;
   void gather_replaced_faces(const Change& change);
   void gather_boundary(const Change& change);
   bool boundary_is_inside(const Change& change);
@@ -88,7 +130,7 @@ class CertifiedBounds::FullTrial final : public VertexTrial {
   std::vector<Coverage::Element> boundary_elements_;
   std::vector<Coverage::Removed> boundary_removed_;
   Coverage::Trial backward_, boundary_backward_;
-  std::vector<double> face_distances_;  ///< For each face of the change: an upper bound on its distance.
+  std::vector<FaceBound> face_bounds_;  ///< For each face of the change.
   /// The face that failed last: of another try at the same place it is the likeliest to fail.
   std::size_t failed_last_ = 0;
 };
@@ -122,26 +164,10 @@ bool CertifiedBounds::FullTrial::shows_outside(const Change& change) {
 bool CertifiedBounds::FullTrial::faces_are_inside(const Change& change) {
   const std::size_t count = change.elements().size();
   replaced_faces_.clear();
-  face_distances_.resize(count);
+  face_bounds_.resize(count);
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t i = (failed_last_ + k) % count;
-    const Coverage::Element& element = change.elements()[i];
-    const Change::Face& face = change.faces()[i];
-    double& distance = face_distances_[i];
-    const TriangleCertificate forward = bounds_.forward().narrowed(change.share(face));
-    // No point of the face moves farther than its moving corner.
-    distance = bounds_.face_distance(element.id) + element.moved;
-    if (element.moved == 0 || distance <= forward.limit()) continue;
-    if (is_large(element)) {
-      if (replaced_faces_.empty()) gather_replaced_faces(change);
-      distance = replaced_faces_.bound(element.corners, forward.limit());
-      if (distance <= forward.limit()) continue;
-    }
-    glm::dvec3 corners(bounds_.distance(face.vertices[0]), bounds_.distance(face.vertices[1]),
-                       bounds_.distance(face.vertices[2]));
-    if (change.vertex()) corners[face.corner] = vertex_distance_;
-    distance = forward.bound_with_room(element.corners, corners);
-    if (distance == TriangleCertificate::kUnproved) {
+    if (!face_is_inside(change, i)) {
       failed_last_ = i;
       return false;
     }
@@ -149,11 +175,55 @@ bool CertifiedBounds::FullTrial::faces_are_inside(const Change& change) {
   return true;
 }
 
+bool CertifiedBounds::FullTrial::face_is_inside(const Change& change, std::size_t i) {
+  const Coverage::Element& element = change.elements()[i];
+  const Change::Face& face = change.faces()[i];
+  FaceBound& bound = face_bounds_[i];
+  bound = bounds_.face_bound(element.id);
+  if (element.moved == 0) return true;
+  std::optional<Facing> facing;
+  if (!bounds_.start(element.id, element.corners, facing)) return false;
+  const TriangleCertificate forward = bounds_.forward().narrowed(change.share(face));
+  // No point of the face moves farther than its moving corner, and its witness stays.
+  bound.distance += element.moved;
+  if (bound.distance <= forward.limit()) {
+    if (!facing) return true;
+    bound.angle += turn(change, i, *facing);
+    if (bound.angle <= facing->limit()) return true;
+  }
+  if (is_large(element)) {
+    if (replaced_faces_.empty()) gather_replaced_faces(change);
+    bound = replaced_faces_.bound(element.corners, forward.limit(), facing ? &*facing : nullptr);
+    if (bound.distance <= forward.limit()) return true;
+  }
+  PointBound corners[3];
+  for (int k = 0; k < 3; ++k) corners[k] = bounds_.vertex_bound(face.vertices[k]);
+  if (change.vertex()) corners[face.corner] = vertex_bound_;
+  if (facing) facing->set_corners({corners[0].triangle, corners[1].triangle, corners[2].triangle});
+  bound = {forward.bound_with_room(element.corners, {corners[0].distance, corners[1].distance, corners[2].distance},
+                                   facing ? &*facing : nullptr),
+           facing ? facing->angle() : std::numbers::pi};
+  return bound.distance != TriangleCertificate::kUnproved;
+}
+
+/// By how much a change turns a face at most.
+double CertifiedBounds::FullTrial::turn(const Change& change, std::size_t i, const Facing& facing) const {
+  const Coverage::Element& element = change.elements()[i];
+  glm::dvec3 before[3] = {element.corners[0], element.corners[1], element.corners[2]};
+  before[change.faces()[i].corner] = change.faces()[i].before;
+  std::optional<Facing> was;
+  const bool known = bounds_.start(element.id, before, was) && was;
+  return known ? angle_bound(glm::dot(was->normal(), facing.normal())) : std::numbers::pi;
+}
+
 void CertifiedBounds::FullTrial::gather_replaced_faces(const Change& change) {
   const BoundedMesh& mesh = change.mesh();
   const auto add = [&](std::uint32_t id) {
     const glm::uvec3& t = mesh.triangle(id);
-    replaced_faces_.add(mesh.position(t.x), mesh.position(t.y), mesh.position(t.z), bounds_.face_distance(id));
+    const glm::dvec3 corners[3] = {mesh.position(t.x), mesh.position(t.y), mesh.position(t.z)};
+    std::optional<Facing> facing;
+    bounds_.start(id, corners, facing);
+    replaced_faces_.add(corners, bounds_.face_bound(id), facing ? std::optional(facing->normal()) : std::nullopt);
   };
   for (const Coverage::Element& e : change.elements()) add(e.id);
   for (const Coverage::Removed& r : change.removed()) add(r.id);

@@ -1,18 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Bounds that are proved: every point of the mesh is within the tolerance of the reference; if asked for, every point
-/// of the reference is within it of the mesh, and the boundaries are within it of each other. The class keeps account
-/// of what is known of every vertex and face, in the volume's frame.
+/// Bounds that are proved: every point of the mesh is within the tolerance of the reference; if asked for, of a
+/// triangle of it that its face is not turned away from, every point of the reference is within the tolerance of the
+/// mesh, and the boundaries are within it of each other. The class keeps account of what is known of every vertex and
+/// face, in the volume's frame.
 #pragma once
 
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
+#include <numbers>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "check/certificate.h"
 #include "check/coverage.h"
+#include "check/facing.h"
 #include "decimation/bounds.h"
+#include "decimation/face_bound.h"
+#include "topology/faces_cross.h"
 
 namespace tolvol {
 
@@ -24,11 +30,11 @@ class CertifiedBounds final : public Bounds {
     Coverage* backward = nullptr;                           ///< Its elements are triangles of the mesh.
     const TriangleCertificate* boundary_forward = nullptr;  ///< It is about the reference's boundary edges.
     Coverage* boundary_backward = nullptr;  ///< Its elements are boundary edges, named by their first vertex.
+    const FacingRule* facing = nullptr;     ///< The rule that witnesses of the forward direction keep.
   };
-  /// Makes the bounds for a mesh with vertices at these positions, before any change. `on_reference` says that every
-  /// triangle is one of the reference. Keeps references to the checks.
-  CertifiedBounds(const Directions& directions, std::span<const glm::dvec3> positions, std::size_t triangle_count,
-                  bool on_reference);
+  /// Makes the bounds for a mesh before any change. `on_reference` has the triangle of the reference that each triangle
+  /// is, or is empty if they are no triangles of it. Keeps references to the checks and the rule.
+  CertifiedBounds(const Directions& directions, MeshView mesh, std::span<const std::uint32_t> on_reference = {});
 
   std::unique_ptr<Trial> trial() override;
   /// A trial that asks only where the vertex is: a DeferredProof has to prove the rest.
@@ -43,17 +49,34 @@ class CertifiedBounds final : public Bounds {
   const TriangleCertificate* boundary_forward() const { return directions_.boundary_forward; }
   Coverage* boundary_backward() const { return directions_.boundary_backward; }
 
-  /// Upper bounds on the distance to the reference: of a vertex, and of all points of a face (infinite where no bound
-  /// is known).
-  double distance(std::uint32_t vertex) const { return distance_[vertex]; }
-  double face_distance(std::uint32_t triangle) const { return face_distance_[triangle]; }
+  /// An upper bound on the distance of a vertex, and the triangle that it was measured to.
+  using PointBound = TriangleCertificate::PointBound;
+  const PointBound& vertex_bound(std::uint32_t vertex) const { return vertices_[vertex]; }
+  const FaceBound& face_bound(std::uint32_t triangle) const { return faces_[triangle]; }
   /// Notes such a bound, which was proved for the vertex or the face as it is.
-  void note_distance(std::uint32_t vertex, double distance) { distance_[vertex] = distance; }
-  void note_face_distance(std::uint32_t triangle, double distance) { face_distance_[triangle] = distance; }
+  void note(std::uint32_t vertex, const PointBound& bound) { vertices_[vertex] = bound; }
+  void note_face(std::uint32_t triangle, const FaceBound& bound) { faces_[triangle] = bound; }
+
+  /// How a face keeps the rule of facing, for as long as there is the face.
+  struct FaceRule {
+    double limit;        ///< The largest angle; pi for a face that is free of the rule.
+    bool reversed;       ///< Whether the other side of the face is the one that has to face as its witnesses do.
+    bool may_be_unsure;  ///< Whether the rule holds only once the face has a sure normal, because it had none before.
+  };
+  const FaceRule& rule(std::uint32_t triangle) const { return rules_[triangle]; }
+  void set_rule(std::uint32_t triangle, const FaceRule& rule) { rules_[triangle] = rule; }
+  /// Whether there is a rule of facing that the face is not free of.
+  bool must_face(std::uint32_t triangle) const {
+    return directions_.facing && rules_[triangle].limit < std::numbers::pi;
+  }
+  /// Starts the rule of a face with these corners in `facing`, which stays empty where the face does not have to keep
+  /// it. Returns false if the face would have to, but has no sure normal.
+  bool start(std::uint32_t triangle, const glm::dvec3 (&corners)[3], std::optional<Facing>& facing) const;
 
   /// What is known of some vertices and faces, to go back to when the mesh does.
   struct Saved {
-    std::vector<double> distance, face_distance;
+    std::vector<PointBound> vertices;
+    std::vector<FaceBound> faces;
   };
   Saved save(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces) const;
   /// Goes back to it. `vertices` and `faces` are those that were saved.
@@ -64,7 +87,9 @@ class CertifiedBounds final : public Bounds {
   class FullTrial;
 
   const Directions directions_;
-  std::vector<double> distance_, face_distance_;
+  std::vector<PointBound> vertices_;
+  std::vector<FaceBound> faces_;
+  std::vector<FaceRule> rules_;  ///< For each face; empty without a rule of facing.
 };
 
 }  // namespace tolvol

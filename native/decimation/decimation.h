@@ -28,6 +28,9 @@ struct DecimationOptions {
   /// keep_out: two faces of the result may cross only where input faces that they stand for crossed
   /// (topology/new_crossings.h). Ignored without a volume and where a baseline decides.
   Crossings crossings = Crossings::keep_out;
+  /// In degrees, more than 0 and at most 180: every point of a face has a witness within the tolerance whose normal is
+  /// within this angle of the face's (check/facing.h). 180 keeps no angle. Ignored as above.
+  double max_normal_angle = 90;
   double max_seconds = 0;            ///< It stops then with what is proved; 0 is no limit.
   std::size_t target_triangles = 0;  ///< It stops at so many; 0 is as few as the tolerance allows.
   /// For each input vertex, or empty: it neither moves nor vanishes, and an edge between two such vertices stays.
@@ -63,6 +66,13 @@ struct DecimationResult {
   std::string method, renderer;     ///< The check that decided; empty without a volume.
   std::vector<Repair> repairs;
   std::map<std::string, std::size_t> locked;  ///< The number of vertices that could not move, by cause.
+  /// How the faces face the reference; none where no angle was kept.
+  struct Normals {
+    double largest = 0;  ///< An upper bound, in degrees, on the angle of all faces but those that exceeded it.
+    std::size_t exceeded_before = 0;  ///< The number of input faces with no proof of max_normal_angle.
+    std::size_t exceeded_after = 0;   ///< How many of them are left.
+  };
+  std::optional<Normals> normals;
   std::size_t outside_faces = 0;  ///< The number of input faces not within the tolerance, which are kept as they are.
   std::optional<std::uint32_t> first_outside;
   std::size_t uncovered_faces =

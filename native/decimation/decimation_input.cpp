@@ -8,6 +8,7 @@
 #include "base/call.h"
 #include "base/errors.h"
 #include "check/input_checks.h"
+#include "decimation/input_facing.h"
 #include "topology/t_junctions.h"
 #include "topology/wedges.h"
 
@@ -31,6 +32,9 @@ void check(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> tri
     if (!(options.shares[i] >= 0 && options.shares[i] <= 1)) {
       throw InvalidInput("shares must be from 0 to 1, that of vertex " + std::to_string(i) + " is not");
     }
+  }
+  if (!(options.max_normal_angle > 0 && options.max_normal_angle <= 180)) {
+    throw InvalidInput("max_normal_angle must be more than 0 and at most 180 degrees");
   }
   if (!options.wedges.empty() && options.wedges.size() != 3 * triangles.size()) {
     throw InvalidInput("wedges must have one label for each corner of each triangle");
@@ -156,7 +160,20 @@ Bounds* DecimationInput::set_bounds(Team& team) {
       }
     }
   }
-  return &certified_.emplace(directions, positions_, cut_.triangles.size(), identical_);
+  if (options_.max_normal_angle < 180) {
+    facing_.emplace(volume_->reference(), volume_->mapping_error(), mapping_error,
+                    glm::radians(options_.max_normal_angle));
+    if (identical_) face_as_cut(cut_, *facing_);
+    directions.facing = &*facing_;
+  }
+  certified_.emplace(directions, MeshView{cut_.triangles, positions_},
+                     identical_ ? cut_.triangle_input : std::vector<std::uint32_t>());
+  if (facing_ && !identical_) {
+    const TriangleCertificate start(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), provable,
+                                    volume_->refutable(mapping_error));
+    exceeding_ = face_as_reference(cut_, positions_, start, volume_->hierarchy(), *facing_, team, *certified_);
+  }
+  return &*certified_;
 }
 
 void DecimationInput::certify_input(const Certificate& certificate) {

@@ -13,6 +13,7 @@
 #include "base/parallel.h"
 #include "check/certificate.h"
 #include "check/coverage.h"
+#include "check/facing.h"
 #include "check/tolerance_volume.h"
 #include "decimation/boundary.h"
 #include "decimation/bounded_mesh.h"
@@ -50,6 +51,12 @@ class DecimationInput {
   std::vector<Corners> faces_aside() const;
   /// For each triangle of the cut mesh, the number of its island; valid after take_mesh(), empty without wedges.
   const std::vector<std::uint32_t>& islands() const { return islands_; }
+
+  double max_normal_angle() const { return options_.max_normal_angle; }
+  /// The rule of facing; null where no angle is kept.
+  const FacingRule* facing() const { return facing_ ? &*facing_ : nullptr; }
+  /// The triangles of the cut mesh that exceed the angle of the rule as they come.
+  const std::vector<std::uint32_t>& exceeding() const { return exceeding_; }
 
   /// The reference's triangles, where the input is the reference itself; else null.
   const Hierarchy* own_hierarchy() const { return identical_ ? &volume_->hierarchy() : nullptr; }
@@ -94,7 +101,9 @@ class DecimationInput {
   std::optional<TriangleCertificate> forward_;
   std::optional<Coverage> backward_;
   std::optional<BoundaryBounds> boundary_;
+  std::optional<FacingRule> facing_;
   std::optional<CertifiedBounds> certified_;
+  std::vector<std::uint32_t> exceeding_;
   Bounds* bounds_ = nullptr;
 };
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/call.h"
+#include "decimation/certified_bounds.h"
 #include "geometry/hierarchy.h"
 
 namespace tolvol {
@@ -125,12 +126,33 @@ class Output {
     std::size_t unused = 0;
     for (const std::uint32_t v : cut_.input_vertex) unused += v == kNone;
     repair(unused, "unused", "vertices that no face uses are not part of the result");
+    report_normals();
     for (const CutCause cause : cut_.cause) {
       if (cause == CutCause::degenerate) ++result_.locked["degenerate face"];
     }
   }
 
  private:
+  void report_normals() {
+    const CertifiedBounds* const bounds = mesh_.certified();
+    if (!bounds || !input_.facing()) return;
+    DecimationResult::Normals normals;
+    double largest = 0;
+    for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
+      poll_at(t);
+      if (!mesh_.alive(t) || bounds->rule(t).limit > input_.facing()->angle) continue;
+      const glm::uvec3& corners = mesh_.triangle(t);
+      std::optional<Facing> facing;
+      bounds->start(t, {mesh_.position(corners.x), mesh_.position(corners.y), mesh_.position(corners.z)}, facing);
+      if (facing) largest = std::max(largest, bounds->face_bound(t).angle);
+    }
+    // The conversion rounds.
+    normals.largest = std::min(glm::degrees(largest), input_.max_normal_angle());
+    normals.exceeded_before = input_.exceeding().size();
+    for (const std::uint32_t t : input_.exceeding()) normals.exceeded_after += mesh_.alive(t);
+    result_.normals = normals;
+  }
+
   const DecimationInput& input_;
   const CutMesh& cut_;
   const BoundedMesh& mesh_;

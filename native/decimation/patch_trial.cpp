@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <limits>
-
-#include "decimation/certified_bounds.h"
+#include <numbers>
 
 namespace tolvol {
 namespace {
@@ -194,30 +193,38 @@ bool PatchTrial::pieces_hold() {
 }
 
 bool PatchTrial::faces_hold() {
-  vertex_distances_.clear(), face_distances_.clear();
+  vertex_bounds_.clear(), face_bounds_.clear();
   const TriangleCertificate& forward = bounds_.forward();
   for (std::uint32_t v = 0; v < positions_.size(); ++v) {
     const std::uint32_t id = patch_.vertices()[v].id;
-    vertex_distances_.push_back(moved_[v] ? forward.nearest(positions_[v].position, forward.limit()).distance
-                                          : bounds_.distance(id));
+    vertex_bounds_.push_back(moved_[v] ? forward.nearest(positions_[v].position, forward.limit())
+                                       : bounds_.vertex_bound(id));
     const bool asked = moved_[v] || id == *change_.vertex();  // The vertex that is kept may have a smaller share now.
-    if (asked && !(vertex_distances_[v] <= patch_.vertices()[v].share * forward.limit())) return false;
+    if (asked && !(vertex_bounds_[v].distance <= patch_.vertices()[v].share * forward.limit())) return false;
   }
   bool hold = true;
   for (std::uint32_t f = 0; f < elements_.size(); ++f) {
-    face_distances_.push_back(bounds_.face_distance(elements_[f].id));
-    if (!changed(f)) continue;
-    const auto& c = patch_.faces()[f].corners;
-    const auto share = [&](int k) { return patch_.vertices()[c[k]].share; };
-    face_distances_[f] =
-        forward.narrowed(std::min({share(0), share(1), share(2)}))
-            .bound_in_any_order(elements_[f].corners,
-                                {vertex_distances_[c[0]], vertex_distances_[c[1]], vertex_distances_[c[2]]});
-    if (face_distances_[f] != TriangleCertificate::kUnproved) continue;
+    face_bounds_.push_back(changed(f) ? prove(f) : bounds_.face_bound(elements_[f].id));
+    if (!changed(f) || face_bounds_[f].distance != TriangleCertificate::kUnproved) continue;
     hold = false;
     add_face_points(f);
   }
   return hold;
+}
+
+/// What can be proved of a face that has changed.
+FaceBound PatchTrial::prove(std::uint32_t face) const {
+  std::optional<Facing> facing;
+  if (!bounds_.start(elements_[face].id, elements_[face].corners, facing)) return {};
+  const auto& c = patch_.faces()[face].corners;
+  const auto share = [&](int k) { return patch_.vertices()[c[k]].share; };
+  const CertifiedBounds::PointBound &x = vertex_bounds_[c[0]], &y = vertex_bounds_[c[1]], &z = vertex_bounds_[c[2]];
+  if (facing) facing->set_corners({x.triangle, y.triangle, z.triangle});
+  const double distance = bounds_.forward()
+                              .narrowed(std::min({share(0), share(1), share(2)}))
+                              .bound_in_any_order(elements_[face].corners, {x.distance, y.distance, z.distance},
+                                                  glm::uvec3(Hierarchy::kNone), facing ? &*facing : nullptr);
+  return {distance, facing ? facing->angle() : std::numbers::pi};
 }
 
 /// Adds the points of a face that are farthest from the reference, near each of its corners one, if they are beyond
@@ -293,10 +300,10 @@ Box PatchTrial::carry_out(BoundedMesh& mesh) {
   if (Coverage* const backward = bounds_.backward()) backward->commit(backward_);
   if (!boundary_elements_.empty()) bounds_.boundary_backward()->commit(boundary_backward_);
   for (std::uint32_t v = 0; v < positions_.size(); ++v) {
-    if (moved_[v]) bounds_.note_distance(patch_.vertices()[v].id, vertex_distances_[v]);
+    if (moved_[v]) bounds_.note(patch_.vertices()[v].id, vertex_bounds_[v]);
   }
   for (std::uint32_t f = 0; f < elements_.size(); ++f) {
-    bounds_.note_face_distance(elements_[f].id, face_distances_[f]);
+    bounds_.note_face(elements_[f].id, face_bounds_[f]);
   }
   const Box changed = around_ ? around_->follow(crossings_) : Box();
 

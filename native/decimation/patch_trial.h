@@ -12,6 +12,7 @@
 
 #include "check/coverage.h"
 #include "decimation/bounded_mesh.h"
+#include "decimation/certified_bounds.h"
 #include "decimation/change.h"
 #include "decimation/patch.h"
 #include "decimation/relaxation.h"
@@ -66,6 +67,7 @@ class PatchTrial {
   bool changed(std::uint32_t face) const;
   bool pieces_hold();
   bool faces_hold();
+  FaceBound prove(std::uint32_t face) const;
   bool boundary_holds();
   bool uncrossed();
   void gather_elements();
@@ -81,7 +83,8 @@ class PatchTrial {
   std::uint32_t vanished_ = 0;
   std::vector<VertexPosition> positions_;  ///< For each vertex of the patch.
   std::vector<bool> moved_;                ///< For each vertex of the patch: whether it leaves its place in the mesh.
-  std::vector<double> vertex_distances_, face_distances_;
+  std::vector<CertifiedBounds::PointBound> vertex_bounds_;
+  std::vector<FaceBound> face_bounds_;
   std::vector<Coverage::Element> elements_, boundary_elements_;
   std::vector<Coverage::Removed> removed_, boundary_removed_;
   Coverage::Trial backward_, boundary_backward_;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace tolvol {
 namespace {
@@ -25,20 +26,27 @@ constexpr std::size_t kMostParts = 512;
 
 }  // namespace
 
-void ReplacedFaces::add(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double distance) {
-  faces_.emplace_back(a, b, c);
-  farthest_ = std::max(farthest_, distance);
+void ReplacedFaces::add(const glm::dvec3 (&corners)[3], const FaceBound& bound,
+                        const std::optional<glm::dvec3>& normal) {
+  faces_.emplace_back(corners[0], corners[1], corners[2]);
+  normals_.push_back(normal);
+  angles_.push_back(bound.angle);
+  farthest_ = std::max(farthest_, bound.distance);
 }
 
-double ReplacedFaces::bound(const glm::dvec3 (&corners)[3], double limit) {
+FaceBound ReplacedFaces::bound(const glm::dvec3 (&corners)[3], double limit, const Facing* facing) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const double step = kStep * (limit - farthest_);
   const double near = kLookedFor * step, near2 = near * near, rounding = witness_error(2 * (1 + limit));
-  if (!(step >= kLeast * limit && near + rounding <= step)) return kNone;
-  double used2 = 0;
+  if (!(step >= kLeast * limit && near + rounding <= step)) return {};
+  turned_.assign(faces_.size(), facing ? std::numbers::pi : 0);
+  for (std::size_t i = 0; facing && i < faces_.size(); ++i) {
+    if (normals_[i]) turned_[i] = angles_[i] + angle_bound(glm::dot(*normals_[i], facing->normal()));
+  }
+  double used2 = 0, used_angle = facing ? 0 : std::numbers::pi;
   parts_.assign(1, {{corners[0], corners[1], corners[2]}});
   for (std::size_t looked = 0; !parts_.empty(); ++looked) {
-    if (looked == kMostParts) return kNone;
+    if (looked == kMostParts) return {};
     const Part part = parts_.back();
     parts_.pop_back();
     const auto& [a, b, c] = part.corners;
@@ -48,25 +56,27 @@ double ReplacedFaces::bound(const glm::dvec3 (&corners)[3], double limit) {
     const WitnessTriangle* below = nullptr;  // The face nearest to the centre.
     double least2 = near2;                   // The square of how far the corners are from one face at most.
     bool covered = false;
-    for (const WitnessTriangle& face : faces_) {
+    double angle = 0;  // Of the face that covers the part.
+    for (std::size_t i = 0; i < faces_.size(); ++i) {
+      if (facing && !(turned_[i] <= facing->limit())) continue;
       double d2[4];
-      witness_distances(face, points, d2);
-      if (d2[3] < centre2) centre2 = d2[3], below = &face;
+      witness_distances(faces_[i], points, d2);
+      if (d2[3] < centre2) centre2 = d2[3], below = &faces_[i];
       // The comparisons are written so that NaN is not covered.
       if (d2[0] <= least2 && d2[1] <= least2 && d2[2] <= least2) {
         least2 = std::max({d2[0], d2[1], d2[2]});
-        covered = true;
+        covered = true, angle = turned_[i];
       }
     }
     if (covered) {
-      used2 = std::max(used2, least2);
+      used2 = std::max(used2, least2), used_angle = std::max(used_angle, angle);
       continue;
     }
     // The comparison is written so that NaN ends here.
-    if (!(centre2 <= near2) || longest_squared(part) <= kFloor * kFloor * near2 || part.cuts == kMostCuts) return kNone;
+    if (!(centre2 <= near2) || longest_squared(part) <= kFloor * kFloor * near2 || part.cuts == kMostCuts) return {};
     if (!cut(part, *below, kWorthCutting * near, parts_)) split(part, parts_);
   }
-  return farthest_ + std::sqrt(used2) + rounding;
+  return {farthest_ + std::sqrt(used2) + rounding, used_angle};
 }
 
 }  // namespace tolvol

@@ -1,33 +1,39 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// The faces that a change replaces, as witnesses of the faces that take their place: a point within w of a face that
-/// is within e of the reference is within e + w of the reference.
+/// is within e of the reference is within e + w of the reference, and angles to the witnesses there add up alike.
 ///
 /// A change replaces few faces, but a large face lies near thousands of triangles of the reference. Where the faces are
 /// nearly flat, the few prove at once what the thousands would prove anew for every change.
 #pragma once
 
 #include <glm/glm.hpp>
+#include <optional>
 #include <vector>
 
+#include "check/facing.h"
 #include "check/part.h"
 #include "check/witness.h"
+#include "decimation/face_bound.h"
 
 namespace tolvol {
 
 class ReplacedFaces {
  public:
-  void clear() { faces_.clear(), farthest_ = 0; }
-  /// `distance` is an upper bound on the distance of the face's points to the reference.
-  void add(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double distance);
+  void clear() { faces_.clear(), normals_.clear(), angles_.clear(), farthest_ = 0; }
+  /// `bound` is what is known of the face's points. `normal` is that of the face, if it keeps the rule of facing.
+  void add(const glm::dvec3 (&corners)[3], const FaceBound& bound, const std::optional<glm::dvec3>& normal);
   bool empty() const { return faces_.empty(); }
 
-  /// An upper bound, at most `limit`, on the distance of any point of the triangle to the reference; infinity where the
-  /// search finds none. It takes about 20 ns for each face where the faces are not flat.
-  double bound(const glm::dvec3 (&corners)[3], double limit);
+  /// What is then known of a triangle: a distance of at most `limit`, or none where the search finds no proof. If
+  /// `facing` is not null, the bound keeps it. It takes about 20 ns for each face where the faces are not flat.
+  FaceBound bound(const glm::dvec3 (&corners)[3], double limit, const Facing* facing);
 
  private:
   std::vector<WitnessTriangle> faces_;
-  double farthest_ = 0;  ///< The largest of the faces' distances.
+  std::vector<std::optional<glm::dvec3>> normals_;  ///< Of the faces that keep the rule of facing.
+  std::vector<double> angles_;                      ///< For each face: between it and its witnesses at most.
+  std::vector<double> turned_;                      ///< The same between the triangle and the face's witnesses.
+  double farthest_ = 0;                             ///< The largest of the faces' distances.
   std::vector<Part> parts_;
 };
 

@@ -54,6 +54,13 @@ py::dict make_report(const DecimationResult& r, std::size_t triangles_in, double
   outside["first"] = r.first_outside ? py::object(py::int_(*r.first_outside)) : py::object(py::none());
   outside["reference_faces"] = r.uncovered_faces;
   report["outside"] = outside;
+  py::object normals = py::none();
+  if (r.normals) {
+    normals = py::dict();
+    normals["largest"] = r.normals->largest;
+    normals["exceeded_before"] = r.normals->exceeded_before, normals["exceeded_after"] = r.normals->exceeded_after;
+  }
+  report["normals"] = normals;
   report["warnings"] = r.warnings;
   return report;
 }
@@ -62,8 +69,8 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
                        const py::object& to_world, const std::string& placement, bool two_sided,
                        std::optional<std::int64_t> target_triangles, const py::object& locked, const py::object& shares,
                        const std::string& outside, const py::object& wedges, const std::string& effort,
-                       const std::string& crossings, std::optional<double> max_seconds, std::optional<int> threads,
-                       Progress* progress) {
+                       const std::string& crossings, std::optional<double> max_normal_angle,
+                       std::optional<double> max_seconds, std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const StoredSpace space(to_matrix(to_world), v.storage);
@@ -76,6 +83,7 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
                           DecimationOptions::Effort::thorough);
   options.crossings = choose(crossings, "crossings", "keep_out", DecimationOptions::Crossings::keep_out, "allow",
                              DecimationOptions::Crossings::allow);
+  options.max_normal_angle = max_normal_angle.value_or(options.max_normal_angle);
   if (max_seconds && !(*max_seconds > 0)) throw InvalidInput("max_seconds must be positive, or None for no limit");
   options.max_seconds = max_seconds.value_or(0);
   options.two_sided = two_sided;
@@ -172,14 +180,17 @@ repairs : a list of dicts with `kind`, `count` and `message`
 locked : a dict from a cause to the number of vertices that could not move
 outside : a dict of `faces`, the number of input faces that were outside and were kept, `first`, the first of them, and
     `reference_faces`, the number of reference faces that were beyond the tolerance of the input
+normals : a dict of `largest`, an upper bound in degrees on the angle between a face of the result and its witnesses,
+    `exceeded_before`, the number of input faces that were not proved to keep max_normal_angle, and `exceeded_after`, how
+    many of these are left, for which `largest` does not hold; or None where no angle was kept
 warnings : a list of sentences)doc");
 
   module.def("decimate", &decimate_arrays, py::arg("vertices"), py::arg("triangles"), py::arg("volume").none(true),
              py::kw_only(), py::arg("to_world") = py::none(), py::arg("placement") = "optimal",
              py::arg("two_sided") = true, py::arg("target_triangles") = py::none(), py::arg("locked") = py::none(),
              py::arg("shares") = py::none(), py::arg("outside") = "error", py::arg("wedges") = py::none(),
-             py::arg("effort") = "fast", py::arg("crossings") = "keep_out", py::arg("max_seconds") = py::none(),
-             py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+             py::arg("effort") = "fast", py::arg("crossings") = "keep_out", py::arg("max_normal_angle") = py::none(),
+             py::arg("max_seconds") = py::none(), py::arg("threads") = py::none(), py::arg("progress") = py::none(),
              R"doc(Reduce a mesh to few triangles within the tolerance of a volume.
 
 Every point of the result is within the tolerance of the reference and, with two_sided, every point of the reference is
@@ -216,6 +227,14 @@ crossings : {"keep_out", "allow"}
     without. Sheets that lie exactly on each other are exempt from each other. It is decided exactly for the
     coordinates of the result as they are returned, and is ignored without a volume. "allow" takes a tenth to a quarter
     less time, and leaves fewer triangles of walls that are thinner than twice the tolerance.
+max_normal_angle : float, optional
+    In degrees, more than 0 and at most 180: every point of a face of the result has a witness, a triangle of the
+    reference within the tolerance whose normal is within this angle of the face's. None keeps 90: no face is turned
+    over. 180 keeps no angle. Ignored without a volume. A connected part of the input that faces against the reference
+    is compared by its other side. Where neighbours are oriented against each other, the normals are those of the part
+    with one orientation; of a reference that is not the input, they stay as they are. An input face with a larger angle
+    is no error: it is counted, and its angle does not rise unless it faced against all of the reference near it. A face
+    whose normal rounding could turn is no witness and has no angle, but no other face becomes one.
 max_seconds : float, optional
     Stop after this time with what is proved by then, which depends on the speed of the machine. The time does not cut
     short the preparation, in which the mesh is set up and the input is certified: about 0.7 us a triangle, and 2 us if

@@ -19,7 +19,7 @@ BENCHMARK, FIGURES = FOLDER.parents[1] / "benchmark", FOLDER.parents[1] / "docs"
 PATIENCE = 120  # seconds after which a command counts as stuck
 LINE = re.compile(
     r"([\d,]+) -> ([\d,]+) triangles(?: \((.*)\))?, tolerance ([\d.e-]+) % = ([\d.e-]+), result within ([\d.e+-]+) %, "
-    r"reference within ([\d.e+-]+) % \(certified\), [\d.]+ s"
+    r"reference within ([\d.e+-]+) %(?:, normals within [\d.]+\N{DEGREE SIGN})? \(certified\), [\d.]+ s"
 )
 READS_GLTF = bpy.app.version >= (4, 0) or "bool" in vars(np)
 

@@ -40,7 +40,7 @@ struct CertifiedMesh {
       const glm::dvec3 stored = space->store(p);
       return VertexPosition{stored, space->frame(stored)};
     };
-    bounds.emplace(CertifiedBounds::Directions{*certificate, &*coverage}, positions, reference.triangles.size(), false);
+    bounds.emplace(CertifiedBounds::Directions{*certificate, &*coverage}, MeshView{reference.triangles, positions});
     mesh.emplace(std::move(input), &*bounds, team);
   }
 

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <numeric>
 #include <optional>
 
 #include "check/certificate.h"
@@ -61,8 +63,10 @@ struct Worked {
       const dvec3 stored = space->store(p);
       return VertexPosition{stored, space->frame(stored)};
     };
-    bounds.emplace(CertifiedBounds::Directions{*certificate, &*coverage}, positions(), reference.triangles.size(),
-                   true);
+    facing.emplace(volume->reference(), 1e-15, 1e-15, std::numbers::pi / 2);
+    CertifiedBounds::Directions directions{*certificate, &*coverage};
+    directions.facing = &*facing;
+    bounds.emplace(directions, MeshView{reference.triangles, positions()}, own_triangles());
     mesh.emplace(std::move(input), &*bounds, alone);
     collapse.emplace(*mesh);
     shared.emplace(*collapse);
@@ -80,6 +84,11 @@ struct Worked {
   }
 
   std::vector<dvec3> positions() const { return space->frame(reference.vertices); }
+  std::vector<std::uint32_t> own_triangles() const {
+    std::vector<std::uint32_t> triangles(reference.triangles.size());
+    std::iota(triangles.begin(), triangles.end(), 0u);
+    return triangles;
+  }
 
   DeferredProof later(std::uint32_t region) {
     return DeferredProof(*collapse, *mesh, nullptr, vertices[region], faces[region], places);
@@ -108,6 +117,7 @@ struct Worked {
   std::optional<ToleranceVolume> volume;
   std::optional<TriangleCertificate> certificate;
   std::optional<Coverage> coverage;
+  std::optional<FacingRule> facing;
   std::optional<CertifiedBounds> bounds;
   std::optional<BoundedMesh> mesh;
   std::optional<EdgeCollapse> collapse;
@@ -126,7 +136,9 @@ void expect_same(const BoundedMesh& a, const BoundedMesh& b) {
     ASSERT_EQ(a.survivor(std::uint32_t(i)), b.survivor(std::uint32_t(i)));
     ASSERT_EQ(a.position(std::uint32_t(i)), b.position(std::uint32_t(i)));
     ASSERT_EQ(a.left_original(std::uint32_t(i)), b.left_original(std::uint32_t(i)));
-    ASSERT_EQ(a.certified()->distance(std::uint32_t(i)), b.certified()->distance(std::uint32_t(i)));
+    const auto &p = a.certified()->vertex_bound(std::uint32_t(i)), &q = b.certified()->vertex_bound(std::uint32_t(i));
+    ASSERT_EQ(p.distance, q.distance);
+    ASSERT_EQ(p.triangle, q.triangle);
     ASSERT_EQ(a.share(std::uint32_t(i)), b.share(std::uint32_t(i)));
   }
   for (int i = 0; i < int(x.n_halfedges()); ++i) {
@@ -144,7 +156,9 @@ void expect_same(const BoundedMesh& a, const BoundedMesh& b) {
     const OpenMesh::FaceHandle f(i);
     ASSERT_EQ(x.status(f).deleted(), y.status(f).deleted());
     ASSERT_EQ(x.halfedge_handle(f), y.halfedge_handle(f)) << "of face " << i;
-    ASSERT_EQ(a.certified()->face_distance(std::uint32_t(i)), b.certified()->face_distance(std::uint32_t(i)));
+    const FaceBound &p = a.certified()->face_bound(std::uint32_t(i)), &q = b.certified()->face_bound(std::uint32_t(i));
+    ASSERT_EQ(p.distance, q.distance);
+    ASSERT_EQ(p.angle, q.angle);
     for (int k = 0; k < 3; ++k) {
       ASSERT_EQ(a.corner_source(std::uint32_t(i), k), b.corner_source(std::uint32_t(i), k));
     }
@@ -221,7 +235,7 @@ TEST(DeferredProof, LeavesBoundariesWithBoundsToOthers) {
   Worked worked(kTolerance);
   CertifiedBounds::Directions directions{*worked.certificate};
   directions.boundary_forward = &*worked.certificate, directions.boundary_backward = &*worked.coverage;
-  CertifiedBounds bounds(directions, worked.positions(), worked.reference.triangles.size(), true);
+  CertifiedBounds bounds(directions, MeshView{worked.reference.triangles, worked.positions()}, worked.own_triangles());
   BoundedMeshInput input;
   Team alone(1);
   input.triangles = worked.reference.triangles;

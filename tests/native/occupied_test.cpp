@@ -54,7 +54,7 @@ TEST(Occupied, NoVertexIsPutWhereAnotherIs) {
   input.pinned.assign(both.vertices.size(), false);
   input.store = [&](const dvec3& p) { return VertexPosition{space.store(p), p}; };
   const std::vector<dvec3> positions = space.frame(both.vertices);
-  CertifiedBounds bounds({certificate}, positions, both.triangles.size(), false);
+  CertifiedBounds bounds({certificate}, MeshView{both.triangles, positions});
   BoundedMesh mesh(std::move(input), &bounds, alone);
 
   // The edge that runs along x to a vertex collapses into the vertex, which goes to a place.

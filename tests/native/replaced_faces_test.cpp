@@ -29,7 +29,7 @@ TriangleMesh fan(unsigned count, double height) {
 ReplacedFaces faces_of(const TriangleMesh& mesh, double distance) {
   ReplacedFaces faces;
   for (const glm::uvec3& t : mesh.triangles)
-    faces.add(mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z], distance);
+    faces.add({mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]}, {distance}, std::nullopt);
   return faces;
 }
 
@@ -37,14 +37,14 @@ TEST(ReplacedFaces, BoundWhatLiesInTheirPlane) {
   const TriangleMesh mesh = fan(7, 0);
   ReplacedFaces faces = faces_of(mesh, 0);
   const dvec3 across[3] = {mesh.vertices[1], mesh.vertices[3], mesh.vertices[6]};
-  const double bound = faces.bound(across, kWithin);
+  const double bound = faces.bound(across, kWithin, nullptr).distance;
   EXPECT_LE(bound, 1e-9 * kWithin);
   EXPECT_GT(bound, 0);
   // Again and again, from where hardly any room is left.
   double distance = 0.9999 * kWithin;
   for (int i = 0; i < 1'000; ++i) {
     ReplacedFaces next = faces_of(mesh, distance);
-    distance = next.bound(across, kWithin);
+    distance = next.bound(across, kWithin, nullptr).distance;
     ASSERT_LE(distance, 0.99991 * kWithin) << i;
   }
 }
@@ -57,7 +57,7 @@ TEST(ReplacedFaces, TakeAShareOfTheRoomThatIsLeftAndNoMore) {
     const double height = 0.01 * (kWithin - distance);
     const dvec3 corners[3] = {{0.1, 0.1, height}, {0.4, 0.1, 0}, {0.1, 0.4, 0}};
     const double before = distance;
-    distance = faces_of(mesh, distance).bound(corners, kWithin);
+    distance = faces_of(mesh, distance).bound(corners, kWithin, nullptr).distance;
     ASSERT_GE(distance, before + height) << i;
     ASSERT_LE(distance, before + height * (1 + 1e-9) + 1e-10 * kWithin) << i;
   }
@@ -72,7 +72,7 @@ TEST(ReplacedFaces, NeverBoundByLessThanTheDistance) {
     const TriangleMesh mesh = fan(5, scale * kWithin * unit(engine));
     dvec3 corners[3];
     for (dvec3& p : corners) p = {0.6 * unit(engine), 0.6 * unit(engine), scale * kWithin * unit(engine)};
-    const double bound = faces_of(mesh, distance).bound(corners, kWithin);
+    const double bound = faces_of(mesh, distance).bound(corners, kWithin, nullptr).distance;
     if (!(bound <= kWithin)) continue;
     ++bounded;
     const TriangleMesh face{{corners[0], corners[1], corners[2]}, {{0, 1, 2}}};
@@ -85,13 +85,15 @@ TEST(ReplacedFaces, NeverBoundByLessThanTheDistance) {
 TEST(ReplacedFaces, LeaveOpenWhatTheyCannotBound) {
   const dvec3 inside[3] = {{0.1, 0.1, 0}, {0.4, 0.1, 0}, {0.1, 0.4, 0}},
               beyond[3] = {{0, 0, 0}, {1.2, 0, 0}, {0, 1, 0}};
-  EXPECT_LE(faces_of(fan(6, 0), 0).bound(inside, kWithin), kWithin);
-  EXPECT_GT(faces_of(fan(6, 0), 0).bound(beyond, kWithin), kWithin);
-  EXPECT_GT(faces_of(fan(6, 0), kWithin).bound(inside, kWithin), kWithin) << "no room is left";
-  EXPECT_GT(faces_of(fan(6, 0), std::numeric_limits<double>::infinity()).bound(inside, kWithin), kWithin);
-  EXPECT_GT(ReplacedFaces().bound(inside, kWithin), kWithin);
+  EXPECT_LE(faces_of(fan(6, 0), 0).bound(inside, kWithin, nullptr).distance, kWithin);
+  EXPECT_GT(faces_of(fan(6, 0), 0).bound(beyond, kWithin, nullptr).distance, kWithin);
+  EXPECT_GT(faces_of(fan(6, 0), kWithin).bound(inside, kWithin, nullptr).distance, kWithin) << "no room is left";
+  EXPECT_GT(faces_of(fan(6, 0), std::numeric_limits<double>::infinity()).bound(inside, kWithin, nullptr).distance,
+            kWithin);
+  EXPECT_GT(ReplacedFaces().bound(inside, kWithin, nullptr).distance, kWithin);
   constexpr double kTiny = 1e-12;
-  EXPECT_GT(faces_of(fan(6, 0), 0).bound(inside, kTiny), kTiny) << "a step of it is no more than rounding hides";
+  EXPECT_GT(faces_of(fan(6, 0), 0).bound(inside, kTiny, nullptr).distance, kTiny)
+      << "a step of it is no more than rounding hides";
 }
 
 }  // namespace

@@ -237,6 +237,7 @@ def decimate(
     wedges: _Integers | None = None,
     effort: Literal["fast", "thorough"] = "fast",
     crossings: Literal["keep_out", "allow"] = "keep_out",
+    max_normal_angle: float | None = None,
     max_seconds: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,

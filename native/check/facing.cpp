@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Rounding moves a corner by at most d, so that an edge of length l is wrong by at most e = 2 d + 24 u, u = 2^-53, with
+// the subtraction. The cross product n of the edges p and q is then wrong by at most e (|p| + |q|) + e^2 and its own
+// rounding of 6 u |p| |q|, for which 24 u in e has room because edges are shorter than 4. The normal is sure if this is
+// at most kSureNormal |n|, which 4 e^2 (|p|^2 + |q|^2) <= kSureNormal^2 |n|^2 implies.
+#include "check/facing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "base/call.h"
+#include "geometry/frame.h"
+
+namespace tolvol {
+namespace {
+
+/// Bounds the rounding of the dot product of two unit vectors and of their lengths.
+constexpr double kRounding = 32 * kUnitRoundoff;
+/// Both normals may be wrong.
+constexpr double kBothNormals = 2.001 * kSureNormal;
+
+/// The least cosine of two sure normals between which the angle is at most `limit`. It is rounded up to few digits, so
+/// that every platform gets one result although their cosines differ in the last ones.
+double least_cosine(double limit) {
+  constexpr double kDigits = 0x1p40;
+  return std::ceil((std::cos(std::max(limit - kBothNormals, 0.0)) + kRounding) * kDigits) / kDigits;
+}
+
+}  // namespace
+
+std::optional<glm::dvec3> sure_normal(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double error) {
+  const glm::dvec3 p = b - a, q = c - a, n = glm::cross(p, q);
+  const double e = 2 * error + 24 * kUnitRoundoff, n2 = glm::dot(n, n);
+  // A comparison with NaN is false, so that NaN is not sure.
+  if (!(4 * e * e * (glm::dot(p, p) + glm::dot(q, q)) <= kSureNormal * kSureNormal * n2)) return std::nullopt;
+  return n * (1 / std::sqrt(n2));
+}
+
+double angle_bound(double cosine) {
+  // With s = 1 - cos x the series x = sqrt(2 s) (1 + s / 12 + 3 s^2 / 160 + ...) has positive coefficients, so that
+  // (x / sqrt(2 s) - 1) / s rises with s, from 1 / 12 to 0.11072 at a right angle. Beyond a right angle, the angle is
+  // pi less the other one, which is at least the sum of these three terms.
+  const double lowered = std::max(cosine - kRounding, -1.0);
+  const double s = 1 - std::abs(lowered), root = std::sqrt(2 * s);
+  const double exact =
+      lowered >= 0 ? root * (1 + 0.11073 * s) : std::numbers::pi - root * (1 + s / 12 + 3 * s * s / 160) + kRounding;
+  return exact + kBothNormals;
+}
+
+FacingRule::FacingRule(const TriangleMesh& reference, double reference_error, double mesh_error, double angle)
+    : mesh_error(mesh_error), angle(angle) {
+  normals.reserve(reference.triangles.size());
+  for (const glm::uvec3& t : reference.triangles) {
+    poll_at(normals.size());
+    normals.push_back(
+        sure_normal(reference.vertices[t.x], reference.vertices[t.y], reference.vertices[t.z], reference_error)
+            .value_or(glm::dvec3(std::numeric_limits<double>::quiet_NaN())));
+  }
+}
+
+Facing::Facing(const FacingRule& rule, const glm::dvec3& normal, double limit)
+    : rule_(&rule), normal_(normal), limit_(limit), least_cosine_(least_cosine(limit)) {}
+
+}  // namespace tolvol

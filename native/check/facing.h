@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Whether a face and its witnesses face the same way. Distances alone do not tell: a face that is turned over is
+/// within the tolerance of the surface that it was made from, and may have the other side of a thin wall as its
+/// witness.
+///
+/// All angles are between the fronts of triangles, in radians. A normal is used only where rounding cannot turn it by
+/// more than kSureNormal. A triangle without such a normal, degenerate or nearly so, is no witness.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <optional>
+#include <vector>
+
+#include "geometry/triangle_mesh.h"
+
+namespace tolvol {
+
+/// The sine of the angle by which a normal that is used may be wrong.
+inline constexpr double kSureNormal = 0x1p-24;
+
+/// Returns the unit normal of a triangle if it is sure. Each corner may be wrong by `error`; coordinates are at most
+/// about 1, as in a frame.
+std::optional<glm::dvec3> sure_normal(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double error);
+
+/// Returns an upper bound on the exact angle between two triangles whose sure normals have this dot product. It is less
+/// than 1e-6 too large near 0, and 0.02 at most. It uses square roots alone, so that every platform gets one result.
+double angle_bound(double cosine);
+
+/// The rule that every witness of a face faces as the face does.
+struct FacingRule {
+  /// `angle` is the largest angle that the rule permits, more than 0 and less than pi. Rounding may have moved the
+  /// corners of the reference's triangles by `reference_error`, and those of faces by `mesh_error`. O(m).
+  FacingRule(const TriangleMesh& reference, double reference_error, double mesh_error, double angle);
+
+  std::vector<glm::dvec3> normals;  ///< are those of the reference's triangles; NaN, which admits none, if not sure
+  double mesh_error;
+  double angle;
+};
+
+/// The rule for one face, and what a search has found of it.
+class Facing {
+ public:
+  /// `normal` is the sure normal of the face, and `limit` the largest angle between it and that of a witness. Keeps a
+  /// reference to the rule.
+  Facing(const FacingRule& rule, const glm::dvec3& normal, double limit);
+
+  /// Names the triangles of the reference to which the bounds of the corners were measured that a search gets. Unless
+  /// all are admitted, these bounds prove nothing of the face.
+  void set_corners(const glm::uvec3& triangles) { corners_ = triangles; }
+  /// Takes the triangles of the corners as witnesses, if all are admitted.
+  bool take_corners() {
+    for (int k = 0; k < 3; ++k) {
+      if (corners_[k] == kNone || !admits(corners_[k])) return false;
+    }
+    for (int k = 0; k < 3; ++k) take(corners_[k]);
+    return true;
+  }
+
+  const glm::dvec3& normal() const { return normal_; }
+  double limit() const { return limit_; }
+
+  /// Starts a search.
+  void begin() { least_ = 1; }
+  /// Tells whether a triangle of the reference may be a witness.
+  bool admits(std::uint32_t triangle) const { return cosine(triangle) >= least_cosine_; }
+  /// Notes that an admitted triangle is a witness.
+  void take(std::uint32_t triangle) { least_ = std::min(least_, cosine(triangle)); }
+  /// Returns an upper bound on the angle between the face and any witness noted since begin().
+  double angle() const { return std::min(angle_bound(least_), limit_); }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+
+  double cosine(std::uint32_t triangle) const { return glm::dot(rule_->normals[triangle], normal_); }
+
+  const FacingRule* rule_;
+  glm::dvec3 normal_;
+  glm::uvec3 corners_{kNone};
+  double limit_, least_cosine_, least_ = 1;
+};
+
+}  // namespace tolvol

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Where the orientation of the reference is not consistent, the cut makes that of the mesh consistent. The triangles of
+// a reference that is the mesh itself are turned along. Of another reference they stay as they are, so that the parts
+// of the mesh over its reversed triangles are free of the rule, and counted.
+#include "decimation/input_facing.h"
+
+#include <atomic>
+#include <limits>
+#include <numbers>
+
+#include "base/call.h"
+
+namespace tolvol {
+namespace {
+
+constexpr std::uint32_t kNone = CutMesh::kNone;
+constexpr double kRightAngle = std::numbers::pi / 2;
+/// A face that keeps no smaller angle than this one is free.
+constexpr double kNearlyTurned = 0.99 * std::numbers::pi;
+
+/// For each triangle, the first triangle of its connected part.
+std::vector<std::uint32_t> connected_parts(const CutMesh& cut) {
+  std::vector<std::uint32_t> part(cut.triangles.size(), kNone), queue;
+  for (std::uint32_t seed = 0; seed < part.size(); ++seed) {
+    poll_at(seed);
+    if (part[seed] != kNone) continue;
+    part[seed] = seed;
+    queue.assign(1, seed);
+    while (!queue.empty()) {
+      const std::uint32_t t = queue.back();
+      queue.pop_back();
+      for (std::uint32_t side = 3 * t; side < 3 * t + 3; ++side) {
+        if (cut.mates[side] == kNone || part[cut.mates[side] / 3] != kNone) continue;
+        part[cut.mates[side] / 3] = seed;
+        queue.push_back(cut.mates[side] / 3);
+      }
+    }
+  }
+  return part;
+}
+
+}  // namespace
+
+void face_as_cut(const CutMesh& cut, FacingRule& rule) {
+  std::vector<glm::dvec3> normals(rule.normals.size(), glm::dvec3(std::numeric_limits<double>::quiet_NaN()));
+  for (std::uint32_t t = 0; t < cut.triangles.size(); ++t) {
+    const std::uint32_t input = cut.triangle_input[t];
+    normals[input] = cut.reversed[t] ? -rule.normals[input] : rule.normals[input];
+  }
+  rule.normals = std::move(normals);
+}
+
+std::vector<std::uint32_t> face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> positions,
+                                             const TriangleCertificate& certificate, const Hierarchy& hierarchy,
+                                             const FacingRule& rule, Team& team, CertifiedBounds& bounds) {
+  constexpr std::size_t kBlock = 64;
+  constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+  struct Place {
+    double area = 0;  ///< Of the triangle, negative if all near it face against it, and 0 if some do and some do not.
+    std::uint32_t below = kNone;  ///< The nearest triangle that faces as this one, or else the nearest one.
+  };
+  std::vector<Place> places(cut.triangles.size());
+  team.run(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const glm::uvec3& t = cut.triangles[i];
+      const glm::dvec3 &a = positions[t.x], &b = positions[t.y], &c = positions[t.z];
+      const glm::dvec3 centre = (a + b + c) * (1.0 / 3), normal = glm::cross(b - a, c - a);
+      const auto nearest = [&](double sign) {
+        const auto faces_so = [&](std::uint32_t triangle) {
+          return sign * glm::dot(rule.normals[triangle], normal) > 0;
+        };
+        return hierarchy.nearest_if(centre, faces_so, certificate.limit()).triangle;
+      };
+      const std::uint32_t along = nearest(1), against = nearest(-1);
+      places[i].below = along != kNone ? along : against;
+      if ((along == kNone) != (against == kNone)) places[i].area = (along != kNone ? 1 : -1) * glm::length(normal);
+    }
+  });
+  const std::vector<std::uint32_t> part = connected_parts(cut);
+  std::vector<double> area(part.size(), 0);
+  for (std::size_t i = 0; i < part.size(); ++i) area[part[i]] += places[i].area;
+
+  std::vector<std::uint8_t> exceeds(part.size(), 0);  // Threads would share bits.
+  team.run(part.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (auto f = static_cast<std::uint32_t>(begin); f < end; ++f) {
+      const glm::uvec3& t = cut.triangles[f];
+      const glm::dvec3 corners[3] = {positions[t.x], positions[t.y], positions[t.z]};
+      CertifiedBounds::FaceRule of_face = bounds.rule(f);
+      of_face.reversed = area[part[f]] < 0;
+      const auto holds = [&](double limit) {
+        of_face.limit = limit;
+        bounds.set_rule(f, of_face);
+        std::optional<Facing> question;
+        bounds.start(f, corners, question);
+        if (!question) return true;
+        const glm::uvec3 hints(places[f].below, kNone, kNone);
+        if (certificate.verdict(corners, glm::dvec3(kAnywhere), hints, &*question) != Verdict::inside) return false;
+        bounds.note_face(f, {bounds.face_bound(f).distance, question->angle()});
+        return true;
+      };
+      if (holds(rule.angle)) continue;
+      exceeds[f] = 1;
+      const bool is_bounded = (rule.angle < kRightAngle && holds(kRightAngle)) || holds(kNearlyTurned);
+      of_face.limit = is_bounded ? bounds.face_bound(f).angle : std::numbers::pi;
+      bounds.set_rule(f, of_face);
+    }
+  });
+  std::vector<std::uint32_t> result;
+  for (std::uint32_t f = 0; f < exceeds.size(); ++f) {
+    if (exceeds[f]) result.push_back(f);
+  }
+  return result;
+}
+
+}  // namespace tolvol

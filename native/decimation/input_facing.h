@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// How the input of a decimation faces its reference, which decides what its faces have to keep.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "base/parallel.h"
+#include "check/certificate.h"
+#include "check/facing.h"
+#include "decimation/certified_bounds.h"
+#include "geometry/hierarchy.h"
+#include "topology/manifold_cut.h"
+
+namespace tolvol {
+
+/// Turns the normals of a rule to where the triangles of the manifold face that its reference was cut to. Triangles
+/// that the cut dropped or set aside are no witnesses; what covers their points is. O(m).
+void face_as_cut(const CutMesh& cut, FacingRule& rule);
+
+/// Looks at the faces of a mesh that is not its reference, and sets their rules. A connected part is compared by its
+/// other side if, over more of its area, all triangles of the reference near a face look against it than all look as it
+/// does. A face without a proof that it keeps the angle of the rule keeps the angle that is proved for it, so that it
+/// becomes no worse; a face that looks against all triangles near it is free of the rule. `certificate` decides which
+/// points are within the tolerance; `hierarchy` is of its reference. Returns the faces without a proof that they keep
+/// the angle of the rule. About 3 us a triangle.
+std::vector<std::uint32_t> face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> positions,
+                                             const TriangleCertificate& certificate, const Hierarchy& hierarchy,
+                                             const FacingRule& rule, Team& team, CertifiedBounds& bounds);
+
+}  // namespace tolvol

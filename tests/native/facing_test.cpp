@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "check/facing.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "check/certificate.h"
+#include "check/tolerance_volume.h"
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+constexpr double kRight = std::numbers::pi / 2;
+constexpr double kError = 1e-15;
+
+double angle_between(const dvec3& a, const dvec3& b) {
+  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+}
+
+TEST(Facing, BoundsEveryAngleFromAbove) {
+  shapes::Random random(1);
+  for (int i = 0; i < 20'000; ++i) {
+    const dvec3 a = glm::normalize(random.point());
+    // Half of the pairs are nearly equal or nearly opposite.
+    const double spread = i % 2 ? 1 : std::pow(10, -8 * random.share());
+    const dvec3 b = glm::normalize((i % 4 < 2 ? a : -a) + spread * random.point());
+    const double angle = angle_between(a, b), bound = angle_bound(glm::dot(a, b));
+    ASSERT_GE(bound, angle);
+    ASSERT_LE(bound, angle + 0.02);
+    if (angle < 0.1) ASSERT_LE(bound, angle + 2e-5);
+  }
+}
+
+TEST(Facing, NormalsThatRoundingCouldTurnAreNotSure) {
+  const dvec3 a(0, 0, 0), b(1, 0, 0);
+  const auto sure = [&](const dvec3& c, double error) { return sure_normal(a, b, c, error).has_value(); };
+  EXPECT_TRUE(sure({0, 1, 0}, kError));
+  EXPECT_TRUE(sure({0.5, 1e-6, 0}, kError));
+  EXPECT_FALSE(sure({0.5, 1e-9, 0}, kError)) << "a needle";
+  EXPECT_FALSE(sure({0.5, 1e-6, 0}, 1e-9)) << "the corners may be elsewhere";
+  EXPECT_FALSE(sure({0.5, 0, 0}, kError));
+  EXPECT_FALSE(sure(a, kError));
+  EXPECT_FALSE(sure({std::numeric_limits<double>::quiet_NaN(), 1, 0}, kError));
+}
+
+TEST(Facing, NoLimitAdmitsALargerAngle) {
+  shapes::Random random(2);
+  const TriangleMesh flat{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.5, 0, 0}}, {{0, 1, 2}, {0, 1, 3}}};
+  for (const double limit : {1e-9, 1e-6, 0.01, 0.5, kRight, 2.0, 3.1}) {
+    const FacingRule rule(flat, kError, kError, limit);
+    int admitted = 0;
+    for (int i = 0; i < 2'000; ++i) {
+      const double angle = std::min(limit * (1 + 0.2 * (random.share() - 0.5)), std::numbers::pi);
+      const double turn = 2 * std::numbers::pi * random.share();
+      const dvec3 normal(std::sin(angle) * std::cos(turn), std::sin(angle) * std::sin(turn), std::cos(angle));
+      Facing facing(rule, normal, limit);
+      EXPECT_FALSE(facing.admits(1)) << "a degenerate triangle is no witness";
+      if (!facing.admits(0)) continue;
+      ++admitted;
+      EXPECT_LE(angle, limit);
+      facing.begin();
+      facing.take(0);
+      EXPECT_GE(facing.angle(), angle - 1e-15);
+      EXPECT_LE(facing.angle(), limit);
+    }
+    if (limit > 1e-5) EXPECT_GT(admitted, 500) << limit;
+  }
+}
+
+/// Two squares, one above the other, whose fronts face outwards.
+struct Wall {
+  explicit Wall(double thickness) {
+    const TriangleMesh top = shapes::squares(8, [&](const dvec3& p) { return p + dvec3(0, 0, thickness); });
+    mesh = shapes::joined(shapes::turned(shapes::grid(8)), top);
+    volume.emplace(mesh.vertices, mesh.triangles, StoredSpace(glm::dmat4(1), Storage::float64), 0.1,
+                   ToleranceVolume::Options{.precision = 8});
+    certificate.emplace(volume->witnesses(), volume->grid(), volume->hierarchy(), volume->provable(kError),
+                        volume->frame_tolerance());
+    rule.emplace(volume->reference(), kError, kError, kRight);
+  }
+
+  /// What is proved of a triangle whose corners are in the world, by a hostile hint: the triangle right below it.
+  double bound(const dvec3& a, const dvec3& b, const dvec3& c, bool faces) const {
+    const StoredSpace space = StoredSpace(glm::dmat4(1), Storage::float64).in(volume->frame());
+    const dvec3 corners[3] = {space.frame(a), space.frame(b), space.frame(c)};
+    const dvec3 anywhere(std::numeric_limits<double>::infinity());
+    std::optional<Facing> facing;
+    if (faces) facing.emplace(*rule, *sure_normal(corners[0], corners[1], corners[2], kError), kRight);
+    const auto below = certificate->nearest((corners[0] + corners[1] + corners[2]) * (1.0 / 3), 1.0).triangle;
+    const double ordered = certificate->bound(corners, anywhere, glm::uvec3(below), facing ? &*facing : nullptr);
+    if (facing && ordered != TriangleCertificate::kUnproved) EXPECT_LE(facing->angle(), kRight);
+    const double any =
+        certificate->bound_in_any_order(corners, anywhere, glm::uvec3(below), facing ? &*facing : nullptr);
+    EXPECT_EQ(ordered == TriangleCertificate::kUnproved, any == TriangleCertificate::kUnproved);
+    return ordered;
+  }
+
+  TriangleMesh mesh;
+  std::optional<ToleranceVolume> volume;
+  std::optional<TriangleCertificate> certificate;
+  std::optional<FacingRule> rule;
+};
+
+TEST(CertifiedFacing, TheOtherSideOfAWallIsNoWitness) {
+  const Wall thick(0.3), thin(0.05);
+  const dvec3 a(0.1, 0.1, 0), b(0.8, 0.2, 0), c(0.2, 0.9, 0), up(0, 0, 0.3);
+  for (const Wall* wall : {&thick, &thin}) {
+    for (const bool faces : {false, true}) {
+      EXPECT_NE(wall->bound(a, c, b, faces), TriangleCertificate::kUnproved) << "it faces as the bottom does";
+    }
+    EXPECT_NE(wall->bound(a, b, c, false), TriangleCertificate::kUnproved);
+  }
+  EXPECT_EQ(thick.bound(a, b, c, true), TriangleCertificate::kUnproved) << "turned over, and the top is too far";
+  EXPECT_NE(thick.bound(a + up, b + up, c + up, true), TriangleCertificate::kUnproved);
+  // The bottom is nearest, but the top is near enough, too.
+  const double bound = thin.bound(a, b, c, true);
+  EXPECT_NE(bound, TriangleCertificate::kUnproved);
+  EXPECT_GE(bound, 0.999 * 0.05 * thin.volume->frame().scale()) << "the distance to the witness, not to the nearest";
+}
+
+TEST(CertifiedFacing, CornersProveNothingByTrianglesThatAreNotAdmitted) {
+  const Wall thick(0.3);
+  const StoredSpace space = StoredSpace(glm::dmat4(1), Storage::float64).in(thick.volume->frame());
+  // So small that the distances of the corners bound all of its points.
+  const dvec3 corners[3] = {space.frame({0.3, 0.3, 0}), space.frame({0.301, 0.3, 0}), space.frame({0.3, 0.301, 0})};
+  const dvec3 distances(0);
+  EXPECT_NE(thick.certificate->bound(corners, distances), TriangleCertificate::kUnproved);
+  Facing facing(*thick.rule, *sure_normal(corners[0], corners[1], corners[2], kError), kRight);
+  const auto below = thick.certificate->nearest(corners[0], 1.0).triangle;
+  for (const glm::uvec3& triangles : {glm::uvec3(below), glm::uvec3(Hierarchy::kNone)}) {
+    facing.set_corners(triangles);
+    EXPECT_EQ(thick.certificate->bound(corners, distances, glm::uvec3(Hierarchy::kNone), &facing),
+              TriangleCertificate::kUnproved);
+  }
+}
+
+}  // namespace

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""max_normal_angle of tolvol.decimate: no face is turned away from all of the reference that is near it.
+
+The judge looks at points of every face of the result, and at all triangles of the reference within the tolerance of each.
+"""
+
+import numpy as np
+import pytest
+import tolvol
+
+import meshes
+from judge import assert_promise, decimate
+
+PLATES = meshes.non_manifold()
+STEPS = 6
+WEIGHTS = np.array([(i, j, STEPS - i - j) for i in range(STEPS + 1) for j in range(STEPS + 1 - i)]) / STEPS
+ROUNDING = 1e-4  # degrees
+
+
+def unit_normals(corners):
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def distances_to(points, corners):
+    """Returns the distance of each point to each triangle."""
+    p, (a, b, c) = points[:, None], corners.transpose(1, 0, 2)
+
+    def to_edge(start, end):
+        along, from_start = end - start, p - start
+        share = np.clip((from_start * along).sum(-1) / (along * along).sum(-1), 0, 1)
+        return np.linalg.norm(from_start - share[..., None] * along, axis=-1)
+
+    normals = np.cross(b - a, c - a)
+    squares = (normals * normals).sum(-1)
+    v = (np.cross(p - a, c - a) * normals).sum(-1) / squares
+    w = (np.cross(b - a, p - a) * normals).sum(-1) / squares
+    height = np.abs(((p - a) * normals).sum(-1)) / np.sqrt(squares)
+    to_edges = np.minimum(np.minimum(to_edge(a, b), to_edge(b, c)), to_edge(c, a))
+    return np.where((v >= 0) & (w >= 0) & (v + w <= 1), height, to_edges)
+
+
+def largest_angles(vertices, triangles, result, tolerance):
+    """For each face of the result: the least angle to a triangle near one of its points, at the worst of the points."""
+    reference = vertices[triangles].astype(float)
+    faces = result.vertices[result.triangles].astype(float)
+    angles = np.degrees(np.arccos(np.clip(unit_normals(faces) @ unit_normals(reference).T, -1, 1)))
+    low, high = reference.min(1) - tolerance, reference.max(1) + tolerance
+
+    def at_worst_point(face, angle):
+        candidates = ((low <= face.max(0)) & (high >= face.min(0))).all(1)
+        near = distances_to(WEIGHTS @ face, reference[candidates]) <= tolerance
+        return np.where(near, angle[candidates], 180).min(1).max()
+
+    return np.array([at_worst_point(face, angle) for face, angle in zip(faces, angles, strict=True)])
+
+
+def test_no_face_of_the_result_is_turned_over():
+    vertices, triangles = PLATES
+    turned = []
+    for percent in (1, 2):
+        tolerance = percent / 100 * tolvol.diagonal(vertices, triangles)
+        for effort in ("fast", "thorough"):
+            free = decimate(vertices, triangles, tolerance, effort=effort, max_normal_angle=180)
+            turned.append((largest_angles(vertices, triangles, free, tolerance) > 91).sum())
+            assert free.report["normals"] is None
+            result = decimate(vertices, triangles, tolerance, effort=effort)
+            found = largest_angles(vertices, triangles, result, tolerance).max()
+            assert found <= result.report["normals"]["largest"] + ROUNDING
+            assert result.report["normals"]["largest"] <= 90
+            assert result.report["normals"]["exceeded_before"] == result.report["normals"]["exceeded_after"] == 0
+            assert_promise(vertices, triangles, result, tolerance)
+            assert len(result.triangles) <= 1.1 * len(free.triangles)
+    assert sum(turned) > 3, "without the rule there are faces that are turned over"
+
+
+@pytest.mark.parametrize("options", [{}, {"effort": "thorough"}, {"placement": "subset"}, {"two_sided": False}])
+@pytest.mark.parametrize("angle", [12, 40])
+def test_the_angle_is_a_bound_of_ones_own(options, angle):
+    vertices, triangles = meshes.torus(32, 16, noise=0.003)
+    tolerance = 0.02 * tolvol.diagonal(vertices, triangles)
+    result = decimate(vertices, triangles, tolerance, max_normal_angle=angle, **options)
+    assert largest_angles(vertices, triangles, result, tolerance).max() <= angle + ROUNDING
+    assert 0 < result.report["normals"]["largest"] <= angle
+    free = decimate(vertices, triangles, tolerance, **options)
+    assert largest_angles(vertices, triangles, free, tolerance).max() > angle
+    assert len(free.triangles) < len(result.triangles) < len(triangles)
+    assert_promise(vertices, triangles, result, tolerance, two_sided=options.get("two_sided", True))
+
+
+@pytest.mark.parametrize("effort", ["fast", "thorough"])
+def test_the_bits_do_not_depend_on_the_number_of_threads(effort):
+    vertices, triangles = meshes.torus(80, 40, noise=0.002)
+    tolerance = 0.01 * tolvol.diagonal(vertices, triangles)
+    one, three = (
+        decimate(vertices, triangles, tolerance, effort=effort, max_normal_angle=25, threads=n) for n in (1, 3)
+    )
+    assert np.array_equal(one.vertices, three.vertices) and np.array_equal(one.triangles, three.triangles)
+    assert one.report["normals"] == three.report["normals"]
+
+
+def folded_plate():
+    """Returns a plate, the same with one vertex moved over the faces beside it, and which faces that turns over."""
+    vertices, triangles = meshes.plate(17)
+    moved = vertices.copy()
+    moved[17 * 8 + 8, 0] += 1.6 / 16
+    over = unit_normals(moved[triangles])[:, 2] * unit_normals(vertices[triangles])[:, 2] < 0
+    return vertices, triangles, moved, over
+
+
+def test_faces_of_the_input_that_are_turned_over_are_counted_and_become_no_more():
+    vertices, triangles, moved, over = folded_plate()
+    assert over.any()
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.02)
+    kept = tolvol.decimate(moved, triangles, volume, target_triangles=len(triangles))
+    assert kept.report["normals"]["exceeded_before"] == kept.report["normals"]["exceeded_after"] == over.sum()
+    result = tolvol.decimate(moved, triangles, volume)
+    assert len(result.triangles) < len(triangles) / 4
+    after = (largest_angles(vertices, triangles, result, 0.02) > 90 + ROUNDING).sum()
+    assert after <= result.report["normals"]["exceeded_after"] <= over.sum()
+
+
+def test_an_angle_that_the_input_exceeds_does_not_rise():
+    """The faces of a corrugated sheet over a flat one have 45 degrees, and only the flat ones at its ends have less."""
+    vertices, triangles = meshes.plate(33)
+    inner = (vertices[:, 0] > 0.2) & (vertices[:, 0] < 0.8)
+    raised = vertices + np.where(inner & (np.arange(len(vertices)) % 2 == 1), 1 / 32, 0)[:, None] * [0, 0, 1]
+    before = np.degrees(np.arccos(unit_normals(raised[triangles])[:, 2]))
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.04)
+    result = tolvol.decimate(raised, triangles, volume, max_normal_angle=20)
+    normals = result.report["normals"]
+    assert normals["exceeded_before"] == (before > 20).sum() > 500
+    assert normals["exceeded_after"] < normals["exceeded_before"]
+    assert normals["largest"] <= 20
+    after = np.degrees(np.arccos(unit_normals(result.vertices[result.triangles])[:, 2]))
+    assert after.max() <= before.max() + 0.1 and (after > 20 + ROUNDING).sum() <= normals["exceeded_after"]
+
+
+def test_a_part_that_faces_the_other_way_is_compared_by_its_other_side():
+    vertices, triangles = meshes.torus(48, 24)
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.01 * tolvol.diagonal(vertices, triangles))
+    result = tolvol.decimate(vertices, triangles[:, ::-1], volume)
+    assert result.report["normals"]["exceeded_before"] == 0 and result.report["normals"]["largest"] <= 90
+    assert len(result.triangles) < len(triangles) / 5
+
+
+@pytest.mark.parametrize("mesh", [meshes.misoriented, meshes.degenerate, meshes.needles])
+def test_orientation_and_needles_of_the_input_are_no_error(mesh):
+    vertices, triangles = mesh()
+    result = decimate(vertices, triangles, 0.02 * tolvol.diagonal(vertices, triangles))
+    normals = result.report["normals"]
+    assert normals["exceeded_before"] == normals["exceeded_after"] == 0 and normals["largest"] <= 90
+
+
+@pytest.mark.parametrize("angle", [0, -1, 180.001, np.nan, np.inf])
+def test_other_angles_are_refused(angle):
+    with pytest.raises(tolvol.InvalidInput, match="max_normal_angle must be more than 0 and at most 180 degrees"):
+        decimate(*PLATES, 0.03, max_normal_angle=angle)
+
+
+def test_without_a_volume_there_is_no_angle():
+    result = tolvol.decimate(*PLATES, None, target_triangles=500, max_normal_angle=10)
+    assert result.report["normals"] is None
