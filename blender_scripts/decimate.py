@@ -291,11 +291,10 @@ class Command:
             kept = sum(run["outside"]["faces"] for run in runs)
             judged = [self._certify(snapshots.joined(found.values()), snapshots.joined(references), tolerance, kept)]
         whole = self._summary(names, runs, judged, tolerance, size)
-        before, after = (
-            solidity.facts(snapshots.joined(surfaces), self.options.threads) for surfaces in (inputs, found.values())
+        whole["solidity"] = solidity.compared(
+            *(solidity.facts(snapshots.joined(surfaces), self.options.threads) for surfaces in (inputs, found.values()))
         )
-        whole["solidity"] = {"before": before, "after": after, "change": solidity.change(after, before)}
-        pairs = {"before": before["crossing_pairs"], "after": after["crossing_pairs"]}
+        pairs = {when: whole["solidity"][when]["crossing_pairs"] for when in ("before", "after")}
         whole["crossings"] = pairs
         if self.options.crossings == "keep_out" and pairs["after"] > pairs["before"]:
             whole["warnings"].append(
@@ -309,7 +308,7 @@ class Command:
                 whole["repairs"].append({"kind": kind, "count": lost, "message": message})
         whole["seconds"]["certify"] += time.perf_counter() - start
         self._stage("certified both ways", start)
-        print(f"{self.exported.name}: {solidity.line(after)}")
+        print(f"{self.exported.name}: {solidity.line(whole['solidity']['after'])}")
         if not report.proved(whole):
             raise cli.Stop(
                 f"{NOT_PROVED}: {report.intervals(whole)}; {self.options.output} was not written", cli.NOT_PROVED

@@ -256,10 +256,9 @@ class _Task:
                 progress,
             )
             certified["outside"]["backward_before"] = before.upper
-        certified["crossings"] = {
-            when: solidity.crossing_count(mesh, threads, progress)
-            for when, mesh in (("before", arrays), ("after", decimated.arrays))
-        }
+        certified["solidity"] = solidity.compared(
+            *(solidity.facts(surface, threads, progress) for surface in (self.surface, decimated))
+        )
         clock.append(time.perf_counter())
         seconds = dict(zip(("field", "decimate", "certify"), np.diff(clock).tolist()))
         run = report.decimation_run(arrays, result, computed.report, built, certified, self.options, seconds)

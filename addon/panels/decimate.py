@@ -19,13 +19,12 @@ class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
         count = len(targets(context))
         layout.operator("tolvol.decimate", text=f"Decimate {count} Objects" if count > 1 else "Decimate")
         if ob.tolvol.last_run and ob.tolvol.last_run_of == measurements.shown_fingerprint(ob):
-            counts = report.remembered_counts(ob.tolvol.last_run)
-            text_lines(
-                context,
-                layout,
-                counts or "The report of the last run is damaged: decimate again to get a new one",
-                "CHECKMARK" if counts else "ERROR",
-            )
+            lines = report.remembered(ob.tolvol.last_run)
+            for line, icon in zip(lines or (), ("CHECKMARK", "MESH_DATA")):
+                text_lines(context, layout, line, icon)
+            if lines is None:
+                damaged = "The report of the last run is damaged: decimate again to get a new one"
+                text_lines(context, layout, damaged, "ERROR")
         say_blocked(context, layout, ob)
 
 

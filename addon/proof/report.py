@@ -8,6 +8,7 @@ import json
 import math
 
 from .. import native
+from . import solidity
 
 # The distance of the reference counts as no larger than before if its upper end grew by at most this share, the width of a
 # certified interval (native/measure/hausdorff.h): equal distances count as equal.
@@ -18,9 +19,8 @@ def decimation_run(source, result, native_report, volume, certified, options, se
     """Returns the run of one decimation.
 
     source: the MeshArrays of the input; result: the Decimated; native_report: the report of the native decimate();
-    certified: the result of certify() for the mesh that will be stored, and "crossings", a dictionary of the numbers of
-    crossing pairs "before" and "after" (solidity.crossing_count()); options: two_sided, placement, effort and
-    target_triangles as they were given.
+    certified: the result of certify() for the mesh that will be stored, and "solidity", the result of solidity.compared();
+    options: two_sided, placement, effort and target_triangles as they were given.
     """
     # The native report lists unused vertices as removed, but Blender keeps them: this is not a repair here.
     repairs = [repair for repair in native_report["repairs"] if repair["kind"] != "unused"]
@@ -42,7 +42,8 @@ def decimation_run(source, result, native_report, volume, certified, options, se
         "precision": volume.precision,
         "forward": certified["forward"],
         "backward": certified["backward"],
-        "crossings": certified["crossings"],
+        "solidity": certified["solidity"],
+        "crossings": {when: certified["solidity"][when]["crossing_pairs"] for when in ("before", "after")},
         "normals": native_report["normals"],
         "seconds": seconds,
         "repairs": repairs,
@@ -105,11 +106,18 @@ def counts(run):
     return f"{run['input']['triangles']:,} -> {run['output']['triangles']:,} triangles{remark}"
 
 
-def remembered_counts(text):
-    """Returns counts() of a run that a .blend file keeps as JSON, or None if the text is damaged."""
+def remembered(text):
+    """Returns lines about a run that a .blend file keeps as JSON, or None if the text is damaged.
+
+    The lines are counts() and, unless the run is of an earlier version, the facts about the result.
+    """
     try:
-        return counts(json.loads(text))
-    except (ValueError, TypeError, LookupError, RecursionError):
+        run = json.loads(text)
+        lines = [counts(run)]
+        if "solidity" in run:
+            lines.append(solidity.summary(run["solidity"]["after"], run["solidity"]["change"]))
+        return lines
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
         return None
 
 

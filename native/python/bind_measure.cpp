@@ -2,14 +2,12 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
-#include <limits>
 
 #include "measure/deviation.h"
 #include "measure/hausdorff.h"
 #include "python/arrays.h"
 #include "python/interruptible.h"
 #include "python/module.h"
-#include "topology/crossings.h"
 
 namespace tolvol::python {
 namespace {
@@ -44,56 +42,6 @@ struct BothWays {
 }  // namespace
 
 void bind_measure(py::module_& module) {
-  module.def(
-      "crossing_pairs",
-      [](const py::object& vertices, const py::object& triangles, std::optional<std::int64_t> most,
-         std::optional<int> threads, Progress* progress) {
-        if (most && *most < 1) throw InvalidInput("most must be at least 1, or None for no limit");
-        const TriangleMesh mesh = to_mesh(vertices, triangles, "");
-        validate(mesh.vertices, mesh.triangles);
-        std::vector<glm::uvec2> pairs;
-        {
-          const Interruptible call(progress);
-          Team team(thread_count(to_threads(threads)));
-          const auto limit = most ? static_cast<std::size_t>(*most) : std::numeric_limits<std::size_t>::max();
-          pairs = crossings(mesh.vertices, mesh.triangles, limit, team, progress).pairs;
-        }
-        py::array_t<std::int32_t> rows({py::ssize_t(pairs.size()), py::ssize_t(2)});
-        for (std::size_t i = 0; i < pairs.size(); ++i) {
-          for (int k = 0; k < 2; ++k) rows.mutable_at(i, k) = static_cast<std::int32_t>(pairs[i][k]);
-        }
-        return rows;
-      },
-      py::arg("vertices"), py::arg("triangles"), py::kw_only(), py::arg("most") = py::none(),
-      py::arg("threads") = py::none(), py::arg("progress") = py::none(),
-      R"doc(Return the pairs of triangles that cross each other, exactly.
-
-Two triangles cross if they meet anywhere but in the corners and edges that they share. A corner is shared if both have
-the same coordinates. Triangles in one plane that overlap cross, and so do two triangles on the same three corners. A
-triangle without an area crosses what its segment or point meets; two such triangles never cross.
-
-Parameters
-----------
-vertices : (n, 3) float32 or float64 array
-triangles : (m, 3) integer array
-most : int, optional
-    Stop after this many pairs. Among 100,000 triangles on one place there are five thousand million.
-threads, progress
-    See help(tolvol).
-
-Returns
--------
-(k, 2) int32 array
-    Indices of triangles, the lower one first, in order. A mesh without crossings has none.
-
-Raises
-------
-InvalidInput
-    If the mesh is not valid.
-Cancelled
-
-The predicates are CGAL's, and no epsilon is involved. The call takes about 2 us for each triangle on one thread, and
-more where boxes of many triangles overlap.)doc");
   py::class_<HausdorffInterval>(module, "DirectedHausdorffResult", py::module_local(),
                                 "The interval that directed_hausdorff found, in the units of the meshes.")
       .def_readonly("lower", &HausdorffInterval::lower, "The largest distance is at least this.")

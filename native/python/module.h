@@ -16,6 +16,7 @@ void bind_smoothing(pybind11::module_& module);
 void bind_decimation(pybind11::module_& module);
 void bind_deformation(pybind11::module_& module);
 void bind_measure(pybind11::module_& module);
+void bind_topology(pybind11::module_& module);
 void bind_picture(pybind11::module_& module);
 
 }  // namespace tolvol::python

@@ -17,7 +17,7 @@ from scenes import torus
 def decimated():
     ob = torus()
     bpy.ops.tolvol.decimate()
-    assert report.remembered_counts(ob.tolvol.last_run) and measurements.measurement_of(ob)
+    assert report.remembered(ob.tolvol.last_run) and measurements.measurement_of(ob)
     return ob
 
 
@@ -26,14 +26,14 @@ def damaged_runs(text):
     yield from ("{", text[: len(text) // 2], "null", "7", "[]", "{}", '"run"', "[" * 100_000, "\udcff")
     for key in ("input", "output", "target_triangles", "stopped_by", "outside"):
         yield json.dumps({name: value for name, value in run.items() if name != key})
-    for key in ("input", "output", "outside"):
+    for key in ("input", "output", "outside", "solidity"):
         for value in (None, [], 3, "text", {}, {"triangles": None, "faces": "x"}, {"triangles": [], "faces": [1]}):
             yield json.dumps(run | {key: value})
 
 
 def test_a_damaged_run_is_no_run(decimated):
     for text in damaged_runs(decimated.tolvol.last_run):
-        assert report.remembered_counts(text) is None, text[:200]
+        assert report.remembered(text) is None, text[:200]
 
 
 @pytest.mark.parametrize("value", [math.nan, -1.0])

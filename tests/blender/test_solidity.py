@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from addon.mesh import mesh_io
-from addon.proof import solidity
+from addon.proof import report, solidity
 from addon.reference import snapshots
 from commands import command, save
 from scenes import activate, add_object, sheet, torus, torus_arrays
@@ -75,6 +75,21 @@ def test_crossing_shells_and_degenerate_triangles_are_counted():
     vertices = np.concatenate([CUBE[0], CUBE[0][:1]])
     sliver = facts((vertices, [*CUBE[1], [0, 8, 1]]))
     assert sliver["degenerate_triangles"] == 1 and sliver["closed"]
+
+
+def test_the_panel_states_what_became_of_a_decimated_solid():
+    ob = torus()
+    activate(ob)
+    bpy.ops.tolvol.decimate(tolerance_percent=1)
+    run = json.loads(ob.tolvol.last_run)
+    found = run["solidity"]
+    assert found["after"] == pytest.approx(solidity.facts(snapshots.surface_of(ob)))
+    assert found["before"]["area"] * (1 + found["change"]["area"]) == pytest.approx(found["after"]["area"])
+    assert -0.1 < found["change"]["volume"] < 0.1
+    _, line = report.remembered(ob.tolvol.last_run)
+    assert line.startswith("Closed, manifold, no crossings, 1 shell, area ") and ", volume " in line
+    holed = found["after"] | {"closed": False, "boundary_loops": 2, "shells": 3}
+    assert solidity.summary(holed, {"area": None, "volume": None}) == "2 boundary loops, 3 shells"
 
 
 def test_the_command_requires(tmp_path):

@@ -57,6 +57,7 @@ from ._native import (
     renderer,
     shutdown,
     smooth,
+    solidity,
     transfer_colours,
     wedges,
 )
@@ -99,6 +100,7 @@ __all__ = [
     "renderer",
     "shutdown",
     "smooth",
+    "solidity",
     "transfer_colours",
     "wedges",
 ]

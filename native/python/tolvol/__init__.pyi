@@ -308,6 +308,14 @@ def crossing_pairs(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> NDArray[np.int32]: ...
+def solidity(
+    vertices: _Vertices,
+    triangles: _Integers,
+    *,
+    to_world: ArrayLike | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]: ...
 def directed_hausdorff(
     vertices_a: _Vertices,
     triangles_a: _Integers,

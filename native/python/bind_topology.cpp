@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <pybind11/stl.h>
+
+#include <limits>
+
+#include "geometry/frame.h"
+#include "python/arrays.h"
+#include "python/interruptible.h"
+#include "python/module.h"
+#include "topology/crossings.h"
+#include "topology/solidity.h"
+
+namespace tolvol::python {
+namespace {
+
+double area_of(const TriangleMesh& mesh) {
+  double twice = 0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    const glm::dvec3 &a = mesh.vertices[t.x], &b = mesh.vertices[t.y], &c = mesh.vertices[t.z];
+    twice += glm::length(glm::cross(b - a, c - a));
+  }
+  return twice / 2;
+}
+
+py::dict solidity_facts(const py::object& vertices, const py::object& triangles, const py::object& to_world,
+                        std::optional<int> threads, Progress* progress) {
+  const Vertices v = to_vertices(vertices, "vertices");
+  TriangleMesh mesh{v.values, to_triangles(triangles, "triangles")};
+  const StoredSpace space(to_matrix(to_world), v.storage);
+  if (!mesh.triangles.empty()) validate(mesh.vertices, mesh.triangles);
+  Solidity found;
+  double area = 0;
+  std::optional<double> volume;
+  {
+    const Interruptible call(progress);
+    Team team(thread_count(to_threads(threads)));
+    found = solidity(mesh.vertices, mesh.triangles, team);
+    // Relative to one of them, positions far from the origin lose less to rounding.
+    const glm::dvec3 first = mesh.vertices.empty() ? glm::dvec3(0) : space.world(mesh.vertices.front());
+    for (glm::dvec3& p : mesh.vertices) p = space.world(p) - first;
+    area = area_of(mesh);
+    if (found.closed() && found.oriented() && found.non_manifold_edges == 0) {
+      volume = enclosed_volume(mesh) / (space.mirrors() ? -6 : 6);
+    }
+  }
+  py::dict facts;
+  facts["closed"] = found.closed();
+  facts["boundary_loops"] = found.boundary_loops;
+  facts["open_edges"] = found.open_edges;
+  facts["manifold"] = found.manifold();
+  facts["non_manifold_edges"] = found.non_manifold_edges;
+  facts["non_manifold_vertices"] = found.non_manifold_vertices;
+  facts["oriented"] = found.oriented();
+  facts["misoriented_edges"] = found.misoriented_edges;
+  facts["degenerate_triangles"] = found.degenerate_triangles;
+  facts["shells"] = found.shells;
+  facts["area"] = area;
+  facts["volume"] = volume ? py::object(py::float_(*volume)) : py::object(py::none());
+  return facts;
+}
+
+}  // namespace
+
+void bind_topology(py::module_& module) {
+  module.def(
+      "crossing_pairs",
+      [](const py::object& vertices, const py::object& triangles, std::optional<std::int64_t> most,
+         std::optional<int> threads, Progress* progress) {
+        if (most && *most < 1) throw InvalidInput("most must be at least 1, or None for no limit");
+        const TriangleMesh mesh{to_vertices(vertices, "vertices").values, to_triangles(triangles, "triangles")};
+        validate(mesh.vertices, mesh.triangles);
+        std::vector<glm::uvec2> pairs;
+        {
+          const Interruptible call(progress);
+          Team team(thread_count(to_threads(threads)));
+          const auto limit = most ? static_cast<std::size_t>(*most) : std::numeric_limits<std::size_t>::max();
+          pairs = crossings(mesh.vertices, mesh.triangles, limit, team, progress).pairs;
+        }
+        py::array_t<std::int32_t> rows({py::ssize_t(pairs.size()), py::ssize_t(2)});
+        for (std::size_t i = 0; i < pairs.size(); ++i) {
+          for (int k = 0; k < 2; ++k) rows.mutable_at(i, k) = static_cast<std::int32_t>(pairs[i][k]);
+        }
+        return rows;
+      },
+      py::arg("vertices"), py::arg("triangles"), py::kw_only(), py::arg("most") = py::none(),
+      py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+      R"doc(Return the pairs of triangles that cross each other, exactly.
+
+Two triangles cross if they meet anywhere but in the corners and edges that they share. A corner is shared if both have
+the same coordinates. Triangles in one plane that overlap cross, and so do two triangles on the same three corners. A
+triangle without an area crosses what its segment or point meets; two such triangles never cross.
+
+Parameters
+----------
+vertices : (n, 3) float32 or float64 array
+triangles : (m, 3) integer array
+most : int, optional
+    Stop after this many pairs. Among 100,000 triangles on one place there are five thousand million.
+threads, progress
+    See help(tolvol).
+
+Returns
+-------
+(k, 2) int32 array
+    Indices of triangles, the lower one first, in order. A mesh without crossings has none.
+
+Raises
+------
+InvalidInput
+    If the mesh is not valid.
+Cancelled
+
+The predicates are CGAL's, and no epsilon is involved. The call takes about 2 us for each triangle on one thread, and
+more where boxes of many triangles overlap.)doc");
+  module.def("solidity", &solidity_facts, py::arg("vertices"), py::arg("triangles"), py::kw_only(),
+             py::arg("to_world") = py::none(), py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+             R"doc(Tell whether a mesh bounds a solid: facts about how its triangles are connected.
+
+Vertices at the same position are one vertex. All facts but the area and the volume are exact.
+
+Parameters
+----------
+vertices : (n, 3) float32 or float64 array
+    Local coordinates.
+triangles : (m, 3) integer array
+to_world : (4, 4) array, optional
+    The matrix from local to world space, the identity by default. Only the area and the volume depend on it.
+threads, progress
+    See help(tolvol).
+
+Returns
+-------
+dict
+    closed, boundary_loops, open_edges : whether there is no open edge, which belongs to one triangle; the number of
+        groups of open edges that touch; the number of open edges
+    manifold, non_manifold_edges, non_manifold_vertices : whether there are no edges of more than two triangles, and no
+        vertices at which the triangles do not all hang together by edges; their numbers
+    oriented, misoriented_edges : whether there are no edges through which both triangles run in the same direction;
+        their number
+    degenerate_triangles : the number of triangles with two equal corners, which are left out of all other counts
+    shells : the number of groups of triangles that hang together by edges
+    area, volume : in the units of the world. The volume is negative if the faces look inwards, and None unless the mesh
+        is closed and oriented and no edge has more than two triangles.
+
+Raises
+------
+InvalidInput
+    If the mesh or the matrix is not valid.
+Cancelled
+
+crossing_pairs() tells whether the triangles cross each other. The call takes about 0.3 us for each triangle.)doc");
+}
+
+}  // namespace tolvol::python
