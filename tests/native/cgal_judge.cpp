@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The largest distance of a point of one mesh to another, by CGAL, for tests/fuzz.py. Reads doubles: the number of
-// triangles of either mesh, the error that is allowed, and nine coordinates for each triangle. Prints the distance.
+// CGAL's judgement, for tests/fuzz.py and the benchmarks. All input is doubles.
+// Without an argument it prints the largest distance of a point of one mesh to another. It reads the number of
+// triangles of either mesh, the error that is allowed, and nine coordinates for each triangle. With the argument
+// "crossings" it prints the number of pairs of faces that cross. It reads the numbers of vertices and of triangles,
+// three coordinates for each vertex, and three indices for each triangle.
 #include <cstdio>
 #include <stdexcept>
+#include <string_view>
 #include <vector>
 
+#include "crossing_judge.h"
 #include "distance_judge.h"
 
 namespace {
@@ -26,10 +31,28 @@ tolvol::TriangleMesh triangles(std::size_t count) {
   return mesh;
 }
 
+tolvol::TriangleMesh indexed_mesh() {
+  const std::vector<double> head = read(2);
+  const std::vector<double> coordinates = read(static_cast<std::size_t>(3 * head[0]));
+  const std::vector<double> indices = read(static_cast<std::size_t>(3 * head[1]));
+  tolvol::TriangleMesh mesh;
+  for (std::size_t i = 0; i < coordinates.size(); i += 3) {
+    mesh.vertices.emplace_back(coordinates[i], coordinates[i + 1], coordinates[i + 2]);
+  }
+  for (std::size_t i = 0; i < indices.size(); i += 3) {
+    mesh.triangles.emplace_back(indices[i], indices[i + 1], indices[i + 2]);
+  }
+  return mesh;
+}
+
 }  // namespace
 
-int main() {
+int main(int count, char** arguments) {
   try {
+    if (count == 2 && std::string_view(arguments[1]) == "crossings") {
+      std::printf("%zu\n", tolvol::crossings_by_cgal(indexed_mesh()).size());
+      return 0;
+    }
     const std::vector<double> head = read(3);
     const tolvol::TriangleMesh a = triangles(static_cast<std::size_t>(head[0]));
     const tolvol::TriangleMesh b = triangles(static_cast<std::size_t>(head[1]));

@@ -45,7 +45,7 @@ TriangleMesh hollow(unsigned n, double wall) {
 /// Two rings through each other, `apart` where they are nearest.
 TriangleMesh links(double apart) {
   const glm::dmat4 other({1, 0, 0, 0}, {0, 0, 1, 0}, {0, -1, 0, 0}, {1.2 - apart, 0, 0, 1});
-  return shapes::joined(shapes::torus(across(24)), moved(shapes::torus(across(24)), other));
+  return shapes::joined(shapes::torus(24), moved(shapes::torus(24), other));
 }
 
 /// A sheet rolled up, with layers so far apart.
