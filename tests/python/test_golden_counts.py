@@ -21,19 +21,19 @@ MODELS = {
 # The counts of this model change by a tenth when the tolerance changes by one in a hundred: the mean over tolerances is
 # compared.
 SCATTERED = {"three plates at one edge": (0.98, 0.99, 1, 1.01, 1.02)}
-# Triangles left by fast, thorough and subset, as recorded when the test was written. A change that leaves fewer records
-# its counts here.
+# Triangles left by fast, thorough and subset. A change that leaves fewer records its counts here. More are recorded only
+# for a new promise: those of the noisy torus, the spike, the soup and the plates are since no face may be turned over.
 COUNTS = {
     ("sphere", 1): (112, 78, 244),
     ("sphere", 0.2): (610, 398, 1204),
     ("torus", 1): (170, 120, 278),
-    ("noisy torus", 1): (168, 116, 284),
+    ("noisy torus", 1): (162, 120, 280),
     ("hill", 1): (26, 14, 41),
     ("hill", 0.2): (124, 72, 213),
-    ("spike", 1): (96, 64, 198),
+    ("spike", 1): (96, 68, 198),
     ("spike", 0.2): (512, 336, 908),
-    ("soup", 1): (158, 112, 302),
-    ("three plates at one edge", 1): (154.4, 114, 249.6),
+    ("soup", 1): (158, 116, 302),
+    ("three plates at one edge", 1): (143, 107.8, 264),
     ("needles", 1): (72, 72, 72),
 }
 
