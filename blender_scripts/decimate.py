@@ -409,8 +409,8 @@ def _normals(runs):
     kept = [run["normals"] for run in runs if run["normals"]]
     if not kept:
         return None
-    counts = {key: sum(one[key] for one in kept) for key in ("exceeded_before", "exceeded_after")}
-    return {"largest": max(one["largest"] for one in kept), **counts}
+    counts = {key: sum(one[key] for one in kept) for key in ("unsure", "exceeded_before", "exceeded_after")}
+    return {"largest": max((one["largest"] for one in kept if one["largest"] is not None), default=None), **counts}
 
 
 def _not_above(length):

@@ -54,9 +54,10 @@ FacingRule::FacingRule(const TriangleMesh& reference, double reference_error, do
   normals.reserve(reference.triangles.size());
   for (const glm::uvec3& t : reference.triangles) {
     poll_at(normals.size());
-    normals.push_back(
-        sure_normal(reference.vertices[t.x], reference.vertices[t.y], reference.vertices[t.z], reference_error)
-            .value_or(glm::dvec3(std::numeric_limits<double>::quiet_NaN())));
+    const glm::dvec3 &a = reference.vertices[t.x], &b = reference.vertices[t.y], &c = reference.vertices[t.z];
+    const std::optional<glm::dvec3> normal = sure_normal(a, b, c, reference_error);
+    unsure += !normal && glm::cross(b - a, c - a) != glm::dvec3(0);
+    normals.push_back(normal.value_or(glm::dvec3(std::numeric_limits<double>::quiet_NaN())));
   }
 }
 

@@ -35,6 +35,7 @@ struct FacingRule {
   FacingRule(const TriangleMesh& reference, double reference_error, double mesh_error, double angle);
 
   std::vector<glm::dvec3> normals;  ///< are those of the reference's triangles; NaN, which admits none, if not sure
+  std::size_t unsure = 0;           ///< counts the triangles with an area but without a sure normal
   double mesh_error;
   double angle;
 };

@@ -51,8 +51,7 @@ PlacedPieces::PlacedPieces(const Pieces& pieces, const ToleranceVolume& volume)
   }
   const Frame& frame = volume.frame();
   const StoredSpace world = pieces.space.in(Frame()), placed = pieces.space.in(frame);
-  const glm::dvec3 centre = frame.to_world(glm::dvec3(0));
-  glm::dvec3 extent(0);  // the largest coordinates of the points whose mapping error counts
+  Box counted;  // the box of the points whose mapping error counts
   for (std::size_t i = 0; i < points.size(); ++i) {
     poll_at(i);
     const glm::dvec3& p = pieces.points[i];
@@ -61,11 +60,11 @@ PlacedPieces::PlacedPieces(const Pieces& pieces, const ToleranceVolume& volume)
     const glm::dvec3 at = placed.frame(p);
     if (glm::all(glm::lessThanEqual(glm::abs(at), glm::dvec3(kFar)))) {
       points[i] = at;
-      extent = glm::max(extent, glm::abs(p));
+      counted.add(p);
       continue;
     }
     // This compares in the world because the frame's scale alone may take a point out of the range of double.
-    const glm::dvec3 away = glm::abs(world.world(p) - centre);
+    const glm::dvec3 away = glm::abs(world.frame(p) - frame.centre());
     const double certain = kFar / frame.scale() + world.mapping_error({&p, 1});
     if (!(std::max({away.x, away.y, away.z}) > certain)) {
       throw InvalidInput("point " + std::to_string(i) +
@@ -74,7 +73,8 @@ PlacedPieces::PlacedPieces(const Pieces& pieces, const ToleranceVolume& volume)
     }
     points[i] = glm::clamp(at, -kFar, kFar);
   }
-  mapping_error = placed.mapping_error({&extent, 1});
+  const glm::dvec3 ends[2] = {counted.lower, counted.upper};
+  mapping_error = counted.empty() ? 0 : placed.mapping_error(ends);
 }
 
 std::vector<Verdict> ToleranceCheck::check(const Pieces& pieces, const Options& options) const {

@@ -61,6 +61,11 @@ ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span
 
   Box box;
   for (const glm::dvec3& p : used) box.add(placed.frame(p));
+  // What is proved of a frame holds for coordinates of about 1. They are larger only where the frame itself was
+  // rounded.
+  constexpr double kAboutOne = 1.1;
+  const glm::dvec3 reach = glm::max(-box.lower, box.upper);
+  if (!(std::max({reach.x, reach.y, reach.z}) <= kAboutOne)) refuse_tolerance();
   grid_ = layout_grid(box, frame_tolerance(), options.precision);
   // The two parts run at the same time, because neither needs the other.
   parallel_for(2, 1, options.threads, [&](std::size_t part, std::size_t) {
@@ -92,13 +97,15 @@ double ToleranceVolume::provable(double mapping_error) const {
   const double epsilon = frame_tolerance();
   const double left = epsilon - mapping_error_ - mapping_error -
                       witness_error(1 + 2 * epsilon);  // faces of the result, too, serve as witnesses
-  if (!(left > 0.5 * epsilon)) {
-    std::ostringstream text;
-    text << "the tolerance " << tolerance_ << " is too small for double precision at these coordinates; "
-         << "move the mesh nearer to the origin or take a larger tolerance";
-    throw InvalidInput(text.str(), "tolerance_too_small");
-  }
+  if (!(left > 0.5 * epsilon)) refuse_tolerance();
   return left;
+}
+
+void ToleranceVolume::refuse_tolerance() const {
+  std::ostringstream text;
+  text << "the tolerance " << tolerance_ << " is too small for double precision at these coordinates; "
+       << "move the mesh nearer to the origin or take a larger tolerance";
+  throw InvalidInput(text.str(), "tolerance_too_small");
 }
 
 }  // namespace tolvol

@@ -72,6 +72,8 @@ class ToleranceVolume {
   double refutable(double mapping_error) const { return 2 * frame_tolerance() - provable(mapping_error); }
 
  private:
+  [[noreturn]] void refuse_tolerance() const;
+
   Frame frame_;
   TriangleMesh reference_;
   std::vector<WitnessTriangle> witnesses_;

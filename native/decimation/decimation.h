@@ -68,7 +68,9 @@ struct DecimationResult {
   std::map<std::string, std::size_t> locked;  ///< The number of vertices that could not move, by cause.
   /// How the faces face the reference; none where no angle was kept.
   struct Normals {
-    double largest = 0;  ///< An upper bound, in degrees, on the angle of all faces but those that exceeded it.
+    /// An upper bound, in degrees, on the angle of all faces but those below; none if no face has an angle.
+    std::optional<double> largest;
+    std::size_t unsure = 0;           ///< The number of faces without an angle, because rounding could turn them.
     std::size_t exceeded_before = 0;  ///< The number of input faces with no proof of max_normal_angle.
     std::size_t exceeded_after = 0;   ///< How many of them are left.
   };

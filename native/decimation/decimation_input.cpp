@@ -163,6 +163,15 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   if (options_.max_normal_angle < 180) {
     facing_.emplace(volume_->reference(), volume_->mapping_error(), mapping_error,
                     glm::radians(options_.max_normal_angle));
+    if (2 * facing_->unsure > facing_->normals.size()) {
+      // Hardly any face would find a witness, and hardly any vertex could go.
+      report_.warnings.push_back(
+          "no angle of normals is kept: rounding could turn most faces of the reference, which "
+          "are too small for its size");
+      facing_.reset();
+    }
+  }
+  if (facing_) {
     if (identical_) face_as_cut(cut_, *facing_);
     directions.facing = &*facing_;
   }

@@ -137,17 +137,21 @@ class Output {
     const CertifiedBounds* const bounds = mesh_.certified();
     if (!bounds || !input_.facing()) return;
     DecimationResult::Normals normals;
-    double largest = 0;
+    std::optional<double> largest;
     for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
       poll_at(t);
       if (!mesh_.alive(t) || bounds->rule(t).limit > input_.facing()->angle) continue;
       const glm::uvec3& corners = mesh_.triangle(t);
       std::optional<Facing> facing;
       bounds->start(t, {mesh_.position(corners.x), mesh_.position(corners.y), mesh_.position(corners.z)}, facing);
-      if (facing) largest = std::max(largest, bounds->face_bound(t).angle);
+      if (facing) {
+        largest = std::max(largest.value_or(0), bounds->face_bound(t).angle);
+      } else {
+        ++normals.unsure;
+      }
     }
     // The conversion rounds.
-    normals.largest = std::min(glm::degrees(largest), input_.max_normal_angle());
+    if (largest) normals.largest = std::min(glm::degrees(*largest), input_.max_normal_angle());
     normals.exceeded_before = input_.exceeding().size();
     for (const std::uint32_t t : input_.exceeding()) normals.exceeded_after += mesh_.alive(t);
     result_.normals = normals;

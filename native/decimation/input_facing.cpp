@@ -4,38 +4,30 @@
 // of the mesh over its reversed triangles are free of the rule, and counted.
 #include "decimation/input_facing.h"
 
-#include <atomic>
 #include <limits>
 #include <numbers>
 
 #include "base/call.h"
+#include "base/union_find.h"
 
 namespace tolvol {
 namespace {
 
 constexpr std::uint32_t kNone = CutMesh::kNone;
-constexpr double kRightAngle = std::numbers::pi / 2;
+/// A smaller difference to the least angle that can be proved of a face does not matter.
+constexpr double kNearEnough = std::numbers::pi / 180;
 /// A face that keeps no smaller angle than this one is free.
 constexpr double kNearlyTurned = 0.99 * std::numbers::pi;
 
 /// For each triangle, the first triangle of its connected part.
 std::vector<std::uint32_t> connected_parts(const CutMesh& cut) {
-  std::vector<std::uint32_t> part(cut.triangles.size(), kNone), queue;
-  for (std::uint32_t seed = 0; seed < part.size(); ++seed) {
-    poll_at(seed);
-    if (part[seed] != kNone) continue;
-    part[seed] = seed;
-    queue.assign(1, seed);
-    while (!queue.empty()) {
-      const std::uint32_t t = queue.back();
-      queue.pop_back();
-      for (std::uint32_t side = 3 * t; side < 3 * t + 3; ++side) {
-        if (cut.mates[side] == kNone || part[cut.mates[side] / 3] != kNone) continue;
-        part[cut.mates[side] / 3] = seed;
-        queue.push_back(cut.mates[side] / 3);
-      }
-    }
+  UnionFind parts(cut.triangles.size());
+  for (std::uint32_t side = 0; side < cut.mates.size(); ++side) {
+    poll_at(side);
+    if (cut.mates[side] != kNone) parts.join(side / 3, cut.mates[side] / 3);
   }
+  std::vector<std::uint32_t> part(cut.triangles.size());
+  for (std::uint32_t t = 0; t < part.size(); ++t) part[t] = parts.find(t);
   return part;
 }
 
@@ -100,8 +92,21 @@ std::vector<std::uint32_t> face_as_reference(const CutMesh& cut, std::span<const
       };
       if (holds(rule.angle)) continue;
       exceeds[f] = 1;
-      const bool is_bounded = (rule.angle < kRightAngle && holds(kRightAngle)) || holds(kNearlyTurned);
-      of_face.limit = is_bounded ? bounds.face_bound(f).angle : std::numbers::pi;
+      if (!holds(kNearlyTurned)) {
+        of_face.limit = std::numbers::pi;
+      } else {
+        // A search notes the angle of the witnesses that it happens to find. Those with less may be there, too.
+        double least = rule.angle, proved = bounds.face_bound(f).angle;
+        while (proved - least > kNearEnough) {
+          const double tried = (least + proved) / 2;
+          if (holds(tried)) {
+            proved = bounds.face_bound(f).angle;
+          } else {
+            least = tried;
+          }
+        }
+        of_face.limit = proved;
+      }
       bounds.set_rule(f, of_face);
     }
   });

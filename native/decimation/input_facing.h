@@ -22,8 +22,8 @@ void face_as_cut(const CutMesh& cut, FacingRule& rule);
 
 /// Looks at the faces of a mesh that is not its reference, and sets their rules. A connected part is compared by its
 /// other side if, over more of its area, all triangles of the reference near a face look against it than all look as it
-/// does. A face without a proof that it keeps the angle of the rule keeps the angle that is proved for it, so that it
-/// becomes no worse; a face that looks against all triangles near it is free of the rule. `certificate` decides which
+/// does. A face without a proof that it keeps the angle of the rule keeps the least angle that is proved for it, to
+/// within a degree; a face that looks against all triangles near it is free of the rule. `certificate` decides which
 /// points are within the tolerance; `hierarchy` is of its reference. Returns the faces without a proof that they keep
 /// the angle of the rule. About 3 us a triangle.
 std::vector<std::uint32_t> face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> positions,

@@ -2,6 +2,7 @@
 #include "geometry/frame.h"
 
 #include <algorithm>
+#include <boost/multiprecision/cpp_bin_float.hpp>
 #include <cmath>
 
 #include "base/errors.h"
@@ -61,13 +62,37 @@ StoredSpace::StoredSpace(const glm::dmat4& to_world, Storage storage, const Fram
   for (int column = 0; column < 3; ++column) {
     for (int row = 0; row < 3; ++row) inverse[column][row] /= lengths[row];
   }
-  to_local_ = glm::dmat4(inverse);
+  to_local_ = inverse;
+  set_anchor();
 }
 
 StoredSpace StoredSpace::in(const Frame& frame) const {
   StoredSpace copy = *this;
   copy.frame_ = frame;
+  copy.set_anchor();
   return copy;
+}
+
+// Stored positions less the anchor are small where the mesh is near the frame's centre, and no large numbers cancel.
+// The offset makes up for the rounding of the anchor. It is the sum of large numbers that cancel, hence the quadruple
+// precision.
+void StoredSpace::set_anchor() {
+  using Quad = boost::multiprecision::cpp_bin_float_quad;
+  constexpr double kQuadRoundoff = 0x1p-113;
+  anchor_ = to_local_ * (frame_.centre() - glm::dvec3(to_world_[3]));
+  // An anchor out of the range of double is no help.
+  if (!std::isfinite(anchor_.x + anchor_.y + anchor_.z)) anchor_ = glm::dvec3(0);
+  anchor_error_ = 0;
+  for (int row = 0; row < 3; ++row) {
+    Quad sum = Quad(to_world_[3][row]) - Quad(frame_.centre()[row]);
+    double magnitude = std::abs(to_world_[3][row]) + std::abs(frame_.centre()[row]);
+    for (int column = 0; column < 3; ++column) {
+      sum += Quad(to_world_[column][row]) * Quad(anchor_[column]);
+      magnitude += std::abs(to_world_[column][row] * anchor_[column]);
+    }
+    anchor_offset_[row] = static_cast<double>(sum);
+    anchor_error_ = std::max(anchor_error_, 8 * kQuadRoundoff * magnitude);  // three products and four sums
+  }
 }
 
 glm::dvec3 StoredSpace::world(const glm::dvec3& stored) const {
@@ -86,22 +111,22 @@ std::vector<glm::dvec3> StoredSpace::frame(std::span<const glm::dvec3> stored) c
 }
 
 glm::dvec3 StoredSpace::store(const glm::dvec3& in_frame) const {
-  const glm::dvec3 local = glm::dmat3(to_local_) * (frame_.to_world(in_frame) - glm::dvec3(to_world_[3]));
+  const glm::dvec3 local = to_local_ * (in_frame / frame_.scale() - anchor_offset_) + anchor_;
   return storage_ == Storage::float32 ? rounded_to_float32(local) : local;
 }
 
 double StoredSpace::mapping_error(std::span<const glm::dvec3> stored) const {
   glm::dvec3 extent{0};
-  for (const glm::dvec3& p : stored) extent = glm::max(extent, glm::abs(p));
+  for (const glm::dvec3& p : stored) extent = glm::max(extent, glm::abs(p - anchor_));
   double largest = 0;
   for (int row = 0; row < 3; ++row) {
     largest = std::max(largest, std::abs(to_world_[0][row]) * extent.x + std::abs(to_world_[1][row]) * extent.y +
-                                    std::abs(to_world_[2][row]) * extent.z + std::abs(to_world_[3][row]));
+                                    std::abs(to_world_[2][row]) * extent.z + std::abs(anchor_offset_[row]));
   }
-  // A row is three products and three sums, hence an error of at most 4u (1 + 4u) times the sum of magnitudes. Taking
-  // the centre off adds u of at most twice that magnitude, and scaling by a power of two adds nothing. This is six u
-  // for each coordinate, and sqrt(3) times as much for the length.
-  return 11 * kUnitRoundoff * largest * frame_.scale();
+  // The difference to the anchor, a product and up to three sums round each term of a row, and the offset was rounded
+  // before, hence an error of at most six u times the sum of magnitudes. Scaling by a power of two adds nothing. The
+  // length over three coordinates is sqrt(3) times as much.
+  return (11 * kUnitRoundoff * largest + 2 * anchor_error_) * frame_.scale();
 }
 
 double StoredSpace::mapping_error(std::span<const glm::dvec3> stored, double reach) const {

@@ -26,6 +26,8 @@ class Frame {
   glm::dvec3 to_world(const glm::dvec3& p) const { return p / scale_ + centre_; }
   /// The frame length of a world length of 1.
   double scale() const { return scale_; }
+  /// The centre in the world.
+  const glm::dvec3& centre() const { return centre_; }
 
  private:
   glm::dvec3 centre_{0};
@@ -49,14 +51,18 @@ class StoredSpace {
   StoredSpace in(const Frame& frame) const;
 
   glm::dvec3 world(const glm::dvec3& stored) const;
-  glm::dvec3 frame(const glm::dvec3& stored) const { return frame_.from_world(world(stored)); }
+  /// Loses no accuracy to a far origin, neither of the local space nor of the world.
+  glm::dvec3 frame(const glm::dvec3& stored) const {
+    return (glm::dmat3(to_world_) * (stored - anchor_) + anchor_offset_) * frame_.scale();
+  }
   std::vector<glm::dvec3> frame(std::span<const glm::dvec3> stored) const;
 
   /// Returns the stored value nearest to a position in the frame, rounded to the stored type. frame() of this value is
   /// the position to judge.
   glm::dvec3 store(const glm::dvec3& in_frame) const;
 
-  /// Returns a bound, in frame lengths, on the difference between frame() and exact arithmetic over the given points.
+  /// Returns a bound, in frame lengths, on the difference between frame() and exact arithmetic over the bounding box of
+  /// the given points.
   double mapping_error(std::span<const glm::dvec3> stored) const;
   /// The same over the given points and all that are stored for positions in the frame with coordinates up to `reach`.
   double mapping_error(std::span<const glm::dvec3> stored, double reach) const;
@@ -70,11 +76,16 @@ class StoredSpace {
   Storage storage() const { return storage_; }
 
  private:
+  void set_anchor();
+
   glm::dmat4 to_world_;
-  glm::dmat4 to_local_;
+  glm::dmat3 to_local_;  ///< The inverse of the linear part of `to_world_`.
   Storage storage_;
   bool mirrors_;
   Frame frame_;
+  glm::dvec3 anchor_{0};         ///< The stored position of the frame's centre, rounded.
+  glm::dvec3 anchor_offset_{0};  ///< From the frame's centre to the anchor in the world, rounded only once.
+  double anchor_error_ = 0;      ///< How far a coordinate of the offset may be off before it was rounded.
 };
 
 /// Returns the length that 100 % stands for, in world units: the longest of the four diagonals of the local bounding

@@ -58,6 +58,7 @@ py::dict make_report(const DecimationResult& r, std::size_t triangles_in, double
   if (r.normals) {
     normals = py::dict();
     normals["largest"] = r.normals->largest;
+    normals["unsure"] = r.normals->unsure;
     normals["exceeded_before"] = r.normals->exceeded_before, normals["exceeded_after"] = r.normals->exceeded_after;
   }
   report["normals"] = normals;
@@ -180,9 +181,11 @@ repairs : a list of dicts with `kind`, `count` and `message`
 locked : a dict from a cause to the number of vertices that could not move
 outside : a dict of `faces`, the number of input faces that were outside and were kept, `first`, the first of them, and
     `reference_faces`, the number of reference faces that were beyond the tolerance of the input
-normals : a dict of `largest`, an upper bound in degrees on the angle between a face of the result and its witnesses,
-    `exceeded_before`, the number of input faces that were not proved to keep max_normal_angle, and `exceeded_after`, how
-    many of these are left, for which `largest` does not hold; or None where no angle was kept
+normals : a dict of `largest`, an upper bound in degrees on the angle between a face of the result and its witnesses, or
+    None if no face has an angle; `unsure`, the number of faces without an angle, because they are degenerate or so
+    nearly that rounding could turn them; `exceeded_before`, the number of input faces that were not proved to keep
+    max_normal_angle; and `exceeded_after`, how many of these are left, for which `largest` does not hold. None where no
+    angle was kept
 warnings : a list of sentences)doc");
 
   module.def("decimate", &decimate_arrays, py::arg("vertices"), py::arg("triangles"), py::arg("volume").none(true),
@@ -233,8 +236,10 @@ max_normal_angle : float, optional
     over. 180 keeps no angle. Ignored without a volume. A connected part of the input that faces against the reference
     is compared by its other side. Where neighbours are oriented against each other, the normals are those of the part
     with one orientation; of a reference that is not the input, they stay as they are. An input face with a larger angle
-    is no error: it is counted, and its angle does not rise unless it faced against all of the reference near it. A face
-    whose normal rounding could turn is no witness and has no angle, but no other face becomes one.
+    is no error: it is counted, and its angle rises by at most a degree above the least that is proved of it, unless it
+    faces against all of the reference near it. A face whose normal rounding could turn is no witness and has no angle,
+    but no other face becomes one. If most faces of the reference are so small for its size, no angle is kept, and a
+    warning says so.
 max_seconds : float, optional
     Stop after this time with what is proved by then, which depends on the speed of the machine. The time does not cut
     short the preparation, in which the mesh is set up and the input is certified: about 0.7 us a triangle, and 2 us if

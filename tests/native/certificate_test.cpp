@@ -329,14 +329,15 @@ TEST(Certificate, HoldsAtAnyPrecision) {
 
 TEST(ToleranceVolume, RefusesWhatItCannotHold) {
   const TriangleMesh mesh = shapes::torus(10);
-  const auto make = [&](double tolerance, const dvec3& offset = dvec3(0)) {
-    std::vector<dvec3> moved = mesh.vertices;
-    for (dvec3& p : moved) p += offset;
-    ToleranceVolume(moved, mesh.triangles, kIdentity, tolerance);
+  const auto make = [&](double tolerance, double away = 0) {
+    glm::dmat4 to_world(1);
+    to_world[3] = {away, away, away, 1};
+    ToleranceVolume(mesh.vertices, mesh.triangles, StoredSpace(to_world, Storage::float64), tolerance);
   };
   EXPECT_NO_THROW(make(0.01));
-  EXPECT_NO_THROW(make(0.01, dvec3(1e9)));
-  EXPECT_THROW(make(0.01, dvec3(1e15)), InvalidInput) << "double cannot hold 0.01 there";
+  EXPECT_NO_THROW(make(0.01, 1e14));
+  EXPECT_THROW(make(0.01, 1e17), InvalidInput) << "no double is near the centre";
+  EXPECT_THROW(make(1e-14), InvalidInput) << "rounding is larger";
   for (const double bad :
        {0.0, -1.0, 10.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     EXPECT_THROW(make(bad), InvalidInput) << bad;

@@ -231,22 +231,36 @@ TEST_P(ProvingCheck, RefusesPiecesThatAreNot) {
 }
 
 TEST_P(ProvingCheck, TheMappingErrorOfUsedPointsCountsAgainstTheTolerance) {
+  constexpr double kSmall = 0.01;
+  const TriangleMesh plane = shapes::grid(2);
+  const std::unique_ptr<ToleranceVolume> volume = make_volume(plane, kSmall);
+  const std::unique_ptr<ToleranceCheck> check = make_check(GetParam(), *volume);
+  // Where the points are stored, large numbers cancel under a shear, so that placing the second one may err by this
+  // share of the tolerance.
+  const auto verdict = [&](double share, const std::vector<std::uint32_t>& used) {
+    const double shear = std::round(share * kSmall / (165 * kUnitRoundoff));
+    glm::dmat4 to_world(1);
+    to_world[1].x = shear;
+    const Points points{{0.5 - 0.5 * shear, 0.5, 0.6 * kSmall}, {0.5 - 8 * shear, 8, 0}};
+    return check->check({points, StoredSpace(to_world, Storage::float64), used, 1}, {}).at(0);
+  };
+  EXPECT_EQ(verdict(0, {0, 1}), Verdict::inside);
+  EXPECT_EQ(verdict(1, {0}), Verdict::inside) << "the second point is not used";
+  EXPECT_NE(verdict(0.45, {0, 1}), Verdict::inside);
+  EXPECT_THROW(verdict(1, {0, 1}), InvalidInput);
+}
+
+TEST_P(ProvingCheck, AFarOriginCostsNothing) {
   const TriangleMesh plane = shapes::grid(2);
   const std::unique_ptr<ToleranceVolume> volume = make_volume(plane);
   const std::unique_ptr<ToleranceCheck> check = make_check(GetParam(), *volume);
   const std::vector<std::uint32_t> index{0};
-  // The point is stored so far from its origin that placing it may err by this share of the tolerance.
-  const auto verdict = [&](double share) {
-    const double far = std::round(share * kTolerance / (22 * kUnitRoundoff));
+  for (const double far : {1e5, 1e10, 1e15}) {
     glm::dmat4 to_world(1);
     to_world[3].x = far;
-    const Points points{{-far, 0.5, 0.6 * kTolerance}, {2 * far, 0, 0}};
-    return check->check({points, StoredSpace(to_world, Storage::float64), index, 1}, {}).at(0);
-  };
-  EXPECT_EQ(verdict(0), Verdict::inside);
-  EXPECT_EQ(verdict(0.01), Verdict::inside) << "the second point is not used";
-  EXPECT_NE(verdict(0.45), Verdict::inside);
-  EXPECT_THROW(verdict(1), InvalidInput);
+    const Points points{{-far, 0.5, 0.9 * kTolerance}};
+    EXPECT_EQ(check->check({points, StoredSpace(to_world, Storage::float64), index, 1}, {}).at(0), Verdict::inside);
+  }
 }
 
 TEST_P(ProvingCheck, APointFarAwayCostsTheOthersNothing) {

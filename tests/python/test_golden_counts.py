@@ -18,9 +18,8 @@ MODELS = {
     "three plates at one edge": meshes.non_manifold(),
     "needles": meshes.needles(height=1e-5),
 }
-# The counts of this model change by a tenth when the tolerance changes by one in a hundred: the mean over tolerances is
-# compared.
-SCATTERED = {"three plates at one edge": (0.98, 0.99, 1, 1.01, 1.02)}
+# These counts change by up to a tenth when the tolerance changes by one in a hundred: the mean over tolerances is compared.
+SCATTERED = (("three plates at one edge", 1), ("hill", 0.2))
 # Triangles left by fast, thorough and subset. A change that leaves fewer records its counts here. More are recorded only
 # for a new promise: those of the noisy torus, the spike, the soup and the plates are since no face may be turned over.
 COUNTS = {
@@ -43,7 +42,8 @@ def test_no_more_triangles_are_left_than_recorded(name, percent):
     vertices, triangles = MODELS[name]
     vertices = vertices.astype(np.float32)
     tolerance = percent / 100 * np.linalg.norm(np.ptp(vertices.astype(float), axis=0))
-    volumes = [tolvol.ToleranceVolume(vertices, triangles, share * tolerance) for share in SCATTERED.get(name, (1,))]
+    shares = (0.98, 0.99, 1, 1.01, 1.02) if (name, percent) in SCATTERED else (1,)
+    volumes = [tolvol.ToleranceVolume(vertices, triangles, share * tolerance) for share in shares]
 
     def left(**options):
         return np.mean([len(tolvol.decimate(vertices, triangles, volume, **options).triangles) for volume in volumes])

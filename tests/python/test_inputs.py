@@ -226,9 +226,11 @@ def test_float32_that_cannot_hold_the_tolerance():
 
 
 def test_a_tolerance_below_double_precision():
-    vertices = VERTICES + [1e12, 0, 0]
-    with pytest.raises(tolvol.InvalidInput, match="too small for double precision"):
-        tolvol.ToleranceVolume(vertices, TRIANGLES, 1e-5)
+    away = np.eye(4)
+    away[:3, 3] = 1e17
+    for tolerance, to_world in ((1e-15, None), (1e-5, away)):
+        with pytest.raises(tolvol.InvalidInput, match="too small for double precision"):
+            tolvol.ToleranceVolume(VERTICES, TRIANGLES, tolerance, to_world=to_world)
 
 
 def test_a_mesh_outside_its_reference_names_count_and_first():
@@ -259,7 +261,7 @@ REFUSED = {
     ),
     "tolerance_too_large": (lambda: tolvol.ToleranceVolume(VERTICES, TRIANGLES, 50),),
     "tolerance_too_small": (
-        lambda: tolvol.ToleranceVolume(VERTICES + [1e12, 0, 0], TRIANGLES, 1e-5),
+        lambda: tolvol.ToleranceVolume(VERTICES, TRIANGLES, 1e-15),
         lambda: tolvol.decimate(SHIFTED, TRIANGLES, tolvol.ToleranceVolume(SHIFTED, TRIANGLES, TOLERANCE)),
     ),
     "too_far": (lambda: VOLUME.distance(1e308 * VERTICES, to_world=np.diag([1e300, 1e300, 1e300, 1])),),

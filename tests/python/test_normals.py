@@ -136,6 +136,40 @@ def test_an_angle_that_the_input_exceeds_does_not_rise():
     assert after.max() <= before.max() + 0.1 and (after > 20 + ROUNDING).sum() <= normals["exceeded_after"]
 
 
+def test_a_far_origin_costs_nothing():
+    """Coordinates of a terrain are often millions of metres, in float64 arrays or behind a matrix."""
+    vertices, triangles = meshes.torus(64, 32, noise=0.002)
+    vertices = vertices.astype(np.float64)
+    tolerance = 0.01 * tolvol.diagonal(vertices, triangles)
+    count = len(decimate(vertices, triangles, tolerance).triangles)
+    for away in (1e5, 1e8, 1e11):
+        matrix = np.eye(4)
+        matrix[:3, 3] = -away
+        moved = vertices + away
+        there = decimate(moved, triangles, tolerance)
+        back = decimate(moved, triangles, tolerance, to_world=matrix)
+        for result in (there, back):
+            assert abs(len(result.triangles) / count - 1) < 0.1
+            assert 0 < result.report["normals"]["largest"] <= 90 and result.report["normals"]["unsure"] == 0
+            assert result.report["warnings"] == []
+
+
+def test_no_angle_is_kept_where_faces_are_too_small_for_the_size_of_the_reference():
+    vertices, triangles = meshes.torus(32, 16)
+    vertices = np.vstack([vertices.astype(np.float64) * 1e-6, [[1, 0, 0], [1, 1e-6, 0], [1, 0, 1e-6]]])
+    triangles = np.vstack([triangles, [np.arange(3) + len(vertices) - 3]])
+    result, free = (decimate(vertices, triangles, 1e-8, max_normal_angle=angle) for angle in (None, 180))
+    assert result.report["normals"] is None
+    assert "no angle of normals is kept" in result.report["warnings"][0]
+    assert len(result.triangles) == len(free.triangles) < len(triangles)
+
+
+def test_degenerate_faces_are_counted_as_faces_without_an_angle():
+    vertices, triangles = meshes.needles(height=1e-9)
+    result = decimate(vertices, triangles, 1e-6)
+    assert result.report["normals"]["unsure"] > 0
+
+
 def test_a_part_that_faces_the_other_way_is_compared_by_its_other_side():
     vertices, triangles = meshes.torus(48, 24)
     volume = tolvol.ToleranceVolume(vertices, triangles, 0.01 * tolvol.diagonal(vertices, triangles))

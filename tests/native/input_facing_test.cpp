@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "decimation/input_facing.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "candidates.h"
+#include "decimation/decimation_input.h"
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+/// Moves points along z so that a plate turns about the y axis through a point.
+dvec3 turned(const dvec3& p, double about, double degrees) {
+  return p + dvec3(0, 0, (p.x - about) * std::tan(glm::radians(degrees)));
+}
+
+TEST(InputFacing, AFaceKeepsTheLeastAngleThatIsProved) {
+  // Slats go through a plate, turned by 60 degrees from it. Farther below is a plate that is turned by 20.
+  const TriangleMesh plate = shapes::grid(8);
+  TriangleMesh below = plate, slats = shapes::soup(plate);
+  for (dvec3& p : below.vertices) p = turned(p, 0.5, 20) - dvec3(0, 0, 0.5);
+  for (const glm::uvec3& t : slats.triangles) {
+    const double middle = (slats.vertices[t.x].x + slats.vertices[t.y].x + slats.vertices[t.z].x) / 3;
+    for (int k = 0; k < 3; ++k) slats.vertices[t[k]] = turned(slats.vertices[t[k]], middle, 60);
+  }
+  const TriangleMesh reference = shapes::joined(below, slats);
+  const ToleranceVolume volume(reference.vertices, reference.triangles, candidates::kIdentity, 1.0);
+  DecimationOptions options;
+  options.two_sided = false, options.max_normal_angle = 10;
+  Team team(1);
+  DecimationResult report;
+  const DecimationInput input(plate.vertices, plate.triangles, candidates::kIdentity, &volume, options, team, report);
+  EXPECT_EQ(input.exceeding().size(), plate.triangles.size());
+  for (std::uint32_t t = 0; t < plate.triangles.size(); ++t) {
+    const double kept = glm::degrees(input.bounds()->certified()->rule(t).limit);
+    EXPECT_GT(kept, 19.99);
+    EXPECT_LT(kept, 21.01);
+  }
+}
+
+}  // namespace
