@@ -40,6 +40,20 @@ bool CertifiedBounds::start(std::uint32_t triangle, const glm::dvec3 (&corners)[
   return true;
 }
 
+FaceBound CertifiedBounds::prove(std::uint32_t triangle, const glm::dvec3 (&corners)[3], const PointBound (&known)[3],
+                                 double share, Search search) const {
+  std::optional<Facing> facing;
+  if (!start(triangle, corners, facing)) return {};
+  if (facing) facing->set_corners({known[0].triangle, known[1].triangle, known[2].triangle});
+  Facing* const rule = facing ? &*facing : nullptr;
+  const glm::dvec3 bounds(known[0].distance, known[1].distance, known[2].distance);
+  const TriangleCertificate certificate = forward().narrowed(share);
+  const double distance = search == Search::with_room
+                              ? certificate.bound_with_room(corners, bounds, rule)
+                              : certificate.bound_in_any_order(corners, bounds, glm::uvec3(Hierarchy::kNone), rule);
+  return {distance, facing ? facing->angle() : std::numbers::pi};
+}
+
 CertifiedBounds::Saved CertifiedBounds::save(std::span<const std::uint32_t> vertices,
                                              std::span<const std::uint32_t> faces) const {
   Saved saved;
@@ -183,26 +197,23 @@ bool CertifiedBounds::FullTrial::face_is_inside(const Change& change, std::size_
   if (element.moved == 0) return true;
   std::optional<Facing> facing;
   if (!bounds_.start(element.id, element.corners, facing)) return false;
-  const TriangleCertificate forward = bounds_.forward().narrowed(change.share(face));
+  const double limit = bounds_.forward().narrowed(change.share(face)).limit();
   // No point of the face moves farther than its moving corner, and its witness stays.
   bound.distance += element.moved;
-  if (bound.distance <= forward.limit()) {
+  if (bound.distance <= limit) {
     if (!facing) return true;
     bound.angle += turn(change, i, *facing);
     if (bound.angle <= facing->limit()) return true;
   }
   if (is_large(element)) {
     if (replaced_faces_.empty()) gather_replaced_faces(change);
-    bound = replaced_faces_.bound(element.corners, forward.limit(), facing ? &*facing : nullptr);
-    if (bound.distance <= forward.limit()) return true;
+    bound = replaced_faces_.bound(element.corners, limit, facing ? &*facing : nullptr);
+    if (bound.distance <= limit) return true;
   }
   PointBound corners[3];
   for (int k = 0; k < 3; ++k) corners[k] = bounds_.vertex_bound(face.vertices[k]);
   if (change.vertex()) corners[face.corner] = vertex_bound_;
-  if (facing) facing->set_corners({corners[0].triangle, corners[1].triangle, corners[2].triangle});
-  bound = {forward.bound_with_room(element.corners, {corners[0].distance, corners[1].distance, corners[2].distance},
-                                   facing ? &*facing : nullptr),
-           facing ? facing->angle() : std::numbers::pi};
+  bound = bounds_.prove(element.id, element.corners, corners, change.share(face), Search::with_room);
   return bound.distance != TriangleCertificate::kUnproved;
 }
 

@@ -73,6 +73,13 @@ class CertifiedBounds final : public Bounds {
   /// it. Returns false if the face would have to, but has no sure normal.
   bool start(std::uint32_t triangle, const glm::dvec3 (&corners)[3], std::optional<Facing>& facing) const;
 
+  /// How prove() searches: it may prefer to leave room below the limit for the faces to come, or search longer so that
+  /// the result does not depend on the order of the corners.
+  enum class Search { with_room, in_any_order };
+  /// Returns what can be proved of a face with these corners, of which `known` is known, below `share` of the limit.
+  FaceBound prove(std::uint32_t triangle, const glm::dvec3 (&corners)[3], const PointBound (&known)[3], double share,
+                  Search search) const;
+
   /// What is known of some vertices and faces, to go back to when the mesh does.
   struct Saved {
     std::vector<PointBound> vertices;

@@ -6,8 +6,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <numbers>
-#include <optional>
 
 namespace tolvol {
 
@@ -74,17 +72,13 @@ bool DeferredProof::faces_hold() {
     if (!changed_[i]) continue;
     const std::uint32_t f = faces_[i];
     const glm::uvec3& t = mesh_.triangle(f);
-    const TriangleCertificate forward =
-        bounds_.forward().narrowed(std::min({mesh_.share(t.x), mesh_.share(t.y), mesh_.share(t.z)}));
     const glm::dvec3 corners[3] = {mesh_.position(t.x), mesh_.position(t.y), mesh_.position(t.z)};
-    const auto &x = bounds_.vertex_bound(t.x), &y = bounds_.vertex_bound(t.y), &z = bounds_.vertex_bound(t.z);
-    std::optional<Facing> facing;
-    if (!bounds_.start(f, corners, facing)) return false;
-    if (facing) facing->set_corners({x.triangle, y.triangle, z.triangle});
-    const double distance =
-        forward.bound_with_room(corners, {x.distance, y.distance, z.distance}, facing ? &*facing : nullptr);
-    if (distance == TriangleCertificate::kUnproved) return false;
-    bounds_.note_face(f, {distance, facing ? facing->angle() : std::numbers::pi});
+    const CertifiedBounds::PointBound known[3] = {bounds_.vertex_bound(t.x), bounds_.vertex_bound(t.y),
+                                                  bounds_.vertex_bound(t.z)};
+    const double share = std::min({mesh_.share(t.x), mesh_.share(t.y), mesh_.share(t.z)});
+    const FaceBound bound = bounds_.prove(f, corners, known, share, CertifiedBounds::Search::with_room);
+    if (bound.distance == TriangleCertificate::kUnproved) return false;
+    bounds_.note_face(f, bound);
   }
   return true;
 }

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cassert>
 #include <limits>
-#include <numbers>
 
 namespace tolvol {
 namespace {
@@ -214,17 +213,11 @@ bool PatchTrial::faces_hold() {
 
 /// What can be proved of a face that has changed.
 FaceBound PatchTrial::prove(std::uint32_t face) const {
-  std::optional<Facing> facing;
-  if (!bounds_.start(elements_[face].id, elements_[face].corners, facing)) return {};
   const auto& c = patch_.faces()[face].corners;
   const auto share = [&](int k) { return patch_.vertices()[c[k]].share; };
-  const CertifiedBounds::PointBound &x = vertex_bounds_[c[0]], &y = vertex_bounds_[c[1]], &z = vertex_bounds_[c[2]];
-  if (facing) facing->set_corners({x.triangle, y.triangle, z.triangle});
-  const double distance = bounds_.forward()
-                              .narrowed(std::min({share(0), share(1), share(2)}))
-                              .bound_in_any_order(elements_[face].corners, {x.distance, y.distance, z.distance},
-                                                  glm::uvec3(Hierarchy::kNone), facing ? &*facing : nullptr);
-  return {distance, facing ? facing->angle() : std::numbers::pi};
+  const CertifiedBounds::PointBound known[3] = {vertex_bounds_[c[0]], vertex_bounds_[c[1]], vertex_bounds_[c[2]]};
+  return bounds_.prove(elements_[face].id, elements_[face].corners, known, std::min({share(0), share(1), share(2)}),
+                       CertifiedBounds::Search::in_any_order);
 }
 
 /// Adds the points of a face that are farthest from the reference, near each of its corners one, if they are beyond

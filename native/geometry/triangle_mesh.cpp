@@ -49,6 +49,15 @@ double enclosed_volume(const TriangleMesh& mesh) {
   return volume;
 }
 
+double surface_area(const TriangleMesh& mesh) {
+  double twice = 0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    const glm::dvec3 &a = mesh.vertices[t.x], &b = mesh.vertices[t.y], &c = mesh.vertices[t.z];
+    twice += glm::length(glm::cross(b - a, c - a));
+  }
+  return twice / 2;
+}
+
 std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vertices) {
   // The table uses open addressing and is at most half full.
   constexpr std::uint32_t kFree = 0xFFFFFFFFu;

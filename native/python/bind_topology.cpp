@@ -13,20 +13,14 @@
 namespace tolvol::python {
 namespace {
 
-double area_of(const TriangleMesh& mesh) {
-  double twice = 0;
-  for (const glm::uvec3& t : mesh.triangles) {
-    const glm::dvec3 &a = mesh.vertices[t.x], &b = mesh.vertices[t.y], &c = mesh.vertices[t.z];
-    twice += glm::length(glm::cross(b - a, c - a));
-  }
-  return twice / 2;
-}
-
 py::dict solidity_facts(const py::object& vertices, const py::object& triangles, const py::object& to_world,
                         std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   TriangleMesh mesh{v.values, to_triangles(triangles, "triangles")};
-  const StoredSpace space(to_matrix(to_world), v.storage);
+  // Where the mesh is in the world changes neither its area nor its volume.
+  glm::dmat4 linear = to_matrix(to_world);
+  linear[3] = {0, 0, 0, 1};
+  const StoredSpace space(linear, v.storage);
   if (!mesh.triangles.empty()) validate(mesh.vertices, mesh.triangles);
   Solidity found;
   double area = 0;
@@ -35,12 +29,15 @@ py::dict solidity_facts(const py::object& vertices, const py::object& triangles,
     const Interruptible call(progress);
     Team team(thread_count(to_threads(threads)));
     found = solidity(mesh.vertices, mesh.triangles, team);
-    // Relative to one of them, positions far from the origin lose less to rounding.
-    const glm::dvec3 first = mesh.vertices.empty() ? glm::dvec3(0) : space.world(mesh.vertices.front());
-    for (glm::dvec3& p : mesh.vertices) p = space.world(p) - first;
-    area = area_of(mesh);
+    Box world;
+    for (const glm::dvec3& p : mesh.vertices) world.add(space.world(p));
+    const Frame frame(world);
+    mesh.vertices = space.in(frame).frame(mesh.vertices);
+    // No power of the scale is formed, which could leave the range of double although the result does not.
+    const double scale = frame.scale();
+    area = surface_area(mesh) / scale / scale;
     if (found.closed() && found.oriented() && found.non_manifold_edges == 0) {
-      volume = enclosed_volume(mesh) / (space.mirrors() ? -6 : 6);
+      volume = enclosed_volume(mesh) / (space.mirrors() ? -6 : 6) / scale / scale / scale;
     }
   }
   py::dict facts;
@@ -139,8 +136,9 @@ dict
         their number
     degenerate_triangles : the number of triangles with two equal corners, which are left out of all other counts
     shells : the number of groups of triangles that hang together by edges
-    area, volume : in the units of the world. The volume is negative if the faces look inwards, and None unless the mesh
-        is closed and oriented and no edge has more than two triangles.
+    area, volume : in the units of the world, 0 or infinite beyond the range of double. The volume is negative if the
+        faces look inwards in the local space, also where the matrix mirrors them, and None unless the mesh is closed
+        and oriented and no edge has more than two triangles.
 
 Raises
 ------

@@ -10,6 +10,7 @@
 
 #include "base/call.h"
 #include "topology/manifold_cut.h"
+#include "topology/sides.h"
 
 namespace tolvol {
 namespace {

@@ -15,6 +15,7 @@
 
 #include "base/call.h"
 #include "geometry/triangle_mesh.h"
+#include "topology/sides.h"
 #include "topology/sort_by.h"
 
 namespace tolvol {
@@ -22,13 +23,8 @@ namespace {
 
 constexpr std::uint32_t kNone = CutMesh::kNone;
 
-/// A side is the edge of triangle side / 3 from corner side % 3 to the next.
-using Side = std::uint32_t;
+using Side = std::uint32_t;  // see topology/sides.h
 Side previous_corner(Side s) { return s % 3 == 0 ? s + 2 : s - 1; }
-
-std::uint64_t pair_key(std::uint32_t a, std::uint32_t b) {
-  return (static_cast<std::uint64_t>(std::min(a, b)) << 32) | std::max(a, b);
-}
 
 class Cutter {
  public:
@@ -134,28 +130,6 @@ class Cutter {
     }
   }
 
-  /// Calls visit() once for each set of sides with the same two ends, and hands it the sides in ascending order.
-  /// end_of(corner) is the vertex of a corner, a number below `vertices`.
-  template <class EndOf, class Visit>
-  void by_ends(const std::vector<Side>& sides, std::size_t vertices, EndOf&& end_of, Visit&& visit) const {
-    using Keyed = std::pair<std::uint64_t, Side>;
-    std::vector<Keyed> sorted(sides.size());
-    team_.run(sides.size(), 4096, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i)
-        sorted[i] = {pair_key(end_of(sides[i]), end_of(next_corner(sides[i]))), sides[i]};
-    });
-    sort_by(
-        sorted, vertices, team_, [](const Keyed& s) { return s.first >> 32; }, std::less<Keyed>());
-    std::vector<Side> alike;
-    for (std::size_t i = 0; i < sorted.size(); ++i) {
-      poll_at(i);
-      alike.push_back(sorted[i].second);
-      if (i + 1 < sorted.size() && sorted[i + 1].first == sorted[i].first) continue;
-      visit(alike);
-      alike.clear();
-    }
-  }
-
   void join_sides() {
     for (const bool by_position : {false, true}) {
       if (by_position && !renamed_) return;  // positions would give the same sides as indices
@@ -164,7 +138,7 @@ class Cutter {
         if (mate_[s] == kNone && !is_cut_[s]) open.push_back(s);
       }
       const auto end_of = [&](Side corner) { return by_position ? welded(corner) : vertex(corner); };
-      by_ends(open, weld_.size(), end_of, [&](const std::vector<Side>& alike) {
+      by_ends(open, weld_.size(), team_, end_of, [&](const std::vector<Side>& alike) {
         if (alike.size() == 2) {
           mate_[alike[0]] = alike[1], mate_[alike[1]] = alike[0];
           oriented_ = oriented_ && opposed(alike[0], alike[1]);
@@ -238,7 +212,7 @@ class Cutter {
     std::iota(all.begin(), all.end(), 0u);
     std::vector<std::uint32_t> offenders;
     const auto end_of = [&](Side corner) { return corner_vertex_[corner]; };
-    by_ends(all, count, end_of, [&](const std::vector<Side>& alike) {
+    by_ends(all, count, team_, end_of, [&](const std::vector<Side>& alike) {
       if (alike.size() > 2 || (alike.size() == 2 && mate_[alike[0]] != alike[1])) {
         for (const Side s : alike) offenders.push_back(s / 3);
       }
@@ -379,7 +353,7 @@ class Cutter {
       if (touched[welded(s)] && touched[welded(next_corner(s))]) sides.push_back(s);
     }
     const auto end_of = [&](Side corner) { return welded(corner); };
-    by_ends(sides, weld_.size(), end_of, [&](const std::vector<Side>& alike) {
+    by_ends(sides, weld_.size(), team_, end_of, [&](const std::vector<Side>& alike) {
       if (alike.size() == 1 || (alike.size() == 2 && mate_[alike[0]] == alike[1])) return;
       touched[welded(alike[0])] = touched[welded(next_corner(alike[0]))] = false;
     });

@@ -45,10 +45,6 @@ struct CutMesh {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 };
 
-/// Returns the next corner of the same triangle, and so the next side: a side has the number of the corner at its
-/// start.
-inline std::uint32_t next_corner(std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
-
 /// Joins triangles across edges by vertex index first and, where that leaves an edge open, by exactly equal position,
 /// so that soups and seam splits decimate without cracks while sheets that merely touch stay apart. Edges of more than
 /// two triangles are cut. O(m) expected. After A. Guéziec et al., "Cutting and stitching: converting sets of polygons

@@ -1,27 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "topology/solidity.h"
 
-#include <algorithm>
-#include <tuple>
+#include <numeric>
 #include <vector>
 
 #include "base/call.h"
 #include "base/union_find.h"
 #include "geometry/triangle_mesh.h"
-#include "topology/sort_by.h"
+#include "topology/sides.h"
 
 namespace tolvol {
-namespace {
-
-/// The edge of triangle corner / 3 from this corner to the next.
-struct Side {
-  std::uint32_t low, high;  ///< are the positions of its ends
-  std::uint32_t corner;
-};
-
-std::uint32_t next(std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
-
-}  // namespace
 
 Solidity solidity(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, Team& team) {
   Solidity found;
@@ -37,44 +25,32 @@ Solidity solidity(std::span<const glm::dvec3> vertices, std::span<const glm::uve
       at.insert(at.end(), {a, b, c});
     }
   }
-  std::vector<Side> sides(at.size());
-  for (std::uint32_t corner = 0; corner < at.size(); ++corner) {
-    poll_at(corner);
-    sides[corner] = {std::min(at[corner], at[next(corner)]), std::max(at[corner], at[next(corner)]), corner};
-  }
-  const auto key = [](const Side& s) { return std::tuple(s.low, s.high, s.corner); };
-  sort_by(
-      sides, vertices.size(), team, [](const Side& s) { return s.low; },
-      [&](const Side& a, const Side& b) { return key(a) < key(b); });
-
   UnionFind loops(vertices.size()), fans(at.size()), shells(at.size() / 3);
   std::vector<bool> on_boundary(vertices.size(), false);
-  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
-    poll_at(begin);
-    const Side& first = sides[begin];
-    while (end < sides.size() && sides[end].low == first.low && sides[end].high == first.high) ++end;
-    if (end - begin == 1) {
+  std::vector<std::uint32_t> sides(at.size());
+  std::iota(sides.begin(), sides.end(), 0u);
+  const auto end_of = [&](std::uint32_t corner) { return at[corner]; };
+  by_ends(sides, vertices.size(), team, end_of, [&](const std::vector<std::uint32_t>& alike) {
+    if (alike.size() == 1) {
+      const std::uint32_t from = at[alike[0]], to = at[next_corner(alike[0])];
       ++found.open_edges;
-      loops.join(first.low, first.high);
-      on_boundary[first.low] = true;
+      loops.join(from, to);
+      on_boundary[from] = on_boundary[to] = true;
     }
-    found.non_manifold_edges += end - begin > 2;
-    for (std::size_t i = begin + 1; i < end; ++i) {
-      const std::uint32_t a = sides[i - 1].corner, b = sides[i].corner;
+    found.non_manifold_edges += alike.size() > 2;
+    for (std::size_t i = 1; i < alike.size(); ++i) {
+      const std::uint32_t a = alike[i - 1], b = alike[i];
       const bool same_direction = at[a] == at[b];
-      found.misoriented_edges += same_direction && end - begin == 2;
-      fans.join(a, same_direction ? b : next(b));
-      fans.join(next(a), same_direction ? next(b) : b);
+      found.misoriented_edges += same_direction && alike.size() == 2;
+      fans.join(a, same_direction ? b : next_corner(b));
+      fans.join(next_corner(a), same_direction ? next_corner(b) : b);
       shells.join(a / 3, b / 3);
     }
-  }
+  });
 
-  std::vector<bool> is_counted(vertices.size(), false);
   for (std::uint32_t v = 0; v < vertices.size(); ++v) {
     poll_at(v);
-    if (!on_boundary[v] || is_counted[loops.find(v)]) continue;
-    is_counted[loops.find(v)] = true;
-    ++found.boundary_loops;
+    found.boundary_loops += on_boundary[v] && loops.find(v) == v;
   }
   std::vector<std::uint8_t> fans_at(vertices.size(), 0);
   for (std::uint32_t corner = 0; corner < at.size(); ++corner) {

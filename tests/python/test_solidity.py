@@ -23,6 +23,21 @@ def test_a_box_in_the_world():
         assert placed["volume"] == pytest.approx(24 * np.prod(size), rel=1e-6), "a mirrored body is no hollow"
 
 
+def test_area_and_volume_hold_at_any_scale_and_place():
+    vertices, triangles = meshes.box()
+    area, volume = (tolvol.solidity(vertices, triangles)[key] for key in ("area", "volume"))
+    for scale in (1e-100, 1e-6, 1e6, 1e100):
+        found = tolvol.solidity(vertices * scale, triangles)
+        assert found["area"] == pytest.approx(area * scale**2)
+        assert found["volume"] == pytest.approx(volume * scale**3)
+    away = np.eye(4)
+    away[:3, 3] = 1e200
+    placed = tolvol.solidity(vertices, triangles, to_world=away)
+    assert (placed["area"], placed["volume"]) == pytest.approx((area, volume))
+    huge = tolvol.solidity(vertices * 1e120, triangles)
+    assert huge["area"] == pytest.approx(area * 1e240) and huge["volume"] == np.inf
+
+
 def test_an_open_mesh_has_no_volume():
     vertices, triangles = meshes.plate(9)
     found = tolvol.solidity(vertices, triangles)
