@@ -30,7 +30,7 @@ def decimate_settings(options=frozenset()):
     return {
         "keep": EnumProperty(
             name="Keep",
-            description="The directions in which the tolerance has to hold",
+            description="The directions in which the tolerance has to hold, for every operation except the lattice guard",
             items=(
                 (
                     "BOTH",
@@ -42,7 +42,7 @@ def decimate_settings(options=frozenset()):
                     "ONE",
                     "One Way",
                     "Every point of the result stays within the tolerance of the reference. Parts of the reference, such "
-                    "as thin spikes, may vanish; its borders and separate pieces stay",
+                    "as thin spikes, may vanish. Decimation still keeps borders and separate pieces",
                 ),
             ),
             options=set(options),

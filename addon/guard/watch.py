@@ -41,7 +41,8 @@ def blocked(ob):
 
 
 def situation(ob):
-    """Returns a value that identifies mesh, placement, tolerance and reference. When it changes, a new watch is needed."""
+    """Returns a value that identifies mesh, placement, tolerance, directions and reference. When it changes, a new watch is
+    needed."""
     settings, key = ob.tolvol, ob.active_shape_key
     return (
         ob.as_pointer(),
@@ -49,6 +50,7 @@ def situation(ob):
         key.name if key else None,
         mesh_io.matrix_array(ob.matrix_world).tobytes(),
         tolerances.tolerance_length(settings, settings.snapshot_size),
+        settings.keep,
         (settings.snapshot.as_pointer(), settings.snapshot_fingerprint),
     )
 
@@ -62,6 +64,7 @@ def points_of(ob):
 class Faces:
     """The faces that have to stay inside in every triangulation, and the triangles that Blender shows for them."""
 
+    largest: int  # the number of corners of the largest polygon
     faces: np.ndarray  # (m, 3) or (m, 4) int32
     polygons: np.ndarray  # (m,) the polygon of each face
     shown: np.ndarray  # (k, 3) int32 triangles
@@ -89,7 +92,7 @@ class Faces:
         faces = np.concatenate(faces)
         if sizes.max() == 3:
             faces = np.ascontiguousarray(faces[:, :3])
-        return cls(faces, np.concatenate(polygons), arrays.triangles, arrays.polygons)
+        return cls(sizes.max(), faces, np.concatenate(polygons), arrays.triangles, arrays.polygons)
 
     def outside(self, built, positions, options):
         """Returns how many polygons are outside in the triangulation that Blender shows. options: of a check."""
@@ -148,7 +151,7 @@ class Watch(Preparing):
 
     def __init__(self, ob, positions, followed=False):
         super().__init__(followed)
-        self.kept_polygons = 0
+        self.remark = None  # what the guard cannot keep, or why something cannot move
         self._guard = None
         self._last = positions
         self._held = np.zeros(len(positions), bool)
@@ -160,19 +163,31 @@ class Watch(Preparing):
             self.reason = str(error)
             return
 
+        both = ob.tolvol.keep == "BOTH"
+        # A larger polygon stands for triangles that are not all there, so that they cannot be witnesses.
+        two_sided = both and faces.largest <= 4
+
         def work(progress):
             built = volumes.native_volume(reference, tolerance, threads, progress)
             options = {"to_world": matrix, "threads": threads, "progress": progress}
-            guard = native.module.Guard(positions, faces.faces, built, outside="keep", **options)
+            guard = native.module.Guard(positions, faces.faces, built, two_sided=two_sided, outside="keep", **options)
             # A concave face may be inside in its present triangulation and outside in another one. The guard keeps the
             # corners of such a face where they are.
             kept = len(np.unique(faces.polygons[guard.outside]))
-            return guard, kept and faces.outside(built, positions, options), kept
+            if kept:
+                remark = f"{kept:,} concave faces stay where they are"
+            elif guard.uncovered:
+                remark = f"{guard.uncovered:,} faces of the reference are beyond the tolerance: what is nearest stays"
+            elif both and not two_sided:
+                remark = f"One way only: a face has {faces.largest} corners. Triangulate Faces helps"
+            else:
+                remark = None
+            return guard, kept and faces.outside(built, positions, options), remark
 
         self.begin(work)
 
     def prepared(self, outcome):
-        guard, outside, self.kept_polygons = outcome
+        guard, outside, self.remark = outcome
         self.on = not outside
         if outside:
             self.reason = outside_reason(outside)
@@ -211,7 +226,7 @@ class Watch(Preparing):
         """Returns the message about the last stroke, or None."""
         if self._held.any():
             return f"Held back {self.held_back:,} vertices"
-        return f"{self.kept_polygons:,} concave faces stay where they are" if self.kept_polygons else None
+        return self.remark
 
 
 def outside_reason(count):

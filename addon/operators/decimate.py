@@ -26,7 +26,6 @@ from .blocked import allowed, decimate_blocked
 
 def draw_decimate_settings(layout, settings):
     """Draws the settings of a decimation, for the panel and for Adjust Last Operation."""
-    layout.prop(settings, "keep")
     layout.prop(settings, "effort")
     layout.prop(settings, "max_seconds")
     column = layout.column(align=True)
@@ -112,6 +111,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         column = layout.column(align=True)
         column.prop(self, "tolerance_percent" if self.tolerance_mode == "PERCENT" else "tolerance_length")
         column.prop(self, "tolerance_mode", text=" ")
+        layout.prop(self, "keep")
         draw_decimate_settings(layout, self)
         draw_protect_settings(layout, self, context.active_object)
         layout.prop(self, "outside")

@@ -62,6 +62,7 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
                 motion.volume(progress),
                 to_world=motion.surface.matrix,
                 mode=mode,
+                two_sided=motion.two_sided,
                 threads=motion.threads,
                 progress=progress,
             )

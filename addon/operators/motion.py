@@ -23,6 +23,7 @@ class Motion:
         self.reference = snapshots.reference_of(ob)
         self.size = self.reference.size()
         self.tolerance = tolerances.tolerance_length(ob.tolvol, self.size)
+        self.two_sided = ob.tolvol.keep == "BOTH"
         self.faces = mesh_io.whole_quads(ob.data, self.surface.arrays)
         self.threads = threads
         self._mesh = ob.data
@@ -38,11 +39,12 @@ class Motion:
     def hold(self, wished, progress):
         """Moves every vertex towards `wished` as far as the tolerance permits. Returns (n, 3).
 
-        Quads are within the tolerance in both triangulations.
+        Quads keep the tolerance in both triangulations.
         """
         triangles = self.surface.arrays.triangles
         held = self._constrain(wished, triangles, "error", progress)
-        # A bent quad may be outside from the start in the triangulation that Blender does not show: its corners stay.
+        # A bent quad may be beyond the tolerance from the start in the triangulation that Blender does not show: its
+        # corners stay.
         return held if self.faces is triangles else self._constrain(held, self.faces, "keep", progress)
 
     def _constrain(self, wished, faces, outside, progress):
@@ -52,6 +54,7 @@ class Motion:
             faces,
             self.volume(progress),
             to_world=self.surface.matrix,
+            two_sided=self.two_sided,
             outside=outside,
             threads=self.threads,
             progress=progress,
@@ -64,10 +67,14 @@ class Motion:
             arrays = replace(arrays, triangles=triangles)
         moved = snapshots.Surface(arrays, self.surface.matrix)
         certified = certify(moved, self.reference, self.tolerance, 0, self.threads, progress)
-        lower, upper = certified["forward"]
-        if upper > self.tolerance:
-            ends = f"between {report.percent(lower, self.size)} and {report.percent(upper, self.size)}"
-            raise NotProved(f"the result is {ends} of the size from the reference")
+        kept = {"forward": "the result is {} from the reference"}
+        if self.two_sided:
+            kept["backward"] = "the reference is {} from the result"
+        for way, said in kept.items():
+            lower, upper = certified[way]
+            if upper > self.tolerance:
+                ends = f"between {report.percent(lower, self.size)} and {report.percent(upper, self.size)} of the size"
+                raise NotProved(said.format(ends))
         return certified
 
     def settle(self, vertices, certified):

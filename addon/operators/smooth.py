@@ -134,10 +134,11 @@ class _Task:
             motion.surface.arrays.triangles,
             motion.volume(progress),
             to_world=motion.surface.matrix,
+            two_sided=motion.two_sided,
             threads=motion.threads,
             progress=progress,
             **self._options,
         )
-        # smooth() keeps quads inside in the triangulation that Blender shows; hold() keeps them inside in both.
+        # smooth() knows the triangulation of quads that Blender shows; hold() keeps the tolerance in both.
         vertices = motion.hold(smoothed.vertices, progress)
         return motion, vertices, smoothed.report, motion.certify(vertices, progress)

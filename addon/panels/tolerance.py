@@ -34,6 +34,7 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
         row.prop(settings, "tolerance_mode", text=" ")
         row.menu("TOLVOL_MT_tolerances", text="", icon="PRESET")
         right(layout, self._other_form(context, ob))
+        layout.prop(settings, "keep")
         row = layout.row(align=True)
         row.operator("tolvol.set_reference", text="Replace Reference..." if settings.snapshot else "Set Reference")
         if settings.snapshot:

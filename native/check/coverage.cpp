@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/call.h"
+#include "check/tolerance_volume.h"
 
 namespace tolvol {
 namespace {
@@ -17,8 +18,12 @@ namespace {
 constexpr double kWorthCutting = 0.25;
 // A piece shorter than this, in tolerances, is not split further.
 constexpr double kFloor = 0.1;
-// A change is refused once splitting has added this many pieces. find_witnesses() splits as many of one triangle.
+// A change is refused once splitting has added this many pieces.
 constexpr std::size_t kBudget = 1 << 12;
+// find_witnesses() looks at this many parts of one triangle, and splits a part down to the headroom below the
+// tolerance, so that it finds witnesses again for a mesh that kept within the headroom. Once a point of the triangle is
+// known to be beyond the tolerance, it goes no deeper than a change does.
+constexpr std::size_t kBudgetOfFirst = 1 << 16;
 // The budget grows by this many pieces for each piece that a change places.
 constexpr std::size_t kBudgetOfPiece = 4;
 // If there are more candidates than this, a piece looks only at the nearest.
@@ -68,6 +73,7 @@ bool Coverage::find_witnesses(std::uint32_t triangle, const Hierarchy& hierarchy
   bool all = true;
   std::vector<Part> stack{whole(triangle)};
   std::size_t looked = 0;
+  bool is_hopeless = false;
   std::uint32_t hint = Hierarchy::kNone;
   while (!stack.empty()) {
     poll();
@@ -90,8 +96,10 @@ bool Coverage::find_witnesses(std::uint32_t triangle, const Hierarchy& hierarchy
     const double radius =
         std::sqrt(std::max({glm::dot(c[0] - centre, c[0] - centre), glm::dot(c[1] - centre, c[1] - centre),
                             glm::dot(c[2] - centre, c[2] - centre)}));
-    const bool finest =
-        longest_squared(piece) <= kFloor * kFloor * limit2_ || piece.cuts == kMostCuts || ++looked > kBudget;
+    is_hopeless = is_hopeless || closest.distance > provable;
+    const double floor = (is_hopeless ? kFloor : kHeadroom) * limit_;
+    const bool finest = longest_squared(piece) <= floor * floor || piece.cuts == kMostCuts ||
+                        ++looked > (is_hopeless ? kBudget : kBudgetOfFirst);
     if (closest.distance > provable + radius || finest) {
       nearest.push_back(closest.triangle);
       all = false;
@@ -155,7 +163,8 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
     const std::uint32_t second = trial.last_;
     if (covered_by(first) || (second != first && covered_by(second))) continue;
     bool covered = false;
-    if (trial.hierarchy_) {
+    if (trial.candidates_.size() > kMany) {
+      if (!trial.hierarchy_) trial.hierarchy_.emplace(mesh_of(trial.elements_));
       const glm::dvec3 centre(points.x[3], points.y[3], points.z[3]);
       const Hierarchy::Nearest nearest = trial.hierarchy_->nearest(centre, limit_, below);
       covered = nearest.triangle != Hierarchy::kNone && covered_by(nearest.triangle);
@@ -185,7 +194,7 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   for (const Element& e : elements) {
     const List& list = lists_[e.id];
     const double distance = list.pieces.empty() ? 0 : list.distance + e.moved;
-    const bool keeps = distance <= limit_;
+    const bool keeps = e.moved == 0 || distance <= limit_;
     settled &= keeps;
     trial.candidates_.push_back({e.id, {}, keeps ? distance : 0, !keeps});
   }
@@ -202,7 +211,7 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   for (std::size_t i = 0; i < elements.size(); ++i) {
     trial.candidates_[i].witness = {elements[i].corners[0], elements[i].corners[1], elements[i].corners[2]};
   }
-  if (elements.size() > kMany) trial.hierarchy_.emplace(mesh_of(elements));
+  trial.elements_ = elements;
   thread_local std::vector<std::uint32_t> gathered;  // has a count for each triangle of the reference, 0 between calls
   if (gathered.size() < split_into_.size()) gathered.resize(split_into_.size(), 0);
   const auto for_each_split = [&](auto&& call) {

@@ -64,9 +64,19 @@ class Coverage {
   void points(std::uint32_t element, std::size_t stride, std::vector<glm::dvec3>& out) const;
   std::size_t piece_count(std::uint32_t element) const { return lists_[element].pieces.size(); }
 
+  /// Tells whether the element is still the witness of all its pieces, without a look at them, when its points move by
+  /// at most `moved`.
+  bool settles(std::uint32_t element, double moved) const {
+    return lists_[element].pieces.empty() || lists_[element].distance + moved <= limit_;
+  }
+  /// Carries out such a motion.
+  void carry(std::uint32_t element, double moved) {
+    if (!lists_[element].pieces.empty()) lists_[element].distance += moved;
+  }
+
   class Trial;
-  /// Tells whether all pieces of the elements of a change have witnesses among `elements`. Only reads: nothing changes
-  /// until commit().
+  /// Tells whether all pieces of the elements of a change have witnesses among `elements`. An element that does not
+  /// move keeps its pieces. Only reads: nothing changes until commit().
   bool try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial) const;
   /// Carries out the last change that was tried, which must have succeeded on this state.
   void commit(const Trial& trial);
@@ -139,7 +149,8 @@ class Coverage::Trial {
   std::vector<Failure> failed_;
   std::size_t most_failures_ = 0;  ///< of each element, after which the search goes on; 0 ends it at the first
   std::vector<Part> stack_;
-  std::optional<Hierarchy> hierarchy_;  ///< holds the candidates if there are too many to look at each
+  std::span<const Element> elements_;   ///< are those of the change, while it is tried
+  std::optional<Hierarchy> hierarchy_;  ///< holds the elements once there are too many candidates to look at each
   std::size_t budget_ = 0;              ///< is the number of pieces that this change may still add
   std::size_t looked_at_ = 0;
   std::uint32_t last_ = 0;         ///< is the candidate that took the last piece

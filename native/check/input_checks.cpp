@@ -25,4 +25,17 @@ void refuse_outside(std::size_t count, std::uint32_t first) {
   throw FacesOutside(count, first, text.str(), "input_outside");
 }
 
+std::string take_uncovered(const FaceCount& uncovered, Outside outside) {
+  std::ostringstream text;
+  if (outside == Outside::keep) {
+    text << uncovered.faces << " faces of the reference are partly or wholly beyond the tolerance of the mesh, as they "
+         << "were before; what is nearest to them was kept";
+    return text.str();
+  }
+  text << uncovered.faces << " faces of the reference are not within the tolerance of the mesh, the first is face "
+       << *uncovered.first << "; take a larger tolerance, set the reference anew, keep one direction only "
+       << "(two_sided=False), or go on from what there is (outside=\"keep\")";
+  throw FacesOutside(uncovered.faces, *uncovered.first, text.str(), "reference_outside");
+}
+
 }  // namespace tolvol

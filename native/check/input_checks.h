@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include "check/outside.h"
 #include "check/tolerance_volume.h"
 #include "geometry/frame.h"
 
@@ -20,5 +21,9 @@ std::optional<std::string> storage_warning(const ToleranceVolume& volume, const 
 
 /// Throws FacesOutside: faces of the input are not inside.
 [[noreturn]] void refuse_outside(std::size_t count, std::uint32_t first);
+
+/// Takes faces of the reference that are not within the tolerance of the input as `outside` says: throws FacesOutside,
+/// or returns a warning. `uncovered` must not be empty.
+std::string take_uncovered(const FaceCount& uncovered, Outside outside);
 
 }  // namespace tolvol

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "check/outside.h"
 #include "check/tolerance_volume.h"
 #include "decimation/ring_check.h"
 
@@ -17,7 +18,6 @@ namespace tolvol {
 
 struct DecimationOptions {
   enum class Placement { optimal, subset };
-  enum class Outside { error, keep };
   enum class Effort { fast, thorough };
   enum class Crossings { keep_out, allow };
 
@@ -75,10 +75,8 @@ struct DecimationResult {
     std::size_t exceeded_after = 0;   ///< How many of them are left.
   };
   std::optional<Normals> normals;
-  std::size_t outside_faces = 0;  ///< The number of input faces not within the tolerance, which are kept as they are.
-  std::optional<std::uint32_t> first_outside;
-  std::size_t uncovered_faces =
-      0;  ///< The number of reference faces with a part that was not within the tolerance of the input.
+  FaceCount outside;    ///< Input faces that are not within the tolerance and are kept as they are.
+  FaceCount uncovered;  ///< Faces of the reference that are not within the tolerance of the input.
   std::vector<std::string> warnings;
 };
 

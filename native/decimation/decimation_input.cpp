@@ -2,7 +2,6 @@
 #include "decimation/decimation_input.h"
 
 #include <algorithm>
-#include <sstream>
 #include <unordered_map>
 
 #include "base/call.h"
@@ -193,12 +192,11 @@ void DecimationInput::certify_input(const Certificate& certificate) {
       certificate.check({vertices_, space_, indices}, {options_.threads, options_.progress});
   for (std::uint32_t i = 0; i < verdicts.size(); ++i) {
     if (verdicts[i] == Verdict::inside) continue;
-    ++report_.outside_faces;
-    if (!report_.first_outside) report_.first_outside = i;
+    if (report_.outside.faces++ == 0) report_.outside.first = i;
     for (int k = 0; k < 3; ++k) pin(cut_.input_vertex[triangles_[i][k]], "outside the tolerance");
   }
-  if (report_.outside_faces && options_.outside == DecimationOptions::Outside::error) {
-    refuse_outside(report_.outside_faces, *report_.first_outside);
+  if (report_.outside.faces && options_.outside == Outside::error) {
+    refuse_outside(report_.outside.faces, *report_.outside.first);
   }
 }
 
@@ -221,28 +219,15 @@ void DecimationInput::cover(double provable) {
   }
   const Hierarchy hierarchy(elements);
   std::vector<std::uint32_t> nearest;
-  std::size_t first = 0;
-  std::size_t& uncovered = report_.uncovered_faces;
-  const std::size_t count = volume_->reference().triangles.size();
+  FaceCount& uncovered = report_.uncovered;
+  const auto count = static_cast<std::uint32_t>(volume_->reference().triangles.size());
   if (options_.progress) options_.progress->begin("comparing");
   for (std::uint32_t i = 0; i < count; ++i) {
     poll_at(i);
     if (options_.progress) options_.progress->update(static_cast<double>(i) / static_cast<double>(count));
-    if (!backward_->find_witnesses(i, hierarchy, ids, provable, nearest) && uncovered++ == 0) first = i;
+    if (!backward_->find_witnesses(i, hierarchy, ids, provable, nearest) && uncovered.faces++ == 0) uncovered.first = i;
   }
-  if (uncovered && options_.outside == DecimationOptions::Outside::error) {
-    std::ostringstream text;
-    text << uncovered << " faces of the reference are not within the tolerance of the mesh, the first is face " << first
-         << "; take a larger tolerance, set the reference anew, keep one direction only (two_sided=False), or go on "
-            "from "
-         << "what there is (outside=\"keep\")";
-    throw FacesOutside(uncovered, first, text.str(), "reference_outside");
-  }
-  if (uncovered) {
-    report_.warnings.push_back(std::to_string(uncovered) +
-                               " faces of the reference are partly or wholly beyond the tolerance of " +
-                               "the mesh, as they were before; what is nearest to them was kept");
-  }
+  if (uncovered.faces) report_.warnings.push_back(take_uncovered(uncovered, options_.outside));
   for (const std::uint32_t t : nearest) {
     for (int k = 0; k < 3; ++k) pin(elements.triangles[t][k], "outside the tolerance");
   }

@@ -3,7 +3,7 @@
 
 #include "base/call.h"
 #include "base/errors.h"
-#include "check/input_checks.h"
+#include "check/certificate.h"
 
 namespace tolvol {
 
@@ -16,14 +16,12 @@ ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const gl
   }
   const Call call(options.progress);
   PullBack pull_back(volume, space, faces, corners, before.size(), options.threads);
-  const MovingMesh::Start start = pull_back.start(before, options.progress);
+  PullBack::Start start = pull_back.start(before, {options.outside, options.two_sided}, options.progress);
   ConstrainResult result;
-  result.outside_faces = start.outside.size();
-  if (!start.outside.empty()) result.first_outside = start.outside.front();
-  if (!start.outside.empty() && options.outside == ConstrainOptions::Outside::error) {
-    refuse_outside(start.outside.size(), start.outside.front());
-  }
-  if (start.warning) result.warnings.push_back(*start.warning);
+  result.outside.faces = start.outside.size();
+  if (!start.outside.empty()) result.outside.first = start.outside.front();
+  result.uncovered = start.uncovered;
+  result.warnings = std::move(start.warnings);
   const Certificate certificate(volume);
   result.method = certificate.method(), result.renderer = certificate.renderer();
 

@@ -10,16 +10,16 @@
 #include <string>
 #include <vector>
 
+#include "check/outside.h"
 #include "check/tolerance_volume.h"
 #include "motion/pull_back.h"
 
 namespace tolvol {
 
 struct ConstrainOptions {
-  enum class Outside { error, keep };
-
   PullBack::Mode mode = PullBack::Mode::pull_back;
-  Outside outside = Outside::error;  ///< With keep, vertices of faces that are outside in `before` stay where they are.
+  bool two_sided = true;             ///< Also keeps the whole reference within the tolerance of the mesh.
+  Outside outside = Outside::error;  ///< What happens to a mesh that is not within the tolerance in `before`.
   unsigned threads = 0;              ///< 0 is one for each core. It never changes the result.
   Progress* progress = nullptr;
 };
@@ -28,10 +28,9 @@ struct ConstrainResult {
   std::vector<glm::dvec3> vertices;  ///< In stored coordinates.
   std::vector<double> factors;       ///< The share, 0 to 1, of each vertex's motion from `before` to `after`.
   std::size_t held_back = 0;         ///< The number of factors below 1.
-  std::size_t outside_faces =
-      0;  ///< The number of faces of `before` that are not within the tolerance, which are kept as they are.
-  std::optional<std::uint32_t> first_outside;
-  std::string method, renderer;  ///< The check that decided.
+  FaceCount outside;                 ///< Faces of `before` that are not within the tolerance and are kept as they are.
+  FaceCount uncovered;               ///< Faces of the reference that are not within the tolerance of `before`.
+  std::string method, renderer;      ///< The check that decided.
   std::vector<std::string> warnings;
 };
 
@@ -39,12 +38,13 @@ struct ConstrainResult {
 /// and `before` where f is 0. Every face of the result is inside as it is stored, corners with different factors
 /// included. `faces` has `corners` (1 to 4) indices for each face, as in Pieces.
 ///
-/// A vertex that touches no face that failed has factor 1. With Mode::pull_back no single factor can rise by 1/64 alone
-/// (or to 1, where that is less), and none is below that of Mode::reset, whose factors are 0 and 1.
+/// A vertex that touches no face that failed has factor 1. One-sided, with Mode::pull_back, no single factor can rise
+/// by 1/64 alone (or to 1, where that is less), and none is below that of Mode::reset, whose factors are 0 and 1.
+/// Two-sided, vertices go back farther where the reference would lose its witness, by at least 1/16 of their way.
 ///
-/// Throws InvalidInput for bad arrays, naming the first offender, for faces of `before` that are not inside (unless
-/// Outside::keep) and where the stored type cannot hold the tolerance; Cancelled. About 1 us a vertex to certify
-/// `before`; PullBack::move says what the motion costs.
+/// Throws InvalidInput for bad arrays, naming the first offender, for a mesh that is not within the tolerance in
+/// `before` (unless Outside::keep) and where the stored type cannot hold the tolerance; Cancelled. Starting costs what
+/// PullBack::start() says, and the motion what PullBack::move() says.
 ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const glm::dvec3> after,
                           std::span<const std::uint32_t> faces, int corners, const StoredSpace& space,
                           const ToleranceVolume& volume, const ConstrainOptions& options = {});

@@ -14,6 +14,8 @@
 #include "check/certificate.h"
 #include "check/input_checks.h"
 #include "motion/constrain.h"
+#include "motion/moving_coverage.h"
+#include "motion/moving_mesh.h"
 
 namespace tolvol {
 namespace {
@@ -97,7 +99,14 @@ class Deformation {
   void bound() {
     result_.method = certificate_->method(), result_.renderer = certificate_->renderer();
     warn_of_rounding();
-    if (options_.outside == DeformationOptions::Outside::keep) keep_outside();
+    if (options_.two_sided && corners_ < 3) {
+      throw InvalidInput("points and segments cannot cover a reference; keep one direction only (two_sided=False)");
+    }
+    if (options_.two_sided) {
+      start(before_);
+      if (options_.outside == Outside::error && !is_whole()) return accept_only_if_whole();
+    }
+    if (options_.outside == Outside::keep) keep_outside();
     std::vector<std::uint32_t> failing = leaving(after_);
     if (failing.empty()) {
       result_.vertices = after_;
@@ -115,32 +124,68 @@ class Deformation {
     }
   }
 
-  /// Keeps the faces that are outside to begin with as they are, and asks about them no more.
+  /// Begins to keep both directions, from this state on.
+  void start(std::span<const glm::dvec3> stored) {
+    coverage_.reset();
+    if (!mesh_) {
+      mesh_.emplace(*volume_, space_, faces_, static_cast<int>(corners_), before_.size(), options_.threads);
+    }
+    outside_ = mesh_->start(stored, options_.progress).outside;
+    coverage_.emplace(*mesh_, options_.progress);
+  }
+
+  bool is_whole() const { return outside_.empty() && coverage_->uncovered().faces == 0; }
+
+  /// A mesh that is not within the tolerance to begin with may be brought there as a whole, but not halfway.
+  void accept_only_if_whole() {
+    const std::vector<std::uint32_t> outside = outside_;
+    const FaceCount uncovered = coverage_->uncovered();
+    start(after_);
+    if (is_whole()) {
+      result_.vertices = after_;
+      return;
+    }
+    if (!outside.empty()) refuse_outside(outside.size(), outside.front());
+    take_uncovered(uncovered, Outside::error);
+  }
+
+  /// Keeps the faces that are outside to begin with as they are, and asks about them no more. Two-sided, it also keeps
+  /// what is nearest to uncovered parts of the reference.
   void keep_outside() {
-    const std::vector<std::uint32_t> outside = not_inside(before_, faces_);
-    if (outside.empty()) return;
-    result_.outside = {outside.size(), outside.front()};
-    kept_.assign(faces_.size() / corners_, false);
+    const std::vector<std::uint32_t> outside = options_.two_sided ? outside_ : not_inside(before_, faces_);
+    const auto keep = [&](std::uint32_t v) {
+      result_.held_back += after_[v] != before_[v];
+      after_[v] = before_[v];
+    };
+    if (!outside.empty()) {
+      result_.outside = {outside.size(), outside.front()};
+      kept_.assign(faces_.size() / corners_, false);
+    }
     for (const std::uint32_t face : outside) {
       kept_[face] = true;
-      for (const std::uint32_t v : corners_of(face)) {
-        result_.held_back += after_[v] != before_[v];
-        after_[v] = before_[v];
-      }
+      for (const std::uint32_t v : corners_of(face)) keep(v);
+    }
+    if (!options_.two_sided) return;
+    result_.uncovered = coverage_->uncovered();
+    if (!result_.uncovered.faces) return;
+    result_.warnings.push_back(take_uncovered(result_.uncovered, Outside::keep));
+    for (std::uint32_t v = 0; v < after_.size(); ++v) {
+      if (mesh_->frozen(v)) keep(v);
     }
   }
 
   void pull_back() {
     result_.permitted_fraction = std::nullopt;
     ConstrainOptions options;
-    if (options_.outside == DeformationOptions::Outside::keep) options.outside = ConstrainOptions::Outside::keep;
+    if (options_.outside == Outside::keep) options.outside = Outside::keep;
+    options.two_sided = options_.two_sided;
     options.threads = options_.threads, options.progress = options_.progress;
     result_.vertices =
         constrain(before_, after_, faces_, static_cast<int>(corners_), space_, *volume_, options).vertices;
   }
 
   void search(std::vector<std::uint32_t> failing) {
-    if (options_.outside == DeformationOptions::Outside::error) {
+    if (options_.outside == Outside::error) {
       const std::vector<std::uint32_t> outside = not_inside(before_, faces_);
       if (!outside.empty()) refuse_outside(outside.size(), outside.front());
     }
@@ -206,11 +251,19 @@ class Deformation {
     return result;
   }
 
-  /// All faces that are not certified to be inside, except for the kept ones.
-  std::vector<std::uint32_t> leaving(std::span<const glm::dvec3> stored) const {
+  /// All faces that are not certified to be inside, except for the kept ones; if there are none, two-sided, faces that
+  /// a part of the reference would lose.
+  std::vector<std::uint32_t> leaving(std::span<const glm::dvec3> stored) {
     std::vector<std::uint32_t> result = not_inside(stored, faces_);
     if (!kept_.empty()) std::erase_if(result, [&](std::uint32_t face) { return kept_[face]; });
-    return result;
+    if (!result.empty() || !coverage_) return result;
+    std::vector<std::uint32_t> moving;
+    std::vector<glm::dvec3> from, to;
+    for (std::uint32_t v = 0; v < before_.size(); ++v) {
+      if (after_[v] != before_[v]) moving.push_back(v), from.push_back(before_[v]), to.push_back(stored[v]);
+    }
+    mesh_->try_all(moving, from, to);
+    return coverage_->failing(mesh_->faces_around(moving));
   }
 
   std::span<const glm::dvec3> before_;
@@ -221,6 +274,9 @@ class Deformation {
   const LatticeDeformation& lattice_;
   const DeformationOptions& options_;
   std::optional<Certificate> certificate_;
+  std::optional<MovingMesh> mesh_;  // These two are empty if only the forward direction is kept.
+  std::optional<MovingCoverage> coverage_;
+  std::vector<std::uint32_t> outside_;  // The faces that were outside when mesh_ started.
   std::vector<glm::dvec3> after_;
   std::vector<bool> kept_;  // For each face; empty if none is kept.
   DeformationResult result_;

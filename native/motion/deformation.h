@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "check/outside.h"
 #include "check/tolerance_volume.h"
 #include "motion/lattice.h"
 
@@ -22,19 +23,12 @@ struct DeformationOptions {
     farthest,   ///< Everything goes the same share of its way, the permitted fraction.
     pull_back,  ///< Each vertex goes as far as it may, see constrain.h.
   };
-  enum class Outside { error, keep };
 
   Mode mode = Mode::blocked;
-  Outside outside =
-      Outside::error;    ///< With keep, vertices of faces that are outside to begin with stay where they are.
-  unsigned threads = 0;  ///< 0 is one for each core. It never changes the result.
+  bool two_sided = true;             ///< Also keeps the whole reference within the tolerance of the mesh.
+  Outside outside = Outside::error;  ///< What happens to a mesh that is not within the tolerance to begin with.
+  unsigned threads = 0;              ///< 0 is one for each core. It never changes the result.
   Progress* progress = nullptr;
-};
-
-/// The number of some faces, and the first of them.
-struct FaceCount {
-  std::size_t faces = 0;
-  std::optional<std::uint32_t> first;
 };
 
 struct DeformationResult {
@@ -43,8 +37,11 @@ struct DeformationResult {
   /// not looked for when vertices are pulled back. Bisection finds it to a thousandth: a larger share may be inside as
   /// well, and smaller shares were not looked at.
   std::optional<double> permitted_fraction = 1;
-  FaceCount leaving;  ///< Faces that the deformation as wished would not leave certified to be inside.
-  FaceCount outside;  ///< Faces that are outside to begin with, which are kept as they are.
+  /// Faces that the deformation as wished would not leave certified to be inside or, if there are none, some that it
+  /// would take from a part of the reference that has no other face within the tolerance.
+  FaceCount leaving;
+  FaceCount outside;    ///< Faces that are outside to begin with, which are kept as they are.
+  FaceCount uncovered;  ///< Faces of the reference that are not within the tolerance of the mesh to begin with.
   std::size_t outside_lattice =
       0;                         ///< The number of vertices not in the box of the lattice, which stay where they are.
   std::size_t moved = 0;         ///< The number of vertices of the result that are not where they were.
@@ -55,10 +52,11 @@ struct DeformationResult {
 };
 
 /// `faces` has `corners` (1 to 4) indices for each face; without a volume it may be empty. Without a volume there is no
-/// tolerance. All faces of the result are inside, except for the faces that are kept. Throws InvalidInput for bad
-/// arrays, for a mesh that is outside to begin with (unless Outside::keep, or the deformation brings it inside), and
-/// where the stored type cannot hold the tolerance; Cancelled. It takes about 0.4 us a vertex, and with a volume the
-/// time of one check; where that check fails, of about twelve checks or of constrain().
+/// tolerance. All faces of the result are inside, and two-sided the reference is covered, except for what is kept.
+/// Throws InvalidInput for bad arrays, for a mesh that is not within the tolerance to begin with (unless Outside::keep,
+/// or the deformation brings it there), and where the stored type cannot hold the tolerance; Cancelled. It takes about
+/// 0.4 us a vertex, and with a volume the time of one check, two-sided also of PullBack::start(); where that check
+/// fails, of about twelve checks or of constrain().
 DeformationResult deform(std::span<const glm::dvec3> vertices, std::span<const std::uint32_t> faces, int corners,
                          const StoredSpace& space, const ToleranceVolume* volume, const LatticeDeformation& lattice,
                          const DeformationOptions& options);

@@ -7,7 +7,6 @@
 #include "base/call.h"
 #include "base/errors.h"
 #include "base/parallel.h"
-#include "check/input_checks.h"
 
 namespace tolvol {
 namespace {
@@ -43,12 +42,7 @@ void Guard::begin(std::span<const float> positions, Progress* progress) {
   const Call call(progress);
   std::vector<glm::dvec3> stored(positions.size() / 3);
   for (std::size_t v = 0; v < stored.size(); ++v) stored[v] = at(positions, v);
-  MovingMesh::Start start = pull_back_.start(stored, progress);
-  if (!start.outside.empty() && options_.outside == ConstrainOptions::Outside::error) {
-    refuse_outside(start.outside.size(), start.outside.front());
-  }
-  outside_ = std::move(start.outside);
-  warning_ = std::move(start.warning);
+  start_ = pull_back_.start(stored, {options_.outside, options_.two_sided}, progress);
   last_.assign(positions.begin(), positions.end());
 }
 

@@ -19,9 +19,10 @@ namespace tolvol {
 class Guard {
  public:
   struct Options {
-    ConstrainOptions::Outside outside = ConstrainOptions::Outside::error;  ///< See ConstrainOptions.
-    unsigned threads = 0;                                                  ///< 0 is one for each core.
-    Progress* progress = nullptr;                                          ///< The progress of the construction alone.
+    Outside outside = Outside::error;  ///< See ConstrainOptions.
+    bool two_sided = true;             ///< See ConstrainOptions.
+    unsigned threads = 0;              ///< 0 is one for each core.
+    Progress* progress = nullptr;      ///< The progress of the construction alone.
   };
 
   /// The vertices that constrain() moved back, ascending, and their new positions, three coordinates each.
@@ -48,8 +49,7 @@ class Guard {
   void reset(std::span<const float> positions, Progress* progress = nullptr);
 
   std::size_t vertex_count() const { return last_.size() / 3; }
-  const std::vector<std::uint32_t>& outside() const { return outside_; }  ///< The faces that were outside at the start.
-  const std::optional<std::string>& warning() const { return warning_; }  ///< The storage_warning() at the start.
+  const PullBack::Start& start() const { return start_; }  ///< What the last start found.
 
  private:
   void begin(std::span<const float> positions, Progress* progress);
@@ -61,8 +61,7 @@ class Guard {
   std::vector<float> last_;  // The state, as it is stored.
   Options options_;
   PullBack pull_back_;
-  std::vector<std::uint32_t> outside_;
-  std::optional<std::string> warning_;
+  PullBack::Start start_;
 };
 
 }  // namespace tolvol

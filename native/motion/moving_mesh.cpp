@@ -146,7 +146,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress
   trial_ = state_;
   if (!refusals_.empty()) refusals_.assign(stored.size(), {});
   step_.assign(stored.size(), 0);
-  frozen_.assign(stored.size(), false);
+  frozen_.assign(stored.size(), false), any_frozen_ = false;
   const std::size_t count = faces_.size() / corners_;
   reach_.assign(count, 0);
   trial_reach_.assign(count, 0);
@@ -168,13 +168,11 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, Progress
   });
   result.outside = chosen(open, outside);
   for (const std::uint32_t f : result.outside) {
-    for (const std::uint32_t v : corners_of(f)) frozen_[v] = true;
+    for (const std::uint32_t v : corners_of(f)) freeze(v);
   }
-  any_frozen_ = !result.outside.empty();
   return result;
 }
 
-/// Whether the face equals the reference's face of this number.
 bool MovingMesh::is_own(std::uint32_t face) const {
   const TriangleMesh& reference = volume_->reference();
   if (corners_ != 3 || face >= reference.triangles.size()) return false;

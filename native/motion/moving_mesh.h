@@ -63,6 +63,7 @@ class MovingMesh {
   void accept(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces);
 
   const glm::dvec3& state(std::uint32_t vertex) const { return state_[vertex].at; }
+  const glm::dvec3& trial(std::uint32_t vertex) const { return trial_[vertex].at; }
   /// From now on, keeps in mind where vertices were refused: 64 bytes a vertex, for those who push the same ones
   /// against the limit again and again. It saves searches and changes no answer.
   void remember_refusals() { refusals_.resize(state_.size()); }
@@ -80,11 +81,19 @@ class MovingMesh {
   double step(std::uint32_t vertex) const { return step_[vertex]; }  ///< The length from state to trial.
   bool frozen(std::uint32_t vertex) const { return frozen_[vertex]; }
   bool any_frozen() const { return any_frozen_; }
+  /// The vertex never moves from now on.
+  void freeze(std::uint32_t vertex) { frozen_[vertex] = any_frozen_ = true; }
+  double provable() const { return provable_; }
   double limit() const { return limit_; }  ///< The provable distance less a headroom.
   const ToleranceVolume& volume() const { return *volume_; }
   const StoredSpace& space() const { return space_; }
   unsigned threads() const { return threads_; }
 
+  std::size_t vertex_count() const { return state_.size(); }
+  std::size_t face_count() const { return faces_.size() / corners_; }
+  int corners() const { return static_cast<int>(corners_); }
+  /// Whether the face equals the reference's face of this number in the state.
+  bool is_own(std::uint32_t face) const;
   std::span<const std::uint32_t> corners_of(std::uint32_t face) const {
     return faces_.subspan(std::size_t{face} * corners_, corners_);
   }
@@ -112,7 +121,6 @@ class MovingMesh {
 
   void make_rings(std::size_t vertex_count);
   void set_trial(std::uint32_t vertex, const VertexState& state);
-  bool is_own(std::uint32_t face) const;
   double reach_by_motion(std::uint32_t face) const;
   template <class Bound>
   double over_triangulations(std::uint32_t face, Bound&& bound) const;

@@ -5,6 +5,9 @@
 // far as they would be inside alone, and go back by shares in rounds while faces fail, at the worst to step (1). (3)
 // One after the other, they go forward again as far as the faces around them let them; vertices that share no face are
 // taken at the same time, a colour of them after the other, so that the result does not depend on threads.
+//
+// Two-sided there is a fourth step: while the reference would lose faces as witnesses, their vertices go back, by a
+// small share of the way first. In the state itself the reference loses nothing, so that this comes to an end.
 #include "motion/pull_back.h"
 
 #include <algorithm>
@@ -12,7 +15,10 @@
 #include <stdexcept>
 #include <utility>
 
+#include "base/errors.h"
 #include "base/parallel.h"
+#include "check/input_checks.h"
+#include "motion/moving_coverage.h"
 
 namespace tolvol {
 namespace {
@@ -23,6 +29,9 @@ constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 constexpr double kRise = 1.0 / 64;
 /// A factor shrinks to this share in each round in which a face of the vertex fails.
 constexpr double kShrink = 0.5;
+/// Where the reference would lose a witness, a factor shrinks by this share first, then by twice the share each time,
+/// and after half of it by kShrink.
+constexpr double kRetreat = 1.0 / 16;
 /// The share of the provable distance at which vertices are put first, because parts of a quarter of the tolerance
 /// prove a face there.
 constexpr double kComfort = 0.97;
@@ -42,9 +51,25 @@ PullBack::PullBack(const ToleranceVolume& volume, const StoredSpace& space, std:
                    int corners, std::size_t vertex_count, unsigned threads)
     : mesh_(volume, space, faces, corners, vertex_count, threads), held_index_(vertex_count, kNone) {}
 
-MovingMesh::Start PullBack::start(std::span<const glm::dvec3> stored, Progress* progress) {
+PullBack::~PullBack() = default;
+
+PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, const StartOptions& options, Progress* progress) {
+  if (options.two_sided && mesh_.corners() < 3) {
+    throw InvalidInput("points and segments cannot cover a reference; keep one direction only (two_sided=False)");
+  }
   held_index_.assign(stored.size(), kNone);
-  return mesh_.start(stored, progress);
+  coverage_.reset();
+  MovingMesh::Start start = mesh_.start(stored, progress);
+  if (!start.outside.empty() && options.outside == Outside::error) {
+    refuse_outside(start.outside.size(), start.outside.front());
+  }
+  Start result{std::move(start.outside), {}, {}};
+  if (start.warning) result.warnings.push_back(*start.warning);
+  if (!options.two_sided) return result;
+  coverage_ = std::make_unique<MovingCoverage>(mesh_, progress);
+  result.uncovered = coverage_->uncovered();
+  if (result.uncovered.faces) result.warnings.push_back(take_uncovered(result.uncovered, options.outside));
+  return result;
 }
 
 PullBack::Moving PullBack::moving(std::vector<std::uint32_t> vertices) {
@@ -56,37 +81,48 @@ PullBack::Moving PullBack::moving(std::vector<std::uint32_t> vertices) {
 PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3> before,
                                 std::span<const glm::dvec3> after, Mode mode, Progress* progress) {
   const std::vector<std::uint32_t>& vertices = moving.vertices;
+  const Wish wish{moving, before, after};
   mesh_.try_all(vertices, before, after);
   Result result{std::vector<double>(vertices.size(), 1), {after.begin(), after.end()}, 0};
   if (mode == Mode::settle) mesh_.remember_refusals();
   std::vector<std::uint32_t> failed = mesh_.failing(moving.faces, progress);
+  std::vector<Held> held;
   if (!failed.empty()) {
-    std::vector<Held> held = hold(moving, before, after, std::move(failed), progress);
+    held = hold(wish, std::move(failed), progress);
     if (mode != Mode::reset) {
       pull(held, mode, progress);
       if (mode != Mode::halve) let_go(held, mode, progress);
     }
-    for (const Held& h : held) {
-      const auto place = std::lower_bound(vertices.begin(), vertices.end(), h.vertex) - vertices.begin();
-      result.factors[place] = h.factor;
-      result.reached[place] = stored_at(h, h.factor);
-      result.held_back += h.factor < 1;
-      held_index_[h.vertex] = kNone;
-    }
+  }
+  if (coverage_) cover(held, wish, mode, progress);
+  for (const Held& h : held) {
+    const auto place = std::lower_bound(vertices.begin(), vertices.end(), h.vertex) - vertices.begin();
+    result.factors[place] = h.factor;
+    result.reached[place] = stored_at(h, h.factor);
+    result.held_back += h.factor < 1;
+    held_index_[h.vertex] = kNone;
   }
   for (std::size_t i = 0; mesh_.any_frozen() && i < vertices.size(); ++i) {
     if (!mesh_.frozen(vertices[i])) continue;
     result.factors[i] = 0, result.reached[i] = before[i];
     ++result.held_back;
   }
+  if (coverage_) coverage_->accept(moving.faces);
   mesh_.accept(vertices, moving.faces);
   return result;
 }
 
+/// Puts a moving vertex among those that are held.
+PullBack::Held& PullBack::hold(std::uint32_t vertex, const Wish& wish, std::vector<Held>& held) {
+  const std::vector<std::uint32_t>& vertices = wish.moving.vertices;
+  const auto place = std::lower_bound(vertices.begin(), vertices.end(), vertex) - vertices.begin();
+  held_index_[vertex] = static_cast<std::uint32_t>(held.size());
+  held.push_back({vertex, wish.before[place], wish.after[place], mesh_.bound_of_trial(vertex), mesh_.step(vertex)});
+  return held.back();
+}
+
 /// Does step (1). It ends, because a face that fails has a corner away from the state, in which it did not fail.
-std::vector<PullBack::Held> PullBack::hold(const Moving& moving, std::span<const glm::dvec3> before,
-                                           std::span<const glm::dvec3> after, std::vector<std::uint32_t> failed,
-                                           Progress* progress) {
+std::vector<PullBack::Held> PullBack::hold(const Wish& wish, std::vector<std::uint32_t> failed, Progress* progress) {
   std::vector<Held> held;
   std::vector<std::uint32_t> back;
   for (; !failed.empty(); failed = mesh_.failing(mesh_.faces_around(back), progress)) {
@@ -94,9 +130,7 @@ std::vector<PullBack::Held> PullBack::hold(const Moving& moving, std::span<const
     for (const std::uint32_t f : failed) {
       for (const std::uint32_t v : mesh_.corners_of(f)) {
         if (mesh_.step(v) == 0) continue;
-        const auto place =
-            std::lower_bound(moving.vertices.begin(), moving.vertices.end(), v) - moving.vertices.begin();
-        held.push_back({v, before[place], after[place], mesh_.bound_of_trial(v), mesh_.step(v)});
+        hold(v, wish, held);
         mesh_.take_back(v);
         back.push_back(v);
       }
@@ -305,6 +339,45 @@ void PullBack::raise(Held& held, Mode mode, bool search) {
     if (!attempt(held, std::min(1.0, held.factor + step))) return;
     search = true;
   }
+}
+
+/// Does step (4). It ends, because a vertex is back in the state after a few rounds in which a face of it fails. It
+/// goes back from its wish if no step before has held it.
+void PullBack::cover(std::vector<Held>& held, const Wish& wish, Mode mode, Progress* progress) {
+  std::vector<std::uint32_t> changed, lost;
+  for (;;) {
+    // A face may fail because some of its corners went back and others did not.
+    std::vector<std::uint32_t> failed = mesh_.failing(mesh_.faces_around(changed), progress);
+    if (failed.empty() && !lost.empty()) failed = lost = coverage_->still_failing(lost);
+    if (failed.empty()) failed = lost = coverage_->failing(wish.moving.faces);
+    if (failed.empty()) return;
+    changed.clear();
+    for (const std::uint32_t f : failed) {
+      for (const std::uint32_t v : mesh_.corners_of(f)) {
+        if (mesh_.step(v) == 0) continue;
+        if (held_index_[v] == kNone) hold(v, wish, held).factor = 1;
+        changed.push_back(v);
+      }
+    }
+    if (changed.empty()) throw std::logic_error("the reference would lose a face that does not move");
+    std::sort(changed.begin(), changed.end());
+    changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
+    for (const std::uint32_t v : changed) retreat(held[held_index_[v]], mode);
+  }
+}
+
+void PullBack::retreat(Held& held, Mode mode) {
+  if (held.retreat == 0) held.factor_before = held.factor;
+  if (mode == Mode::reset) {
+    held.factor = 0;
+  } else if (held.retreat < kShrink) {
+    held.retreat = held.retreat == 0 ? kRetreat : 2 * held.retreat;
+    held.factor = held.factor_before * (1 - held.retreat);
+  } else {
+    held.factor *= kShrink;
+  }
+  if (held.factor < little(held)) held.factor = 0;
+  held.factor > 0 ? place(held, {held.factor, {}}) : mesh_.take_back(held.vertex);
 }
 
 }  // namespace tolvol

@@ -1,16 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Keeps a moving mesh inside a tolerance volume: vertices of faces that would leave it are pulled back along their
-/// motion. constrain(), Guard and smooth() share it. It keeps the state from one motion to the next.
+/// Keeps a moving mesh inside a tolerance volume, and its reference within the tolerance of it: vertices of faces that
+/// would leave the volume, or leave a part of the reference without a witness, are pulled back along their motion.
+/// constrain(), Guard and smooth() share it. It keeps the state from one motion to the next.
 #pragma once
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "check/outside.h"
 #include "motion/moving_mesh.h"
 
 namespace tolvol {
+
+class MovingCoverage;
 
 class PullBack {
  public:
@@ -35,15 +41,32 @@ class PullBack {
   /// Has the parameters of MovingMesh.
   PullBack(const ToleranceVolume& volume, const StoredSpace& space, std::span<const std::uint32_t> faces, int corners,
            std::size_t vertex_count, unsigned threads);
-  /// Does what MovingMesh::start() does.
-  MovingMesh::Start start(std::span<const glm::dvec3> stored, Progress* progress);
+  ~PullBack();
+  PullBack(const PullBack&) = delete;
+  PullBack& operator=(const PullBack&) = delete;
+
+  struct StartOptions {
+    Outside outside = Outside::error;
+    bool two_sided = true;  ///< Keeps the backward direction, too: see MovingCoverage.
+  };
+  /// What the state is short of, and will be after any motion.
+  struct Start {
+    std::vector<std::uint32_t> outside;  ///< Faces that are not proved inside, ascending. Their vertices never move.
+    FaceCount uncovered;  ///< Faces of the reference that are not covered. What is nearest to them never moves.
+    std::vector<std::string> warnings;
+  };
+  /// Takes the stored positions as the state. Throws what MovingMesh::start() throws, FacesOutside as the options say,
+  /// and InvalidInput for two_sided where the faces have fewer than 3 corners. About 1 us a vertex and, two-sided, 2 us
+  /// a face of the reference; nothing for faces of the reference itself.
+  Start start(std::span<const glm::dvec3> stored, const StartOptions& options, Progress* progress);
+  bool frozen(std::uint32_t vertex) const { return mesh_.frozen(vertex); }
 
   Moving moving(std::vector<std::uint32_t> vertices);
 
   /// Moves each vertex from `before`, its stored position now, towards `after`, and makes where it ends the new state.
-  /// All faces of the new state are inside; see constrain.h for what else holds of the factors. Throws InvalidInput,
-  /// changing nothing, for a wish that is not finite. After Cancelled only start() may be called. A settled face
-  /// costs about 10 ns, and a face near the tolerance about 1 us for each try.
+  /// All faces of the new state are inside, and the reference is covered; see constrain.h for what else holds of the
+  /// factors. Throws InvalidInput, changing nothing, for a wish that is not finite. After Cancelled only start() may be
+  /// called. A settled face costs about 10 ns, and a face near the tolerance about 1 us for each try.
   Result move(const Moving& moving, std::span<const glm::dvec3> before, std::span<const glm::dvec3> after, Mode mode,
               Progress* progress);
 
@@ -58,7 +81,9 @@ class PullBack {
     /// About the factor at which the vertex itself leaves the volume, 1 only if it does not leave it. In Mode::settle,
     /// the factor that it is to reach.
     double largest_factor = 1;
-    std::uint32_t blame = 0;  ///< The place in the vertex's ring of the face that refused last.
+    double retreat = 0;        ///< The share of `factor_before` by which it went back for the reference.
+    double factor_before = 0;  ///< The factor before it did.
+    std::uint32_t blame = 0;   ///< The place in the vertex's ring of the face that refused last.
     std::uint32_t colour = 0;
   };
 
@@ -68,10 +93,16 @@ class PullBack {
     MovingMesh::PointBound bound;
   };
 
+  /// A motion as move() is asked for it.
+  struct Wish {
+    const Moving& moving;
+    std::span<const glm::dvec3> before, after;
+  };
+
   glm::dvec3 stored_at(const Held& held, double factor) const;
   void place(Held& held, const Along& along);
-  std::vector<Held> hold(const Moving& moving, std::span<const glm::dvec3> before, std::span<const glm::dvec3> after,
-                         std::vector<std::uint32_t> failed, Progress* progress);
+  Held& hold(std::uint32_t vertex, const Wish& wish, std::vector<Held>& held);
+  std::vector<Held> hold(const Wish& wish, std::vector<std::uint32_t> failed, Progress* progress);
   Along along(const Held& held, double factor, std::uint32_t hint) const;
   Along crossing(const Held& held, double target, Along inner, Along outer) const;
   void release(Held& held, Mode mode);
@@ -83,9 +114,12 @@ class PullBack {
   double little(const Held& held) const;
   void raise(Held& held, Mode mode, bool search);
   bool attempt(Held& held, double factor);
+  void cover(std::vector<Held>& held, const Wish& wish, Mode mode, Progress* progress);
+  void retreat(Held& held, Mode mode);
 
   MovingMesh mesh_;
-  std::vector<std::uint32_t> held_index_;  // For each vertex: its place among the held ones, or kNone.
+  std::unique_ptr<MovingCoverage> coverage_;  // Null if only the forward direction is kept.
+  std::vector<std::uint32_t> held_index_;     // For each vertex: its place among the held ones, or kNone.
 };
 
 }  // namespace tolvol

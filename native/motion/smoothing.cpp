@@ -17,7 +17,6 @@
 #include "base/errors.h"
 #include "base/parallel.h"
 #include "check/certificate.h"
-#include "check/input_checks.h"
 
 namespace tolvol {
 namespace {
@@ -155,18 +154,14 @@ class Smoothing {
   void start_pull_back() {
     for (const glm::uvec3& t : triangles_) faces_.insert(faces_.end(), {t.x, t.y, t.z});
     pull_back_ = std::make_unique<PullBack>(*volume_, space_, faces_, 3, positions_.size(), options_.threads);
-    const MovingMesh::Start start = pull_back_->start(positions_, options_.progress);
-    result_.outside_faces = start.outside.size();
-    if (!start.outside.empty()) {
-      if (options_.outside == ConstrainOptions::Outside::error) {
-        refuse_outside(start.outside.size(), start.outside.front());
-      }
-      result_.first_outside = start.outside.front();
-      for (const std::uint32_t f : start.outside) {
-        for (int k = 0; k < 3; ++k) strength_[triangles_[f][k]] = 0;
-      }
+    PullBack::Start start = pull_back_->start(positions_, {options_.outside, options_.two_sided}, options_.progress);
+    result_.outside.faces = start.outside.size();
+    if (!start.outside.empty()) result_.outside.first = start.outside.front();
+    result_.uncovered = start.uncovered;
+    result_.warnings = std::move(start.warnings);
+    for (std::uint32_t v = 0; v < strength_.size(); ++v) {
+      if (pull_back_->frozen(v)) strength_[v] = 0;
     }
-    if (start.warning) result_.warnings.push_back(*start.warning);
     const Certificate certificate(*volume_);
     result_.method = certificate.method(), result_.renderer = certificate.renderer();
   }

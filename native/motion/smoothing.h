@@ -29,8 +29,9 @@ struct SmoothingOptions {
   std::span<const double> strength = {};  ///< For each vertex, or empty: the share, 0 to 1, of a full step.
   bool reset =
       false;  ///< a vertex that would leave the tolerance stays for this iteration, instead of being pulled back
-  ConstrainOptions::Outside outside = ConstrainOptions::Outside::error;  ///< With keep, vertices of such faces stay.
-  unsigned threads = 0;  ///< 0 is one for each core. It never changes the result.
+  bool two_sided = true;             ///< Also keeps the whole reference within the tolerance of the mesh.
+  Outside outside = Outside::error;  ///< What happens to a mesh that is not within the tolerance.
+  unsigned threads = 0;              ///< 0 is one for each core. It never changes the result.
   Progress* progress = nullptr;
 };
 
@@ -41,10 +42,9 @@ struct SmoothingResult {
   std::size_t welded = 0;              ///< The number of vertices treated as one with an earlier one at the same place.
   std::size_t fixed_boundary = 0;      ///< The number of vertices that stay because they are on the boundary.
   std::size_t fixed_non_manifold = 0;  ///< The number that stay because an edge there has more than two faces.
-  std::size_t outside_faces =
-      0;  ///< The number of input faces that are not within the tolerance, which are kept as they are.
-  std::optional<std::uint32_t> first_outside;
-  std::string method, renderer;  ///< The check that decided; empty without a volume.
+  FaceCount outside;                   ///< Input faces that are not within the tolerance and are kept as they are.
+  FaceCount uncovered;                 ///< Faces of the reference that are not within the tolerance of the input.
+  std::string method, renderer;        ///< The check that decided; empty without a volume.
   std::vector<std::string> warnings;
 };
 

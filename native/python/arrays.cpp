@@ -131,6 +131,20 @@ glm::dmat4 to_matrix(const py::object& object, const std::string& name) {
   return result;
 }
 
+Outside to_outside(const std::string& outside) {
+  if (outside == "error") return Outside::error;
+  if (outside == "keep") return Outside::keep;
+  throw InvalidInput("outside must be \"error\" or \"keep\", not \"" + outside + "\"");
+}
+
+py::dict from_outside(const FaceCount& outside, const FaceCount& uncovered) {
+  py::dict entry;
+  entry["faces"] = outside.faces;
+  entry["first"] = outside.first ? py::object(py::int_(*outside.first)) : py::object(py::none());
+  entry["reference_faces"] = uncovered.faces;
+  return entry;
+}
+
 py::array from_vertices(const std::vector<glm::dvec3>& values, Storage storage) {
   const auto fill = [&](auto array) -> py::array {
     auto view = array.template mutable_unchecked<2>();

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/errors.h"
+#include "check/outside.h"
 #include "geometry/frame.h"
 
 namespace tolvol::python {
@@ -43,6 +44,11 @@ py::array_t<T, py::array::c_style> to_values(const py::object& array, const char
   }
   return py::array_t<T, py::array::c_style>(py::reinterpret_borrow<py::array>(array));
 }
+
+Outside to_outside(const std::string& outside);
+
+/// The entry "outside" of a report.
+py::dict from_outside(const FaceCount& outside, const FaceCount& uncovered);
 
 /// Returns 0, which means one for each core, for None. Throws InvalidInput below 1.
 unsigned to_threads(std::optional<int> threads);

@@ -27,14 +27,8 @@ PullBack::Mode to_mode(const std::string& mode) {
   throw InvalidInput("mode must be \"pull_back\" or \"reset\", not \"" + mode + "\"");
 }
 
-ConstrainOptions::Outside to_outside(const std::string& outside) {
-  if (outside == "error") return ConstrainOptions::Outside::error;
-  if (outside == "keep") return ConstrainOptions::Outside::keep;
-  throw InvalidInput("outside must be \"error\" or \"keep\", not \"" + outside + "\"");
-}
-
 Constrained constrain_arrays(const py::object& before, const py::object& after, const py::object& faces,
-                             const Volume& volume, const py::object& to_world, const std::string& mode,
+                             const Volume& volume, const py::object& to_world, const std::string& mode, bool two_sided,
                              const std::string& outside, std::optional<int> threads, Progress* progress) {
   const Vertices from = to_vertices(before, "before"), to = to_vertices(after, "after");
   if (from.storage != to.storage) throw InvalidInput("before and after must have the same type");
@@ -43,6 +37,7 @@ Constrained constrain_arrays(const py::object& before, const py::object& after, 
   const StoredSpace space(to_matrix(to_world), from.storage);
   ConstrainOptions options;
   options.mode = to_mode(mode);
+  options.two_sided = two_sided;
   options.outside = to_outside(outside);
   options.threads = to_threads(threads);
   options.progress = progress;
@@ -52,11 +47,8 @@ Constrained constrain_arrays(const py::object& before, const py::object& after, 
     r = constrain(from.values, to.values, indices, corners, space, volume.native, options);
   }
   Constrained result{from_vertices(r.vertices, from.storage), from_vector<double>(r.factors), {}};
-  py::dict kept;
-  kept["faces"] = r.outside_faces;
-  kept["first"] = r.first_outside ? py::object(py::int_(*r.first_outside)) : py::object(py::none());
   result.report["held_back"] = r.held_back;
-  result.report["outside"] = kept;
+  result.report["outside"] = from_outside(r.outside, r.uncovered);
   result.report["method"] = r.method;
   result.report["renderer"] = r.renderer;
   result.report["warnings"] = r.warnings;
@@ -86,13 +78,13 @@ struct LockedGuard {
 };
 
 std::unique_ptr<LockedGuard> make_guard(const py::object& positions, const py::object& faces, const Volume& volume,
-                                        const py::object& to_world, const std::string& outside,
+                                        const py::object& to_world, bool two_sided, const std::string& outside,
                                         std::optional<int> threads, Progress* progress) {
   const Positions p = to_positions(positions);
   int corners = 3;
   std::vector<std::uint32_t> indices = to_faces(faces, "faces", corners);
   const glm::dmat4 matrix = to_matrix(to_world);
-  const Guard::Options options{to_outside(outside), to_threads(threads), progress};
+  const Guard::Options options{to_outside(outside), two_sided, to_threads(threads), progress};
   const Interruptible call(progress);
   return std::unique_ptr<LockedGuard>(
       new LockedGuard{{values(p), std::move(indices), corners, matrix, volume.native, options}, {}});
@@ -129,30 +121,37 @@ void bind_constrain(py::module_& module) {
       .def_readonly("report", &Constrained::report, R"doc(A dict with these entries:
 
 held_back : the number of vertices that did not go all the way
-outside : a dict of `faces`, the number of faces that were outside before and were kept, and `first`, the first of them
+outside : a dict of `faces`, the number of faces that were outside before and were kept, `first`, the first of them, and
+    `reference_faces`, the number of reference faces that were beyond the tolerance of the mesh before
 method, renderer : which check was used, and what computed it
 warnings : a list of sentences)doc");
   module.def("constrain", &constrain_arrays, py::arg("before"), py::arg("after"), py::arg("faces"), py::arg("volume"),
              py::kw_only(), py::arg("to_world") = py::none(), py::arg("mode") = "pull_back",
-             py::arg("outside") = "error", py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+             py::arg("two_sided") = true, py::arg("outside") = "error", py::arg("threads") = py::none(),
+             py::arg("progress") = py::none(),
              R"doc(Move the vertices of a mesh as far as the tolerance permits.
 
 Vertex v ends at before + f (after - before), rounded to the stored type, where f is its factor. All faces of the result
-are inside the volume, also where the factors of their corners differ. A vertex that touches no face that failed ends
-exactly at `after`, bit for bit.
+are inside the volume, also where the factors of their corners differ, and every point of the reference is within the
+tolerance of the result. A vertex that touches no face that failed ends exactly at `after`, bit for bit.
 
 Parameters
 ----------
 before, after : (n, 3) arrays, both float32 or both float64
     Local coordinates before the motion and as they are wished.
 faces : (m, k) integer array
-    k is 1 (points), 2 (segments), 3 (triangles) or 4 (quads, which are kept inside in every triangulation). A triangle
-    among quads repeats a corner.
+    k is 1 (points), 2 (segments), 3 (triangles) or 4 (quads, which keep the tolerance in every triangulation). A
+    triangle among quads repeats a corner.
 volume : ToleranceVolume
 mode : {"pull_back", "reset"}
-    "pull_back" goes so far that no single factor can rise by 1/64 alone. With "reset" each factor is 0 or 1.
+    "pull_back" goes so far that no single factor can rise by 1/64 alone. Two-sided, it lowers factors by at least 1/16
+    of themselves where the reference would lose its last face within the tolerance. With "reset" each factor is 0 or 1.
+two_sided : bool
+    False keeps the distance from the mesh to the reference alone: parts of the reference may be farther from the mesh.
+    It must be False for points and segments.
 outside : {"error", "keep"}
-    What happens if faces are outside before the motion: an error, or their vertices stay where they are.
+    What happens if the mesh is beyond the tolerance before the motion: an error, or the vertices of faces that are
+    outside and of those nearest to uncovered faces of the reference stay where they are.
 to_world, threads, progress
     See help(tolvol).
 
@@ -163,12 +162,13 @@ ConstrainResult
 Raises
 ------
 InvalidInput
-    If an array is not valid, if the stored type cannot hold the tolerance, or if faces are outside before the motion.
+    If an array is not valid, if the stored type cannot hold the tolerance, or if the mesh is beyond the tolerance
+    before the motion.
 Cancelled
 
 Notes
 -----
-Cost: about 1 us a vertex to certify the mesh before the motion. Each vertex that is held back costs 2 to 20 us if its
+Cost: about 1 us a vertex and 2 us a face of the reference to certify the mesh before the motion. Each vertex that is held back costs 2 to 20 us if its
 neighbours move like it over a smooth reference. It costs 100 to 400 us if the reference is rough, if each vertex is
 pushed in a direction of its own by several tolerances, or if it is at the tolerance already, as in a loop that pushes
 on. Among large triangles that run through each other a search looks at a share of them all: with 3,000 random ones a
@@ -182,15 +182,15 @@ vertex that is held back costs 1.2 ms.
 An edit costs a comparison of all positions with the last ones and what it touches: about 1 ms for 1,000 of a million
 vertices, and for each vertex that is held back as much as in constrain.)doc")
       .def(py::init(&make_guard), py::arg("positions"), py::arg("faces"), py::arg("volume"), py::kw_only(),
-           py::arg("to_world") = py::none(), py::arg("outside") = "error", py::arg("threads") = py::none(),
-           py::arg("progress") = py::none(), py::keep_alive<1, 4>(),
+           py::arg("to_world") = py::none(), py::arg("two_sided") = true, py::arg("outside") = "error",
+           py::arg("threads") = py::none(), py::arg("progress") = py::none(), py::keep_alive<1, 4>(),
            R"doc(Start from these positions.
 
 Parameters
 ----------
 positions : (n, 3) float32 array
     Local coordinates.
-faces, volume, outside
+faces, volume, two_sided, outside
     As for constrain.
 to_world, threads, progress
     See help(tolvol). The progress is that of this call alone.
@@ -203,7 +203,7 @@ Cancelled
 
 Notes
 -----
-Cost: about 1 us a vertex.)doc")
+Cost: about 1 us a vertex and 2 us a face of the reference.)doc")
       .def("constrain", &guard_constrain, py::arg("positions"), py::kw_only(), py::arg("progress") = py::none(),
            R"doc(Take the mesh as it was edited since the last call, and return the vertices that have to go back.
 
@@ -239,16 +239,20 @@ Cancelled
 
 Notes
 -----
-Cost: about 1 us a vertex.)doc")
+Cost: about 1 us a vertex and 2 us a face of the reference.)doc")
       .def_property_readonly(
           "vertex_count", [](const LockedGuard& guard) { return guard.native.vertex_count(); },
           "The number of vertices.")
       .def_property_readonly(
-          "outside", [](const LockedGuard& guard) { return from_vector<std::int32_t>(guard.native.outside()); },
+          "outside", [](const LockedGuard& guard) { return from_vector<std::int32_t>(guard.native.start().outside); },
           "(k,) int32: the faces that were outside at the start. Their vertices never move.")
       .def_property_readonly(
-          "warning", [](const LockedGuard& guard) { return guard.native.warning(); },
-          "A sentence if the rounding of the stored type exceeds 1 % of the tolerance, else None.");
+          "uncovered", [](const LockedGuard& guard) { return guard.native.start().uncovered.faces; },
+          "The number of reference faces that were beyond the tolerance of the mesh at the start. The vertices nearest "
+          "to them never move.")
+      .def_property_readonly(
+          "warnings", [](const LockedGuard& guard) { return guard.native.start().warnings; },
+          "A list of sentences about the start.");
 }
 
 }  // namespace tolvol::python

@@ -49,11 +49,7 @@ py::dict make_report(const DecimationResult& r, std::size_t triangles_in, double
   report["renderer"] = r.renderer;
   report["repairs"] = repairs;
   report["locked"] = locked;
-  py::dict outside;
-  outside["faces"] = r.outside_faces;
-  outside["first"] = r.first_outside ? py::object(py::int_(*r.first_outside)) : py::object(py::none());
-  outside["reference_faces"] = r.uncovered_faces;
-  report["outside"] = outside;
+  report["outside"] = from_outside(r.outside, r.uncovered);
   py::object normals = py::none();
   if (r.normals) {
     normals = py::dict();
@@ -78,8 +74,7 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
   DecimationOptions options;
   options.placement = choose(placement, "placement", "optimal", DecimationOptions::Placement::optimal, "subset",
                              DecimationOptions::Placement::subset);
-  options.outside =
-      choose(outside, "outside", "error", DecimationOptions::Outside::error, "keep", DecimationOptions::Outside::keep);
+  options.outside = to_outside(outside);
   options.effort = choose(effort, "effort", "fast", DecimationOptions::Effort::fast, "thorough",
                           DecimationOptions::Effort::thorough);
   options.crossings = choose(crossings, "crossings", "keep_out", DecimationOptions::Crossings::keep_out, "allow",

@@ -105,12 +105,6 @@ DeformationOptions::Mode to_mode(const std::string& mode) {
   throw InvalidInput("mode must be \"blocked\", \"farthest\" or \"pull_back\", not \"" + mode + "\"");
 }
 
-DeformationOptions::Outside to_outside(const std::string& outside) {
-  if (outside == "error") return DeformationOptions::Outside::error;
-  if (outside == "keep") return DeformationOptions::Outside::keep;
-  throw InvalidInput("outside must be \"error\" or \"keep\", not \"" + outside + "\"");
-}
-
 py::dict make_report(const DeformationResult& r, double seconds) {
   const auto counted = [](const FaceCount& count) {
     py::dict entry;
@@ -120,7 +114,7 @@ py::dict make_report(const DeformationResult& r, double seconds) {
   py::dict report;
   report["permitted_fraction"] = r.permitted_fraction;
   report["leaving"] = counted(r.leaving);
-  report["outside"] = counted(r.outside);
+  report["outside"] = from_outside(r.outside, r.uncovered);
   report["outside_lattice"] = r.outside_lattice;
   report["moved"] = r.moved;
   report["held_back"] = r.held_back;
@@ -133,7 +127,7 @@ py::dict make_report(const DeformationResult& r, double seconds) {
 }
 
 Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, const py::object& faces,
-                     const Volume* volume, const py::object& to_world, const std::string& mode,
+                     const Volume* volume, const py::object& to_world, const std::string& mode, bool two_sided,
                      const std::string& outside, std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   int corners = 3;
@@ -143,6 +137,7 @@ Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, c
   const StoredSpace placed(to_matrix(to_world), v.storage);
   DeformationOptions options;
   options.mode = to_mode(mode);
+  options.two_sided = two_sided;
   options.outside = to_outside(outside);
   options.threads = to_threads(threads);
   options.progress = progress;
@@ -224,8 +219,10 @@ InvalidInput)doc");
 permitted_fraction : from 0 to 1, the share of the way at which the whole mesh is certified to be inside, found by
     bisection to a thousandth; 1 without a volume; None if vertices were pulled back instead
 leaving : a dict of `faces`, the number of faces that the deformation as wished would not leave certified inside, and
-    `first`, the first of them
-outside : the same for faces that were outside before the deformation and were kept as they are
+    `first`, the first of them. If there are none, some that it would take from a part of the reference that has no
+    other face within the tolerance
+outside : a dict of `faces`, the number of faces that were outside before and were kept, `first`, the first of them, and
+    `reference_faces`, the number of reference faces that were beyond the tolerance of the mesh before
 outside_lattice : the number of vertices that are not in the box
 moved : the number of vertices of the result that are not where they were
 held_back : the number of vertices of the result that are not where they were to go
@@ -236,8 +233,8 @@ warnings : a list of sentences)doc");
 
   module.def("deform", &deform_arrays, py::arg("vertices"), py::arg("lattice"), py::arg("faces") = py::none(),
              py::arg("volume").none(true) = py::none(), py::kw_only(), py::arg("to_world") = py::none(),
-             py::arg("mode") = "blocked", py::arg("outside") = "error", py::arg("threads") = py::none(),
-             py::arg("progress") = py::none(),
+             py::arg("mode") = "blocked", py::arg("two_sided") = true, py::arg("outside") = "error",
+             py::arg("threads") = py::none(), py::arg("progress") = py::none(),
              R"doc(Deform the space in the box of a lattice, and with it a mesh, within the tolerance of a volume.
 
 Vertices outside of the box stay where they are.
@@ -248,16 +245,17 @@ vertices : (n, 3) float32 or float64 array
     Local coordinates.
 lattice : Lattice
 faces : (m, k) integer array, optional
-    k is 1 (points), 2 (segments), 3 (triangles) or 4 (quads, which are kept inside in every triangulation). A triangle
-    among quads repeats a corner. With a volume the faces are needed.
+    k is 1 (points), 2 (segments), 3 (triangles) or 4 (quads, which keep the tolerance in every triangulation). A
+    triangle among quads repeats a corner. With a volume the faces are needed.
 volume : ToleranceVolume, optional
     The result has to stay in it.
 mode : {"blocked", "farthest", "pull_back"}
     What happens to a deformation that is not certified inside as a whole. "blocked" moves nothing, and the report says
     how far the deformation may go. "farthest" moves every vertex that permitted share of its way. "pull_back" moves each
     vertex as far as it may go, as constrain does.
-outside : {"error", "keep"}
-    What happens if faces are outside before the deformation: an error, or their vertices stay where they are.
+two_sided, outside
+    As for constrain. A mesh that is beyond the tolerance before the deformation is no error if it is within it
+    afterwards.
 to_world, threads, progress
     See help(tolvol).
 
@@ -268,12 +266,13 @@ DeformationResult
 Raises
 ------
 InvalidInput
-    If an argument is not valid, if the stored type cannot hold the tolerance, or if faces are outside before.
+    If an argument is not valid, if the stored type cannot hold the tolerance, or if the mesh is beyond the tolerance before.
 Cancelled
 
 Notes
 -----
-Cost: about 0.4 us a vertex, and with a volume one check. If that check fails: some twelve checks, or constrain.
+Cost: about 0.4 us a vertex, with a volume one check, and two-sided 1 us a vertex and 2 us a face of the reference. If
+the check fails: some twelve checks, or constrain.
 
 After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.)doc");
 }

@@ -29,7 +29,7 @@ bool is_second(const std::string& value, const char* name, const char* first, co
 Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, const Volume* volume,
                        const py::object& to_world, std::int64_t iterations, const std::string& kind,
                        const std::string& weights, const std::string& boundary, const py::object& locked,
-                       const py::object& strength, const std::string& mode, const std::string& outside,
+                       const py::object& strength, const std::string& mode, bool two_sided, const std::string& outside,
                        std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
@@ -47,8 +47,8 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
   options.boundary =
       is_second(boundary, "boundary", "fixed", "along") ? Options::Boundary::along : Options::Boundary::fixed;
   options.reset = is_second(mode, "mode", "pull_back", "reset");
-  options.outside = is_second(outside, "outside", "error", "keep") ? ConstrainOptions::Outside::keep
-                                                                   : ConstrainOptions::Outside::error;
+  options.two_sided = two_sided;
+  options.outside = to_outside(outside);
   py::array_t<bool, py::array::c_style> locked_values;
   if (!locked.is_none()) {
     locked_values = to_values<bool>(locked, "locked must be a bool array, one value for each vertex");
@@ -71,16 +71,14 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
     seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
   Smoothed result{from_vertices(r.vertices, v.storage), {}};
-  py::dict fixed, kept;
+  py::dict fixed;
   fixed["boundary"] = r.fixed_boundary;
   fixed["non-manifold"] = r.fixed_non_manifold;
-  kept["faces"] = r.outside_faces;
-  kept["first"] = r.first_outside ? py::object(py::int_(*r.first_outside)) : py::object(py::none());
   result.report["held_back"] = r.held_back;
   result.report["largest_motion"] = r.largest_motion;
   result.report["welded"] = r.welded;
   result.report["fixed"] = fixed;
-  result.report["outside"] = kept;
+  result.report["outside"] = from_outside(r.outside, r.uncovered);
   result.report["method"] = r.method;
   result.report["renderer"] = r.renderer;
   result.report["warnings"] = r.warnings;
@@ -99,7 +97,8 @@ held_back : for each iteration the number of vertices that did not go all the wa
 largest_motion : the longest way of a vertex from the input to the result, in world units
 welded : the number of vertices that were treated as one with an earlier vertex at the same place
 fixed : a dict of `boundary` and `non-manifold`, the number of vertices that stay for that cause
-outside : a dict of `faces`, the number of input faces that were outside and were kept, and `first`, the first of them
+outside : a dict of `faces`, the number of input faces that were outside and were kept, `first`, the first of them, and
+    `reference_faces`, the number of reference faces that were beyond the tolerance of the input
 method, renderer : which check was used, and what computed it
 warnings : a list of sentences
 seconds : the time that the call took)doc");
@@ -107,10 +106,11 @@ seconds : the time that the call took)doc");
              py::kw_only(), py::arg("to_world") = py::none(), py::arg("iterations") = 10,
              py::arg("operator") = "bilaplacian", py::arg("weights") = "cotangent", py::arg("boundary") = "fixed",
              py::arg("locked") = py::none(), py::arg("strength") = py::none(), py::arg("mode") = "pull_back",
-             py::arg("outside") = "error", py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+             py::arg("two_sided") = true, py::arg("outside") = "error", py::arg("threads") = py::none(),
+             py::arg("progress") = py::none(),
              R"doc(Smooth a mesh within the tolerance of a volume.
 
-Every iteration ends with all faces inside. Vertices at an edge with more than two faces stay where they are.
+Every iteration ends with all faces inside and the whole reference within the tolerance of them. Vertices at an edge with more than two faces stay where they are.
 
 Parameters
 ----------
@@ -134,8 +134,11 @@ strength : (n,) float64 array, optional
 mode : {"pull_back", "reset"}
     A vertex that would leave the tolerance is pulled back along its step until the faces around it are inside, or stays
     where it is for this iteration.
+two_sided : bool
+    False keeps the distance from the mesh to the reference alone: parts of the reference may be farther from the mesh.
 outside : {"error", "keep"}
-    What happens if input faces are not within the tolerance: an error, or they stay as they are.
+    What happens if the input is beyond the tolerance: an error, or faces that are outside and those nearest to
+    uncovered faces of the reference stay as they are.
 to_world, threads, progress
     See help(tolvol).
 
@@ -151,7 +154,8 @@ Cancelled
 
 Notes
 -----
-Cost: about 0.3 us for each vertex in each iteration, and some us for each vertex that is held back.
+Cost: about 0.3 us for each vertex in each iteration, and some us for each vertex that is held back; two-sided also
+2 us for each face of the reference, and 0.3 us for each in each iteration.
 
 After M. Desbrun et al., Implicit Fairing of Irregular Meshes using Diffusion and Curvature Flow, 1999. "reset" is from
 M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.)doc");

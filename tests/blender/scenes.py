@@ -84,9 +84,8 @@ def sampled_distance(surface, other, samples=20_000, seed=7):
     return max(tree.find_nearest(Vector(point))[3] for point in points)
 
 
-def assert_within(surface, reference, tolerance, both_ways=True):
+def assert_within(surface, reference, tolerance):
     """Asserts that no sample of either surface is beyond the tolerance of the other (the tree computes in float32)."""
     slack = 1e-6 * np.abs(reference[0]).max()
     assert sampled_distance(surface, reference) <= tolerance + slack
-    if both_ways:
-        assert sampled_distance(reference, surface) <= tolerance + slack
+    assert sampled_distance(reference, surface) <= tolerance + slack

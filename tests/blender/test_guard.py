@@ -43,14 +43,14 @@ def dab(ob, positions):
     return coordinates(ob)
 
 
-def judged(ob, reference, tolerance=TOLERANCE):
-    """Returns (lower, upper) of the largest distance from the reference, in tolerances, in Blender's triangulation."""
+def judged(ob, reference, tolerance=TOLERANCE, measure=native.module.hausdorff):
+    """Returns (lower, upper) of the distance of mesh and reference, in tolerances, in Blender's triangulation."""
     scratch = ob.data.copy()
     scratch.vertices.foreach_set("co", coordinates(ob).ravel())
     arrays = mesh_io.read_mesh(scratch)
     bpy.data.meshes.remove(scratch)
     vertices = mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world))
-    found = native.module.directed_hausdorff(vertices, arrays.triangles, *reference, bound=tolerance)
+    found = measure(vertices, arrays.triangles, *reference, bound=tolerance)
     return found.lower / tolerance, found.upper / tolerance
 
 
@@ -154,10 +154,44 @@ def test_faces_of_many_corners_stay_however_blender_cuts_them():
     vertices = [(np.cos(a), np.sin(a), 0) for a in around]
     ob = add_object("disc", vertices, [range(12)])
     reference = guarded(ob, "sculpting")
+    assert state(ob)["sculpting"] == ("One way only: a face has 12 corners. Triangulate Faces helps", True)
     rng = np.random.default_rng(5)
     for _ in range(10):
         dab(ob, coordinates(ob) + rng.normal(0, 0.03, (12, 3)))
-        assert judged(ob, reference)[1] <= 1
+        assert judged(ob, reference, measure=native.module.directed_hausdorff)[1] <= 1
+
+
+def needle():
+    """A thin pyramid. Its tip may slide down inside of it without leaving the tolerance."""
+    feet = [(0.03, 0, 0), (-0.02, 0.03, 0), (-0.02, -0.03, 0)]
+    return add_object("needle", [*feet, (0, 0, 1)], [(0, 1, 3), (1, 2, 3), (2, 0, 3)])
+
+
+@pytest.mark.parametrize(("keep", "height"), [("BOTH", 0.925), ("ONE", 0.5)])
+def test_the_reference_stays_within_the_tolerance_unless_one_way_is_asked_for(keep, height):
+    ob = needle()
+    ob.tolvol.keep = keep
+    reference = guarded(ob, "sculpting", tolerance=0.1)
+    co = coordinates(ob)
+    co[3, 2] = 0.5
+    after = dab(ob, co)
+    assert abs(after[3, 2] - height) <= 0.025
+    backward = judged(ob, reference, 0.1)[1]
+    assert backward <= 1 if keep == "BOTH" else backward > 4
+
+
+def test_parts_of_the_reference_that_are_beyond_the_tolerance_are_named():
+    ob = needle()
+    guarded(ob, tolerance=0.1, mode="OBJECT")
+    ob.data.vertices[3].co.z = 0.5
+    ob.tolvol.guard.sculpting = True
+    bpy.ops.object.mode_set(mode="SCULPT")
+    updated(ob)
+    said = "3 faces of the reference are beyond the tolerance: what is nearest stays"
+    assert state(ob)["sculpting"] == (said, True)
+    ob.tolvol.keep = "ONE"
+    updated(ob)
+    assert state(ob)["sculpting"] == ("Within the tolerance", True)
 
 
 def test_corners_of_a_concave_face_stay_where_they_are():

@@ -27,7 +27,11 @@ def chain(run):
     for step in options["steps"]:
         before = vertices, triangles
 
-        def call(step=step, v=vertices, t=triangles, both_ways=both_ways):
+        # After a step that keeps only one direction the other one may be lost.
+        both_ways = both_ways and step != "one-sided"
+        place["two_sided"] = both_ways
+
+        def call(step=step, v=vertices, t=triangles):
             if step == "smooth":
                 return tolvol.smooth(v, t, volume, iterations=3, **place)
             if step == "deform":
@@ -35,10 +39,7 @@ def chain(run):
             if step == "constrain":
                 wish = v + rng.standard_normal(v.shape) * case.tolerance / scale
                 return tolvol.constrain(v, wish.astype(v.dtype), t, volume, **place)
-            effort = "thorough" if step == "thorough" else "fast"
-            # An operation that moves vertices keeps only one direction, so the other one may be lost afterwards.
-            two_sided = both_ways and step != "one-sided"
-            return tolvol.decimate(v, t, volume, two_sided=two_sided, effort=effort, **place)
+            return tolvol.decimate(v, t, volume, effort="thorough" if step == "thorough" else "fast", **place)
 
         result = run.call(step, call, run.threads[0])
         vertices = result.vertices
@@ -48,7 +49,6 @@ def chain(run):
         reference = case.world(case.vertices), case.triangles
         judges.within(run, (case.world(vertices), triangles), reference, case.tolerance, f"after {step}")
         decimates = step in ("decimate", "thorough", "one-sided")
-        both_ways = both_ways and step in ("decimate", "thorough")
         if both_ways:
             judges.within(run, reference, (case.world(vertices), triangles), case.tolerance, f"reference to {step}")
         if decimates:

@@ -6,7 +6,7 @@ import tolvol
 
 from . import judges
 from .case import Finding
-from .parts import faces_of, lattice_of, motion_of, moved, proved_inside, some, within_as_pieces
+from .parts import covers, faces_of, lattice_of, motion_of, moved, proved_inside, some, within_as_pieces
 
 
 def draw_smooth(rng, case):
@@ -16,6 +16,7 @@ def draw_smooth(rng, case):
     options["weights"] = some(rng, "uniform", "cotangent")
     options["boundary"] = some(rng, "fixed", "along")
     options["mode"] = some(rng, "pull_back", "reset")
+    options["two_sided"] = bool(rng.random() < 0.7)
     if rng.random() < 0.2:
         case.arrays["locked"] = rng.random(n) < rng.random()
     if rng.random() < 0.2:
@@ -28,7 +29,7 @@ def draw_smooth(rng, case):
 def smooth(run):
     case, options, arrays = run.case, run.case.options, run.case.arrays
     vertices, triangles, volume = moved(run), case.triangles, run.volume()
-    names = ("iterations", "operator", "weights", "boundary", "mode", "outside")
+    names = ("iterations", "operator", "weights", "boundary", "mode", "two_sided", "outside")
     given = {name: options[name] for name in names if name in options}
     given |= {name: arrays[name] for name in ("locked", "strength") if name in arrays}
 
@@ -58,11 +59,14 @@ def _judge_motion(run, result, vertices, faces, volume, stay):
             raise Finding("outside", "a face that was outside has moved")
     reference = case.world(case.vertices), case.triangles
     within_as_pieces(run, case.world(result.vertices), faces[~kept], reference)
+    if case.options["two_sided"] and not result.report["outside"]["reference_faces"]:
+        covers(run, case.world(result.vertices), faces, reference)
 
 
 def draw_deform(rng, case):
     options = case.options
     options["mode"] = some(rng, "blocked", "farthest", "pull_back")
+    options["two_sided"] = bool(rng.random() < 0.7)
     options["points"] = [int(k) for k in rng.integers(2, 6, 3)]
     options["amplitude"] = float(10 ** rng.uniform(-2, 2))
     options["seed"] = int(rng.integers(1 << 30))
@@ -76,7 +80,7 @@ def deform(run):
     case, options = run.case, run.case.options
     vertices, triangles, volume = moved(run), case.triangles, run.volume()
     lattice = run.call("Lattice", lambda: lattice_of(run, vertices))
-    given = {name: options[name] for name in ("mode", "outside") if name in options}
+    given = {name: options[name] for name in ("mode", "two_sided", "outside") if name in options}
 
     def call(threads, progress):
         return tolvol.deform(
@@ -94,6 +98,7 @@ def deform(run):
 def draw_constrain(rng, case):
     case.options["corners"] = int(some(rng, 1, 2, 3, 3, 3, 4))
     case.options["mode"] = some(rng, "pull_back", "pull_back", "reset")
+    case.options["two_sided"] = bool(case.options["corners"] > 2 and rng.random() < 0.7)
     case.options["outside"] = "keep" if case.options["corners"] == 4 else "error"
     case.arrays["wish"] = motion_of(rng, case, 10 ** rng.uniform(-1, 2))
 
@@ -112,6 +117,7 @@ def constrain(run):
             volume,
             to_world=case.to_world,
             mode=mode,
+            two_sided=options["two_sided"],
             outside=options["outside"],
             threads=threads,
             progress=progress,
@@ -124,7 +130,7 @@ def constrain(run):
         raise Finding(
             "factors", f"factors from {f.min()} to {f.max()}, {result.report['held_back']} said to be held back"
         )
-    if options["mode"] == "reset":
+    if options["mode"] == "reset" or options["two_sided"]:
         return
     reset = run.call("constrain", lambda: bounded("reset", 1, None)).factors
     if (f < reset).any():
@@ -148,6 +154,7 @@ def draw_guard(rng, case):
     case.vertices = case.vertices.astype(np.float32)
     case.options["seed"] = int(rng.integers(1 << 30))
     case.options["edits"] = int(rng.integers(1, 6))
+    case.options["two_sided"] = bool(rng.random() < 0.7)
     case.options["amplitude"] = float(10 ** rng.uniform(-1, 2))
 
 
@@ -161,7 +168,13 @@ def guard(run):
         def __init__(self, threads, progress):
             rng = np.random.default_rng(options["seed"])
             guard = tolvol.Guard(
-                case.vertices, case.triangles, volume, to_world=case.to_world, threads=threads, progress=progress
+                case.vertices,
+                case.triangles,
+                volume,
+                to_world=case.to_world,
+                two_sided=options["two_sided"],
+                threads=threads,
+                progress=progress,
             )
             self.vertices = case.vertices.copy()
             scale = 1 if case.to_world is None else np.linalg.norm(case.to_world[:3, :3], 2)
@@ -177,4 +190,7 @@ def guard(run):
     if result.again:
         raise Finding("guard", f"{result.again} vertices go back again, though nothing was edited")
     judges.valid(run, result.vertices, case.triangles, np.float32)
-    within_as_pieces(run, case.world(result.vertices), case.triangles, (case.world(case.vertices), case.triangles))
+    reference = case.world(case.vertices), case.triangles
+    within_as_pieces(run, case.world(result.vertices), case.triangles, reference)
+    if options["two_sided"]:
+        covers(run, case.world(result.vertices), case.triangles, reference)

@@ -41,15 +41,24 @@ def proved_inside(run, vertices, triangles, volume):
     return verdicts == tolvol.Verdict.INSIDE
 
 
+# For faces of 1 to 4 corners, how each is cut into triangles: a quad in either of its two ways.
+_CUTS = {1: [[[0, 0, 0]]], 2: [[[0, 1, 1]]], 3: [[[0, 1, 2]]], 4: [[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]]}
+
+
 def within_as_pieces(run, vertices, faces, reference):
     """Requires that faces of 1 to 4 corners are within the tolerance of the reference.
 
     Points and segments are judged as degenerate triangles, and a quad in both its triangulations.
     """
-    corners = faces.shape[1]
-    cuts = {1: [[0, 0, 0]], 2: [[0, 1, 1]], 3: [[0, 1, 2]], 4: [[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]}[corners]
-    triangles = np.concatenate([faces[:, cut] for cut in cuts])
+    triangles = np.concatenate([faces[:, cut] for way in _CUTS[faces.shape[1]] for cut in way])
     judges.within(run, (vertices, triangles), reference, run.case.tolerance, "result to reference")
+
+
+def covers(run, vertices, faces, reference):
+    """Requires that the reference is within the tolerance of faces of 3 or 4 corners, of quads in both triangulations."""
+    for way in _CUTS[faces.shape[1]]:
+        triangles = np.concatenate([faces[:, cut] for cut in way])
+        judges.within(run, reference, (vertices, triangles), run.case.tolerance, "reference to result")
 
 
 def faces_of(case):

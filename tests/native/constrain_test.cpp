@@ -62,16 +62,18 @@ bool all_inside(const std::vector<Verdict>& verdicts) {
   return std::all_of(verdicts.begin(), verdicts.end(), [](Verdict v) { return v == Verdict::inside; });
 }
 
-void expect_inside(const Scene& scene, const ConstrainResult& r) {
+void expect_inside(const Scene& scene, const ConstrainResult& r, bool two_sided) {
   const auto world = [&](Points points) {
     for (dvec3& p : points) p = scene.space().world(p);
     return TriangleMesh{points, scene.mesh.triangles};
   };
   const double tolerance = scene.tolerance();
-  EXPECT_LE(
-      hausdorff(world(r.vertices), world(scene.mesh.vertices), {.bound = tolerance, .threads = 1, .narrow = false})
-          .upper,
-      tolerance);
+  const TriangleMesh after = world(r.vertices), before = world(scene.mesh.vertices);
+  const auto distance = [&](const TriangleMesh& a, const TriangleMesh& b) {
+    return hausdorff(a, b, {.bound = tolerance, .threads = 1, .narrow = false}).upper;
+  };
+  EXPECT_LE(distance(after, before), tolerance);
+  if (two_sided) EXPECT_LE(distance(before, after), tolerance);
   EXPECT_TRUE(all_inside(verdicts(*scene.volume(), scene.space(), r.vertices, flat(scene.mesh.triangles))));
 }
 
@@ -148,16 +150,19 @@ TEST(Constrain, EveryFaceIsInsideOnEveryMesh) {
   for (const Scene& scene : scenes()) {
     SCOPED_TRACE(testing::Message() << "scene " << number++);
     const Points wish = scene.wish(noise(0.6));
-    const ConstrainResult pulled = run(scene, wish), reset = run(scene, wish, {.mode = Mode::reset});
-    expect_inside(scene, pulled);
-    expect_inside(scene, reset);
-    expect_on_the_way(scene, wish, pulled);
-    expect_on_the_way(scene, wish, reset);
-    EXPECT_GT(pulled.held_back, 0u);
-    EXPECT_GT(reset.held_back, pulled.held_back);
-    for (std::size_t v = 0; v < wish.size(); ++v) {
-      EXPECT_TRUE(reset.factors[v] == 0 || reset.factors[v] == 1);
-      EXPECT_GE(pulled.factors[v], reset.factors[v]);
+    for (const bool two_sided : {false, true}) {
+      const ConstrainResult pulled = run(scene, wish, {.two_sided = two_sided});
+      const ConstrainResult reset = run(scene, wish, {.mode = Mode::reset, .two_sided = two_sided});
+      expect_inside(scene, pulled, two_sided);
+      expect_inside(scene, reset, two_sided);
+      expect_on_the_way(scene, wish, pulled);
+      expect_on_the_way(scene, wish, reset);
+      EXPECT_GT(pulled.held_back, 0u);
+      EXPECT_GT(reset.held_back, pulled.held_back);
+      for (std::size_t v = 0; v < wish.size(); ++v) {
+        EXPECT_TRUE(reset.factors[v] == 0 || reset.factors[v] == 1);
+        if (!two_sided) EXPECT_GE(pulled.factors[v], reset.factors[v]);
+      }
     }
   }
 }
@@ -200,7 +205,7 @@ TEST(Constrain, NoFactorCanRiseAlone) {
   for (const double deviation : {0.5, 3.0}) {
     const Scene scene{shapes::torus(40)};
     const Points wish = scene.wish(noise(deviation));
-    const ConstrainResult r = run(scene, wish);
+    const ConstrainResult r = run(scene, wish, {.two_sided = false});
     const auto ring = rings(scene);
     // Nearer to its end than the headroom that is kept no vertex has to go.
     const auto volume = scene.volume(1 - 2e-4);
@@ -238,7 +243,7 @@ TEST(Constrain, CornersThatStayAreChecked) {
   Points wish = scene.mesh.vertices;
   wish[60] += dvec3(0, 0, 10 * scene.tolerance());
   const ConstrainResult r = run(scene, wish);
-  expect_inside(scene, r);
+  expect_inside(scene, r, true);
   EXPECT_EQ(r.held_back, 1u);
   EXPECT_NEAR(r.factors[60], 0.1, 0.005);
 }
@@ -255,7 +260,7 @@ TEST(Constrain, PointsSegmentsAndQuads) {
   Points after = before;
   after[0] = {-0.5, -0.5, 0.5}, after[2] = {0.5, 0.5, 0.5};
   const auto factors = [&](const std::vector<std::uint32_t>& faces, int corners) {
-    const ConstrainResult r = constrain(before, after, faces, corners, space, volume);
+    const ConstrainResult r = constrain(before, after, faces, corners, space, volume, {.two_sided = false});
     EXPECT_TRUE(all_inside(verdicts(volume, space, r.vertices, faces, corners)));
     return r.factors;
   };
@@ -288,10 +293,9 @@ TEST(Constrain, OutsideIsAnErrorOrKept) {
                                  std::to_string(first - found.begin());
     EXPECT_EQ(std::string(error.what()).find(expected), 0u) << error.what();
   }
-  const ConstrainResult r =
-      constrain(before, wish, faces, 3, scene.space(), *volume, {.outside = ConstrainOptions::Outside::keep});
-  EXPECT_EQ(r.outside_faces, std::size_t(count));
-  EXPECT_EQ(r.first_outside, std::uint32_t(first - found.begin()));
+  const ConstrainResult r = constrain(before, wish, faces, 3, scene.space(), *volume, {.outside = Outside::keep});
+  EXPECT_EQ(r.outside.faces, std::size_t(count));
+  EXPECT_EQ(r.outside.first, std::uint32_t(first - found.begin()));
   const std::vector<Verdict> after = verdicts(*volume, scene.space(), r.vertices, faces);
   std::size_t moved = 0;
   for (std::size_t f = 0; f < found.size(); ++f) {
@@ -331,7 +335,7 @@ TEST(Constrain, BadInput) {
   broken.mesh.vertices[9].x = nan;
   const auto volume = scene.volume();
   const auto with = [&](const Points& before, std::vector<std::uint32_t> faces, int corners) {
-    constrain(before, before, faces, corners, scene.space(), *volume);
+    constrain(before, before, faces, corners, scene.space(), *volume, {.two_sided = false});
   };
   expect_refused([&] { with(broken.mesh.vertices, {0, 1, 2}, 3); }, "vertex 9 is not finite");
   expect_refused([&] { with(scene.mesh.vertices, {0, 1, 2, 0, 1, 400}, 3); }, "face 1 uses vertex 400");
@@ -339,6 +343,7 @@ TEST(Constrain, BadInput) {
   expect_refused([&] { with(scene.mesh.vertices, {0, 1, 2, 3, 4}, 5); }, "1 to 4 corners");
   with(scene.mesh.vertices, {}, 3);
   with({}, {}, 3);
+  expect_refused([&] { constrain({}, {}, {}, 3, scene.space(), *volume); }, "800 faces of the reference");
 }
 
 TEST(Constrain, CoarselyStoredCoordinatesAreNamed) {

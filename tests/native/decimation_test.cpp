@@ -184,10 +184,10 @@ TEST(Decimation, OutsideIsAnErrorOrKept) {
     EXPECT_NE(std::string(error.what()).find("faces are not within"), std::string::npos) << error.what();
   }
   Options options;
-  options.outside = Options::Outside::keep;
+  options.outside = Outside::keep;
   const DecimationResult r = decimate(bent.vertices, bent.triangles, c.space(), volume.get(), options);
-  EXPECT_GT(r.outside_faces, 0u);
-  ASSERT_TRUE(r.first_outside.has_value());
+  EXPECT_GT(r.outside.faces, 0u);
+  ASSERT_TRUE(r.outside.first.has_value());
   EXPECT_GE(r.vertex_map[7], 0);
   EXPECT_EQ(r.vertices[std::size_t(r.vertex_map[7])], bent.vertices[7]) << "kept as it was";
   // None got worse.
@@ -383,11 +383,11 @@ TEST(Decimation, KeepGivesUpOnlyWhatWasNeverCovered) {
   const ToleranceVolume volume(reference.vertices, reference.triangles, space, tolerance);
   Options options;
   EXPECT_THROW(decimate(quarter.vertices, quarter.triangles, space, &volume, options), InvalidInput);
-  options.outside = Options::Outside::keep;
+  options.outside = Outside::keep;
   const DecimationResult r = decimate(quarter.vertices, quarter.triangles, space, &volume, options);
   EXPECT_LT(r.triangles.size(), quarter.triangles.size() / 2);
   EXPECT_LE(hausdorff(quarter, {r.vertices, r.triangles}, {2 * tolerance, 1, nullptr}).upper, 2 * tolerance);
-  EXPECT_EQ(r.uncovered_faces, 2u);
+  EXPECT_EQ(r.uncovered.faces, 2u);
   EXPECT_FALSE(r.warnings.empty());
 }
 

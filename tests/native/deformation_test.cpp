@@ -182,7 +182,7 @@ TEST(Deformation, WhatIsOutsideToBeginWithIsKept) {
   const std::vector<std::uint32_t> faces = indices(c.mesh);
   for (const double height : {0.02, 0.2}) {
     for (const Mode mode : {Mode::blocked, Mode::farthest, Mode::pull_back}) {
-      const Options options{.mode = mode, .outside = Options::Outside::keep};
+      const Options options{.mode = mode, .outside = Outside::keep};
       const DeformationResult r = deform(c.mesh.vertices, faces, 3, c.space(), &volume, lifted(height), options);
       EXPECT_EQ(r.outside.faces, 6u);
       EXPECT_EQ(r.vertices[100], c.mesh.vertices[100]);

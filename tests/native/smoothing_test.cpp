@@ -332,10 +332,9 @@ TEST(Smoothing, OutsideIsAnErrorOrKept) {
   } catch (const InvalidInput& error) {
     EXPECT_EQ(std::string(error.what()).find("6 faces are not within the tolerance"), 0u) << error.what();
   }
-  const SmoothingResult r =
-      smooth(mesh.vertices, mesh.triangles, kSingle, &volume, {.outside = ConstrainOptions::Outside::keep});
-  EXPECT_EQ(r.outside_faces, 6u);
-  ASSERT_TRUE(r.first_outside.has_value());
+  const SmoothingResult r = smooth(mesh.vertices, mesh.triangles, kSingle, &volume, {.outside = Outside::keep});
+  EXPECT_EQ(r.outside.faces, 6u);
+  ASSERT_TRUE(r.outside.first.has_value());
   for (const glm::uvec3& t : mesh.triangles) {
     const bool touched = t.x == 17 || t.y == 17 || t.z == 17;
     for (int k = 0; touched && k < 3; ++k) EXPECT_EQ(r.vertices[t[k]], mesh.vertices[t[k]]);

@@ -15,7 +15,7 @@ def smooth(vertices, triangles, volume):
 
 
 def decimate(vertices, triangles, volume):
-    result = tolvol.decimate(vertices, triangles, volume, two_sided=False)
+    result = tolvol.decimate(vertices, triangles, volume)
     return result.vertices, result.triangles
 
 
@@ -44,7 +44,7 @@ def test_one_reference_for_the_whole_chain_keeps_it_inside_and_one_a_step_does_n
         one = step(*one, volume)
         each = step(*each, tolvol.ToleranceVolume(*each, tolerance))
         assert one[0].dtype == np.float32
-        bounded = tolvol.directed_hausdorff(*one, *reference, bound=tolerance).upper
+        bounded = tolvol.hausdorff(*one, *reference, bound=tolerance).upper
         assert bounded <= tolerance, step.__name__
         drift.append((step.__name__, bounded, tolvol.directed_hausdorff(*each, *reference).lower))
     print(f"\n{shape}, {percent} %: distance from the reference in tolerances")
@@ -68,4 +68,59 @@ def test_what_one_step_left_inside_the_next_takes_in_any_form():
         vertices = tolvol.constrain(vertices, wish, triangles, volume).vertices
         faces = np.ascontiguousarray(triangles[:, form])
         assert (volume.check(vertices, faces).verdicts == tolvol.Verdict.INSIDE).all(), form
-        tolvol.constrain(vertices, vertices, faces, volume, outside="error")
+        tolvol.constrain(vertices, vertices, faces, volume, two_sided=len(form) > 2, outside="error")
+
+
+def random_step(rng, vertices, triangles, volume):
+    """Returns (name, result) of a random operation with its default settings, apart from those that say how far to go."""
+    name = rng.choice(["decimate", "thorough", "smooth", "deform", "constrain", "guard"], p=[0.2, 0.05, *[0.1875] * 4])
+    if name in ("decimate", "thorough"):
+        effort = "fast" if name == "decimate" else "thorough"
+        result = tolvol.decimate(vertices, triangles, volume, effort=effort)
+        return name, (result.vertices, result.triangles)
+    if name == "smooth":
+        operator = rng.choice(["laplacian", "bilaplacian"])
+        return name, (tolvol.smooth(vertices, triangles, volume, operator=operator, iterations=5).vertices, triangles)
+    if name == "deform":
+        lower, size = vertices.min(0) - 0.2, np.ptp(vertices, axis=0) + 0.4
+        domain = meshes.matrix(np.diag(size), lower)
+        points = tolvol.lattice_points(4, domain)
+        points += volume.tolerance * rng.normal(0, rng.choice([0.5, 5]), points.shape)
+        mode = rng.choice(["blocked", "farthest", "pull_back"])
+        return name, (
+            tolvol.deform(vertices, tolvol.Lattice(points, domain), triangles, volume, mode=mode).vertices,
+            triangles,
+        )
+    wish = vertices + rng.choice([0.3, 2]) * volume.tolerance * rng.standard_normal(vertices.shape)
+    wish = wish.astype(np.float32)
+    if name == "constrain":
+        return name, (tolvol.constrain(vertices, wish, triangles, volume).vertices, triangles)
+    guard = tolvol.Guard(vertices, triangles, volume)
+    indices, back = guard.constrain(wish)
+    wish[indices] = back
+    return name, (wish, triangles)
+
+
+CHAINS = {
+    "torus": lambda: meshes.torus(32, 16, noise=0.002),
+    "spike": lambda: meshes.spike(levels=3),
+    "plate": lambda: meshes.plate(15, bump=0.1),
+    "parts": lambda: meshes.join(meshes.sphere(2), meshes.rod(levels=2), meshes.plate(9)),
+}
+
+
+@pytest.mark.parametrize("shape", CHAINS)
+def test_no_step_is_refused_for_what_another_one_left(shape):
+    """Every chain of operations with default settings goes on, and both directions hold after each step."""
+    vertices, triangles = CHAINS[shape]()
+    reference = vertices.astype(np.float32), triangles
+    rng = np.random.default_rng(7)
+    for chain in range(50):
+        tolerance = rng.choice([0.015, 0.04]) * tolvol.diagonal(*reference)
+        volume = tolvol.ToleranceVolume(*reference, tolerance)
+        mesh, names = reference, []
+        for _ in range(4):
+            name, mesh = random_step(rng, *mesh, volume)
+            names.append(str(name))
+            judged = tolvol.hausdorff(*mesh, *reference, bound=tolerance)
+            assert judged.upper <= tolerance, f"chain {chain}: {names}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""tolvol.smooth: each option has a test that fails when it is ignored; distances are judged by tolvol.directed_hausdorff."""
+"""tolvol.smooth: each option has a test that fails when it is ignored; distances are judged by tolvol.hausdorff."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def smooth(vertices=VERTICES, volume=None, **options):
 def deviation(vertices, to_world=None):
     m = np.eye(4) if to_world is None else to_world
     now, then = meshes.transform(m, vertices), meshes.transform(m, VERTICES)
-    return tolvol.directed_hausdorff(now, TRIANGLES, then, TRIANGLES, bound=TOLERANCE).upper
+    return tolvol.hausdorff(now, TRIANGLES, then, TRIANGLES, bound=TOLERANCE).upper
 
 
 def motion(vertices):
@@ -99,9 +99,29 @@ def test_outside():
         tolvol.smooth(vertices, TRIANGLES, VOLUME)
     result = tolvol.smooth(vertices, TRIANGLES, VOLUME, outside="keep")
     kept = (TRIANGLES == 100).any(1)
-    assert result.report["outside"] == {"faces": 6, "first": np.flatnonzero(kept)[0]}
+    assert result.report["outside"] == {"faces": 6, "first": np.flatnonzero(kept)[0], "reference_faces": 6}
     assert np.array_equal(result.vertices[TRIANGLES[kept]], vertices[TRIANGLES[kept]])
     assert np.isin(VOLUME.check(result.vertices, TRIANGLES[~kept]).verdicts, 2).all()
+
+
+@pytest.mark.parametrize("mode", ["pull_back", "reset"])
+def test_the_reference_stays_within_the_tolerance_unless_one_direction_is_asked_for(mode):
+    vertices, triangles = meshes.spike()
+    tolerance = 0.005 * tolvol.diagonal(vertices, triangles)
+    volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
+    options = {"operator": "laplacian", "iterations": 30, "mode": mode}
+    one, both = (tolvol.smooth(vertices, triangles, volume, two_sided=two, **options) for two in (False, True))
+    reference = vertices, triangles
+    assert tolvol.hausdorff(one.vertices, triangles, *reference).forward.upper <= tolerance
+    assert tolvol.hausdorff(one.vertices, triangles, *reference).backward.lower > 1.1 * tolerance
+    assert tolvol.hausdorff(both.vertices, triangles, *reference, bound=tolerance).upper <= tolerance
+    assert 0.5 * tolerance < both.report["largest_motion"]
+    two = tolvol.smooth(vertices, triangles, volume, threads=2, **options)
+    assert np.array_equal(two.vertices, both.vertices)
+    with pytest.raises(tolvol.InvalidInput, match=r"faces of the reference are not within .* \(two_sided=False\)"):
+        tolvol.smooth(one.vertices, triangles, volume)
+    kept = tolvol.smooth(one.vertices, triangles, volume, outside="keep").report
+    assert kept["outside"]["reference_faces"] > 0 and "what is nearest to them was kept" in kept["warnings"][0]
 
 
 @pytest.mark.parametrize("mesh", [meshes.non_manifold(), meshes.degenerate(), meshes.needles(), meshes.misoriented()])
@@ -113,7 +133,7 @@ def test_hostile_meshes(mesh):
         result = tolvol.smooth(vertices, triangles, volume, **options).vertices
         then, now = vertices.astype(np.float64), result.astype(np.float64)
         assert np.isfinite(now).all()
-        assert tolvol.directed_hausdorff(now, triangles, then, triangles, bound=tolerance).upper <= tolerance
+        assert tolvol.hausdorff(now, triangles, then, triangles, bound=tolerance).upper <= tolerance
 
 
 def test_a_soup_stays_closed():

@@ -152,6 +152,7 @@ def constrain(
     *,
     to_world: ArrayLike | None = None,
     mode: Literal["pull_back", "reset"] = "pull_back",
+    two_sided: bool = True,
     outside: _Outside = "error",
     threads: int | None = None,
     progress: Progress | None = None,
@@ -165,6 +166,7 @@ class Guard:
         volume: ToleranceVolume,
         *,
         to_world: ArrayLike | None = None,
+        two_sided: bool = True,
         outside: _Outside = "error",
         threads: int | None = None,
         progress: Progress | None = None,
@@ -178,7 +180,9 @@ class Guard:
     @property
     def outside(self) -> NDArray[np.int32]: ...
     @property
-    def warning(self) -> str | None: ...
+    def uncovered(self) -> int: ...
+    @property
+    def warnings(self) -> list[str]: ...
 
 class SmoothingResult:
     @property
@@ -199,6 +203,7 @@ def smooth(
     locked: NDArray[np.bool_] | None = None,
     strength: NDArray[np.float64] | None = None,
     mode: Literal["pull_back", "reset"] = "pull_back",
+    two_sided: bool = True,
     outside: _Outside = "error",
     threads: int | None = None,
     progress: Progress | None = None,
@@ -275,6 +280,7 @@ def deform(
     *,
     to_world: ArrayLike | None = None,
     mode: Literal["blocked", "farthest", "pull_back"] = "blocked",
+    two_sided: bool = True,
     outside: _Outside = "error",
     threads: int | None = None,
     progress: Progress | None = None,

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The backward direction of a moving mesh: every point of the reference stays within the tolerance of it.
+///
+/// Each piece of the reference has a triangle of the mesh as its witness (check/coverage.h), and the witness moves
+/// along with its face. Only where that leaves the tolerance is another one looked for. A quad is two triangles in
+/// either of its triangulations, so that each piece has one witness for each triangulation.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/progress.h"
+#include "check/coverage.h"
+#include "check/outside.h"
+#include "check/tolerance_check.h"
+#include "motion/moving_mesh.h"
+
+namespace tolvol {
+
+class MovingCoverage {
+ public:
+  /// Finds witnesses for the state of the mesh, which must have started. What is nearest to an uncovered part of the
+  /// reference never moves again. About 2 us a face of the reference, and nothing for faces that are the reference's
+  /// own.
+  MovingCoverage(MovingMesh& mesh, Progress* progress);
+  /// The faces of the reference that the state did not cover at the start; nothing is promised of them.
+  const FaceCount& uncovered() const { return uncovered_; }
+
+  /// Returns faces of `faces` whose pieces would have no witness on trial; none if every piece has one. `faces` must be
+  /// all faces that move. A face that is far from the tolerance costs about 10 ns, another one about 0.1 us a piece.
+  std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces);
+  /// Takes another look at faces that failing() returned: which of them fail still? It proves nothing of other faces.
+  std::vector<std::uint32_t> still_failing(std::span<const std::uint32_t> failed);
+  /// Goes with the mesh to its trial, for which failing() found no face last. The mesh itself accepts it after this.
+  void accept(std::span<const std::uint32_t> faces);
+
+ private:
+  /// One triangulation of the mesh. Its element `e` is triangle e % triangles.size() of face e / triangles.size().
+  struct Layer {
+    std::span<const PieceTriangle> triangles;  ///< of each face
+    Coverage coverage;
+    Coverage::Trial trial;
+    std::vector<Coverage::Element> elements;  ///< of the last change that was tried
+  };
+
+  double moved(const Layer& layer, std::uint32_t element) const;
+  std::vector<std::uint32_t> unsettled(const Layer& layer, std::span<const std::uint32_t> faces) const;
+  /// The faces that may lose pieces, and whether their neighbours may lose pieces as well.
+  enum class Neighbours { lose_pieces, only_take_pieces };
+  std::vector<std::uint32_t> failing(Layer& layer, std::span<const std::uint32_t> faces, Neighbours neighbours);
+  void find_witnesses(Layer& layer, Progress* progress);
+
+  MovingMesh* mesh_;
+  std::vector<Layer> layers_;
+  FaceCount uncovered_;
+};
+
+}  // namespace tolvol
