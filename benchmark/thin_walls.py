@@ -2,7 +2,7 @@
 """Decimates thin-walled models with a million collapses together, and lets CGAL look for faces that cross.
 
 The models are closed and free of crossings, and their walls and gaps are from 0.1 to 2 tolerances wide: hollow spheres and
-tori, plates, stacks of plates, and interlocked rings. Each result is also judged both ways by tolvol.directed_hausdorff.
+tori, plates, stacks of plates, and interlocked rings. Each result is also judged both ways by tolvol.hausdorff.
 """
 
 import itertools

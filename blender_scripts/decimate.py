@@ -405,9 +405,12 @@ class Command:
 
 
 def _normals(runs):
-    """Returns the normals of several runs as those of one. They are of the meshes before the file rounds coordinates."""
-    kept = [run["normals"] for run in runs if run["normals"]]
-    if not kept:
+    """Returns the normals of several runs as those of one, or None if a run has none.
+
+    They are of the meshes before the file rounds coordinates.
+    """
+    kept = [run["normals"] for run in runs]
+    if not all(kept):
         return None
     counts = {key: sum(one[key] for one in kept) for key in ("unsure", "exceeded_before", "exceeded_after")}
     return {"largest": max((one["largest"] for one in kept if one["largest"] is not None), default=None), **counts}

@@ -197,8 +197,8 @@ object. An object without a reference gets one first, as by Set Reference"""
             "two_sided": self.keep == "BOTH",
             "effort": self.effort.lower(),
             "crossings": self.crossings.lower(),
-            # A property holds a float32, and 180 degrees in it are more than 180.
-            "max_normal_angle": min(round(math.degrees(self.max_normal_angle), 4), 180),
+            # A property holds a float32, in which 90 and 180 degrees are slightly more.
+            "max_normal_angle": round(math.degrees(self.max_normal_angle), 4),
             "max_seconds": self.max_seconds or None,
             "target_triangles": self.target_triangles if self.use_target else None,
             "outside": self.outside.lower(),

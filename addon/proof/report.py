@@ -68,9 +68,12 @@ def line(run, seconds=None):
     """Returns a run as one line of text. Every percentage is of the reference's size."""
     size = 100 * run["tolerance"]["absolute"] / run["tolerance"]["percent"]
     seconds = sum(run["seconds"].values()) if seconds is None else seconds
-    largest = (run["normals"] or {"largest": None})["largest"]
-    # Rounded up: a proved bound must not look smaller than it is.
-    normals = "" if largest is None else f", normals within {math.ceil(10 * largest) / 10:g}\N{DEGREE SIGN}"
+    normals = ""
+    if run["normals"] and run["normals"]["largest"] is not None:
+        others = "other " if run["normals"]["exceeded_after"] or run["normals"]["unsure"] else ""
+        # Rounded up: a proved bound must not look smaller than it is.
+        largest = math.ceil(10 * run["normals"]["largest"]) / 10
+        normals = f", {others}normals within {largest:g}\N{DEGREE SIGN}"
     return (
         f"{counts(run)}, "
         f"tolerance {run['tolerance']['percent']:.4g} % = {run['tolerance']['absolute']:.3g}, "

@@ -81,12 +81,12 @@ def line(found):
     return f"not printable: {', '.join(missing.values())}"
 
 
-def summary(found, change):
-    """Returns the facts about a result as text for the panel, with the change of its area and volume."""
+def summary(found, changes):
+    """Returns the facts about a result as text for the panel, with the changes of its area and volume."""
     connected = ", ".join(lacking(found).values()) or "closed, manifold, no crossings"
     shells = f"{found['shells']:,} shell{'s' * (found['shells'] != 1)}"
-    changes = [f"{name} {100 * share:+.2g}{NO_BREAK}%" for name, share in change.items() if share is not None]
-    return ", ".join([connected[:1].upper() + connected[1:], shells, *changes])
+    said = [f"{name} {100 * share:+.2g}{NO_BREAK}%" for name, share in changes.items() if share is not None]
+    return ", ".join([connected[:1].upper() + connected[1:], shells, *said])
 
 
 def change(of_a, of_b):

@@ -91,7 +91,12 @@ TriangleCertificate::PointBound TriangleCertificate::point_bound(const glm::dvec
   points.set(p, p, p, p);
   double d2[4];
   witness_distances((*reference_)[triangle], points, d2);
-  return {std::sqrt(d2[0]), triangle};
+  const double guessed = std::sqrt(d2[0]);
+  if (guessed <= limit_) return {guessed, triangle};
+  // The triangle of the nearest node need not be that of the point, least of all where the grid is coarse.
+  const Hierarchy::Nearest nearest = hierarchy_->nearest(p, limit_, triangle);
+  return nearest.triangle == Hierarchy::kNone ? PointBound{guessed, triangle}
+                                              : PointBound{nearest.distance, nearest.triangle};
 }
 
 bool TriangleCertificate::leaves_room(double distance) const { return distance <= kRoom * limit_; }

@@ -78,8 +78,8 @@ class TriangleCertificate {
   /// Tells whether nearest() takes a guess of this distance.
   bool leaves_room(double distance) const;
 
-  /// Returns an upper bound on the distance of p from the reference: by the grid's guess or, if the grid has none, by a
-  /// search, which returns infinity if the distance exceeds limit().
+  /// Returns an upper bound on the distance of p from the reference: by the grid's guess or, if that is beyond limit(),
+  /// by a search. It is infinite if p is beyond the grid, or if there is neither a guess nor a triangle within limit().
   PointBound point_bound(const glm::dvec3& p) const;
   double distance_bound(const glm::dvec3& p) const { return point_bound(p).distance; }
 

@@ -20,12 +20,14 @@ constexpr double kWorthCutting = 0.25;
 constexpr double kFloor = 0.1;
 // A change is refused once splitting has added this many pieces.
 constexpr std::size_t kBudget = 1 << 12;
-// find_witnesses() looks at this many parts of one triangle, and splits a part down to the headroom below the
-// tolerance, so that it finds witnesses again for a mesh that kept within the headroom. Once a point of the triangle is
-// known to be beyond the tolerance, it goes no deeper than a change does.
-constexpr std::size_t kBudgetOfFirst = 1 << 16;
+// find_witnesses() may look at this many parts more for each element, all calls together, and divides a part down to
+// the headroom below the tolerance, so that it finds witnesses again for a mesh that kept within the headroom. Once a
+// point of a triangle is known to be beyond the tolerance, it goes no deeper than a change does.
+constexpr std::size_t kBudgetOfElement = 64, kBudgetOfFirst = 1 << 16;
 // The budget grows by this many pieces for each piece that a change places.
 constexpr std::size_t kBudgetOfPiece = 4;
+// A triangle of so many pieces, all of which lose their witness, is placed as a whole even if each piece has a budget.
+constexpr std::uint32_t kMostUnited = 256;
 // If there are more candidates than this, a piece looks only at the nearest.
 constexpr std::size_t kMany = 64;
 // A try polls after this many parts of pieces, each of which may look at kMany candidates.
@@ -57,6 +59,7 @@ Coverage::Coverage(const TriangleMesh& reference, double limit, std::size_t elem
       limit_(limit),
       limit2_(limit * limit),
       lists_(element_count),
+      budget_of_first_(kBudgetOfFirst + kBudgetOfElement * element_count),
       split_into_(reference.triangles.size()) {}
 
 Part Coverage::whole(std::uint32_t triangle) const {
@@ -68,8 +71,9 @@ void Coverage::set_witness(std::uint32_t element, std::uint32_t triangle) {
   lists_[element].pieces.push_back(whole(triangle));
 }
 
-bool Coverage::find_witnesses(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids,
-                              double provable, std::vector<std::uint32_t>& nearest) {
+bool Coverage::find_witnesses(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
+                              std::span<const std::uint32_t> ids, double provable,
+                              std::vector<std::uint32_t>& nearest) {
   bool all = true;
   std::vector<Part> stack{whole(triangle)};
   std::size_t looked = 0;
@@ -99,13 +103,15 @@ bool Coverage::find_witnesses(std::uint32_t triangle, const Hierarchy& hierarchy
     is_hopeless = is_hopeless || closest.distance > provable;
     const double floor = (is_hopeless ? kFloor : kHeadroom) * limit_;
     const bool finest = longest_squared(piece) <= floor * floor || piece.cuts == kMostCuts ||
-                        ++looked > (is_hopeless ? kBudget : kBudgetOfFirst);
+                        (++looked > kBudget && (is_hopeless || budget_of_first_ == 0 || --budget_of_first_ == 0));
     if (closest.distance > provable + radius || finest) {
       nearest.push_back(closest.triangle);
       all = false;
       split_into_[triangle] |= kNeverWhole;
     } else {
-      split(piece, stack);
+      const glm::uvec3& t = mesh.triangles[closest.triangle];
+      const WitnessTriangle below{mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]};
+      if (!cut(piece, below, kWorthCutting * limit_, stack)) split(piece, stack);
     }
   }
   return all;
@@ -129,7 +135,7 @@ void Coverage::points(std::uint32_t element, std::size_t stride, std::vector<glm
 
 bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const {
   trial.stack_.assign(1, whole);
-  trial.budget_ += kBudgetOfPiece;
+  trial.budget_ = trial.budget_is_shared_ ? trial.budget_ + kBudgetOfPiece : kBudget;
   while (!trial.stack_.empty()) {
     if (++trial.looked_at_ % kBetweenPolls == 0) poll();
     const Part piece = trial.stack_.back();
@@ -239,7 +245,8 @@ bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) con
       if (piece.cuts == 0) return place(piece, first, trial) || trial.failed_.size() < enough;
       std::uint32_t& count = gathered[piece.of];
       if (count == kPlaced) return true;
-      if (count != split_into_[piece.of].load(std::memory_order_relaxed)) {
+      const bool too_many = !trial.budget_is_shared_ && count > kMostUnited;
+      if (too_many || count != split_into_[piece.of].load(std::memory_order_relaxed)) {
         return place(piece, first, trial) || trial.failed_.size() < enough;
       }
       count = kPlaced;

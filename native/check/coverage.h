@@ -47,11 +47,11 @@ class Coverage {
   /// Makes the element the witness of a triangle of the reference that coincides with it.
   void set_witness(std::uint32_t element, std::uint32_t triangle);
 
-  /// Finds witnesses for a triangle of the reference among the triangles of a hierarchy. `ids[i]` is the element that
-  /// triangle i of the hierarchy is, or kNone if it never changes. A piece farther than `provable` from all triangles
-  /// gets no witness, and the triangle nearest to it is added to `nearest`. Returns whether every piece has a witness.
-  bool find_witnesses(std::uint32_t triangle, const Hierarchy& hierarchy, std::span<const std::uint32_t> ids,
-                      double provable, std::vector<std::uint32_t>& nearest);
+  /// Finds witnesses for a triangle of the reference among the triangles of a mesh. `ids[i]` is the element that
+  /// triangle i of the mesh is, or kNone if it never changes. A piece farther than `provable` from all triangles gets
+  /// no witness, and the triangle nearest to it is added to `nearest`. Returns whether every piece has a witness.
+  bool find_witnesses(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
+                      std::span<const std::uint32_t> ids, double provable, std::vector<std::uint32_t>& nearest);
 
   /// A point that stands for a piece. sample() adds one for every `stride`-th piece of the element.
   struct Sample {
@@ -98,6 +98,7 @@ class Coverage {
   const TriangleMesh* reference_;
   double limit_, limit2_;
   std::vector<List> lists_;
+  std::size_t budget_of_first_;  ///< is the number of parts that find_witnesses() may still look at beyond its own
   /// Counts for each triangle of the reference the pieces that it was split into, 0 while it is whole. Other threads
   /// may read a count while it changes, but it is never less than the number of pieces that exist.
   std::vector<std::atomic<std::uint32_t>> split_into_;
@@ -110,6 +111,9 @@ class Coverage::Trial {
   void begin() { failed_last_ = 0, looked_at_ = 0; }
   /// A refused change has one part without a witness in failed(), or, if it is asked for, several of each element.
   void look_for_failures(std::size_t of_each_element) { most_failures_ = of_each_element; }
+  /// Gives each piece the budget of a whole change: for changes of many elements, which must not depend on their
+  /// number.
+  void give_each_piece_a_budget() { budget_is_shared_ = false; }
   /// The parts of pieces for which the last try found no witness, and the number of the element in the change that it
   /// was sought at first.
   struct Failure {
@@ -151,7 +155,8 @@ class Coverage::Trial {
   std::vector<Part> stack_;
   std::span<const Element> elements_;   ///< are those of the change, while it is tried
   std::optional<Hierarchy> hierarchy_;  ///< holds the elements once there are too many candidates to look at each
-  std::size_t budget_ = 0;              ///< is the number of pieces that this change may still add
+  std::size_t budget_ = 0;              ///< is the number of pieces that this change, or this piece, may still add
+  bool budget_is_shared_ = true;
   std::size_t looked_at_ = 0;
   std::uint32_t last_ = 0;         ///< is the candidate that took the last piece
   std::uint32_t failed_last_ = 0;  ///< is the candidate whose pieces failed last; it comes first, to be refused soon

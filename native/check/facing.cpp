@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Rounding moves a corner by at most d, so that an edge of length l is wrong by at most e = 2 d + 24 u, u = 2^-53, with
 // the subtraction. The cross product n of the edges p and q is then wrong by at most e (|p| + |q|) + e^2 and its own
-// rounding of 6 u |p| |q|, for which 24 u in e has room because edges are shorter than 4. The normal is sure if this is
-// at most kSureNormal |n|, which 4 e^2 (|p|^2 + |q|^2) <= kSureNormal^2 |n|^2 implies.
+// rounding of at most 3 u |p| |q| for each component, for which 24 u in e has room because edges are at most 6 long:
+// the tolerance is at most the reference's diagonal, which is at most 2 in its frame. The normal is sure if this is at
+// most kSureNormal |n|, which 4 e^2 (|p|^2 + |q|^2) <= kSureNormal^2 |n|^2 implies.
 #include "check/facing.h"
 
 #include <algorithm>
@@ -34,7 +35,8 @@ std::optional<glm::dvec3> sure_normal(const glm::dvec3& a, const glm::dvec3& b, 
   const glm::dvec3 p = b - a, q = c - a, n = glm::cross(p, q);
   const double e = 2 * error + 24 * kUnitRoundoff, n2 = glm::dot(n, n);
   // A comparison with NaN is false, so that NaN is not sure.
-  if (!(4 * e * e * (glm::dot(p, p) + glm::dot(q, q)) <= kSureNormal * kSureNormal * n2)) return std::nullopt;
+  const bool is_sure = n2 > 0 && 4 * e * e * (glm::dot(p, p) + glm::dot(q, q)) <= kSureNormal * kSureNormal * n2;
+  if (!is_sure) return std::nullopt;
   return n * (1 / std::sqrt(n2));
 }
 

@@ -20,15 +20,15 @@ namespace tolvol {
 /// The sine of the angle by which a normal that is used may be wrong.
 inline constexpr double kSureNormal = 0x1p-24;
 
-/// Returns the unit normal of a triangle if it is sure. Each corner may be wrong by `error`; coordinates are at most
-/// about 1, as in a frame.
+/// Returns the unit normal of a triangle if it is sure. Each corner may be wrong by `error`; coordinates are in a
+/// frame.
 std::optional<glm::dvec3> sure_normal(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double error);
 
 /// Returns an upper bound on the exact angle between two triangles whose sure normals have this dot product. It is less
 /// than 1e-6 too large near 0, and 0.02 at most. It uses square roots alone, so that every platform gets one result.
 double angle_bound(double cosine);
 
-/// The rule that every witness of a face faces as the face does.
+/// The rule that the normal of every witness is within an angle of the face's normal.
 struct FacingRule {
   /// `angle` is the largest angle that the rule permits, more than 0 and less than pi. Rounding may have moved the
   /// corners of the reference's triangles by `reference_error`, and those of faces by `mesh_error`. O(m).
@@ -47,8 +47,8 @@ class Facing {
   /// reference to the rule.
   Facing(const FacingRule& rule, const glm::dvec3& normal, double limit);
 
-  /// Names the triangles of the reference to which the bounds of the corners were measured that a search gets. Unless
-  /// all are admitted, these bounds prove nothing of the face.
+  /// Sets the triangles of the reference from which the bounds of the corners were measured. Unless all are admitted,
+  /// these bounds prove nothing of the face.
   void set_corners(const glm::uvec3& triangles) { corners_ = triangles; }
   /// Takes the triangles of the corners as witnesses, if all are admitted.
   bool take_corners() {

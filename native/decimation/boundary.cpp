@@ -52,7 +52,7 @@ BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mes
   std::vector<std::uint32_t> nearest;
   for (std::uint32_t i = 0; i < reference_.triangles.size(); ++i) {
     poll_at(i);
-    backward_->find_witnesses(i, of_mesh, ids, provable, nearest);
+    backward_->find_witnesses(i, elements, of_mesh, ids, provable, nearest);
   }
   for (const std::uint32_t t : nearest) {
     uncertified_.push_back(elements.triangles[t].x);

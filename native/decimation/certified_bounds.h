@@ -61,7 +61,7 @@ class CertifiedBounds final : public Bounds {
   struct FaceRule {
     double limit;        ///< The largest angle; pi for a face that is free of the rule.
     bool reversed;       ///< Whether the other side of the face is the one that has to face as its witnesses do.
-    bool may_be_unsure;  ///< Whether the rule holds only once the face has a sure normal, because it had none before.
+    bool may_be_unsure;  ///< Whether the face may have no sure normal, because its input face had none.
   };
   const FaceRule& rule(std::uint32_t triangle) const { return rules_[triangle]; }
   void set_rule(std::uint32_t triangle, const FaceRule& rule) { rules_[triangle] = rule; }

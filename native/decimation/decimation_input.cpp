@@ -63,8 +63,11 @@ DecimationInput::DecimationInput(std::span<const glm::dvec3> vertices, std::span
 }
 
 Frame DecimationInput::own_frame() const {
+  const std::vector<bool> used = used_vertices(vertices_.size(), triangles_);
   Box world;
-  for (const glm::dvec3& p : vertices_) world.add(space_.world(p));
+  for (std::size_t v = 0; v < vertices_.size(); ++v) {
+    if (used[v]) world.add(space_.world(vertices_[v]));
+  }
   return Frame(world);
 }
 
@@ -165,8 +168,9 @@ Bounds* DecimationInput::set_bounds(Team& team) {
     if (2 * facing_->unsure > facing_->normals.size()) {
       // Hardly any face would find a witness, and hardly any vertex could go.
       report_.warnings.push_back(
-          "no angle of normals is kept: rounding could turn most faces of the reference, which "
-          "are too small for its size");
+          "no angle of normals is kept: rounding could turn most faces of the reference, which are too small or too "
+          "thin "
+          "for its size; decimate the small parts as a mesh of their own");
       facing_.reset();
     }
   }
@@ -180,6 +184,8 @@ Bounds* DecimationInput::set_bounds(Team& team) {
     const TriangleCertificate start(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), provable,
                                     volume_->refutable(mapping_error));
     exceeding_ = face_as_reference(cut_, positions_, start, volume_->hierarchy(), *facing_, team, *certified_);
+    // A face that is outside has no witness, and so no angle. It is counted as outside.
+    std::erase_if(exceeding_, [&](std::uint32_t t) { return is_outside_[cut_.triangle_input[t]]; });
   }
   return &*certified_;
 }
@@ -190,8 +196,10 @@ void DecimationInput::certify_input(const Certificate& certificate) {
   for (const glm::uvec3& t : triangles_) indices.insert(indices.end(), {t.x, t.y, t.z});
   const std::vector<Verdict> verdicts =
       certificate.check({vertices_, space_, indices}, {options_.threads, options_.progress});
+  is_outside_.assign(triangles_.size(), false);
   for (std::uint32_t i = 0; i < verdicts.size(); ++i) {
     if (verdicts[i] == Verdict::inside) continue;
+    is_outside_[i] = true;
     if (report_.outside.faces++ == 0) report_.outside.first = i;
     for (int k = 0; k < 3; ++k) pin(cut_.input_vertex[triangles_[i][k]], "outside the tolerance");
   }
@@ -225,7 +233,8 @@ void DecimationInput::cover(double provable) {
   for (std::uint32_t i = 0; i < count; ++i) {
     poll_at(i);
     if (options_.progress) options_.progress->update(static_cast<double>(i) / static_cast<double>(count));
-    if (!backward_->find_witnesses(i, hierarchy, ids, provable, nearest) && uncovered.faces++ == 0) uncovered.first = i;
+    if (!backward_->find_witnesses(i, elements, hierarchy, ids, provable, nearest) && uncovered.faces++ == 0)
+      uncovered.first = i;
   }
   if (uncovered.faces) report_.warnings.push_back(take_uncovered(uncovered, options_.outside));
   for (const std::uint32_t t : nearest) {

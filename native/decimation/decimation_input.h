@@ -104,6 +104,7 @@ class DecimationInput {
   std::optional<FacingRule> facing_;
   std::optional<CertifiedBounds> certified_;
   std::vector<std::uint32_t> exceeding_;
+  std::vector<bool> is_outside_;  ///< for each input triangle, if the input is not the reference
   Bounds* bounds_ = nullptr;
 };
 

@@ -150,7 +150,7 @@ class Output {
         ++normals.unsure;
       }
     }
-    // The conversion rounds.
+    // The conversion to degrees must not round the bound above the option.
     if (largest) normals.largest = std::min(glm::degrees(*largest), input_.max_normal_angle());
     normals.exceeded_before = input_.exceeding().size();
     for (const std::uint32_t t : input_.exceeding()) normals.exceeded_after += mesh_.alive(t);

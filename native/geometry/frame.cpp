@@ -139,19 +139,20 @@ double StoredSpace::mapping_error(std::span<const glm::dvec3> stored, double rea
 }
 
 double StoredSpace::storage_step(std::span<const glm::dvec3> stored) const {
-  // A coordinate is off by half a unit in the last place. The arithmetic of store() errs by less than mapping_error()
-  // over the condition of the matrix, which only matters for float64 and is covered by the factor of 8.
-  const double half_ulp = storage_ == Storage::float32 ? 0x1p-24 : 8 * kUnitRoundoff;
+  // A coordinate is off by half a unit in the last place, and in double precision by as much again in the last sum of
+  // store().
+  const double rounding = storage_ == Storage::float32 ? 0x1p-24 : 2 * kUnitRoundoff;
   glm::dvec3 extent{0};
   for (const glm::dvec3& p : stored) extent = glm::max(extent, glm::abs(p));
-  double step = 0;
+  glm::dvec3 step{0};
   for (int row = 0; row < 3; ++row) {
-    const double coordinate =
-        half_ulp * (std::abs(to_world_[0][row]) * extent.x + std::abs(to_world_[1][row]) * extent.y +
-                    std::abs(to_world_[2][row]) * extent.z);
-    step += coordinate * coordinate;
+    // Each term is brought to the frame before they are added: in the world their squares may leave the range of
+    // double.
+    for (int column = 0; column < 3; ++column) {
+      step[row] += std::abs(to_world_[column][row]) * frame_.scale() * (rounding * extent[column]);
+    }
   }
-  return std::sqrt(step) * frame_.scale();
+  return glm::length(step);
 }
 
 double longest_diagonal(std::span<const glm::dvec3> stored, std::span<const glm::uvec3> triangles,

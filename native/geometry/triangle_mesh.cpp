@@ -11,9 +11,7 @@
 
 namespace tolvol {
 
-void validate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles) {
-  if (vertices.empty()) throw InvalidInput("the mesh has no vertices", "invalid_mesh");
-  if (triangles.empty()) throw InvalidInput("the mesh has no faces", "invalid_mesh");
+void require_finite(std::span<const glm::dvec3> vertices) {
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     poll_at(i);
     const glm::dvec3& p = vertices[i];
@@ -23,6 +21,12 @@ void validate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> 
       throw InvalidInput(text.str(), "invalid_mesh");
     }
   }
+}
+
+void validate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles) {
+  if (vertices.empty()) throw InvalidInput("the mesh has no vertices", "invalid_mesh");
+  if (triangles.empty()) throw InvalidInput("the mesh has no faces", "invalid_mesh");
+  require_finite(vertices);
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     poll_at(i);
     for (int k = 0; k < 3; ++k) {
@@ -47,15 +51,6 @@ double enclosed_volume(const TriangleMesh& mesh) {
     volume += glm::dot(mesh.vertices[t.x], glm::cross(mesh.vertices[t.y], mesh.vertices[t.z]));
   }
   return volume;
-}
-
-double surface_area(const TriangleMesh& mesh) {
-  double twice = 0;
-  for (const glm::uvec3& t : mesh.triangles) {
-    const glm::dvec3 &a = mesh.vertices[t.x], &b = mesh.vertices[t.y], &c = mesh.vertices[t.z];
-    twice += glm::length(glm::cross(b - a, c - a));
-  }
-  return twice / 2;
 }
 
 std::vector<std::uint32_t> weld_equal_positions(std::span<const glm::dvec3> vertices) {

@@ -43,6 +43,9 @@ inline bool strictly_inside(const glm::dvec3& p, const Box& box) {
          p.z < box.upper.z;
 }
 
+/// Throws InvalidInput, naming the first offender, unless every coordinate is finite. O(n).
+void require_finite(std::span<const glm::dvec3> vertices);
+
 /// Throws InvalidInput, naming the first offender, unless there is at least one triangle, every index is below
 /// `vertices.size()` and every coordinate is finite (unused vertices too). O(n + m).
 void validate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles);
@@ -52,9 +55,6 @@ std::vector<bool> used_vertices(std::size_t vertex_count, std::span<const glm::u
 
 /// Returns six times the volume that a closed mesh encloses, negative if its faces run the other way round. O(m).
 double enclosed_volume(const TriangleMesh& mesh);
-
-/// Returns the sum of the areas of all triangles. O(m).
-double surface_area(const TriangleMesh& mesh);
 
 /// Returns for each vertex the first vertex with exactly the same coordinates, which may be itself. Coordinates are
 /// equal if they are equal numbers, so that -0 is 0. O(n) expected.

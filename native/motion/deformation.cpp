@@ -118,8 +118,14 @@ class Deformation {
   }
 
   void warn_of_rounding() {
+    std::vector<bool> used(before_.size(), false);
+    for (const std::uint32_t v : faces_) used[v] = true;
     for (const std::span<const glm::dvec3> stored : {before_, std::span<const glm::dvec3>(after_)}) {
-      const std::optional<std::string> warning = storage_warning(*volume_, space_, stored);
+      std::vector<glm::dvec3> of_faces;
+      for (std::size_t v = 0; v < stored.size(); ++v) {
+        if (used[v]) of_faces.push_back(stored[v]);
+      }
+      const std::optional<std::string> warning = storage_warning(*volume_, space_, of_faces);
       if (warning && result_.warnings.empty()) result_.warnings.push_back(*warning);
     }
   }

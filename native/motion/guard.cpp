@@ -76,8 +76,7 @@ std::vector<std::uint32_t> Guard::changed(std::span<const float> positions) cons
 
 Guard::Correction Guard::constrain(std::span<const float> positions) {
   require_size(positions);
-  if (interrupted_) begin(std::vector<float>(last_), nullptr);
-  interrupted_ = true;
+  if (interrupted_) begin(std::vector<float>(last_), nullptr), interrupted_ = false;
   const PullBack::Moving moving = pull_back_.moving(changed(positions));
   std::vector<glm::dvec3> before, after;
   for (const std::uint32_t v : moving.vertices) before.push_back(at(last_, v)), after.push_back(at(positions, v));
@@ -88,11 +87,9 @@ Guard::Correction Guard::constrain(std::span<const float> positions) {
     correction.vertices.push_back(moving.vertices[i]);
     for (int k = 0; k < 3; ++k) correction.positions.push_back(static_cast<float>(ends.reached[i][k]));
   }
-  // From here on nothing throws.
   for (std::size_t i = 0; i < moving.vertices.size(); ++i) {
     for (int k = 0; k < 3; ++k) last_[3 * moving.vertices[i] + k] = static_cast<float>(ends.reached[i][k]);
   }
-  interrupted_ = false;
   return correction;
 }
 

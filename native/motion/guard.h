@@ -42,10 +42,11 @@ class Guard {
   /// Takes the mesh as it was edited since the last call: what is inside is the new state, the rest is pulled back
   /// along its motion since then, as by constrain(); going back to an earlier state by undo is an edit like others.
   /// Throws InvalidInput for another number of vertices or a moved one that is not finite, and Cancelled; both keep the
-  /// state. The call after one that threw costs as much as a start.
+  /// state.
   Correction constrain(std::span<const float> positions);
 
-  /// Starts anew from these positions, whatever came before. Throws like the constructor, keeping the state.
+  /// Starts anew from these positions, whatever came before. Throws like the constructor, keeping the state; the next
+  /// call then starts from it.
   void reset(std::span<const float> positions, Progress* progress = nullptr);
 
   std::size_t vertex_count() const { return last_.size() / 3; }
@@ -56,7 +57,7 @@ class Guard {
   void require_size(std::span<const float> positions) const;
   std::vector<std::uint32_t> changed(std::span<const float> positions) const;
 
-  bool interrupted_ = false;  // An exception has ended a call: last_ holds the state, and pull_back_ does not.
+  bool interrupted_ = false;  // An exception has ended reset(): last_ holds the state, and pull_back_ does not.
   std::vector<std::uint32_t> faces_;
   std::vector<float> last_;  // The state, as it is stored.
   Options options_;

@@ -15,23 +15,41 @@ constexpr double kInflate = 0x1p-50;
 constexpr std::size_t kBlock = 1024;
 /// A triangulation of a quad has this many triangles.
 constexpr std::size_t kOfQuad = 2;
+/// Motion divides pieces and seldom unites them. tidy() acts once there are so many times as many as at first, and so
+/// many more.
+constexpr std::size_t kGrowth = 2, kMorePieces = 1000;
 
 }  // namespace
 
 MovingCoverage::MovingCoverage(MovingMesh& mesh, Progress* progress) : mesh_(&mesh) {
-  const std::span<const PieceTriangle> triangles = triangles_of(mesh.corners());
-  const std::size_t of_layer = std::min(triangles.size(), kOfQuad);
-  for (std::size_t first = 0; first < triangles.size(); first += of_layer) {
-    layers_.push_back({triangles.subspan(first, of_layer),
-                       Coverage(mesh.volume().reference(), mesh.limit(), of_layer * mesh.face_count()),
-                       {},
-                       {}});
-  }
   if (progress) progress->begin("comparing");
-  for (Layer& layer : layers_) find_witnesses(layer, progress);
+  Found found = find_layers(progress);
+  layers_ = std::move(found.layers);
+  uncovered_ = found.uncovered;
+  for (const std::uint32_t v : found.nearest) mesh_->freeze(v);
+  count_pieces();
 }
 
-void MovingCoverage::find_witnesses(Layer& layer, Progress* progress) {
+/// Finds witnesses for the state, in every triangulation.
+MovingCoverage::Found MovingCoverage::find_layers(Progress* progress) const {
+  Found found;
+  const std::span<const PieceTriangle> triangles = triangles_of(mesh_->corners());
+  const std::size_t of_layer = std::min(triangles.size(), kOfQuad);
+  for (std::size_t first = 0; first < triangles.size(); first += of_layer) {
+    found.layers.push_back({triangles.subspan(first, of_layer),
+                            Coverage(mesh_->volume().reference(), mesh_->limit(), of_layer * mesh_->face_count()),
+                            {},
+                            {}});
+    found.layers.back().trial.look_for_failures(1);
+    found.layers.back().trial.give_each_piece_a_budget();
+    find_witnesses(found, progress);
+  }
+  return found;
+}
+
+/// Does so for the last of the layers.
+void MovingCoverage::find_witnesses(Found& found, Progress* progress) const {
+  Layer& layer = found.layers.back();
   const auto count = static_cast<std::uint32_t>(mesh_->volume().reference().triangles.size());
   std::vector<std::uint32_t> open;
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -40,7 +58,7 @@ void MovingCoverage::find_witnesses(Layer& layer, Progress* progress) {
   }
   if (open.empty()) return;
   if (mesh_->face_count() == 0) {
-    uncovered_ = {open.size(), open.front()};
+    found.uncovered = {open.size(), open.front()};
     return;
   }
   TriangleMesh elements;
@@ -62,13 +80,34 @@ void MovingCoverage::find_witnesses(Layer& layer, Progress* progress) {
   for (std::size_t i = 0; i < open.size(); ++i) {
     poll_at(i);
     if (progress) progress->update(static_cast<double>(i) / static_cast<double>(open.size()));
-    if (layer.coverage.find_witnesses(open[i], hierarchy, ids, mesh_->provable(), nearest)) continue;
-    if (uncovered++ == 0) uncovered_.first = std::min(open[i], uncovered_.first.value_or(open[i]));
+    if (layer.coverage.find_witnesses(open[i], elements, hierarchy, ids, mesh_->provable(), nearest)) continue;
+    if (uncovered++ == 0) found.uncovered.first = std::min(open[i], found.uncovered.first.value_or(open[i]));
   }
-  uncovered_.faces = std::max(uncovered_.faces, uncovered);
+  found.uncovered.faces = std::max(found.uncovered.faces, uncovered);
   for (const std::uint32_t element : nearest) {
-    for (int k = 0; k < 3; ++k) mesh_->freeze(elements.triangles[element][k]);
+    for (int k = 0; k < 3; ++k) found.nearest.push_back(elements.triangles[element][k]);
   }
+}
+
+void MovingCoverage::count_pieces() {
+  pieces_ = 0;
+  for (const Layer& layer : layers_) {
+    for (std::uint32_t e = 0; e < layer.triangles.size() * mesh_->face_count(); ++e) {
+      pieces_ += layer.coverage.piece_count(e);
+    }
+  }
+  most_pieces_ = kGrowth * pieces_ + kMorePieces;
+}
+
+void MovingCoverage::tidy() {
+  if (pieces_ > most_pieces_) renew();
+}
+
+void MovingCoverage::renew() {
+  if (uncovered_.faces > 0) return;
+  Found found = find_layers(nullptr);
+  if (found.uncovered.faces == 0) layers_ = std::move(found.layers);
+  count_pieces();
 }
 
 /// How far a point of the element moves from the state to the trial at most.
@@ -138,10 +177,11 @@ std::vector<std::uint32_t> MovingCoverage::failing(Layer& layer, std::span<const
     }
   }
   layer.trial.begin();
-  layer.trial.look_for_failures(1);
   layer.coverage.try_change(layer.elements, {}, layer.trial);
   std::vector<std::uint32_t> failed;
+  is_worn_ = false;
   for (const Coverage::Trial::Failure& f : layer.trial.failed()) {
+    is_worn_ = is_worn_ || f.part.cuts == kMostCuts;
     failed.push_back(layer.elements[f.element].id / of_face);
   }
   std::sort(failed.begin(), failed.end());
@@ -154,7 +194,14 @@ void MovingCoverage::accept(std::span<const std::uint32_t> faces) {
     const auto of_face = static_cast<std::uint32_t>(layer.triangles.size());
     std::vector<bool> is_tried(mesh_->face_count(), false);
     for (const Coverage::Element& e : layer.elements) is_tried[e.id / of_face] = true;
+    const auto count = [&] {
+      std::size_t pieces = 0;
+      for (const Coverage::Element& e : layer.elements) pieces += layer.coverage.piece_count(e.id);
+      return pieces;
+    };
+    pieces_ -= count();
     layer.coverage.commit(layer.trial);
+    pieces_ += count();
     for (const std::uint32_t f : faces) {
       for (std::uint32_t e = of_face * f; !is_tried[f] && e < of_face * (f + 1); ++e) {
         layer.coverage.carry(e, moved(layer, e));

@@ -34,6 +34,13 @@ class MovingCoverage {
   std::vector<std::uint32_t> still_failing(std::span<const std::uint32_t> failed);
   /// Goes with the mesh to its trial, for which failing() found no face last. The mesh itself accepts it after this.
   void accept(std::span<const std::uint32_t> faces);
+  /// Whether failing() last found a piece that had been divided so often that it could not be divided again.
+  bool is_worn() const { return is_worn_; }
+  /// Finds all witnesses of the state anew, as at the start. Costs as much, and does nothing if not all were found
+  /// then.
+  void renew();
+  /// Does so if the reference has been divided into many more pieces since then.
+  void tidy();
 
  private:
   /// One triangulation of the mesh. Its element `e` is triangle e % triangles.size() of face e / triangles.size().
@@ -49,11 +56,21 @@ class MovingCoverage {
   /// The faces that may lose pieces, and whether their neighbours may lose pieces as well.
   enum class Neighbours { lose_pieces, only_take_pieces };
   std::vector<std::uint32_t> failing(Layer& layer, std::span<const std::uint32_t> faces, Neighbours neighbours);
-  void find_witnesses(Layer& layer, Progress* progress);
+  /// Witnesses of the state, the faces of the reference that have none, and the vertices nearest to these.
+  struct Found {
+    std::vector<Layer> layers;
+    FaceCount uncovered;
+    std::vector<std::uint32_t> nearest;
+  };
+  Found find_layers(Progress* progress) const;
+  void find_witnesses(Found& found, Progress* progress) const;
+  void count_pieces();
 
   MovingMesh* mesh_;
   std::vector<Layer> layers_;
   FaceCount uncovered_;
+  std::size_t pieces_ = 0, most_pieces_ = 0;
+  bool is_worn_ = false;
 };
 
 }  // namespace tolvol

@@ -80,9 +80,20 @@ PullBack::Moving PullBack::moving(std::vector<std::uint32_t> vertices) {
 
 PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3> before,
                                 std::span<const glm::dvec3> after, Mode mode, Progress* progress) {
+  if (coverage_) coverage_->tidy();
+  mesh_.try_all(moving.vertices, before, after);
+  try {
+    return settle({moving, before, after}, mode, progress);
+  } catch (...) {
+    for (const std::uint32_t v : moving.vertices) mesh_.take_back(v), held_index_[v] = kNone;
+    throw;
+  }
+}
+
+/// Moves the vertices from the wish, which is on trial, to where they may stay, and accepts that.
+PullBack::Result PullBack::settle(const Wish& wish, Mode mode, Progress* progress) {
+  const auto& [moving, before, after] = wish;
   const std::vector<std::uint32_t>& vertices = moving.vertices;
-  const Wish wish{moving, before, after};
-  mesh_.try_all(vertices, before, after);
   Result result{std::vector<double>(vertices.size(), 1), {after.begin(), after.end()}, 0};
   if (mode == Mode::settle) mesh_.remember_refusals();
   std::vector<std::uint32_t> failed = mesh_.failing(moving.faces, progress);
@@ -345,11 +356,17 @@ void PullBack::raise(Held& held, Mode mode, bool search) {
 /// goes back from its wish if no step before has held it.
 void PullBack::cover(std::vector<Held>& held, const Wish& wish, Mode mode, Progress* progress) {
   std::vector<std::uint32_t> changed, lost;
+  bool is_renewed = false;
   for (;;) {
     // A face may fail because some of its corners went back and others did not.
     std::vector<std::uint32_t> failed = mesh_.failing(mesh_.faces_around(changed), progress);
     if (failed.empty() && !lost.empty()) failed = lost = coverage_->still_failing(lost);
     if (failed.empty()) failed = lost = coverage_->failing(wish.moving.faces);
+    if (!failed.empty() && !is_renewed && coverage_->is_worn()) {
+      is_renewed = true;
+      coverage_->renew();
+      failed = lost = coverage_->failing(wish.moving.faces);
+    }
     if (failed.empty()) return;
     changed.clear();
     for (const std::uint32_t f : failed) {

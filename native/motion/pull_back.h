@@ -65,8 +65,8 @@ class PullBack {
 
   /// Moves each vertex from `before`, its stored position now, towards `after`, and makes where it ends the new state.
   /// All faces of the new state are inside, and the reference is covered; see constrain.h for what else holds of the
-  /// factors. Throws InvalidInput, changing nothing, for a wish that is not finite. After Cancelled only start() may be
-  /// called. A settled face costs about 10 ns, and a face near the tolerance about 1 us for each try.
+  /// factors. Throws InvalidInput, for a wish that is not finite, and Cancelled; both change nothing. A settled face
+  /// costs about 10 ns, and a face near the tolerance about 1 us for each try.
   Result move(const Moving& moving, std::span<const glm::dvec3> before, std::span<const glm::dvec3> after, Mode mode,
               Progress* progress);
 
@@ -102,6 +102,7 @@ class PullBack {
   glm::dvec3 stored_at(const Held& held, double factor) const;
   void place(Held& held, const Along& along);
   Held& hold(std::uint32_t vertex, const Wish& wish, std::vector<Held>& held);
+  Result settle(const Wish& wish, Mode mode, Progress* progress);
   std::vector<Held> hold(const Wish& wish, std::vector<std::uint32_t> failed, Progress* progress);
   Along along(const Held& held, double factor, std::uint32_t hint) const;
   Along crossing(const Held& held, double target, Along inner, Along outer) const;

@@ -131,6 +131,10 @@ glm::dmat4 to_matrix(const py::object& object, const std::string& name) {
   return result;
 }
 
+TriangleMesh to_mesh(const py::object& vertices, const py::object& triangles, const std::string& suffix) {
+  return {to_vertices(vertices, "vertices" + suffix).values, to_triangles(triangles, "triangles" + suffix)};
+}
+
 Outside to_outside(const std::string& outside) {
   if (outside == "error") return Outside::error;
   if (outside == "keep") return Outside::keep;

@@ -15,6 +15,7 @@
 #include "base/errors.h"
 #include "check/outside.h"
 #include "geometry/frame.h"
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol::python {
 
@@ -29,6 +30,9 @@ Vertices to_vertices(const py::object& array, const std::string& name);
 
 /// Takes an (m, 3) array of any integer type. This refuses negative values; the native validation refuses large values.
 std::vector<glm::uvec3> to_triangles(const py::object& array, const std::string& name);
+
+/// Takes both. `suffix` ends the names of the arguments, as in "vertices_a".
+TriangleMesh to_mesh(const py::object& vertices, const py::object& triangles, const std::string& suffix = "");
 
 /// Takes an (m, k) array of any integer type, k from 1 to 4, and returns it flat. Sets `corners` to k.
 std::vector<std::uint32_t> to_faces(const py::object& array, const std::string& name, int& corners);

@@ -141,7 +141,7 @@ before, after : (n, 3) arrays, both float32 or both float64
     Local coordinates before the motion and as they are wished.
 faces : (m, k) integer array
     k is 1 (points), 2 (segments), 3 (triangles) or 4 (quads, which keep the tolerance in every triangulation). A
-    triangle among quads repeats a corner.
+    triangle among quads repeats a corner that is next to itself, as in (a, b, c, c).
 volume : ToleranceVolume
 mode : {"pull_back", "reset"}
     "pull_back" goes so far that no single factor can rise by 1/64 alone. Two-sided, it lowers factors by at least 1/16

@@ -232,9 +232,9 @@ max_normal_angle : float, optional
     is compared by its other side. Where neighbours are oriented against each other, the normals are those of the part
     with one orientation; of a reference that is not the input, they stay as they are. An input face with a larger angle
     is no error: it is counted, and its angle rises by at most a degree above the least that is proved of it, unless it
-    faces against all of the reference near it. A face whose normal rounding could turn is no witness and has no angle,
-    but no other face becomes one. If most faces of the reference are so small for its size, no angle is kept, and a
-    warning says so.
+    faces against all of the reference near it. A face so thin that rounding could turn its normal is no witness and
+    has no angle; only a face that was so in the input may be so in the result. If most faces of the reference are so,
+    no angle is kept, and a warning says so.
 max_seconds : float, optional
     Stop after this time with what is proved by then, which depends on the speed of the machine. The time does not cut
     short the preparation, in which the mesh is set up and the input is certified: about 0.7 us a triangle, and 2 us if

@@ -246,7 +246,7 @@ vertices : (n, 3) float32 or float64 array
 lattice : Lattice
 faces : (m, k) integer array, optional
     k is 1 (points), 2 (segments), 3 (triangles) or 4 (quads, which keep the tolerance in every triangulation). A
-    triangle among quads repeats a corner. With a volume the faces are needed.
+    triangle among quads repeats a corner that is next to itself, as in (a, b, c, c). With a volume the faces are needed.
 volume : ToleranceVolume, optional
     The result has to stay in it.
 mode : {"blocked", "farthest", "pull_back"}

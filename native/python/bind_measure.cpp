@@ -12,10 +12,6 @@
 namespace tolvol::python {
 namespace {
 
-TriangleMesh to_mesh(const py::object& vertices, const py::object& triangles, const std::string& suffix) {
-  return {to_vertices(vertices, "vertices" + suffix).values, to_triangles(triangles, "triangles" + suffix)};
-}
-
 py::tuple to_pair(const Range& range) { return py::make_tuple(range.lower, range.upper); }
 
 py::array_t<double> values_of(const std::vector<Estimate>& estimates) {

@@ -7,6 +7,7 @@
 #include "python/arrays.h"
 #include "python/interruptible.h"
 #include "python/module.h"
+#include "topology/area_and_volume.h"
 #include "topology/crossings.h"
 #include "topology/solidity.h"
 
@@ -15,31 +16,18 @@ namespace {
 
 py::dict solidity_facts(const py::object& vertices, const py::object& triangles, const py::object& to_world,
                         std::optional<int> threads, Progress* progress) {
-  const Vertices v = to_vertices(vertices, "vertices");
-  TriangleMesh mesh{v.values, to_triangles(triangles, "triangles")};
-  // Where the mesh is in the world changes neither its area nor its volume.
-  glm::dmat4 linear = to_matrix(to_world);
-  linear[3] = {0, 0, 0, 1};
-  const StoredSpace space(linear, v.storage);
-  if (!mesh.triangles.empty()) validate(mesh.vertices, mesh.triangles);
+  const TriangleMesh mesh = to_mesh(vertices, triangles);
+  const StoredSpace space(to_matrix(to_world), Storage::float64);
+  mesh.triangles.empty() ? require_finite(mesh.vertices) : validate(mesh.vertices, mesh.triangles);
   Solidity found;
-  double area = 0;
-  std::optional<double> volume;
+  AreaAndVolume extent;
   {
     const Interruptible call(progress);
     Team team(thread_count(to_threads(threads)));
     found = solidity(mesh.vertices, mesh.triangles, team);
-    Box world;
-    for (const glm::dvec3& p : mesh.vertices) world.add(space.world(p));
-    const Frame frame(world);
-    mesh.vertices = space.in(frame).frame(mesh.vertices);
-    // No power of the scale is formed, which could leave the range of double although the result does not.
-    const double scale = frame.scale();
-    area = surface_area(mesh) / scale / scale;
-    if (found.closed() && found.oriented() && found.non_manifold_edges == 0) {
-      volume = enclosed_volume(mesh) / (space.mirrors() ? -6 : 6) / scale / scale / scale;
-    }
+    extent = area_and_volume(mesh.vertices, mesh.triangles, found.shell_of, glm::dmat3(space.to_world()));
   }
+  const bool is_solid = found.closed() && found.oriented() && found.non_manifold_edges == 0;
   py::dict facts;
   facts["closed"] = found.closed();
   facts["boundary_loops"] = found.boundary_loops;
@@ -51,8 +39,8 @@ py::dict solidity_facts(const py::object& vertices, const py::object& triangles,
   facts["misoriented_edges"] = found.misoriented_edges;
   facts["degenerate_triangles"] = found.degenerate_triangles;
   facts["shells"] = found.shells;
-  facts["area"] = area;
-  facts["volume"] = volume ? py::object(py::float_(*volume)) : py::object(py::none());
+  facts["area"] = extent.area;
+  facts["volume"] = is_solid ? py::object(py::float_(extent.volume)) : py::object(py::none());
   return facts;
 }
 
@@ -64,7 +52,7 @@ void bind_topology(py::module_& module) {
       [](const py::object& vertices, const py::object& triangles, std::optional<std::int64_t> most,
          std::optional<int> threads, Progress* progress) {
         if (most && *most < 1) throw InvalidInput("most must be at least 1, or None for no limit");
-        const TriangleMesh mesh{to_vertices(vertices, "vertices").values, to_triangles(triangles, "triangles")};
+        const TriangleMesh mesh = to_mesh(vertices, triangles);
         validate(mesh.vertices, mesh.triangles);
         std::vector<glm::uvec2> pairs;
         {

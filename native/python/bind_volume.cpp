@@ -80,7 +80,7 @@ double distance_to(const ToleranceVolume& volume, const StoredSpace& space, cons
   const glm::dvec3 world = space.world(stored);
   if (!finite(world)) throw InvalidInput(name + " is too far away for double precision under to_world", "too_far");
   // The point is so far away that the reference counts as a point.
-  const glm::dvec3 away = world - frame.to_world(glm::dvec3(0));
+  const glm::dvec3 away = world - frame.centre();
   return std::hypot(away.x, away.y, away.z);
 }
 

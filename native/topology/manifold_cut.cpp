@@ -23,9 +23,6 @@ namespace {
 
 constexpr std::uint32_t kNone = CutMesh::kNone;
 
-using Side = std::uint32_t;  // see topology/sides.h
-Side previous_corner(Side s) { return s % 3 == 0 ? s + 2 : s - 1; }
-
 class Cutter {
  public:
   Cutter(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, Team& team)

@@ -16,8 +16,11 @@
 
 namespace tolvol {
 
-/// Returns the next corner of the same triangle, and so the next side.
-inline std::uint32_t next_corner(std::uint32_t corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
+using Side = std::uint32_t;
+
+/// Return the next or the previous corner of the same triangle, and so the side there.
+inline Side next_corner(Side corner) { return corner % 3 == 2 ? corner - 2 : corner + 1; }
+inline Side previous_corner(Side corner) { return corner % 3 == 0 ? corner + 2 : corner - 1; }
 
 /// Returns one key for a pair of numbers in either order.
 inline std::uint64_t pair_key(std::uint32_t a, std::uint32_t b) {
@@ -27,8 +30,8 @@ inline std::uint64_t pair_key(std::uint32_t a, std::uint32_t b) {
 /// Calls visit() once for each set of sides with the same two ends, and hands it the sides in ascending order.
 /// end_of(corner) is the vertex of a corner, a number below `vertices`.
 template <class EndOf, class Visit>
-void by_ends(std::span<const std::uint32_t> sides, std::size_t vertices, Team& team, EndOf&& end_of, Visit&& visit) {
-  using Keyed = std::pair<std::uint64_t, std::uint32_t>;
+void by_ends(std::span<const Side> sides, std::size_t vertices, Team& team, EndOf&& end_of, Visit&& visit) {
+  using Keyed = std::pair<std::uint64_t, Side>;
   std::vector<Keyed> sorted(sides.size());
   team.run(sides.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
@@ -36,7 +39,7 @@ void by_ends(std::span<const std::uint32_t> sides, std::size_t vertices, Team& t
   });
   sort_by(
       sorted, vertices, team, [](const Keyed& s) { return s.first >> 32; }, std::less<Keyed>());
-  std::vector<std::uint32_t> alike;
+  std::vector<Side> alike;
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     poll_at(i);
     alike.push_back(sorted[i].second);

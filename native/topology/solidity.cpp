@@ -14,7 +14,8 @@ namespace tolvol {
 Solidity solidity(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, Team& team) {
   Solidity found;
   const std::vector<std::uint32_t> position = weld_equal_positions(vertices);
-  std::vector<std::uint32_t> at;  // For each corner of a triangle that counts.
+  std::vector<std::uint32_t> at;       // For each corner of a triangle that counts.
+  std::vector<std::uint32_t> counted;  // The triangles that count.
   at.reserve(3 * triangles.size());
   for (const glm::uvec3& t : triangles) {
     poll_at(at.size());
@@ -23,6 +24,7 @@ Solidity solidity(std::span<const glm::dvec3> vertices, std::span<const glm::uve
       ++found.degenerate_triangles;
     } else {
       at.insert(at.end(), {a, b, c});
+      counted.push_back(static_cast<std::uint32_t>(at.size() / 3 + found.degenerate_triangles - 1));
     }
   }
   UnionFind loops(vertices.size()), fans(at.size()), shells(at.size() / 3);
@@ -59,7 +61,12 @@ Solidity solidity(std::span<const glm::dvec3> vertices, std::span<const glm::uve
       ++found.non_manifold_vertices;
     }
   }
-  for (std::uint32_t t = 0; 3 * t < at.size(); ++t) found.shells += shells.find(t) == t;
+  found.shell_of.resize(triangles.size());
+  std::iota(found.shell_of.begin(), found.shell_of.end(), 0u);
+  for (std::uint32_t t = 0; t < counted.size(); ++t) {
+    found.shells += shells.find(t) == t;
+    found.shell_of[counted[t]] = counted[shells.find(t)];
+  }
   return found;
 }
 

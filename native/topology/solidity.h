@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
+#include <vector>
 
 #include "base/parallel.h"
 
@@ -19,6 +21,8 @@ struct Solidity {
   std::size_t misoriented_edges = 0;      ///< of two triangles that both run through them in the same direction
   std::size_t degenerate_triangles = 0;   ///< the triangles that are not counted
   std::size_t shells = 0;                 ///< groups of triangles that hang together by edges
+  /// For each triangle, the first of its shell; a triangle that is not counted is alone.
+  std::vector<std::uint32_t> shell_of;
 
   bool closed() const { return open_edges == 0 && shells > 0; }
   bool manifold() const { return non_manifold_edges == 0 && non_manifold_vertices == 0; }

@@ -105,7 +105,7 @@ def test_faces_outside_are_refused_or_kept(scan, tmp_path):
     assert not (tmp_path / "out.ply").exists()
     arguments = bent, tmp_path / "out.ply", "--tolerance", "1%", "--reference", scan, "--outside", "keep"
     match = succeeded(decimate(*arguments, "--report", tmp_path / "r.json"))
-    assert re.match(r"\d+ faces outside kept", match[3])
+    assert re.fullmatch(r"\d+ faces outside kept", match[3])
     run = json.loads((tmp_path / "r.json").read_text())
     assert run["outside"]["rest"][1] <= run["tolerance"]["absolute"] < run["forward"][1]
     stored = world(tmp_path / "out.ply")

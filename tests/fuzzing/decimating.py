@@ -29,6 +29,8 @@ def draw_decimate(rng, case):
         options["effort"] = "thorough"
         if rng.random() < 0.3:
             options["max_seconds"] = float(some(rng, 0.001, 0.05, 0.5))
+    if rng.random() < 0.3:
+        options["max_normal_angle"] = float(some(rng, 5, 45, 90, 180))
     if rng.random() < 0.2:
         options["target_triangles"] = int(rng.integers(1, len(case.triangles) + 2))
     if rng.random() < 0.2:
@@ -48,7 +50,15 @@ def decimate(run):
     volume = run.volume()
     given = {
         name: options[name]
-        for name in ("placement", "two_sided", "effort", "max_seconds", "target_triangles", "outside")
+        for name in (
+            "placement",
+            "two_sided",
+            "effort",
+            "max_seconds",
+            "max_normal_angle",
+            "target_triangles",
+            "outside",
+        )
         if name in options
     }
     given |= {name: arrays[name] for name in ("locked", "shares") if name in arrays}

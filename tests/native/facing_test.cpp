@@ -46,6 +46,7 @@ TEST(Facing, NormalsThatRoundingCouldTurnAreNotSure) {
   EXPECT_FALSE(sure({0.5, 1e-6, 0}, 1e-9)) << "the corners may be elsewhere";
   EXPECT_FALSE(sure({0.5, 0, 0}, kError));
   EXPECT_FALSE(sure(a, kError));
+  EXPECT_FALSE(sure_normal(a, a, a, 0).has_value());
   EXPECT_FALSE(sure({std::numeric_limits<double>::quiet_NaN(), 1, 0}, kError));
 }
 

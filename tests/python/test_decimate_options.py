@@ -202,6 +202,13 @@ def test_the_promise_holds_at_any_precision(precision):
     assert_promise(vertices, triangles, result, TOLERANCE)
 
 
+def test_a_coarse_grid_costs_few_triangles():
+    """The grid is coarse where parts are small for the size of the whole."""
+    vertices, triangles = TORUS
+    fine, coarse = (decimate(vertices, triangles, TOLERANCE, precision=p) for p in (1, 1 / 64))
+    assert len(coarse.triangles) <= 1.25 * len(fine.triangles)
+
+
 def test_locks_of_a_dropped_face_hold_where_the_face_is_that_stands_in_for_it():
     """To a sheet two faces are added that meet in one vertex. The first of them repeats a face of the sheet."""
     x = np.linspace(0, 1, 21)

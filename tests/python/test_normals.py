@@ -148,6 +148,8 @@ def test_a_far_origin_costs_nothing():
         moved = vertices + away
         there = decimate(moved, triangles, tolerance)
         back = decimate(moved, triangles, tolerance, to_world=matrix)
+        assert_promise(moved, triangles, there, tolerance)
+        assert_promise(moved, triangles, back, tolerance, to_world=matrix)
         for result in (there, back):
             assert abs(len(result.triangles) / count - 1) < 0.1
             assert 0 < result.report["normals"]["largest"] <= 90 and result.report["normals"]["unsure"] == 0
@@ -184,6 +186,9 @@ def test_orientation_and_needles_of_the_input_are_no_error(mesh):
     result = decimate(vertices, triangles, 0.02 * tolvol.diagonal(vertices, triangles))
     normals = result.report["normals"]
     assert normals["exceeded_before"] == normals["exceeded_after"] == 0 and normals["largest"] <= 90
+    # A face that is compared by the wrong side finds no witness, and its vertices cannot go.
+    free = decimate(vertices, triangles, 0.02 * tolvol.diagonal(vertices, triangles), max_normal_angle=180)
+    assert len(result.triangles) <= 1.5 * len(free.triangles)
 
 
 @pytest.mark.parametrize("angle", [0, -1, 180.001, np.nan, np.inf])

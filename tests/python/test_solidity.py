@@ -34,6 +34,10 @@ def test_area_and_volume_hold_at_any_scale_and_place():
     away[:3, 3] = 1e200
     placed = tolvol.solidity(vertices, triangles, to_world=away)
     assert (placed["area"], placed["volume"]) == pytest.approx((area, volume))
+    stray = np.append(vertices, [[1e30, 0, 0]], axis=0)
+    assert tolvol.solidity(stray, triangles)["volume"] == pytest.approx(volume), "an unused vertex"
+    with pytest.raises(tolvol.InvalidInput, match="vertex 0 is not finite"):
+        tolvol.solidity(np.full((1, 3), np.nan), np.empty((0, 3), int))
     huge = tolvol.solidity(vertices * 1e120, triangles)
     assert huge["area"] == pytest.approx(area * 1e240) and huge["volume"] == np.inf
 
