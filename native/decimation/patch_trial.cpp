@@ -39,7 +39,9 @@ PatchTrial::PatchTrial(const BoundedMesh& mesh, const SurfaceSamples& samples, S
 
 /// Prepares a collapse and a patch around it, with its samples.
 bool PatchTrial::prepare(Halfedge h, const glm::dvec3& position, int rings) {
-  const VertexPosition target = mesh_.store(position);
+  // A vertex that stays where it is keeps its bits, which mapping from the frame need not give.
+  const std::uint32_t end = mesh_.to(h);
+  const VertexPosition target = position == mesh_.position(end) ? mesh_.vertex_position(end) : mesh_.store(position);
   if (!target.is_finite() || !change_.prepare_collapse(h, target) || change_.folds_over()) return false;
   if (!patch_.gather(change_, rings, !bounds_.bounds_boundaries())) return false;
   relaxation_.start(patch_);

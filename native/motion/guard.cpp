@@ -80,7 +80,14 @@ Guard::Correction Guard::constrain(std::span<const float> positions) {
   const PullBack::Moving moving = pull_back_.moving(changed(positions));
   std::vector<glm::dvec3> before, after;
   for (const std::uint32_t v : moving.vertices) before.push_back(at(last_, v)), after.push_back(at(positions, v));
-  const PullBack::Result ends = pull_back_.move(moving, before, after, PullBack::Mode::settle, nullptr);
+  interrupted_ = true;
+  PullBack::Result ends;
+  try {
+    ends = pull_back_.move(moving, before, after, PullBack::Mode::settle, nullptr);
+  } catch (const Error&) {
+    interrupted_ = false;  // A refused or cancelled motion has changed nothing. Of any other exception nobody knows.
+    throw;
+  }
   Correction correction;
   for (std::size_t i = 0; i < moving.vertices.size(); ++i) {
     if (ends.factors[i] >= 1) continue;
@@ -90,6 +97,7 @@ Guard::Correction Guard::constrain(std::span<const float> positions) {
   for (std::size_t i = 0; i < moving.vertices.size(); ++i) {
     for (int k = 0; k < 3; ++k) last_[3 * moving.vertices[i] + k] = static_cast<float>(ends.reached[i][k]);
   }
+  interrupted_ = false;
   return correction;
 }
 

@@ -57,7 +57,7 @@ class Guard {
   void require_size(std::span<const float> positions) const;
   std::vector<std::uint32_t> changed(std::span<const float> positions) const;
 
-  bool interrupted_ = false;  // An exception has ended reset(): last_ holds the state, and pull_back_ does not.
+  bool interrupted_ = false;  // An exception has ended a call: last_ holds the state, and pull_back_ may not.
   std::vector<std::uint32_t> faces_;
   std::vector<float> last_;  // The state, as it is stored.
   Options options_;

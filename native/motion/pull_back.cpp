@@ -83,7 +83,7 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
   if (coverage_) coverage_->tidy();
   mesh_.try_all(moving.vertices, before, after);
   try {
-    return settle({moving, before, after}, mode, progress);
+    return finish({moving, before, after}, mode, progress);
   } catch (...) {
     for (const std::uint32_t v : moving.vertices) mesh_.take_back(v), held_index_[v] = kNone;
     throw;
@@ -91,7 +91,7 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
 }
 
 /// Moves the vertices from the wish, which is on trial, to where they may stay, and accepts that.
-PullBack::Result PullBack::settle(const Wish& wish, Mode mode, Progress* progress) {
+PullBack::Result PullBack::finish(const Wish& wish, Mode mode, Progress* progress) {
   const auto& [moving, before, after] = wish;
   const std::vector<std::uint32_t>& vertices = moving.vertices;
   Result result{std::vector<double>(vertices.size(), 1), {after.begin(), after.end()}, 0};
@@ -360,12 +360,15 @@ void PullBack::cover(std::vector<Held>& held, const Wish& wish, Mode mode, Progr
   for (;;) {
     // A face may fail because some of its corners went back and others did not.
     std::vector<std::uint32_t> failed = mesh_.failing(mesh_.faces_around(changed), progress);
-    if (failed.empty() && !lost.empty()) failed = lost = coverage_->still_failing(lost);
-    if (failed.empty()) failed = lost = coverage_->failing(wish.moving.faces);
-    if (!failed.empty() && !is_renewed && coverage_->is_worn()) {
-      is_renewed = true;
-      coverage_->renew();
-      failed = lost = coverage_->failing(wish.moving.faces);
+    if (failed.empty()) {
+      if (!lost.empty()) lost = coverage_->still_failing(lost);
+      if (lost.empty()) lost = coverage_->failing(wish.moving.faces);
+      if (!lost.empty() && !is_renewed && coverage_->is_worn()) {
+        is_renewed = true;
+        coverage_->renew();
+        lost = coverage_->failing(wish.moving.faces);
+      }
+      failed = lost;
     }
     if (failed.empty()) return;
     changed.clear();

@@ -102,7 +102,7 @@ class PullBack {
   glm::dvec3 stored_at(const Held& held, double factor) const;
   void place(Held& held, const Along& along);
   Held& hold(std::uint32_t vertex, const Wish& wish, std::vector<Held>& held);
-  Result settle(const Wish& wish, Mode mode, Progress* progress);
+  Result finish(const Wish& wish, Mode mode, Progress* progress);
   std::vector<Held> hold(const Wish& wish, std::vector<std::uint32_t> failed, Progress* progress);
   Along along(const Held& held, double factor, std::uint32_t hint) const;
   Along crossing(const Held& held, double target, Along inner, Along outer) const;

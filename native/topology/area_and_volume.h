@@ -9,8 +9,10 @@
 namespace tolvol {
 
 struct AreaAndVolume {
-  double area = 0;    ///< 0 or infinite beyond the range of double
-  double volume = 0;  ///< negative if the faces run the other way round; it means nothing if the mesh is not closed
+  double area = 0;  ///< 0 or infinite beyond the range of double
+  /// Negative if the faces run the other way round. It means nothing if the mesh is not closed. It is 0 or infinite
+  /// beyond the range of double, and 0 for a body that is flatter than that range has room for.
+  double volume = 0;
 };
 
 /// `shell_of`: for each triangle, a triangle of its shell, the same one for all of the shell (Solidity::shell_of).

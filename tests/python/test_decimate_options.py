@@ -202,6 +202,21 @@ def test_the_promise_holds_at_any_precision(precision):
     assert_promise(vertices, triangles, result, TOLERANCE)
 
 
+@pytest.mark.parametrize("seed", [0, 4, 6])
+def test_original_vertices_keep_their_bits_under_a_matrix(seed):
+    """Mapping to the frame and back may change the last bit of a coordinate."""
+    vertices, triangles = meshes.torus(20, 10, noise=0.01, seed=seed)
+    vertices = vertices.astype(np.float32)
+    sizes = np.random.default_rng(seed).uniform(0.3, 3, 3)
+    place = meshes.matrix(meshes.random_rotation(seed) @ np.diag(sizes))
+    side = vertices[triangles].mean(1)[:, 0] > 0
+    wedges = tolvol.wedges(triangles, np.repeat(side[:, None, None], 3, axis=1).astype(np.float32))
+    options = {"placement": "subset", "effort": "thorough", "wedges": wedges}
+    result = decimate(vertices, triangles, 0.08, to_world=place, **options)
+    assert len(result.triangles) < len(triangles)
+    assert np.array_equal(result.vertices, vertices[result.vertex_source])
+
+
 def test_a_coarse_grid_costs_few_triangles():
     """The grid is coarse where parts are small for the size of the whole."""
     vertices, triangles = TORUS
