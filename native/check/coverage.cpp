@@ -71,9 +71,25 @@ void Coverage::set_witness(std::uint32_t element, std::uint32_t triangle) {
   lists_[element].pieces.push_back(whole(triangle));
 }
 
-bool Coverage::find_witnesses(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
-                              std::span<const std::uint32_t> ids, double provable,
-                              std::vector<std::uint32_t>& nearest) {
+FaceCount Coverage::find_witnesses(std::span<const std::uint32_t> triangles, const TriangleMesh& mesh,
+                                   std::span<const std::uint32_t> ids, double provable,
+                                   std::vector<std::uint32_t>& nearest, Progress* progress) {
+  if (mesh.triangles.empty()) return FaceCount::of(triangles);
+  const Hierarchy hierarchy(mesh);
+  FaceCount uncovered;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    poll_at(i);
+    if (progress) progress->update(static_cast<double>(i) / static_cast<double>(triangles.size()));
+    if (find_witnesses_of(triangles[i], mesh, hierarchy, ids, provable, nearest)) continue;
+    if (uncovered.faces++ == 0) uncovered.first = triangles[i];
+  }
+  return uncovered;
+}
+
+/// Does so for one triangle. Returns whether every piece has a witness.
+bool Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
+                                 std::span<const std::uint32_t> ids, double provable,
+                                 std::vector<std::uint32_t>& nearest) {
   bool all = true;
   std::vector<Part> stack{whole(triangle)};
   std::size_t looked = 0;

@@ -18,11 +18,11 @@ std::optional<std::string> storage_warning(const ToleranceVolume& volume, const 
   return std::nullopt;
 }
 
-void refuse_outside(std::size_t count, std::uint32_t first) {
+void refuse_outside(const FaceCount& outside) {
   std::ostringstream text;
-  text << count << " faces are not within the tolerance of the reference, the first is face " << first
+  text << outside.faces << " faces are not within the tolerance of the reference, the first is face " << *outside.first
        << "; take a larger tolerance, set the reference anew, or keep them (outside=\"keep\")";
-  throw FacesOutside(count, first, text.str(), "input_outside");
+  throw FacesOutside(outside.faces, *outside.first, text.str(), "input_outside");
 }
 
 std::string take_uncovered(const FaceCount& uncovered, Outside outside) {
@@ -36,6 +36,11 @@ std::string take_uncovered(const FaceCount& uncovered, Outside outside) {
        << *uncovered.first << "; take a larger tolerance, set the reference anew, keep one direction only "
        << "(two_sided=False), or go on from what there is (outside=\"keep\")";
   throw FacesOutside(uncovered.faces, *uncovered.first, text.str(), "reference_outside");
+}
+
+void require_area_to_cover(int corners) {
+  if (corners >= 3) return;
+  throw InvalidInput("points and segments cannot cover a reference; keep one direction only (two_sided=False)");
 }
 
 }  // namespace tolvol

@@ -19,11 +19,14 @@ namespace tolvol {
 std::optional<std::string> storage_warning(const ToleranceVolume& volume, const StoredSpace& space,
                                            std::span<const glm::dvec3> stored);
 
-/// Throws FacesOutside: faces of the input are not inside.
-[[noreturn]] void refuse_outside(std::size_t count, std::uint32_t first);
+/// Throws FacesOutside: faces of the input are not inside. `outside` must not be empty.
+[[noreturn]] void refuse_outside(const FaceCount& outside);
 
 /// Takes faces of the reference that are not within the tolerance of the input as `outside` says: throws FacesOutside,
 /// or returns a warning. `uncovered` must not be empty.
 std::string take_uncovered(const FaceCount& uncovered, Outside outside);
+
+/// Throws InvalidInput for faces of fewer than 3 corners, which have no area.
+void require_area_to_cover(int corners);
 
 }  // namespace tolvol

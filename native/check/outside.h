@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 namespace tolvol {
 
@@ -18,6 +19,12 @@ enum class Outside {
 struct FaceCount {
   std::size_t faces = 0;
   std::optional<std::uint32_t> first;
+
+  /// Counts these faces, whose numbers ascend.
+  static FaceCount of(std::span<const std::uint32_t> numbers) {
+    if (numbers.empty()) return {};
+    return {numbers.size(), numbers.front()};
+  }
 };
 
 }  // namespace tolvol

@@ -2,6 +2,7 @@
 #include "decimation/boundary.h"
 
 #include <limits>
+#include <numeric>
 
 #include "base/call.h"
 
@@ -48,12 +49,9 @@ BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mes
       uncertified_.push_back(b);
     }
   }
-  const Hierarchy of_mesh(elements);
-  std::vector<std::uint32_t> nearest;
-  for (std::uint32_t i = 0; i < reference_.triangles.size(); ++i) {
-    poll_at(i);
-    backward_->find_witnesses(i, elements, of_mesh, ids, provable, nearest);
-  }
+  std::vector<std::uint32_t> all(reference_.triangles.size()), nearest;
+  std::iota(all.begin(), all.end(), 0u);
+  backward_->find_witnesses(all, elements, ids, provable, nearest, nullptr);
   for (const std::uint32_t t : nearest) {
     uncertified_.push_back(elements.triangles[t].x);
     uncertified_.push_back(elements.triangles[t].y);

@@ -2,6 +2,7 @@
 #include "decimation/decimation_input.h"
 
 #include <algorithm>
+#include <numeric>
 #include <unordered_map>
 
 #include "base/call.h"
@@ -169,8 +170,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
       // Hardly any face would find a witness, and hardly any vertex could go.
       report_.warnings.push_back(
           "no angle of normals is kept: rounding could turn most faces of the reference, which are too small or too "
-          "thin "
-          "for its size; decimate the small parts as a mesh of their own");
+          "thin for its size; decimate the small parts as a mesh of their own");
       facing_.reset();
     }
   }
@@ -203,9 +203,7 @@ void DecimationInput::certify_input(const Certificate& certificate) {
     if (report_.outside.faces++ == 0) report_.outside.first = i;
     for (int k = 0; k < 3; ++k) pin(cut_.input_vertex[triangles_[i][k]], "outside the tolerance");
   }
-  if (report_.outside.faces && options_.outside == Outside::error) {
-    refuse_outside(report_.outside.faces, *report_.outside.first);
-  }
+  if (report_.outside.faces && options_.outside == Outside::error) refuse_outside(report_.outside);
 }
 
 /// Finds the first witnesses for every triangle of the reference.
@@ -225,18 +223,11 @@ void DecimationInput::cover(double provable) {
                                     cut_.input_vertex[triangles_[i].z]);
     ids.push_back(kNone);
   }
-  const Hierarchy hierarchy(elements);
-  std::vector<std::uint32_t> nearest;
-  FaceCount& uncovered = report_.uncovered;
-  const auto count = static_cast<std::uint32_t>(volume_->reference().triangles.size());
+  std::vector<std::uint32_t> all(volume_->reference().triangles.size()), nearest;
+  std::iota(all.begin(), all.end(), 0u);
   if (options_.progress) options_.progress->begin("comparing");
-  for (std::uint32_t i = 0; i < count; ++i) {
-    poll_at(i);
-    if (options_.progress) options_.progress->update(static_cast<double>(i) / static_cast<double>(count));
-    if (!backward_->find_witnesses(i, elements, hierarchy, ids, provable, nearest) && uncovered.faces++ == 0)
-      uncovered.first = i;
-  }
-  if (uncovered.faces) report_.warnings.push_back(take_uncovered(uncovered, options_.outside));
+  report_.uncovered = backward_->find_witnesses(all, elements, ids, provable, nearest, options_.progress);
+  if (report_.uncovered.faces) report_.warnings.push_back(take_uncovered(report_.uncovered, options_.outside));
   for (const std::uint32_t t : nearest) {
     for (int k = 0; k < 3; ++k) pin(elements.triangles[t][k], "outside the tolerance");
   }

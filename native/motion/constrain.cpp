@@ -18,8 +18,7 @@ ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const gl
   PullBack pull_back(volume, space, faces, corners, before.size(), options.threads);
   PullBack::Start start = pull_back.start(before, {options.outside, options.two_sided}, options.progress);
   ConstrainResult result;
-  result.outside.faces = start.outside.size();
-  if (!start.outside.empty()) result.outside.first = start.outside.front();
+  result.outside = FaceCount::of(start.outside);
   result.uncovered = start.uncovered;
   result.warnings = std::move(start.warnings);
   const Certificate certificate(volume);

@@ -99,10 +99,8 @@ class Deformation {
   void bound() {
     result_.method = certificate_->method(), result_.renderer = certificate_->renderer();
     warn_of_rounding();
-    if (options_.two_sided && corners_ < 3) {
-      throw InvalidInput("points and segments cannot cover a reference; keep one direction only (two_sided=False)");
-    }
     if (options_.two_sided) {
+      require_area_to_cover(static_cast<int>(corners_));
       start(before_);
       if (options_.outside == Outside::error && !is_whole()) return accept_only_if_whole();
     }
@@ -111,7 +109,7 @@ class Deformation {
     if (failing.empty()) {
       result_.vertices = after_;
     } else {
-      result_.leaving = {failing.size(), failing.front()};
+      result_.leaving = FaceCount::of(failing);
       options_.mode == Mode::pull_back ? pull_back() : search(std::move(failing));
     }
     for (std::size_t i = 0; i < after_.size(); ++i) result_.held_back += result_.vertices[i] != after_[i];
@@ -151,7 +149,7 @@ class Deformation {
       result_.vertices = after_;
       return;
     }
-    if (!outside.empty()) refuse_outside(outside.size(), outside.front());
+    if (!outside.empty()) refuse_outside(FaceCount::of(outside));
     take_uncovered(uncovered, Outside::error);
   }
 
@@ -163,10 +161,8 @@ class Deformation {
       result_.held_back += after_[v] != before_[v];
       after_[v] = before_[v];
     };
-    if (!outside.empty()) {
-      result_.outside = {outside.size(), outside.front()};
-      kept_.assign(faces_.size() / corners_, false);
-    }
+    result_.outside = FaceCount::of(outside);
+    if (!outside.empty()) kept_.assign(faces_.size() / corners_, false);
     for (const std::uint32_t face : outside) {
       kept_[face] = true;
       for (const std::uint32_t v : corners_of(face)) keep(v);
@@ -183,17 +179,17 @@ class Deformation {
   void pull_back() {
     result_.permitted_fraction = std::nullopt;
     ConstrainOptions options;
-    if (options_.outside == Outside::keep) options.outside = Outside::keep;
-    options.two_sided = options_.two_sided;
+    options.outside = options_.outside, options.two_sided = options_.two_sided;
     options.threads = options_.threads, options.progress = options_.progress;
     result_.vertices =
         constrain(before_, after_, faces_, static_cast<int>(corners_), space_, *volume_, options).vertices;
   }
 
   void search(std::vector<std::uint32_t> failing) {
-    if (options_.outside == Outside::error) {
+    // Two-sided, start() has looked at the mesh before the deformation.
+    if (options_.outside == Outside::error && !options_.two_sided) {
       const std::vector<std::uint32_t> outside = not_inside(before_, faces_);
-      if (!outside.empty()) refuse_outside(outside.size(), outside.front());
+      if (!outside.empty()) refuse_outside(FaceCount::of(outside));
     }
     result_.vertices.assign(before_.begin(), before_.end());
     std::vector<glm::dvec3> permitted = result_.vertices;

@@ -57,10 +57,6 @@ void MovingCoverage::find_witnesses(Found& found, Progress* progress) const {
     i < mesh_->face_count() && mesh_->is_own(i) ? layer.coverage.set_witness(i, i) : open.push_back(i);
   }
   if (open.empty()) return;
-  if (mesh_->face_count() == 0) {
-    found.uncovered = {open.size(), open.front()};
-    return;
-  }
   TriangleMesh elements;
   for (std::uint32_t v = 0; v < mesh_->vertex_count(); ++v) {
     // A vertex without faces may be anywhere.
@@ -74,16 +70,11 @@ void MovingCoverage::find_witnesses(Found& found, Progress* progress) const {
       elements.triangles.emplace_back(corners[a], corners[b], corners[c]);
     }
   }
-  const Hierarchy hierarchy(elements);
   std::vector<std::uint32_t> nearest;
-  std::size_t uncovered = 0;
-  for (std::size_t i = 0; i < open.size(); ++i) {
-    poll_at(i);
-    if (progress) progress->update(static_cast<double>(i) / static_cast<double>(open.size()));
-    if (layer.coverage.find_witnesses(open[i], elements, hierarchy, ids, mesh_->provable(), nearest)) continue;
-    if (uncovered++ == 0) found.uncovered.first = std::min(open[i], found.uncovered.first.value_or(open[i]));
-  }
-  found.uncovered.faces = std::max(found.uncovered.faces, uncovered);
+  const FaceCount uncovered = layer.coverage.find_witnesses(open, elements, ids, mesh_->provable(), nearest, progress);
+  found.uncovered.faces = std::max(found.uncovered.faces, uncovered.faces);
+  if (uncovered.first)
+    found.uncovered.first = std::min(*uncovered.first, found.uncovered.first.value_or(*uncovered.first));
   for (const std::uint32_t element : nearest) {
     for (int k = 0; k < 3; ++k) found.nearest.push_back(elements.triangles[element][k]);
   }

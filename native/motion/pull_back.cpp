@@ -54,15 +54,11 @@ PullBack::PullBack(const ToleranceVolume& volume, const StoredSpace& space, std:
 PullBack::~PullBack() = default;
 
 PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, const StartOptions& options, Progress* progress) {
-  if (options.two_sided && mesh_.corners() < 3) {
-    throw InvalidInput("points and segments cannot cover a reference; keep one direction only (two_sided=False)");
-  }
+  if (options.two_sided) require_area_to_cover(mesh_.corners());
   held_index_.assign(stored.size(), kNone);
   coverage_.reset();
   MovingMesh::Start start = mesh_.start(stored, progress);
-  if (!start.outside.empty() && options.outside == Outside::error) {
-    refuse_outside(start.outside.size(), start.outside.front());
-  }
+  if (!start.outside.empty() && options.outside == Outside::error) refuse_outside(FaceCount::of(start.outside));
   Start result{std::move(start.outside), {}, {}};
   if (start.warning) result.warnings.push_back(*start.warning);
   if (!options.two_sided) return result;
@@ -352,8 +348,8 @@ void PullBack::raise(Held& held, Mode mode, bool search) {
   }
 }
 
-/// Does step (4). It ends, because a vertex is back in the state after a few rounds in which a face of it fails. It
-/// goes back from its wish if no step before has held it.
+/// Does step (4). It ends, because a vertex is back in the state after some rounds in which a face of it fails. A
+/// vertex that no step before has held goes back from its wish.
 void PullBack::cover(std::vector<Held>& held, const Wish& wish, Mode mode, Progress* progress) {
   std::vector<std::uint32_t> changed, lost;
   bool is_renewed = false;

@@ -266,7 +266,8 @@ DeformationResult
 Raises
 ------
 InvalidInput
-    If an argument is not valid, if the stored type cannot hold the tolerance, or if the mesh is beyond the tolerance before.
+    If an argument is not valid, if the stored type cannot hold the tolerance, or if the mesh is beyond the tolerance
+    before.
 Cancelled
 
 Notes

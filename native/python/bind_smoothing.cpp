@@ -110,7 +110,8 @@ seconds : the time that the call took)doc");
              py::arg("progress") = py::none(),
              R"doc(Smooth a mesh within the tolerance of a volume.
 
-Every iteration ends with all faces inside and the whole reference within the tolerance of them. Vertices at an edge with more than two faces stay where they are.
+Every iteration ends with all faces inside and the whole reference within the tolerance of them. Vertices at an edge
+with more than two faces stay where they are.
 
 Parameters
 ----------
@@ -154,8 +155,9 @@ Cancelled
 
 Notes
 -----
-Cost: about 0.3 us for each vertex in each iteration, and some us for each vertex that is held back; two-sided also
-2 us for each face of the reference, and 0.3 us for each in each iteration.
+Cost: about 0.3 us for each vertex in each iteration, and some us for each vertex that is held back. Two-sided, 2 us for
+each face of a reference that is not the input, and half as much again for each iteration; up to three and a half times
+as much if many vertices are held back.
 
 After M. Desbrun et al., Implicit Fairing of Irregular Meshes using Diffusion and Curvature Flow, 1999. "reset" is from
 M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.)doc");

@@ -19,13 +19,22 @@ def decimate(vertices, triangles, volume):
     return result.vertices, result.triangles
 
 
-def deform(vertices, triangles, volume):
-    """Moves vertices upwards by far more than the tolerance."""
+def lattice_around(vertices, motion):
+    """Returns a lattice around the vertices. motion: moves its (4, 4, 4, 3) control points in place."""
     lower, size = vertices.min(0) - 0.2, np.ptp(vertices, axis=0) + 0.4
     domain = meshes.matrix(np.diag(size), lower)
     points = tolvol.lattice_points(4, domain)
-    points[:, 1:3, 2:] += [0, 0, 10 * volume.tolerance]
-    lattice = tolvol.Lattice(points, domain)
+    motion(points)
+    return tolvol.Lattice(points, domain)
+
+
+def deform(vertices, triangles, volume):
+    """Moves vertices upwards by far more than the tolerance."""
+
+    def lift(points):
+        points[:, 1:3, 2:] += [0, 0, 10 * volume.tolerance]
+
+    lattice = lattice_around(vertices, lift)
     return tolvol.deform(vertices, lattice, triangles, volume, mode="pull_back").vertices, triangles
 
 
@@ -82,15 +91,12 @@ def random_step(rng, vertices, triangles, volume):
         operator = rng.choice(["laplacian", "bilaplacian"])
         return name, (tolvol.smooth(vertices, triangles, volume, operator=operator, iterations=5).vertices, triangles)
     if name == "deform":
-        lower, size = vertices.min(0) - 0.2, np.ptp(vertices, axis=0) + 0.4
-        domain = meshes.matrix(np.diag(size), lower)
-        points = tolvol.lattice_points(4, domain)
-        points += volume.tolerance * rng.normal(0, rng.choice([0.5, 5]), points.shape)
-        mode = rng.choice(["blocked", "farthest", "pull_back"])
-        return name, (
-            tolvol.deform(vertices, tolvol.Lattice(points, domain), triangles, volume, mode=mode).vertices,
-            triangles,
-        )
+
+        def shake(points):
+            points += volume.tolerance * rng.normal(0, rng.choice([0.5, 5]), points.shape)
+
+        lattice, mode = lattice_around(vertices, shake), rng.choice(["blocked", "farthest", "pull_back"])
+        return name, (tolvol.deform(vertices, lattice, triangles, volume, mode=mode).vertices, triangles)
     wish = vertices + rng.choice([0.3, 2]) * volume.tolerance * rng.standard_normal(vertices.shape)
     wish = wish.astype(np.float32)
     if name == "constrain":

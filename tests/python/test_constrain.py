@@ -190,6 +190,9 @@ def test_guard_bad_input(positions, message):
     assert len(guard.constrain(SINGLE)[0]) == 0
 
 
+SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
+
+
 def test_a_motion_that_leaves_the_surface_as_it_is_is_granted_at_any_size():
     vertices, triangles = meshes.plate(41)
     inner = (np.abs(vertices[:, :2] - 0.5) < 0.499).all(1)
@@ -201,19 +204,17 @@ def test_a_motion_that_leaves_the_surface_as_it_is_is_granted_at_any_size():
 
 @pytest.mark.parametrize("count", [5, 31, 61])
 def test_a_fine_mesh_covers_a_coarse_reference(count):
-    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
     vertices, triangles = meshes.plate(count)
-    volume = tolvol.ToleranceVolume(*square, 3e-4)
+    volume = tolvol.ToleranceVolume(*SQUARE, 3e-4)
     pushed = tolvol.constrain(vertices, vertices + [0, 0, 1e-3], triangles, volume).vertices
     assert pushed[:, 2].min() > 2.8e-4
     assert np.array_equal(tolvol.constrain(pushed, pushed, triangles, volume).vertices, pushed)
 
 
 def test_a_guard_goes_on_after_an_edit_that_it_refused():
-    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
     vertices, triangles = meshes.plate(31)
     positions = vertices.astype(np.float32)
-    guard = tolvol.Guard(positions, triangles, tolvol.ToleranceVolume(*square, 1e-3))
+    guard = tolvol.Guard(positions, triangles, tolvol.ToleranceVolume(*SQUARE, 1e-3))
     wish = positions + np.float32([0, 0, 5e-3])
     indices, back = guard.constrain(wish)
     wish[indices] = back
@@ -228,10 +229,9 @@ def test_a_guard_goes_on_after_an_edit_that_it_refused():
 
 def test_small_steps_do_not_wear_a_guard_out():
     """The reference is divided at the edges that move over it, in each step again."""
-    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
     vertices, triangles = meshes.plate(21)
     positions = vertices.astype(np.float32)
-    guard = tolvol.Guard(positions, triangles, tolvol.ToleranceVolume(*square, 5e-4))
+    guard = tolvol.Guard(positions, triangles, tolvol.ToleranceVolume(*SQUARE, 5e-4))
     vertex = np.abs(vertices[:, :2] - 0.5).sum(1).argmin()
     for _ in range(200):
         positions[vertex, 0] += 5e-4 / 3
