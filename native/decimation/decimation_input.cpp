@@ -83,10 +83,11 @@ void DecimationInput::pin() {
 
 /// Faces that meet in a T-junction share no edge along which they could be kept together while it moves.
 void DecimationInput::pin_t_junctions(Team& team) {
-  std::vector<glm::dvec3> stored(cut_.vertex_input.size());
-  for (std::size_t v = 0; v < stored.size(); ++v) stored[v] = vertices_[cut_.vertex_input[v]];
+  if (cut_.boundary.empty()) return;
+  TriangleMesh stored{std::vector<glm::dvec3>(cut_.vertex_input.size()), cut_.triangles};
+  for (std::size_t v = 0; v < stored.vertices.size(); ++v) stored.vertices[v] = vertices_[cut_.vertex_input[v]];
   const double unit = space_.storage() == Storage::float32 ? 0x1p-24 : 0x1p-53;
-  for (const std::uint32_t v : t_junctions(stored, cut_.boundary, unit, team)) pin(v, "T-junction");
+  for (const std::uint32_t v : t_junctions(std::move(stored), cut_.boundary, unit, team)) pin(v, "T-junction");
 }
 
 /// Calls visit(input vertex, vertex of the manifold) for all vertices that hold an input vertex: the one that it

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// T-junctions of a mesh: open edges on which vertices of other open edges lie. The faces there meet, but share no
-/// edge.
+/// T-junctions of a mesh: vertices of open edges that lie on other edges or on the inside of faces. The faces there
+/// meet, but share no edge or vertex.
 #pragma once
 
 #include <cstdint>
@@ -9,15 +9,18 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol {
 
-/// The vertices that hold the T-junctions together, in rising order: those that lie on an edge between its ends, the
-/// ends of these edges, and what is at the same places. `edges` are the open edges, as pairs of vertices. A vertex lies
-/// on an edge if it is as near as the rounding of coordinates may have put it: within 4 * `unit` * the largest
-/// coordinate of the three, where `unit` is half the distance from 1 to the next number. O(n log n) for n edges, about
-/// 1 us each.
-std::vector<std::uint32_t> t_junctions(std::span<const glm::dvec3> vertices, std::span<const glm::uvec2> edges,
-                                       double unit, Team& team);
+/// The vertices that hold the T-junctions together, in rising order: those that lie on an edge between its ends or on
+/// the inside of a triangle, these ends and the triangle's corners, and what is at the same places. `open` are the open
+/// edges, as pairs of vertices. A vertex lies there if it is as near as the rounding of coordinates may have put it:
+/// within 4 * `unit` * the largest coordinate of the points concerned, where `unit` is half the distance from 1 to the
+/// next number. A vertex that is as near to an end of the edge or to a corner is at no T-junction there. Neither is one
+/// that triangles which are no more than segments join to both ends, nor one whose faces all lie upon a face in its
+/// plane, as a decal does. O(n log n), about 0.2 us a triangle and 2 us
+/// an open edge; nothing without open edges.
+std::vector<std::uint32_t> t_junctions(TriangleMesh mesh, std::span<const glm::uvec2> open, double unit, Team& team);
 
 }  // namespace tolvol

@@ -16,31 +16,91 @@ using glm::dvec3;
 
 constexpr double kFloat = 0x1p-24;
 
-std::vector<std::uint32_t> found(const std::vector<dvec3>& vertices, const std::vector<glm::uvec2>& edges) {
+std::vector<std::uint32_t> found(const TriangleMesh& mesh, const std::vector<glm::uvec2>& open) {
   Team alone(1);
-  return t_junctions(vertices, edges, kFloat, alone);
+  return t_junctions(mesh, open, kFloat, alone);
 }
 
+using Indices = std::vector<std::uint32_t>;
+
+/// Triangles above the x axis, from 0 to 1 and from 2 to 3, and below it from 0 to 0.5 and from 0.5 to 1.
+const TriangleMesh kAlongALine{
+    {{0, 0, 0}, {1, 0, 0}, {0.5, 0, 0}, {0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}, {0, 1, 0}, {0, -1, 0}},
+    {{0, 1, 7}, {3, 8, 2}, {2, 8, 4}, {5, 6, 7}}};
+
 TEST(TJunctions, AreHeldByTheVertexTheEndsAndWhatIsAtTheirPlaces) {
-  const std::vector<dvec3> vertices{{0, 0, 0}, {1, 0, 0}, {0.5, 0, 0}, {0, 0, 0}, {1, 0, 0}, {5, 5, 5}, {6, 5, 5}};
-  EXPECT_EQ(found(vertices, {{0, 1}, {3, 2}, {2, 4}, {5, 6}}), (std::vector<std::uint32_t>{0, 1, 2, 3, 4}));
+  EXPECT_EQ(found(kAlongALine, {{0, 1}, {3, 2}, {2, 4}, {5, 6}}), (Indices{0, 1, 2, 3, 4}));
   // The ends of one edge on those of another are no T-junction.
-  EXPECT_TRUE(found(vertices, {{0, 1}, {3, 4}, {5, 6}}).empty());
-  EXPECT_TRUE(found(vertices, {}).empty());
+  EXPECT_TRUE(found(kAlongALine, {{0, 1}, {3, 4}, {5, 6}}).empty());
+  EXPECT_TRUE(found(kAlongALine, {}).empty());
+}
+
+TEST(TJunctions, AreNotWhereCornersDifferByRounding) {
+  for (const dvec3& rounded : {dvec3(0x1p-26, 0x1p-26, 0), dvec3(1, -0x1p-26, 0x1p-26), dvec3(1 - 0x1p-24, 0, 0)}) {
+    TriangleMesh mesh = kAlongALine;
+    mesh.vertices[2] = rounded;
+    mesh.vertices.emplace_back(1, -1, 0);
+    mesh.triangles = {{0, 1, 7}, {2, 8, 9}};
+    EXPECT_EQ(found(mesh, {{0, 1}, {1, 7}, {7, 0}, {2, 8}, {8, 9}, {9, 2}}), Indices{}) << rounded.x;
+  }
+}
+
+TEST(TJunctions, AreFoundAtAnyScale) {
+  for (const double scale : {1e-300, 1e-160, 1e160, 1e300}) {
+    TriangleMesh mesh = kAlongALine;
+    for (dvec3& p : mesh.vertices) p *= scale;
+    EXPECT_EQ(found(mesh, {{0, 1}, {3, 2}, {2, 4}, {5, 6}}), (Indices{0, 1, 2, 3, 4})) << scale;
+  }
 }
 
 TEST(TJunctions, CountARoundedVertexAndNoneBesideTheEdge) {
   const dvec3 a(1000.1, 2, 3), b(1000.9, 2.7, 3.4);
   const auto rounded = [](const dvec3& p) { return rounded_to_float32(p); };
+  const auto is_found = [&](const dvec3& p) {
+    const TriangleMesh mesh{{rounded(a), rounded(b), rounded(p), dvec3(0), dvec3(1000, 0, 0), dvec3(1000, 10, 0)},
+                            {{0, 1, 4}, {2, 3, 5}}};
+    return !found(mesh, {{0, 1}, {2, 3}}).empty();
+  };
   std::size_t on = 0, beside = 0;
   for (int i = 1; i < 100; ++i) {
     const dvec3 middle = rounded(a) + i / 100.0 * (rounded(b) - rounded(a));
-    on += !found({rounded(a), rounded(b), rounded(middle), dvec3(0)}, {{0, 1}, {2, 3}}).empty();
-    beside +=
-        !found({rounded(a), rounded(b), rounded(middle + dvec3(0, 0, 0.002)), dvec3(0)}, {{0, 1}, {2, 3}}).empty();
+    on += is_found(middle), beside += is_found(middle + dvec3(0, 0, 0.002));
   }
   EXPECT_EQ(on, 99u);
   EXPECT_EQ(beside, 0u);
+}
+
+TEST(TJunctions, AreAlsoOnTheInsideOfFacesAndOnEdgesThatAreNotOpen) {
+  // A square of two triangles; above it a triangle that stands on the diagonal, and one that stands on one half.
+  TriangleMesh mesh{{{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}}, {{0, 1, 2}, {0, 2, 3}}};
+  const auto standing_on = [&](const dvec3& a, const dvec3& b) {
+    TriangleMesh both = mesh;
+    both.vertices.insert(both.vertices.end(), {a, b, a + dvec3(0, 0, 1)});
+    both.triangles.emplace_back(4, 5, 6);
+    return found(both, {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 4}});
+  };
+  EXPECT_EQ(standing_on({1, 1, 0}, {3, 3, 0}), (Indices{0, 2, 4, 5}));
+  EXPECT_EQ(standing_on({3, 1, 0}, {3.5, 2, 0}), (Indices{0, 1, 2, 4, 5}));
+  EXPECT_EQ(standing_on({3, 1, 1e-3}, {3.5, 2, 1e-3}), Indices{});
+}
+
+TEST(TJunctions, AreNotWhereASheetLiesUponAnotherInItsPlane) {
+  // Two squares at a right angle, and a triangle upon one of them that reaches the edge between them.
+  const TriangleMesh mesh{
+      {{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}, {0, 0, 4}, {4, 0, 4}, {1, 0, 0}, {3, 0, 0}, {3, 1, 0}},
+      {{0, 1, 2}, {0, 2, 3}, {1, 0, 4}, {1, 4, 5}, {6, 7, 8}}};
+  const std::vector<glm::uvec2> open{{1, 2}, {2, 3}, {3, 0}, {0, 4}, {4, 5}, {5, 1}, {6, 7}, {7, 8}, {8, 6}};
+  EXPECT_EQ(found(mesh, open), Indices{});
+  TriangleMesh risen = mesh;
+  risen.vertices[8].z = 1;
+  EXPECT_EQ(found(risen, open), (Indices{0, 1, 6, 7}));
+}
+
+TEST(TJunctions, AreNotWhereATriangleThatIsASegmentFillsThePlace) {
+  // Vertex 2 is on the edge from 0 to 1 of the triangle below, to which a segment through all three joins it.
+  const TriangleMesh mesh{{{0, 0, 0}, {2, 0, 0}, {1, 0, 0}, {1, -1, 0}, {1, 1, 0}},
+                          {{1, 0, 3}, {0, 1, 2}, {0, 2, 4}, {2, 1, 4}}};
+  EXPECT_TRUE(found(mesh, {{0, 3}, {3, 1}, {2, 1}, {1, 4}, {4, 0}}).empty());
 }
 
 /// Two plates side by side, one of which has twice as many vertices along the edge where they meet.
@@ -91,6 +151,33 @@ TEST(TJunctions, DoNotOpenInADecimation) {
       EXPECT_EQ(r.locked.at("T-junction"), (n + 1) + (2 * n + 1)) << "the vertices of both borders";
       cases::expect_within(c, r, two_sided);
     }
+  }
+}
+
+/// A plate in the plane z = 0 on which a wall of squares stands, with which it shares no vertex.
+TriangleMesh plate_with_wall(unsigned n) {
+  const TriangleMesh wall = shapes::squares(n / 2, [](const dvec3& p) { return dvec3(0.21 + 0.57 * p.x, 0.43, p.y); });
+  return shapes::stored(shapes::joined(shapes::grid(n), wall));
+}
+
+TEST(TJunctions, AWallStaysOnItsPlate) {
+  for (const auto effort : {DecimationOptions::Effort::fast, DecimationOptions::Effort::thorough}) {
+    const cases::Case c{plate_with_wall(across(20))};
+    DecimationOptions options;
+    options.effort = effort;
+    const DecimationResult r = cases::run(c, options);
+    std::size_t standing = 0;
+    for (const glm::uvec3& t : r.triangles) {
+      for (int k = 0; k < 3; ++k) {
+        const dvec3 &p = r.vertices[t[k]], &q = r.vertices[t[(k + 1) % 3]];
+        if (p.y != q.y || std::abs(p.y - 0.43) > 1e-6 || std::max(p.z, q.z) > 0.01) continue;
+        EXPECT_EQ(std::max(p.z, q.z), 0);
+        ++standing;
+      }
+    }
+    EXPECT_GE(standing, across(20) / 2u) << "the open edges of the wall that lie on the plate";
+    EXPECT_LT(r.triangles.size(), c.mesh.triangles.size());
+    cases::expect_within(c, r, true);
   }
 }
 
