@@ -51,10 +51,11 @@ check base geometry gl field
 topology base geometry
 decimation base geometry field check topology
 motion base geometry field check topology
+repair base geometry field check topology
 measure base geometry
 picture base geometry gl field
 openmesh base geometry field check
-python base geometry gl field check topology decimation motion measure picture
+python base geometry gl field check topology decimation motion repair measure picture
 EOF
   )
   [ -z "$crossing" ] || { echo "these may not be included here:" && echo "$crossing" && return 1; }

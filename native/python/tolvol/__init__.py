@@ -2,8 +2,9 @@
 """Tolerance volumes: keep a triangle mesh within a tolerance of a reference surface, proved.
 
 A ToleranceVolume holds all points within a tolerance of a reference mesh. The functions decimate, smooth, deform and
-constrain and the class Guard keep a mesh in it. hausdorff, directed_hausdorff and deviation measure the distances of two
-meshes. They share no bounds with the functions before, whose results they judge.
+constrain and the class Guard keep a mesh in it, and close_holes fills the holes that are smaller than the tolerance.
+hausdorff, directed_hausdorff and deviation measure the distances of two meshes. They share no bounds with the functions
+before, whose results they judge.
 
 These conventions hold for every function:
 
@@ -34,6 +35,7 @@ from ._native import (
     GlUnavailable,
     Guard,
     HausdorffResult,
+    HoleClosingResult,
     InvalidInput,
     Lattice,
     Progress,
@@ -43,6 +45,7 @@ from ._native import (
     ToleranceVolume,
     TolvolError,
     __version__,
+    close_holes,
     constrain,
     crossing_pairs,
     decimate,
@@ -76,6 +79,7 @@ __all__ = [
     "GlUnavailable",
     "Guard",
     "HausdorffResult",
+    "HoleClosingResult",
     "InvalidInput",
     "Lattice",
     "Progress",
@@ -86,6 +90,7 @@ __all__ = [
     "TolvolError",
     "Verdict",
     "__version__",
+    "close_holes",
     "constrain",
     "crossing_pairs",
     "decimate",

@@ -249,6 +249,32 @@ def decimate(
 ) -> DecimationResult: ...
 def wedges(triangles: _Integers, corners: NDArray[np.float32]) -> NDArray[np.int32]: ...
 
+class HoleClosingResult:
+    @property
+    def triangles(self) -> NDArray[np.int32]: ...
+    @property
+    def triangle_loop(self) -> NDArray[np.int32]: ...
+    @property
+    def borders(self) -> NDArray[np.int32]: ...
+    @property
+    def corner_source(self) -> NDArray[np.int32]: ...
+    @property
+    def loops(self) -> list[dict[str, Any]]: ...
+    @property
+    def report(self) -> dict[str, Any]: ...
+
+def close_holes(
+    vertices: _Vertices,
+    triangles: _Integers,
+    volume: ToleranceVolume,
+    *,
+    to_world: ArrayLike | None = None,
+    largest_perimeter: float | None = None,
+    max_normal_angle: float | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> HoleClosingResult: ...
+
 class Lattice:
     def __init__(
         self,

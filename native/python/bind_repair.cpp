@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <pybind11/stl.h>
+
+#include "python/arrays.h"
+#include "python/interruptible.h"
+#include "python/module.h"
+#include "python/volume.h"
+#include "repair/close_holes.h"
+
+namespace tolvol::python {
+namespace {
+
+struct HolesClosed {
+  py::array_t<std::int32_t> triangles, triangle_loop, borders, corner_source;
+  py::list loops;
+  py::dict report;
+};
+
+/// -1 for HoleClosingResult::kNone.
+py::array_t<std::int32_t> from_rows(const std::vector<glm::uvec3>& rows) {
+  py::array_t<std::int32_t> array({static_cast<py::ssize_t>(rows.size()), py::ssize_t{3}});
+  std::int32_t* out = array.mutable_data();
+  for (const glm::uvec3& row : rows) {
+    for (int k = 0; k < 3; ++k) *out++ = static_cast<std::int32_t>(row[k]);
+  }
+  return array;
+}
+
+HolesClosed close_holes_of_arrays(const py::object& vertices, const py::object& triangles, const Volume& volume,
+                                  const py::object& to_world, std::optional<double> largest_perimeter,
+                                  std::optional<double> max_normal_angle, std::optional<int> threads,
+                                  Progress* progress) {
+  const Vertices v = to_vertices(vertices, "vertices");
+  const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
+  const StoredSpace space(to_matrix(to_world), v.storage);
+  CloseHolesOptions options;
+  options.largest_perimeter = largest_perimeter;
+  options.max_normal_angle = max_normal_angle.value_or(options.max_normal_angle);
+  options.threads = to_threads(threads);
+  options.progress = progress;
+  HoleClosingResult r;
+  {
+    const Interruptible call(progress);
+    r = close_holes(v.values, t, space, volume.native, options);
+  }
+  HolesClosed result{from_triangles(r.triangles),
+                     from_vector<std::int32_t>(r.loop),
+                     from_rows(r.borders),
+                     from_rows(r.corner_source),
+                     py::list(),
+                     py::dict()};
+  py::dict refused;
+  for (const HoleClosingResult::Loop& loop : r.loops) {
+    const py::str outcome(name_of(loop.outcome));
+    py::dict entry;
+    entry["outcome"] = outcome;
+    entry["vertex"] = loop.vertex;
+    entry["corners"] = loop.corners;
+    entry["perimeter"] = loop.perimeter;
+    entry["centre"] = py::make_tuple(loop.centre.x, loop.centre.y, loop.centre.z);
+    result.loops.append(entry);
+    if (loop.outcome != LoopOutcome::closed) {
+      refused[outcome] = refused.contains(outcome) ? refused[outcome].cast<std::size_t>() + 1 : std::size_t{1};
+    }
+  }
+  result.report["closed"] = r.count(LoopOutcome::closed);
+  result.report["refused"] = refused;
+  result.report["triangles_added"] = r.loop.size();
+  result.report["warnings"] = r.warnings;
+  return result;
+}
+
+}  // namespace
+
+void bind_repair(py::module_& module) {
+  py::class_<HolesClosed>(module, "HoleClosingResult", py::module_local(),
+                          "The triangles that close_holes returns, and what became of each boundary loop.")
+      .def_readonly("triangles", &HolesClosed::triangles,
+                    "(m + k, 3) int32: the triangles of the input, and after them the new ones, loop by loop.")
+      .def_readonly("triangle_loop", &HolesClosed::triangle_loop,
+                    "(k,) int32: for each new triangle, the index of its loop in `loops`.")
+      .def_readonly("borders", &HolesClosed::borders,
+                    "(k, 3) int32: for each side of each new triangle, from corner j to the next, the triangle of the "
+                    "input on its other side; -1 where a new triangle is there.")
+      .def_readonly("corner_source", &HolesClosed::corner_source,
+                    "(k, 3) int32: for each corner of each new triangle, a corner at the rim of the hole, as 3 * "
+                    "triangle + corner, from which attributes may be taken. It is a corner of a triangle in `borders` "
+                    "where one is at this corner.")
+      .def_readonly("loops", &HolesClosed::loops, R"doc(A list with a dict for each boundary loop:
+
+outcome : "closed", or the reason why the loop is left open: "not_a_loop", the open edges end at triangles of the other
+    orientation or at an edge of more than two triangles; "too_long", more than 1,000 corners; "perimeter", longer than
+    largest_perimeter; "outside", it is not proved that the triangles would be within the tolerance; "turned", they would
+    be turned away from the reference, or rounding could turn them; "crossing", they would cross others. Of several of
+    the last three it is the one that refused most of the triangles and edges that were tried, and only where there is
+    none of the three: "non_manifold", an edge would be one of more than two triangles; "degenerate", the triangles would
+    be segments
+vertex : the vertex at which the loop begins, an index
+corners : the number of its edges
+perimeter : its length in world units
+centre : the mean of its corners, (x, y, z) in the world)doc")
+      .def_readonly("report", &HolesClosed::report, R"doc(A dict with these entries:
+
+closed : the number of loops that were closed
+refused : a dict of the number of other loops for each reason
+triangles_added : the number of new triangles
+warnings : a list of sentences)doc");
+  module.def("close_holes", &close_holes_of_arrays, py::arg("vertices"), py::arg("triangles"), py::arg("volume"),
+             py::kw_only(), py::arg("to_world") = py::none(), py::arg("largest_perimeter") = py::none(),
+             py::arg("max_normal_angle") = py::none(), py::arg("threads") = py::none(),
+             py::arg("progress") = py::none(),
+             R"doc(Fill the holes of a mesh that can be filled within the tolerance.
+
+A hole is closed by triangles between the vertices of its rim: no vertex is added or moved, and triangle i of the input
+stays triangle i. Every point of a new triangle is within the tolerance of the reference. Because the input stays, the
+reference is as near to the result as to the input. A new triangle crosses no other, is not degenerate, gives no edge more
+than two triangles, and has the orientation of the rim. A hole is filled as a whole or not at all.
+
+To decimate the closed mesh, hand it to decimate with the same volume, and so with the reference that has the holes::
+
+    volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
+    closed = tolvol.close_holes(vertices, triangles, volume)
+    result = tolvol.decimate(vertices, closed.triangles, volume)
+
+Parameters
+----------
+vertices : (n, 3) float32 or float64 array
+    Local coordinates.
+triangles : (m, 3) integer array
+volume : ToleranceVolume
+largest_perimeter : float, optional
+    Leave longer loops open, in world units. The ends of a tube thinner than the tolerance are holes like others.
+max_normal_angle : float, optional
+    Degrees, more than 0 and at most 180: every point of a new triangle has a point of the reference within the tolerance
+    where the normals of both differ by at most this angle. The default, 120, closes the ends of tubes, which are at right
+    angles to the tubes, but no sheet by a second one on its back. 180 permits any angle.
+to_world, threads, progress
+    See help(tolvol).
+
+Returns
+-------
+HoleClosingResult
+
+Raises
+------
+InvalidInput
+    If the mesh or an option is not valid, or if the stored type cannot hold the tolerance.
+Cancelled
+
+Notes
+-----
+Edges are open if they are edges of one triangle only. Vertices at the same position count as one, so that seams between
+vertices at one place are no holes; a triangle that repeats another one does not count. Where several holes meet at a vertex each is a loop of its own, as the triangles lie
+around the mean normal of the vertex. Loops are filled as if they were alone; one that is in conflict with a lower one is
+then filled anew around that, if possible.
+
+Of all triangulations whose triangles keep the bounds, the one is taken with the least sum of area times squared sides: in
+a plane the Delaunay triangulation. The search is exact for triangles one by one. Where two of its triangles cross each
+other, up to seven more searches leave one of them out.
+
+Cost: about 1 us a triangle of the mesh, and 2 to 4 us for each pair of corners of a loop, which are at most 1,000.)doc");
+}
+
+}  // namespace tolvol::python

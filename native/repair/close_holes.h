@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Closes the holes of a mesh that are smaller than the tolerance.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "check/tolerance_volume.h"
+
+namespace tolvol {
+
+struct CloseHolesOptions {
+  /// The largest length of a boundary loop that is closed, in world units.
+  std::optional<double> largest_perimeter = {};
+  /// In degrees, more than 0 and at most 180: every point of a new face has a witness within the tolerance whose normal
+  /// is within this angle of the face's (check/facing.h). The end of a tube is at right angles to the tube, so that a
+  /// limit of 90 would leave it to rounding. 180 keeps no angle.
+  double max_normal_angle = 120;
+  unsigned threads = 0;  ///< 0 is one for each core. It never changes the result.
+  Progress* progress = nullptr;
+};
+
+/// What became of a boundary loop. Of a loop that is left open because its faces would be outside, turned or crossing,
+/// the outcome is the reason that refused most of the faces and edges that were tried; of equals it is the first. Only
+/// where there is none of these reasons it is one of the two after them.
+enum class LoopOutcome : std::uint8_t {
+  closed,
+  not_a_loop,    ///< the open edges end at triangles of the other orientation or at an edge of more than two triangles
+  too_long,      ///< it has more than kMostLoopCorners corners
+  perimeter,     ///< it is longer than CloseHolesOptions::largest_perimeter
+  outside,       ///< it is not proved that the faces would be within the tolerance
+  turned,        ///< the faces would be turned away from the reference, or rounding could turn them
+  crossing,      ///< the faces would cross others
+  non_manifold,  ///< an edge would be one of more than two triangles
+  degenerate,    ///< the faces would be segments
+};
+/// The name of an outcome, as in "not_a_loop".
+const char* name_of(LoopOutcome outcome);
+
+/// The work on a loop grows with the third power of its corners.
+inline constexpr std::size_t kMostLoopCorners = 1000;
+
+struct HoleClosingResult {
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+
+  struct Loop {
+    LoopOutcome outcome = LoopOutcome::closed;
+    std::uint32_t vertex = 0;  ///< where its first edge begins
+    std::size_t corners = 0;   ///< the number of its edges
+    double perimeter = 0;      ///< in world units
+    glm::dvec3 centre{0};      ///< the mean of its corners in the world
+  };
+  std::vector<Loop> loops;
+  /// The input's triangles and after them the new ones, loop by loop.
+  std::vector<glm::uvec3> triangles;
+  std::vector<std::uint32_t> loop;  ///< for each new triangle: its loop
+  /// For each side of each new triangle, from corner k to the next: the input triangle that it closes on, or kNone
+  /// where another new triangle is.
+  std::vector<glm::uvec3> borders;
+  /// For each corner of each new triangle: a corner of an input triangle at the rim there, as 3 * triangle + corner, of
+  /// the triangle that the new one closes on if there is one. Attributes may be taken from there.
+  std::vector<glm::uvec3> corner_source;
+  std::vector<std::string> warnings;
+
+  /// The number of loops with this outcome.
+  std::size_t count(LoopOutcome outcome) const;
+};
+
+/// Fills every boundary loop (topology/boundary_loops.h) that can be filled with triangles between its corners, each
+/// within the tolerance of the reference with the headroom that operations leave, facing as the reference does there,
+/// neither degenerate nor crossing any other face, so that no edge gets more than two triangles. A loop is filled as a
+/// whole or not at all, in the orientation of its rim. Of the triangulations whose triangles keep these bounds one by
+/// one it takes the least (repair/least_triangulation.h); where two of its triangles cross, or lie on one edge, it
+/// tries a few times without one of them. Loops are filled as if they were alone; then each that is in conflict with
+/// one of lower number is filled anew around that, if possible.
+///
+/// No vertex moves and none is added, and every input triangle keeps its number. Because the input stays, the reference
+/// is as near to the result as it is to the input. Throws InvalidInput for a bad mesh, and where the stored type cannot
+/// hold the tolerance; Cancelled. 1 us a triangle, and for a loop of n corners about 5 ns * n^3 / 6 and n^2 / 2
+/// certificates at most.
+HoleClosingResult close_holes(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
+                              const StoredSpace& space, const ToleranceVolume& volume,
+                              const CloseHolesOptions& options = {});
+
+}  // namespace tolvol
