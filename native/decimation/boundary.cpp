@@ -9,10 +9,10 @@
 namespace tolvol {
 
 BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh,
-                               std::span<const glm::dvec3> positions, bool mesh_is_reference, double limit,
+                               std::span<const glm::dvec3> positions, bool boundary_is_of_reference, double limit,
                                double provable, Team& team) {
   if (mesh.boundary.empty()) return;
-  if (mesh_is_reference) {
+  if (boundary_is_of_reference) {
     reference_.vertices.assign(positions.begin(), positions.end());
     for (const glm::uvec2& e : mesh.boundary) reference_.triangles.emplace_back(e.x, e.y, e.y);
   } else {

@@ -17,9 +17,11 @@ namespace tolvol {
 
 class BoundaryBounds {
  public:
-  /// `limit` is the distance that collapses must keep; an edge nearer than `provable` counts as near at the start.
+  /// `limit` is the distance that collapses must keep; an edge nearer than `provable` counts as near at the start. If
+  /// the open edges of the mesh are such of the reference, they stand for those: edges that were closed are no
+  /// boundary.
   BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh, std::span<const glm::dvec3> positions,
-                 bool mesh_is_reference, double limit, double provable, Team& team);
+                 bool boundary_is_of_reference, double limit, double provable, Team& team);
   BoundaryBounds(const BoundaryBounds&) = delete;
   BoundaryBounds& operator=(const BoundaryBounds&) = delete;
 

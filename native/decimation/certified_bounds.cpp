@@ -13,13 +13,14 @@ namespace tolvol {
 CertifiedBounds::CertifiedBounds(const Directions& directions, MeshView mesh,
                                  std::span<const std::uint32_t> on_reference)
     : directions_(directions), vertices_(mesh.vertices.size()), faces_(mesh.triangles.size()) {
-  for (std::size_t v = 0; v < vertices_.size() && on_reference.empty(); ++v) {
-    poll_at(v);
-    vertices_[v] = forward().point_bound(mesh.vertices[v]);
-  }
   for (std::size_t f = 0; f < on_reference.size(); ++f) {
+    if (on_reference[f] == Hierarchy::kNone) continue;
     faces_[f] = {0, 0};
     for (int k = 0; k < 3; ++k) vertices_[mesh.triangles[f][k]] = {0, on_reference[f]};
+  }
+  for (std::size_t v = 0; v < vertices_.size(); ++v) {
+    poll_at(v);
+    if (vertices_[v].triangle == Hierarchy::kNone) vertices_[v] = forward().point_bound(mesh.vertices[v]);
   }
   if (!directions_.facing) return;
   rules_.assign(faces_.size(), {directions_.facing->angle, false, false});

@@ -33,7 +33,8 @@ class CertifiedBounds final : public Bounds {
     const FacingRule* facing = nullptr;     ///< The rule that witnesses of the forward direction keep.
   };
   /// Makes the bounds for a mesh before any change. `on_reference` has the triangle of the reference that each triangle
-  /// is, or is empty if they are no triangles of it. Keeps references to the checks and the rule.
+  /// is, or Hierarchy::kNone; or it is empty if they are no triangles of it. Keeps references to the checks and the
+  /// rule.
   CertifiedBounds(const Directions& directions, MeshView mesh, std::span<const std::uint32_t> on_reference = {});
 
   std::unique_ptr<Trial> trial() override;

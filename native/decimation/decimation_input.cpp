@@ -114,14 +114,22 @@ void DecimationInput::pin(std::uint32_t vertex, const std::string& cause) {
   pinned_[vertex] = true;
 }
 
-bool DecimationInput::input_is_reference() const {
+bool DecimationInput::input_begins_as_reference() const {
   const TriangleMesh& reference = volume_->reference();
-  if (reference.vertices.size() != vertices_.size() || reference.triangles.size() != triangles_.size()) return false;
-  if (!std::equal(triangles_.begin(), triangles_.end(), reference.triangles.begin())) return false;
+  if (reference.vertices.size() != vertices_.size() || reference.triangles.size() > triangles_.size()) return false;
+  if (!std::equal(reference.triangles.begin(), reference.triangles.end(), triangles_.begin())) return false;
   for (std::size_t i = 0; i < vertices_.size(); ++i) {
     if (space_.frame(vertices_[i]) != reference.vertices[i]) return false;
   }
   return true;
+}
+
+/// Whether a triangle that is none of the reference has an open edge.
+bool DecimationInput::added_triangles_are_open() const {
+  for (std::uint32_t side = 0; side < cut_.mates.size(); ++side) {
+    if (cut_.triangle_input[side / 3] >= own_count_ && cut_.mates[side] == kNone) return true;
+  }
+  return false;
 }
 
 Bounds* DecimationInput::set_bounds(Team& team) {
@@ -138,12 +146,12 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   }
   const Certificate certificate(*volume_);
   report_.method = certificate.method(), report_.renderer = certificate.renderer();
-  identical_ = input_is_reference();
-  if (identical_) {
+  if (input_begins_as_reference()) {
+    own_count_ = volume_->reference().triangles.size();
     element_of_.assign(triangles_.size(), kNone);
     for (std::uint32_t t = 0; t < cut_.triangle_input.size(); ++t) element_of_[cut_.triangle_input[t]] = t;
   }
-  if (!identical_) certify_input(certificate);
+  certify_input(certificate);
 
   forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), limit,
                    volume_->refutable(mapping_error));
@@ -153,7 +161,9 @@ Bounds* DecimationInput::set_bounds(Team& team) {
     cover(provable);
     directions.backward = &*backward_;
   } else {
-    boundary_.emplace(*volume_, cut_, positions_, identical_, limit, provable, team);
+    // Open edges of the reference that were closed are no boundary any more.
+    const bool is_own_boundary = own_count_ > 0 && !added_triangles_are_open();
+    boundary_.emplace(*volume_, cut_, positions_, is_own_boundary, limit, provable, team);
     for (const std::uint32_t v : boundary_->uncertified()) pin(v, "boundary not near the reference's boundary");
     if (boundary_->any()) {
       directions.boundary_forward = &boundary_->forward();
@@ -176,30 +186,48 @@ Bounds* DecimationInput::set_bounds(Team& team) {
     }
   }
   if (facing_) {
-    if (identical_) face_as_cut(cut_, *facing_);
+    if (own_count_ > 0) face_as_cut(cut_, *facing_);
     directions.facing = &*facing_;
   }
-  certified_.emplace(directions, MeshView{cut_.triangles, positions_},
-                     identical_ ? cut_.triangle_input : std::vector<std::uint32_t>());
-  if (facing_ && !identical_) {
-    const TriangleCertificate start(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), provable,
-                                    volume_->refutable(mapping_error));
-    exceeding_ = face_as_reference(cut_, positions_, start, volume_->hierarchy(), *facing_, team, *certified_);
-    // A face that is outside has no witness, and so no angle. It is counted as outside.
-    std::erase_if(exceeding_, [&](std::uint32_t t) { return is_outside_[cut_.triangle_input[t]]; });
+  std::vector<std::uint32_t> on_reference;
+  if (own_count_ > 0) {
+    on_reference = cut_.triangle_input;
+    for (std::uint32_t& t : on_reference) t = t < own_count_ ? t : kNone;
   }
+  certified_.emplace(directions, MeshView{cut_.triangles, positions_}, on_reference);
+  if (facing_ && own_count_ < triangles_.size()) face(provable, mapping_error, team);
   return &*certified_;
 }
 
+/// Finds how the triangles that are none of the reference face it.
+void DecimationInput::face(double provable, double mapping_error, Team& team) {
+  const TriangleCertificate start(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), provable,
+                                  volume_->refutable(mapping_error));
+  if (own_count_ == 0) {
+    exceeding_ = face_as_reference(cut_, positions_, start, volume_->hierarchy(), *facing_, team, *certified_);
+  } else {
+    std::vector<std::uint32_t> added;
+    for (std::uint32_t t = 0; t < cut_.triangle_input.size(); ++t) {
+      if (cut_.triangle_input[t] >= own_count_) added.push_back(t);
+    }
+    exceeding_ = keep_angles(cut_, positions_, start, *facing_, added, team, *certified_);
+  }
+  // A face that is outside has no witness, and so no angle. It is counted as outside.
+  std::erase_if(exceeding_, [&](std::uint32_t t) { return is_outside_[cut_.triangle_input[t]]; });
+}
+
+/// Proves the triangles that are none of the reference.
 void DecimationInput::certify_input(const Certificate& certificate) {
+  is_outside_.assign(triangles_.size(), false);
+  if (own_count_ == triangles_.size()) return;
   std::vector<std::uint32_t> indices;
-  indices.reserve(3 * triangles_.size());
-  for (const glm::uvec3& t : triangles_) indices.insert(indices.end(), {t.x, t.y, t.z});
+  indices.reserve(3 * (triangles_.size() - own_count_));
+  for (const glm::uvec3& t : triangles_.subspan(own_count_)) indices.insert(indices.end(), {t.x, t.y, t.z});
   const std::vector<Verdict> verdicts =
       certificate.check({vertices_, space_, indices}, {options_.threads, options_.progress});
-  is_outside_.assign(triangles_.size(), false);
-  for (std::uint32_t i = 0; i < verdicts.size(); ++i) {
-    if (verdicts[i] == Verdict::inside) continue;
+  for (std::uint32_t k = 0; k < verdicts.size(); ++k) {
+    if (verdicts[k] == Verdict::inside) continue;
+    const auto i = static_cast<std::uint32_t>(own_count_ + k);
     is_outside_[i] = true;
     if (report_.outside.faces++ == 0) report_.outside.first = i;
     for (int k = 0; k < 3; ++k) pin(cut_.input_vertex[triangles_[i][k]], "outside the tolerance");
@@ -209,8 +237,8 @@ void DecimationInput::certify_input(const Certificate& certificate) {
 
 /// Finds the first witnesses for every triangle of the reference.
 void DecimationInput::cover(double provable) {
-  if (identical_) {
-    for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
+  if (own_count_ > 0) {
+    for (std::uint32_t i = 0; i < own_count_; ++i) {
       const std::uint32_t element = element_of_[cut_.stand_in[i]];
       if (element != kNone) backward_->set_witness(element, i);  // what is set aside never changes and covers itself
     }

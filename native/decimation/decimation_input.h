@@ -27,8 +27,8 @@ namespace tolvol {
 class DecimationInput {
  public:
   /// Throws as decimate() does. Notes in `report` what it finds: locked vertices, faces outside, warnings and the
-  /// method. Keeps references to all but the team. About 0.7 us a triangle, and 2 us where the input is not the
-  /// reference.
+  /// method. Keeps references to all but the team. About 0.7 us a triangle, and 2 us for each that is not the triangle
+  /// of the reference with the same number, unless all vertices and the first triangles are those of the reference.
   DecimationInput(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
                   const ToleranceVolume* volume, const DecimationOptions& options, Team& team,
                   DecimationResult& report);
@@ -59,7 +59,9 @@ class DecimationInput {
   const std::vector<std::uint32_t>& exceeding() const { return exceeding_; }
 
   /// The reference's triangles, where the input is the reference itself; else null.
-  const Hierarchy* own_hierarchy() const { return identical_ ? &volume_->hierarchy() : nullptr; }
+  const Hierarchy* own_hierarchy() const {
+    return own_count_ > 0 && own_count_ == triangles_.size() ? &volume_->hierarchy() : nullptr;
+  }
   /// In this case, for each input triangle: its triangle in the cut mesh or CutMesh::kNone.
   const std::vector<std::uint32_t>& element_of() const { return element_of_; }
 
@@ -79,10 +81,12 @@ class DecimationInput {
   template <class Visit>
   void for_holders(Visit&& visit) const;
   void pin(std::uint32_t vertex, const std::string& cause);
-  bool input_is_reference() const;
+  bool input_begins_as_reference() const;
+  bool added_triangles_are_open() const;
   Bounds* set_bounds(Team& team);
   void certify_input(const Certificate& certificate);
   void cover(double provable);
+  void face(double provable, double mapping_error, Team& team);
 
   std::span<const glm::dvec3> vertices_;
   std::span<const glm::uvec3> triangles_;
@@ -96,7 +100,9 @@ class DecimationInput {
   std::vector<glm::dvec3> stored_;
   std::vector<bool> pinned_;  ///< For each vertex of the cut mesh.
   std::vector<std::uint32_t> islands_;
-  bool identical_ = false;  ///< Whether the input is the reference itself.
+  /// Triangle i of the input is triangle i of the reference below this number, which is 0 or that of all triangles of
+  /// the reference. All others were added, as to close holes.
+  std::size_t own_count_ = 0;
   std::vector<std::uint32_t> element_of_;
   std::optional<TriangleCertificate> forward_;
   std::optional<Coverage> backward_;
@@ -104,7 +110,7 @@ class DecimationInput {
   std::optional<FacingRule> facing_;
   std::optional<CertifiedBounds> certified_;
   std::vector<std::uint32_t> exceeding_;
-  std::vector<bool> is_outside_;  ///< for each input triangle, if the input is not the reference
+  std::vector<bool> is_outside_;  ///< for each input triangle
   Bounds* bounds_ = nullptr;
 };
 

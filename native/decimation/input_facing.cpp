@@ -14,6 +14,8 @@ namespace tolvol {
 namespace {
 
 constexpr std::uint32_t kNone = CutMesh::kNone;
+constexpr std::size_t kBlock = 64;
+constexpr double kAnywhere = std::numeric_limits<double>::infinity();
 /// A smaller difference to the least angle that can be proved of a face does not matter.
 constexpr double kNearEnough = std::numbers::pi / 180;
 /// A face that keeps no smaller angle than this one is free.
@@ -37,6 +39,7 @@ void face_as_cut(const CutMesh& cut, FacingRule& rule) {
   std::vector<glm::dvec3> normals(rule.normals.size(), glm::dvec3(std::numeric_limits<double>::quiet_NaN()));
   for (std::uint32_t t = 0; t < cut.triangles.size(); ++t) {
     const std::uint32_t input = cut.triangle_input[t];
+    if (input >= normals.size()) continue;  // it is no triangle of the reference
     normals[input] = cut.reversed[t] ? -rule.normals[input] : rule.normals[input];
   }
   rule.normals = std::move(normals);
@@ -45,8 +48,6 @@ void face_as_cut(const CutMesh& cut, FacingRule& rule) {
 std::vector<std::uint32_t> face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> positions,
                                              const TriangleCertificate& certificate, const Hierarchy& hierarchy,
                                              const FacingRule& rule, Team& team, CertifiedBounds& bounds) {
-  constexpr std::size_t kBlock = 64;
-  constexpr double kAnywhere = std::numeric_limits<double>::infinity();
   struct Place {
     double area = 0;  ///< Of the triangle, negative if all near it face against it, and 0 if some do and some do not.
     std::uint32_t below = kNone;  ///< The nearest triangle that faces as this one, or else the nearest one.
@@ -72,26 +73,40 @@ std::vector<std::uint32_t> face_as_reference(const CutMesh& cut, std::span<const
   std::vector<double> area(part.size(), 0);
   for (std::size_t i = 0; i < part.size(); ++i) area[part[i]] += places[i].area;
 
-  std::vector<std::uint8_t> exceeds(part.size(), 0);  // Threads would share bits.
-  team.run(part.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-    for (auto f = static_cast<std::uint32_t>(begin); f < end; ++f) {
+  std::vector<std::uint32_t> all(part.size()), below(part.size());
+  for (std::uint32_t f = 0; f < all.size(); ++f) {
+    all[f] = f, below[f] = places[f].below;
+    CertifiedBounds::FaceRule of_face = bounds.rule(f);
+    of_face.reversed = area[part[f]] < 0;
+    bounds.set_rule(f, of_face);
+  }
+  return keep_angles(cut, positions, certificate, rule, all, team, bounds, below);
+}
+
+std::vector<std::uint32_t> keep_angles(const CutMesh& cut, std::span<const glm::dvec3> positions,
+                                       const TriangleCertificate& certificate, const FacingRule& rule,
+                                       std::span<const std::uint32_t> faces, Team& team, CertifiedBounds& bounds,
+                                       std::span<const std::uint32_t> hints) {
+  std::vector<std::uint8_t> exceeds(faces.size(), 0);  // Threads would share bits.
+  team.run(faces.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t f = faces[i];
       const glm::uvec3& t = cut.triangles[f];
       const glm::dvec3 corners[3] = {positions[t.x], positions[t.y], positions[t.z]};
+      const glm::uvec3 hint(hints.empty() ? kNone : hints[i], kNone, kNone);
       CertifiedBounds::FaceRule of_face = bounds.rule(f);
-      of_face.reversed = area[part[f]] < 0;
       const auto holds = [&](double limit) {
         of_face.limit = limit;
         bounds.set_rule(f, of_face);
         std::optional<Facing> question;
         bounds.start(f, corners, question);
         if (!question) return true;
-        const glm::uvec3 hints(places[f].below, kNone, kNone);
-        if (certificate.verdict(corners, glm::dvec3(kAnywhere), hints, &*question) != Verdict::inside) return false;
+        if (certificate.verdict(corners, glm::dvec3(kAnywhere), hint, &*question) != Verdict::inside) return false;
         bounds.note_face(f, {bounds.face_bound(f).distance, question->angle()});
         return true;
       };
       if (holds(rule.angle)) continue;
-      exceeds[f] = 1;
+      exceeds[i] = 1;
       if (!holds(kNearlyTurned)) {
         of_face.limit = std::numbers::pi;
       } else {
@@ -111,8 +126,8 @@ std::vector<std::uint32_t> face_as_reference(const CutMesh& cut, std::span<const
     }
   });
   std::vector<std::uint32_t> result;
-  for (std::uint32_t f = 0; f < exceeds.size(); ++f) {
-    if (exceeds[f]) result.push_back(f);
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    if (exceeds[i]) result.push_back(faces[i]);
   }
   return result;
 }

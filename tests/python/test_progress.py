@@ -44,6 +44,7 @@ CALLS = {
     "grid": lambda progress: VOLUME.grid(signed=True, progress=progress),
     "DisplayTree": lambda progress: tolvol.DisplayTree(VOLUME, progress=progress),
     "deform": lambda progress: tolvol.deform(LARGE[0], LATTICE, LARGE[1], VOLUME, progress=progress),
+    "close_holes": lambda progress: tolvol.close_holes(*LARGE, VOLUME, progress=progress),
     "deviation": lambda progress: tolvol.deviation(*LARGE, *meshes.torus(), progress=progress),
 }
 LATTICE = tolvol.Lattice(tolvol.lattice_points(4))
