@@ -108,6 +108,22 @@ def decimate_settings(options=frozenset()):
             precision=0,
             options=set(options),
         ),
+        "close_holes": BoolProperty(
+            name="Close Holes",
+            description="First fill the holes that can be filled within the tolerance, as the pinholes of a scan, so that "
+            "far fewer triangles are left. The ends of a tube thinner than the tolerance are holes, too",
+            options=set(options),
+        ),
+        "largest_perimeter": FloatProperty(
+            name="Largest Perimeter",
+            description="Leave holes open whose rim is longer than this length. 0 means no limit",
+            min=0,
+            soft_max=10,
+            step=1,
+            precision=5,
+            subtype="DISTANCE",
+            options=set(options),
+        ),
         "only_selected": BoolProperty(
             name="Selected Faces Only",
             description="Decimate the faces that are selected in Edit Mode, and leave all other faces exactly as they are",

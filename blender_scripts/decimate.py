@@ -94,6 +94,18 @@ def arguments():
         help="stop at N triangles if the tolerance permits so few; N is divided among objects by their triangles",
     )
     parser.add_argument(
+        "--close-holes",
+        action="store_true",
+        help="first fill the holes that can be filled within the tolerance, as the pinholes of a scan and the ends of a tube "
+        "thinner than the tolerance",
+    )
+    parser.add_argument(
+        "--largest-perimeter",
+        type=cli.length,
+        metavar="LENGTH",
+        help="leave holes open whose rim is longer; N%% of size, or a length in the file's units (default: no limit)",
+    )
+    parser.add_argument(
         "--outside",
         choices=("error", "keep"),
         default="error",
@@ -107,7 +119,10 @@ def arguments():
         help="draw the result to this file, coloured by its distance to the reference; needs OpenGL",
     )
     parser.add_argument("--threads", type=cli.whole_number(1), metavar="N", help="default: all cores")
-    return parser.parse()
+    options = parser.parse()
+    if options.largest_perimeter and not options.close_holes:
+        parser.error("--largest-perimeter needs --close-holes")
+    return options
 
 
 class Command:
@@ -173,6 +188,8 @@ class Command:
                 f"--tolerance: {tolerance:.3g} is less than the rounding when {self.exported.suffix} is written; "
                 "use .ply for OUT, and objects without location, rotation and scale in IN"
             )
+        perimeter = self.options.largest_perimeter
+        self.largest_perimeter = cli.in_units(perimeter, size) if perimeter else 0.0
         runs = [
             self._decimate(ob, reference, min(working, surface.size()), target)
             for ob, reference, surface, target in zip(
@@ -262,6 +279,8 @@ class Command:
                     crossings=self.options.crossings.upper(),
                     max_normal_angle=math.radians(self.options.max_normal_angle),
                     max_seconds=self.options.max_seconds or 0,
+                    close_holes=self.options.close_holes,
+                    largest_perimeter=self.largest_perimeter,
                     outside=self.options.outside.upper(),
                     threads=self.options.threads or 0,
                     **asked,
@@ -390,6 +409,7 @@ class Command:
             "backward": backward,
             "outside": outside,
             "normals": _normals(runs),
+            "holes": _holes(runs),
             "seconds": {stage: sum(run["seconds"][stage] for run in runs) for stage in runs[0]["seconds"]},
             "repairs": [
                 {**repair, "message": f"{name}: {repair['message']}" if several else repair["message"]}
@@ -414,6 +434,18 @@ def _normals(runs):
         return None
     counts = {key: sum(one[key] for one in kept) for key in ("unsure", "exceeded_before", "exceeded_after")}
     return {"largest": max((one["largest"] for one in kept if one["largest"] is not None), default=None), **counts}
+
+
+def _holes(runs):
+    """Returns what became of the holes of several runs as of one, or None if none were to be closed."""
+    if runs[0]["holes"] is None:
+        return None
+    refused = {}
+    for run in runs:
+        for reason, count in run["holes"]["refused"].items():
+            refused[reason] = refused.get(reason, 0) + count
+    counts = {key: sum(run["holes"][key] for run in runs) for key in ("closed", "triangles_added")}
+    return {**counts, "refused": refused, "largest_perimeter": runs[0]["holes"]["largest_perimeter"]}
 
 
 def _not_above(length):

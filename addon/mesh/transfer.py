@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import Refused
 from .carry import Carry
+from .filling import FilledArrays, add_faces
 from .mesh_io import column
 
 
@@ -71,7 +72,8 @@ class Decimated:
 
 
 class Writing:
-    """A context manager that turns `mesh`, whose arrays are `source`, into the Decimated `result`.
+    """A context manager that turns `mesh`, whose arrays are `source`, into the Decimated `result`. The arrays may be
+    FilledArrays: the mesh then gets their new faces first.
 
     Entering the context builds a scratch mesh, compares it with the result vertex by vertex and triangle by triangle, and
     raises MeshMismatch if they differ. Only write() changes the mesh.
@@ -89,6 +91,8 @@ class Writing:
         try:
             built.from_mesh(mesh)
             loose = _loose(built)
+            if isinstance(source, FilledArrays):
+                add_faces(built, mesh, source)
             _triangulate(built, source)
             faces = _keep_faces(built, source, result.triangle_source)
             _turn(built, faces, result)

@@ -14,7 +14,7 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty
 from .. import native, preferences
 from ..errors import NotProved, Refused
 from ..job import JobOperator, run_all
-from ..mesh import mesh_io, protect, transfer
+from ..mesh import filling, mesh_io, protect, transfer
 from ..operation_settings import PROTECTED, decimate_settings
 from ..proof import measure, report, solidity
 from ..proof.certify import certify
@@ -37,6 +37,10 @@ def draw_decimate_settings(layout, settings):
     sub = row.row()
     sub.active = settings.use_target
     sub.prop(settings, "target_triangles", text="")
+    layout.row(heading="Holes").prop(settings, "close_holes", text="Close")
+    row = layout.row()
+    row.active = settings.close_holes
+    row.prop(settings, "largest_perimeter")
 
 
 def draw_advanced_settings(layout, settings):
@@ -148,6 +152,9 @@ object. An object without a reference gets one first, as by Set Reference"""
         task.locked |= protect.on_planes(ob.data, self.symmetry)
         if self.only_selected:
             task.locked |= protect.unselected(ob)
+            task.selected = mesh_io.column(ob.data.polygons, "select", 1, bool)
+        if self.close_holes:
+            task.close_holes = {"largest_perimeter": self.largest_perimeter or None}
         task.shares = protect.group_weights(ob, self.vertex_group, self.invert_vertex_group)
         if task.shares is not None:
             task.locked |= task.shares == 0
@@ -157,8 +164,8 @@ object. An object without a reference gets one first, as by Set Reference"""
         # Entering all contexts checks that Blender can hold all results before the first mesh is changed.
         with contextlib.ExitStack() as stack:
             writes = [
-                stack.enter_context(transfer.Writing(ob.data, surface.arrays, result))
-                for ob, (surface, _, result, _) in zip(self.objects, outcomes)
+                stack.enter_context(transfer.Writing(ob.data, source, result))
+                for ob, (source, _, result, _) in zip(self.objects, outcomes)
             ]
             for write in writes:
                 write.write()
@@ -221,6 +228,8 @@ class _Task:
         self.locked = np.zeros(len(surface.arrays.vertices), bool)
         self.shares = None
         self.uvs = None
+        self.close_holes = None  # the options of close_holes(), if holes are to be closed
+        self.selected = None  # (polygons,) bool, if only the selected ones are to be changed
 
     def run(self, progress):
         clock = [time.perf_counter()]
@@ -228,6 +237,11 @@ class _Task:
         built = volumes.native_volume(self.reference, self.tolerance, threads, progress)
         clock.append(time.perf_counter())
         arrays, matrix = self.surface.arrays, self.surface.matrix
+        holes, stages = None, ["field", "decimate", "certify"]
+        if self.close_holes is not None:
+            arrays, holes = self._close(arrays, built, progress)
+            stages.insert(1, "close_holes")
+            clock.append(time.perf_counter())
         wedges = None
         if self.uvs is not None:
             wedges = native.module.wedges(arrays.triangles, self.uvs[arrays.corners])
@@ -250,7 +264,7 @@ class _Task:
         if kept:
             before = measure.largest_distance(
                 (self.reference.world(), self.reference.arrays.triangles),
-                (self.surface.world(), arrays.triangles),
+                (self.surface.world(), self.surface.arrays.triangles),
                 self.tolerance,
                 threads,
                 progress,
@@ -260,18 +274,33 @@ class _Task:
             *(solidity.facts(surface, threads, progress) for surface in (self.surface, decimated))
         )
         clock.append(time.perf_counter())
-        seconds = dict(zip(("field", "decimate", "certify"), np.diff(clock).tolist()))
-        run = report.decimation_run(arrays, result, computed.report, built, certified, self.options, seconds)
+        seconds = dict(zip(stages, np.diff(clock).tolist()))
+        run = report.decimation_run(
+            self.surface.arrays, result, computed.report, built, certified, self.options, seconds, holes
+        )
         if wedges is not None:
-            self._name_corners(run, wedges)
+            self._name_corners(run, arrays.triangles, wedges)
         if not report.proved(run):
             raise NotProved(report.intervals(run))
-        return self.surface, self.reference, result, run
+        return arrays, self.reference, result, run
 
-    def _name_corners(self, run, wedges):
+    def _close(self, arrays, volume, progress):
+        """Returns the arrays with holes closed, and the report of them."""
+        closed = native.module.close_holes(
+            arrays.vertices,
+            arrays.triangles,
+            volume,
+            to_world=self.surface.matrix,
+            threads=self.options["threads"],
+            progress=progress,
+            **self.close_holes,
+        )
+        arrays, holes = filling.filled(arrays, closed, self.selected)
+        return arrays, holes | self.close_holes | {"warnings": closed.report["warnings"]}
+
+    def _name_corners(self, run, triangles, wedges):
         """Counts the vertices where three or more UV islands meet. They have to stay, so a UV map of many islands leaves
         little to decimate: the run warns of that."""
-        triangles = self.surface.arrays.triangles
         _, one_corner_each = np.unique(wedges, return_index=True)
         meeting = int((np.bincount(triangles.ravel()[one_corner_each]) > 2).sum())
         if meeting:

@@ -15,12 +15,27 @@ from . import solidity
 _RESOLUTION = 0.001
 
 
-def decimation_run(source, result, native_report, volume, certified, options, seconds):
+# Why a hole is left open: the outcomes of close_holes(), and "unselected".
+_LEFT_OPEN = {
+    "not_a_loop": "no loops",
+    "too_long": "of more than 1,000 edges",
+    "perimeter": "beyond Largest Perimeter",
+    "outside": "beyond the tolerance",
+    "turned": "facing away",
+    "crossing": "crossing other faces",
+    "non_manifold": "on edges of two faces",
+    "degenerate": "without an area",
+    "unselected": "at unselected faces",
+}
+
+
+def decimation_run(source, result, native_report, volume, certified, options, seconds, holes=None):
     """Returns the run of one decimation.
 
     source: the MeshArrays of the input; result: the Decimated; native_report: the report of the native decimate();
     certified: the result of certify() for the mesh that will be stored, and "solidity", the result of solidity.compared();
-    options: two_sided, placement, effort and target_triangles as they were given.
+    options: two_sided, placement, effort and target_triangles as they were given. holes: what became of the holes, a
+    dictionary of closed, triangles_added, refused, largest_perimeter and warnings, or None if none were to be closed.
     """
     # The native report lists unused vertices as removed, but Blender keeps them: this is not a repair here.
     repairs = [repair for repair in native_report["repairs"] if repair["kind"] != "unused"]
@@ -49,7 +64,8 @@ def decimation_run(source, result, native_report, volume, certified, options, se
         "repairs": repairs,
         "locked": native_report["locked"],
         "outside": native_report["outside"] | certified["outside"],
-        "warnings": native_report["warnings"],
+        "holes": holes and {key: value for key, value in holes.items() if key != "warnings"},
+        "warnings": (holes or {"warnings": []})["warnings"] + native_report["warnings"],
     }
 
 
@@ -85,10 +101,11 @@ def line(run, seconds=None):
 def counts(run):
     """Returns the numbers of triangles before and after a run as text, with remarks.
 
-    The remarks say why the run ended early or missed its target, how many faces outside the tolerance were kept, how many
-    pairs of faces cross, and how many faces have a larger angle to the reference than they may have.
+    The remarks say how many holes were closed and how many were not, why the run ended early or missed its target, how
+    many faces outside the tolerance were kept, how many pairs of faces cross, and how many faces have a larger angle to
+    the reference than they may have.
     """
-    remarks = []
+    remarks = [holes_closed(run["holes"])] if run.get("holes") else []
     if run["target_triangles"] and run["stopped_by"] != "target":
         within = " within the tolerance" if run["stopped_by"] == "tolerance" else ""
         remarks.append(f"target {run['target_triangles']:,} not reached{within}")
@@ -106,6 +123,16 @@ def counts(run):
         remarks.append(f"{turned:,} faces beyond the angle of Normals, before {run['normals']['exceeded_before']:,}")
     remark = f" ({', '.join(remarks)})" if remarks else ""
     return f"{run['input']['triangles']:,} -> {run['output']['triangles']:,} triangles{remark}"
+
+
+def holes_closed(holes):
+    """Returns the entry "holes" of a run as text."""
+    closed, refused = holes["closed"], holes["refused"]
+    text = f"{closed:,} hole{'s' if closed != 1 else ''} closed"
+    if not refused:
+        return text
+    reasons = ", ".join(f"{refused[reason]:,} {words}" for reason, words in _LEFT_OPEN.items() if reason in refused)
+    return f"{text}, {sum(refused.values()):,} left open: {reasons}"
 
 
 def remembered(text):

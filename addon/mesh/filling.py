@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Adds the faces that close holes to the arrays of a mesh, and to its BMesh with the attributes of the rims."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import Refused
+from .mesh_io import MeshArrays, column
+
+
+@dataclass(frozen=True)
+class FilledArrays(MeshArrays):
+    """A mesh with further triangles at the end, k of them. Each is a polygon of its own.
+
+    The corner of a new triangle is a corner of the mesh at the rim of the hole, whose attributes it takes.
+    """
+
+    like: np.ndarray  # (k,) int32: the polygon at the rim whose attributes the new face takes
+
+
+def filled(arrays, result, allowed=None):
+    """Returns (FilledArrays, the report of the closed holes) for the result of the native close_holes() for `arrays`.
+
+    allowed: (polygons,) bool, or None for all: holes with another polygon at their rim stay open.
+    """
+    count = len(arrays.triangles)
+    kept = np.ones(len(result.triangle_loop), bool)
+    refused = dict(result.report["refused"])
+    if allowed is not None:
+        # Each edge of a rim is a side of one new triangle, so that the borders name all polygons at the rim.
+        borders = result.borders
+        kept_out = (borders >= 0) & ~allowed[arrays.polygons[borders]]
+        loops = np.unique(result.triangle_loop[kept_out.any(1)])
+        kept = ~np.isin(result.triangle_loop, loops)
+        if len(loops):
+            refused["unselected"] = len(loops)
+    sources = result.corner_source[kept]
+    # The face at the rim on the first side that has one, or else a face at the first corner.
+    borders = result.borders[kept]
+    first = np.argmax(borders >= 0, 1)
+    at_rim = borders[np.arange(len(borders)), first]
+    like = arrays.polygons[np.where(at_rim >= 0, at_rim, sources[:, 0] // 3)]
+    polygons = arrays.polygons[-1] + 1
+    added = FilledArrays(
+        arrays.vertices,
+        np.concatenate([arrays.triangles, result.triangles[count:][kept]]),
+        np.concatenate([arrays.corners, arrays.corners.ravel()[sources]]),
+        np.concatenate([arrays.polygons, np.arange(polygons, polygons + kept.sum(), dtype=arrays.polygons.dtype)]),
+        like,
+    )
+    closed = len(np.unique(result.triangle_loop[kept]))
+    return added, {"closed": closed, "triangles_added": int(kept.sum()), "refused": refused}
+
+
+def add_faces(built, mesh, source):
+    """Adds the new faces of FilledArrays to a BMesh that holds `mesh`. They come last."""
+    count = len(built.faces)
+    built.verts.ensure_lookup_table()
+    built.faces.ensure_lookup_table()
+    faces = built.faces[:]
+    starts = column(mesh.polygons, "loop_start", 1, np.int32)
+    new = slice(len(source.triangles) - len(source.like), None)
+    of_corner = np.searchsorted(starts, source.corners[new], "right") - 1
+    offsets = source.corners[new] - starts[of_corner]
+    for vertices, like, polygons, places in zip(
+        source.triangles[new].tolist(), source.like.tolist(), of_corner.tolist(), offsets.tolist()
+    ):
+        face = built.faces.new([built.verts[vertex] for vertex in vertices], faces[like])
+        for loop, polygon, place in zip(face.loops, polygons, places):
+            loop.copy_from(faces[polygon].loops[place])
+    built.faces.index_update()
+    if [face.index for face in faces] != list(range(count)):
+        raise Refused("Blender does not keep the order of faces when some are added")
