@@ -8,7 +8,8 @@ from bpy.props import StringProperty
 
 from ..errors import Refused
 from ..files import safe_files
-from ..proof import deviation
+from ..mesh import mesh_io
+from ..proof import deviation, report
 from .check import Comparison
 
 # The report gives the share of the area in the bands between these shares of the tolerance.
@@ -61,6 +62,9 @@ read (.html), a table (.csv) or all numbers (.json)"""
             "a": _counted(self.ob.name, self.ob.data),
             "b": _counted("its reference", self.ob.tolvol.snapshot),
         }
+        if self.ob.tolvol.last_run_of == mesh_io.read_mesh(self.ob.data).fingerprint():
+            if holes := report.remembered_holes(self.ob.tolvol.last_run):
+                self._about["a"]["holes"] = holes
         units = context.scene.unit_settings
         self._unit = "m" if units.system != "NONE" and units.scale_length == 1 else "units"
         return super().prepare(context)

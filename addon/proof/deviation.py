@@ -7,7 +7,8 @@ number:
 
     version, method, unit, size   `size` is the length that is 100 %
     tolerance                     {absolute, percent}, or None
-    a, b                          {name or file, vertices, triangles}
+    a, b                          {name or file, vertices, triangles}; a also has `holes`, as in report.py, if the last
+                                  decimation closed holes
     solidity                      {a, b}: facts about both (solidity.py); {change}: solidity.change(), a against b
     forward, backward             a from b, and b from a; each:
         largest, position, triangle, face               position: the point with the largest distance found, in this

@@ -11,7 +11,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from html import escape
 from pathlib import Path
 
-from . import solidity
+from . import report, solidity
 
 _WITHIN, _BEYOND, _LINE = "#0072B2", "#D55E00", "#1a1a1a"
 
@@ -77,7 +77,8 @@ def _name(mesh):
 
 def _counts(mesh):
     whole = escape(str(mesh.get("file", mesh.get("name"))))
-    return f"{whole}: {mesh['vertices']:,} vertices, {mesh['triangles']:,} triangles"
+    holes = f"; {escape(report.holes_closed(mesh['holes']))}" if "holes" in mesh else ""
+    return f"{whole}: {mesh['vertices']:,} vertices, {mesh['triangles']:,} triangles{holes}"
 
 
 def _rounded(value, up, digits=4):

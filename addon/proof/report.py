@@ -150,6 +150,15 @@ def remembered(text):
         return None
 
 
+def remembered_holes(text):
+    """Returns the entry "holes" of a run that a .blend file keeps as JSON, or None if there is none that can be read."""
+    try:
+        holes = json.loads(text)["holes"]
+        return holes if holes and holes_closed(holes) else None
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
+        return None
+
+
 def intervals(run):
     """Returns both certified intervals as text for a message."""
     size = 100 * run["tolerance"]["absolute"] / run["tolerance"]["percent"]

@@ -169,6 +169,19 @@ def test_n_gons_and_several_objects():
     assert loops_of(objects[1]) == 0
 
 
+def test_save_report_tells_it(tmp_path):
+    ob = holed()
+    bpy.ops.tolvol.decimate(tolerance_percent=4, close_holes=True)
+    for name in ("report.json", "report.html"):
+        bpy.ops.tolvol.save_report(filepath=str(tmp_path / name))
+    assert json.loads((tmp_path / "report.json").read_text())["a"]["holes"] == run_of(ob)["holes"]
+    assert "; 5 holes closed, 1 left open: 1 " in (tmp_path / "report.html").read_text()
+    # Of a mesh that has changed since, the last decimation tells nothing.
+    ob.data.vertices[0].co.z += 0.001
+    bpy.ops.tolvol.save_report(filepath=str(tmp_path / "report.json"))
+    assert "holes" not in json.loads((tmp_path / "report.json").read_text())["a"]
+
+
 def test_on_the_command_line(tmp_path):
     vertices, quads = torus_arrays()
     tube = np.delete(quads, np.r_[0:24, 300:306, 700, 900], axis=0)

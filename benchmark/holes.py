@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Measures what closing holes is worth: triangles left with and without, of a scan and of spheres with missing faces.
+
+/usr/bin/python3 benchmark/holes.py [--write docs/benchmark.md]
+
+Every result is judged both ways by tolvol.hausdorff against the mesh with its holes.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT / "build/release/python"), str(ROOT / "tests/python")]
+
+import tolvol  # noqa: E402
+
+import meshes as shapes  # noqa: E402
+import tables  # noqa: E402
+from scan import scan  # noqa: E402
+
+HEADS = (
+    "Mesh, ε = 1 %",
+    "Triangles",
+    "Holes closed",
+    "Left open",
+    "Left without closing",
+    "Left with closing",
+    "Result → reference",
+    "Reference → result",
+    "Seconds without",
+    "Seconds with",
+)
+SUBDIVIDED = 4  # times; an icosahedron then has 5,120 faces
+
+
+def icosphere(levels):
+    """Returns a sphere of 20 * 4**levels triangles: (n, 3) float64, (m, 3)."""
+    golden = (1 + 5**0.5) / 2
+    ones = [(0, a, b * golden) for a in (-1, 1) for b in (-1, 1)]
+    corners = np.array([np.roll(p, k) for k in range(3) for p in ones])
+    near = np.linalg.norm(corners[:, None] - corners, axis=2) < 2.1
+    faces = [
+        (a, b, c) for a in range(12) for b in range(a) for c in range(b) if near[a, b] and near[b, c] and near[c, a]
+    ]
+    vertices, triangles = corners, np.array(faces)
+    for _ in range(levels):
+        vertices, triangles = shapes.subdivide(vertices, triangles)
+    vertices = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    inwards = (np.cross(b - a, c - a) * a).sum(1) < 0
+    triangles[inwards] = triangles[inwards][:, ::-1]
+    return vertices, triangles
+
+
+def bumpy_sphere(missing, seed=1):
+    """Returns a bumpy sphere of which a share of the faces is missing at random."""
+    vertices, triangles = icosphere(SUBDIVIDED)
+    x, y, z = vertices.T
+    vertices = vertices * (1 + 0.05 * np.sin(5 * x) * np.cos(4 * y + z))[:, None]
+    kept = np.random.default_rng(seed).permutation(len(triangles))[: round((1 - missing) * len(triangles))]
+    return vertices.astype(np.float32), triangles[np.sort(kept)].astype(np.int32)
+
+
+def measured(name, vertices, triangles):
+    """Returns a row of the table, on one thread."""
+    volume = tolvol.ToleranceVolume(vertices, triangles, 0.01 * tolvol.diagonal(vertices, triangles))
+    clock = [time.process_time()]
+    without = tolvol.decimate(vertices, triangles, volume, threads=1)
+    clock.append(time.process_time())
+    closed = tolvol.close_holes(vertices, triangles, volume, threads=1)
+    result = tolvol.decimate(vertices, closed.triangles, volume, threads=1)
+    clock.append(time.process_time())
+    ways = tolvol.hausdorff(result.vertices, result.triangles, vertices, triangles, bound=volume.tolerance)
+    if ways.upper > volume.tolerance or len(tolvol.crossing_pairs(result.vertices, result.triangles)):
+        sys.exit(f"{name}: the result is not as promised")
+    return [
+        name,
+        f"{len(triangles):,}",
+        f"{closed.report['closed']:,}",
+        f"{sum(closed.report['refused'].values()):,}",
+        f"{len(without.triangles):,}",
+        f"**{len(result.triangles):,}**",
+        f"{ways.forward.upper / volume.tolerance:.3f}",
+        f"{ways.backward.upper / volume.tolerance:.3f}",
+        *(f"{seconds:.2f}" for seconds in np.diff(clock)),
+    ]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--write", metavar="FILE.md", help="put the table into this file")
+    options = parser.parse_args()
+    rows = [
+        measured("scan", *scan()),
+        measured("bumpy sphere, a fifth of the faces missing", *bumpy_sphere(0.2)),
+        measured("bumpy sphere, half of the faces missing", *bumpy_sphere(0.5)),
+    ]
+    text = tables.table(HEADS, rows, "l" + "r" * (len(HEADS) - 1))
+    print(text)
+    if options.write:
+        tables.write(options.write, "closing holes", text)
+
+
+main()
