@@ -17,12 +17,16 @@ class FilledArrays(MeshArrays):
     """
 
     like: np.ndarray  # (k,) int32: the polygon at the rim whose attributes the new face takes
+    # (m + k,) int32: 0, but for the new faces of a hole at which islands of a UV map meet the number of that hole. The
+    # islands would become one if the new faces were part of them.
+    hole: np.ndarray
 
 
-def filled(arrays, result, allowed=None):
+def filled(arrays, result, allowed=None, uvs=None):
     """Returns (FilledArrays, the report of the closed holes) for the result of the native close_holes() for `arrays`.
 
-    allowed: (polygons,) bool, or None for all: holes with another polygon at their rim stay open.
+    allowed: (polygons,) bool, or None for all: holes with another polygon at their rim stay open. uvs: the values of UV
+    maps at the mesh's corners, or None.
     """
     count = len(arrays.triangles)
     kept = np.ones(len(result.triangle_loop), bool)
@@ -42,15 +46,41 @@ def filled(arrays, result, allowed=None):
     at_rim = borders[np.arange(len(borders)), first]
     like = arrays.polygons[np.where(at_rim >= 0, at_rim, sources[:, 0] // 3)]
     polygons = arrays.polygons[-1] + 1
+    numbers = np.zeros(len(result.triangle_loop), np.int32)
+    if uvs is not None:
+        numbers = np.where(_meet_islands(arrays, result, uvs)[result.triangle_loop], result.triangle_loop + 1, 0)
     added = FilledArrays(
         arrays.vertices,
         np.concatenate([arrays.triangles, result.triangles[count:][kept]]),
         np.concatenate([arrays.corners, arrays.corners.ravel()[sources]]),
         np.concatenate([arrays.polygons, np.arange(polygons, polygons + kept.sum(), dtype=arrays.polygons.dtype)]),
         like,
+        np.concatenate([np.zeros(count, np.int32), numbers[kept].astype(np.int32)]),
     )
     closed = len(np.unique(result.triangle_loop[kept]))
     return added, {"closed": closed, "triangles_added": int(kept.sum()), "refused": refused}
+
+
+def _meet_islands(arrays, result, uvs):
+    """Returns (loops,) bool: the closed loops along which the UVs at some vertex differ from one face to the next."""
+    faces, sides = np.nonzero(result.borders >= 0)
+    new = result.triangles[len(arrays.triangles) :]
+    rims = result.borders[faces, sides]
+    found = np.zeros(len(result.loops), bool)
+    vertices, values = [], []
+    for end in (0, 1):
+        vertex = new[faces, (sides + end) % 3]
+        # The face at the rim may have another vertex at the same place.
+        there = (arrays.vertices[arrays.triangles[rims]] == arrays.vertices[vertex][:, None]).all(2)
+        vertices.append(vertex)
+        values.append(uvs[arrays.corners[rims, np.argmax(there, 1)]])
+    loops = np.tile(result.triangle_loop[faces], 2)
+    vertices, values = np.concatenate(vertices), np.concatenate(values)
+    order = np.lexsort((vertices, loops))
+    loops, vertices, values = loops[order], vertices[order], values[order]
+    alike = (loops[1:] == loops[:-1]) & (vertices[1:] == vertices[:-1])
+    found[loops[1:][alike & (values[1:] != values[:-1]).any(1)]] = True
+    return found
 
 
 def add_faces(built, mesh, source):

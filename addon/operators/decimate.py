@@ -244,7 +244,11 @@ class _Task:
             clock.append(time.perf_counter())
         wedges = None
         if self.uvs is not None:
-            wedges = native.module.wedges(arrays.triangles, self.uvs[arrays.corners])
+            values = self.uvs[arrays.corners]
+            if holes is not None:
+                number = arrays.hole.astype(np.float32)[:, None, None]
+                values = np.concatenate([values, np.broadcast_to(number, (*values.shape[:2], 1))], 2)
+            wedges = native.module.wedges(arrays.triangles, np.ascontiguousarray(values))
         computed = native.module.decimate(
             arrays.vertices,
             arrays.triangles,
@@ -295,7 +299,7 @@ class _Task:
             progress=progress,
             **self.close_holes,
         )
-        arrays, holes = filling.filled(arrays, closed, self.selected)
+        arrays, holes = filling.filled(arrays, closed, self.selected, self.uvs)
         return arrays, holes | self.close_holes | {"warnings": closed.report["warnings"]}
 
     def _name_corners(self, run, triangles, wedges):

@@ -62,9 +62,9 @@ read (.html), a table (.csv) or all numbers (.json)"""
             "a": _counted(self.ob.name, self.ob.data),
             "b": _counted("its reference", self.ob.tolvol.snapshot),
         }
-        if self.ob.tolvol.last_run_of == mesh_io.read_mesh(self.ob.data).fingerprint():
-            if holes := report.remembered_holes(self.ob.tolvol.last_run):
-                self._about["a"]["holes"] = holes
+        holes = report.remembered_holes(self.ob.tolvol.last_run)
+        if holes and self.ob.tolvol.last_run_of == mesh_io.read_mesh(self.ob.data).fingerprint():
+            self._about["a"]["holes"] = holes
         units = context.scene.unit_settings
         self._unit = "m" if units.system != "NONE" and units.scale_length == 1 else "units"
         return super().prepare(context)

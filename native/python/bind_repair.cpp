@@ -116,7 +116,8 @@ stays triangle i. Every point of a new triangle is within the tolerance of the r
 reference is as near to the result as to the input. A new triangle crosses no other, is not degenerate, gives no edge more
 than two triangles, and has the orientation of the rim. A hole is filled as a whole or not at all.
 
-To decimate the closed mesh, hand it to decimate with the same volume, and so with the reference that has the holes::
+To decimate the closed mesh, hand it to decimate with the same volume, and so with the reference that has the holes. Where
+wedges are given and islands meet at a hole, its new triangles need labels of their own, or the islands become one::
 
     volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
     closed = tolvol.close_holes(vertices, triangles, volume)

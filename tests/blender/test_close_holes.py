@@ -149,6 +149,27 @@ def test_attributes_of_a_decimated_mesh_with_closed_holes():
     assert_within(world_triangles(ob), reference, 1.00001 * 0.02 * native.module.diagonal(*reference))
 
 
+def test_islands_of_a_uv_map_that_meet_at_a_hole_stay_apart():
+    ob = holed(missing=(430, 431, 460, 461, 435, 465, 440, 470, 200))
+    mesh = ob.data
+    places = column(mesh.vertices, "co", 3)[column(mesh.loops, "vertex_index", 1, np.int32)]
+    right = np.repeat(column(mesh.polygons, "center", 3)[:, 0] > 0, 4)
+    layer = mesh.uv_layers.new(name="UV")
+    uvs = places[:, :2] + np.stack([10 * right, 0 * right], 1)
+    layer.data.foreach_set("uv", uvs.astype(np.float32).ravel())
+    bpy.ops.tolvol.decimate(tolerance_percent=4, close_holes=True, placement="OPTIMAL")
+    assert run_of(ob)["holes"]["closed"] == 4
+    vertices = column(mesh.loops, "vertex_index", 1, np.int32)
+    offset = (column(mesh.uv_layers["UV"].data, "uv", 2) - column(mesh.vertices, "co", 3)[vertices][:, :2])[:, 0]
+    island = np.round(offset / 10).reshape(-1, 3)
+    mixed = (island != island[:, :1]).any(1)
+    # Only faces within the three holes on the seam take their corners from both sides.
+    middles = column(mesh.polygons, "center", 3)[mixed]
+    assert len(middles) <= 3 * 8 and (np.abs(middles[:, 0]) < 0.08).all()
+    assert np.abs(offset.reshape(-1, 3)[~mixed] - 10 * island[~mixed]).max() < 0.1
+    assert len(mesh.polygons) < 120
+
+
 def test_n_gons_and_several_objects():
     """Faces of more than four corners beside holes, and two objects in one step."""
     objects = [holed("one"), holed("two", torus_arrays(), (3, 700))]
