@@ -14,6 +14,16 @@ constexpr double kFoldCosine = 0.2;
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
+/// Whether the vertices are neighbours, or have one in common other than `end`.
+bool have_common_neighbour(const OpenMesh::TriConnectivity& mesh, OpenMesh::VertexHandle a, OpenMesh::VertexHandle b,
+                           std::uint32_t end) {
+  return std::ranges::any_of(mesh.vv_range(a), [&](const auto& near) {
+    if (near == b) return true;
+    return near != BoundedMesh::handle(end) &&
+           std::ranges::any_of(mesh.vv_range(b), [&](const auto& v) { return v == near; });
+  });
+}
+
 bool turns_too_far(const glm::dvec3& before, const glm::dvec3& after) {
   const double before2 = squared_length(before), after2 = squared_length(after), cosine = glm::dot(before, after);
   if (!(before2 > 0)) return false;  // A degenerate face has no side to keep.
@@ -221,8 +231,9 @@ bool Change::wedges_fit(Halfedge h) {
 }
 
 /// Gathers what happens to the copies of the vertex that vanishes, in which several sheets meet. Where the sheets meet
-/// along edges, each must have the edge that is collapsed, so that the line of edges becomes shorter. Where they only
-/// touch, the other copies are carried along.
+/// along edges, each must have the edge that is collapsed, so that the line of edges becomes shorter. Two of them may
+/// be one sheet at the end of the line, which meets the line twice: then two of its edges collapse into one vertex.
+/// Where the sheets only touch, the other copies are carried along.
 bool Change::gather_copies(Halfedge h) {
   const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
   const auto in_line = [&](Halfedge edge) { return mesh_->joined_by_other(mesh_->from(edge), mesh_->to(edge)); };
@@ -236,7 +247,8 @@ bool Change::gather_copies(Halfedge h) {
       if (!edge.is_valid()) continue;
       if (edges++ > 0) return false;
       for (const Halfedge other : collapses_) {
-        if (mesh_->to(other) == end) return false;
+        if (mesh_->to(other) == end && have_common_neighbour(mesh, mesh.from_vertex_handle(other), v, end))
+          return false;
       }
       collapses_.push_back(edge);
     }
@@ -269,12 +281,24 @@ bool Change::slots_fit() {
     }
   }
   std::sort(around_.begin(), around_.end());
+  // Whether a face joins the kept vertex with vertices of these two slots already.
+  const auto has_face = [&](std::uint32_t a, std::uint32_t b) {
+    return std::ranges::any_of(mesh_->copies(vertex_), [&](std::uint32_t copy) {
+      return std::ranges::any_of(mesh.vf_range(BoundedMesh::handle(copy)), [&](const auto& f) {
+        const glm::uvec3& t = mesh_->triangle(static_cast<std::uint32_t>(f.idx()));
+        const auto has = [&](std::uint32_t slot) {
+          return mesh_->slot(t.x) == slot || mesh_->slot(t.y) == slot || mesh_->slot(t.z) == slot;
+        };
+        return has(a) && has(b);
+      });
+    });
+  };
   for (const Face& face : faces_) {
     if (!face.moves) continue;
     const std::uint32_t a = mesh_->slot(face.vertices[(face.corner + 1) % 3]),
                         b = mesh_->slot(face.vertices[(face.corner + 2) % 3]);
     if (face.vertices[face.corner] == vertex_) continue;
-    if (is_apex(a) && is_apex(b)) return false;
+    if (is_apex(a) && is_apex(b) && has_face(a, b)) return false;
     for (const std::uint32_t slot : {a, b}) {
       if (!is_apex(slot) && std::binary_search(around_.begin(), around_.end(), slot)) return false;
     }
