@@ -110,8 +110,8 @@ def decimate_settings(options=frozenset()):
         ),
         "close_holes": BoolProperty(
             name="Close Holes",
-            description="First fill the holes that can be filled within the tolerance, as the pinholes of a scan, so that "
-            "far fewer triangles are left. The ends of a tube thinner than the tolerance are holes, too",
+            description="First fill the holes that can be filled within the tolerance, such as the pinholes of a scan. "
+            "Far fewer triangles are left then. The ends of a tube thinner than the tolerance are holes, too",
             options=set(options),
         ),
         "largest_perimeter": FloatProperty(

@@ -96,8 +96,8 @@ def arguments():
     parser.add_argument(
         "--close-holes",
         action="store_true",
-        help="first fill the holes that can be filled within the tolerance, as the pinholes of a scan and the ends of a tube "
-        "thinner than the tolerance",
+        help="first fill the holes that can be filled within the tolerance, such as the pinholes of a scan, and the ends of "
+        "a tube thinner than the tolerance",
     )
     parser.add_argument(
         "--largest-perimeter",

@@ -17,8 +17,8 @@ class FilledArrays(MeshArrays):
     """
 
     like: np.ndarray  # (k,) int32: the polygon at the rim whose attributes the new face takes
-    # (m + k,) int32: 0, but for the new faces of a hole at which islands of a UV map meet the number of that hole. The
-    # islands would become one if the new faces were part of them.
+    # (m + k,) int32: where islands of a UV map meet at a hole, its new faces have a number that no other hole has. If
+    # they were part of the islands, the islands would become one. All other triangles have 0.
     hole: np.ndarray
 
 

@@ -17,14 +17,14 @@ _RESOLUTION = 0.001
 
 # Why a hole is left open: the outcomes of close_holes(), and "unselected".
 _LEFT_OPEN = {
-    "not_a_loop": "no loops",
+    "not_a_loop": "with a rim that does not close",
     "too_long": "of more than 1,000 edges",
     "perimeter": "beyond Largest Perimeter",
     "outside": "beyond the tolerance",
-    "turned": "facing away",
-    "crossing": "crossing other faces",
-    "non_manifold": "on edges of two faces",
-    "degenerate": "without an area",
+    "turned": "with faces that would be turned away",
+    "crossing": "with faces that would cross others",
+    "non_manifold": "with edges that would have three faces",
+    "degenerate": "with faces that would have no area",
     "unselected": "at unselected faces",
 }
 

@@ -5,8 +5,8 @@
 /// This is the certificate with the roles exchanged: a piece whose three corners are within epsilon of one element is
 /// within epsilon of it as a whole. A change of the mesh must find a new witness for each piece of the elements it
 /// replaces, and splits a piece that no single element covers. One piece without a witness refuses the change. If all
-/// pieces of a triangle of the reference need new witnesses, the search begins with the whole triangle again, unless
-/// they are so many that the pieces would have to be found anew as well.
+/// pieces of a triangle of the reference need new witnesses, the search begins with the whole triangle again. A change
+/// of many elements begins with the pieces where a triangle has very many, which it would only be split into again.
 #pragma once
 
 #include <algorithm>

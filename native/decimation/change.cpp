@@ -231,9 +231,9 @@ bool Change::wedges_fit(Halfedge h) {
 }
 
 /// Gathers what happens to the copies of the vertex that vanishes, in which several sheets meet. Where the sheets meet
-/// along edges, each must have the edge that is collapsed, so that the line of edges becomes shorter. Two of them may
-/// be one sheet at the end of the line, which meets the line twice: then two of its edges collapse into one vertex.
-/// Where the sheets only touch, the other copies are carried along.
+/// along edges, each must have the edge that is collapsed, so that the line of edges becomes shorter. At the end of the
+/// line one sheet may lie on two sides of it: then two edges of this sheet collapse into one vertex. Where the sheets
+/// only touch, the other copies are carried along.
 bool Change::gather_copies(Halfedge h) {
   const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
   const auto in_line = [&](Halfedge edge) { return mesh_->joined_by_other(mesh_->from(edge), mesh_->to(edge)); };

@@ -27,8 +27,9 @@ namespace tolvol {
 class DecimationInput {
  public:
   /// Throws as decimate() does. Notes in `report` what it finds: locked vertices, faces outside, warnings and the
-  /// method. Keeps references to all but the team. About 0.7 us a triangle, and 2 us for each that is not the triangle
-  /// of the reference with the same number, unless all vertices and the first triangles are those of the reference.
+  /// method. Keeps references to all but the team. About 0.7 us a triangle, and 2 us for each that has to be certified:
+  /// all of them, or those after the reference's if the input has the vertices of the reference and begins with its
+  /// triangles.
   DecimationInput(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
                   const ToleranceVolume* volume, const DecimationOptions& options, Team& team,
                   DecimationResult& report);
@@ -62,7 +63,8 @@ class DecimationInput {
   const Hierarchy* own_hierarchy() const {
     return own_count_ > 0 && own_count_ == triangles_.size() ? &volume_->hierarchy() : nullptr;
   }
-  /// In this case, for each input triangle: its triangle in the cut mesh or CutMesh::kNone.
+  /// For each input triangle, its triangle in the cut mesh or CutMesh::kNone; empty unless the input has the vertices
+  /// of the reference and begins with its triangles.
   const std::vector<std::uint32_t>& element_of() const { return element_of_; }
 
   /// The input corner, as 3 * triangle + corner, of a corner of the cut mesh.

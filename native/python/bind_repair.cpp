@@ -88,13 +88,19 @@ void bind_repair(py::module_& module) {
                     "where one is at this corner.")
       .def_readonly("loops", &HolesClosed::loops, R"doc(A list with a dict for each boundary loop:
 
-outcome : "closed", or the reason why the loop is left open: "not_a_loop", the open edges end at triangles of the other
-    orientation or at an edge of more than two triangles; "too_long", more than 1,000 corners; "perimeter", longer than
-    largest_perimeter; "outside", it is not proved that the triangles would be within the tolerance; "turned", they would
-    be turned away from the reference, or rounding could turn them; "crossing", they would cross others. Of several of
-    the last three it is the one that refused most of the triangles and edges that were tried, and only where there is
-    none of the three: "non_manifold", an edge would be one of more than two triangles; "degenerate", the triangles would
-    be segments
+outcome : "closed", or the reason why the loop is left open:
+
+    - "not_a_loop": the open edges end at triangles of the other orientation or at an edge of more than two triangles
+    - "too_long": it has more than 1,000 corners
+    - "perimeter": it is longer than largest_perimeter
+    - "outside": it is not proved that the triangles would be within the tolerance
+    - "turned": the triangles would be turned away from the reference, or rounding could turn them
+    - "crossing": the triangles would cross others
+    - "non_manifold": an edge would be one of more than two triangles
+    - "degenerate": the triangles would be segments
+
+    If several of "outside", "turned" and "crossing" apply, it is the one that refused most of the triangles and edges
+    that were tried. The last two are named only if none of these three applies.
 vertex : the vertex at which the loop begins, an index
 corners : the number of its edges
 perimeter : its length in world units
@@ -113,15 +119,18 @@ warnings : a list of sentences)doc");
 
 A hole is closed by triangles between the vertices of its rim: no vertex is added or moved, and triangle i of the input
 stays triangle i. Every point of a new triangle is within the tolerance of the reference. Because the input stays, the
-reference is as near to the result as to the input. A new triangle crosses no other, is not degenerate, gives no edge more
-than two triangles, and has the orientation of the rim. A hole is filled as a whole or not at all.
+reference is as near to the result as to the input. A new triangle crosses no other, is not degenerate, gives no edge
+more than two triangles, and has the orientation of the rim. A hole is filled as a whole or not at all.
 
-To decimate the closed mesh, hand it to decimate with the same volume, and so with the reference that has the holes. Where
-wedges are given and islands meet at a hole, its new triangles need labels of their own, or the islands become one::
+To decimate the closed mesh, hand it to decimate with the same volume. The tolerance then still refers to the mesh with
+its holes::
 
     volume = tolvol.ToleranceVolume(vertices, triangles, tolerance)
     closed = tolvol.close_holes(vertices, triangles, volume)
     result = tolvol.decimate(vertices, closed.triangles, volume)
+
+If you give wedges to decimate, give labels of their own to the new triangles of a hole at which islands meet. Otherwise
+the islands become one.
 
 Parameters
 ----------
@@ -132,9 +141,10 @@ volume : ToleranceVolume
 largest_perimeter : float, optional
     Leave longer loops open, in world units. The ends of a tube thinner than the tolerance are holes like others.
 max_normal_angle : float, optional
-    Degrees, more than 0 and at most 180: every point of a new triangle has a point of the reference within the tolerance
-    where the normals of both differ by at most this angle. The default, 120, closes the ends of tubes, which are at right
-    angles to the tubes, but no sheet by a second one on its back. 180 permits any angle.
+    Degrees, more than 0 and at most 180: every point of a new triangle has a point of the reference within the
+    tolerance where the normals of both differ by at most this angle. The default, 120, closes the ends of tubes, which
+    are at right angles to the tubes, but no sheet by a second one on its back. 180 permits any angle. The default of
+    decimate is 90: it counts new triangles with a larger angle among those that exceed it, and keeps their angle.
 to_world, threads, progress
     See help(tolvol).
 
@@ -150,16 +160,19 @@ Cancelled
 
 Notes
 -----
-Edges are open if they are edges of one triangle only. Vertices at the same position count as one, so that seams between
-vertices at one place are no holes; a triangle that repeats another one does not count. Where several holes meet at a vertex each is a loop of its own, as the triangles lie
-around the mean normal of the vertex. Loops are filled as if they were alone; one that is in conflict with a lower one is
-then filled anew around that, if possible.
+An edge is open if it is the edge of one triangle only. Vertices at the same position count as one, so that seams
+between vertices at one place are no holes. A triangle that repeats another one does not count. Where several holes meet
+at a vertex, each is a loop of its own: the order of the triangles around the mean normal of the vertex decides. Loops
+are filled as if they were alone. A loop whose triangles are in conflict with those of a loop before it is then filled
+anew around those, if possible.
 
-Of all triangulations whose triangles keep the bounds, the one is taken with the least sum of area times squared sides: in
-a plane the Delaunay triangulation. The search is exact for triangles one by one. Where two of its triangles cross each
-other, up to seven more searches leave one of them out.
+Of all triangulations whose triangles keep the bounds one by one, the one with the least sum of area times squared sides
+is taken. In a plane this is the Delaunay triangulation. Where two of its triangles cross each other, or lie on one
+edge, up to seven more searches leave one of them out.
 
-Cost: about 1 us a triangle of the mesh, and 2 to 4 us for each pair of corners of a loop, which are at most 1,000.)doc");
+Cost: about 1 us a triangle of the mesh, and 2 to 4 us for each pair of corners of a loop, of which there are at most
+1,000. A loop costs more, up to as much for each three of its corners, if the edges between its corners are within the
+tolerance but most triangles between them are refused, as around an island in a hole.)doc");
 }
 
 }  // namespace tolvol::python

@@ -24,9 +24,10 @@ namespace tolvol {
 namespace {
 
 constexpr std::uint32_t kNone = HoleClosingResult::kNone;
-/// A filling of which two triangles cross, or lie on one edge, is tried again without one of them so many times.
+/// A loop is searched for a filling at most so many times. After each search but the last, one of two triangles that
+/// cross, or that lie on one edge, is left out.
 constexpr int kMostTries = 8;
-/// An edge across a hole is looked at in so many points before any triangle at it is proved.
+/// An edge across a hole is probed in so many points before any triangle at it is proved.
 constexpr int kProbes = 7;
 
 constexpr std::array kNames = {"closed", "not_a_loop", "too_long",     "perimeter", "outside",

@@ -25,9 +25,9 @@ struct CloseHolesOptions {
   Progress* progress = nullptr;
 };
 
-/// What became of a boundary loop. Of a loop that is left open because its faces would be outside, turned or crossing,
-/// the outcome is the reason that refused most of the faces and edges that were tried; of equals it is the first. Only
-/// where there is none of these reasons it is one of the two after them.
+/// What became of a boundary loop. If several of `outside`, `turned` and `crossing` keep it open, the outcome is the
+/// one that refused most of the faces and edges that were tried, and of equals the first. `non_manifold` and
+/// `degenerate` are outcomes only of loops that none of these three keeps open.
 enum class LoopOutcome : std::uint8_t {
   closed,
   not_a_loop,    ///< the open edges end at triangles of the other orientation or at an edge of more than two triangles
@@ -42,7 +42,7 @@ enum class LoopOutcome : std::uint8_t {
 /// The name of an outcome, as in "not_a_loop".
 const char* name_of(LoopOutcome outcome);
 
-/// The work on a loop grows with the third power of its corners.
+/// The most corners of a loop that is filled: the work on a loop grows with the third power of its corners.
 inline constexpr std::size_t kMostLoopCorners = 1000;
 
 struct HoleClosingResult {
@@ -76,13 +76,14 @@ struct HoleClosingResult {
 /// neither degenerate nor crossing any other face, so that no edge gets more than two triangles. A loop is filled as a
 /// whole or not at all, in the orientation of its rim. Of the triangulations whose triangles keep these bounds one by
 /// one it takes the least (repair/least_triangulation.h); where two of its triangles cross, or lie on one edge, it
-/// tries a few times without one of them. Loops are filled as if they were alone; then each that is in conflict with
-/// one of lower number is filled anew around that, if possible.
+/// searches a few more times without one of them. Loops are filled as if they were alone; then each whose faces are in
+/// conflict with those of a loop of lower number is filled anew around those, if possible.
 ///
 /// No vertex moves and none is added, and every input triangle keeps its number. Because the input stays, the reference
 /// is as near to the result as it is to the input. Throws InvalidInput for a bad mesh, and where the stored type cannot
-/// hold the tolerance; Cancelled. 1 us a triangle, and for a loop of n corners about 5 ns * n^3 / 6 and n^2 / 2
-/// certificates at most.
+/// hold the tolerance; Cancelled. 1 us a triangle. A search for the filling of a loop of n corners takes about
+/// 5 ns * n^3 / 6 and n^2 / 2 certificates, but n^3 / 6 certificates where nearly all triangles are refused although
+/// their edges are admitted, as around an island in a hole.
 HoleClosingResult close_holes(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                               const StoredSpace& space, const ToleranceVolume& volume,
                               const CloseHolesOptions& options = {});

@@ -25,8 +25,8 @@ struct TriangulationRules {
 /// The sum of a part of the polygon is that of a triangle at its inner edge and of the two parts beyond the triangle
 /// (G. T. Klincsek, "Minimal triangulations of polygonal domains", 1980; for holes: G. Barequet, M. Sharir, "Filling
 /// gaps in the boundary of a polyhedron", 1995). That the sum is least for Delaunay triangulations is from V. T. Rajan,
-/// "Optimality of the Delaunay triangulation in R^d", 1994. O(n^3) where all is admitted, about 5 ns a step, and O(n^2)
-/// questions; 12 bytes * n^2 / 2. Polls.
+/// "Optimality of the Delaunay triangulation in R^d", 1994. O(n^3), about 5 ns a step. Where all is admitted it asks
+/// O(n^2) questions; where edges are admitted and nearly all triangles refused, O(n^3). 12 bytes * n^2 / 2. Polls.
 std::vector<glm::uvec3> least_triangulation(std::span<const glm::dvec3> corners, const TriangulationRules& rules);
 
 }  // namespace tolvol

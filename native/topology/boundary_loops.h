@@ -14,7 +14,8 @@ namespace tolvol {
 /// A run of open edges, each of which begins at the place where the one before ends.
 struct BoundaryLoop {
   /// The open edges as sides of their triangles (topology/sides.h), in the direction of the triangles, so that the hole
-  /// lies to the right as seen from the front. The lowest side of a loop comes first.
+  /// lies to the right as seen from the front. The lowest side of a loop that is closed comes first; one that is not
+  /// begins with the edge that no other leads to.
   std::vector<std::uint32_t> sides;
   /// Tells whether the last edge ends where the first begins. Open edges that lead to an edge of more than two
   /// triangles, or to a triangle of the other orientation, form no loop.
