@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "base/call.h"
@@ -95,6 +96,8 @@ class TJunctions {
   struct Contact {
     Edge edge;
     bool in_plane;  // of that triangle, all faces around the vertex
+
+    auto operator<=>(const Contact& other) const = default;
   };
 
   const glm::dvec3& place(std::uint32_t vertex) const { return mesh_.vertices[vertex]; }
@@ -143,12 +146,13 @@ class TJunctions {
       if (!lies_inside(p, t) || lies_in_plane(vertex, t)) return;
       places.insert(places.end(), {p, place(t.x), place(t.y), place(t.z)});
     });
-    for (const Contact& c : contacts) {
-      if (is_joined(vertex, c.edge)) continue;
-      const bool is_open = std::ranges::binary_search(open_, c.edge);
-      const bool overlaps =
-          std::ranges::any_of(contacts, [&](const Contact& other) { return other.edge == c.edge && other.in_plane; });
-      if (is_open || !overlaps) places.insert(places.end(), {p, place(c.edge.first), place(c.edge.second)});
+    // The sides on one edge stand together, and those in whose plane the faces lie are first.
+    std::ranges::sort(contacts, std::greater<>());
+    for (std::size_t i = 0; i < contacts.size(); ++i) {
+      const auto& [edge, lies_upon_a_face] = contacts[i];
+      if ((i > 0 && contacts[i - 1].edge == edge) || is_joined(vertex, edge)) continue;
+      const bool is_open = std::ranges::binary_search(open_, edge);
+      if (is_open || !lies_upon_a_face) places.insert(places.end(), {p, place(edge.first), place(edge.second)});
     }
   }
 
