@@ -24,9 +24,10 @@ namespace tolvol {
 namespace {
 
 constexpr std::uint32_t kNone = HoleClosingResult::kNone;
-/// A loop is searched for a filling at most so many times. After each search but the last, one of two triangles that
-/// cross, or that lie on one edge, is left out.
-constexpr int kMostTries = 8;
+/// A loop is searched for a filling at most so many times, a long one less often. After each search but the last, faces
+/// that are in the way are gone around, and one of two triangles that cross, or that lie on one edge, is left out.
+constexpr int kMostTries = 32, kMostTriesOfLong = 8;
+constexpr std::size_t kLong = 200;  ///< corners
 /// An edge across a hole is probed in so many points before any triangle at it is proved.
 constexpr int kProbes = 7;
 
@@ -218,13 +219,14 @@ class Closing::Filling {
   LoopOutcome run() {
     TriangulationRules rules{[this](std::uint32_t i, std::uint32_t j) { return admits_edge(i, j); },
                              [this](const glm::uvec3& face) { return admits(face); }};
-    for (int tries = 0; tries < kMostTries; ++tries) {
+    const int most = loop_.at.size() > kLong ? kMostTriesOfLong : kMostTries;
+    for (int tries = 0; tries < most; ++tries) {
       loop_.faces = least_triangulation(loop_.at, rules);
       if (loop_.faces.empty()) break;
       std::sort(loop_.faces.begin(), loop_.faces.end(), [](const glm::uvec3& a, const glm::uvec3& b) {
         return std::array{a.x, a.y, a.z} < std::array{b.x, b.y, b.z};
       });
-      if (is_sound()) return LoopOutcome::closed;
+      if (is_clear() && is_sound()) return LoopOutcome::closed;
     }
     loop_.faces.clear();
     return reason();
@@ -290,15 +292,33 @@ class Closing::Filling {
       return refuse(is_inside ? LoopOutcome::turned : LoopOutcome::outside);
     }
     const Box box = box_of(stored);
-    bool is_clear = true;
-    closing_.tree_.for_each_meeting(
-        box, [&](std::uint32_t other) { return is_clear = !faces_cross(stored, closing_.mesh_.corners(other)); });
-    if (is_clear && before_) {
+    for (const Obstacle& obstacle : obstacles_) {
+      if (meet(box, obstacle.box) && faces_cross(stored, obstacle.corners)) return refuse(LoopOutcome::crossing);
+    }
+    return true;
+  }
+
+  /// Whether the triangles cross no face of the input, and none of the fillings that the loop has to keep apart from.
+  /// All triangles of the next try go around what they cross. Hardly a hole has anything in it, so that it would take
+  /// most of the time to ask about all triangles whether they cross any face.
+  bool is_clear() {
+    bool clear = true;
+    const auto look = [&](const Corners& stored, const Corners& other) {
+      if (!faces_cross(stored, other)) return;
+      clear = refuse(LoopOutcome::crossing);
+      obstacles_.push_back({other, box_of(other)});
+    };
+    for (const glm::uvec3& face : loop_.faces) {
+      poll();
+      const Corners stored = closing_.corners_of(loop_, face);
+      const Box box = box_of(stored);
+      closing_.tree_.for_each_meeting(box, [&](std::uint32_t other) { look(stored, closing_.mesh_.corners(other)); });
+      if (!before_) continue;
       closing_.new_tree_.for_each_meeting(box, [&](std::uint32_t other) {
-        return is_clear = closing_.loop_of_[other] >= *before_ || !faces_cross(stored, closing_.new_faces_[other]);
+        if (closing_.loop_of_[other] < *before_) look(stored, closing_.new_faces_[other]);
       });
     }
-    return is_clear || refuse(LoopOutcome::crossing);
+    return clear;
   }
 
   /// Whether the triangles fit together. If not, one of those that do not is left out of the next try.
@@ -331,6 +351,11 @@ class Closing::Filling {
   const Closing& closing_;
   Filled& loop_;
   std::optional<std::uint32_t> before_;
+  struct Obstacle {
+    Corners corners;
+    Box box;
+  };
+  std::vector<Obstacle> obstacles_;  ///< faces that an earlier try crossed
   std::set<std::array<std::uint32_t, 3>> left_out_;
   std::set<std::array<std::uint32_t, 2>> left_out_edges_;
   std::array<std::size_t, kNames.size()> refused_{};  ///< for each outcome

@@ -309,6 +309,35 @@ TEST(CloseHoles, AFillingGoesAroundWhatStandsInTheWay) {
   EXPECT_NE(uses(result, corner(4, 4), corner(5, 5)), is_high);
 }
 
+TEST(CloseHoles, AFillingOfALongLoopGoesAroundWhatStandsInTheWay) {
+  // The end of a tube bulges, and a small sheet stands where the filling was.
+  TriangleMesh mesh = tube(240, 1, 4, 4);
+  for (unsigned i = 0; i < 240; ++i) mesh.vertices[i].z += 0.2 * std::sin(2 * std::numbers::pi * i / 80);
+  CloseHolesOptions options;
+  options.largest_perimeter = 8;
+  const HoleClosingResult alone = close(mesh, 1.3, options);
+  ASSERT_EQ(alone.loops[0].corners, 240u);
+  ASSERT_EQ(alone.loops[0].outcome, LoopOutcome::closed);
+  // Through the middle of the largest of its triangles.
+  std::pair<double, std::uint32_t> largest{0, 0};
+  for (auto t = std::uint32_t(mesh.triangles.size()); t < alone.triangles.size(); ++t) {
+    if (alone.loop[t - mesh.triangles.size()] != 0) continue;
+    const glm::uvec3& c = alone.triangles[t];
+    const dvec3 n = glm::cross(mesh.vertices[c.y] - mesh.vertices[c.x], mesh.vertices[c.z] - mesh.vertices[c.x]);
+    largest = std::max(largest, std::pair(glm::length(n), t));
+  }
+  const glm::uvec3& c = alone.triangles[largest.second];
+  const dvec3 middle = (mesh.vertices[c.x] + mesh.vertices[c.y] + mesh.vertices[c.z]) / 3.0;
+  const TriangleMesh sheet{
+      {middle + dvec3(0.01, 0, -0.01), middle + dvec3(-0.01, 0.01, 0.01), middle + dvec3(-0.01, -0.01, 0.01)},
+      {{0, 1, 2}}};
+  mesh = shapes::joined(mesh, sheet);
+  const HoleClosingResult result = close(mesh, 1.3, options);
+  judge(mesh, result, 1.3);
+  EXPECT_EQ(result.loops[0].outcome, LoopOutcome::closed);
+  EXPECT_EQ(std::count(result.triangles.begin(), result.triangles.end(), c), 0);
+}
+
 TEST(CloseHoles, ShellsWithinShellsAreClosedEach) {
   // Walls thinner than the tolerance, with holes at the same places.
   const auto hole = [](unsigned t) { return t == 100 || t == 101 || t == 300; };
