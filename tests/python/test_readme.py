@@ -39,9 +39,19 @@ def test_they_run_one_after_the_other(gl):
 
 
 def test_decimation_is_within_one_percent():
-    names = run(block_with("tolvol.decimate"))
+    names = run(block_with("tolvol.hausdorff"))
     assert len(names["result"].triangles) < len(names["triangles"]) / 4
     assert names["distance"].upper <= 0.01 * tolvol.diagonal(names["vertices"], names["triangles"])
+
+
+def test_closing_holes_goes_on_from_the_decimation():
+    vertices, triangles = meshes.torus()
+    names = {"vertices": vertices.astype(np.float32), "triangles": np.delete(triangles, slice(None, None, 60), axis=0)}
+    exec(block_with("tolvol.hausdorff"), names)
+    before = names["result"]
+    exec(block_with("close_holes"), names)
+    assert names["closed"].report["closed"] > 100
+    assert len(names["result"].triangles) < len(before.triangles) / 2
 
 
 def test_five_lines_keep_a_smoothing_loop_within_the_tolerance():
