@@ -35,14 +35,18 @@ void Surroundings::renew() {
 
 void Surroundings::renew(Team& team) {
   std::vector<std::uint32_t> alive;
-  std::vector<Box> boxes;
+  std::vector<Corners> corners;
+  std::vector<std::uint8_t> hubs;
   for (const std::uint32_t face : faces_) {
     poll_at(face);
-    if (face < mesh_.connectivity().n_faces() && !mesh_.alive(face)) continue;
+    const bool is_fixed = face >= mesh_.connectivity().n_faces();
+    if (!is_fixed && !mesh_.alive(face)) continue;
     alive.push_back(face);
-    boxes.push_back(box_of(crossings_.corners(face)));
+    corners.push_back(crossings_.corners(face));
+    const auto faces_around = [&](std::uint32_t v) { return mesh_.faces_around(v); };
+    hubs.push_back(is_fixed ? NearFaces::kNoHub : NearFaces::hub_of(mesh_.triangle(face), faces_around));
   }
-  tree_ = FaceTree(alive, boxes, team);
+  near_ = NearFaces(alive, corners, hubs, team);
 }
 
 /// The faces that get another shape. One that moves by nothing may still have another vertex for a corner.
@@ -74,11 +78,11 @@ Box Surroundings::follow(const Trial& trial) {
   for (const NewCrossings::Face& face : trial.faces) {
     const Box box = box_of(face.corners);
     all.add(box), all.add(box_of(crossings_.corners(face.id)));
-    tree_.change(face.id, box);
+    near_.change(face.id, face.corners);
   }
   for (const NewCrossings::Removed& r : trial.removed) {
     all.add(box_of(crossings_.corners(r.id))), all.add(box_of(crossings_.corners(r.successor)));
-    tree_.change(r.id, Box());
+    near_.remove(r.id);
   }
   crossings_.hand_over(trial.removed, trial.crossings.given());
   return all;

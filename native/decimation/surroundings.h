@@ -10,7 +10,7 @@
 #include "base/parallel.h"
 #include "decimation/bounded_mesh.h"
 #include "decimation/change.h"
-#include "topology/face_tree.h"
+#include "topology/near_faces.h"
 #include "topology/new_crossings.h"
 
 namespace tolvol {
@@ -42,9 +42,9 @@ class Surroundings {
   /// may ask at once.
   bool allow(const Change& change, Trial& trial) const;
   /// The same for the faces and the removed faces that the trial names, for whatever reason they change.
-  bool allow(Trial& trial) const { return crossings_.none(tree_, trial.faces, trial.removed, trial.crossings); }
+  bool allow(Trial& trial) const { return crossings_.none(near_, trial.faces, trial.removed, trial.crossings); }
   /// Whether none of some faces that were changed on trust, as they are now, crosses others anew or is degenerate.
-  bool allow(std::span<const std::uint32_t> changed) const { return crossings_.none(tree_, changed); }
+  bool allow(std::span<const std::uint32_t> changed) const { return crossings_.none(near_, changed); }
   /// Follows a change, which `trial` was asked about last, before it is carried out on the mesh. Returns a box around
   /// all that it changes: also around the faces that come to stand for others.
   Box follow(const Change& change, Trial& trial);
@@ -59,7 +59,7 @@ class Surroundings {
   NewCrossings& crossings_;
   std::vector<std::uint32_t> faces_;
   Box cell_;
-  FaceTree tree_;
+  NearFaces near_;
 };
 
 /// The faces that a change removes, and the faces that stand for them from then on.

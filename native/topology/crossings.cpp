@@ -5,22 +5,22 @@
 #include <numeric>
 
 #include "base/call.h"
-#include "topology/face_tree.h"
 #include "topology/faces_cross.h"
+#include "topology/near_faces.h"
 
 namespace tolvol {
 
 Crossings crossings(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, std::size_t most,
                     Team& team, Progress* progress) {
   const MeshView mesh{triangles, vertices};
-  std::vector<Box> boxes(triangles.size());
+  std::vector<Corners> corners(triangles.size());
   for (std::uint32_t i = 0; i < triangles.size(); ++i) {
     poll_at(i);
-    boxes[i] = box_of(mesh.corners(i));
+    corners[i] = mesh.corners(i);
   }
   std::vector<std::uint32_t> faces(triangles.size());
   std::iota(faces.begin(), faces.end(), 0u);
-  const FaceTree tree(faces, boxes, team);
+  const NearFaces near(faces, corners, NearFaces::hubs_of(triangles, vertices.size()), team);
   if (progress) progress->begin("finding crossings");
   Crossings found;
   // One face may cross all others, so that pairs are collected from a few faces at a time before they are counted.
@@ -32,10 +32,10 @@ Crossings crossings(std::span<const glm::dvec3> vertices, std::span<const glm::u
       pairs.clear();
       for (auto i = static_cast<std::uint32_t>(first + begin); i < first + end; ++i) {
         const std::size_t before = pairs.size();
-        const Corners own = mesh.corners(i);
-        tree.for_each_meeting(boxes[i], [&](std::uint32_t j) {
+        near.for_each_near(corners[i], [&](std::uint32_t j) {
           poll_at(j);
-          if (j > i && faces_cross(own, mesh.corners(j))) pairs.emplace_back(i, j);
+          if (j > i && faces_cross(corners[i], corners[j])) pairs.emplace_back(i, j);
+          return true;
         });
         std::sort(pairs.begin() + static_cast<std::ptrdiff_t>(before), pairs.end(),
                   [](const glm::uvec2& a, const glm::uvec2& b) { return a.y < b.y; });

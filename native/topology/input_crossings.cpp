@@ -54,11 +54,13 @@ void InputCrossings::keep_crossing(std::vector<std::uint32_t>& faces) const {
   std::call_once(states_ready_, [&] {
     std::vector<std::uint32_t> all(face_count());
     std::iota(all.begin(), all.end(), 0u);
-    std::vector<Box> boxes;
-    boxes.reserve(all.size());
-    for (const std::uint32_t face : all) boxes.push_back(box_of(corners(face)));
+    std::vector<Corners> places;
+    places.reserve(all.size());
+    for (const std::uint32_t face : all) places.push_back(corners(face));
+    std::vector<std::uint8_t> hubs = NearFaces::hubs_of(input_.triangles, input_.vertices.size());
+    if (!hubs.empty()) hubs.resize(all.size(), NearFaces::kNoHub);
     Team alone(1);
-    tree_ = FaceTree(all, boxes, alone);
+    near_ = NearFaces(all, places, hubs, alone);
     state_ = std::vector<std::atomic<std::uint8_t>>(all.size());
   });
   std::erase_if(faces, [&](std::uint32_t face) {
@@ -75,7 +77,7 @@ void InputCrossings::keep_crossing(std::vector<std::uint32_t>& faces) const {
 bool InputCrossings::crosses_another(std::uint32_t face) const {
   const Corners own = corners(face);
   bool found = false;
-  tree_.for_each_meeting(box_of(own), [&](std::uint32_t other) {
+  near_.for_each_near(own, [&](std::uint32_t other) {
     found = other != face && faces_cross(own, corners(other));
     return !found;
   });

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "topology/face_tree.h"
 #include "topology/faces_cross.h"
+#include "topology/near_faces.h"
 
 namespace tolvol {
 
@@ -47,7 +47,7 @@ class InputCrossings {
   std::vector<Corners> fixed_;
   mutable std::once_flag sheets_known_, states_ready_;
   mutable std::vector<std::uint32_t> sheets_;             ///< per face, found when first needed
-  mutable FaceTree tree_;                                 ///< of all faces, made when first needed
+  mutable NearFaces near_;                                ///< all faces, made when first needed
   mutable std::vector<std::atomic<std::uint8_t>> state_;  ///< per face: a State, made with the tree
 };
 

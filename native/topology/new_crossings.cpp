@@ -93,7 +93,7 @@ bool NewCrossings::inherited(std::uint32_t a, std::uint32_t b, std::span<const R
   return input_.any_crossed(origins_of(a, removed), origins_of(b, removed));
 }
 
-bool NewCrossings::none(const FaceTree& near, std::span<const Face> faces, std::span<const Removed> removed,
+bool NewCrossings::none(const NearFaces& near, std::span<const Face> faces, std::span<const Removed> removed,
                         Trial& trial) const {
   Box all;
   trial.boxes_.clear(), trial.replaced_.clear(), trial.given_.clear();
@@ -132,7 +132,7 @@ bool NewCrossings::none(const FaceTree& near, std::span<const Face> faces, std::
     return share_out(near, faces, removed, trial);
   }
   trial.met_last_ = kNone;
-  near.for_each_meeting(all, [&](std::uint32_t other) {
+  near.for_each_near(all, faces, [&](std::uint32_t other) {
     if (stays(other) && crosses_any(other)) trial.met_last_ = other;
     return trial.met_last_ == kNone;
   });
@@ -142,7 +142,7 @@ bool NewCrossings::none(const FaceTree& near, std::span<const Face> faces, std::
 /// Whether the input faces that the changed and the removed faces stand for can be shared out among the changed faces
 /// so that every crossing is inherited, after one was found with `trial.met_last_` that is not. Notes in `trial` what
 /// has to be given then.
-bool NewCrossings::share_out(const FaceTree& near, std::span<const Face> faces, std::span<const Removed> removed,
+bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces, std::span<const Removed> removed,
                              Trial& trial) const {
   std::vector<std::uint32_t> of_met = origins_of(trial.met_last_, {});
   input_.keep_crossing(of_met);
@@ -181,7 +181,7 @@ bool NewCrossings::share_out(const FaceTree& near, std::span<const Face> faces, 
   for (const Box& box : trial.boxes_) all.add(box);
   std::size_t pairs = 0;
   bool possible = true;
-  near.for_each_meeting(all, [&](std::uint32_t other) {
+  near.for_each_near(all, faces, [&](std::uint32_t other) {
     if (std::binary_search(trial.replaced_.begin(), trial.replaced_.end(), other)) return true;
     const Corners t = corners(other);
     std::vector<std::uint32_t> crossing;
@@ -211,13 +211,13 @@ bool NewCrossings::share_out(const FaceTree& near, std::span<const Face> faces, 
   return true;
 }
 
-bool NewCrossings::none(const FaceTree& near, std::span<const std::uint32_t> changed) const {
+bool NewCrossings::none(const NearFaces& near, std::span<const std::uint32_t> changed) const {
   return std::ranges::none_of(changed, [&](std::uint32_t face) {
     poll();
     const Corners own = corners(face);
     if (is_degenerate(own) && !is_degenerate(input_.corners(face))) return true;
     bool crosses = false;
-    near.for_each_meeting(box_of(own), [&](std::uint32_t other) {
+    near.for_each_near(own, [&](std::uint32_t other) {
       crosses = other != face && faces_cross(own, corners(other)) && !inherited(face, other, {});
       return !crosses;
     });

@@ -17,6 +17,7 @@
 #include "topology/face_tree.h"
 #include "topology/faces_cross.h"
 #include "topology/input_crossings.h"
+#include "topology/near_faces.h"
 
 namespace tolvol {
 
@@ -65,12 +66,12 @@ class NewCrossings {
   /// and no face would become degenerate. `near` has to have every face whose box meets those of `faces`. Only reads;
   /// several threads may ask at once. About 5 us for the faces around a vertex, and O(n log n) where n faces around a
   /// vertex lie about it like a fan.
-  bool none(const FaceTree& near, std::span<const Face> faces, std::span<const Removed> removed, Trial& trial) const;
+  bool none(const NearFaces& near, std::span<const Face> faces, std::span<const Removed> removed, Trial& trial) const;
 
   /// The same of changes that were carried out on trust: whether none of the `changed` faces, as they are now, is
   /// degenerate or crosses any face anew. `near` has to have every face that meets them, as it is now. Several threads
   /// may ask at once. About 3 us a face.
-  bool none(const FaceTree& near, std::span<const std::uint32_t> changed) const;
+  bool none(const NearFaces& near, std::span<const std::uint32_t> changed) const;
 
   /// After a change was carried out, with what none() found that it has to give.
   void hand_over(std::span<const Removed> removed, std::span<const Given> given = {});
@@ -89,7 +90,7 @@ class NewCrossings {
 
   std::vector<std::uint32_t> origins_of(std::uint32_t face, std::span<const Removed> removed) const;
   bool inherited(std::uint32_t a, std::uint32_t b, std::span<const Removed> removed) const;
-  bool share_out(const FaceTree& near, std::span<const Face> faces, std::span<const Removed> removed,
+  bool share_out(const NearFaces& near, std::span<const Face> faces, std::span<const Removed> removed,
                  Trial& trial) const;
 
   MeshView now_;

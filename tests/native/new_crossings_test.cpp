@@ -12,10 +12,9 @@
 namespace {
 
 using glm::dvec3;
-using tolvol::box_of;
 using tolvol::Corners;
 using tolvol::faces_cross;
-using tolvol::FaceTree;
+using tolvol::NearFaces;
 using tolvol::NewCrossings;
 using tolvol::Team;
 using tolvol::TriangleMesh;
@@ -29,16 +28,16 @@ struct Scene {
         now(input),
         crossings({input.triangles, input.vertices}, {now.triangles, now.vertices}, std::move(fixed)) {}
 
-  FaceTree tree() const {
+  NearFaces near() const {
     std::vector<std::uint32_t> faces(crossings.face_count());
     std::iota(faces.begin(), faces.end(), 0u);
-    std::vector<tolvol::Box> boxes;
-    for (const std::uint32_t face : faces) boxes.push_back(box_of(crossings.corners(face)));
+    std::vector<Corners> corners;
+    for (const std::uint32_t face : faces) corners.push_back(crossings.corners(face));
     Team alone(1);
-    return FaceTree(faces, boxes, alone);
+    return {faces, corners, {}, alone};
   }
   bool none(const std::vector<Face>& faces, const std::vector<Removed>& removed = {}) {
-    return crossings.none(tree(), faces, removed, trial);
+    return crossings.none(near(), faces, removed, trial);
   }
   /// Whether one vertex may go there.
   bool may_move(std::uint32_t vertex, const dvec3& to) {

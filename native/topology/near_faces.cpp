@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The rule about faces with a common corner holds for degenerate ones, too: a segment from the hub that runs into a
+// face either ends on it, or leaves it through the edge opposite the hub. A face of a crowd that has lost its hub has
+// all of its corners in both trees, so that its boxes are compared as others' are.
+#include "topology/near_faces.h"
+
+#include <map>
+
+#include "base/call.h"
+
+namespace tolvol {
+
+Box NearFaces::rim(const Corners& corners, const glm::dvec3& hub) {
+  Box box;
+  for (const glm::dvec3& p : corners) {
+    if (p != hub) box.add(p);
+  }
+  return has_corner(corners, hub) ? box : box_of(corners);
+}
+
+std::vector<std::uint8_t> NearFaces::hubs_of(std::span<const glm::uvec3> triangles, std::size_t vertex_count) {
+  std::vector<std::uint32_t> count(vertex_count, 0);
+  std::uint32_t most = 0;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    poll_at(i);
+    for (int k = 0; k < 3; ++k) most = std::max(most, ++count[triangles[i][k]]);
+  }
+  std::vector<std::uint8_t> hubs;
+  if (most < kHub) return hubs;
+  hubs.reserve(triangles.size());
+  for (const glm::uvec3& t : triangles) hubs.push_back(hub_of(t, [&](std::uint32_t v) { return count[v]; }));
+  return hubs;
+}
+
+NearFaces::NearFaces(std::span<const std::uint32_t> faces, std::span<const Corners> corners,
+                     std::span<const std::uint8_t> hubs, Team& team) {
+  std::vector<Box> boxes(faces.size());
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    poll_at(i);
+    boxes[i] = box_of(corners[i]);
+  }
+  if (std::ranges::all_of(hubs, [](std::uint8_t corner) { return corner == kNoHub; })) {
+    others_ = FaceTree(faces, boxes, team);
+    return;
+  }
+  struct Group {
+    std::uint32_t number;
+    std::vector<std::uint32_t> faces{};
+    std::vector<Box> boxes{}, rims{};
+  };
+  const auto before = [](const glm::dvec3& a, const glm::dvec3& b) {
+    return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
+  };
+  std::map<glm::dvec3, Group, decltype(before)> groups(before);
+  Group rest{0};
+  std::vector<Group*> group_of(faces.size(), &rest);
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    poll_at(i);
+    if (hubs[i] != kNoHub) group_of[i] = &groups.try_emplace(corners[i][hubs[i]], Group{0}).first->second;
+    group_of[i]->faces.push_back(faces[i]), group_of[i]->boxes.push_back(boxes[i]);
+    if (hubs[i] != kNoHub) group_of[i]->rims.push_back(rim(corners[i], corners[i][hubs[i]]));
+  }
+  for (auto& [hub, group] : groups) {
+    group.number = static_cast<std::uint32_t>(crowds_.size());
+    crowds_.push_back({hub, FaceTree(group.faces, group.boxes, team), FaceTree(group.faces, group.rims, team)});
+  }
+  rest.number = static_cast<std::uint32_t>(crowds_.size());
+  others_ = FaceTree(rest.faces, rest.boxes, team);
+  faces_.assign(faces.begin(), faces.end());
+  for (const Group* const group : group_of) crowd_of_.push_back(group->number);
+  whole_ = std::move(boxes);
+}
+
+void NearFaces::change(std::uint32_t face, const Corners& corners) {
+  const std::size_t place = crowds_.empty() ? 0 : place_of(face);
+  if (crowds_.empty() || crowd_of_[place] == crowds_.size()) {
+    others_.change(face, box_of(corners));
+    return;
+  }
+  Crowd& crowd = crowds_[crowd_of_[place]];
+  whole_[place] = box_of(corners);
+  crowd.whole.change(face, whole_[place]);
+  crowd.rims.change(face, rim(corners, crowd.hub));
+}
+
+void NearFaces::remove(std::uint32_t face) {
+  const std::size_t place = crowds_.empty() ? 0 : place_of(face);
+  if (crowds_.empty() || crowd_of_[place] == crowds_.size()) {
+    others_.change(face, Box());
+    return;
+  }
+  Crowd& crowd = crowds_[crowd_of_[place]];
+  crowd.whole.change(face, Box());
+  crowd.rims.change(face, Box());
+}
+
+}  // namespace tolvol

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The faces that some faces may cross, while faces change and vanish. It differs from a FaceTree of their boxes where
+/// very many faces meet in one corner: the boxes of all of them meet there, but two faces with a common corner cross
+/// (topology/faces_cross.h) only if the edge of one that is opposite the corner meets the other.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "base/parallel.h"
+#include "geometry/triangle_mesh.h"
+#include "topology/face_tree.h"
+#include "topology/faces_cross.h"
+
+namespace tolvol {
+
+class NearFaces {
+ public:
+  /// A corner that at least so many faces share is a hub.
+  static constexpr std::uint32_t kHub = 256;
+  static constexpr std::uint8_t kNoHub = 3;
+
+  NearFaces() = default;
+  /// `faces` are the numbers of the faces, in rising order, and `corners` their corners. `hubs` has for each the corner
+  /// that is a hub, or kNoHub; if none has one it may be empty. Which corners count as hubs decides about time alone.
+  /// O(n log n), as a FaceTree, and twice as much for faces at hubs.
+  NearFaces(std::span<const std::uint32_t> faces, std::span<const Corners> corners, std::span<const std::uint8_t> hubs,
+            Team& team);
+
+  /// The corner of a triangle that is a hub, the one with the most faces, or kNoHub. `faces_at` tells how many faces a
+  /// vertex has.
+  template <class FacesAt>
+  static std::uint8_t hub_of(const glm::uvec3& triangle, FacesAt&& faces_at) {
+    std::uint8_t hub = kNoHub;
+    std::uint32_t most = kHub - 1;
+    for (std::uint8_t k = 0; k < 3; ++k) {
+      const std::uint32_t count = faces_at(triangle[k]);
+      if (count > most) most = count, hub = k;
+    }
+    return hub;
+  }
+  /// The same for all triangles of a mesh, by the vertices that their corners name; empty if there is none.
+  static std::vector<std::uint8_t> hubs_of(std::span<const glm::uvec3> triangles, std::size_t vertex_count);
+
+  /// Gives a face of the constructor's other corners, or removes it. O(log n).
+  void change(std::uint32_t face, const Corners& corners);
+  void remove(std::uint32_t face);
+
+  /// Calls visit(face) for all faces that one of `own` crosses, and for others whose boxes meet. `all` is a box around
+  /// `own`, whose elements have a member `corners`. A visit that returns false ends the search. Which faces a search
+  /// finds depends on `own` and the faces alone; their order also depends on those that the trees were built with.
+  template <class Faces, class Visit>
+  void for_each_near(const Box& all, const Faces& own, Visit&& visit) const;
+  /// The same near one face.
+  template <class Visit>
+  void for_each_near(const Corners& own, Visit&& visit) const {
+    struct Own {
+      Corners corners;
+    };
+    for_each_near(box_of(own), std::array{Own{own}}, visit);
+  }
+
+ private:
+  /// The faces around one hub, in two trees: by their boxes, and by the boxes of their corners beside the hub.
+  struct Crowd {
+    glm::dvec3 hub;
+    FaceTree whole, rims;
+  };
+
+  static bool has_corner(const Corners& corners, const glm::dvec3& p) {
+    return corners[0] == p || corners[1] == p || corners[2] == p;
+  }
+  /// The box of the corners other than `hub`; of all if none of them is there.
+  static Box rim(const Corners& corners, const glm::dvec3& hub);
+
+  std::size_t place_of(std::uint32_t face) const {
+    return static_cast<std::size_t>(std::lower_bound(faces_.begin(), faces_.end(), face) - faces_.begin());
+  }
+
+  FaceTree others_;  ///< all faces without a hub
+  std::vector<Crowd> crowds_;
+  // These are empty if there is no crowd.
+  std::vector<std::uint32_t> faces_;     ///< in rising order
+  std::vector<std::uint32_t> crowd_of_;  ///< for each of faces_; crowds_.size() for one without a hub
+  std::vector<Box> whole_;               ///< for each of faces_ that is in a crowd: its box
+};
+
+template <class Faces, class Visit>
+void NearFaces::for_each_near(const Box& all, const Faces& own, Visit&& visit) const {
+  bool more = true;
+  const auto next = [&](std::uint32_t face) { return more = visit(face); };
+  others_.for_each_meeting(all, next);
+  for (std::size_t i = 0; i < crowds_.size() && more; ++i) {
+    const Crowd& crowd = crowds_[i];
+    Box sharing, opposite, strange;  // Of those of `own` that share the hub, of their rims, and of the rest.
+    for (const auto& face : own) {
+      if (has_corner(face.corners, crowd.hub)) {
+        sharing.add(box_of(face.corners)), opposite.add(rim(face.corners, crowd.hub));
+      } else {
+        strange.add(box_of(face.corners));
+      }
+    }
+    Box first = opposite;
+    first.add(strange);
+    if (!first.empty()) crowd.whole.for_each_meeting(first, next);
+    if (!more || sharing.empty()) continue;
+    crowd.rims.for_each_meeting(sharing,
+                                [&](std::uint32_t face) { return meet(whole_[place_of(face)], first) || next(face); });
+  }
+}
+
+}  // namespace tolvol
