@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every operation while the n-th allocation fails, for all n of its run, or for n that grow by a share of themselves:
-// the exception comes out, what was there before is as it was, and the next call gives what it always gives.
+// Every operation while the n-th allocation fails, for all n of its run, for those of each place in the code, or for n
+// that grow by a share of themselves: the exception comes out, what was there before is as it was, and the next call
+// gives what it always gives.
+#include <execinfo.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <functional>
+#include <map>
 #include <new>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "check/certificate.h"
@@ -26,7 +32,16 @@ namespace {
 
 std::atomic<long> allocations_left{-1};  // the one after these fails; negative: none does
 
+using Callers = std::array<void*, 16>;
+std::vector<Callers>* recorded = nullptr;  // who allocates, one after another; null: nobody wants to know
+
 void* allocate(std::size_t size, std::size_t alignment) {
+  if (std::vector<Callers>* const record = std::exchange(recorded, nullptr)) {
+    Callers callers{};
+    backtrace(callers.data(), int(callers.size()));
+    record->push_back(callers);
+    recorded = record;
+  }
   // Once: what is allocated while the exception is on its way succeeds.
   if (allocations_left.load(std::memory_order_relaxed) >= 0 && allocations_left.fetch_sub(1) == 0)
     throw std::bad_alloc();
@@ -107,29 +122,56 @@ struct Scene {
 
 constexpr double kLeastGrowth = kSanitized ? 0.5 : 0;
 
-/// Calls `operation` with the n-th allocation failing until a run has no n-th, and after each failure once more: it
-/// must give what it gave first. `growth`: n grows by so much of itself, for what takes long; at least by kLeastGrowth.
-/// Returns how many allocations there were, at least.
+/// Calls `operation` with the n-th allocation failing and then, if there was an n-th, once more: it must give what it
+/// gave at first. Returns whether there was one and all is well.
+bool survives(const std::function<Numbers()>& operation, long n, const Numbers& expected) {
+  bool failed = false;
+  allocations_left = n;
+  try {
+    operation();
+  } catch (const std::bad_alloc&) {
+    failed = true;
+  }
+  const bool reached = allocations_left.exchange(-1) < 0;
+  EXPECT_TRUE(reached || !failed) << n;
+  if (!reached) return false;
+  const bool same = operation() == expected;
+  EXPECT_TRUE(same) << "another result after allocation " << n << " failed";
+  return same;
+}
+
+/// Does so until a run has no n-th. `growth`: n grows by so much of itself, for what takes long; at least by
+/// kLeastGrowth. Returns how many allocations there were, at least.
 long fail_allocations(const std::function<Numbers()>& operation, double growth = 0) {
   growth = std::max(growth, kLeastGrowth);
   const Numbers expected = operation();
   EXPECT_FALSE(expected.empty());
-  for (long n = 0;; n += 1 + long(growth * double(n))) {
-    bool failed = false;
-    allocations_left = n;
-    try {
-      operation();
-    } catch (const std::bad_alloc&) {
-      failed = true;
-    }
-    const bool reached = allocations_left.exchange(-1) < 0;
-    EXPECT_TRUE(reached || !failed) << n;
-    if (!reached) return n;
-    if (operation() != expected) {
-      ADD_FAILURE() << "another result after allocation " << n << " failed";
-      return n;
+  long n = 0;
+  while (survives(operation, n, expected)) n += 1 + long(growth * double(n));
+  return n;
+}
+
+/// Does so, on one thread, with the first, the second and the last allocation of each place: of the same line, called
+/// from the same lines. Returns the number of places.
+long fail_each_place(const std::function<Numbers()>& operation) {
+  if (kSanitized) return fail_allocations(operation);
+  const Numbers expected = operation();
+  EXPECT_FALSE(expected.empty());
+  std::vector<Callers> calls;
+  recorded = &calls;
+  operation();
+  recorded = nullptr;
+  std::map<Callers, std::vector<long>> places;
+  for (std::size_t n = 0; n < calls.size(); ++n) places[calls[n]].push_back(long(n));
+  std::set<long> chosen;
+  for (const auto& [callers, at] : places) chosen.insert({at.front(), at[at.size() > 1], at.back()});
+  for (const long n : chosen) {
+    if (!survives(operation, n, expected)) {
+      ADD_FAILURE() << "allocation " << n << " of " << calls.size();
+      break;
     }
   }
+  return long(places.size());
 }
 
 TEST(Allocation, DecimationInEveryForm) {
@@ -181,15 +223,20 @@ TEST(Allocation, VolumeAndChecks) {
 TEST(Allocation, Motion) {
   const Scene scene;
   for (const unsigned threads : {1u, 2u}) {
-    EXPECT_GT(fail_allocations([&] {
+    // Threads allocate in another order each time, so that a place is not found again.
+    const auto fail = [&](const std::function<Numbers()>& operation) {
+      return threads == 1 ? fail_each_place(operation) : fail_allocations(operation, 0.05);
+    };
+    EXPECT_GT(fail([&] {
                 const ConstrainResult result = constrain(scene.mesh.vertices, scene.wish, scene.faces, 3, kStored,
                                                          scene.volume, {.threads = threads});
+                EXPECT_GT(result.held_back, 0u);
                 Numbers numbers = result.factors;
                 add(numbers, result.vertices);
                 return numbers;
               }),
               20);
-    EXPECT_GT(fail_allocations([&] {
+    EXPECT_GT(fail([&] {
                 SmoothingOptions options;
                 options.threads = threads, options.iterations = 2;
                 Numbers numbers;
@@ -211,11 +258,12 @@ TEST(Allocation, Deformation) {
   for (std::size_t i = 0; i < lattice.points.size(); i += 3) lattice.points[i].z += 1;
   DeformationOptions options;
   options.mode = DeformationOptions::Mode::pull_back, options.threads = 1;
-  EXPECT_GT(fail_allocations([&] {
+  EXPECT_GT(fail_each_place([&] {
+              const DeformationResult result = deform(scene.mesh.vertices, scene.faces, 3, kStored, &scene.volume,
+                                                      LatticeDeformation(lattice), options);
+              EXPECT_GT(result.held_back, 0u);
               Numbers numbers;
-              add(numbers, deform(scene.mesh.vertices, scene.faces, 3, kStored, &scene.volume,
-                                  LatticeDeformation(lattice), options)
-                               .vertices);
+              add(numbers, result.vertices);
               return numbers;
             }),
             20);
