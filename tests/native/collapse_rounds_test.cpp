@@ -71,7 +71,7 @@ TEST(CollapseRounds, ThreadsDoNotChangeABit) {
       options.wedges = wedges;
     }
     options.two_sided = seams;  // one-sided, boundaries have bounds of their own
-    cases::expect_same_bits(c, options, 4);
+    cases::expect_same_bits(c, options, {4});
     seams = !seams;
   }
 }

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <initializer_list>
 #include <vector>
 
 #include "decimation/decimation.h"
@@ -26,15 +27,17 @@ inline DecimationResult run(const Case& c, const Options& options = {}) {
 }
 
 /// Whatever the number of threads.
-inline void expect_same_bits(const Case& c, Options options, unsigned threads = 3) {
+inline void expect_same_bits(const Case& c, Options options, std::initializer_list<unsigned> threads = {3}) {
   options.threads = 1;
   const DecimationResult one = run(c, options);
-  options.threads = threads;
-  const DecimationResult several = run(c, options);
-  EXPECT_EQ(one.vertices, several.vertices);
-  EXPECT_EQ(one.triangles, several.triangles);
-  EXPECT_EQ(one.triangle_source, several.triangle_source);
-  EXPECT_EQ(one.source_weights, several.source_weights);
+  for (const unsigned count : threads) {
+    options.threads = count;
+    const DecimationResult several = run(c, options);
+    EXPECT_EQ(one.vertices, several.vertices);
+    EXPECT_EQ(one.triangles, several.triangles);
+    EXPECT_EQ(one.triangle_source, several.triangle_source);
+    EXPECT_EQ(one.source_weights, several.source_weights);
+  }
 }
 
 inline void expect_within(const Case& c, const DecimationResult& r, bool two_sided = true) {
