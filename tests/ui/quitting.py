@@ -13,12 +13,13 @@ sys.dont_write_bytecode = True
 sys.path[:0] = [str(FOLDER.parents[1]), str(FOLDER)]
 bpy.context.preferences.view.show_splash = False
 bpy.context.preferences.view.use_save_prompt = False
-bpy.context.preferences.system.viewport_aa = "OFF"
 
 import addon  # noqa: E402
 from addon import job  # noqa: E402
 from addon.reference import snapshots  # noqa: E402
-from window import window_context  # noqa: E402
+from window import draw_finely, window_context  # noqa: E402
+
+draw_finely(False)
 
 _TICK = 0.05
 _MOST_TICKS = 2000

@@ -18,11 +18,12 @@ sys.dont_write_bytecode = True
 sys.path[:0] = [str(FOLDER), str(FOLDER.parents[1]), str(FOLDER.parent / "blender")]
 # This works only before the first window is drawn.
 bpy.context.preferences.view.show_splash = False
-# Anti-aliasing would take more than half of the time when Blender draws in software.
-bpy.context.preferences.system.viewport_aa = "OFF"
 
 import addon  # noqa: E402
+import window  # noqa: E402
 from addon import native  # noqa: E402
+
+window.draw_finely(False)
 
 _SETTLE = 0.3  # seconds that Blender needs to handle an event and to draw again
 

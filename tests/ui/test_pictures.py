@@ -16,6 +16,7 @@ from addon.reference import measurements
 from test_guard import all_panels, only_guard_panel
 from test_show_deviation import sides, solid_monkey, stroke, surface, the_object, to_mode
 from window import (
+    draw_finely,
     finished,
     maximize,
     on_screen,
@@ -39,7 +40,7 @@ _SNOUT = (0.36, 0.72), (0.38, 0.75)
 def test_pictures_for_the_documentation():
     yield from reset(solid_monkey)
     yield from maximize()
-    bpy.context.preferences.system.viewport_aa = "8" if "TOLVOL_ALL_TESTS" in os.environ else "OFF"
+    draw_finely("TOLVOL_ALL_TESTS" in os.environ)
     space = view()[1].spaces[0]
     space.show_gizmo = space.show_region_toolbar = space.overlay.show_cursor = False
     from_the_front()
@@ -84,7 +85,7 @@ def test_pictures_for_the_documentation():
     assert found.forward_within and found.backward_within and min(sides()) > 300 and magenta() == 0
     space.overlay.show_wireframes = False
     space.show_gizmo = space.show_region_toolbar = space.overlay.show_cursor = True
-    bpy.context.preferences.system.viewport_aa = "OFF"
+    draw_finely(False)
     yield from maximize()
 
 

@@ -169,7 +169,6 @@ def shown_as_magnitude(ob, percent):
     ob.tolvol.tolerance_percent = percent
     ob.tolvol.deviation_kind, ob.tolvol.deviation_opacity = "MAGNITUDE", 1
     view()[1].spaces[0].region_3d.view_distance = 5
-    view()[1].spaces[0].overlay.show_outline_selected = False
 
 
 def counted():
@@ -192,7 +191,6 @@ def test_what_deviates_by_nothing_is_drawn_as_nothing():
         yield from press("tolvol.set_reference")
         xdotool("mousemove", *beside())
         space = view()[1].spaces[0]
-        space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
         space.show_gizmo = space.overlay.show_object_origins = space.overlay.show_cursor = False
         yield from finished(lambda: near() > 15_000)
         yield 1.0
@@ -213,7 +211,6 @@ def test_what_deviates_by_nothing_is_drawn_as_nothing():
     the_object().tolvol.tolerance_percent = 0.05
     yield from finished(lambda: striped() > 1000)
     screenshot("overlay 9 half the tolerance")
-    space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = True
     space.show_gizmo = space.overlay.show_object_origins = space.overlay.show_cursor = True
 
 
