@@ -16,7 +16,8 @@ ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const gl
   }
   const Call call(options.progress);
   PullBack pull_back(volume, space, faces, corners, before.size(), options.threads);
-  PullBack::Start start = pull_back.start(before, {options.outside, options.two_sided}, options.progress);
+  PullBack::Start start =
+      pull_back.start(before, {options.outside, options.two_sided, options.crossings}, options.progress);
   ConstrainResult result;
   result.outside = FaceCount::of(start.outside);
   result.uncovered = start.uncovered;
@@ -35,7 +36,7 @@ ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const gl
   const PullBack::Result ends = pull_back.move(moving, from, to, options.mode, options.progress);
   result.vertices.assign(after.begin(), after.end());
   result.factors.assign(before.size(), 1);
-  result.held_back = ends.held_back;
+  result.held_back = ends.held_back, result.kept_from_crossing = ends.kept_from_crossing;
   for (std::size_t i = 0; i < moving.vertices.size(); ++i) {
     result.vertices[moving.vertices[i]] = ends.reached[i];
     result.factors[moving.vertices[i]] = ends.factors[i];

@@ -20,17 +20,19 @@ struct ConstrainOptions {
   PullBack::Mode mode = PullBack::Mode::pull_back;
   bool two_sided = true;             ///< Also keeps the whole reference within the tolerance of the mesh.
   Outside outside = Outside::error;  ///< What happens to a mesh that is not within the tolerance in `before`.
-  unsigned threads = 0;              ///< 0 is one for each core. It never changes the result.
+  PullBack::Crossings crossings = PullBack::Crossings::keep_out;
+  unsigned threads = 0;  ///< 0 is one for each core. It never changes the result.
   Progress* progress = nullptr;
 };
 
 struct ConstrainResult {
-  std::vector<glm::dvec3> vertices;  ///< In stored coordinates.
-  std::vector<double> factors;       ///< The share, 0 to 1, of each vertex's motion from `before` to `after`.
-  std::size_t held_back = 0;         ///< The number of factors below 1.
-  FaceCount outside;                 ///< Faces of `before` that are not within the tolerance and are kept as they are.
-  FaceCount uncovered;               ///< Faces of the reference that are not within the tolerance of `before`.
-  std::string method, renderer;      ///< The check that decided.
+  std::vector<glm::dvec3> vertices;    ///< In stored coordinates.
+  std::vector<double> factors;         ///< The share, 0 to 1, of each vertex's motion from `before` to `after`.
+  std::size_t held_back = 0;           ///< The number of factors below 1.
+  std::size_t kept_from_crossing = 0;  ///< The number of these vertices that went back so that no faces cross.
+  FaceCount outside;             ///< Faces of `before` that are not within the tolerance and are kept as they are.
+  FaceCount uncovered;           ///< Faces of the reference that are not within the tolerance of `before`.
+  std::string method, renderer;  ///< The check that decided.
   std::vector<std::string> warnings;
 };
 
@@ -38,9 +40,11 @@ struct ConstrainResult {
 /// and `before` where f is 0. Every face of the result is inside as it is stored, corners with different factors
 /// included. `faces` has `corners` (1 to 4) indices for each face, as in Pieces.
 ///
-/// A vertex that touches no face that failed has factor 1. One-sided, with Mode::pull_back, no single factor can rise
-/// by 1/64 alone (or to 1, where that is less), and none is below that of Mode::reset, whose factors are 0 and 1.
-/// Two-sided, vertices go back farther where the reference would lose its witness, by at least 1/16 of their way.
+/// A vertex that touches no face that failed has factor 1. One-sided, with Mode::pull_back, and where crossings are
+/// allowed, no single factor can rise by 1/64 alone (or to 1, where that is less), and none is below that of
+/// Mode::reset, whose factors are 0 and 1. Two-sided, vertices go back farther where the reference would lose its
+/// witness, by at least 1/16 of their way, and so they do where faces would cross that do not cross in `before`, or
+/// would become degenerate.
 ///
 /// Throws InvalidInput for bad arrays, naming the first offender, for a mesh that is not within the tolerance in
 /// `before` (unless Outside::keep) and where the stored type cannot hold the tolerance; Cancelled. Starting costs what

@@ -15,6 +15,7 @@
 #include "check/input_checks.h"
 #include "motion/constrain.h"
 #include "motion/moving_coverage.h"
+#include "motion/moving_crossings.h"
 #include "motion/moving_mesh.h"
 
 namespace tolvol {
@@ -106,10 +107,14 @@ class Deformation {
     }
     if (options_.outside == Outside::keep) keep_outside();
     std::vector<std::uint32_t> failing = leaving(after_);
+    if (!failing.empty()) {
+      result_.leaving = FaceCount::of(failing);
+    } else if (failing = crossing(after_); !failing.empty()) {
+      result_.crossing = FaceCount::of(failing);
+    }
     if (failing.empty()) {
       result_.vertices = after_;
     } else {
-      result_.leaving = FaceCount::of(failing);
       options_.mode == Mode::pull_back ? pull_back() : search(std::move(failing));
     }
     for (std::size_t i = 0; i < after_.size(); ++i) result_.held_back += result_.vertices[i] != after_[i];
@@ -145,7 +150,7 @@ class Deformation {
     const std::vector<std::uint32_t> outside = outside_;
     const FaceCount uncovered = coverage_->uncovered();
     start(after_);
-    if (is_whole()) {
+    if (is_whole() && crossing(after_).empty()) {
       result_.vertices = after_;
       return;
     }
@@ -180,9 +185,10 @@ class Deformation {
     result_.permitted_fraction = std::nullopt;
     ConstrainOptions options;
     options.outside = options_.outside, options.two_sided = options_.two_sided;
+    options.crossings = options_.crossings;
     options.threads = options_.threads, options.progress = options_.progress;
-    result_.vertices =
-        constrain(before_, after_, faces_, static_cast<int>(corners_), space_, *volume_, options).vertices;
+    ConstrainResult held = constrain(before_, after_, faces_, static_cast<int>(corners_), space_, *volume_, options);
+    result_.vertices = std::move(held.vertices), result_.kept_from_crossing = held.kept_from_crossing;
   }
 
   void search(std::vector<std::uint32_t> failing) {
@@ -201,6 +207,7 @@ class Deformation {
       std::vector<std::uint32_t> still = not_inside(state, only(failing));
       if (still.empty()) {
         still = leaving(state);
+        if (still.empty()) still = crossing(state);
       } else {
         for (std::uint32_t& i : still) i = failing[i];
       }
@@ -268,6 +275,20 @@ class Deformation {
     return coverage_->failing(mesh_->faces_around(moving));
   }
 
+  /// Faces that would cross others anew or become degenerate.
+  std::vector<std::uint32_t> crossing(std::span<const glm::dvec3> stored) {
+    if (options_.crossings == PullBack::Crossings::allow || corners_ < 3) return {};
+    if (!crossings_) crossings_.emplace(faces_, static_cast<int>(corners_), before_, options_.threads);
+    std::vector<std::uint32_t> moving;
+    for (std::uint32_t v = 0; v < before_.size(); ++v) crossings_->try_at(v, stored[v]);
+    for (std::uint32_t f = 0; f < faces_.size() / corners_; ++f) {
+      if (std::ranges::any_of(corners_of(f), [&](std::uint32_t v) { return after_[v] != before_[v]; })) {
+        moving.push_back(f);
+      }
+    }
+    return crossings_->failing(moving, options_.progress);
+  }
+
   std::span<const glm::dvec3> before_;
   std::span<const std::uint32_t> faces_;
   std::size_t corners_;
@@ -278,7 +299,8 @@ class Deformation {
   std::optional<Certificate> certificate_;
   std::optional<MovingMesh> mesh_;  // These two are empty if only the forward direction is kept.
   std::optional<MovingCoverage> coverage_;
-  std::vector<std::uint32_t> outside_;  // The faces that were outside when mesh_ started.
+  std::optional<MovingCrossings> crossings_;  // Made when it is first asked.
+  std::vector<std::uint32_t> outside_;        // The faces that were outside when mesh_ started.
   std::vector<glm::dvec3> after_;
   std::vector<bool> kept_;  // For each face; empty if none is kept.
   DeformationResult result_;

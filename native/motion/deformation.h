@@ -13,6 +13,7 @@
 #include "check/outside.h"
 #include "check/tolerance_volume.h"
 #include "motion/lattice.h"
+#include "motion/pull_back.h"
 
 namespace tolvol {
 
@@ -27,25 +28,31 @@ struct DeformationOptions {
   Mode mode = Mode::blocked;
   bool two_sided = true;             ///< Also keeps the whole reference within the tolerance of the mesh.
   Outside outside = Outside::error;  ///< What happens to a mesh that is not within the tolerance to begin with.
-  unsigned threads = 0;              ///< 0 is one for each core. It never changes the result.
+  PullBack::Crossings crossings = PullBack::Crossings::keep_out;  ///< It matters only with a volume.
+  unsigned threads = 0;  ///< 0 is one for each core. It never changes the result.
   Progress* progress = nullptr;
 };
 
 struct DeformationResult {
   std::vector<glm::dvec3> vertices;  ///< In stored coordinates.
-  /// The share of the way, from 0 to 1, at which the whole mesh is certified to be inside; 1 without a volume. It is
+  /// The share of the way, from 0 to 1, at which the whole mesh is certified to be inside and no faces cross that must
+  /// not; 1 without a volume. It is
   /// not looked for when vertices are pulled back. Bisection finds it to a thousandth: a larger share may be inside as
   /// well, and smaller shares were not looked at.
   std::optional<double> permitted_fraction = 1;
   /// Faces that the deformation as wished would not leave certified to be inside or, if there are none, some that it
   /// would take from a part of the reference that has no other face within the tolerance.
   FaceCount leaving;
+  /// If there are none: faces that would cross others anew, or become degenerate, by the deformation as wished.
+  FaceCount crossing;
   FaceCount outside;    ///< Faces that are outside to begin with, which are kept as they are.
   FaceCount uncovered;  ///< Faces of the reference that are not within the tolerance of the mesh to begin with.
   std::size_t outside_lattice =
-      0;                         ///< The number of vertices not in the box of the lattice, which stay where they are.
-  std::size_t moved = 0;         ///< The number of vertices of the result that are not where they were.
-  std::size_t held_back = 0;     ///< The number of vertices that did not go all their way.
+      0;                      ///< The number of vertices not in the box of the lattice, which stay where they are.
+  std::size_t moved = 0;      ///< The number of vertices of the result that are not where they were.
+  std::size_t held_back = 0;  ///< The number of vertices that did not go all their way.
+  /// When vertices are pulled back: the number of these that went back so that no faces cross.
+  std::size_t kept_from_crossing = 0;
   double largest_motion = 0;     ///< The largest motion of a vertex, in world units.
   std::string method, renderer;  ///< The check that decided; empty without a volume.
   std::vector<std::string> warnings;
@@ -53,6 +60,7 @@ struct DeformationResult {
 
 /// `faces` has `corners` (1 to 4) indices for each face; without a volume it may be empty. Without a volume there is no
 /// tolerance. All faces of the result are inside, and two-sided the reference is covered, except for what is kept.
+/// Unless they are allowed to, no faces cross that do not cross to begin with.
 /// Throws InvalidInput for bad arrays, for a mesh that is not within the tolerance to begin with (unless Outside::keep,
 /// or the deformation brings it there), and where the stored type cannot hold the tolerance; Cancelled. It takes about
 /// 0.4 us a vertex, and with a volume the time of one check, two-sided also of PullBack::start(); where that check

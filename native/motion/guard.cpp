@@ -42,7 +42,7 @@ void Guard::begin(std::span<const float> positions, Progress* progress) {
   const Call call(progress);
   std::vector<glm::dvec3> stored(positions.size() / 3);
   for (std::size_t v = 0; v < stored.size(); ++v) stored[v] = at(positions, v);
-  start_ = pull_back_.start(stored, {options_.outside, options_.two_sided}, progress);
+  start_ = pull_back_.start(stored, {options_.outside, options_.two_sided, options_.crossings}, progress);
   last_.assign(positions.begin(), positions.end());
 }
 

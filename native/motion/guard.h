@@ -19,10 +19,11 @@ namespace tolvol {
 class Guard {
  public:
   struct Options {
-    Outside outside = Outside::error;  ///< See ConstrainOptions.
-    bool two_sided = true;             ///< See ConstrainOptions.
-    unsigned threads = 0;              ///< 0 is one for each core.
-    Progress* progress = nullptr;      ///< The progress of the construction alone.
+    Outside outside = Outside::error;                            ///< See ConstrainOptions.
+    bool two_sided = true;                                       ///< See ConstrainOptions.
+    PullBack::Crossings crossings = PullBack::Crossings::allow;  ///< Relative to the last start.
+    unsigned threads = 0;                                        ///< 0 is one for each core.
+    Progress* progress = nullptr;                                ///< The progress of the construction alone.
   };
 
   /// The vertices that constrain() moved back, ascending, and their new positions, three coordinates each.

@@ -89,6 +89,7 @@ class MovingMesh {
   const StoredSpace& space() const { return space_; }
   unsigned threads() const { return threads_; }
 
+  std::span<const std::uint32_t> faces() const { return faces_; }
   std::size_t vertex_count() const { return state_.size(); }
   std::size_t face_count() const { return faces_.size() / corners_; }
   int corners() const { return static_cast<int>(corners_); }

@@ -6,8 +6,10 @@
 // One after the other, they go forward again as far as the faces around them let them; vertices that share no face are
 // taken at the same time, a colour of them after the other, so that the result does not depend on threads.
 //
-// Two-sided there is a fourth step: while the reference would lose faces as witnesses, their vertices go back, by a
-// small share of the way first. In the state itself the reference loses nothing, so that this comes to an end.
+// There is a fourth step: while the reference would lose faces as witnesses, or faces would cross that did not at the
+// start, the vertices of these faces go back, by a small share of the way first. What goes back may uncover a part of
+// the reference that it covered, leave the volume as its neighbours go on, or meet another face, so that all is asked
+// again until all of it holds. In the state itself all of it does, so that this comes to an end.
 #include "motion/pull_back.h"
 
 #include <algorithm>
@@ -19,6 +21,7 @@
 #include "base/parallel.h"
 #include "check/input_checks.h"
 #include "motion/moving_coverage.h"
+#include "motion/moving_crossings.h"
 
 namespace tolvol {
 namespace {
@@ -29,9 +32,13 @@ constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 constexpr double kRise = 1.0 / 64;
 /// A factor shrinks to this share in each round in which a face of the vertex fails.
 constexpr double kShrink = 0.5;
-/// Where the reference would lose a witness, a factor shrinks by this share first, then by twice the share each time,
-/// and after half of it by kShrink.
+/// Where the reference would lose a witness or faces would cross, a factor shrinks by this share first, then by twice
+/// the share each time, and after half of it by kShrink.
 constexpr double kRetreat = 1.0 / 16;
+/// Where vertices went back for crossings so many times and faces still cross, they go all the way back, together with
+/// more and more rings of vertices around them: far from where they were, faces that stay in the way of others meet
+/// them one after the other.
+constexpr std::size_t kPatience = 64;
 /// The share of the provable distance at which vertices are put first, because parts of a quarter of the tolerance
 /// prove a face there.
 constexpr double kComfort = 0.97;
@@ -56,11 +63,15 @@ PullBack::~PullBack() = default;
 PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, const StartOptions& options, Progress* progress) {
   if (options.two_sided) require_area_to_cover(mesh_.corners());
   held_index_.assign(stored.size(), kNone);
-  coverage_.reset();
+  coverage_.reset(), crossings_.reset();
   MovingMesh::Start start = mesh_.start(stored, progress);
   if (!start.outside.empty() && options.outside == Outside::error) refuse_outside(FaceCount::of(start.outside));
   Start result{std::move(start.outside), {}, {}};
   if (start.warning) result.warnings.push_back(*start.warning);
+  if (options.crossings == Crossings::keep_out && mesh_.corners() >= 3) {
+    crossings_ = std::make_unique<MovingCrossings>(mesh_.faces(), mesh_.corners(), stored, mesh_.threads());
+    if (options.short_ways && mesh_.corners() == 3) crossings_->skip_short_ways(mesh_);
+  }
   if (!options.two_sided) return result;
   coverage_ = std::make_unique<MovingCoverage>(mesh_, progress);
   result.uncovered = coverage_->uncovered();
@@ -77,11 +88,13 @@ PullBack::Moving PullBack::moving(std::vector<std::uint32_t> vertices) {
 PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3> before,
                                 std::span<const glm::dvec3> after, Mode mode, Progress* progress) {
   if (coverage_) coverage_->tidy();
+  if (crossings_) crossings_->tidy();
   mesh_.try_all(moving.vertices, before, after);
   try {
     return finish({moving, before, after}, mode, progress);
   } catch (...) {
     for (const std::uint32_t v : moving.vertices) mesh_.take_back(v), held_index_[v] = kNone;
+    if (crossings_) crossings_->take_back(moving.vertices, moving.faces);
     throw;
   }
 }
@@ -90,7 +103,7 @@ PullBack::Result PullBack::move(const Moving& moving, std::span<const glm::dvec3
 PullBack::Result PullBack::finish(const Wish& wish, Mode mode, Progress* progress) {
   const auto& [moving, before, after] = wish;
   const std::vector<std::uint32_t>& vertices = moving.vertices;
-  Result result{std::vector<double>(vertices.size(), 1), {after.begin(), after.end()}, 0};
+  Result result{std::vector<double>(vertices.size(), 1), {after.begin(), after.end()}};
   if (mode == Mode::settle) mesh_.remember_refusals();
   std::vector<std::uint32_t> failed = mesh_.failing(moving.faces, progress);
   std::vector<Held> held;
@@ -101,12 +114,13 @@ PullBack::Result PullBack::finish(const Wish& wish, Mode mode, Progress* progres
       if (mode != Mode::halve) let_go(held, mode, progress);
     }
   }
-  if (coverage_) cover(held, wish, mode, progress);
+  back_off(held, wish, mode, progress);
   for (const Held& h : held) {
     const auto place = std::lower_bound(vertices.begin(), vertices.end(), h.vertex) - vertices.begin();
     result.factors[place] = h.factor;
     result.reached[place] = stored_at(h, h.factor);
     result.held_back += h.factor < 1;
+    result.kept_from_crossing += h.kept_from_crossing && h.factor < 1;
     held_index_[h.vertex] = kNone;
   }
   for (std::size_t i = 0; mesh_.any_frozen() && i < vertices.size(); ++i) {
@@ -116,6 +130,7 @@ PullBack::Result PullBack::finish(const Wish& wish, Mode mode, Progress* progres
   }
   if (coverage_) coverage_->accept(moving.faces);
   mesh_.accept(vertices, moving.faces);
+  if (crossings_) crossings_->accept(vertices);
   return result;
 }
 
@@ -348,15 +363,19 @@ void PullBack::raise(Held& held, Mode mode, bool search) {
   }
 }
 
-/// Does step (4). It ends, because a vertex is back in the state after some rounds in which a face of it fails. A
-/// vertex that no step before has held goes back from its wish.
-void PullBack::cover(std::vector<Held>& held, const Wish& wish, Mode mode, Progress* progress) {
-  std::vector<std::uint32_t> changed, lost;
+/// Does step (4). It ends: a face that fails has a corner away from the state, or crosses a face that has one, because
+/// nothing fails in the state. All of these corners go back, and a vertex is back in the state after some rounds in
+/// which a face of it fails. A vertex that no step before has held goes back from its wish.
+void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Progress* progress) {
+  if (crossings_) start_crossings(held, wish);
+  // Crossings are looked for among the faces whose corners have moved since they were last.
+  std::vector<std::uint32_t> changed, lost, untested = wish.moving.faces, since;
   bool is_renewed = false;
+  std::size_t rounds = 0;
   for (;;) {
     // A face may fail because some of its corners went back and others did not.
     std::vector<std::uint32_t> failed = mesh_.failing(mesh_.faces_around(changed), progress);
-    if (failed.empty()) {
+    if (failed.empty() && coverage_) {
       if (!lost.empty()) lost = coverage_->still_failing(lost);
       if (lost.empty()) lost = coverage_->failing(wish.moving.faces);
       if (!lost.empty() && !is_renewed && coverage_->is_worn()) {
@@ -366,23 +385,67 @@ void PullBack::cover(std::vector<Held>& held, const Wish& wish, Mode mode, Progr
       }
       failed = lost;
     }
+    const bool cross = failed.empty() && crossings_;
+    if (cross) {
+      if (rounds > 0) untested = mesh_.faces_around(since);
+      failed = crossings_->failing(untested, progress);
+      since.clear();
+      ++rounds;
+    }
     if (failed.empty()) return;
     changed.clear();
     for (const std::uint32_t f : failed) {
       for (const std::uint32_t v : mesh_.corners_of(f)) {
-        if (mesh_.step(v) == 0) continue;
-        if (held_index_[v] == kNone) hold(v, wish, held).factor = 1;
-        changed.push_back(v);
+        if (is_away(v)) changed.push_back(v);
       }
     }
-    if (changed.empty()) throw std::logic_error("the reference would lose a face that does not move");
+    if (changed.empty()) throw std::logic_error("faces that do not move would break the promise");
+    const bool is_hasty = cross && rounds > kPatience;
+    if (is_hasty) widen(changed, std::size_t{1} << std::min<std::size_t>(rounds - kPatience, 30));
     std::sort(changed.begin(), changed.end());
     changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
-    for (const std::uint32_t v : changed) retreat(held[held_index_[v]], mode);
+    for (const std::uint32_t v : changed) {
+      if (held_index_[v] == kNone) hold(v, wish, held).factor = 1;
+      Held& h = held[held_index_[v]];
+      h.kept_from_crossing = h.kept_from_crossing || cross;
+      retreat(h, is_hasty ? Mode::reset : mode, cross ? kRise : little(h));
+    }
+    if (crossings_) since.insert(since.end(), changed.begin(), changed.end());
   }
 }
 
-void PullBack::retreat(Held& held, Mode mode) {
+void PullBack::start_crossings(const std::vector<Held>& held, const Wish& wish) {
+  const std::vector<std::uint32_t>& vertices = wish.moving.vertices;
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const std::uint32_t v = vertices[i], h = held_index_[v];
+    if (mesh_.frozen(v)) continue;
+    crossings_->try_at(v, h == kNone ? wish.after[i] : stored_at(held[h], held[h].factor));
+  }
+}
+
+/// Whether the vertex is elsewhere on trial than in the state.
+bool PullBack::is_away(std::uint32_t vertex) const {
+  return mesh_.step(vertex) != 0 || (crossings_ && crossings_->moves(vertex));
+}
+
+/// Adds the vertices in so many rings around these that are away from the state.
+void PullBack::widen(std::vector<std::uint32_t>& vertices, std::size_t rings) {
+  for (std::size_t before = 0; rings > 0 && vertices.size() > before; --rings) {
+    before = vertices.size();
+    const std::vector<std::uint32_t> faces = mesh_.faces_around(vertices);
+    vertices.clear();
+    for (const std::uint32_t f : faces) {
+      for (const std::uint32_t v : mesh_.corners_of(f)) {
+        if (is_away(v)) vertices.push_back(v);
+      }
+    }
+    std::sort(vertices.begin(), vertices.end());
+    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  }
+}
+
+/// Sends a vertex back by the next share of its way, or all the way where less than `least` would be left.
+void PullBack::retreat(Held& held, Mode mode, double least) {
   if (held.retreat == 0) held.factor_before = held.factor;
   if (mode == Mode::reset) {
     held.factor = 0;
@@ -392,8 +455,9 @@ void PullBack::retreat(Held& held, Mode mode) {
   } else {
     held.factor *= kShrink;
   }
-  if (held.factor < little(held)) held.factor = 0;
+  if (held.factor < least) held.factor = 0;
   held.factor > 0 ? place(held, {held.factor, {}}) : mesh_.take_back(held.vertex);
+  if (crossings_) crossings_->try_at(held.vertex, stored_at(held, held.factor));
 }
 
 }  // namespace tolvol

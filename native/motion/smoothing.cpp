@@ -154,7 +154,8 @@ class Smoothing {
   void start_pull_back() {
     for (const glm::uvec3& t : triangles_) faces_.insert(faces_.end(), {t.x, t.y, t.z});
     pull_back_ = std::make_unique<PullBack>(*volume_, space_, faces_, 3, positions_.size(), options_.threads);
-    PullBack::Start start = pull_back_->start(positions_, {options_.outside, options_.two_sided}, options_.progress);
+    PullBack::Start start = pull_back_->start(
+        positions_, {options_.outside, options_.two_sided, options_.crossings, true}, options_.progress);
     result_.outside = FaceCount::of(start.outside);
     result_.uncovered = start.uncovered;
     result_.warnings = std::move(start.warnings);
@@ -239,14 +240,14 @@ class Smoothing {
       before_[i] = positions_[v];
       after_[i] = space_.storage() == Storage::float32 ? rounded_to_float32(to) : to;
     });
-    std::size_t held_back = 0;
+    std::size_t held_back = 0, kept_from_crossing = 0;
     if (pull_back_) {
       PullBack::Result ends = pull_back_->move(
           moving_, before_, after_, options_.reset ? PullBack::Mode::reset : PullBack::Mode::halve, options_.progress);
       after_.swap(ends.reached);
-      held_back = ends.held_back;
+      held_back = ends.held_back, kept_from_crossing = ends.kept_from_crossing;
     }
-    result_.held_back.push_back(held_back);
+    result_.held_back.push_back(held_back), result_.kept_from_crossing.push_back(kept_from_crossing);
     each(moving.size(), [&](std::uint32_t i) { positions_[moving[i]] = after_[i]; });
   }
 

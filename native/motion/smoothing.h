@@ -31,16 +31,19 @@ struct SmoothingOptions {
       false;  ///< a vertex that would leave the tolerance stays for this iteration, instead of being pulled back
   bool two_sided = true;             ///< Also keeps the whole reference within the tolerance of the mesh.
   Outside outside = Outside::error;  ///< What happens to a mesh that is not within the tolerance.
-  unsigned threads = 0;              ///< 0 is one for each core. It never changes the result.
+  PullBack::Crossings crossings = PullBack::Crossings::keep_out;  ///< It matters only with a volume.
+  unsigned threads = 0;  ///< 0 is one for each core. It never changes the result.
   Progress* progress = nullptr;
 };
 
 struct SmoothingResult {
   std::vector<glm::dvec3> vertices;    ///< In stored coordinates.
   std::vector<std::size_t> held_back;  ///< For each iteration: the number of vertices that did not go all the way.
-  double largest_motion = 0;           ///< In world units, from the input to the result.
-  std::size_t welded = 0;              ///< The number of vertices treated as one with an earlier one at the same place.
-  std::size_t fixed_boundary = 0;      ///< The number of vertices that stay because they are on the boundary.
+  std::vector<std::size_t>
+      kept_from_crossing;          ///< For each iteration: the number of these that went back so that no faces cross.
+  double largest_motion = 0;       ///< In world units, from the input to the result.
+  std::size_t welded = 0;          ///< The number of vertices treated as one with an earlier one at the same place.
+  std::size_t fixed_boundary = 0;  ///< The number of vertices that stay because they are on the boundary.
   std::size_t fixed_non_manifold = 0;  ///< The number that stay because an edge there has more than two faces.
   FaceCount outside;                   ///< Input faces that are not within the tolerance and are kept as they are.
   FaceCount uncovered;                 ///< Faces of the reference that are not within the tolerance of the input.

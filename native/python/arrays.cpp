@@ -141,6 +141,12 @@ Outside to_outside(const std::string& outside) {
   throw InvalidInput("outside must be \"error\" or \"keep\", not \"" + outside + "\"");
 }
 
+PullBack::Crossings to_crossings(const std::string& crossings) {
+  if (crossings == "keep_out") return PullBack::Crossings::keep_out;
+  if (crossings == "allow") return PullBack::Crossings::allow;
+  throw InvalidInput("crossings must be \"keep_out\" or \"allow\", not \"" + crossings + "\"");
+}
+
 py::dict from_outside(const FaceCount& outside, const FaceCount& uncovered) {
   py::dict entry;
   entry["faces"] = outside.faces;

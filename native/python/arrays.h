@@ -16,6 +16,7 @@
 #include "check/outside.h"
 #include "geometry/frame.h"
 #include "geometry/triangle_mesh.h"
+#include "motion/pull_back.h"
 
 namespace tolvol::python {
 
@@ -50,6 +51,7 @@ py::array_t<T, py::array::c_style> to_values(const py::object& array, const char
 }
 
 Outside to_outside(const std::string& outside);
+PullBack::Crossings to_crossings(const std::string& crossings);
 
 /// The entry "outside" of a report.
 py::dict from_outside(const FaceCount& outside, const FaceCount& uncovered);

@@ -29,7 +29,8 @@ PullBack::Mode to_mode(const std::string& mode) {
 
 Constrained constrain_arrays(const py::object& before, const py::object& after, const py::object& faces,
                              const Volume& volume, const py::object& to_world, const std::string& mode, bool two_sided,
-                             const std::string& outside, std::optional<int> threads, Progress* progress) {
+                             const std::string& outside, const std::string& crossings, std::optional<int> threads,
+                             Progress* progress) {
   const Vertices from = to_vertices(before, "before"), to = to_vertices(after, "after");
   if (from.storage != to.storage) throw InvalidInput("before and after must have the same type");
   int corners = 3;
@@ -39,6 +40,7 @@ Constrained constrain_arrays(const py::object& before, const py::object& after, 
   options.mode = to_mode(mode);
   options.two_sided = two_sided;
   options.outside = to_outside(outside);
+  options.crossings = to_crossings(crossings);
   options.threads = to_threads(threads);
   options.progress = progress;
   ConstrainResult r;
@@ -48,6 +50,7 @@ Constrained constrain_arrays(const py::object& before, const py::object& after, 
   }
   Constrained result{from_vertices(r.vertices, from.storage), from_vector<double>(r.factors), {}};
   result.report["held_back"] = r.held_back;
+  result.report["kept_from_crossing"] = r.kept_from_crossing;
   result.report["outside"] = from_outside(r.outside, r.uncovered);
   result.report["method"] = r.method;
   result.report["renderer"] = r.renderer;
@@ -79,12 +82,12 @@ struct LockedGuard {
 
 std::unique_ptr<LockedGuard> make_guard(const py::object& positions, const py::object& faces, const Volume& volume,
                                         const py::object& to_world, bool two_sided, const std::string& outside,
-                                        std::optional<int> threads, Progress* progress) {
+                                        const std::string& crossings, std::optional<int> threads, Progress* progress) {
   const Positions p = to_positions(positions);
   int corners = 3;
   std::vector<std::uint32_t> indices = to_faces(faces, "faces", corners);
   const glm::dmat4 matrix = to_matrix(to_world);
-  const Guard::Options options{to_outside(outside), two_sided, to_threads(threads), progress};
+  const Guard::Options options{to_outside(outside), two_sided, to_crossings(crossings), to_threads(threads), progress};
   const Interruptible call(progress);
   return std::unique_ptr<LockedGuard>(
       new LockedGuard{{values(p), std::move(indices), corners, matrix, volume.native, options}, {}});
@@ -121,14 +124,15 @@ void bind_constrain(py::module_& module) {
       .def_readonly("report", &Constrained::report, R"doc(A dict with these entries:
 
 held_back : the number of vertices that did not go all the way
+kept_from_crossing : the number of these that went back so that no faces cross
 outside : a dict of `faces`, the number of faces that were outside before and were kept, `first`, the first of them, and
     `reference_faces`, the number of reference faces that were beyond the tolerance of the mesh before
 method, renderer : which check was used, and what computed it
 warnings : a list of sentences)doc");
   module.def("constrain", &constrain_arrays, py::arg("before"), py::arg("after"), py::arg("faces"), py::arg("volume"),
              py::kw_only(), py::arg("to_world") = py::none(), py::arg("mode") = "pull_back",
-             py::arg("two_sided") = true, py::arg("outside") = "error", py::arg("threads") = py::none(),
-             py::arg("progress") = py::none(),
+             py::arg("two_sided") = true, py::arg("outside") = "error", py::arg("crossings") = "keep_out",
+             py::arg("threads") = py::none(), py::arg("progress") = py::none(),
              R"doc(Move the vertices of a mesh as far as the tolerance permits.
 
 Vertex v ends at before + f (after - before), rounded to the stored type, where f is its factor. All faces of the result
@@ -145,13 +149,19 @@ faces : (m, k) integer array
 volume : ToleranceVolume
 mode : {"pull_back", "reset"}
     "pull_back" goes so far that no single factor can rise by 1/64 alone. Two-sided, it lowers factors by at least 1/16
-    of themselves where the reference would lose its last face within the tolerance. With "reset" each factor is 0 or 1.
+    of themselves where the reference would lose its last face within the tolerance, and so it does where faces would
+    cross. With "reset" each factor is 0 or 1.
 two_sided : bool
     False keeps the distance from the mesh to the reference alone: parts of the reference may be farther from the mesh.
     It must be False for points and segments.
 outside : {"error", "keep"}
     What happens if the mesh is beyond the tolerance before the motion: an error, or the vertices of faces that are
     outside and of those nearest to uncovered faces of the reference stay where they are.
+crossings : {"keep_out", "allow"}
+    "keep_out" also holds vertices back where faces would come to cross. Two faces cross where they meet anywhere but in
+    the corners and edges that they share, decided exactly for the stored coordinates; they may cross only if they cross
+    in `before`. No face becomes degenerate, either. Of quads this holds in every triangulation. Vertices go back by at
+    least 1/16 of their way then.
 to_world, threads, progress
     See help(tolvol).
 
@@ -171,8 +181,9 @@ Notes
 Cost: about 1 us a vertex and 2 us a face of the reference to certify the mesh before the motion. Each vertex that is
 held back costs 2 to 20 us if its neighbours move like it over a smooth reference. It costs 100 to 400 us if the
 reference is rough, if each vertex is pushed in a direction of its own by several tolerances, or if it is at the
-tolerance already, as in a loop that pushes on. Among large triangles that run through each other a search looks at a
-share of them all: with 3,000 random ones a vertex that is held back costs 1.2 ms.
+tolerance already, as in a loop that pushes on. Keeping crossings out costs 1 us for each triangle that moves, and 5 us
+for each quad. Among large triangles that run through each other a search looks at a share of them all: with 3,000
+random ones a vertex that is held back costs 1.2 ms.
 
 "reset" is from M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.)doc");
 
@@ -183,7 +194,8 @@ An edit costs a comparison of all positions with the last ones and what it touch
 vertices, and for each vertex that is held back as much as in constrain.)doc")
       .def(py::init(&make_guard), py::arg("positions"), py::arg("faces"), py::arg("volume"), py::kw_only(),
            py::arg("to_world") = py::none(), py::arg("two_sided") = true, py::arg("outside") = "error",
-           py::arg("threads") = py::none(), py::arg("progress") = py::none(), py::keep_alive<1, 4>(),
+           py::arg("crossings") = "allow", py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+           py::keep_alive<1, 4>(),
            R"doc(Start from these positions.
 
 Parameters
@@ -192,6 +204,8 @@ positions : (n, 3) float32 array
     Local coordinates.
 faces, volume, two_sided, outside
     As for constrain.
+crossings : {"allow", "keep_out"}
+    As for constrain. Faces may cross only if they crossed at the start.
 to_world, threads, progress
     See help(tolvol). The progress is that of this call alone.
 

@@ -114,10 +114,12 @@ py::dict make_report(const DeformationResult& r, double seconds) {
   py::dict report;
   report["permitted_fraction"] = r.permitted_fraction;
   report["leaving"] = counted(r.leaving);
+  report["crossing"] = counted(r.crossing);
   report["outside"] = from_outside(r.outside, r.uncovered);
   report["outside_lattice"] = r.outside_lattice;
   report["moved"] = r.moved;
   report["held_back"] = r.held_back;
+  report["kept_from_crossing"] = r.kept_from_crossing;
   report["largest_motion"] = r.largest_motion;
   report["method"] = r.method;
   report["renderer"] = r.renderer;
@@ -128,7 +130,8 @@ py::dict make_report(const DeformationResult& r, double seconds) {
 
 Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, const py::object& faces,
                      const Volume* volume, const py::object& to_world, const std::string& mode, bool two_sided,
-                     const std::string& outside, std::optional<int> threads, Progress* progress) {
+                     const std::string& outside, const std::string& crossings, std::optional<int> threads,
+                     Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   int corners = 3;
   std::vector<std::uint32_t> indices;
@@ -139,6 +142,7 @@ Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, c
   options.mode = to_mode(mode);
   options.two_sided = two_sided;
   options.outside = to_outside(outside);
+  options.crossings = to_crossings(crossings);
   options.threads = to_threads(threads);
   options.progress = progress;
   DeformationResult r;
@@ -216,16 +220,19 @@ InvalidInput)doc");
       .def_readonly("vertices", &Result::vertices, "(n, 3) array of the input's dtype: local coordinates.")
       .def_readonly("report", &Result::report, R"doc(A dict with these entries:
 
-permitted_fraction : from 0 to 1, the share of the way at which the whole mesh is certified to be inside, found by
-    bisection to a thousandth; 1 without a volume; None if vertices were pulled back instead
+permitted_fraction : from 0 to 1, the share of the way at which the whole mesh is certified to be inside, and no faces
+    cross that must not, found by bisection to a thousandth; 1 without a volume; None if vertices were pulled back
+    instead
 leaving : a dict of `faces`, the number of faces that the deformation as wished would not leave certified inside, and
     `first`, the first of them. If there are none, some that it would take from a part of the reference that has no
     other face within the tolerance
+crossing : a dict alike. If no faces are leaving: those that would cross others or become degenerate, and did not before
 outside : a dict of `faces`, the number of faces that were outside before and were kept, `first`, the first of them, and
     `reference_faces`, the number of reference faces that were beyond the tolerance of the mesh before
 outside_lattice : the number of vertices that are not in the box
 moved : the number of vertices of the result that are not where they were
 held_back : the number of vertices of the result that are not where they were to go
+kept_from_crossing : the number of these that went back so that no faces cross, if vertices were pulled back
 largest_motion : the longest way of a vertex, in world units
 method, renderer : which check was used, and what computed it
 seconds : the time that the call took
@@ -234,7 +241,7 @@ warnings : a list of sentences)doc");
   module.def("deform", &deform_arrays, py::arg("vertices"), py::arg("lattice"), py::arg("faces") = py::none(),
              py::arg("volume").none(true) = py::none(), py::kw_only(), py::arg("to_world") = py::none(),
              py::arg("mode") = "blocked", py::arg("two_sided") = true, py::arg("outside") = "error",
-             py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+             py::arg("crossings") = "keep_out", py::arg("threads") = py::none(), py::arg("progress") = py::none(),
              R"doc(Deform the space in the box of a lattice, and with it a mesh, within the tolerance of a volume.
 
 Vertices outside of the box stay where they are.
@@ -250,12 +257,14 @@ faces : (m, k) integer array, optional
 volume : ToleranceVolume, optional
     The result has to stay in it.
 mode : {"blocked", "farthest", "pull_back"}
-    What happens to a deformation that is not certified inside as a whole. "blocked" moves nothing, and the report says
+    What happens to a deformation that is not certified inside as a whole, or by which faces would cross. "blocked" moves nothing, and the report says
     how far the deformation may go. "farthest" moves every vertex that permitted share of its way. "pull_back" moves each
     vertex as far as it may go, as constrain does.
 two_sided, outside
     As for constrain. A mesh that is beyond the tolerance before the deformation is no error if it is within it
     afterwards.
+crossings : {"keep_out", "allow"}
+    As for constrain. Without a volume nothing is held back.
 to_world, threads, progress
     See help(tolvol).
 

@@ -30,7 +30,7 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
                        const py::object& to_world, std::int64_t iterations, const std::string& kind,
                        const std::string& weights, const std::string& boundary, const py::object& locked,
                        const py::object& strength, const std::string& mode, bool two_sided, const std::string& outside,
-                       std::optional<int> threads, Progress* progress) {
+                       const std::string& crossings, std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const StoredSpace space(to_matrix(to_world), v.storage);
@@ -49,6 +49,7 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
   options.reset = is_second(mode, "mode", "pull_back", "reset");
   options.two_sided = two_sided;
   options.outside = to_outside(outside);
+  options.crossings = to_crossings(crossings);
   py::array_t<bool, py::array::c_style> locked_values;
   if (!locked.is_none()) {
     locked_values = to_values<bool>(locked, "locked must be a bool array, one value for each vertex");
@@ -75,6 +76,7 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
   fixed["boundary"] = r.fixed_boundary;
   fixed["non-manifold"] = r.fixed_non_manifold;
   result.report["held_back"] = r.held_back;
+  result.report["kept_from_crossing"] = r.kept_from_crossing;
   result.report["largest_motion"] = r.largest_motion;
   result.report["welded"] = r.welded;
   result.report["fixed"] = fixed;
@@ -94,6 +96,7 @@ void bind_smoothing(py::module_& module) {
       .def_readonly("report", &Smoothed::report, R"doc(A dict with these entries:
 
 held_back : for each iteration the number of vertices that did not go all the way
+kept_from_crossing : for each iteration the number of these that went back so that no faces cross
 largest_motion : the longest way of a vertex from the input to the result, in world units
 welded : the number of vertices that were treated as one with an earlier vertex at the same place
 fixed : a dict of `boundary` and `non-manifold`, the number of vertices that stay for that cause
@@ -106,8 +109,8 @@ seconds : the time that the call took)doc");
              py::kw_only(), py::arg("to_world") = py::none(), py::arg("iterations") = 10,
              py::arg("operator") = "bilaplacian", py::arg("weights") = "cotangent", py::arg("boundary") = "fixed",
              py::arg("locked") = py::none(), py::arg("strength") = py::none(), py::arg("mode") = "pull_back",
-             py::arg("two_sided") = true, py::arg("outside") = "error", py::arg("threads") = py::none(),
-             py::arg("progress") = py::none(),
+             py::arg("two_sided") = true, py::arg("outside") = "error", py::arg("crossings") = "keep_out",
+             py::arg("threads") = py::none(), py::arg("progress") = py::none(),
              R"doc(Smooth a mesh within the tolerance of a volume.
 
 Every iteration ends with all faces inside and the whole reference within the tolerance of them. Vertices at an edge
@@ -119,7 +122,7 @@ vertices : (n, 3) float32 or float64 array
     Local coordinates.
 triangles : (m, 3) integer array
 volume : ToleranceVolume, optional
-    None smooths without a bound.
+    None smooths without a bound, and holds nothing back.
 iterations : int
     0 or more.
 operator : {"bilaplacian", "laplacian"}
@@ -140,6 +143,9 @@ two_sided : bool
 outside : {"error", "keep"}
     What happens if the input is beyond the tolerance: an error, or faces that are outside and those nearest to
     uncovered faces of the reference stay as they are.
+crossings : {"keep_out", "allow"}
+    "keep_out" also holds vertices back where faces would come to cross that do not cross in the input, as constrain
+    does. Without a volume nothing is held back.
 to_world, threads, progress
     See help(tolvol).
 

@@ -7,6 +7,9 @@
 namespace tolvol {
 namespace {
 
+/// Above this share of a tree's faces, all boxes are fitted anew instead of those above each face.
+constexpr std::size_t kMany = 8;
+
 bool same(const Box& a, const Box& b) { return a.lower == b.lower && a.upper == b.upper; }
 
 }  // namespace
@@ -71,9 +74,35 @@ Box FaceTree::fitted(std::size_t node) const {
   return box;
 }
 
+std::size_t FaceTree::slot_of(std::uint32_t face) const {
+  if (faces_.back() == faces_.size() - 1) return place_[face];  // The tree has every number.
+  return place_[std::lower_bound(faces_.begin(), faces_.end(), face) - faces_.begin()];
+}
+
+void FaceTree::change(std::span<const std::uint32_t> faces, std::span<const Box> boxes) {
+  if (faces.empty()) return;
+  if (faces.size() * kMany < faces_.size()) {
+    for (std::size_t i = 0; i < faces.size(); ++i) change(faces[i], boxes[i]);
+    return;
+  }
+  for (std::size_t i = 0; i < faces.size(); ++i) slots_[slot_of(faces[i])].box = boxes[i];
+  for (std::size_t leaf = 0; leaf < leaves_; ++leaf) fit_leaf(leaf);
+  for (std::size_t node = leaves_ - 1; node-- > 0;) nodes_[node] = fitted(node);
+}
+
+double FaceTree::extent() const {
+  double sum = 0;
+  for (std::size_t leaf = 0; leaf < leaves_; ++leaf) {
+    const Box& box = nodes_[leaves_ - 1 + leaf];
+    if (box.empty()) continue;
+    const glm::dvec3 size = box.upper - box.lower;
+    sum += size.x + size.y + size.z;
+  }
+  return sum;
+}
+
 void FaceTree::change(std::uint32_t face, const Box& box) {
-  const auto index = static_cast<std::size_t>(std::lower_bound(faces_.begin(), faces_.end(), face) - faces_.begin());
-  const std::size_t slot = place_[index], leaf = slot / kLeaf;
+  const std::size_t slot = slot_of(face), leaf = slot / kLeaf;
   slots_[slot].box = box;
   fit_leaf(leaf);
   for (std::size_t node = leaves_ - 1 + leaf; node > 0;) {

@@ -24,6 +24,13 @@ class FaceTree {
 
   /// Gives a face of the constructor's another box; an empty one removes the face. O(log n).
   void change(std::uint32_t face, const Box& box);
+  /// Gives many of these faces other boxes. O(log n) a face, or about 10 ns for each face of the tree where that is
+  /// less.
+  void change(std::span<const std::uint32_t> faces, std::span<const Box> boxes);
+
+  /// The sum of the sizes of the leaves' boxes along the axes: the larger it has become since the tree was built, the
+  /// more a search has to look at.
+  double extent() const;
 
   /// Calls visit(face) for every face whose box meets `box`, and for no other. A visit that returns false ends the
   /// search.
@@ -37,6 +44,7 @@ class FaceTree {
     std::uint32_t face = 0;
   };
 
+  std::size_t slot_of(std::uint32_t face) const;
   void fit_leaf(std::size_t leaf);
   Box fitted(std::size_t node) const;
 

@@ -272,7 +272,7 @@ TEST(Allocation, Deformation) {
 TEST(Allocation, AGuardKeepsItsState) {
   const Scene scene;
   const std::vector<float> start = scene.flat(scene.mesh.vertices), wish = scene.flat(scene.wish);
-  const Guard::Options options{Outside::error, false, 1, nullptr};
+  const Guard::Options options{Outside::error, false, PullBack::Crossings::keep_out, 1, nullptr};
   const auto made = [&] { return Guard(start, scene.faces, 3, glm::dmat4(1), scene.volume, options).vertex_count(); };
   EXPECT_GT(fail_allocations([&] { return Numbers{double(made())}; }), 10);
 

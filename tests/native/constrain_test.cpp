@@ -151,8 +151,10 @@ TEST(Constrain, EveryFaceIsInsideOnEveryMesh) {
     SCOPED_TRACE(testing::Message() << "scene " << number++);
     const Points wish = scene.wish(noise(0.6));
     for (const bool two_sided : {false, true}) {
-      const ConstrainResult pulled = run(scene, wish, {.two_sided = two_sided});
-      const ConstrainResult reset = run(scene, wish, {.mode = Mode::reset, .two_sided = two_sided});
+      using Crossings = PullBack::Crossings;
+      const ConstrainResult pulled = run(scene, wish, {.two_sided = two_sided, .crossings = Crossings::allow});
+      const ConstrainResult reset =
+          run(scene, wish, {.mode = Mode::reset, .two_sided = two_sided, .crossings = Crossings::allow});
       expect_inside(scene, pulled, two_sided);
       expect_inside(scene, reset, two_sided);
       expect_on_the_way(scene, wish, pulled);
@@ -205,7 +207,7 @@ TEST(Constrain, NoFactorCanRiseAlone) {
   for (const double deviation : {0.5, 3.0}) {
     const Scene scene{shapes::torus(40)};
     const Points wish = scene.wish(noise(deviation));
-    const ConstrainResult r = run(scene, wish, {.two_sided = false});
+    const ConstrainResult r = run(scene, wish, {.two_sided = false, .crossings = PullBack::Crossings::allow});
     const auto ring = rings(scene);
     // Nearer to its end than the headroom that is kept no vertex has to go.
     const auto volume = scene.volume(1 - 2e-4);

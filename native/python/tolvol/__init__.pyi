@@ -13,6 +13,7 @@ _Three = tuple[float, float, float]
 _Vector = Sequence[float] | NDArray[np.floating[Any]]
 _Range = tuple[float, float]
 _Outside = Literal["error", "keep"]
+_Crossings = Literal["keep_out", "allow"]
 _Transfer = Literal["signed", "magnitude"]
 
 __version__: str
@@ -154,6 +155,7 @@ def constrain(
     mode: Literal["pull_back", "reset"] = "pull_back",
     two_sided: bool = True,
     outside: _Outside = "error",
+    crossings: _Crossings = "keep_out",
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> ConstrainResult: ...
@@ -168,6 +170,7 @@ class Guard:
         to_world: ArrayLike | None = None,
         two_sided: bool = True,
         outside: _Outside = "error",
+        crossings: _Crossings = "allow",
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> None: ...
@@ -205,6 +208,7 @@ def smooth(
     mode: Literal["pull_back", "reset"] = "pull_back",
     two_sided: bool = True,
     outside: _Outside = "error",
+    crossings: _Crossings = "keep_out",
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> SmoothingResult: ...
@@ -241,7 +245,7 @@ def decimate(
     outside: _Outside = "error",
     wedges: _Integers | None = None,
     effort: Literal["fast", "thorough"] = "fast",
-    crossings: Literal["keep_out", "allow"] = "keep_out",
+    crossings: _Crossings = "keep_out",
     max_normal_angle: float | None = None,
     max_seconds: float | None = None,
     threads: int | None = None,
@@ -308,6 +312,7 @@ def deform(
     mode: Literal["blocked", "farthest", "pull_back"] = "blocked",
     two_sided: bool = True,
     outside: _Outside = "error",
+    crossings: _Crossings = "keep_out",
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> DeformationResult: ...

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Only pairs of which one face moves can begin to cross. Nearly all of these are told apart by a box or by
+// surely_uncrossed(), and the exact predicates decide about the rest.
+#include "motion/moving_crossings.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "base/call.h"
+#include "base/parallel.h"
+#include "topology/faces_apart.h"
+
+namespace tolvol {
+namespace {
+
+/// The number of faces that a thread takes at a time, for work of about 1 us each.
+constexpr std::size_t kBlock = 64;
+/// A face is looked at no further once it crosses so many others anew: all of them have to go back anyway.
+constexpr std::size_t kEnough = 16;
+/// The tree is built anew when its boxes have become so many times as large.
+constexpr double kWorn = 2;
+
+}  // namespace
+
+MovingCrossings::MovingCrossings(std::span<const std::uint32_t> faces, int corners, std::span<const glm::dvec3> stored,
+                                 unsigned threads)
+    : faces_(faces),
+      corners_(static_cast<std::size_t>(corners)),
+      threads_(threads),
+      start_(stored.begin(), stored.end()),
+      state_(start_),
+      trial_(start_) {
+  if (corners_ < 3) return;
+  asked_.assign(face_count(), 0);
+  build();
+}
+
+void MovingCrossings::build() {
+  std::vector<std::uint32_t> all(face_count());
+  std::iota(all.begin(), all.end(), 0u);
+  std::vector<Box> boxes(all.size());
+  for (const std::uint32_t f : all) poll_at(f), boxes[f] = box(f);
+  Team team(thread_count(threads_));
+  tree_ = FaceTree(all, boxes, team);
+  extent_ = tree_.extent();
+  refitted_ = 0;
+}
+
+void MovingCrossings::skip_short_ways(MovingMesh& mesh) {
+  clearance_.emplace(mesh, state_);
+  fitted_.assign(face_count(), false);
+  extent_ = 0;
+}
+
+void MovingCrossings::tidy() {
+  const bool worn = refitted_ > face_count() && tree_.extent() > kWorn * extent_;
+  if (refitted_ > face_count()) refitted_ = 0;
+  if (worn) build();
+  if (!clearance_) return;
+  if (worn) fitted_.assign(face_count(), true);
+  std::vector<std::uint32_t> gone;
+  for (std::uint32_t v = 0; v < state_.size(); ++v) {
+    if (!clearance_->has(v, state_[v])) gone.push_back(v);
+  }
+  for (std::uint32_t f = 0; f < face_count(); ++f) {
+    if (fitted_[f]) tree_.change(f, clearance_->box(f));
+  }
+  fitted_.assign(face_count(), false);
+  clearance_->renew(gone, state_, tree_);
+  if (worn || extent_ == 0) extent_ = tree_.extent();
+}
+
+std::span<const PieceTriangle> MovingCrossings::shapes(std::uint32_t face) const {
+  const std::span<const PieceTriangle> all = triangles_of(static_cast<int>(corners_));
+  if (corners_ == 3) return all;
+  // A quad that repeats a corner is a triangle.
+  const auto c = corners_of(face);
+  const auto repeats = [&](const PieceTriangle& t) {
+    return c[t[0]] == c[t[1]] || c[t[1]] == c[t[2]] || c[t[2]] == c[t[0]];
+  };
+  if (std::ranges::none_of(all, repeats)) return all;
+  const auto whole = std::ranges::find_if_not(all, repeats);
+  return all.subspan(whole == all.end() ? 0 : static_cast<std::size_t>(whole - all.begin()), 1);
+}
+
+Corners MovingCrossings::corners(const Positions& positions, std::uint32_t face, const PieceTriangle& shape) const {
+  const auto c = corners_of(face);
+  return {positions[c[shape[0]]], positions[c[shape[1]]], positions[c[shape[2]]]};
+}
+
+Box MovingCrossings::box(std::uint32_t face) const {
+  Box box;
+  for (const std::uint32_t v : corners_of(face)) box.add(trial_[v]);
+  return box;
+}
+
+/// Whether the face may cross others anew.
+bool MovingCrossings::is_due(std::uint32_t face) const {
+  return std::ranges::any_of(corners_of(face),
+                             [&](std::uint32_t v) { return clearance_ ? !clearance_->has(v, trial_[v]) : moves(v); });
+}
+
+bool MovingCrossings::triangles_cross_anew(std::uint32_t a, const PieceTriangle& shape_a, std::uint32_t b,
+                                           const PieceTriangle& shape_b) const {
+  const Corners one = corners(trial_, a, shape_a), other = corners(trial_, b, shape_b);
+  return !surely_uncrossed(one, other) && faces_cross(one, other) &&
+         !faces_cross(corners(start_, a, shape_a), corners(start_, b, shape_b));
+}
+
+/// Whether the face becomes degenerate, or a triangulation of it folds onto itself, and it was not so at the start.
+bool MovingCrossings::spoils_itself(std::uint32_t face) const {
+  const std::span<const PieceTriangle> all = shapes(face);
+  for (const PieceTriangle& shape : all) {
+    if (is_degenerate(corners(trial_, face, shape)) && !is_degenerate(corners(start_, face, shape))) return true;
+  }
+  // The two triangles of a triangulation stand beside each other.
+  for (std::size_t first = 0; first + 1 < all.size(); first += 2) {
+    if (triangles_cross_anew(face, all[first], face, all[first + 1])) return true;
+  }
+  return false;
+}
+
+bool MovingCrossings::cross_anew(std::uint32_t a, std::uint32_t b) const {
+  if (corners_ == 3) {
+    const PieceTriangle& whole = triangles_of(3).front();
+    return triangles_cross_anew(a, whole, b, whole);
+  }
+  const std::span<const PieceTriangle> of_a = shapes(a), of_b = shapes(b);
+  return std::ranges::any_of(of_a, [&](const PieceTriangle& shape_a) {
+    return std::ranges::any_of(of_b, [&](const PieceTriangle& shape_b) {
+      return meet(box_of(corners(trial_, a, shape_a)), box_of(corners(trial_, b, shape_b))) &&
+             triangles_cross_anew(a, shape_a, b, shape_b);
+    });
+  });
+}
+
+/// Adds to `failed` a face that moves and the faces that it crosses anew. A pair of which both were asked about comes
+/// from the one with the lower number alone.
+void MovingCrossings::test(std::uint32_t face, std::vector<std::uint32_t>& failed) const {
+  if (spoils_itself(face)) failed.push_back(face);
+  std::size_t found = 0, looked_at = 0;
+  tree_.for_each_meeting(box(face), [&](std::uint32_t other) {
+    if (++looked_at % 64 == 0) poll();
+    if (other == face || (other < face && asked_[other] == now_) || !cross_anew(face, other)) return true;
+    if (found == 0) failed.push_back(face);
+    failed.push_back(other);
+    return ++found < kEnough;
+  });
+}
+
+std::vector<std::uint32_t> MovingCrossings::failing(std::span<const std::uint32_t> faces, Progress* progress) {
+  if (corners_ < 3) return {};
+  ++now_;
+  boxes_.clear();
+  std::vector<std::uint32_t> moving, refitted;
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    poll_at(i);
+    const std::uint32_t f = faces[i];
+    const bool due = is_due(f);
+    if (due) moving.push_back(f), asked_[f] = now_;
+    if (clearance_ && !due && !fitted_[f]) continue;
+    if (clearance_) fitted_[f] = true;
+    refitted.push_back(f), boxes_.push_back(box(f));
+  }
+  tree_.change(refitted, boxes_);
+  refitted_ += refitted.size();
+  std::vector<std::vector<std::uint32_t>> failed((moving.size() + kBlock - 1) / kBlock);
+  parallel_for(moving.size(), kBlock, threads_, [&](std::size_t begin, std::size_t end) {
+    if (progress) progress->update(progress->fraction());
+    for (std::size_t i = begin; i < end; ++i) test(moving[i], failed[begin / kBlock]);
+  });
+  std::vector<std::uint32_t> result;
+  for (const std::vector<std::uint32_t>& part : failed) result.insert(result.end(), part.begin(), part.end());
+  std::sort(result.begin(), result.end());
+  result.erase(std::unique(result.begin(), result.end()), result.end());
+  return result;
+}
+
+void MovingCrossings::accept(std::span<const std::uint32_t> vertices) {
+  for (const std::uint32_t v : vertices) state_[v] = trial_[v];
+}
+
+void MovingCrossings::take_back(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces) {
+  for (const std::uint32_t v : vertices) trial_[v] = state_[v];
+  if (corners_ < 3) return;
+  for (const std::uint32_t f : faces) {
+    if (!clearance_ || fitted_[f]) tree_.change(f, box(f));
+  }
+}
+
+}  // namespace tolvol

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// The promise that a moving mesh gets no new crossings: two faces may cross (topology/faces_cross.h) only where they
+/// crossed at the start, and no face becomes degenerate that was not degenerate then.
+///
+/// Faces keep their numbers while they move, so that the pairs that cross are always among those of the start. A quad
+/// is two triangles in either of its triangulations, and the promise holds in all of them: of the triangles of two
+/// quads, no pair crosses anew, and neither do the two of one triangulation of a quad. Points and segments never cross.
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/progress.h"
+#include "check/tolerance_check.h"
+#include "motion/clearance.h"
+#include "topology/face_tree.h"
+#include "topology/faces_cross.h"
+
+namespace tolvol {
+
+/// It holds the start, a state that has no new crossings, and beside it a trial, which equals the state at first.
+/// Positions are as they are stored.
+class MovingCrossings {
+ public:
+  /// Takes the stored positions as the start. `faces` has `corners` (1 to 4) indices for each face, as in Pieces; keeps
+  /// a reference to them. About 0.2 us a face.
+  MovingCrossings(std::span<const std::uint32_t> faces, int corners, std::span<const glm::dvec3> stored,
+                  unsigned threads);
+
+  /// From now on looks only at faces that have come so far that they could cross others, for those who move all
+  /// vertices by little again and again. Costs 1.5 us a face once, and as much for faces that have come so far. `mesh`
+  /// has the same faces, which must be triangles; keeps a reference to it.
+  void skip_short_ways(MovingMesh& mesh);
+
+  void try_at(std::uint32_t vertex, const glm::dvec3& stored) { trial_[vertex] = stored; }
+  /// Whether the vertex is elsewhere on trial than in the state.
+  bool moves(std::uint32_t vertex) const { return trial_[vertex] != state_[vertex]; }
+
+  /// Returns faces of new crossings and new degenerate faces on trial, ascending; none if there are none. A face that
+  /// crosses very many is not returned with all of them. Every face must be asked about after the last change to a
+  /// corner. Throws Cancelled; take_back() has to follow then. About 1 us a face that moves, for a quad 5 us.
+  std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Progress* progress);
+  /// Makes the trial of these vertices the state, for which failing() found no face last.
+  void accept(std::span<const std::uint32_t> vertices);
+  /// Makes the state the trial of these vertices. `faces` are all faces around them. It never throws.
+  void take_back(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces);
+  /// Prepares the next trial, which equals the state. Throws Cancelled.
+  void tidy();
+
+ private:
+  using Positions = std::vector<glm::dvec3>;
+  /// The triangles of a face that are looked at.
+  std::span<const PieceTriangle> shapes(std::uint32_t face) const;
+  Corners corners(const Positions& positions, std::uint32_t face, const PieceTriangle& shape) const;
+  Box box(std::uint32_t face) const;
+  bool is_due(std::uint32_t face) const;
+  bool spoils_itself(std::uint32_t face) const;
+  bool cross_anew(std::uint32_t a, std::uint32_t b) const;
+  bool triangles_cross_anew(std::uint32_t a, const PieceTriangle& shape_a, std::uint32_t b,
+                            const PieceTriangle& shape_b) const;
+  void test(std::uint32_t face, std::vector<std::uint32_t>& failed) const;
+  void build();
+
+  std::size_t face_count() const { return faces_.size() / corners_; }
+  std::span<const std::uint32_t> corners_of(std::uint32_t face) const {
+    return faces_.subspan(std::size_t{face} * corners_, corners_);
+  }
+
+  std::span<const std::uint32_t> faces_;
+  std::size_t corners_;
+  unsigned threads_;
+  Positions start_, state_, trial_;
+  FaceTree tree_;                     // of the faces as they are on trial, or wherever they have clearance
+  double extent_ = 0;                 // FaceTree::extent() when the tree was built
+  std::size_t refitted_ = 0;          // The number of boxes that changed since extent() was looked at.
+  std::vector<Box> boxes_;            // scratch
+  std::vector<std::uint32_t> asked_;  // For each face: in which call failing() looked at it last.
+  std::uint32_t now_ = 0;             // The number of these calls.
+  std::optional<Clearance> clearance_;
+  std::vector<bool> fitted_;  // With it, for each face: whether its box in the tree is that of the trial.
+};
+
+}  // namespace tolvol

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Two triangles are apart if along some direction all corners of one come before all corners of the other. Any
+// direction proves it, however it was found, so that rounding matters in the products with the corners alone.
+#include "topology/faces_apart.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace tolvol {
+namespace {
+
+using glm::dvec3;
+
+/// Products of directions and differences of coordinates, and sums of three of them, have at most this error relative
+/// to the sum of their parts; it is several times what the operations can round.
+constexpr double kRounding = 16 * 0x1p-53;
+/// What products that are too small for double precision lose.
+constexpr double kSmallest = 1e-300;
+
+double largest(const dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
+
+double sum(const dvec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
+
+/// The corners of two triangles, from a corner of the first, and the largest coordinate.
+struct Pair {
+  dvec3 a[3], b[3];
+  double size = 0;
+};
+
+Pair pair_of(const Corners& a, const Corners& b) {
+  Pair pair;
+  for (int k = 0; k < 3; ++k) {
+    pair.a[k] = a[k] - a[0], pair.b[k] = b[k] - a[0];
+    pair.size = std::max({pair.size, largest(pair.a[k]), largest(pair.b[k])});
+  }
+  return pair;
+}
+
+/// By how much one comes before the other along `u`, times its length; not positive where they overlap.
+double gap_along(const dvec3& u, const Pair& pair) {
+  const double a0 = glm::dot(u, pair.a[0]), a1 = glm::dot(u, pair.a[1]), a2 = glm::dot(u, pair.a[2]);
+  const double b0 = glm::dot(u, pair.b[0]), b1 = glm::dot(u, pair.b[1]), b2 = glm::dot(u, pair.b[2]);
+  const double b_after_a = std::min({b0, b1, b2}) - std::max({a0, a1, a2});
+  const double a_after_b = std::min({a0, a1, a2}) - std::max({b0, b1, b2});
+  return std::max(b_after_a, a_after_b) - (4 * kRounding * sum(u) * pair.size + kSmallest);
+}
+
+/// Calls visit(direction) for the directions along which they may be apart, until it returns true.
+template <class Visit>
+void for_each_direction(const Pair& pair, Visit&& visit) {
+  const auto& [a, b, size] = pair;
+  if (visit(b[0] + b[1] + b[2] - (a[0] + a[1] + a[2]))) return;
+  const dvec3 normal_a = glm::cross(a[1] - a[0], a[2] - a[0]), normal_b = glm::cross(b[1] - b[0], b[2] - b[0]);
+  if (visit(normal_a) || visit(normal_b)) return;
+  for (int k = 0; k < 3; ++k) {
+    const int next = k == 2 ? 0 : k + 1;
+    if (visit(glm::cross(normal_a, a[next] - a[k])) || visit(glm::cross(normal_b, b[next] - b[k]))) return;
+  }
+}
+
+/// The side of the plane through 0, u and v that p is on, as 1 or -1; 0 if rounding leaves a doubt.
+int side(const dvec3& u, const dvec3& v, const dvec3& p) {
+  const dvec3 normal = glm::cross(u, v);
+  const dvec3 most(std::abs(u.y * v.z) + std::abs(u.z * v.y), std::abs(u.z * v.x) + std::abs(u.x * v.z),
+                   std::abs(u.x * v.y) + std::abs(u.y * v.x));
+  const double volume = glm::dot(normal, p), error = kRounding * glm::dot(most, glm::abs(p)) + kSmallest;
+  return volume > error ? 1 : volume < -error ? -1 : 0;
+}
+
+/// For triangles with the corner 0 in common, and their other corners.
+bool apart_beyond_corner(const dvec3& a1, const dvec3& a2, const dvec3& b1, const dvec3& b2) {
+  if (const int s = side(a1, a2, b1); s != 0 && side(a1, a2, b2) == s) return true;
+  if (const int s = side(b1, b2, a1); s != 0 && side(b1, b2, a2) == s) return true;
+  const dvec3 u = glm::normalize(b1) + glm::normalize(b2) - glm::normalize(a1) - glm::normalize(a2);
+  const double error = kRounding * sum(u) * std::max({largest(a1), largest(a2), largest(b1), largest(b2)}) + kSmallest;
+  return glm::dot(u, a1) < -error && glm::dot(u, a2) < -error && glm::dot(u, b1) > error && glm::dot(u, b2) > error;
+}
+
+}  // namespace
+
+double gap(const Corners& a, const Corners& b, double enough) {
+  const Pair pair = pair_of(a, b);
+  double largest_gap = 0;
+  for_each_direction(pair, [&](const dvec3& u) {
+    const double along = gap_along(u, pair);
+    if (along > 0) largest_gap = std::max(largest_gap, along / glm::length(u) * (1 - kRounding));
+    return largest_gap >= enough;
+  });
+  return largest_gap;
+}
+
+bool surely_uncrossed(const Corners& a, const Corners& b) {
+  int count = 0;
+  std::array<std::pair<int, int>, 3> shared;
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      if (a[i] != b[k]) continue;
+      shared[count++] = {i, k};
+      break;
+    }
+  }
+  const auto [i, k] = shared[0];
+  switch (count) {
+    case 0: {
+      const Pair pair = pair_of(a, b);
+      bool apart = false;
+      for_each_direction(pair, [&](const dvec3& u) { return apart = gap_along(u, pair) > 0; });
+      return apart;
+    }
+    case 1: {
+      const dvec3& corner = a[i];
+      return apart_beyond_corner(a[(i + 1) % 3] - corner, a[(i + 2) % 3] - corner, b[(k + 1) % 3] - corner,
+                                 b[(k + 2) % 3] - corner);
+    }
+    case 2: {
+      const auto [j, l] = shared[1];
+      const dvec3& corner = a[i];
+      if (k == l) return false;  // two corners of the first triangle are one point
+      return side(a[j] - corner, a[3 - i - j] - corner, b[3 - k - l] - corner) != 0;
+    }
+    default:
+      return false;
+  }
+}
+
+}  // namespace tolvol

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Judged by exact predicates (topology/faces_cross.h), and by distances of points of both triangles.
+#include "topology/faces_apart.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "shapes.h"
+
+namespace {
+
+using namespace tolvol;
+using glm::dvec3;
+
+constexpr double kFar = std::numeric_limits<double>::infinity();
+const Corners kFlat{dvec3(0, 0, 0), dvec3(4, 0, 0), dvec3(0, 4, 0)};
+
+Corners random_corners(shapes::Random& random) { return {random.point(), random.point(), random.point()}; }
+
+dvec3 random_point(const Corners& t, shapes::Random& random) {
+  double u = random.share(), v = random.share();
+  if (u + v > 1) u = 1 - u, v = 1 - v;
+  return t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0]);
+}
+
+}  // namespace
+
+TEST(FacesApart, TheGapOfParallelTrianglesIsTheirDistance) {
+  const Corners above{dvec3(0, 0, 0.5), dvec3(4, 0, 0.5), dvec3(0, 4, 0.5)};
+  EXPECT_NEAR(gap(kFlat, above, kFar), 0.5, 1e-12);
+  EXPECT_LE(gap(kFlat, above, kFar), 0.5);
+  const Corners beside{dvec3(-1, 0, 0), dvec3(-2, 3, 0), dvec3(-1, 3, 0)};
+  EXPECT_NEAR(gap(kFlat, beside, kFar), 1, 1e-12);
+  EXPECT_EQ(gap(kFlat, {dvec3(1, 1, -1), dvec3(1, 1, 1), dvec3(9, 9, 0)}, kFar), 0);
+}
+
+TEST(FacesApart, TheGapIsNeverLargerThanTheDistanceOfTwoPoints) {
+  shapes::Random random(3);
+  std::size_t found = 0;
+  for (int i = 0; i < 2'000; ++i) {
+    const Corners a = random_corners(random);
+    Corners b = random_corners(random);
+    for (dvec3& corner : b) corner += 2.0 * dvec3(random.share(), random.share(), random.share());
+    const double apart = gap(a, b, kFar), enough = gap(a, b, 0.1);
+    EXPECT_EQ(apart >= 0.1, enough >= 0.1);
+    EXPECT_LE(enough, apart);
+    if (apart == 0) continue;
+    ++found;
+    EXPECT_FALSE(faces_cross(a, b));
+    for (int k = 0; k < 50; ++k) {
+      ASSERT_LE(apart, glm::length(random_point(a, random) - random_point(b, random)) * (1 + 1e-12));
+    }
+  }
+  EXPECT_GT(found, 500u);
+}
+
+TEST(FacesApart, WhatIsSaidToBeUncrossedIsUncrossed) {
+  // Corners on a small grid share places, lie on each other's edges and in each other's planes.
+  shapes::Random random(5);
+  std::size_t sure[4] = {}, all[4] = {};
+  for (int i = 0; i < 100'000; ++i) {
+    const auto corner = [&] { return dvec3(random.below(4), random.below(4), random.below(2)) * 0.1; };
+    Corners a{corner(), corner(), corner()}, b{corner(), corner(), corner()};
+    int shared = 0;
+    for (const dvec3& p : a) shared += std::ranges::find(b, p) != b.end();
+    const bool cross = faces_cross(a, b), uncrossed = surely_uncrossed(a, b);
+    ASSERT_FALSE(cross && uncrossed);
+    ASSERT_EQ(uncrossed, surely_uncrossed(a, b));
+    if (is_degenerate(a) || is_degenerate(b) || cross) continue;
+    ++all[shared], sure[shared] += uncrossed;
+  }
+  for (int shared = 0; shared < 3; ++shared) {
+    EXPECT_GT(all[shared], 1'000u) << shared;
+    EXPECT_GT(sure[shared], all[shared] / 3) << shared;
+  }
+}
+
+TEST(FacesApart, NothingIsSureWhereRoundingDecides) {
+  // The corner is a part in 10^17 above the plane, or below it.
+  for (const double height : {1e-17, -1e-17, 0.0}) {
+    const Corners touching{dvec3(1, 1, height), dvec3(1, 2, 3), dvec3(2, 1, 3)};
+    EXPECT_FALSE(surely_uncrossed(
+        {dvec3(0.1, 0.2, 0.3) + kFlat[0], dvec3(0.1, 0.2, 0.3) + kFlat[1], dvec3(0.1, 0.2, 0.3) + kFlat[2]},
+        {dvec3(0.1, 0.2, 0.3) + touching[0], dvec3(0.1, 0.2, 0.3) + touching[1], dvec3(0.1, 0.2, 0.3) + touching[2]}));
+  }
+  const double huge = 1e200;
+  EXPECT_FALSE(surely_uncrossed({dvec3(0), dvec3(huge, 0, 0), dvec3(0, huge, 0)},
+                                {dvec3(0, 0, 1), dvec3(huge, 0, 1), dvec3(0, huge, 1)}))
+      << "products overflow";
+}
+
+TEST(FacesApart, NeighboursOnAFlatSurfaceAreToldApartWithoutExactArithmetic) {
+  const TriangleMesh mesh = shapes::sphere(12);
+  std::size_t pairs = 0, sure = 0;
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    for (std::uint32_t k = 0; k < i; ++k) {
+      const MeshView view{mesh.triangles, mesh.vertices};
+      if (!meet(box_of(view.corners(i)), box_of(view.corners(k)))) continue;
+      ++pairs, sure += surely_uncrossed(view.corners(i), view.corners(k));
+    }
+  }
+  EXPECT_GT(sure, pairs * 95 / 100);
+}
