@@ -41,8 +41,8 @@ def blocked(ob):
 
 
 def situation(ob):
-    """Returns a value that identifies mesh, placement, tolerance, directions and reference. When it changes, a new watch is
-    needed."""
+    """Returns a value that identifies mesh, placement, tolerance, directions, crossings and reference. When it changes, a
+    new watch is needed."""
     settings, key = ob.tolvol, ob.active_shape_key
     return (
         ob.as_pointer(),
@@ -51,6 +51,7 @@ def situation(ob):
         mesh_io.matrix_array(ob.matrix_world).tobytes(),
         tolerances.tolerance_length(settings, settings.snapshot_size),
         settings.keep,
+        settings.guard.crossings,
         (settings.snapshot.as_pointer(), settings.snapshot_fingerprint),
     )
 
@@ -166,11 +167,15 @@ class Watch(Preparing):
         both = ob.tolvol.keep == "BOTH"
         # A larger polygon stands for triangles that are not all there, so that they cannot be witnesses.
         two_sided = both and faces.largest <= 4
+        keeps_out = ob.tolvol.guard.crossings
+        # Its triangles cross each other as well.
+        crossings = "keep_out" if keeps_out and faces.largest <= 4 else "allow"
 
         def work(progress):
             built = volumes.native_volume(reference, tolerance, threads, progress)
             options = {"to_world": matrix, "threads": threads, "progress": progress}
-            guard = native.module.Guard(positions, faces.faces, built, two_sided=two_sided, outside="keep", **options)
+            keep = {"two_sided": two_sided, "outside": "keep", "crossings": crossings}
+            guard = native.module.Guard(positions, faces.faces, built, **keep, **options)
             # A concave face may be inside in its present triangulation and outside in another one. The guard keeps the
             # corners of such a face where they are.
             kept = len(np.unique(faces.polygons[guard.outside]))
@@ -178,8 +183,11 @@ class Watch(Preparing):
                 remark = f"{kept:,} concave faces stay where they are"
             elif guard.uncovered:
                 remark = f"{guard.uncovered:,} faces of the reference are beyond the tolerance: what is nearest stays"
-            elif both and not two_sided:
-                remark = f"One way only: a face has {faces.largest} corners. Triangulate Faces helps"
+            elif (both or keeps_out) and faces.largest > 4:
+                lost = "One way only" if both else ""
+                if keeps_out:
+                    lost = f"{lost}, and crossings allowed" if both else "Crossings allowed"
+                remark = f"{lost}: a face has {faces.largest} corners. Triangulate Faces helps"
             else:
                 remark = None
             return guard, kept and faces.outside(built, positions, options), remark

@@ -63,6 +63,7 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
                 to_world=motion.surface.matrix,
                 mode=mode,
                 two_sided=motion.two_sided,
+                crossings=motion.crossings,
                 threads=motion.threads,
                 progress=progress,
             )
@@ -74,16 +75,18 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
     def finish(self, context, outcome):
         motion, result, certified = outcome
         ob, run = self.ob, result.report
-        if self.mode == "BLOCKED" and run["leaving"]["faces"]:
+        stopped = run["leaving"]["faces"] or run["crossing"]["faces"]
+        if self.mode == "BLOCKED" and stopped:
+            would = "leave the tolerance" if run["leaving"]["faces"] else "cross others"
             raise Refused(
-                f"Blocked: {run['leaving']['faces']:,} faces of {ob.name} would leave the tolerance. "
+                f"Blocked: {stopped:,} faces of {ob.name} would {would}. "
                 f"{100 * run['permitted_fraction']:.1f} % of the way is permitted: choose As Far as Permitted, "
                 "or choose Pull Back to hold back only the vertices of these faces"
             )
         if not run["moved"]:
             why = (
-                "the tolerance permits no movement"
-                if run["leaving"]["faces"]
+                "the tolerance permits no movement, or faces would cross"
+                if stopped
                 else "the lattice is at rest, or the mesh is outside it"
             )
             raise Refused(f"{self.lattice} does not move {ob.name}: {why}")
@@ -138,9 +141,11 @@ def _twice(ob):
 def _remarks(result):
     run = result.report
     remarks = [f"{run['moved']:,} of {len(result.vertices):,} vertices moved"]
-    if run["leaving"]["faces"]:
+    if run["leaving"]["faces"] or run["crossing"]["faces"]:
         if run["permitted_fraction"] is None:
             remarks.append(f"{run['held_back']:,} held back")
+            if run["kept_from_crossing"]:
+                remarks.append(f"{run['kept_from_crossing']:,} of them so that no faces cross")
         else:
             remarks.append(f"{100 * run['permitted_fraction']:.1f} % of the way")
     if run["outside_lattice"]:

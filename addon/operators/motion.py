@@ -24,6 +24,7 @@ class Motion:
         self.size = self.reference.size()
         self.tolerance = tolerances.tolerance_length(ob.tolvol, self.size)
         self.two_sided = ob.tolvol.keep == "BOTH"
+        self.crossings = ob.tolvol.crossings.lower()
         self.faces = mesh_io.whole_quads(ob.data, self.surface.arrays)
         self.threads = threads
         self._mesh = ob.data
@@ -37,9 +38,9 @@ class Motion:
         return volumes.native_volume(self.reference, self.tolerance, self.threads, progress)
 
     def hold(self, wished, progress):
-        """Moves every vertex towards `wished` as far as the tolerance permits. Returns (n, 3).
+        """Moves every vertex towards `wished` as far as the tolerance and the crossings permit. Returns (n, 3).
 
-        Quads keep the tolerance in both triangulations.
+        Quads keep the tolerance in both triangulations, and crossings out of both.
         """
         triangles = self.surface.arrays.triangles
         held = self._constrain(wished, triangles, "error", progress)
@@ -56,6 +57,7 @@ class Motion:
             to_world=self.surface.matrix,
             two_sided=self.two_sided,
             outside=outside,
+            crossings=self.crossings,
             threads=self.threads,
             progress=progress,
         ).vertices

@@ -135,6 +135,7 @@ class _Task:
             motion.volume(progress),
             to_world=motion.surface.matrix,
             two_sided=motion.two_sided,
+            crossings=motion.crossings,
             threads=motion.threads,
             progress=progress,
             **self._options,

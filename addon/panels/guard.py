@@ -24,6 +24,10 @@ class TOLVOL_PT_guard(SubPanel, bpy.types.Panel):
         states = {setting: state for setting, *state in guard.states(ob)}
         for setting in guard.ROOMS:
             layout.prop(settings, setting)
+            if setting == "editing":
+                row = layout.row()
+                row.active = settings.sculpting or settings.editing
+                row.prop(settings, "crossings")
             if setting in states:
                 text, on = states[setting]
                 icon = GREEN if on else GREY if on is None else AMBER

@@ -18,13 +18,13 @@ constexpr double kFar = std::numeric_limits<double>::infinity();
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 /// Rooms are smaller than what is proved by this share, which is far more than the rounding of a distance.
 constexpr double kInside = 1 - 1e-9;
-/// The share of what the fans leave that a vertex gets at most. Larger rooms last longer, and more faces are near them.
-constexpr double kShare = 0.5;
 /// A bound on the relative rounding of a sum of two products of differences.
 constexpr double kRounding = 8 * 0x1p-53;
 /// What products that are too small for double precision lose.
 constexpr double kSmallest = 1e-300;
 constexpr std::size_t kBlock = 64;
+/// A vertex that leaves its room at once would do so again: it gets none for so many calls.
+constexpr std::uint8_t kRest = 8;
 /// A vertex with more faces than this gets no room, because its fan is looked at pair by pair.
 constexpr std::size_t kMostFaces = 32;
 
@@ -42,7 +42,9 @@ Clearance::Clearance(MovingMesh& mesh, std::span<const glm::dvec3> stored)
       room_(stored.size(), kNone),
       reach_(stored.size(), 0),
       face_room_(mesh.face_count()),
-      renewed_(mesh.face_count(), 0) {
+      renewed_(mesh.face_count(), 0),
+      since_(stored.size(), 0),
+      rest_(stored.size(), 0) {
   for (std::atomic<double>& room : face_room_) room.store(kFar, std::memory_order_relaxed);
 }
 
@@ -141,6 +143,7 @@ void Clearance::limit_by_gaps(std::span<const std::uint32_t> faces, const FaceTr
   parallel_for(faces.size(), kBlock, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t face = faces[i];
+      if (rests(face)) continue;
       const auto own = mesh_.corners_of(face);
       const Corners triangle = corners(face);
       const double own_reach = reach(face);
@@ -152,6 +155,7 @@ void Clearance::limit_by_gaps(std::span<const std::uint32_t> faces, const FaceTr
         for (const std::uint32_t v : own) {
           if (v == c[0] || v == c[1] || v == c[2]) return;
         }
+        if (rests(other)) return;
         const double both = (own_reach + reach(other)) / kInside;
         const double found = gap(triangle, corners(other), both);
         if (found >= both) return;
@@ -162,9 +166,30 @@ void Clearance::limit_by_gaps(std::span<const std::uint32_t> faces, const FaceTr
   });
 }
 
-void Clearance::renew(std::span<const std::uint32_t> vertices, std::span<const glm::dvec3> stored, FaceTree& tree) {
-  if (vertices.empty()) return;
-  for (const std::uint32_t v : vertices) anchor_[v] = stored[v], room_[v] = kNone, reach_[v] = kFar;
+bool Clearance::rests(std::uint32_t face) const {
+  const auto c = mesh_.corners_of(face);
+  return rest_[c[0]] > 0 || rest_[c[1]] > 0 || rest_[c[2]] > 0;
+}
+
+/// The vertices that get another room. Those that rest get an anchor alone.
+std::vector<std::uint32_t> Clearance::gone(std::span<const glm::dvec3> stored) {
+  std::vector<std::uint32_t> gone;
+  for (std::uint32_t v = 0; v < stored.size(); ++v) {
+    poll_at(v);
+    if (has(v, stored[v])) continue;
+    const bool is_hasty = now_ > 0 && rest_[v] == 0 && since_[v] == now_;
+    if (is_hasty) rest_[v] = kRest;
+    if (rest_[v] > 0) --rest_[v];
+    anchor_[v] = stored[v], room_[v] = kNone, reach_[v] = 0;
+    if (rest_[v] == 0) gone.push_back(v);
+  }
+  return gone;
+}
+
+void Clearance::renew(std::span<const glm::dvec3> stored, FaceTree& tree) {
+  const std::vector<std::uint32_t> vertices = gone(stored);
+  ++now_;
+  for (const std::uint32_t v : vertices) reach_[v] = kFar, since_[v] = now_;
   const std::vector<std::uint32_t> faces = mesh_.faces_around(vertices);
   std::vector<std::uint32_t> around;
   for (const std::uint32_t f : faces) {
@@ -174,11 +199,9 @@ void Clearance::renew(std::span<const std::uint32_t> vertices, std::span<const g
   std::sort(around.begin(), around.end());
   around.erase(std::unique(around.begin(), around.end()), around.end());
   limit_by_fans(around);
-  for (const std::uint32_t v : vertices) reach_[v] *= kShare;
   for (const std::uint32_t f : mesh_.faces_around(around)) {
     for (const std::uint32_t v : mesh_.corners_of(f)) room_[v] = std::min(room_[v], reach_[v]);
   }
-  ++now_;
   std::vector<Box> boxes;
   boxes.reserve(faces.size());
   for (const std::uint32_t f : faces) renewed_[f] = now_, boxes.push_back(box(f));

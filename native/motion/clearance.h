@@ -34,10 +34,14 @@ class Clearance {
     return glm::dot(way, way) <= room_[vertex] * room_[vertex];
   }
 
-  /// Finds new anchors and rooms for these vertices, which are stored there; other rooms may become smaller. The tree
-  /// must have boxes around all faces and their rooms; those around these vertices get other ones. Throws Cancelled,
-  /// after which some vertices are in no room. About 1.5 us a face.
-  void renew(std::span<const std::uint32_t> vertices, std::span<const glm::dvec3> stored, FaceTree& tree);
+  /// Finds new anchors and rooms for the vertices that are not in their rooms where they are stored; other rooms may
+  /// become smaller. A vertex that left a room at once gets none for the next calls. The tree must have boxes around
+  /// all faces and their rooms; faces that have no corner without room get such a box. Throws Cancelled, after which
+  /// some vertices are in no room. About 1.5 us a face.
+  void renew(std::span<const glm::dvec3> stored, FaceTree& tree);
+
+  /// Whether a corner of the face has no room, wherever it is.
+  bool rests(std::uint32_t face) const;
 
   /// A box around the face wherever its corners are in their rooms.
   Box box(std::uint32_t face) const;
@@ -48,6 +52,7 @@ class Clearance {
   Corners corners(std::uint32_t face) const;
   void limit_by_fans(std::span<const std::uint32_t> vertices);
   void limit_by_gaps(std::span<const std::uint32_t> faces, const FaceTree& tree);
+  std::vector<std::uint32_t> gone(std::span<const glm::dvec3> stored);
 
   MovingMesh& mesh_;
   std::vector<glm::dvec3> anchor_;
@@ -55,6 +60,8 @@ class Clearance {
   std::vector<double> reach_;                   // Is room_, or what renew() will make of it at most.
   std::vector<std::atomic<double>> face_room_;  // Scratch: what a face leaves to its corners, infinite between calls.
   std::vector<std::uint32_t> renewed_;          // For each face: the last call of renew() for one of its corners.
+  std::vector<std::uint32_t> since_;            // For each vertex: the last call of renew() for it.
+  std::vector<std::uint8_t> rest_;              // For each vertex: in how many calls it will get no room.
   std::uint32_t now_ = 0;                       // The number of these calls.
 };
 

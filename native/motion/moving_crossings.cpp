@@ -58,15 +58,16 @@ void MovingCrossings::tidy() {
   if (worn) build();
   if (!clearance_) return;
   if (worn) fitted_.assign(face_count(), true);
-  std::vector<std::uint32_t> gone;
-  for (std::uint32_t v = 0; v < state_.size(); ++v) {
-    if (!clearance_->has(v, state_[v])) gone.push_back(v);
-  }
-  for (std::uint32_t f = 0; f < face_count(); ++f) {
-    if (fitted_[f]) tree_.change(f, clearance_->box(f));
-  }
-  fitted_.assign(face_count(), false);
-  clearance_->renew(gone, state_, tree_);
+  const auto fit = [&](auto&& has_room) {
+    for (std::uint32_t f = 0; f < face_count(); ++f) {
+      if (!fitted_[f] || !has_room(f)) continue;
+      tree_.change(f, clearance_->box(f));
+      fitted_[f] = false;
+    }
+  };
+  fit([&](std::uint32_t f) { return !is_due(f); });
+  clearance_->renew(state_, tree_);
+  fit([&](std::uint32_t f) { return !clearance_->rests(f); });
   if (worn || extent_ == 0) extent_ = tree_.extent();
 }
 

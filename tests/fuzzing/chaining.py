@@ -53,3 +53,5 @@ def chain(run):
             judges.within(run, reference, (case.world(vertices), triangles), case.tolerance, f"reference to {step}")
         if decimates:
             judges.connected_alike(run, before, (vertices, triangles))
+        else:
+            judges.uncrossed(run, before[0], vertices, triangles)

@@ -78,6 +78,17 @@ def valid(run, vertices, triangles, dtype):
         raise Finding("index", f"an index of the result is out of range: {triangles.min()}, {triangles.max()}")
 
 
+def uncrossed(run, before, after, triangles):
+    """Requires of stored positions that no pair of triangles crosses after a motion that did not cross before it."""
+
+    def pairs(vertices):
+        return {tuple(pair) for pair in run.call("crossing_pairs", lambda: tolvol.crossing_pairs(vertices, triangles))}
+
+    now = pairs(after)
+    if now and (new := now - pairs(before)):
+        raise Finding("crossings", f"{len(new)} pairs of faces cross that did not before: {min(new)}")
+
+
 def proper_faces(vertices, triangles):
     """Returns the faces with positions in place of vertices, without faces that are segments or points.
 

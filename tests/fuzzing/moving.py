@@ -6,7 +6,17 @@ import tolvol
 
 from . import judges
 from .case import Finding
-from .parts import covers, faces_of, lattice_of, motion_of, moved, proved_inside, some, within_as_pieces
+from .parts import (
+    covers,
+    faces_of,
+    lattice_of,
+    motion_of,
+    moved,
+    proved_inside,
+    some,
+    uncrossed_as_pieces,
+    within_as_pieces,
+)
 
 
 def draw_smooth(rng, case):
@@ -17,6 +27,7 @@ def draw_smooth(rng, case):
     options["boundary"] = some(rng, "fixed", "along")
     options["mode"] = some(rng, "pull_back", "reset")
     options["two_sided"] = bool(rng.random() < 0.7)
+    options["crossings"] = some(rng, "keep_out", "keep_out", "allow")
     if rng.random() < 0.2:
         case.arrays["locked"] = rng.random(n) < rng.random()
     if rng.random() < 0.2:
@@ -29,7 +40,7 @@ def draw_smooth(rng, case):
 def smooth(run):
     case, options, arrays = run.case, run.case.options, run.case.arrays
     vertices, triangles, volume = moved(run), case.triangles, run.volume()
-    names = ("iterations", "operator", "weights", "boundary", "mode", "two_sided", "outside")
+    names = ("iterations", "operator", "weights", "boundary", "mode", "two_sided", "outside", "crossings")
     given = {name: options[name] for name in names if name in options}
     given |= {name: arrays[name] for name in ("locked", "strength") if name in arrays}
 
@@ -61,12 +72,17 @@ def _judge_motion(run, result, vertices, faces, volume, stay):
     within_as_pieces(run, case.world(result.vertices), faces[~kept], reference)
     if case.options["two_sided"] and not result.report["outside"]["reference_faces"]:
         covers(run, case.world(result.vertices), faces, reference)
+    if case.options["crossings"] == "keep_out":
+        uncrossed_as_pieces(run, vertices, result.vertices, faces)
+    elif np.any(result.report["kept_from_crossing"]):
+        raise Finding("report", "vertices are said to be kept from crossing, which is allowed")
 
 
 def draw_deform(rng, case):
     options = case.options
     options["mode"] = some(rng, "blocked", "farthest", "pull_back")
     options["two_sided"] = bool(rng.random() < 0.7)
+    options["crossings"] = some(rng, "keep_out", "keep_out", "allow")
     options["points"] = [int(k) for k in rng.integers(2, 6, 3)]
     options["amplitude"] = float(10 ** rng.uniform(-2, 2))
     options["seed"] = int(rng.integers(1 << 30))
@@ -80,7 +96,7 @@ def deform(run):
     case, options = run.case, run.case.options
     vertices, triangles, volume = moved(run), case.triangles, run.volume()
     lattice = run.call("Lattice", lambda: lattice_of(run, vertices))
-    given = {name: options[name] for name in ("mode", "two_sided", "outside") if name in options}
+    given = {name: options[name] for name in ("mode", "two_sided", "outside", "crossings") if name in options}
 
     def call(threads, progress):
         return tolvol.deform(
@@ -91,7 +107,8 @@ def deform(run):
     fraction = result.report["permitted_fraction"]
     if fraction is not None and not 0 <= fraction <= 1:
         raise Finding("report", f"permitted_fraction is {fraction}")
-    stay = np.full(len(vertices), options["mode"] == "blocked" and result.report["leaving"]["faces"] > 0)
+    stopped = result.report["leaving"]["faces"] + result.report["crossing"]["faces"] > 0
+    stay = np.full(len(vertices), options["mode"] == "blocked" and stopped)
     _judge_motion(run, result, vertices, triangles, volume, stay)
 
 
@@ -100,6 +117,7 @@ def draw_constrain(rng, case):
     case.options["mode"] = some(rng, "pull_back", "pull_back", "reset")
     case.options["two_sided"] = bool(case.options["corners"] > 2 and rng.random() < 0.7)
     case.options["outside"] = "keep" if case.options["corners"] == 4 else "error"
+    case.options["crossings"] = some(rng, "keep_out", "keep_out", "allow")
     case.arrays["wish"] = motion_of(rng, case, 10 ** rng.uniform(-1, 2))
 
 
@@ -119,6 +137,7 @@ def constrain(run):
             mode=mode,
             two_sided=options["two_sided"],
             outside=options["outside"],
+            crossings=options["crossings"],
             threads=threads,
             progress=progress,
         )
@@ -130,7 +149,7 @@ def constrain(run):
         raise Finding(
             "factors", f"factors from {f.min()} to {f.max()}, {result.report['held_back']} said to be held back"
         )
-    if options["mode"] == "reset" or options["two_sided"]:
+    if options["mode"] == "reset" or options["two_sided"] or options["crossings"] == "keep_out":
         return
     reset = run.call("constrain", lambda: bounded("reset", 1, None)).factors
     if (f < reset).any():
@@ -155,6 +174,7 @@ def draw_guard(rng, case):
     case.options["seed"] = int(rng.integers(1 << 30))
     case.options["edits"] = int(rng.integers(1, 6))
     case.options["two_sided"] = bool(rng.random() < 0.7)
+    case.options["crossings"] = some(rng, "keep_out", "allow")
     case.options["amplitude"] = float(10 ** rng.uniform(-1, 2))
 
 
@@ -173,6 +193,7 @@ def guard(run):
                 volume,
                 to_world=case.to_world,
                 two_sided=options["two_sided"],
+                crossings=options["crossings"],
                 threads=threads,
                 progress=progress,
             )
@@ -194,3 +215,5 @@ def guard(run):
     within_as_pieces(run, case.world(result.vertices), case.triangles, reference)
     if options["two_sided"]:
         covers(run, case.world(result.vertices), case.triangles, reference)
+    if options["crossings"] == "keep_out":
+        judges.uncrossed(run, case.vertices, result.vertices, case.triangles)

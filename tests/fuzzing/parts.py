@@ -61,6 +61,13 @@ def covers(run, vertices, faces, reference):
         judges.within(run, reference, (vertices, triangles), run.case.tolerance, "reference to result")
 
 
+def uncrossed_as_pieces(run, before, after, faces):
+    """Requires that no faces of 3 or 4 corners cross anew, of quads in both triangulations. Others never cross."""
+    if faces.shape[1] > 2:
+        for way in _CUTS[faces.shape[1]]:
+            judges.uncrossed(run, before, after, np.concatenate([faces[:, cut] for cut in way]))
+
+
 def faces_of(case):
     """Returns the triangles as faces of 1 to 4 corners. With 4, pairs of neighbours are quads, and triangles repeat a corner."""
     corners, triangles = case.options["corners"], case.triangles

@@ -101,7 +101,7 @@ def random_step(rng, vertices, triangles, volume):
     wish = wish.astype(np.float32)
     if name == "constrain":
         return name, (tolvol.constrain(vertices, wish, triangles, volume).vertices, triangles)
-    guard = tolvol.Guard(vertices, triangles, volume)
+    guard = tolvol.Guard(vertices, triangles, volume, crossings="keep_out")
     indices, back = guard.constrain(wish)
     wish[indices] = back
     return name, (wish, triangles)
@@ -117,9 +117,10 @@ CHAINS = {
 
 @pytest.mark.parametrize("shape", CHAINS)
 def test_no_step_is_refused_for_what_another_one_left(shape):
-    """Every chain of operations with default settings goes on, and both directions hold after each step."""
+    """Every chain of operations with default settings goes on, both directions hold after each step, and no faces cross."""
     vertices, triangles = CHAINS[shape]()
     reference = vertices.astype(np.float32), triangles
+    assert not len(tolvol.crossing_pairs(*reference))
     rng = np.random.default_rng(7)
     for chain in range(50):
         tolerance = rng.choice([0.015, 0.04]) * tolvol.diagonal(*reference)
@@ -130,3 +131,4 @@ def test_no_step_is_refused_for_what_another_one_left(shape):
             names.append(str(name))
             judged = tolvol.hausdorff(*mesh, *reference, bound=tolerance)
             assert judged.upper <= tolerance, f"chain {chain}: {names}"
+            assert not len(tolvol.crossing_pairs(*mesh)), f"chain {chain}: {names}"
