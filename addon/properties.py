@@ -309,6 +309,11 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     )
 
     snapshot: PointerProperty(type=bpy.types.Mesh, description="The reference as it was set. It is never changed")
+    original: PointerProperty(
+        type=bpy.types.Mesh,
+        description="The mesh of the reference as it was set, with its UV maps, materials and all other data. A file of an "
+        "earlier version has none",
+    )
     snapshot_kind: StringProperty(description="The kind of reference that was chosen when the reference was set")
     snapshot_object: PointerProperty(
         type=bpy.types.Object, description="The object that was chosen when the reference was set"

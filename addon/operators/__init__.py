@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Registers the operators in bpy.ops.tolvol: set_tolerance, set_reference, clear_reference, check, select_outside,
-select_crossing, save_report, decimate, smooth, apply_modifier, fit_modifier and deform."""
+"""Registers the operators in bpy.ops.tolvol: set_tolerance, set_reference, clear_reference, show_original,
+restore_original, new_original, check, select_outside, select_crossing, save_report, decimate, smooth, apply_modifier,
+fit_modifier and deform."""
 
 import bpy
 
+from . import original
 from .check import TOLVOL_OT_check, TOLVOL_OT_select_outside
 from .crossings import TOLVOL_OT_select_crossing
 from .decimate import TOLVOL_OT_decimate
 from .deform import TOLVOL_OT_deform
 from .modifiers import TOLVOL_OT_apply_modifier, TOLVOL_OT_fit_modifier
+from .original import TOLVOL_OT_new_original, TOLVOL_OT_restore_original, TOLVOL_OT_show_original
 from .presets import TOLVOL_MT_tolerances, TOLVOL_OT_set_tolerance
 from .reference import TOLVOL_OT_clear_reference, TOLVOL_OT_set_reference
 from .report import TOLVOL_OT_save_report
@@ -19,6 +22,9 @@ _CLASSES = (
     TOLVOL_MT_tolerances,
     TOLVOL_OT_set_reference,
     TOLVOL_OT_clear_reference,
+    TOLVOL_OT_show_original,
+    TOLVOL_OT_restore_original,
+    TOLVOL_OT_new_original,
     TOLVOL_OT_check,
     TOLVOL_OT_select_outside,
     TOLVOL_OT_select_crossing,
@@ -30,4 +36,14 @@ _CLASSES = (
     TOLVOL_OT_deform,
 )
 
-register, unregister = bpy.utils.register_classes_factory(_CLASSES)
+_register, _unregister = bpy.utils.register_classes_factory(_CLASSES)
+
+
+def register():
+    _register()
+    original.register()
+
+
+def unregister():
+    original.unregister()
+    _unregister()

@@ -43,8 +43,8 @@ def check_blocked(ob, modes=_OBJECT_MODE):
     return None
 
 
-def decimate_blocked(ob, modes=_OBJECT_MODE):
-    """Why the mesh of `ob` cannot be changed now, or None."""
+def mesh_blocked(ob, modes=_OBJECT_MODE):
+    """Why the mesh of `ob` cannot be replaced now, or None."""
     if reason := object_blocked(ob, modes):
         return reason
     mesh = ob.data
@@ -53,7 +53,14 @@ def decimate_blocked(ob, modes=_OBJECT_MODE):
     users = mesh.users - mesh.use_fake_user
     if users > 1:
         return f"The mesh {mesh.name} has {users} users: Object > Relations > Make Single User > Object & Data"
-    if not mesh.polygons:
+    return None
+
+
+def decimate_blocked(ob, modes=_OBJECT_MODE):
+    """Why the mesh of `ob` cannot be changed within the tolerance now, or None."""
+    if reason := mesh_blocked(ob, modes):
+        return reason
+    if not ob.data.polygons:
         return f"{ob.name} has no faces"
     if any(modifier.type == "MULTIRES" for modifier in ob.modifiers):
         return "Apply the Multiresolution modifier first"

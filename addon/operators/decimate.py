@@ -167,15 +167,16 @@ object. An object without a reference gets one first, as by Set Reference"""
                 stack.enter_context(transfer.Writing(ob.data, source, result))
                 for ob, (source, _, result, _) in zip(self.objects, outcomes)
             ]
+            for ob, (_, reference, _, _) in zip(self.objects, outcomes):
+                if ob.tolvol.snapshot is None:
+                    snapshots.set_reference(ob, reference)
             for write in writes:
                 write.write()
-        for ob, (_, reference, _, run) in zip(self.objects, outcomes):
-            self._keep(ob, reference, run, f"{ob.name}: " if len(self.objects) > 1 else "")
+        for ob, (_, _, _, run) in zip(self.objects, outcomes):
+            self._keep(ob, run, f"{ob.name}: " if len(self.objects) > 1 else "")
 
-    def _keep(self, ob, reference, run, prefix):
+    def _keep(self, ob, run, prefix):
         """Remembers the run at its object and reports it."""
-        if ob.tolvol.snapshot is None:
-            snapshots.set_reference(ob, reference)
         shared.give(self, ob.tolvol, _SHARED if self.own_placements else {*_SHARED, "placement"})
         measurements.remember(ob, snapshots.surface_of(ob), run, run["tolerance"]["absolute"])
         ob.tolvol.last_run_of = ob.tolvol.measurement.fingerprint

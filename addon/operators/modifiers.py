@@ -141,8 +141,8 @@ moves as far as the tolerance permits. An object without a reference gets one fi
         shared.give(self, self.ob.tolvol.modifiers, modifier_settings())
         ob = self.target(context)
         if self.result == "SHAPE_KEY":
-            self._add_key(ob, name, vertices)
             motion.keep_reference(ob)
+            self._add_key(ob, name, vertices)
         else:
             motion.write(ob, vertices, certified)
         self.report({"INFO"}, f"{name}: {motion.line(motion.moved(vertices, wished), certified)}")
@@ -223,6 +223,8 @@ ways, and apply the modifier to the base mesh. An object without a reference get
 
     def _write(self, context, trial, mesh, certified):
         ob = self.target(context)
+        if ob.tolvol.snapshot is None:
+            snapshots.set_reference(ob, trial.reference)
         before = ob.data
         name, mesh.use_fake_user = before.name, before.use_fake_user
         for key, value in before.items():
@@ -230,8 +232,6 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         ob.data = mesh
         bpy.data.meshes.remove(before)
         mesh.name = name
-        if ob.tolvol.snapshot is None:
-            snapshots.set_reference(ob, trial.reference)
         measurements.remember(ob, snapshots.surface_of(ob), certified, trial.tolerance)
 
 

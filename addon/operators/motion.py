@@ -88,11 +88,11 @@ class Motion:
 
     def write(self, ob, vertices, certified):
         """Moves the vertices of `ob`, whose mesh is the one that was read or a copy of that mesh."""
+        self.keep_reference(ob)
         if ob.mode == "EDIT":
             self._write_edited(ob, vertices)
         else:
             mesh_io.move_vertices(ob.data, self.before, vertices)
-        self.keep_reference(ob)
         measurements.remember(ob, snapshots.surface_of(ob), certified, self.tolerance)
 
     def _write_edited(self, ob, vertices):
@@ -103,7 +103,7 @@ class Motion:
         ob.update_from_editmode()
 
     def keep_reference(self, ob):
-        """Stores the reference that was used if the object had none."""
+        """Stores the reference that was used if the object had none. It has to be called before the mesh is changed."""
         if ob.tolvol.snapshot is None:
             snapshots.set_reference(ob, self.reference)
 

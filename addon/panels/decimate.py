@@ -4,7 +4,7 @@ import bpy
 from ..operators.decimate import draw_advanced_settings, draw_decimate_settings, draw_protect_settings, targets
 from ..proof import report
 from ..reference import measurements
-from .layout import SubPanel, say_blocked, text_lines
+from .layout import SubPanel, active, say_blocked, text_lines
 
 
 class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
@@ -14,7 +14,7 @@ class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        ob = context.active_object
+        ob = active(context)
         draw_decimate_settings(layout, ob.tolvol)
         count = len(targets(context))
         layout.operator("tolvol.decimate", text=f"Decimate {count} Objects" if count > 1 else "Decimate")
@@ -37,7 +37,7 @@ class TOLVOL_PT_protect(SubPanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        draw_protect_settings(layout, context.active_object.tolvol, context.active_object)
+        draw_protect_settings(layout, active(context).tolvol, active(context))
 
 
 class TOLVOL_PT_advanced(SubPanel, bpy.types.Panel):
@@ -49,4 +49,4 @@ class TOLVOL_PT_advanced(SubPanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        draw_advanced_settings(layout, context.active_object.tolvol)
+        draw_advanced_settings(layout, active(context).tolvol)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from .layout import SubPanel, say_blocked
+from .layout import SubPanel, active, say_blocked
 
 
 class TOLVOL_PT_deform(SubPanel, bpy.types.Panel):
@@ -12,8 +12,8 @@ class TOLVOL_PT_deform(SubPanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        settings = context.active_object.tolvol
+        settings = active(context).tolvol
         layout.prop(settings, "lattice")
         layout.prop(settings, "deform_mode")
         layout.operator("tolvol.deform", text="Deform")
-        say_blocked(context, layout, context.active_object)
+        say_blocked(context, layout, active(context))

@@ -7,7 +7,7 @@ from .. import overlay
 from ..overlay import reasons
 from ..proof import report, verdict
 from ..units import length
-from .layout import AMBER, GREEN, GREY, RED, SubPanel, right, text_lines
+from .layout import AMBER, GREEN, GREY, RED, SubPanel, active, right, text_lines
 
 _COLOURS = {verdict.WITHIN: GREEN, verdict.ONE_WAY: AMBER, verdict.UNDECIDED: AMBER, verdict.BEYOND: RED}
 
@@ -17,7 +17,7 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
 
     def draw(self, context):
         layout = self.layout
-        ob = context.active_object
+        ob = active(context)
         self._draw_measured(context, ob)
         row = layout.row(align=True)
         row.operator("tolvol.check")
@@ -53,14 +53,14 @@ class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header(self, context):
-        ob = context.active_object
+        ob = active(context)
         self.layout.prop(ob.tolvol, "show_deviation", text="")
         # The overlay is not told of an object that was appended from another file.
         if ob.tolvol.show_deviation and not overlay.shows(ob) and not reasons.hidden(ob):
             bpy.app.timers.register(overlay.refresh, first_interval=0)
 
     def draw(self, context):
-        ob = context.active_object
+        ob = active(context)
         column = self.layout.column()
         column.active = ob.tolvol.show_deviation
         unsigned = reasons.unsigned(ob)

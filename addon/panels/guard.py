@@ -4,7 +4,7 @@
 import bpy
 
 from .. import guard
-from .layout import AMBER, GREEN, GREY, SubPanel, text_lines
+from .layout import AMBER, GREEN, GREY, SubPanel, active, text_lines
 
 _WHERE = {
     "sculpting": "The guard takes effect in Sculpt Mode",
@@ -19,7 +19,7 @@ class TOLVOL_PT_guard(SubPanel, bpy.types.Panel):
 
     def draw(self, context):
         layout = self.layout
-        ob = context.active_object
+        ob = active(context)
         settings = ob.tolvol.guard
         states = {setting: state for setting, *state in guard.states(ob)}
         for setting in guard.ROOMS:

@@ -6,6 +6,7 @@ import bpy
 
 from .. import native
 from ..operators import blocked
+from ..operators.original import active
 
 _FONT = 0  # Blender's own
 # Pixels of the sidebar's width that tabs, margins and the icon take from the text of a label.
@@ -29,7 +30,7 @@ class SubPanel(Panel):
 
     @classmethod
     def poll(cls, context):
-        ob = context.active_object
+        ob = active(context)
         return native.module is not None and ob is not None and ob.type == "MESH"
 
 

@@ -2,7 +2,7 @@
 import bpy
 
 from ..operators.modifiers import FITTED, modifier_blocked
-from .layout import SubPanel, say_blocked, text_lines
+from .layout import SubPanel, active, say_blocked, text_lines
 
 
 class TOLVOL_PT_modifiers(SubPanel, bpy.types.Panel):
@@ -11,7 +11,7 @@ class TOLVOL_PT_modifiers(SubPanel, bpy.types.Panel):
 
     def draw(self, context):
         layout = self.layout
-        ob = context.active_object
+        ob = active(context)
         if not ob.modifiers:
             layout.label(text="No modifiers", icon="INFO")
             return

@@ -2,7 +2,7 @@
 import bpy
 
 from ..operators.smooth import draw_smooth_settings
-from .layout import SubPanel, say_blocked
+from .layout import SubPanel, active, say_blocked
 
 
 class TOLVOL_PT_smooth(SubPanel, bpy.types.Panel):
@@ -13,7 +13,7 @@ class TOLVOL_PT_smooth(SubPanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        ob = context.active_object
+        ob = active(context)
         draw_smooth_settings(layout, ob.tolvol.smooth, ob)
         layout.operator("tolvol.smooth", text="Smooth")
         say_blocked(context, layout, ob)

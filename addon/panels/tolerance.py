@@ -7,7 +7,7 @@ from .. import native
 from ..operators import blocked
 from ..reference import measurements, snapshots, tolerances, volumes
 from ..units import NO_BREAK, length
-from .layout import AMBER, GREEN, GREY, RED, Panel, right, text_lines
+from .layout import AMBER, GREEN, GREY, RED, Panel, active, right, text_lines
 
 
 class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
@@ -17,7 +17,7 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        ob = context.active_object
+        ob = active(context)
         if native.module is None:
             text_lines(context, layout, native.reason, "ERROR")
             return
@@ -39,6 +39,11 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
         row.operator("tolvol.set_reference", text="Replace Reference..." if settings.snapshot else "Set Reference")
         if settings.snapshot:
             row.operator("tolvol.clear_reference", text="", icon="X")
+            row = layout.row(align=True)
+            row.use_property_split = False
+            row.prop(context.window_manager, "tolvol_show_original", toggle=True)
+            row.operator("tolvol.restore_original", text="", icon="LOOP_BACK")
+            row.operator("tolvol.new_original", text="", icon="DUPLICATE")
         _status(context, layout, ob)
         if on_top := measurements.on_top(ob):
             text_lines(context, layout, f"The proof is for the base mesh, without its {' and '.join(on_top)}", "INFO")

@@ -2,9 +2,10 @@
 """Keeps the reference of an object: a snapshot of a mesh and its place.
 
 The snapshot is a Mesh datablock that Object.tolvol points to, so that Blender saves it with the file and includes it in
-undo. It is never changed. If an object is its own reference, the object's present matrix maps snapshot and mesh to the
-world, so that the reference moves, turns and scales with the object. If the reference is another object's mesh, it stays
-at the place in the world where it was when it was set.
+undo. It is never changed. Beside it a second datablock keeps the mesh with all its data (originals.py). If an object is
+its own reference, the object's present matrix maps snapshot and mesh to the world, so that the reference moves, turns and
+scales with the object. If the reference is another object's mesh, it stays at the place in the world where it was when it
+was set.
 """
 
 import math
@@ -17,6 +18,7 @@ from .. import native
 from ..errors import Refused
 from ..mesh import mesh_io
 from ..redraw import redraw_views
+from . import originals
 
 # Fingerprint of a snapshot -> the bounding box of its used vertices, (2, 3) float32. The box never becomes outdated,
 # because a snapshot never changes.
@@ -106,9 +108,13 @@ def snapshot_size(ob):
 
 
 def set_reference(ob, surface):
-    """Stores `surface` as the reference of `ob`, of the kind that the settings of `ob` name."""
+    """Stores `surface` as the reference of `ob`, of the kind that the settings of `ob` name.
+
+    An operator calls it before it changes the mesh, so that the original is kept with its data.
+    """
     clear_reference(ob)
     settings = ob.tolvol
+    settings.original = originals.copy_of(source_object(ob), surface.arrays)
     settings.snapshot = mesh_io.new_mesh(f".{ob.name} reference", surface.arrays.vertices, surface.arrays.triangles)
     settings.snapshot_kind = settings.reference_kind
     settings.snapshot_object = settings.reference_object if settings.reference_kind == "OBJECT" else None
@@ -121,11 +127,12 @@ def set_reference(ob, surface):
 
 
 def clear_reference(ob):
-    snapshot = ob.tolvol.snapshot
-    ob.tolvol.snapshot = None
+    kept = ob.tolvol.snapshot, ob.tolvol.original
+    ob.tolvol.snapshot = ob.tolvol.original = None
     ob.tolvol.measurement.fingerprint = ""
-    if snapshot is not None and snapshot.users == 0:
-        bpy.data.meshes.remove(snapshot)
+    for mesh in kept:
+        if mesh is not None and mesh.users == 0:
+            bpy.data.meshes.remove(mesh)
     notify()
 
 

@@ -45,7 +45,7 @@ def test_update_replaces_and_clear_lets_go():
     ob.data.update()
     bpy.ops.tolvol.set_reference()
     assert ob.tolvol.snapshot.vertices[0].co.x == ob.data.vertices[0].co.x
-    assert len(bpy.data.meshes) == 2  # The first snapshot was removed.
+    assert len(bpy.data.meshes) == 3  # The first snapshot and the first original were removed.
     bpy.ops.tolvol.clear_reference()
     assert ob.tolvol.snapshot is None and len(bpy.data.meshes) == 1
     assert not bpy.ops.tolvol.clear_reference.poll()

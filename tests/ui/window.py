@@ -157,6 +157,11 @@ def find_property(name, across):
     return (yield from _find(f".tolvol.{name}", "ctrl+shift+alt+c", across))
 
 
+def find_hold():
+    """Does the same as find() for the button that shows the original while it is held."""
+    return (yield from _find("tolvol_show_original", "ctrl+shift+alt+c", 0.33))
+
+
 _found_at = {}
 
 
