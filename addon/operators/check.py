@@ -11,9 +11,8 @@ from bpy.props import IntProperty
 from .. import native, preferences
 from ..job import JobOperator
 from ..mesh import mesh_io
-from ..proof import report
-from ..proof.certify import certify, outside
-from ..proof.measure import Interval
+from ..proof import measure, report
+from ..proof.certify import outside
 from ..proof.verdict import BEYOND, ONE_WAY, WITHIN, Verdict
 from ..reference import measurements, snapshots, tolerances
 from .blocked import allowed, check_blocked
@@ -34,7 +33,26 @@ class Comparison(JobOperator):
         surface, reference = snapshots.surface_of(ob), snapshots.reference_of(ob)
         tolerance = tolerances.tolerance_length(ob.tolvol, reference.size())
         threads = self.threads or preferences.threads(context)
+        self.two_sided = ob.tolvol.keep == "BOTH"
         return functools.partial(self.compare, surface, reference, tolerance, threads)
+
+    def judge(self, surface, reference, tolerance, threads, progress):
+        """Returns the Verdict on a Surface, with the share of its area that is outside."""
+        own = surface.world(), surface.arrays.triangles
+        other = reference.world(), reference.arrays.triangles
+        ways = measure.both_ways(own, other, tolerance, threads, progress)
+        found = Verdict(tolerance, *ways, two_sided=self.two_sided)
+        if not found.forward_within:
+            spread = native.module.deviation(*own, *other, bounds=(tolerance,), threads=threads, progress=progress)
+            found = replace(found, share_outside=float(spread.share_beyond[0]))
+        return found
+
+    def remember(self, surface, found):
+        """Stores the Verdict, which every part of the interface then shows."""
+        certified = {
+            name: (way.lower, way.upper) for name, way in (("forward", found.forward), ("backward", found.backward))
+        }
+        measurements.remember(self.ob, surface, certified, found.tolerance, found.share_outside)
 
 
 class TOLVOL_OT_check(Comparison, bpy.types.Operator):
@@ -45,55 +63,52 @@ the share of the mesh that is beyond the tolerance"""
     bl_label = "Check"
     bl_options = {"REGISTER", "UNDO"}
 
-    @staticmethod
-    def compare(surface, reference, tolerance, threads, progress):
-        certified = certify(surface, reference, tolerance, 0, threads, progress)
-        found = Verdict(tolerance, Interval(*certified["forward"]), Interval(*certified["backward"]))
-        if not found.forward_within:
-            own = surface.world(), surface.arrays.triangles
-            other = reference.world(), reference.arrays.triangles
-            spread = native.module.deviation(*own, *other, bounds=(tolerance,), threads=threads, progress=progress)
-            found = replace(found, share_outside=float(spread.share_beyond[0]))
-        return surface, certified, found
+    def compare(self, surface, reference, tolerance, threads, progress):
+        return surface, self.judge(surface, reference, tolerance, threads, progress)
 
     def finish(self, context, outcome):
-        surface, certified, found = outcome
-        measurements.remember(self.ob, surface, certified, found.tolerance, found.share_outside)
-        largest = report.percent(max(found.forward.upper, found.backward.upper), found.tolerance)
-        if found.kind == WITHIN:
-            self.report({"INFO"}, f"Within the tolerance both ways: at most {largest} of the tolerance, proved")
-        elif found.kind == ONE_WAY:
-            self.report(
-                {"WARNING"},
-                f"Within the tolerance one way: the reference is up to {largest} of the tolerance from the mesh",
-            )
-        elif found.kind == BEYOND:
-            share = f"{100 * found.share_outside:.1f} % of the area is outside"
-            self.report({"WARNING"}, f"Beyond the tolerance: up to {largest} of the tolerance, {share}")
-        else:
-            self.report({"WARNING"}, found.line())
+        surface, found = outcome
+        self.remember(surface, found)
+        level = "INFO" if found.kind == WITHIN else "WARNING"
+        self.report({level}, said(found))
+
+
+def said(found):
+    """Returns a Verdict as the message of Check."""
+    largest = report.percent(found.largest, found.tolerance)
+    if found.passed:
+        ways = "both ways" if found.two_sided else "one way"
+        return f"{found.word}: within the tolerance {ways}, at most {largest} of the tolerance, proved"
+    if found.kind == ONE_WAY:
+        return f"{found.word}: the mesh is within the tolerance, but the reference is up to {largest} of the tolerance from it"
+    if found.kind == BEYOND:
+        share = f"{100 * found.share_outside:.1f} % of the area is outside"
+        return f"{found.word}: beyond the tolerance, up to {largest} of the tolerance, {share}"
+    return f"{found.word}: {found.line()}"
 
 
 class TOLVOL_OT_select_outside(Comparison, bpy.types.Operator):
-    """Switch to Edit Mode and select the faces that are not proved to be within the tolerance of the reference"""
+    """Measure as Check does, switch to Edit Mode, select the faces that are not proved to be within the tolerance of the \
+reference, and bring them into view"""
 
     bl_idname = "tolvol.select_outside"
     bl_label = "Select Outside"
     bl_options = {"REGISTER", "UNDO"}
 
-    @staticmethod
-    def compare(surface, reference, tolerance, threads, progress):
-        return surface, outside(surface, reference, tolerance, threads, progress)
+    def compare(self, surface, reference, tolerance, threads, progress):
+        found = self.judge(surface, reference, tolerance, threads, progress)
+        return surface, found, outside(surface, reference, found.forward, tolerance, threads, progress)
 
     def finish(self, context, outcome):
-        surface, triangles = outcome
+        surface, found, triangles = outcome
+        self.remember(surface, found)
         mesh = self.ob.data
         faces = np.zeros(len(mesh.polygons), bool)
         faces[surface.arrays.polygons[triangles]] = True
         if not faces.any():
-            self.report({"INFO"}, "No face is outside")
+            self.report({"INFO" if found.passed else "WARNING"}, f"No face of the mesh is outside. {said(found)}")
             return
         mesh_io.select_faces(mesh, faces)
         context.tool_settings.mesh_select_mode = (False, False, True)
         bpy.ops.object.mode_set(mode="EDIT")
-        self.report({"WARNING"}, f"{faces.sum():,} of {len(faces):,} faces are outside")
+        self.report({"WARNING"}, f"{found.word}: {faces.sum():,} of {len(faces):,} faces are outside")

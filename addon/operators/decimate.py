@@ -16,7 +16,7 @@ from ..errors import NotProved, Refused
 from ..job import JobOperator, run_all
 from ..mesh import filling, mesh_io, protect, transfer
 from ..operation_settings import PROTECTED, decimate_settings
-from ..proof import measure, report, solidity
+from ..proof import measure, report, solidity, verdict
 from ..proof.certify import certify
 from ..properties import PLACEMENTS, automatic_placement, tolerance_settings
 from ..reference import measurements, snapshots, tolerances, volumes
@@ -183,7 +183,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         ob.tolvol.last_run = json.dumps(run)
         for warning in run["warnings"]:
             self.report({"WARNING"}, prefix + warning)
-        self.report({"INFO"}, prefix + report.line(run))
+        self.report({"INFO"}, f"{prefix}{verdict.word(ob)}: {report.line(run)}")
 
     def _take_settings(self, settings):
         """Takes the settings of the active object for all objects, so that Adjust Last Operation shows the ones used."""

@@ -18,6 +18,7 @@ from ..mesh.mesh_io import column
 from ..operation_settings import modifier_settings
 from ..proof import measure, report
 from ..proof.certify import certify
+from ..proof.verdict import Verdict
 from ..reference import measurements, snapshots, tolerances
 from . import fit
 from . import settings as shared
@@ -282,7 +283,7 @@ class _Trial:
         def work(progress):
             surface = snapshots.Surface(arrays, self.surface.matrix)
             found = certify(surface, self.reference, self.tolerance, 0, self._threads, progress)
-            if max(found["forward"][1], found["backward"][1]) > self.tolerance:
+            if not Verdict.certified(found, self.tolerance).passed:
                 ways = (report.percent(found[way][1], self.size) for way in ("forward", "backward"))
                 raise NotProved(
                     "the result is up to {} of the size from the reference, and the reference up to {} from the "
@@ -296,8 +297,9 @@ class _Trial:
     def line(self, certified):
         """Returns the outcome as one line of text."""
         forward, backward = (report.percent(certified[way][1], self.size) for way in ("forward", "backward"))
+        word = Verdict.certified(certified, self.tolerance).word
         return (
-            f"{len(self.surface.arrays.triangles):,} -> {self._left:,} triangles, tolerance "
+            f"{word}: {len(self.surface.arrays.triangles):,} -> {self._left:,} triangles, tolerance "
             f"{100 * self.tolerance / self.size:.4g} % = {self.tolerance:.3g}, result within {forward}, reference within "
             f"{backward} (certified)"
         )

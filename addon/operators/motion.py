@@ -11,7 +11,10 @@ from ..errors import NotProved
 from ..mesh import mesh_io
 from ..proof import report
 from ..proof.certify import certify
+from ..proof.verdict import Interval, Verdict
 from ..reference import measurements, snapshots, tolerances, volumes
+
+_FOUND = {"forward": "the result is {} from the reference", "backward": "the reference is {} from the result"}
 
 
 class Motion:
@@ -69,14 +72,11 @@ class Motion:
             arrays = replace(arrays, triangles=triangles)
         moved = snapshots.Surface(arrays, self.surface.matrix)
         certified = certify(moved, self.reference, self.tolerance, 0, self.threads, progress)
-        kept = {"forward": "the result is {} from the reference"}
-        if self.two_sided:
-            kept["backward"] = "the reference is {} from the result"
-        for way, said in kept.items():
-            lower, upper = certified[way]
-            if upper > self.tolerance:
-                ends = f"between {report.percent(lower, self.size)} and {report.percent(upper, self.size)} of the size"
-                raise NotProved(said.format(ends))
+        for way, said in _FOUND.items() if self.two_sided else [("forward", _FOUND["forward"])]:
+            found = Interval(*certified[way])
+            if not found.within(self.tolerance):
+                ends = (report.percent(end, self.size) for end in (found.lower, found.upper))
+                raise NotProved(said.format("between {} and {} of the size".format(*ends)))
         return certified
 
     def settle(self, vertices, certified):
@@ -110,8 +110,9 @@ class Motion:
     def line(self, remarks, certified):
         """Returns the outcome as one line of text."""
         forward, backward = (report.percent(certified[way][1], self.size) for way in ("forward", "backward"))
+        word = Verdict.certified(certified, self.tolerance, self.two_sided).word
         return (
-            f"{', '.join(remarks)}, tolerance {100 * self.tolerance / self.size:.4g} % = {self.tolerance:.3g}, "
+            f"{word}: {', '.join(remarks)}, tolerance {100 * self.tolerance / self.size:.4g} % = {self.tolerance:.3g}, "
             f"result within {forward} (certified), reference within {backward}"
         )
 

@@ -72,14 +72,14 @@ read (.html), a table (.csv) or all numbers (.json)"""
     def compare(self, surface, reference, tolerance, threads, progress):
         bounds = [share * tolerance for share in _BANDS]
         return deviation.deviation(
-            surface, reference, reference.size(), tolerance, bounds, self._unit, threads, progress
+            surface, reference, reference.size(), tolerance, bounds, self._unit, threads, progress, self.two_sided
         )
 
     def finish(self, context, outcome):
         with safe_files.Staged() as staged:
             staged.write(self._target, deviation.content(outcome | self._about, self._target.name))
             staged.publish()
-        self.report({"INFO"}, f"Saved {self._target.name}")
+        self.report({"INFO"}, f"{outcome['verdict']}: saved {self._target.name}")
 
 
 def _counted(name, mesh):

@@ -5,6 +5,7 @@ import gpu
 import numpy as np
 
 from ..mesh import mesh_io
+from ..proof import verdict
 from ..redraw import redraw_views
 from ..reference import measurements, tolerances
 from . import field, legend, reasons, shaders, shares
@@ -114,11 +115,11 @@ def legend_of_one(context, shown):
         found, reason = field.field_of(ob, _tolerance(ob), redraw_views)
     heading = f"Deviation of {ob.name}"
     if found is None:
-        legend.draw_note(context, f"{heading}: {reason}")
+        legend.draw_note(context, f"{heading}: {reason}. {verdict.word(ob)}")
         return
     signed, tolerance = _signed(ob, found.tree), _tolerance(ob)
     bands = shares.known(ob, shown[ob.name], found, tolerance, redraw_views)
-    legend.draw(context, heading, note(ob), signed, tolerance, bands and shares.fold(bands, signed))
+    legend.draw(context, heading, note(ob), verdict.word(ob), signed, tolerance, bands and shares.fold(bands, signed))
 
 
 def note(ob):
@@ -129,4 +130,4 @@ def note(ob):
     on_top, how = measurements.on_top(ob), "with"
     if ob.mode == "SCULPT":
         on_top, how = [name for name in on_top if name == "modifiers"], "without"
-    return f"Shown {how} its {' and '.join(on_top)}, not proved" if on_top else "Shown, not proved"
+    return f"Colours {how} its {' and '.join(on_top)}, not proved" if on_top else "Colours not proved"

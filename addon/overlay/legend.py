@@ -4,6 +4,7 @@
 import blf
 import gpu
 
+from ..proof.verdict import FAIL, NOT_CHECKED, PASS
 from ..units import NO_BREAK, length
 from . import shaders
 
@@ -15,6 +16,11 @@ _ROW = 17
 _GAP = 10  # between the parts of the legend and around them
 _MARGIN = 14  # between the legend and the edges of the view
 _STRIPE = 12
+_WORD = 30  # the height of the line with the verdict
+_MARK = 16  # the coloured square beside the verdict
+_LARGE = 20  # points of the verdict
+# The colours of Blender's icons in the panel. The word beside them says the same without colours.
+_COLOURS = {PASS: (0.47, 0.8, 0.43), FAIL: (0.88, 0.38, 0.35), NOT_CHECKED: (0.6, 0.6, 0.6)}
 
 _unit_square = None
 
@@ -58,21 +64,30 @@ class _Page:
         _square().draw(shader)
         gpu.state.blend_set("NONE")
 
-    def text(self, x, y, text, faint=False):
+    def text(self, x, y, text, faint=False, points=_POINTS):
         """Draws a line of text. `y` is the middle of its lower-case letters."""
+        blf.size(_FONT, points * self.scale)
         blf.color(_FONT, *self.ink, 0.6 if faint else 1.0)
         blf.position(_FONT, x, y - blf.dimensions(_FONT, "x")[1] / 2, 0)
         blf.draw(_FONT, text)
+        blf.size(_FONT, _POINTS * self.scale)
+
+    def width(self, text, points=_POINTS):
+        blf.size(_FONT, points * self.scale)
+        width = blf.dimensions(_FONT, text)[0]
+        blf.size(_FONT, _POINTS * self.scale)
+        return width
 
 
 def width_of(text):
     return blf.dimensions(_FONT, text)[0]
 
 
-def draw(context, heading, note, signed, tolerance, shares):
+def draw(context, heading, note, word, signed, tolerance, shares):
     """Draws the legend.
 
     note: the lowest line.
+    word: the verdict, in large letters on top.
     shares: the shares of the surface in the four bands from the lowest colour on and beyond the tolerance; None while
     they are not known.
     """
@@ -86,7 +101,8 @@ def draw(context, heading, note, signed, tolerance, shares):
     label_width = max([width_of(text) for _, text in labels] + [width_of("Outside")])
     share_width = max(width_of(text) for text in [*bands, "88.8 %"])
     width = max(bar_width + label_width + share_width + 2 * gap, width_of(heading), width_of(note)) + 2 * gap
-    height = 3 * row + bar_height + 4 * gap
+    width = max(width, page.width(word, _LARGE) + _MARK * scale + 3 * gap)
+    height = 3 * row + _WORD * scale + bar_height + 4 * gap
     place = _corner(context, width, height, _MARGIN * scale)
     if place is None:
         return
@@ -107,7 +123,11 @@ def draw(context, heading, note, signed, tolerance, shares):
         page.text(label_x, at, text)
     for i, text in enumerate(bands[:4]):
         page.text(right - width_of(text), y + (i + 0.5) / 4 * bar_height, text, faint=True)
-    page.text(x, bottom + height - gap - row / 2, heading)
+    top = bottom + height - gap
+    page.text(x, top - row / 2, heading)
+    at, mark = top - row - _WORD * scale / 2, _MARK * scale
+    page.rectangle(x, at - mark / 2, mark, mark, shaders.FLAT, (*_COLOURS[word], 1))
+    page.text(x + mark + gap, at, word, points=_LARGE)
 
 
 def draw_note(context, text):

@@ -9,8 +9,6 @@ from ..proof import report, verdict
 from ..units import length
 from .layout import AMBER, GREEN, GREY, RED, SubPanel, active, right, text_lines
 
-_COLOURS = {verdict.WITHIN: GREEN, verdict.ONE_WAY: AMBER, verdict.UNDECIDED: AMBER, verdict.BEYOND: RED}
-
 
 class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
     bl_label = "Deviation"
@@ -18,31 +16,53 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         ob = active(context)
-        self._draw_measured(context, ob)
+        found = verdict.of(ob)
+        self._draw_verdict(context, found)
         row = layout.row(align=True)
         row.operator("tolvol.check")
         row.operator("tolvol.select_outside")
-        layout.operator("tolvol.select_crossing")
-        layout.operator("tolvol.save_report", text="Save Report...")
+        row = layout.row(align=True)
+        row.operator("tolvol.select_crossing", text="Crossing Faces")
+        row.operator("tolvol.save_report", text="Save Report...")
+        # What may need several lines is below the buttons, so that they do not move.
+        if found is None:
+            text_lines(context, layout, _why_not_checked(ob), GREY)
+        elif found.kind != verdict.WITHIN:
+            text_lines(context, layout, found.line(), AMBER if found.passed else RED)
         if ob.tolvol.show_deviation and (reason := reasons.off()):
             text_lines(context, layout, f"The deviation is not shown: {reason}", "INFO")
 
-    def _draw_measured(self, context, ob):
-        """Draws the same rows with and without a measurement, so that the buttons below them stay where they are."""
-        found = verdict.of(ob)
-        column = self.layout.column(align=True)
-        column.label(text="Largest Deviation")
-        for text, side in (("Mesh", "forward"), ("Reference", "backward")):
-            row = column.split(factor=0.4)
-            row.label(text=text)
-            value = getattr(found, side).upper if found else None
-            right(row, f"{length(context, value)}  {report.percent(value, found.tolerance)}" if found else "\u2013")
-        if found:
-            text_lines(context, column, found.line(), _COLOURS[found.kind])
-        elif ob.mode != "OBJECT":
-            text_lines(context, column, "Measure in Object Mode", GREY)
+    def _draw_verdict(self, context, found):
+        """Draws the same rows with and without a measurement."""
+        box = self.layout.box()
+        row = box.row()
+        row.scale_y, row.alert = 1.5, found is not None and not found.passed
+        if found is None:
+            row.label(text=verdict.NOT_CHECKED, icon=GREY)
         else:
-            text_lines(context, column, "Not measured yet" if ob.tolvol.snapshot else "Set the reference first", GREY)
+            row.label(text=f"{found.word}  {found.ways}", icon=GREEN if found.passed else RED)
+        column = box.column(align=True)
+        for text, side in (("Mesh", "forward"), ("Reference", "backward")):
+            value = getattr(found, side).upper if found else None
+            _row(column, text, f"{length(context, value)}  {report.percent(value, found.tolerance)}" if found else None)
+        if found:
+            left = f"{length(context, abs(found.margin))}  {found.margin_percent()}"
+            name = "Margin" if found.passed else "Beyond by" if found.surely_beyond else "Unproved by"
+            _row(column, name, left)
+        else:
+            _row(column, "Margin", None)
+
+
+def _row(column, name, text):
+    row = column.split(factor=0.38)
+    row.label(text=name)
+    right(row, text or "\u2013")
+
+
+def _why_not_checked(ob):
+    if ob.mode != "OBJECT":
+        return "Measure in Object Mode"
+    return "Press Check to measure it" if ob.tolvol.snapshot else "Set the reference first"
 
 
 class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):

@@ -15,13 +15,12 @@ def verdicts(surface, reference, tolerance, threads=None, progress=None):
     return built.check(arrays.vertices, arrays.triangles, to_world=matrix, threads=threads, progress=progress).verdicts
 
 
-def outside(surface, reference, tolerance, threads=None, progress=None):
+def outside(surface, reference, found, tolerance, threads=None, progress=None):
     """Returns (m,) bool: the triangles of a Surface that are not proved to be within the tolerance.
 
-    There are none if certify() finds the Surface within the tolerance, and otherwise there is at least one.
+    found: the Interval of the largest distance of the Surface from the reference. There are no such triangles if it is within
+    the tolerance, and otherwise there is at least one.
     """
-    pair = (surface.world(), surface.arrays.triangles), (reference.world(), reference.arrays.triangles)
-    found = measure.largest_distance(*pair, tolerance, threads, progress)
     if found.within(tolerance):
         return np.zeros(len(surface.arrays.triangles), bool)
     unproved = verdicts(surface, reference, tolerance, threads, progress) < native.module.Verdict.INSIDE

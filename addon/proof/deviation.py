@@ -7,6 +7,8 @@ number:
 
     version, method, unit, size   `size` is the length that is 100 %
     tolerance                     {absolute, percent}, or None
+    two_sided                     whether both directions have to be within the tolerance for the verdict, or `forward` alone
+    verdict                       PASS or FAIL (verdict.py), or None without a tolerance
     a, b                          {name or file, vertices, triangles}; a also has `holes`, as in report.py, if the last
                                   decimation closed holes
     solidity                      {a, b}: facts about both (solidity.py); {change}: solidity.change(), a against b
@@ -32,6 +34,7 @@ import numpy as np
 
 from .. import native
 from . import deviation_page, measure, solidity
+from .verdict import Verdict
 
 PERCENTILES = (50, 90, 95, 99, 99.9)
 EXTENSIONS = (".json", ".csv", ".html")
@@ -42,7 +45,7 @@ _FORMULA = "=+-@\uff1d\uff0b\uff0d\uff20"
 _BINS = 30  # the approximate number of bins on each side of the histogram
 
 
-def deviation(a, b, size, tolerance=None, bounds=(), unit="", threads=None, progress=None):
+def deviation(a, b, size, tolerance=None, bounds=(), unit="", threads=None, progress=None, two_sided=True):
     """Returns the dictionary that is described above, without `a` and `b`, for two Surfaces."""
     bounds = sorted({*bounds, *([] if tolerance is None else [tolerance])})
     ways = {}
@@ -52,16 +55,19 @@ def deviation(a, b, size, tolerance=None, bounds=(), unit="", threads=None, prog
             *pair[0], *pair[1], bounds=bounds, percentiles=PERCENTILES, threads=threads, progress=progress
         )
         ways[way] = measure.largest_distance(*pair, tolerance, threads, progress), spread, surface.arrays.polygons
-    found = {name: solidity.facts(surface, threads, progress) for name, surface in (("a", a), ("b", b))}
+    facts = {name: solidity.facts(surface, threads, progress) for name, surface in (("a", a), ("b", b))}
+    largest = [measured for measured, _, _ in ways.values()]
     # Both histograms have the same scale, so that they can be compared.
-    edges = _edges(max(largest.upper for largest, _, _ in ways.values()), tolerance)
+    edges = _edges(max(found.upper for found in largest), tolerance)
     return {
         "version": native.module.__version__,
         "method": _METHOD,
         "unit": unit,
         "size": size,
         "tolerance": None if tolerance is None else {"absolute": tolerance, "percent": 100 * tolerance / size},
-        "solidity": found | {"change": solidity.change(found["a"], found["b"])},
+        "two_sided": two_sided,
+        "verdict": None if tolerance is None else Verdict(tolerance, *largest, two_sided=two_sided).word,
+        "solidity": facts | {"change": solidity.change(facts["a"], facts["b"])},
         **{way: _way(*of_way, bounds, edges) for way, of_way in ways.items()},
     }
 
@@ -139,7 +145,10 @@ def table(run):
     rows += [("", "version", "", run["version"], "", ""), ("", "unit", "", run["unit"], "", "")]
     rows += [("", "size", "", run["size"], "", "")]
     if run["tolerance"]:
-        rows += [("", "tolerance", "", run["tolerance"]["absolute"], "", "")]
+        rows += [
+            ("", "tolerance", "", run["tolerance"]["absolute"], "", ""),
+            ("", "verdict", "", run["verdict"], "", ""),
+        ]
     for name in ("a", "b"):
         rows += [("", f"{name} {key}", "", value, "", "") for key, value in run[name].items()]
         facts = run["solidity"][name].items()

@@ -12,6 +12,7 @@ from html import escape
 from pathlib import Path
 
 from . import report, solidity
+from .verdict import FAIL, PASS, Interval
 
 _WITHIN, _BEYOND, _LINE = "#0072B2", "#D55E00", "#1a1a1a"
 
@@ -132,16 +133,20 @@ def _verdict(run):
         return ""
     tolerance = run["tolerance"]["absolute"]
     said = f"Tolerance {_length(run, tolerance)} ({run['tolerance']['percent']:.4g}&nbsp;% of size): "
-    ways = [run[way]["largest"] for way in ("forward", "backward")]
     names = [escape(_name(run[key])) for key in ("a", "b")]
-    if all(upper <= tolerance for _, upper in ways):
-        return f'<p class="verdict within">✓ {said}both are within the tolerance, proved</p>'
-    beyond = [name for name, (lower, _) in zip(names, ways) if lower > tolerance]
-    if beyond:
-        return f'<p class="verdict beyond">✗ {said}beyond the tolerance, proved: {" and ".join(beyond)}</p>'
-    return (
-        f'<p class="verdict">? {said}not decided, because the interval of a largest distance contains the tolerance</p>'
+    found = [Interval(*run[way]["largest"]) for way in ("forward", "backward")]
+    about = "both" if run["two_sided"] else names[0]
+    found, names = (found, names) if run["two_sided"] else (found[:1], names[:1])
+    if run["verdict"] == PASS:
+        verb = "are" if run["two_sided"] else "is"
+        return f'<p class="verdict within">✓ {PASS}. {said}{about} {verb} within the tolerance, proved</p>'
+    beyond = [name for name, interval in zip(names, found) if interval.beyond(tolerance)]
+    why = (
+        f"beyond the tolerance, proved: {' and '.join(beyond)}"
+        if beyond
+        else ("not decided, because the interval of a largest distance contains the tolerance")
     )
+    return f'<p class="verdict beyond">✗ {FAIL}. {said}{why}</p>'
 
 
 def _article(run, way, from_, to, highest):

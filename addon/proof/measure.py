@@ -1,28 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Computes certified distances between two surfaces in the world, from the stored coordinates."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from .. import native
-
-
-@dataclass(frozen=True)
-class Interval:
-    """The true largest distance lies between `lower` and `upper`.
-
-    The point `position` on the triangle `triangle` of the surface is at least `lower` away from the other surface.
-    """
-
-    lower: float
-    upper: float
-    position: tuple = ()
-    triangle: int = -1
-
-    def within(self, tolerance):
-        return self.upper <= tolerance
-
-    def beyond(self, tolerance):
-        return self.lower > tolerance
+from .verdict import Interval
 
 
 def largest_distance(from_surface, to_surface, tolerance=None, threads=None, progress=None):
@@ -40,7 +22,7 @@ def largest_distance(from_surface, to_surface, tolerance=None, threads=None, pro
         return Interval(found.lower, found.upper, found.position, found.triangle)
 
     interval = measured()
-    if tolerance is not None and interval.lower <= tolerance < interval.upper:
+    if tolerance is not None and interval.undecided(tolerance):
         decided = measured(bound=tolerance)
         best = max(interval, decided, key=lambda found: found.lower)
         interval = replace(best, upper=min(interval.upper, decided.upper))

@@ -9,6 +9,7 @@ import math
 
 from .. import native
 from . import solidity
+from .verdict import Interval
 
 # The distance of the reference counts as no larger than before if its upper end grew by at most this share, the width of a
 # certified interval (native/measure/hausdorff.h): equal distances count as equal.
@@ -77,7 +78,8 @@ def proved(run):
     # reference must not be farther away than it was before.
     forward = kept.get("rest", run["forward"])
     backward_bound = max(tolerance, kept.get("backward_before", 0.0) * (1 + _RESOLUTION))
-    return forward[1] <= tolerance and (not run["two_sided"] or run["backward"][1] <= backward_bound)
+    backward = Interval(*run["backward"])
+    return Interval(*forward).within(tolerance) and (not run["two_sided"] or backward.within(backward_bound))
 
 
 def line(run, seconds=None):

@@ -454,12 +454,12 @@ def test_saved_loaded_and_appended(tmp_path):
 
 def test_legend_says_what_no_proof_covers():
     ob = torus()
-    assert draw.note(ob) == "Shown, not proved"
+    assert draw.note(ob) == "Colours not proved"
     ob.modifiers.new("wave", "WAVE")
     ob.shape_key_add()
-    assert draw.note(ob) == "Shown with its modifiers and shape keys, not proved"
+    assert draw.note(ob) == "Colours with its modifiers and shape keys, not proved"
     bpy.ops.object.mode_set(mode="SCULPT")
-    assert draw.note(ob) == "Shown without its modifiers, not proved"
+    assert draw.note(ob) == "Colours without its modifiers, not proved"
 
 
 def test_drawing_that_was_refused_is_asked_for_again_once_it_is_turned_on_anew(chosen_preferences):

@@ -9,6 +9,7 @@ import numpy as np
 import scenes
 from addon import job, native, reference
 from addon.mesh import mesh_io
+from addon.overlay import legend
 from addon.panels import decimate
 from addon.proof import verdict
 from addon.reference import measurements, tolerances
@@ -200,6 +201,20 @@ def test_reference_check_and_select_outside():
     yield from finished(lambda: measurements.measurement_of(suzanne()) is not None)
     yield 1.0
     screenshot("8 checked")
+    # The word of the legend is the one of the panel.
+    words, draw = [], legend.draw
+    legend.draw = lambda context, heading, note, word, *rest: (
+        words.append(word) or draw(context, heading, note, word, *rest)
+    )
+    view()[1].tag_redraw()
+    yield from finished(lambda: words)
+    assert words[-1] == verdict.word(suzanne()) == verdict.FAIL
+    suzanne().tolvol.tolerance_percent = 20
+    yield from finished(lambda: words[-1] == verdict.word(suzanne()) == verdict.PASS)  # at once, without the mouse
+    screenshot("8 checked and passed")
+    suzanne().tolvol.tolerance_percent = 0.5
+    yield from finished(lambda: words[-1] == verdict.FAIL)
+    legend.draw = draw
     measured = suzanne().tolvol.measurement
     assert (
         not verdict.of(suzanne()).forward_within and 0.05 < measured.forward < 0.2 and 0 < measured.share_outside < 0.2

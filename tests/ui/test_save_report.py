@@ -23,7 +23,7 @@ def test_save_report_by_mouse():
     with tempfile.TemporaryDirectory() as folder:
         os.environ["HOME"] = folder
         try:
-            yield from press("tolvol.save_report")
+            yield from press("tolvol.save_report", across=0.7)
             yield 1.0
             screenshot("14 file browser")
             xdotool("mousemove", 640, 400)
@@ -47,7 +47,7 @@ def test_escape_in_the_file_browser_of_save_report():
     ended, cancel = [], TOLVOL_OT_save_report.cancel
     TOLVOL_OT_save_report.cancel = lambda operator, context: ended.append(cancel(operator, context))
     try:
-        yield from press("tolvol.save_report")
+        yield from press("tolvol.save_report", across=0.7)
         yield 1.0
         xdotool("mousemove", 640, 400)
         yield

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""There is one verdict, and everything that is shown says the same."""
+
+import ast
+import csv
+import io
+import json
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.mesh import mesh_io
+from addon.proof import verdict
+from addon.proof.verdict import FAIL, NOT_CHECKED, PASS, Interval, Verdict
+from scenes import sheet, torus
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def judged(forward, backward, tolerance=1.0, **options):
+    return Verdict(tolerance, Interval(*forward), Interval(*backward), **options)
+
+
+@pytest.mark.parametrize(
+    ("forward", "backward", "both", "one", "ways"),
+    (
+        ((0.8, 0.9), (0.7, 1.0), PASS, PASS, ("both ways, proved", "one way, proved")),
+        ((0.8, 0.9), (1.1, 1.2), FAIL, PASS, ("the reference", "one way, proved")),
+        ((1.1, 1.2), (0.8, 0.9), FAIL, FAIL, ("the mesh", "the mesh")),
+        ((1.1, 1.2), (1.1, 1.2), FAIL, FAIL, ("both ways", "one way")),
+        ((0.9, 1.0 + 1e-15), (0.8, 0.9), FAIL, FAIL, ("the mesh", "the mesh")),  # not decided
+    ),
+)
+def test_the_word_is_about_the_directions_that_have_to_be_kept(forward, backward, both, one, ways):
+    found = judged(forward, backward), judged(forward, backward, two_sided=False)
+    assert [verdict.word for verdict in found] == [both, one]
+    assert tuple(verdict.ways for verdict in found) == ways
+
+
+def test_the_margin_never_looks_better_than_it_is():
+    assert judged((0, 0.98765), (0, 0.5)).margin_percent() == "1.23 %"
+    assert judged((0, 1.23451), (0, 0.5)).margin_percent() == "23.5 %"
+    assert judged((0, 0.5), (0, 0.98765), two_sided=False).margin_percent() == "50.0 %"
+    assert judged((0, 1), (0, 1)).margin_percent() == "0 %"
+    assert judged((0, 0), (0, 0)).margin_percent() == "100 %"
+    assert judged((1, 1.5), (0, 0)).margin == -0.5
+    assert judged((1.2, 1.5), (0, 0)).surely_beyond and not judged((0.9, 1.5), (0, 0)).surely_beyond
+    assert judged((0, 0), (1.2, 1.5)).surely_beyond
+    assert not judged((0, 0), (1.2, 1.5), two_sided=False).surely_beyond
+
+
+def shifted(length=0.1):
+    """A sheet that was moved up by `length` after its reference was set; a part of the reference is not there any more."""
+    ob = sheet(bumps=0.0)
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    for vertex in ob.data.vertices:
+        vertex.co.z += length
+    ob.data.update()
+    bpy.context.view_layer.update()
+    ob.tolvol.tolerance_mode = "LENGTH"
+    return ob
+
+
+@pytest.mark.parametrize(("tolerance", "word"), ((0.2, PASS), (0.05, FAIL)))
+def test_check_report_and_select_outside_say_the_same(tolerance, word, tmp_path, capfd):
+    ob = shifted()
+    ob.tolvol.tolerance_length = tolerance
+    assert verdict.word(ob) == NOT_CHECKED
+    assert bpy.ops.tolvol.check() == {"FINISHED"}
+    assert f"{word}: " in capfd.readouterr().out and verdict.word(ob) == word
+    for extension in ("json", "csv", "html"):
+        assert bpy.ops.tolvol.save_report(filepath=str(tmp_path / f"report.{extension}")) == {"FINISHED"}
+        assert f"{word}: saved" in capfd.readouterr().out
+    assert json.loads((tmp_path / "report.json").read_text())["verdict"] == word
+    rows = list(csv.reader(io.StringIO((tmp_path / "report.csv").read_text())))
+    assert ["", "verdict", "", word, "", ""] in rows
+    page = (tmp_path / "report.html").read_text()
+    assert f"{word}. " in page and {PASS: FAIL, FAIL: PASS}[word] not in page
+    ob.data.vertices[0].co.z += 1e-6
+    ob.data.update()
+    bpy.context.view_layer.update()
+    assert verdict.word(ob) == NOT_CHECKED  # What is known is about another state of the mesh.
+    assert bpy.ops.tolvol.select_outside() == {"FINISHED"}
+    assert word in capfd.readouterr().out
+    if word == FAIL:
+        assert ob.mode == "EDIT" and verdict.word(ob) == NOT_CHECKED
+        bpy.ops.object.mode_set(mode="OBJECT")
+    assert verdict.word(ob) == word  # Select Outside has measured both ways.
+
+
+def test_one_way_is_enough_only_if_it_was_asked_for(tmp_path, capfd):
+    ob = sheet(bumps=0.0)
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    mesh_io.select_faces(ob.data, np.arange(len(ob.data.polygons)) < 200)
+    bpy.context.tool_settings.mesh_select_mode = (False, False, True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.delete(type="FACE")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert len(ob.data.polygons) == 700
+    said = {}
+    for keep in ("BOTH", "ONE"):
+        ob.tolvol.keep = keep
+        assert bpy.ops.tolvol.check() == {"FINISHED"}
+        assert bpy.ops.tolvol.save_report(filepath=str(tmp_path / f"{keep}.json")) == {"FINISHED"}
+        stored = json.loads((tmp_path / f"{keep}.json").read_text())
+        said[keep] = verdict.word(ob), stored["verdict"], stored["two_sided"]
+    assert said == {"BOTH": (FAIL, FAIL, True), "ONE": (PASS, PASS, False)}
+    # No new measurement is needed to change the mind.
+    ob.tolvol.keep = "BOTH"
+    assert verdict.word(ob) == FAIL
+    capfd.readouterr()
+    assert bpy.ops.tolvol.select_outside() == {"FINISHED"}
+    assert "No face of the mesh is outside. FAIL" in capfd.readouterr().out and ob.mode == "OBJECT"
+
+
+def test_operations_begin_their_message_with_the_word(capfd):
+    ob = torus()
+    assert bpy.ops.tolvol.decimate() == {"FINISHED"}
+    assert "PASS: 2,304 -> " in capfd.readouterr().out
+    assert bpy.ops.tolvol.smooth() == {"FINISHED"}
+    assert "PASS: " in capfd.readouterr().out and verdict.word(ob) == PASS
+
+
+# Comparisons with a tolerance that decide something else: (file, a part of the line).
+_OTHERS = {
+    ("addon/proof/certify.py", "Verdict.INSIDE"),  # the native check of single triangles
+    ("addon/overlay/field.py", "_FINEST"),  # whether colours can show the tolerance
+    ("addon/proof/deviation_page.py", "abs(lower)"),  # the bars of the histogram that are striped
+    ("blender_scripts/decimate.py", "tolerance > size"),  # an argument that makes no sense
+    ("blender_scripts/decimate.py", "left <= target"),  # numbers of triangles
+}
+
+
+def test_nothing_else_compares_a_distance_with_the_tolerance():
+    found = set()
+    for path in [*ROOT.glob("addon/**/*.py"), *ROOT.glob("blender_scripts/*.py")]:
+        name = path.relative_to(ROOT).as_posix()
+        if name == "addon/proof/verdict.py":
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.Compare):
+                continue
+            ordered = any(isinstance(op, (ast.Lt, ast.LtE, ast.Gt, ast.GtE)) for op in node.ops)
+            text = ast.unparse(node)
+            about = any(word in text for word in ("tolerance", "bound", ".upper", ".lower", "forward", "backward"))
+            if ordered and about and not any(name == other and part in text for other, part in _OTHERS):
+                found.add((name, text))
+    assert not found
