@@ -335,6 +335,7 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     guard: PointerProperty(type=TOLVOL_PG_guard)
 
     measurement: PointerProperty(type=TOLVOL_PG_measurement)
+    warnings: StringProperty(description="The warnings of the last operation, as JSON")
     last_run: StringProperty(description="The report of the last decimation, as JSON")
     last_run_of: StringProperty(description="The fingerprint of the mesh that the last decimation left")
 

@@ -72,13 +72,23 @@ def triangles_at(mesh, vertices):
 
 def select_faces(mesh, chosen):
     """Selects the chosen faces and no other element, in Object Mode. chosen: (polygons,) bool."""
+    _deselect(mesh)
+    mesh.polygons.foreach_set("select", chosen)
+
+
+def select_vertices(mesh, chosen):
+    """Selects the chosen vertices and no other element, in Object Mode. chosen: (vertices,) bool."""
+    _deselect(mesh)
+    mesh.vertices.foreach_set("select", chosen)
+
+
+def _deselect(mesh):
     if bpy.app.version >= (5, 0) and (attribute := mesh.attributes.get(".select_edge")):
         # Blender 5.0 crashes when the selection of edges is written while this attribute exists. Removing the attribute
         # deselects all edges.
         mesh.attributes.remove(attribute)
-    for elements in (mesh.vertices, mesh.edges):
+    for elements in (mesh.vertices, mesh.edges, mesh.polygons):
         elements.foreach_set("select", np.zeros(len(elements), bool))
-    mesh.polygons.foreach_set("select", chosen)
 
 
 def move_vertices(mesh, before, after):

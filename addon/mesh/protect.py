@@ -4,6 +4,7 @@
 import bpy
 import numpy as np
 
+from .. import native
 from ..errors import Refused
 from . import mesh_io
 from .mesh_io import column
@@ -45,6 +46,20 @@ def on_planes(mesh, axes):
     coordinates = np.abs(column(mesh.vertices, "co", 3))
     near = coordinates <= _ON_PLANE * coordinates.max(initial=0.0)
     return near[:, ["XYZ".index(axis) for axis in axes]].any(1)
+
+
+def where_islands_meet(arrays, uvs):
+    """Returns (n,) bool: the vertices at which three or more UV islands meet. Decimation has to keep them.
+
+    arrays: the MeshArrays of the mesh; uvs: its corner_uvs().
+    """
+    return meeting(arrays.triangles, native.module.wedges(arrays.triangles, uvs[arrays.corners]), len(arrays.vertices))
+
+
+def meeting(triangles, wedges, count):
+    """Does the same for wedges that are known: (m, 3), the wedge at each corner of the triangles of `count` vertices."""
+    _, one_corner_each = np.unique(wedges, return_index=True)
+    return np.bincount(triangles.ravel()[one_corner_each], minlength=count) > 2
 
 
 def group_weights(ob, name, invert):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Registers the operators in bpy.ops.tolvol: set_tolerance, set_reference, clear_reference, show_original,
-restore_original, new_original, check, select_outside, select_crossing, save_report, decimate, smooth, apply_modifier,
-fit_modifier and deform."""
+restore_original, new_original, check, select_outside, select_crossing, select_staying, save_report, decimate, smooth,
+apply_modifier, fit_modifier and deform."""
 
 import bpy
 
@@ -16,6 +16,7 @@ from .presets import TOLVOL_MT_tolerances, TOLVOL_OT_set_tolerance
 from .reference import TOLVOL_OT_clear_reference, TOLVOL_OT_set_reference
 from .report import TOLVOL_OT_save_report
 from .smooth import TOLVOL_OT_smooth
+from .staying import TOLVOL_OT_select_staying
 
 _CLASSES = (
     TOLVOL_OT_set_tolerance,
@@ -28,6 +29,7 @@ _CLASSES = (
     TOLVOL_OT_check,
     TOLVOL_OT_select_outside,
     TOLVOL_OT_select_crossing,
+    TOLVOL_OT_select_staying,
     TOLVOL_OT_save_report,
     TOLVOL_OT_decimate,
     TOLVOL_OT_smooth,

@@ -16,6 +16,7 @@ from ..proof.certify import outside
 from ..proof.verdict import BEYOND, ONE_WAY, WITHIN, Verdict
 from ..reference import measurements, snapshots, tolerances
 from .blocked import allowed, check_blocked
+from .staying import show_selected
 
 
 class Comparison(JobOperator):
@@ -109,6 +110,5 @@ reference, and bring them into view"""
             self.report({"INFO" if found.passed else "WARNING"}, f"No face of the mesh is outside. {said(found)}")
             return
         mesh_io.select_faces(mesh, faces)
-        context.tool_settings.mesh_select_mode = (False, False, True)
-        bpy.ops.object.mode_set(mode="EDIT")
+        show_selected(context, (False, False, True))
         self.report({"WARNING"}, f"{found.word}: {faces.sum():,} of {len(faces):,} faces are outside")

@@ -13,6 +13,7 @@ from ..mesh import mesh_io
 from ..proof.solidity import MOST_PAIRS
 from ..reference import snapshots
 from .blocked import allowed, object_blocked
+from .staying import show_selected
 
 
 class TOLVOL_OT_select_crossing(JobOperator, bpy.types.Operator):
@@ -55,6 +56,5 @@ corners and edges that they share"""
             self.report({"INFO"}, "No faces cross")
             return
         mesh_io.select_faces(mesh, faces)
-        context.tool_settings.mesh_select_mode = (False, False, True)
-        bpy.ops.object.mode_set(mode="EDIT")
+        show_selected(context, (False, False, True))
         self.report({"WARNING"}, f"{faces.sum():,} of {len(faces):,} faces cross others")

@@ -16,7 +16,7 @@ from ..errors import NotProved, Refused
 from ..job import JobOperator, run_all
 from ..mesh import filling, mesh_io, protect, transfer
 from ..operation_settings import PROTECTED, decimate_settings
-from ..proof import measure, report, solidity, verdict
+from ..proof import kept_warnings, measure, report, solidity, verdict
 from ..proof.certify import certify
 from ..properties import PLACEMENTS, automatic_placement, tolerance_settings
 from ..reference import measurements, snapshots, tolerances, volumes
@@ -181,6 +181,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         measurements.remember(ob, snapshots.surface_of(ob), run, run["tolerance"]["absolute"])
         ob.tolvol.last_run_of = ob.tolvol.measurement.fingerprint
         ob.tolvol.last_run = json.dumps(run)
+        kept_warnings.keep(ob, "decimate", run["warnings"], run["locked"])
         for warning in run["warnings"]:
             self.report({"WARNING"}, prefix + warning)
         self.report({"INFO"}, f"{prefix}{verdict.word(ob)}: {report.line(run)}")
@@ -306,10 +307,9 @@ class _Task:
     def _name_corners(self, run, triangles, wedges):
         """Counts the vertices where three or more UV islands meet. They have to stay, so a UV map of many islands leaves
         little to decimate: the run warns of that."""
-        _, one_corner_each = np.unique(wedges, return_index=True)
-        meeting = int((np.bincount(triangles.ravel()[one_corner_each]) > 2).sum())
+        meeting = int(protect.meeting(triangles, wedges, 0).sum())
         if meeting:
-            run["locked"]["UV islands meet"] = meeting
+            run["locked"][kept_warnings.ISLANDS] = meeting
         vertices = len(np.unique(triangles))
         if 2 * meeting > vertices:
             run["warnings"].append(

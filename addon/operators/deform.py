@@ -9,6 +9,7 @@ from .. import native, preferences
 from ..errors import Refused
 from ..job import JobOperator
 from ..mesh import mesh_io
+from ..proof import kept_warnings
 from ..properties import DEFORM_MODES
 from .blocked import allowed, decimate_blocked
 from .motion import Motion
@@ -93,7 +94,9 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
         certified = motion.settle(result.vertices, certified)
         motion.write(ob, result.vertices, certified)
         ob.tolvol.lattice, ob.tolvol.deform_mode = bpy.data.objects[self.lattice], self.mode
-        for warning in (*run["warnings"], *_twice(ob)):
+        warnings = [*run["warnings"], *_twice(ob)]
+        kept_warnings.keep(ob, "deform", warnings)
+        for warning in warnings:
             self.report({"WARNING"}, warning)
         self.report({"INFO"}, motion.line(_remarks(result), certified))
 

@@ -16,7 +16,7 @@ from ..mesh import mesh_io
 from ..mesh.evaluation import Evaluation, same_faces
 from ..mesh.mesh_io import column
 from ..operation_settings import modifier_settings
-from ..proof import measure, report
+from ..proof import kept_warnings, measure, report
 from ..proof.certify import certify
 from ..proof.verdict import Verdict
 from ..reference import measurements, snapshots, tolerances
@@ -146,6 +146,7 @@ moves as far as the tolerance permits. An object without a reference gets one fi
             self._add_key(ob, name, vertices)
         else:
             motion.write(ob, vertices, certified)
+        kept_warnings.keep(ob, "apply_modifier", [])
         self.report({"INFO"}, f"{name}: {motion.line(motion.moved(vertices, wished), certified)}")
 
     @staticmethod
@@ -233,6 +234,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         ob.data = mesh
         bpy.data.meshes.remove(before)
         mesh.name = name
+        kept_warnings.keep(ob, "fit_modifier", [])
         measurements.remember(ob, snapshots.surface_of(ob), certified, trial.tolerance)
 
 

@@ -199,7 +199,7 @@ normals. The present mesh and all edits of it are discarded, after a question"""
         ob.data = mesh
         bpy.data.meshes.remove(before)  # mesh_blocked() has seen to it that no other object has this mesh.
         mesh.name = name
-        ob.tolvol.last_run = ob.tolvol.last_run_of = ""
+        ob.tolvol.last_run = ob.tolvol.last_run_of = ob.tolvol.warnings = ""
         snapshots.notify()
         self.report({"INFO"}, f"{ob.name} is the original again: {len(mesh.polygons):,} faces")
         return {"FINISHED"}

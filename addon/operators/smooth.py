@@ -12,6 +12,7 @@ from ..errors import Refused
 from ..job import JobOperator, run_all
 from ..mesh import mesh_io, protect
 from ..operation_settings import smooth_settings
+from ..proof import kept_warnings
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
 from .motion import Motion
@@ -97,6 +98,7 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
         for (ob, motion, vertices, run, _), certified in zip(moved, proved):
             motion.write(ob, vertices, certified)
             shared.give(self, ob.tolvol.smooth, smooth_settings())
+            kept_warnings.keep(ob, "smooth", run["warnings"])
             self._say(motion, vertices, run, certified, f"{ob.name}: " if len(moved) > 1 else "")
 
     def _say(self, motion, vertices, run, certified, prefix):

@@ -4,7 +4,7 @@ import bpy
 from ..operators.decimate import draw_advanced_settings, draw_decimate_settings, draw_protect_settings, targets
 from ..proof import report
 from ..reference import measurements
-from .layout import SubPanel, active, say_blocked, text_lines
+from .layout import SubPanel, active, say_blocked, say_warnings, text_lines
 
 
 class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
@@ -25,6 +25,7 @@ class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
             if lines is None:
                 damaged = "The report of the last run is damaged: decimate again to get a new one"
                 text_lines(context, layout, damaged, "ERROR")
+        say_warnings(context, layout, ob, "decimate")
         say_blocked(context, layout, ob)
 
 

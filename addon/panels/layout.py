@@ -7,6 +7,7 @@ import bpy
 from .. import native
 from ..operators import blocked
 from ..operators.original import active
+from ..proof import kept_warnings
 
 _FONT = 0  # Blender's own
 # Pixels of the sidebar's width that tabs, margins and the icon take from the text of a label.
@@ -61,3 +62,15 @@ def say_blocked(context, layout, ob):
     reason = blocked.decimate_blocked(ob)
     if reason and reason not in (blocked.object_blocked(ob), blocked.reference_blocked(ob), blocked.check_blocked(ob)):
         text_lines(context, layout, reason, "ERROR")
+
+
+def say_warnings(context, layout, ob, operation):
+    """Shows the warnings of `operation` if it was the last one on the object, and selects the vertices that are known."""
+    warnings, staying = kept_warnings.of(ob, operation)
+    for warning in warnings:
+        text_lines(context, layout, warning, "ERROR")
+    known = {kept_warnings.ISLANDS, kept_warnings.ASKED_FOR}
+    if others := [f"{count:,} by {cause}" for cause, count in staying.items() if cause not in known]:
+        text_lines(context, layout, f"Vertices that had to stay: {', '.join(others)}", "INFO")
+    if count := staying.get(kept_warnings.ISLANDS):
+        layout.operator("tolvol.select_staying", text=f"Select {count:,} Staying Vertices")
