@@ -17,6 +17,21 @@ def length(context, value):
     return f"{value:.3g}"
 
 
+def area(context, value):
+    """Returns an area of the world as text in the scene's units."""
+    units = context.scene.unit_settings
+    if units.system == "NONE":
+        return f"{value:.3g}"
+    return bpy.utils.units.to_string(units.system, "AREA", value * units.scale_length**2, precision=3).replace(
+        " ", NO_BREAK
+    )
+
+
+def three_digits(value):
+    """Returns a number with three digits, and one from 1000 on with all digits before the point."""
+    return f"{value:,.0f}" if value >= 999.5 else f"{value:#.3g}".rstrip(".")
+
+
 def shortest(value):
     """Returns the shortest decimal number that rounds to the float32 `value`: the number that the user typed."""
     return float(str(np.float32(value)))

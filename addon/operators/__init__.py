@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Registers the operators in bpy.ops.tolvol: set_tolerance, set_reference, clear_reference, show_original,
-restore_original, new_original, check, select_outside, select_crossing, select_staying, save_report, decimate, smooth,
-apply_modifier, fit_modifier and deform."""
+restore_original, new_original, check, select_outside, worst_point, next_place, clear_places, select_crossing,
+select_staying, save_report, decimate, smooth, apply_modifier, fit_modifier and deform."""
 
 import bpy
 
@@ -12,6 +12,7 @@ from .decimate import TOLVOL_OT_decimate
 from .deform import TOLVOL_OT_deform
 from .modifiers import TOLVOL_OT_apply_modifier, TOLVOL_OT_fit_modifier
 from .original import TOLVOL_OT_new_original, TOLVOL_OT_restore_original, TOLVOL_OT_show_original
+from .places import TOLVOL_OT_clear_places, TOLVOL_OT_next_place, TOLVOL_OT_worst_point
 from .presets import TOLVOL_MT_tolerances, TOLVOL_OT_set_tolerance
 from .reference import TOLVOL_OT_clear_reference, TOLVOL_OT_set_reference
 from .report import TOLVOL_OT_save_report
@@ -28,6 +29,9 @@ _CLASSES = (
     TOLVOL_OT_new_original,
     TOLVOL_OT_check,
     TOLVOL_OT_select_outside,
+    TOLVOL_OT_worst_point,
+    TOLVOL_OT_next_place,
+    TOLVOL_OT_clear_places,
     TOLVOL_OT_select_crossing,
     TOLVOL_OT_select_staying,
     TOLVOL_OT_save_report,

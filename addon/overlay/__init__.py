@@ -11,9 +11,10 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .. import native, preferences
+from ..proof import places
 from ..redraw import redraw_views
 from ..reference import snapshots
-from . import draw, field, legend, reasons, shaders, shares, work
+from . import draw, field, legend, markers, reasons, shaders, shares, work
 from .surface import Surface
 
 _surfaces = {}  # name of an object that shows its deviation -> Surface
@@ -119,9 +120,13 @@ def _note_frame(*_):
 
 def register():
     snapshots.listeners.append(refresh)
+    places.listeners.append(markers.refresh)
 
 
 def unregister():
+    places.forget()
+    places.listeners.remove(markers.refresh)
+    markers.end()
     snapshots.listeners.remove(refresh)
     _end()
     reasons.broken.clear()

@@ -41,7 +41,7 @@ def free():
     _unit_square = None
 
 
-class _Page:
+class Page:
     """Draws rectangles and text. Coordinates are in pixels of the region, with y upwards."""
 
     def __init__(self, context, signed):
@@ -91,7 +91,7 @@ def draw(context, heading, note, word, signed, tolerance, shares):
     shares: the shares of the surface in the four bands from the lowest colour on and beyond the tolerance; None while
     they are not known.
     """
-    page = _Page(context, signed)
+    page = Page(context, signed)
     scale = page.scale
     lowest = -tolerance if signed else 0.0
     labels = [(part, _label(context, lowest + part * (tolerance - lowest), signed)) for part in (0, 0.5, 1)]
@@ -132,7 +132,7 @@ def draw(context, heading, note, word, signed, tolerance, shares):
 
 def draw_note(context, text):
     """Draws one line of text in place of the legend."""
-    page = _Page(context, True)
+    page = Page(context, True)
     gap = _GAP * page.scale
     width, height = width_of(text) + 2 * gap, _ROW * page.scale + gap
     if place := _corner(context, width, height, _MARGIN * page.scale):
@@ -157,11 +157,8 @@ def percent(share):
     return f"{percent:.1f}{NO_BREAK}%"
 
 
-def _corner(context, width, height, margin):
-    """Returns left and bottom of a box in the lower right corner of the view that no other region covers.
-
-    Returns None if there is no room for the box.
-    """
+def free_part(context):
+    """Returns (right, bottom): the edges of the part of the view that no other region covers, in pixels of the region."""
     region, right, bottom = context.region, context.region.width, 0
     for other in context.area.regions:
         if other == region or other.width <= 1 or other.height <= 1:
@@ -170,5 +167,14 @@ def _corner(context, width, height, margin):
             right = min(right, other.x - region.x)
         elif other.alignment == "BOTTOM" and other.y <= region.y + bottom:
             bottom = max(bottom, other.y + other.height - region.y)
+    return right, bottom
+
+
+def _corner(context, width, height, margin):
+    """Returns left and bottom of a box in the lower right corner of the free part of the view.
+
+    Returns None if there is no room for the box.
+    """
+    right, bottom = free_part(context)
     left, bottom = right - width - margin, bottom + margin
-    return (left, bottom) if left >= margin and bottom + height + margin <= region.height else None
+    return (left, bottom) if left >= margin and bottom + height + margin <= context.region.height else None

@@ -22,6 +22,11 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         row.operator("tolvol.check")
         row.operator("tolvol.select_outside")
         row = layout.row(align=True)
+        row.operator("tolvol.worst_point")
+        for back, icon in ((True, "TRIA_LEFT"), (False, "TRIA_RIGHT")):
+            row.operator("tolvol.next_place", text="", icon=icon).back = back
+        row.operator("tolvol.clear_places", text="", icon="X")
+        row = layout.row(align=True)
         row.operator("tolvol.select_crossing", text="Crossing Faces")
         row.operator("tolvol.save_report", text="Save Report...")
         # What may need several lines is below the buttons, so that they do not move.

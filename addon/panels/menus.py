@@ -6,7 +6,7 @@ import bpy
 # All operators are in this menu, because Blender's menu search (F3) finds only entries of menus.
 _IN_OBJECT_MENU = (
     *("set_reference", "clear_reference", "restore_original", "new_original"),
-    *("check", "select_outside", "select_crossing", "select_staying", "save_report"),
+    *("check", "worst_point", "select_outside", "select_crossing", "select_staying", "save_report"),
     *("decimate", "smooth", "apply_modifier", "fit_modifier", "deform"),
 )
 

@@ -8,6 +8,7 @@ import json
 import math
 
 from .. import native
+from ..units import three_digits
 from . import solidity
 from .verdict import Interval
 
@@ -182,7 +183,7 @@ def percent(value, whole):
         return f"{100 + math.ceil(excess * 10**digits - 1e-4) / 10**digits:.{digits}f} %"
     step = 10.0 ** (math.floor(math.log10(share)) - 2)
     # An excess of less than a ten-thousandth of the last digit is not rounded up: rounding 1 % to float32 makes such one.
-    return f"{math.ceil(share / step - 1e-4) * step:#.3g}".rstrip(".") + " %"
+    return three_digits(math.ceil(share / step - 1e-4) * step) + " %"
 
 
 def duration(seconds):

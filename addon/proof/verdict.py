@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 from ..reference import measurements, tolerances
-from ..units import NO_BREAK
+from ..units import NO_BREAK, three_digits
 
 # The words for the outcome that are shown everywhere.
 PASS, FAIL, NOT_CHECKED = "PASS", "FAIL", "NOT CHECKED"
@@ -91,7 +91,7 @@ class Verdict:
         if not share:
             return "0 %"
         step = 10.0 ** (math.floor(math.log10(share)) - 2)
-        return f"{(math.floor if self.passed else math.ceil)(share / step) * step:#.3g}".rstrip(".") + " %"
+        return three_digits((math.floor if self.passed else math.ceil)(share / step) * step) + " %"
 
     @property
     def forward_within(self):

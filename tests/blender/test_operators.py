@@ -273,6 +273,11 @@ def test_a_measurement_that_cannot_be_read_is_none():
 def test_a_little_more_than_the_tolerance_is_not_shown_as_a_percent_more():
     assert report.percent(1 + 4.75e-8, 1) == "100.0000048 %"
     assert report.percent(1.005, 1) == "100.50 %"
+
+
+def test_large_percentages_have_all_their_digits():
+    assert report.percent(30.391, 1) == "3,040 %" and report.percent(9.998, 1) == "1,000 %"
+    assert report.percent(9.98, 1) == "998 %"
     assert report.percent(1 + 1e-13, 1) == "100 %" == report.percent(0.99999, 1)
 
 

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Goes through the places where the mesh and its reference are farthest from each other."""
+
+import bpy
+from bpy.props import BoolProperty
+from mathutils import Vector
+
+from ..proof import places, report
+from ..reference import snapshots, tolerances
+from ..units import area, length
+from .blocked import allowed
+from .check import Comparison
+
+# A place fills about this share of the view or less: what is around has to be seen, too.
+_AROUND = 3.0
+_LEAST = 0.2  # of the size of the reference
+# The view is turned unless the surface at the place looks at the eye at least so much (a cosine).
+_FACING = 0.3
+
+
+def described(context, ob):
+    """Returns what is known about the present place as lines of text, or [] if none is shown."""
+    found, at, regions = places.shown(ob)
+    if not found:
+        return []
+    place = found[at]
+    tolerance = tolerances.tolerance_length(ob.tolvol, snapshots.snapshot_size(ob))
+    where = "the reference" if place.on_reference else "the mesh"
+    lines = [
+        f"{at + 1} of {len(found)}, on {where}: {length(context, place.distance.upper)}, "
+        f"{report.percent(place.distance.upper, tolerance)} of the tolerance"
+    ]
+    if place.beyond:
+        faces = "1 triangle" if place.faces == 1 else f"{place.faces:,} triangles"
+        more = f"; {regions:,} regions in all" if regions > len(found) else ""
+        lines.append(f"Not proved to be within: {faces}, {area(context, place.area)}{more}")
+    else:
+        lines.append("Within the tolerance")
+    return lines
+
+
+def _frame(context, ob):
+    """Turns and moves the 3D view so that the present place is in its middle."""
+    space = context.space_data
+    if space is None or space.type != "VIEW_3D" or space.region_3d is None:
+        return
+    found, at, _ = places.shown(ob)
+    place, view = found[at], space.region_3d
+    if view.view_perspective == "CAMERA":
+        view.view_perspective = "PERSP"
+    normal = Vector(place.normal)
+    towards = view.view_rotation @ Vector((0, 0, 1))
+    if normal.length and not view.lock_rotation and normal.dot(towards) < _FACING:
+        view.view_rotation = normal.to_track_quat("Z", "Y")
+    view.view_location = Vector(place.position)
+    view.view_distance = max(_AROUND * place.radius, _LEAST * snapshots.snapshot_size(ob))
+
+
+class TOLVOL_OT_worst_point(Comparison, bpy.types.Operator):
+    """Measure as Check does, mark the places where the mesh or the reference is beyond the tolerance, or else nearest to it, \
+and bring the one with the largest distance into view"""
+
+    bl_idname = "tolvol.worst_point"
+    bl_label = "Worst Point"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def compare(self, surface, reference, tolerance, threads, progress):
+        found = self.judge(surface, reference, tolerance, threads, progress)
+        return surface, found, places.find(surface, reference, found, threads, progress)
+
+    def finish(self, context, outcome):
+        surface, found, (of_mesh, regions) = outcome
+        self.remember(surface, found)
+        places.show(self.ob, of_mesh, regions)
+        _frame(context, self.ob)
+        self.report({"INFO" if found.passed else "WARNING"}, f"{found.word}: {'. '.join(described(context, self.ob))}")
+
+
+class TOLVOL_OT_next_place(bpy.types.Operator):
+    """Bring the next of the marked places into view, in the order of their distances"""
+
+    bl_idname = "tolvol.next_place"
+    bl_label = "Next Place"
+
+    back: BoolProperty(name="Back", description="Go to the previous place", options={"SKIP_SAVE"})
+
+    @classmethod
+    def description(cls, _context, properties):
+        which = "previous" if properties.back else "next"
+        return f"Bring the {which} of the marked places into view, in the order of their distances"
+
+    @classmethod
+    def poll(cls, context):
+        return allowed(cls, None if places.shown(context.active_object)[0] else "Press Worst Point first")
+
+    def execute(self, context):
+        places.step(-1 if self.back else 1)
+        _frame(context, context.active_object)
+        self.report({"INFO"}, ". ".join(described(context, context.active_object)))
+        return {"FINISHED"}
+
+
+class TOLVOL_OT_clear_places(bpy.types.Operator):
+    """Remove the marks of the places from the 3D view"""
+
+    bl_idname = "tolvol.clear_places"
+    bl_label = "Clear Places"
+
+    @classmethod
+    def poll(cls, context):
+        return allowed(cls, None if places.shown(context.active_object)[0] else "No places are marked")
+
+    def execute(self, _context):
+        places.forget()
+        return {"FINISHED"}

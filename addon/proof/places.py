@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Finds the places where a mesh and its reference are farthest from each other, and keeps the ones that are shown.
+
+A place is a connected region of faces that are not proved to be within the tolerance. If there is none, the places are the
+vertices whose distance is larger than that of their neighbours, and the point with the largest distance.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..reference import measurements, snapshots, tolerances, volumes
+from . import certify, measure
+from .verdict import Interval
+
+# So many places are measured in each direction; further regions are counted.
+MOST = 50
+# So many vertices near to the limit are shown in each direction.
+_NEAREST = 10
+
+
+@dataclass(frozen=True)
+class Place:
+    on_reference: bool  # whether it is on the reference or on the mesh
+    beyond: bool  # whether it is a region that is not proved to be within the tolerance
+    distance: Interval  # the largest distance in the region
+    position: np.ndarray  # (3,) the point of the largest distance, in the world
+    normal: np.ndarray  # (3,) of the surface there; it is 0 where the surface has none
+    radius: float  # the distance of the farthest corner of the region from the position
+    area: float  # of the region, in the world
+    faces: int  # the number of triangles of the region
+
+
+def find(surface, reference, found, threads=None, progress=None):
+    """Returns (places, number of regions beyond), the places by their distance, the largest first.
+
+    surface, reference: Surfaces; found: the Verdict on them. If any direction that counts is beyond the tolerance, the places
+    are all beyond it.
+    """
+    ways = [(False, surface, reference, found.forward)]
+    if found.two_sided:
+        ways.append((True, reference, surface, found.backward))
+    places, regions = [], 0
+    for on_reference, own, other, largest in ways:
+        if largest.within(found.tolerance) and found.passed:
+            places += _near(on_reference, own, other, largest, found.tolerance, threads, progress)
+        elif not largest.within(found.tolerance):
+            triangles = certify.outside(own, other, largest, found.tolerance, threads, progress)
+            beyond = _regions(own, np.flatnonzero(triangles))
+            regions += len(beyond)
+            places += _measured(on_reference, own, other, largest, beyond, found.tolerance, threads, progress)
+    return sorted(places, key=lambda place: -place.distance.upper), regions
+
+
+def _regions(surface, chosen):
+    """Groups the triangles with the indices `chosen` by the corners that they share. Returns a list of index arrays.
+
+    Corners at the same position are the same: the triangles of some files have vertices of their own.
+    """
+    arrays = surface.arrays
+    _, corners = np.unique(arrays.vertices[arrays.triangles[chosen]].reshape(-1, 3), axis=0, return_inverse=True)
+    corners = corners.reshape(-1, 3)
+    labels = np.arange(corners.max(initial=-1) + 1)
+    while True:
+        lowest = labels[corners].min(1)
+        following = labels.copy()
+        np.minimum.at(following, corners.ravel(), np.repeat(lowest, 3))
+        following = following[following]
+        if np.array_equal(following, labels):
+            break
+        labels = following
+    order = np.argsort(labels[corners[:, 0]], kind="stable")
+    _, starts = np.unique(labels[corners[:, 0]][order], return_index=True)
+    return np.split(chosen[order], starts[1:])
+
+
+def _measured(on_reference, own, other, largest, regions, tolerance, threads, progress):
+    """Returns the Places of the MOST regions with the largest distances at their corners."""
+    vertices, triangles = own.world(), own.arrays.triangles
+    target = other.world(), other.arrays.triangles
+    corners = np.unique(np.concatenate([triangles[region].ravel() for region in regions]))
+    distance = np.zeros(len(vertices))
+    distance[corners] = _distances(other, vertices[corners], tolerance, threads, progress)
+    regions = sorted(regions, key=lambda region: -distance[triangles[region]].max())
+    places = []
+    for region in regions[:MOST]:
+        measured = largest
+        if largest.triangle not in region:
+            measured = measure.largest_distance((vertices, triangles[region]), target, None, threads, progress)
+            measured = Interval(measured.lower, measured.upper, measured.position, int(region[measured.triangle]))
+        places.append(_place(on_reference, vertices, triangles, region, measured, True))
+    return places
+
+
+def _near(on_reference, own, other, largest, tolerance, threads, progress):
+    """Returns the Places where the distance has a local maximum."""
+    vertices, triangles = own.world(), own.arrays.triangles
+    used = np.unique(triangles)
+    distance = np.full(len(vertices), -np.inf)
+    distance[used] = _distances(other, vertices[used], tolerance, threads, progress)
+    # Of equal neighbours the one with the lowest index counts as the highest.
+    rank = np.empty(len(vertices), np.int64)
+    rank[np.lexsort((-np.arange(len(vertices)), distance))] = np.arange(len(vertices))
+    highest = np.zeros(len(vertices), np.int64)
+    np.maximum.at(highest, triangles.ravel(), np.repeat(rank[triangles].max(1), 3))
+    tops = used[highest[used] == rank[used]]
+    tops = tops[np.argsort(-rank[tops])][:_NEAREST]
+    first = np.full(len(vertices), -1)
+    first[triangles[::-1].ravel()] = np.repeat(np.arange(len(triangles))[::-1], 3)
+    places = [_place(on_reference, vertices, triangles, np.array([largest.triangle]), largest, False)]
+    for top in tops.tolist():
+        if distance[top] > 0 and top not in triangles[largest.triangle]:
+            exact = Interval(distance[top], distance[top], tuple(vertices[top]), int(first[top]))
+            places.append(_place(on_reference, vertices, triangles, np.array([first[top]]), exact, False))
+    return places
+
+
+def _distances(other, points, tolerance, threads, progress):
+    """Returns the exact distances of points in the world from the Surface `other`."""
+    built = volumes.native_volume(other, tolerance, threads, progress)
+    return built.distance(points, threads=threads, progress=progress)
+
+
+def _place(on_reference, vertices, triangles, region, distance, beyond):
+    corners = vertices[triangles[region]]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    a, b, c = vertices[triangles[distance.triangle]]
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal)
+    position = np.array(distance.position)
+    radius = np.linalg.norm(corners.reshape(-1, 3) - position, axis=1).max()
+    return Place(
+        on_reference,
+        beyond,
+        distance,
+        position,
+        normal / length if length else normal,
+        float(radius),
+        float(areas.sum()),
+        len(region),
+    )
+
+
+# What is shown --------------------------------------------------------------------------------------------------------
+
+# Functions that are called when other places are shown.
+listeners = []
+
+_name = None
+_state = None
+_places = []
+_regions_found = 0
+_at = 0
+
+
+def show(ob, places, regions):
+    """Shows the places of `ob`, the first of them as the present one."""
+    global _name, _state, _places, _regions_found, _at
+    _name, _state, _places, _regions_found, _at = ob.name, _state_of(ob), places, regions, 0
+    _notify()
+
+
+def forget():
+    global _places
+    if _places:
+        _places = []
+        _notify()
+
+
+def step(by):
+    """Makes the next place (by=1) or the previous one (by=-1) the present one, around the ends."""
+    global _at
+    _at = (_at + by) % len(_places)
+    _notify()
+
+
+def any_shown():
+    return bool(_places)
+
+
+def shown(ob):
+    """Returns (places, index of the present one, number of regions beyond) as far as they are still true of `ob`.
+
+    After a change of mesh, place, reference or tolerance there are none. It is quick enough to be called while drawing.
+    """
+    if not _places or ob is None or ob.name != _name or _state != _state_of(ob):
+        return [], 0, 0
+    return _places, _at, _regions_found
+
+
+def _state_of(ob):
+    if ob.mode != "OBJECT" or ob.tolvol.snapshot is None:
+        return None
+    settings = ob.tolvol
+    return (
+        measurements.shown_fingerprint(ob),
+        tuple(map(tuple, ob.matrix_world)),
+        settings.snapshot_fingerprint,
+        tuple(settings.snapshot_matrix),
+        settings.keep,
+        tolerances.tolerance_length(settings, snapshots.snapshot_size(ob)),
+    )
+
+
+def _notify():
+    for listener in listeners:
+        listener()
