@@ -6,7 +6,7 @@ import gpu
 from bpy.props import BoolProperty, FloatProperty, IntProperty
 
 from . import native
-from .reference import snapshots
+from .reference import snapshots, volumes
 
 # The tolerance of an object for which no other was chosen, in percent of the size.
 TOLERANCE = 0.5
@@ -47,7 +47,7 @@ class TOLVOL_AP_preferences(bpy.types.AddonPreferences):
         update=lambda _preferences, _context: snapshots.notify(),
     )
 
-    def draw(self, _context):
+    def draw(self, context):
         self.layout.use_property_split = True
         if native.module is None:
             self.layout.label(text=native.reason, icon="ERROR")
@@ -56,8 +56,20 @@ class TOLVOL_AP_preferences(bpy.types.AddonPreferences):
         self.layout.prop(self, "tolerance")
         self.layout.prop(self, "threads")
         self.layout.prop(self, "use_gl")
+        if text := _volume(context.active_object):
+            self.layout.label(text=text, icon="INFO")
         if not bpy.app.background:  # Without a window Blender crashes when it is asked for the renderer.
             self.layout.label(text=f"3D views are drawn by {gpu.platform.renderer_get()}", icon="INFO")
+
+
+def _volume(ob):
+    """Returns the cost of the tolerance volume of `ob` as text, or None if it has none in memory."""
+    if ob is None or ob.type != "MESH" or ob.tolvol.snapshot is None or not snapshots.sound(ob.tolvol.snapshot_size):
+        return None
+    built = volumes.built_of(ob)
+    if built is None:
+        return None
+    return f"The tolerance volume of {ob.name} took {built.seconds:.2f} s and has {built.memory / 1e6:.3g} MB"
 
 
 def _chosen(context, name, otherwise):

@@ -53,13 +53,14 @@ def where_islands_meet(arrays, uvs):
 
     arrays: the MeshArrays of the mesh; uvs: its corner_uvs().
     """
-    return meeting(arrays.triangles, native.module.wedges(arrays.triangles, uvs[arrays.corners]), len(arrays.vertices))
+    found = meeting(arrays.triangles, native.module.wedges(arrays.triangles, uvs[arrays.corners]))
+    return np.pad(found, (0, len(arrays.vertices) - len(found)))
 
 
-def meeting(triangles, wedges, count):
-    """Does the same for wedges that are known: (m, 3), the wedge at each corner of the triangles of `count` vertices."""
+def meeting(triangles, wedges):
+    """Does the same for wedges that are known: (m, 3), the wedge at each corner. Returns (k,) up to the last vertex in use."""
     _, one_corner_each = np.unique(wedges, return_index=True)
-    return np.bincount(triangles.ravel()[one_corner_each], minlength=count) > 2
+    return np.bincount(triangles.ravel()[one_corner_each]) > 2
 
 
 def group_weights(ob, name, invert):

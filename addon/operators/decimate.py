@@ -27,7 +27,6 @@ from .blocked import allowed, decimate_blocked
 def draw_decimate_settings(layout, settings):
     """Draws the settings of a decimation, for the panel and for Adjust Last Operation."""
     layout.prop(settings, "effort")
-    layout.prop(settings, "max_seconds")
     column = layout.column(align=True)
     column.use_property_split = False  # The names of the placements need the whole width.
     column.label(text="Placement")
@@ -38,13 +37,14 @@ def draw_decimate_settings(layout, settings):
     sub.active = settings.use_target
     sub.prop(settings, "target_triangles", text="")
     layout.row(heading="Holes").prop(settings, "close_holes", text="Close")
-    row = layout.row()
-    row.active = settings.close_holes
-    row.prop(settings, "largest_perimeter")
 
 
 def draw_advanced_settings(layout, settings):
     """Draws the settings of a decimation that hardly anybody changes, for the panel and for Adjust Last Operation."""
+    layout.prop(settings, "max_seconds")
+    row = layout.row()
+    row.active = settings.close_holes
+    row.prop(settings, "largest_perimeter")
     layout.prop(settings, "crossings")
     layout.prop(settings, "max_normal_angle")
 
@@ -181,7 +181,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         measurements.remember(ob, snapshots.surface_of(ob), run, run["tolerance"]["absolute"])
         ob.tolvol.last_run_of = ob.tolvol.measurement.fingerprint
         ob.tolvol.last_run = json.dumps(run)
-        kept_warnings.keep(ob, "decimate", run["warnings"], run["locked"])
+        kept_warnings.keep(ob, run["warnings"], run["locked"])
         for warning in run["warnings"]:
             self.report({"WARNING"}, prefix + warning)
         self.report({"INFO"}, f"{prefix}{verdict.word(ob)}: {report.line(run)}")
@@ -307,7 +307,7 @@ class _Task:
     def _name_corners(self, run, triangles, wedges):
         """Counts the vertices where three or more UV islands meet. They have to stay, so a UV map of many islands leaves
         little to decimate: the run warns of that."""
-        meeting = int(protect.meeting(triangles, wedges, 0).sum())
+        meeting = int(protect.meeting(triangles, wedges).sum())
         if meeting:
             run["locked"][kept_warnings.ISLANDS] = meeting
         vertices = len(np.unique(triangles))

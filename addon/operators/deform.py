@@ -95,7 +95,7 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
         motion.write(ob, result.vertices, certified)
         ob.tolvol.lattice, ob.tolvol.deform_mode = bpy.data.objects[self.lattice], self.mode
         warnings = [*run["warnings"], *_twice(ob)]
-        kept_warnings.keep(ob, "deform", warnings)
+        kept_warnings.keep(ob, warnings)
         for warning in warnings:
             self.report({"WARNING"}, warning)
         self.report({"INFO"}, motion.line(_remarks(result), certified))

@@ -146,7 +146,7 @@ moves as far as the tolerance permits. An object without a reference gets one fi
             self._add_key(ob, name, vertices)
         else:
             motion.write(ob, vertices, certified)
-        kept_warnings.keep(ob, "apply_modifier", [])
+        kept_warnings.keep(ob, [])
         self.report({"INFO"}, f"{name}: {motion.line(motion.moved(vertices, wished), certified)}")
 
     @staticmethod
@@ -234,7 +234,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         ob.data = mesh
         bpy.data.meshes.remove(before)
         mesh.name = name
-        kept_warnings.keep(ob, "fit_modifier", [])
+        kept_warnings.keep(ob, [])
         measurements.remember(ob, snapshots.surface_of(ob), certified, trial.tolerance)
 
 

@@ -98,7 +98,7 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
         for (ob, motion, vertices, run, _), certified in zip(moved, proved):
             motion.write(ob, vertices, certified)
             shared.give(self, ob.tolvol.smooth, smooth_settings())
-            kept_warnings.keep(ob, "smooth", run["warnings"])
+            kept_warnings.keep(ob, run["warnings"])
             self._say(motion, vertices, run, certified, f"{ob.name}: " if len(moved) > 1 else "")
 
     def _say(self, motion, vertices, run, certified, prefix):

@@ -18,6 +18,8 @@ _MARGIN = 14  # between the legend and the edges of the view
 _STRIPE = 12
 _WORD = 30  # the height of the line with the verdict
 _MARK = 16  # the coloured square beside the verdict
+# The legend has room in a view of which it takes at most these shares of the width and the height.
+_MOST_WIDTH, _MOST_HEIGHT = 0.5, 0.75
 _LARGE = 20  # points of the verdict
 # The colours of Blender's icons in the panel. The word beside them says the same without colours.
 _COLOURS = {PASS: (0.47, 0.8, 0.43), FAIL: (0.88, 0.38, 0.35), NOT_CHECKED: (0.6, 0.6, 0.6)}
@@ -104,7 +106,9 @@ def draw(context, heading, note, word, signed, tolerance, shares):
     width = max(width, page.width(word, _LARGE) + _MARK * scale + 3 * gap)
     height = 3 * row + _WORD * scale + bar_height + 4 * gap
     place = _corner(context, width, height, _MARGIN * scale)
-    if place is None:
+    right, low = free_part(context)
+    if place is None or width > _MOST_WIDTH * right or height > _MOST_HEIGHT * (context.region.height - low):
+        _draw_word(context, page, word)
         return
     left, bottom = place
     page.rectangle(left, bottom, width, height, shaders.FLAT, page.paper)
@@ -128,6 +132,17 @@ def draw(context, heading, note, word, signed, tolerance, shares):
     at, mark = top - row - _WORD * scale / 2, _MARK * scale
     page.rectangle(x, at - mark / 2, mark, mark, shaders.FLAT, (*_COLOURS[word], 1))
     page.text(x + mark + gap, at, word, points=_LARGE)
+
+
+def _draw_word(context, page, word):
+    """Draws the verdict alone where the legend has no room."""
+    gap, mark = _GAP * page.scale, _MARK * page.scale
+    width, height = page.width(word, _LARGE) + mark + 3 * gap, _WORD * page.scale
+    if place := _corner(context, width, height, _MARGIN * page.scale):
+        page.rectangle(*place, width, height, shaders.FLAT, page.paper)
+        x, y = place[0] + gap, place[1] + height / 2
+        page.rectangle(x, y - mark / 2, mark, mark, shaders.FLAT, (*_COLOURS[word], 1))
+        page.text(x + mark + gap, y, word, points=_LARGE)
 
 
 def draw_note(context, text):
@@ -177,4 +192,8 @@ def _corner(context, width, height, margin):
     """
     right, bottom = free_part(context)
     left, bottom = right - width - margin, bottom + margin
+    for other in context.area.regions:
+        # Adjust Last Operation lies in the lower left corner.
+        if other.type == "HUD" and other.width > 1 and other.x - context.region.x + other.width > left:
+            bottom = max(bottom, other.y - context.region.y + other.height)
     return (left, bottom) if left >= margin and bottom + height + margin <= context.region.height else None

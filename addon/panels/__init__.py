@@ -14,11 +14,11 @@ from .tolerance import TOLVOL_PT_tolerance
 
 _CLASSES = (
     TOLVOL_PT_tolerance,
-    TOLVOL_PT_deviation,
-    TOLVOL_PT_show_deviation,
     TOLVOL_PT_decimate,
     TOLVOL_PT_protect,
     TOLVOL_PT_advanced,
+    TOLVOL_PT_deviation,
+    TOLVOL_PT_show_deviation,
     TOLVOL_PT_smooth,
     TOLVOL_PT_modifiers,
     TOLVOL_PT_deform,

@@ -2,9 +2,7 @@
 import bpy
 
 from ..operators.decimate import draw_advanced_settings, draw_decimate_settings, draw_protect_settings, targets
-from ..proof import report
-from ..reference import measurements
-from .layout import SubPanel, active, say_blocked, say_warnings, text_lines
+from .layout import SubPanel, active, say_blocked
 
 
 class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
@@ -18,14 +16,6 @@ class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
         draw_decimate_settings(layout, ob.tolvol)
         count = len(targets(context))
         layout.operator("tolvol.decimate", text=f"Decimate {count} Objects" if count > 1 else "Decimate")
-        if ob.tolvol.last_run and ob.tolvol.last_run_of == measurements.shown_fingerprint(ob):
-            lines = report.remembered(ob.tolvol.last_run)
-            for line, icon in zip(lines or (), ("CHECKMARK", "MESH_DATA")):
-                text_lines(context, layout, line, icon)
-            if lines is None:
-                damaged = "The report of the last run is damaged: decimate again to get a new one"
-                text_lines(context, layout, damaged, "ERROR")
-        say_warnings(context, layout, ob, "decimate")
         say_blocked(context, layout, ob)
 
 

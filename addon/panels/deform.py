@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from .layout import SubPanel, active, say_blocked, say_warnings
+from .layout import SubPanel, active, say_blocked
 
 
 class TOLVOL_PT_deform(SubPanel, bpy.types.Panel):
@@ -16,5 +16,4 @@ class TOLVOL_PT_deform(SubPanel, bpy.types.Panel):
         layout.prop(settings, "lattice")
         layout.prop(settings, "deform_mode")
         layout.operator("tolvol.deform", text="Deform")
-        say_warnings(context, layout, active(context), "deform")
         say_blocked(context, layout, active(context))

@@ -5,9 +5,10 @@ import bpy
 
 from .. import overlay
 from ..overlay import reasons
-from ..proof import report, verdict
+from ..proof import kept_warnings, report, verdict
+from ..reference import measurements
 from ..units import length
-from .layout import AMBER, GREEN, GREY, RED, SubPanel, active, right, text_lines
+from .layout import AMBER, GREEN, GREY, RED, SubPanel, active, is_narrow, right, text_lines
 
 
 class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
@@ -29,44 +30,73 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("tolvol.select_crossing", text="Crossing Faces")
         row.operator("tolvol.save_report", text="Save Report...")
+        row = layout.row(align=True)
+        row.prop(context.window_manager, "tolvol_show_original", toggle=True)
+        row.operator("tolvol.restore_original", text="", icon="LOOP_BACK")
+        row.operator("tolvol.new_original", text="", icon="DUPLICATE")
         # What may need several lines is below the buttons, so that they do not move.
         if found is None:
             text_lines(context, layout, _why_not_checked(ob), GREY)
         elif found.kind != verdict.WITHIN:
             text_lines(context, layout, found.line(), AMBER if found.passed else RED)
+        if on_top := measurements.on_top(ob):
+            text_lines(context, layout, f"The proof is for the base mesh, without its {' and '.join(on_top)}", "INFO")
         if ob.tolvol.show_deviation and (reason := reasons.off()):
             text_lines(context, layout, f"The deviation is not shown: {reason}", "INFO")
+        _draw_last_run(context, layout, ob)
 
     def _draw_verdict(self, context, found):
         """Draws the same rows with and without a measurement."""
         box = self.layout.box()
+        narrow = is_narrow(context)
         row = box.row()
         row.scale_y, row.alert = 1.5, found is not None and not found.passed
         if found is None:
             row.label(text=verdict.NOT_CHECKED, icon=GREY)
         else:
-            row.label(text=f"{found.word}  {found.ways}", icon=GREEN if found.passed else RED)
+            row.label(text=found.word if narrow else f"{found.word}  {found.ways}", icon=GREEN if found.passed else RED)
         column = box.column(align=True)
         for text, side in (("Mesh", "forward"), ("Reference", "backward")):
             value = getattr(found, side).upper if found else None
-            _row(column, text, f"{length(context, value)}  {report.percent(value, found.tolerance)}" if found else None)
+            share = report.percent(value, found.tolerance) if found else None
+            _row(column, text, share if narrow or not found else f"{length(context, value)}  {share}", narrow)
         if found:
-            left = f"{length(context, abs(found.margin))}  {found.margin_percent()}"
+            left = found.margin_percent()
+            left = left if narrow else f"{length(context, abs(found.margin))}  {left}"
             name = "Margin" if found.passed else "Beyond by" if found.surely_beyond else "Unproved by"
-            _row(column, name, left)
+            _row(column, name, left, narrow)
         else:
-            _row(column, "Margin", None)
+            _row(column, "Margin", None, narrow)
 
 
-def _row(column, name, text):
-    row = column.split(factor=0.38)
+def _draw_last_run(context, layout, ob):
+    """Draws what is known about the last operation: until the mesh changes, but its warnings until the next operation."""
+    if ob.tolvol.last_run and ob.tolvol.last_run_of == measurements.shown_fingerprint(ob):
+        lines = report.remembered(ob.tolvol.last_run)
+        for line, icon in zip(lines or (), ("CHECKMARK", "MESH_DATA")):
+            text_lines(context, layout, line, icon)
+        if lines is None:
+            damaged = "The report of the last run is damaged: decimate again to get a new one"
+            text_lines(context, layout, damaged, "ERROR")
+    warnings, staying = kept_warnings.of(ob)
+    for warning in warnings:
+        text_lines(context, layout, warning, "ERROR")
+    known = {kept_warnings.ISLANDS, kept_warnings.ASKED_FOR}
+    if others := [f"{count:,} by {cause}" for cause, count in staying.items() if cause not in known]:
+        text_lines(context, layout, f"Vertices that had to stay: {', '.join(others)}", "INFO")
+    if count := staying.get(kept_warnings.ISLANDS):
+        layout.operator("tolvol.select_staying", text=f"Select {count:,} Staying Vertices")
+
+
+def _row(column, name, text, narrow):
+    row = column.split(factor=0.38 if not narrow else 0.55)
     row.label(text=name)
     right(row, text or "\u2013")
 
 
 def _why_not_checked(ob):
     if ob.mode != "OBJECT":
-        return "Measure in Object Mode"
+        return "Switch to Object Mode to measure or decimate"
     return "Press Check to measure it" if ob.tolvol.snapshot else "Set the reference first"
 
 

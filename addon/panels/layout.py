@@ -7,11 +7,12 @@ import bpy
 from .. import native
 from ..operators import blocked
 from ..operators.original import active
-from ..proof import kept_warnings
 
 _FONT = 0  # Blender's own
 # Pixels of the sidebar's width that tabs, margins and the icon take from the text of a label.
 _BESIDE_TEXT = 85
+# Pixels of the sidebar's width, tabs included, below which a row has room for one number.
+_NARROW = 215
 
 GREY = "RADIOBUT_OFF"
 # Blender's icons of coloured squares have other names in newer versions.
@@ -41,6 +42,11 @@ def right(layout, text):
     row.label(text=text)
 
 
+def is_narrow(context):
+    """Whether the sidebar has no room for a length beside its percentage."""
+    return context.region.width < _NARROW * context.preferences.system.ui_scale
+
+
 def text_lines(context, layout, text, icon):
     """Draws a label, broken into lines that fit the sidebar."""
     scale = context.preferences.system.ui_scale
@@ -58,19 +64,7 @@ def text_lines(context, layout, text, icon):
 
 
 def say_blocked(context, layout, ob):
-    """Says why the mesh cannot be changed, unless the reason is the reference or the mode: the top panel says that."""
+    """Says why the mesh cannot be changed, unless the reason is the reference or the mode: other panels say that."""
     reason = blocked.decimate_blocked(ob)
     if reason and reason not in (blocked.object_blocked(ob), blocked.reference_blocked(ob), blocked.check_blocked(ob)):
         text_lines(context, layout, reason, "ERROR")
-
-
-def say_warnings(context, layout, ob, operation):
-    """Shows the warnings of `operation` if it was the last one on the object, and selects the vertices that are known."""
-    warnings, staying = kept_warnings.of(ob, operation)
-    for warning in warnings:
-        text_lines(context, layout, warning, "ERROR")
-    known = {kept_warnings.ISLANDS, kept_warnings.ASKED_FOR}
-    if others := [f"{count:,} by {cause}" for cause, count in staying.items() if cause not in known]:
-        text_lines(context, layout, f"Vertices that had to stay: {', '.join(others)}", "INFO")
-    if count := staying.get(kept_warnings.ISLANDS):
-        layout.operator("tolvol.select_staying", text=f"Select {count:,} Staying Vertices")

@@ -2,7 +2,7 @@
 import bpy
 
 from ..operators.smooth import draw_smooth_settings
-from .layout import SubPanel, active, say_blocked, say_warnings
+from .layout import SubPanel, active, say_blocked
 
 
 class TOLVOL_PT_smooth(SubPanel, bpy.types.Panel):
@@ -16,5 +16,4 @@ class TOLVOL_PT_smooth(SubPanel, bpy.types.Panel):
         ob = active(context)
         draw_smooth_settings(layout, ob.tolvol.smooth, ob)
         layout.operator("tolvol.smooth", text="Smooth")
-        say_warnings(context, layout, ob, "smooth")
         say_blocked(context, layout, ob)

@@ -5,8 +5,8 @@ import bpy
 
 from .. import native
 from ..operators import blocked
-from ..reference import measurements, snapshots, tolerances, volumes
-from ..units import NO_BREAK, length
+from ..reference import measurements, snapshots, tolerances
+from ..units import length
 from .layout import AMBER, GREEN, GREY, RED, Panel, active, right, text_lines
 
 
@@ -39,14 +39,7 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
         row.operator("tolvol.set_reference", text="Replace Reference..." if settings.snapshot else "Set Reference")
         if settings.snapshot:
             row.operator("tolvol.clear_reference", text="", icon="X")
-            row = layout.row(align=True)
-            row.use_property_split = False
-            row.prop(context.window_manager, "tolvol_show_original", toggle=True)
-            row.operator("tolvol.restore_original", text="", icon="LOOP_BACK")
-            row.operator("tolvol.new_original", text="", icon="DUPLICATE")
         _status(context, layout, ob)
-        if on_top := measurements.on_top(ob):
-            text_lines(context, layout, f"The proof is for the base mesh, without its {' and '.join(on_top)}", "INFO")
 
     @staticmethod
     def _other_form(context, ob):
@@ -72,16 +65,4 @@ def _status(context, layout, ob):
     elif stale := snapshots.stale_reason(ob):
         text_lines(context, layout, f"The reference is out of date: {stale}", AMBER)
     else:
-        triangles = len(settings.snapshot.polygons)
-        tolerance = length(context, tolerances.tolerance_length(settings, settings.snapshot_size))
-        built = volumes.built_of(ob)
-        ready = f"ready in {built.seconds:.2f}{NO_BREAK}s, {_bytes(built.memory)}" if built else "computed when needed"
-        text_lines(context, layout, f"{triangles:,} triangles, ±{tolerance}, {ready}", GREEN)
-    # The reference is shown in every mode, because guards and overlay use it in other modes too.
-    if reason:
-        text = "Buttons other than Smooth need Object Mode" if ob.mode == "EDIT" else "Buttons need Object Mode"
-        text_lines(context, layout, text, "INFO")
-
-
-def _bytes(count):
-    return f"{count / 1e6:.3g}{NO_BREAK}MB"
+        text_lines(context, layout, f"{len(settings.snapshot.polygons):,} triangles", GREEN)

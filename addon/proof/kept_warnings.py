@@ -9,20 +9,18 @@ ISLANDS = "UV islands meet"
 ASKED_FOR = "asked for"
 
 
-def keep(ob, operation, warnings, staying=None):
+def keep(ob, warnings, staying=None):
     """Stores the warnings of an operation on `ob` in place of those of the operation before.
 
-    operation: the name of the operator. staying: {cause: number of vertices that had to stay}.
+    staying: {cause: number of vertices that had to stay}.
     """
-    ob.tolvol.warnings = json.dumps({"operation": operation, "warnings": warnings, "staying": staying or {}})
+    ob.tolvol.warnings = json.dumps({"warnings": warnings, "staying": staying or {}})
 
 
-def of(ob, operation):
-    """Returns (warnings, staying) if `operation` was the last one, else empty ones. A damaged file has none."""
+def of(ob):
+    """Returns (warnings, staying) of the last operation. A damaged file has none."""
     try:
-        kept = json.loads(ob.tolvol.warnings or "{}")
-        if kept.get("operation") != operation:
-            return [], {}
+        kept = json.loads(ob.tolvol.warnings or '{"warnings": [], "staying": {}}')
         warnings = [text for text in kept["warnings"] if isinstance(text, str)]
         return warnings, {str(cause): int(count) for cause, count in kept["staying"].items()}
     except (ValueError, TypeError, LookupError, AttributeError, RecursionError):

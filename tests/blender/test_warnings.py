@@ -36,7 +36,7 @@ def test_the_vertices_where_islands_meet_are_selected_exactly():
         meets[vertex] = len({index if index < 60 else 60 for index in around}) > 2
     assert 40 < meets.sum() < 100
     assert bpy.ops.tolvol.decimate(tolerance_percent=2) == {"FINISHED"}
-    _, counts = kept_warnings.of(ob, "decimate")
+    _, counts = kept_warnings.of(ob)
     assert counts[kept_warnings.ISLANDS] == meets.sum() and len(ob.data.vertices) < len(before)
     assert bpy.ops.tolvol.select_staying("EXEC_DEFAULT", True) == {"FINISHED"}
     assert ob.mode == "EDIT" and tuple(bpy.context.tool_settings.mesh_select_mode) == (True, False, False)
@@ -48,25 +48,25 @@ def test_the_vertices_where_islands_meet_are_selected_exactly():
 def test_warnings_stay_through_edits_until_the_next_operation():
     ob = islands(torus(), 48 * 24)
     assert bpy.ops.tolvol.decimate() == {"FINISHED"}
-    (warning,), counts = kept_warnings.of(ob, "decimate")
+    (warning,), counts = kept_warnings.of(ob)
     assert warning.startswith("1,152 of 1,152 vertices have to stay") and counts[kept_warnings.ISLANDS] == 1152
     ob.data.vertices[0].co.z += 1e-4
     ob.data.update()
-    assert kept_warnings.of(ob, "decimate")[0] == [warning] and kept_warnings.of(ob, "smooth") == ([], {})
+    assert kept_warnings.of(ob)[0] == [warning]
     ob.tolvol.snapshot = None
     assert bpy.ops.tolvol.smooth() == {"FINISHED"}
-    assert kept_warnings.of(ob, "decimate") == ([], {})
-    assert bpy.ops.tolvol.decimate() == {"FINISHED"} and kept_warnings.of(ob, "decimate")[0]
+    assert kept_warnings.of(ob) == ([], {})
+    assert bpy.ops.tolvol.decimate() == {"FINISHED"} and kept_warnings.of(ob)[0]
     ob.data.uv_layers.remove(ob.data.uv_layers[0])
     assert bpy.ops.tolvol.decimate() == {"FINISHED"}
-    assert kept_warnings.of(ob, "decimate") == ([], {})
+    assert kept_warnings.of(ob) == ([], {})
 
 
 def test_restoring_the_original_ends_the_warnings():
     ob = islands(torus(), 48 * 24)
-    assert bpy.ops.tolvol.decimate() == {"FINISHED"} and kept_warnings.of(ob, "decimate")[0]
+    assert bpy.ops.tolvol.decimate() == {"FINISHED"} and kept_warnings.of(ob)[0]
     assert bpy.ops.tolvol.restore_original() == {"FINISHED"}
-    assert kept_warnings.of(ob, "decimate") == ([], {})
+    assert kept_warnings.of(ob) == ([], {})
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_restoring_the_original_ends_the_warnings():
 def test_damaged_warnings_are_none(text):
     ob = torus()
     ob.tolvol.warnings = text
-    assert kept_warnings.of(ob, "decimate") == ([], {})
+    assert kept_warnings.of(ob) == ([], {})
 
 
 def test_without_uv_maps_there_is_nothing_to_select():

@@ -9,7 +9,7 @@ from mathutils import Vector
 import scenes
 from addon.mesh import mesh_io
 from addon.overlay import markers
-from addon.panels import layout
+from addon.panels import deviation
 from addon.proof import kept_warnings, places
 from test_warnings import islands
 from window import (
@@ -94,21 +94,23 @@ def test_worst_point_next_and_previous_by_mouse():
         bpy.ops.object.mode_set(mode="OBJECT")
 
 
-def test_warnings_stay_under_the_button_that_caused_them():
+def test_warnings_stay_in_the_panel_and_select_their_vertices():
     yield from reset(lambda: islands(scenes.sheet(), 900))
     yield from open_tab()
-    said, text_lines = [], layout.text_lines
-    layout.text_lines = lambda context, where, text, icon: said.append(text) or text_lines(context, where, text, icon)
+    said, text_lines = [], deviation.text_lines
+    deviation.text_lines = lambda context, where, text, icon: (
+        said.append(text) or text_lines(context, where, text, icon)
+    )
     ob = bpy.data.objects["sheet"]
     yield from press("tolvol.decimate")
     yield from finished(lambda: ob.tolvol.warnings)
-    (warning,), _ = kept_warnings.of(ob, "decimate")
+    (warning,), _ = kept_warnings.of(ob)
     yield from finished(lambda: warning in said)
     yield 6.0  # The status bar has forgotten the message by now.
     said.clear()
     view()[1].tag_redraw()
     yield from finished(lambda: warning in said)
-    layout.text_lines = text_lines
+    deviation.text_lines = text_lines
     yield from press("tolvol.select_staying")
     yield from finished(lambda: ob.mode == "EDIT")
     yield 0.5

@@ -10,7 +10,7 @@ import scenes
 from addon import job, native, reference
 from addon.mesh import mesh_io
 from addon.overlay import legend
-from addon.panels import decimate
+from addon.panels import deviation
 from addon.proof import verdict
 from addon.reference import measurements, tolerances
 from window import (
@@ -270,8 +270,8 @@ def test_a_damaged_file_breaks_no_panel():
     yield from press("tolvol.decimate")
     yield from finished(lambda: suzanne().tolvol.last_run)
     yield 1.0
-    said, text_lines = [], decimate.text_lines
-    decimate.text_lines = lambda context, layout, text, icon: (
+    said, text_lines = [], deviation.text_lines
+    deviation.text_lines = lambda context, layout, text, icon: (
         said.append(text) or text_lines(context, layout, text, icon)
     )
     try:
@@ -285,7 +285,7 @@ def test_a_damaged_file_breaks_no_panel():
         yield 1.0
         screenshot("damaged")
     finally:
-        decimate.text_lines = text_lines
+        deviation.text_lines = text_lines
 
 
 def sidebar_pixels():

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panels as they lie on the screen: what the first screen shows, and that buttons stay where they are."""
+
+from pathlib import Path
+
+import bpy
+
+import scenes
+from addon.overlay import legend
+from addon.proof import verdict
+from window import find, finished, on_screen, open_tab, press, region, reset, screenshot, view, window_context, xdotool
+
+
+def torus():
+    return bpy.data.objects["torus"]
+
+
+def rows():
+    """Returns the heights at which the buttons are."""
+    places = []
+    for operator in ("tolvol.decimate", "tolvol.check"):
+        place = yield from find(operator, across=0.25)
+        assert place is not None, f"{operator} is not on the first screen"
+        places.append(place[1])
+    return places
+
+
+def test_the_first_screen_has_everything_and_buttons_stay_where_they_are():
+    yield from reset(scenes.torus)
+    yield from open_tab()
+    aside = on_screen(region("WINDOW"), 300, 300)
+    first = yield from rows()
+    xdotool("mousemove", *aside)
+    yield 0.5
+    screenshot("layout 1 first screen")
+    assert torus().tolvol.snapshot is None and verdict.word(torus()) == verdict.NOT_CHECKED
+    yield from press("tolvol.decimate")
+    yield from finished(lambda: verdict.word(torus()) == verdict.PASS)
+    assert (yield from rows()) == first
+    torus().modifiers.new("wave", "WAVE")
+    torus().data.vertices[0].co.z += 1
+    torus().data.update()
+    yield 0.5
+    assert (yield from rows()) == first
+    yield from press("tolvol.check")
+    yield from finished(lambda: verdict.word(torus()) == verdict.FAIL)
+    yield 1.0
+    assert (yield from rows()) == first
+    xdotool("mousemove", *aside)
+    yield 0.5
+    screenshot("layout 2 failed")
+    for mode in ("EDIT", "SCULPT"):
+        with window_context():
+            bpy.ops.object.mode_set(mode=mode)
+        yield 0.5
+        assert (yield from rows()) == first
+        xdotool("mousemove", *aside)
+        yield 0.5
+        screenshot(f"layout 3 {mode.lower()}")
+    with window_context():
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def light():
+    theme = next(Path(folder) / "Blender_Light.xml" for folder in bpy.utils.preset_paths("interface_theme"))
+    with window_context():
+        bpy.ops.script.execute_preset(filepath=str(theme), menu_idname="USERPREF_MT_interface_theme_presets")
+
+
+def dark():
+    with window_context():
+        bpy.ops.preferences.reset_default_theme()
+
+
+def drag_sidebar(by):
+    """Moves the left edge of the sidebar by so many pixels."""
+    before = region("UI").width
+    x, y = on_screen(region("UI"), 7, 300)  # The edge is drawn beside the region's own.
+    for step in (("mousemove", x - 40, y), ("mousemove", x, y), ("mousedown", 1), ("mousemove", x + by // 2, y)):
+        xdotool(*step)
+        yield 0.3
+    xdotool("mousemove", x + by, y)
+    yield 0.3
+    xdotool("mouseup", 1)
+    yield 0.5
+    assert abs(before - region("UI").width - by) < 20, (before, region("UI").width, by)
+
+
+def test_themes_widths_and_scales():
+    yield from reset(scenes.torus)
+    yield from open_tab()
+    drawn = []
+    whole, word = legend.Page.rectangle, legend._draw_word
+    legend._draw_word = lambda *arguments: drawn.append("word") or word(*arguments)
+    legend.Page.rectangle = lambda page, x, y, width, height, *rest: (
+        (drawn.append("legend") if height > 120 * page.scale else None) or whole(page, x, y, width, height, *rest)
+    )
+    yield from press("tolvol.decimate")
+    yield from finished(lambda: verdict.word(torus()) == verdict.PASS)
+    aside = on_screen(region("WINDOW"), 300, 300)
+    try:
+        xdotool("mousemove", *aside)
+        light()
+        yield from finished(lambda: drawn)
+        yield 1.0
+        screenshot("layout 4 light")
+        assert set(drawn) == {"legend"}
+        yield from drag_sidebar(60)
+        xdotool("mousemove", *aside)
+        yield 1.0
+        screenshot("layout 5 narrow")
+        yield from drag_sidebar(-260)
+        xdotool("mousemove", *aside)
+        yield 1.0
+        screenshot("layout 6 wide")
+        yield from drag_sidebar(200)
+        dark()
+        with window_context():
+            bpy.ops.screen.region_quadview()
+        drawn.clear()
+        yield 1.0
+        screenshot("layout 7 quad view")
+        assert set(drawn) == {"word"}
+        with window_context():
+            bpy.ops.screen.region_quadview()
+        bpy.context.preferences.view.ui_scale = 2
+        yield 3.0
+        drawn.clear()
+        view()[1].tag_redraw()
+        yield 1.0
+        screenshot("layout 8 twice as large")
+        assert set(drawn) <= {"word"}
+    finally:
+        bpy.context.preferences.view.ui_scale = 1
+        legend.Page.rectangle, legend._draw_word = whole, word
+        dark()
+    yield 1.0
+    view()[1].tag_redraw()
