@@ -91,7 +91,10 @@ void Patch::free_vertices(const Change& collapse, bool boundary_free) {
     vertices_[v].touching = collapse.touching();
   };
   place(*collapse.vertex());
-  vertices_[find_vertex(*collapse.vertex())].share = collapse.share();
+  Vertex& kept = vertices_[find_vertex(*collapse.vertex())];
+  kept.share = collapse.share();
+  // Copies that are carried along do not move any further, so that the vertex to which they are carried must not.
+  if (!collapse.carried().empty()) kept.free = false;
   for (const std::uint32_t v : collapse.carried()) place(v);
   for (const Change::NewWedge& n : collapse.new_wedges()) {
     const std::uint32_t f = find_face(n.triangle);

@@ -169,3 +169,15 @@ def test_distances_are_as_the_report_says():
     assert 0.5 * tolerance < max(forward.upper, backward.upper) <= tolerance
     assert result.report["stopped_by"] == "tolerance"
     assert result.report["seconds"] > 0
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.parametrize("share", [0.3, 0.5])
+def test_thorough_keeps_both_ways_where_holes_touch(share, seed):
+    """Where sheets touch in a vertex, its copies go along with a collapse. The vertex must not move on without them."""
+    vertices, triangles = meshes.torus(48, 24)
+    vertices = vertices.astype(np.float32)
+    triangles = triangles[np.random.default_rng(seed).random(len(triangles)) >= share]
+    tolerance = 0.01 * tolvol.diagonal(vertices, triangles)
+    result = decimate(vertices, triangles, tolerance, effort="thorough")
+    assert_promise(vertices, triangles, result, tolerance)
