@@ -43,9 +43,9 @@ def seconds(call, *arguments, **options):
     return time.perf_counter() - start, result
 
 
-def dabs(vertices, triangles, volume, two_sided, threads):
+def dabs(vertices, triangles, volume, threads, **options):
     """Returns the best seconds of a dab that stays inside and of one that is held back, and how many vertices that held."""
-    guard = native.module.Guard(vertices, triangles, volume, two_sided=two_sided, threads=threads)
+    guard = native.module.Guard(vertices, triangles, volume, threads=threads, **options)
     inside, beyond = np.inf, np.inf
     for turn in range(TURNS):
         positions = vertices.copy()
@@ -81,16 +81,22 @@ def measure(side, tolerance, threads):
     volume = tolvol.ToleranceVolume(vertices, triangles, tolerance, threads=threads)
     whole = min(seconds(volume.check, vertices, triangles, threads=threads)[0] for _ in range(3))
     print(f"{len(vertices):9,} vertices: the whole mesh checked {1e3 * whole:.0f} ms")
-    for name, two_sided in (("both ways", True), ("one way", False)):
-        inside, beyond, held = dabs(vertices, triangles, volume, two_sided, threads)
+    for name, options in (
+        ("both ways", {}),
+        ("both ways, no crossings", {"crossings": "keep_out"}),
+        ("one way", {"two_sided": False}),
+    ):
+        inside, beyond, held = dabs(vertices, triangles, volume, threads, **options)
         print(
             f"{'':19} a dab of {MOVED:,}, {name}: {1e3 * inside:.2f} ms, {1e3 * beyond:.2f} ms with {held} held back; "
             f"a check is as {whole / inside:.0f} and {whole / beyond:.0f} dabs"
         )
+    allow = {"crossings": "allow"}
     for name, bound, options in (
-        ("pulled back, both ways", volume, {}),
-        ("pulled back, one way", volume, {"two_sided": False}),
-        ("reset, both ways", volume, {"mode": "reset"}),
+        ("pulled back, both ways, no crossings", volume, {}),
+        ("pulled back, both ways", volume, allow),
+        ("pulled back, one way", volume, {"two_sided": False, **allow}),
+        ("reset, both ways", volume, {"mode": "reset", **allow}),
         ("free", None, {}),
     ):
         best = np.inf

@@ -32,6 +32,7 @@ MovingCrossings::MovingCrossings(std::span<const std::uint32_t> faces, int corne
       trial_(start_) {
   if (corners_ < 3) return;
   asked_.assign(face_count(), 0);
+  is_fitted_.assign(face_count(), false);
   build();
 }
 
@@ -48,7 +49,6 @@ void MovingCrossings::build() {
 
 void MovingCrossings::skip_short_ways(MovingMesh& mesh) {
   clearance_.emplace(mesh, state_);
-  fitted_.assign(face_count(), false);
   extent_ = 0;
 }
 
@@ -56,14 +56,23 @@ void MovingCrossings::tidy() {
   const bool worn = refitted_ > face_count() && tree_.extent() > kWorn * extent_;
   if (refitted_ > face_count()) refitted_ = 0;
   if (worn) build();
-  if (!clearance_) return;
-  if (worn) fitted_.assign(face_count(), true);
+  if (!clearance_) {
+    for (const std::uint32_t f : fitted_) is_fitted_[f] = false;
+    fitted_.clear();
+    return;
+  }
+  if (worn) {
+    is_fitted_.assign(face_count(), true);
+    fitted_.resize(face_count());
+    std::iota(fitted_.begin(), fitted_.end(), 0u);
+  }
   const auto fit = [&](auto&& has_room) {
-    for (std::uint32_t f = 0; f < face_count(); ++f) {
-      if (!fitted_[f] || !has_room(f)) continue;
+    std::erase_if(fitted_, [&](std::uint32_t f) {
+      if (!has_room(f)) return false;
       tree_.change(f, clearance_->box(f));
-      fitted_[f] = false;
-    }
+      is_fitted_[f] = false;
+      return true;
+    });
   };
   fit([&](std::uint32_t f) { return !is_due(f); });
   clearance_->renew(state_, tree_);
@@ -108,17 +117,11 @@ bool MovingCrossings::triangles_cross_anew(std::uint32_t a, const PieceTriangle&
          !faces_cross(corners(start_, a, shape_a), corners(start_, b, shape_b));
 }
 
-/// Whether the face becomes degenerate, or a triangulation of it folds onto itself, and it was not so at the start.
-bool MovingCrossings::spoils_itself(std::uint32_t face) const {
-  const std::span<const PieceTriangle> all = shapes(face);
-  for (const PieceTriangle& shape : all) {
-    if (is_degenerate(corners(trial_, face, shape)) && !is_degenerate(corners(start_, face, shape))) return true;
-  }
-  // The two triangles of a triangulation stand beside each other.
-  for (std::size_t first = 0; first + 1 < all.size(); first += 2) {
-    if (triangles_cross_anew(face, all[first], face, all[first + 1])) return true;
-  }
-  return false;
+/// Whether the face, or a triangle of it, becomes degenerate and was not so at the start.
+bool MovingCrossings::degenerates(std::uint32_t face) const {
+  return std::ranges::any_of(shapes(face), [&](const PieceTriangle& shape) {
+    return is_degenerate(corners(trial_, face, shape)) && !is_degenerate(corners(start_, face, shape));
+  });
 }
 
 bool MovingCrossings::cross_anew(std::uint32_t a, std::uint32_t b) const {
@@ -135,10 +138,10 @@ bool MovingCrossings::cross_anew(std::uint32_t a, std::uint32_t b) const {
   });
 }
 
-/// Adds to `failed` a face that moves and the faces that it crosses anew. A pair of which both were asked about comes
+/// Adds to `failed` a face and the faces that it crosses anew. A pair of which both were asked about comes
 /// from the one with the lower number alone.
 void MovingCrossings::test(std::uint32_t face, std::vector<std::uint32_t>& failed) const {
-  if (spoils_itself(face)) failed.push_back(face);
+  if (degenerates(face)) failed.push_back(face);
   std::size_t found = 0, looked_at = 0;
   tree_.for_each_meeting(box(face), [&](std::uint32_t other) {
     if (++looked_at % 64 == 0) poll();
@@ -153,22 +156,24 @@ std::vector<std::uint32_t> MovingCrossings::failing(std::span<const std::uint32_
   if (corners_ < 3) return {};
   ++now_;
   boxes_.clear();
-  std::vector<std::uint32_t> moving, refitted;
+  std::vector<std::uint32_t> asked;
   for (std::size_t i = 0; i < faces.size(); ++i) {
     poll_at(i);
     const std::uint32_t f = faces[i];
-    const bool due = is_due(f);
-    if (due) moving.push_back(f), asked_[f] = now_;
-    if (clearance_ && !due && !fitted_[f]) continue;
-    if (clearance_) fitted_[f] = true;
-    refitted.push_back(f), boxes_.push_back(box(f));
+    // A face that is back where it was may meet one that is not asked about, which went on meanwhile.
+    if (!is_fitted_[f]) {
+      if (!is_due(f)) continue;
+      fitted_.push_back(f), is_fitted_[f] = true;
+    }
+    asked_[f] = now_;
+    asked.push_back(f), boxes_.push_back(box(f));
   }
-  tree_.change(refitted, boxes_);
-  refitted_ += refitted.size();
-  std::vector<std::vector<std::uint32_t>> failed((moving.size() + kBlock - 1) / kBlock);
-  parallel_for(moving.size(), kBlock, threads_, [&](std::size_t begin, std::size_t end) {
+  tree_.change(asked, boxes_);
+  refitted_ += asked.size();
+  std::vector<std::vector<std::uint32_t>> failed((asked.size() + kBlock - 1) / kBlock);
+  parallel_for(asked.size(), kBlock, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(progress->fraction());
-    for (std::size_t i = begin; i < end; ++i) test(moving[i], failed[begin / kBlock]);
+    for (std::size_t i = begin; i < end; ++i) test(asked[i], failed[begin / kBlock]);
   });
   std::vector<std::uint32_t> result;
   for (const std::vector<std::uint32_t>& part : failed) result.insert(result.end(), part.begin(), part.end());
@@ -185,7 +190,7 @@ void MovingCrossings::take_back(std::span<const std::uint32_t> vertices, std::sp
   for (const std::uint32_t v : vertices) trial_[v] = state_[v];
   if (corners_ < 3) return;
   for (const std::uint32_t f : faces) {
-    if (!clearance_ || fitted_[f]) tree_.change(f, box(f));
+    if (is_fitted_[f]) tree_.change(f, box(f));
   }
 }
 

@@ -4,7 +4,8 @@
 ///
 /// Faces keep their numbers while they move, so that the pairs that cross are always among those of the start. A quad
 /// is two triangles in either of its triangulations, and the promise holds in all of them: of the triangles of two
-/// quads, no pair crosses anew, and neither do the two of one triangulation of a quad. Points and segments never cross.
+/// quads, no pair crosses anew. Those of one quad are not compared, because a concave one in a plane has a fold of its
+/// own in one of its triangulations. Points and segments never cross.
 #pragma once
 
 #include <cstdint>
@@ -57,7 +58,7 @@ class MovingCrossings {
   Corners corners(const Positions& positions, std::uint32_t face, const PieceTriangle& shape) const;
   Box box(std::uint32_t face) const;
   bool is_due(std::uint32_t face) const;
-  bool spoils_itself(std::uint32_t face) const;
+  bool degenerates(std::uint32_t face) const;
   bool cross_anew(std::uint32_t a, std::uint32_t b) const;
   bool triangles_cross_anew(std::uint32_t a, const PieceTriangle& shape_a, std::uint32_t b,
                             const PieceTriangle& shape_b) const;
@@ -80,7 +81,9 @@ class MovingCrossings {
   std::vector<std::uint32_t> asked_;  // For each face: in which call failing() looked at it last.
   std::uint32_t now_ = 0;             // The number of these calls.
   std::optional<Clearance> clearance_;
-  std::vector<bool> fitted_;  // With it, for each face: whether its box in the tree is that of the trial.
+  /// The faces that were looked at since tidy(): their boxes in the tree are those of the trial.
+  std::vector<std::uint32_t> fitted_;
+  std::vector<bool> is_fitted_;  // For each face.
 };
 
 }  // namespace tolvol

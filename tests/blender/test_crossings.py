@@ -3,13 +3,17 @@
 
 import json
 
+import bmesh
 import bpy
 import numpy as np
+import pytest
+from mathutils import Matrix
 
-from addon import native
+from addon import guard, native
+from addon.mesh import mesh_io
 from addon.proof import report
 from commands import decimate, save, succeeded, world
-from scenes import activate, add_object, sheet_arrays, world_triangles
+from scenes import activate, add_object, link, sheet_arrays, world_triangles
 
 
 def wall_arrays():
@@ -78,3 +82,122 @@ def test_objects_that_come_to_cross_each_other_are_reported(tmp_path):
     run = json.loads(file.read_text())
     assert run["crossings"] == {"before": 0, "after": pairs(world(target))} and run["crossings"]["after"] > 0
     assert "objects are decimated one by one" in out
+
+
+# Operations that move vertices -------------------------------------------------------------------------------------
+
+
+def rough_wall(choice):
+    """Returns two sheets that do not cross, the lower one bumpy and the upper one flat; Crossings is set as chosen."""
+    vertices, quads = sheet_arrays(bumps=0.0)
+    lower, upper = vertices.copy(), vertices + np.float32([0, 0, 0.03])
+    lower[:, 2] = -0.06 * np.clip(1 - np.hypot(lower[:, 0], lower[:, 1]) / 0.4, 0, None)
+    upper[:, 2] += 0.05 * np.random.default_rng(1).random(len(upper))
+    ob = add_object(choice, np.concatenate([lower, upper]), np.concatenate([quads, quads + len(vertices)]))
+    activate(ob)
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.2
+    ob.tolvol.crossings = choice
+    assert not pairs(world_triangles(ob))
+    return ob
+
+
+def press(ob, depth=0.1):
+    """Returns the coordinates of the wall with its upper sheet pressed down in the middle, through the lower one."""
+    wish = mesh_io.column(ob.data.vertices, "co", 3)
+    hill = np.clip(1 - np.hypot(wish[:, 0], wish[:, 1]) / 0.5, 0, None)
+    wish[len(wish) // 2 :, 2] -= depth * 2 * hill[len(wish) // 2 :]
+    return wish
+
+
+@pytest.mark.parametrize("choice", ["KEEP_OUT", "ALLOW"])
+def test_an_applied_modifier_makes_no_crossings_unless_they_are_allowed(choice):
+    ob = rough_wall(choice)
+    ob.shape_key_add(name="Basis")
+    modifier = ob.modifiers.new("Displace", "DISPLACE")
+    modifier.strength, modifier.mid_level, modifier.direction = -0.06, 0.0, "Z"
+    group = ob.vertex_groups.new(name="upper")
+    group.add(list(range(len(ob.data.vertices) // 2, len(ob.data.vertices))), 1.0, "REPLACE")
+    modifier.vertex_group = "upper"
+    assert bpy.ops.tolvol.apply_modifier(modifier="Displace") == {"FINISHED"}
+    assert bool(pairs(world_triangles(ob))) == (choice == "ALLOW")
+
+
+@pytest.mark.parametrize("choice", ["KEEP_OUT", "ALLOW"])
+def test_smoothing_makes_no_crossings_unless_they_are_allowed(choice):
+    ob = rough_wall(choice)
+    # The bumpy part of the lower sheet becomes flat, while its upper neighbour is locked just above it.
+    count = len(ob.data.vertices) // 2
+    positions = mesh_io.column(ob.data.vertices, "co", 3)
+    positions[count:, 2] = positions[:count, 2] + 0.004
+    ob.data.vertices.foreach_set("co", positions.ravel())
+    assert not pairs(world_triangles(ob))
+    group = ob.vertex_groups.new(name="lower")
+    group.add(list(range(count)), 1.0, "REPLACE")
+    options = {"iterations": 20, "method": "LAPLACIAN", "vertex_group": "lower"}
+    assert bpy.ops.tolvol.smooth(**options) == {"FINISHED"}
+    assert bool(pairs(world_triangles(ob))) == (choice == "ALLOW")
+
+
+@pytest.mark.parametrize("mode", ["BLOCKED", "FARTHEST", "PULL_BACK"])
+def test_a_deformation_makes_no_crossings_unless_they_are_allowed(mode):
+    for choice in ("ALLOW", "KEEP_OUT"):
+        ob = rough_wall(choice)
+        data = bpy.data.lattices.new("cage")
+        data.points_u = data.points_v = 4
+        data.points_w = 2
+        cage = link(bpy.data.objects.new("cage", data), Matrix.Diagonal((0.8, 0.8, 0.4, 1)))
+        activate(ob)
+        for point in data.points:  # in the middle the upper layer goes down and the lower one up: the sheets cross
+            if max(abs(point.co.x), abs(point.co.y)) < 1:
+                point.co_deform.z *= -2
+        options = {"lattice": cage.name, "mode": mode}
+        if mode == "BLOCKED" and choice == "KEEP_OUT":
+            with pytest.raises(RuntimeError, match=r"faces of KEEP_OUT\S* would cross others. \d+\.\d % of the way is permitted"):
+                bpy.ops.tolvol.deform(**options)
+            continue
+        assert bpy.ops.tolvol.deform(**options) == {"FINISHED"}
+        assert bool(pairs(world_triangles(ob))) == (choice == "ALLOW")
+
+
+@pytest.mark.parametrize("kind", ["sculpting", "editing"])
+def test_a_guard_keeps_crossings_out_only_if_it_is_asked_to(kind):
+    for keeps_out in (False, True):
+        ob = rough_wall("KEEP_OUT")
+        assert not ob.tolvol.guard.crossings
+        assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+        setattr(ob.tolvol.guard, kind, True)
+        bpy.ops.object.mode_set(mode="SCULPT" if kind == "sculpting" else "EDIT")
+        update(ob)
+        ob.tolvol.guard.crossings = keeps_out
+        update(ob)
+        if kind == "sculpting":
+            ob.data.vertices.foreach_set("co", press(ob).ravel())
+        else:
+            wish = press(ob)
+            edited = bmesh.from_edit_mesh(ob.data)
+            for vertex, place in zip(edited.verts, wish):
+                vertex.co = place
+            bmesh.update_edit_mesh(ob.data)
+        update(ob)
+        bpy.ops.object.mode_set(mode="OBJECT")
+        assert bool(pairs(world_triangles(ob))) == (not keeps_out)
+        moved = mesh_io.column(ob.data.vertices, "co", 3)[len(ob.data.vertices) // 2 :, 2]
+        assert moved.min() < 0.02
+
+
+def update(ob):
+    ob.update_tag()
+    bpy.context.view_layer.update()
+
+
+def test_a_guard_says_that_it_cannot_keep_large_faces_from_crossing():
+    angles = np.arange(12) * np.pi / 6
+    ob = add_object("plate", np.stack([np.cos(angles), np.sin(angles), 0 * angles], 1), [list(range(12))])
+    activate(ob)
+    ob.tolvol.keep = "ONE"
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    ob.tolvol.guard.sculpting = ob.tolvol.guard.crossings = True
+    bpy.ops.object.mode_set(mode="SCULPT")
+    update(ob)
+    state = {kind: text for kind, text, _ in guard.states(ob)}
+    assert state["sculpting"] == "Crossings allowed: a face has 12 corners. Triangulate Faces helps"

@@ -154,6 +154,7 @@ def test_quads_that_blender_cuts_along_their_other_diagonal_stay_within():
     ob = add_object("kite", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 1)], [(0, 1, 2, 3), (0, 1, 4)])
     ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.9
     ob.tolvol.keep = "ONE"
+    ob.tolvol.crossings = "ALLOW"  # Cut along the other diagonal, the quad crosses the triangle beside it.
     before = world_triangles(ob)
     lattice = cage(points=(2, 2, 2), size=(1, 1, 2), matrix=Matrix.Translation((0.5, 0.5, 0.5)))
     for point in lattice.data.points:

@@ -77,7 +77,7 @@ def test_what_one_step_left_inside_the_next_takes_in_any_form():
         vertices = tolvol.constrain(vertices, wish, triangles, volume).vertices
         faces = np.ascontiguousarray(triangles[:, form])
         assert (volume.check(vertices, faces).verdicts == tolvol.Verdict.INSIDE).all(), form
-        tolvol.constrain(vertices, vertices, faces, volume, two_sided=len(form) > 2, outside="error")
+        tolvol.constrain(vertices, vertices, faces, volume, two_sided=len(set(form)) > 2, outside="error")
 
 
 def random_step(rng, vertices, triangles, volume):
