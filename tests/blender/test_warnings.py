@@ -70,7 +70,9 @@ def test_restoring_the_original_ends_the_warnings():
 
 
 @pytest.mark.parametrize(
-    "text", ("{", "[]", '{"operation": "decimate"}', '{"operation": "decimate", "warnings": 3}', "[" * 9999)
+    "text",
+    ("{", "[]", '{"operation": "decimate"}', '{"operation": "decimate", "warnings": 3}', "[" * 9999),
+    ids=range(5),
 )
 def test_damaged_warnings_are_none(text):
     ob = torus()

@@ -19,6 +19,7 @@ from window import (
     region,
     reset,
     screenshot,
+    scroll,
     still,
     view,
     window_context,
@@ -100,6 +101,7 @@ def test_the_original_is_shown_while_its_button_is_held_and_asks_before_it_comes
     key("Return")
     yield from finished(lambda: len(torus().data.polygons) == 48 * 24)
     screenshot("restored")
+    yield from scroll()
     assert mesh_io.read_mesh(torus().data).fingerprint() == torus().tolvol.snapshot_fingerprint
     xdotool("mousemove", *centre())
     yield 0.5

@@ -21,6 +21,7 @@ from window import (
     region,
     reset,
     screenshot,
+    scroll_down,
     sculpt_by_drawing,
     view,
     window_context,
@@ -73,7 +74,7 @@ def surface():
     """Returns the picture of the view without the sidebar and the legend."""
     place = region("WINDOW")
     x, y = on_screen(place, 0, 0)
-    return pixels()[y + 40 : y + place.height - 40, x + 70 : x + place.width - 400]
+    return pixels()[y + 40 : y + place.height - 40, x + 70 : x + place.width - 450]
 
 
 def to_mode(mode):
@@ -273,6 +274,7 @@ def test_views_places_and_switches():
     space.overlay.show_overlays = True
     space.region_3d.view_perspective = "PERSP"
 
+    yield from scroll_down()
     place = yield from find_property("show_deviation", across=0.2)
     assert place is not None
     yield 0.6  # After so many seconds no tooltip is in the way.

@@ -158,7 +158,8 @@ def find_property(name, across):
 
 
 def find_hold():
-    """Does the same as find() for the button that shows the original while it is held."""
+    """Does the same as find() for the button that shows the original while it is held. It scrolls the sidebar down."""
+    yield from scroll_down()
     return (yield from _find("tolvol_show_original", "ctrl+shift+alt+c", 0.33))
 
 
@@ -199,12 +200,16 @@ def press(operator, across=0.33):
 _UP, _DOWN = 4, 5  # X counts the two directions of the wheel as these buttons of the mouse.
 
 
-def scroll(button):
+def scroll(button=_UP):
     """Turns the wheel over the sidebar until it no longer scrolls."""
     sidebar = region("UI")
     middle = on_screen(sidebar, sidebar.width // 2, sidebar.height // 2)
     xdotool("mousemove", *middle, "sleep", "0.1", "click", "--repeat", 30, "--delay", 20, button)
     yield 0.5
+
+
+def scroll_down():
+    yield from scroll(_DOWN)
 
 
 _first_view = {}
