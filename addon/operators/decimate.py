@@ -154,7 +154,12 @@ object. An object without a reference gets one first, as by Set Reference"""
             task.locked |= protect.unselected(ob)
             task.selected = mesh_io.column(ob.data.polygons, "select", 1, bool)
         if self.close_holes:
-            task.close_holes = {"largest_perimeter": self.largest_perimeter or None}
+            angle = task.options["max_normal_angle"]
+            task.close_holes = {
+                "largest_perimeter": self.largest_perimeter or None,
+                # Left as it is, *Normals* would leave open the ends of tubes, which are at right angles to the tubes.
+                "max_normal_angle": None if angle == 90 else angle,
+            }
         task.shares = protect.group_weights(ob, self.vertex_group, self.invert_vertex_group)
         if task.shares is not None:
             task.locked |= task.shares == 0
@@ -297,6 +302,7 @@ class _Task:
             arrays.triangles,
             volume,
             to_world=self.surface.matrix,
+            shares=self.shares,
             threads=self.options["threads"],
             progress=progress,
             **self.close_holes,

@@ -16,26 +16,21 @@ struct HolesClosed {
   py::dict report;
 };
 
-/// -1 for HoleClosingResult::kNone.
-py::array_t<std::int32_t> from_rows(const std::vector<glm::uvec3>& rows) {
-  py::array_t<std::int32_t> array({static_cast<py::ssize_t>(rows.size()), py::ssize_t{3}});
-  std::int32_t* out = array.mutable_data();
-  for (const glm::uvec3& row : rows) {
-    for (int k = 0; k < 3; ++k) *out++ = static_cast<std::int32_t>(row[k]);
-  }
-  return array;
-}
-
 HolesClosed close_holes_of_arrays(const py::object& vertices, const py::object& triangles, const Volume& volume,
                                   const py::object& to_world, std::optional<double> largest_perimeter,
-                                  std::optional<double> max_normal_angle, std::optional<int> threads,
-                                  Progress* progress) {
+                                  std::optional<double> max_normal_angle, const py::object& shares,
+                                  std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const StoredSpace space(to_matrix(to_world), v.storage);
   CloseHolesOptions options;
   options.largest_perimeter = largest_perimeter;
   options.max_normal_angle = max_normal_angle.value_or(options.max_normal_angle);
+  py::array_t<double, py::array::c_style> share_values;
+  if (!shares.is_none()) {
+    share_values = to_values<double>(shares, "shares must be a float64 array, one value for each vertex");
+    options.shares = {share_values.data(), static_cast<std::size_t>(share_values.size())};
+  }
   options.threads = to_threads(threads);
   options.progress = progress;
   HoleClosingResult r;
@@ -45,8 +40,8 @@ HolesClosed close_holes_of_arrays(const py::object& vertices, const py::object& 
   }
   HolesClosed result{from_triangles(r.triangles),
                      from_vector<std::int32_t>(r.loop),
-                     from_rows(r.borders),
-                     from_rows(r.corner_source),
+                     from_triangles(r.borders),
+                     from_triangles(r.corner_source),
                      py::list(),
                      py::dict()};
   py::dict refused;
@@ -113,7 +108,7 @@ triangles_added : the number of new triangles
 warnings : a list of sentences)doc");
   module.def("close_holes", &close_holes_of_arrays, py::arg("vertices"), py::arg("triangles"), py::arg("volume"),
              py::kw_only(), py::arg("to_world") = py::none(), py::arg("largest_perimeter") = py::none(),
-             py::arg("max_normal_angle") = py::none(), py::arg("threads") = py::none(),
+             py::arg("max_normal_angle") = py::none(), py::arg("shares") = py::none(), py::arg("threads") = py::none(),
              py::arg("progress") = py::none(),
              R"doc(Fill the holes of a mesh that can be filled within the tolerance.
 
@@ -145,6 +140,9 @@ max_normal_angle : float, optional
     tolerance where the normals of both differ by at most this angle. The default, 120, closes the ends of tubes, which
     are at right angles to the tubes, but no sheet by a second one on its back. 180 permits any angle. The default of
     decimate is 90: it counts new triangles with a larger angle among those that exceed it, and keeps their angle.
+shares : (n,) float64 array, optional
+    For each vertex, from 0 to 1: a new triangle stays within the least share of the tolerance of its corners, and there
+    is none at a vertex of share 0.
 to_world, threads, progress
     See help(tolvol).
 

@@ -45,6 +45,14 @@ void check(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> tri
   if (!(options.max_normal_angle > 0 && options.max_normal_angle <= 180)) {
     throw InvalidInput("max_normal_angle must be more than 0 and at most 180 degrees");
   }
+  if (!options.shares.empty() && options.shares.size() != vertices.size()) {
+    throw InvalidInput("shares must have one value for each vertex");
+  }
+  for (std::size_t i = 0; i < options.shares.size(); ++i) {
+    if (!(options.shares[i] >= 0 && options.shares[i] <= 1)) {
+      throw InvalidInput("shares must be from 0 to 1, that of vertex " + std::to_string(i) + " is not");
+    }
+  }
 }
 
 /// A boundary loop, and the triangles that fill it.
@@ -172,6 +180,7 @@ class Closing {
   void fill(std::uint32_t loop);
   void keep_apart(std::span<const std::uint32_t> open);
   bool looks_against(const Filled& loop) const;
+  double share_at(std::uint32_t vertex) const { return options_.shares.empty() ? 1 : options_.shares[vertex]; }
   Corners corners_of(const Filled& loop, const glm::uvec3& face) const {
     return {mesh_.vertices[loop.corner[face.z]], mesh_.vertices[loop.corner[face.y]],
             mesh_.vertices[loop.corner[face.x]]};
@@ -254,12 +263,13 @@ class Closing::Filling {
       return refuse(LoopOutcome::non_manifold);
     }
     // A point that is outside refuses all triangles at the edge.
+    const TriangleCertificate& certificate = *closing_.certificate_;
+    const double limit = std::min(share_at(i), share_at(j)) * certificate.limit();
     for (int k = 1; k <= kProbes; ++k) {
-      const double share = static_cast<double>(k) / (kProbes + 1);
-      const glm::dvec3 p = (1 - share) * loop_.at[i] + share * loop_.at[j];
-      const TriangleCertificate& certificate = *closing_.certificate_;
-      if (!(certificate.distance_bound(p) <= certificate.limit()) &&
-          closing_.volume_.hierarchy().nearest(p, certificate.limit()).triangle == Hierarchy::kNone) {
+      const double along = static_cast<double>(k) / (kProbes + 1);
+      const glm::dvec3 p = (1 - along) * loop_.at[i] + along * loop_.at[j];
+      if (!(certificate.distance_bound(p) <= limit) &&
+          closing_.volume_.hierarchy().nearest(p, limit).triangle == Hierarchy::kNone) {
         return refuse(LoopOutcome::outside);
       }
     }
@@ -278,7 +288,9 @@ class Closing::Filling {
       if (!normal) return refuse(LoopOutcome::turned);
       facing.emplace(*closing_.facing_, loop_.reversed ? -*normal : *normal, closing_.facing_->angle);
     }
-    const TriangleCertificate& certificate = *closing_.certificate_;
+    const double share = std::min({share_at(face.x), share_at(face.y), share_at(face.z)});
+    if (!(share > 0)) return refuse(LoopOutcome::outside);
+    const TriangleCertificate certificate = closing_.certificate_->narrowed(share);
     if (certificate.shows_outside(placed)) return refuse(LoopOutcome::outside);
     const TriangleCertificate::PointBound &a = loop_.bounds[face.z], &b = loop_.bounds[face.y],
                                           &c = loop_.bounds[face.x];
@@ -348,6 +360,8 @@ class Closing::Filling {
     return sound;
   }
 
+  double share_at(std::uint32_t corner) const { return closing_.share_at(loop_.corner[corner]); }
+
   const Closing& closing_;
   Filled& loop_;
   std::optional<std::uint32_t> before_;
@@ -365,6 +379,7 @@ class Closing::Filling {
 bool Closing::looks_against(const Filled& loop) const {
   double sum = 0;
   for (const Side side : loop.sides) {
+    poll();
     const glm::uvec3& t = mesh_.triangles[side / 3];
     const glm::dvec3 &a = positions_[t.x], &b = positions_[t.y], &c = positions_[t.z];
     const glm::dvec3 normal = glm::cross(b - a, c - a);

@@ -21,6 +21,9 @@ struct CloseHolesOptions {
   /// is within this angle of the face's (check/facing.h). The end of a tube is at right angles to the tube, so that a
   /// limit of 90 would leave it to rounding. 180 keeps no angle.
   double max_normal_angle = 120;
+  /// For each vertex, from 0 to 1; may be empty. A new face stays within the least share of the tolerance of its
+  /// corners, and there is none at a vertex of share 0.
+  std::span<const double> shares = {};
   unsigned threads = 0;  ///< 0 is one for each core. It never changes the result.
   Progress* progress = nullptr;
 };

@@ -7,11 +7,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <unordered_set>
 #include <utility>
 
 #include "base/call.h"
 #include "topology/sides.h"
+#include "topology/sort_by.h"
 
 namespace tolvol {
 namespace {
@@ -48,25 +50,26 @@ class Loops {
         std::span<const glm::uvec3> triangles, Team& team)
       : positions_(positions), place_(place), triangles_(triangles) {
     find_open(team);
-    link();
+    link(team);
   }
 
   std::vector<BoundaryLoop> walk() const {
-    std::vector<BoundaryLoop> loops;
+    std::vector<std::pair<Side, BoundaryLoop>> found;  // each with its lowest side
     std::vector<bool> has_one_before(3 * triangles_.size(), false), walked(3 * triangles_.size(), false);
     for (const Side side : open_) {
       if (next_[side] != kNone) has_one_before[next_[side]] = true;
     }
     const auto follow = [&](Side first) {
       BoundaryLoop loop{{}, false};
-      Side side = first;
+      Side side = first, lowest = first;
       for (; side != kNone && !walked[side]; side = next_[side]) {
         poll_at(loop.sides.size());
         walked[side] = true;
+        lowest = std::min(lowest, side);
         loop.sides.push_back(side);
       }
       loop.closed = side == first;
-      loops.push_back(std::move(loop));
+      found.emplace_back(lowest, std::move(loop));
     };
     // Runs that do not close begin at an edge that nothing leads to.
     for (const Side side : open_) {
@@ -75,9 +78,10 @@ class Loops {
     for (const Side side : open_) {
       if (!walked[side]) follow(side);
     }
-    std::sort(loops.begin(), loops.end(), [](const BoundaryLoop& a, const BoundaryLoop& b) {
-      return *std::min_element(a.sides.begin(), a.sides.end()) < *std::min_element(b.sides.begin(), b.sides.end());
-    });
+    std::ranges::sort(found, {}, &std::pair<Side, BoundaryLoop>::first);
+    std::vector<BoundaryLoop> loops;
+    loops.reserve(found.size());
+    for (auto& [lowest, loop] : found) loops.push_back(std::move(loop));
     return loops;
   }
 
@@ -97,12 +101,16 @@ class Loops {
       if (!seen.insert({p}).second) continue;
       for (Side k = 0; k < 3; ++k) sides.push_back(3 * t + k);
     }
+    std::vector<bool> is_open(3 * triangles_.size(), false);
     by_ends(
         sides, positions_.size(), team, [this](Side corner) { return at(corner); },
-        [this](const std::vector<Side>& alike) {
-          if (alike.size() == 1) open_.push_back(alike.front());
+        [&](const std::vector<Side>& alike) {
+          if (alike.size() == 1) is_open[alike.front()] = true;
         });
-    std::sort(open_.begin(), open_.end());
+    for (Side side = 0; side < is_open.size(); ++side) {
+      poll_at(side);
+      if (is_open[side]) open_.push_back(side);
+    }
   }
 
   /// A function that returns for a point a number that rises with the angle around `centre` and `normal`.
@@ -122,14 +130,15 @@ class Loops {
   }
 
   /// Finds the open edge that follows on each.
-  void link() {
+  void link(Team& team) {
     next_.assign(3 * triangles_.size(), kNone);
     using Keyed = std::pair<std::uint32_t, Side>;
     std::vector<Keyed> leaving, arriving;
     for (const Side side : open_)
       leaving.emplace_back(at(side), side), arriving.emplace_back(at(next_corner(side)), side);
-    std::sort(leaving.begin(), leaving.end());
-    std::sort(arriving.begin(), arriving.end());
+    const auto vertex = [](const Keyed& keyed) { return keyed.first; };
+    sort_by(leaving, positions_.size(), team, vertex, std::less<Keyed>());
+    sort_by(arriving, positions_.size(), team, vertex, std::less<Keyed>());
     std::vector<bool> is_crowded(positions_.size(), false);
     std::vector<std::pair<std::size_t, std::size_t>> crowds;  // the first of each in `leaving` and in `arriving`
     for (std::size_t i = 0, k = 0; i < leaving.size(); ++i) {

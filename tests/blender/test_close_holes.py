@@ -2,6 +2,7 @@
 """Holes are closed before the decimation, in one step, and the new faces take their attributes from the rims."""
 
 import json
+import math
 
 import bpy
 import numpy as np
@@ -65,6 +66,21 @@ def test_the_largest_perimeter_leaves_longer_holes_open():
     assert run["holes"]["largest_perimeter"] == pytest.approx(0.35)
     assert "4 holes closed, 2 left open: 2 beyond Largest Perimeter" in report.counts(run)
     assert loops_of(ob) == 2
+
+
+def test_no_hole_closes_at_vertices_of_weight_zero():
+    ob = holed()
+    group = ob.vertex_groups.new(name="Loose")
+    group.add([v.index for v in ob.data.vertices if v.co.x > 0], 1, "REPLACE")
+    bpy.ops.tolvol.decimate(tolerance_percent=4, close_holes=True, vertex_group="Loose")
+    holes = run_of(ob)["holes"]
+    assert holes["closed"] == 3 and holes["refused"] == {"outside": 3}
+
+
+def test_the_angle_of_normals_holds_for_closed_holes():
+    ob = holed()
+    bpy.ops.tolvol.decimate(tolerance_percent=4, close_holes=True, max_normal_angle=math.radians(1))
+    assert run_of(ob)["holes"]["refused"]["turned"] > 0
 
 
 def test_holes_at_unselected_faces_stay():

@@ -63,6 +63,22 @@ def test_holes_close_and_all_else_stays():
     assert result.triangles.dtype == np.int32 and result.report["warnings"] == []
 
 
+@pytest.mark.parametrize("share", [0, 0.3])
+def test_shares_of_the_tolerance_are_kept_around_their_vertices(share):
+    inside = VERTICES[:, 0] > 0
+    shares = np.where(inside, share, 1.0)
+    result = close(shares=shares)
+    assert_promise(VERTICES, TRIANGLES, result, TOLERANCE)
+    added = result.triangles[len(TRIANGLES) :]
+    kept = added[inside[added].any(1)]
+    assert (len(kept) > 0) == (share > 0)
+    if share:
+        assert tolvol.directed_hausdorff(VERTICES, kept, VERTICES, TRIANGLES).upper <= share * TOLERANCE
+    whole = close().triangles[len(TRIANGLES) :]
+    assert len(kept) < inside[whole].any(1).sum()
+    assert len(added) - len(kept) == (~inside[whole].any(1)).sum()
+
+
 def test_the_arrays_tell_where_attributes_come_from():
     result = close()
     m = len(TRIANGLES)
@@ -186,6 +202,8 @@ def test_bad_input():
         (lambda: close(largest_perimeter=float("nan")), "largest_perimeter"),
         (lambda: close(max_normal_angle=0.0), "max_normal_angle"),
         (lambda: close(max_normal_angle=181.0), "max_normal_angle"),
+        (lambda: close(shares=np.ones(3)), "shares"),
+        (lambda: close(shares=np.full(len(VERTICES), 1.5)), "vertex 0"),
         (lambda: close(threads=0), "threads"),
         (lambda: close(to_world=np.zeros((4, 4))), "to_world"),
     ):

@@ -275,6 +275,7 @@ def close_holes(
     to_world: ArrayLike | None = None,
     largest_perimeter: float | None = None,
     max_normal_angle: float | None = None,
+    shares: NDArray[np.float64] | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> HoleClosingResult: ...
