@@ -28,6 +28,8 @@ constexpr std::uint32_t kNone = HoleClosingResult::kNone;
 /// that are in the way are gone around, and one of two triangles that cross, or that lie on one edge, is left out.
 constexpr int kMostTries = 32, kMostTriesOfLong = 8;
 constexpr std::size_t kLong = 200;  ///< corners
+/// A loop is given up after so many of its triangles were refused, in all searches together.
+constexpr std::size_t kMostRefused = 50000;
 /// An edge across a hole is probed in so many points before any triangle at it is proved.
 constexpr int kProbes = 7;
 
@@ -231,7 +233,7 @@ class Closing::Filling {
     const int most = loop_.at.size() > kLong ? kMostTriesOfLong : kMostTries;
     for (int tries = 0; tries < most; ++tries) {
       loop_.faces = least_triangulation(loop_.at, rules);
-      if (loop_.faces.empty()) break;
+      if (loop_.faces.empty() || gives_up()) break;
       std::sort(loop_.faces.begin(), loop_.faces.end(), [](const glm::uvec3& a, const glm::uvec3& b) {
         return std::array{a.x, a.y, a.z} < std::array{b.x, b.y, b.z};
       });
@@ -255,7 +257,10 @@ class Closing::Filling {
     return false;
   }
 
+  bool gives_up() const { return refused_triangles_ >= kMostRefused; }
+
   bool admits_edge(std::uint32_t i, std::uint32_t j) {
+    if (gives_up()) return false;
     const std::uint64_t edge = closing_.edge_of(loop_, i, j);
     if (closing_.place_[loop_.corner[i]] == closing_.place_[loop_.corner[j]]) return refuse(LoopOutcome::degenerate);
     if (closing_.edges_.contains(edge) || left_out_edges_.contains({i, j}) ||
@@ -277,6 +282,13 @@ class Closing::Filling {
   }
 
   bool admits(const glm::uvec3& face) {
+    if (gives_up()) return false;
+    const bool is_admitted = proves(face);
+    refused_triangles_ += !is_admitted;
+    return is_admitted;
+  }
+
+  bool proves(const glm::uvec3& face) {
     if (left_out_.contains({face.x, face.y, face.z})) return refuse(LoopOutcome::crossing);
     const Corners stored = closing_.corners_of(loop_, face);
     if (is_degenerate(stored)) return refuse(LoopOutcome::degenerate);
@@ -369,6 +381,7 @@ class Closing::Filling {
     Corners corners;
     Box box;
   };
+  std::size_t refused_triangles_ = 0;
   std::vector<Obstacle> obstacles_;  ///< faces that an earlier try crossed
   std::set<std::array<std::uint32_t, 3>> left_out_;
   std::set<std::array<std::uint32_t, 2>> left_out_edges_;

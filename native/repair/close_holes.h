@@ -78,10 +78,11 @@ struct HoleClosingResult {
 /// within the tolerance of the reference with the headroom that operations leave, facing as the reference does there,
 /// neither degenerate nor crossing any other face, so that no edge gets more than two triangles. A loop is filled as a
 /// whole or not at all, in the orientation of its rim. Of the triangulations whose triangles keep these bounds one by
-/// one it takes the least (repair/least_triangulation.h). Where its triangles cross a face, the next search goes around
-/// that face; where two of them cross, or lie on one edge, it leaves one of them out. The 32nd search is the last, and
-/// the 8th in a loop of more than 200 corners. Loops are filled as if they were alone; then each whose faces are in
-/// conflict with those of a loop of lower number is filled anew around those, if possible.
+/// one it takes the least (repair/least_triangulation.h). Where these cross a face, the next search goes around that
+/// face, and where two of them cross each other, or lie on one edge, it goes without one of them: 32 searches at most,
+/// and 8 in a loop of more than 200 corners. A loop of which 50,000 triangles were refused is given up. Loops are
+/// filled as if they were alone; then each whose faces are in conflict with those of a loop of lower number is filled
+/// anew around those, if possible.
 ///
 /// No vertex moves and none is added, and every input triangle keeps its number. Because the input stays, the reference
 /// is as near to the result as it is to the input. Throws InvalidInput for a bad mesh, and where the stored type cannot

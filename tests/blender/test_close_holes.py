@@ -202,6 +202,7 @@ def test_n_gons_and_several_objects():
         "triangles_added": run_of(objects[1])["holes"]["triangles_added"],
         "refused": {},
         "largest_perimeter": None,
+        "max_normal_angle": None,
     }
     assert loops_of(objects[1]) == 0
 

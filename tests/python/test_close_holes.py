@@ -63,7 +63,7 @@ def test_holes_close_and_all_else_stays():
     assert result.triangles.dtype == np.int32 and result.report["warnings"] == []
 
 
-@pytest.mark.parametrize("share", [0, 0.3])
+@pytest.mark.parametrize("share", [0, 0.7])
 def test_shares_of_the_tolerance_are_kept_around_their_vertices(share):
     inside = VERTICES[:, 0] > 0
     shares = np.where(inside, share, 1.0)
