@@ -152,7 +152,9 @@ def test_a_deformation_makes_no_crossings_unless_they_are_allowed(mode):
                 point.co_deform.z *= -2
         options = {"lattice": cage.name, "mode": mode}
         if mode == "BLOCKED" and choice == "KEEP_OUT":
-            with pytest.raises(RuntimeError, match=r"faces of KEEP_OUT\S* would cross others. \d+\.\d % of the way is permitted"):
+            with pytest.raises(
+                RuntimeError, match=r"faces of KEEP_OUT\S* would cross others. \d+\.\d % of the way is permitted"
+            ):
                 bpy.ops.tolvol.deform(**options)
             continue
         assert bpy.ops.tolvol.deform(**options) == {"FINISHED"}

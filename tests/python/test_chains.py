@@ -117,18 +117,19 @@ CHAINS = {
 
 @pytest.mark.parametrize("shape", CHAINS)
 def test_no_step_is_refused_for_what_another_one_left(shape):
-    """Every chain of operations with default settings goes on, both directions hold after each step, and no faces cross."""
+    """Every chain of operations with default settings goes on, both directions hold after each step, and no faces begin to cross."""
     vertices, triangles = CHAINS[shape]()
     reference = vertices.astype(np.float32), triangles
-    assert not len(tolvol.crossing_pairs(*reference))
     rng = np.random.default_rng(7)
     for chain in range(50):
         tolerance = rng.choice([0.015, 0.04]) * tolvol.diagonal(*reference)
         volume = tolvol.ToleranceVolume(*reference, tolerance)
-        mesh, names = reference, []
+        mesh, names, crossed = reference, [], len(tolvol.crossing_pairs(*reference))
+        assert not crossed or shape == "parts"
         for _ in range(4):
             name, mesh = random_step(rng, *mesh, volume)
             names.append(str(name))
             judged = tolvol.hausdorff(*mesh, *reference, bound=tolerance)
             assert judged.upper <= tolerance, f"chain {chain}: {names}"
-            assert not len(tolvol.crossing_pairs(*mesh)), f"chain {chain}: {names}"
+            before, crossed = crossed, len(tolvol.crossing_pairs(*mesh))
+            assert crossed <= before, f"chain {chain}: {names}"
