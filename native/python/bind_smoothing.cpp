@@ -163,9 +163,8 @@ Notes
 -----
 Cost: about 0.3 us for each vertex in each iteration, and some us for each vertex that is held back. Two-sided, 2 us for
 each face of a reference that is not the input, and half as much again for each iteration; up to three and a half times
-as much if many vertices are held back. Keeping
-crossings out costs 2 us for each triangle, and 3 us in each iteration for each triangle whose corners came so far that
-it could cross others: usually a few in a hundred.
+as much if many vertices are held back. Keeping crossings out costs 2 us for each triangle, and 3 us in each iteration
+for each triangle whose corners came so far that it could cross others: usually a few in a hundred.
 
 After M. Desbrun et al., Implicit Fairing of Irregular Meshes using Diffusion and Curvature Flow, 1999. "reset" is from
 M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.)doc");

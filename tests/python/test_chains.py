@@ -117,7 +117,7 @@ CHAINS = {
 
 @pytest.mark.parametrize("shape", CHAINS)
 def test_no_step_is_refused_for_what_another_one_left(shape):
-    """Every chain of operations with default settings goes on, both directions hold after each step, and no faces begin to cross."""
+    """Every chain of operations with default settings goes on, both directions hold, and no faces begin to cross."""
     vertices, triangles = CHAINS[shape]()
     reference = vertices.astype(np.float32), triangles
     rng = np.random.default_rng(7)
