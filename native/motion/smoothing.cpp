@@ -17,6 +17,7 @@
 #include "base/errors.h"
 #include "base/parallel.h"
 #include "check/certificate.h"
+#include "topology/t_junctions.h"
 
 namespace tolvol {
 namespace {
@@ -45,6 +46,7 @@ class Smoothing {
 
   SmoothingResult run() {
     link();
+    fix_t_junctions();
     set_strength();
     if (volume_) start_pull_back();
     std::vector<std::uint32_t> moving;
@@ -124,6 +126,7 @@ class Smoothing {
         const auto end = std::find_if(side, last, [&](const Side& s) { return s.to != side->to; });
         around.push_back({side->to, {side->opposite, end[-1].opposite}});
         if (end - side == 1) rim.push_back(around.back());
+        if (end - side == 1 && v < side->to) open_.emplace_back(v, side->to);
         branches = branches || end - side > 2;
         side = end;
       }
@@ -138,6 +141,18 @@ class Smoothing {
       const std::vector<Link>& kept = kind_[v] == Kind::curve ? rim : around;
       if (kind_[v] != Kind::fixed) links_.insert(links_.end(), kept.begin(), kept.end());
       link_start_.push_back(static_cast<std::uint32_t>(links_.size()));
+    }
+  }
+
+  /// Faces that meet in a T-junction share no edge along which they could be kept together while it moves.
+  void fix_t_junctions() {
+    if (open_.empty()) return;
+    Team team(thread_count(options_.threads));
+    const double unit = space_.storage() == Storage::float32 ? 0x1p-24 : 0x1p-53;
+    for (const std::uint32_t v : t_junctions({positions_, triangles_}, open_, unit, team)) {
+      if (kind_[v] == Kind::fixed) continue;
+      kind_[v] = Kind::fixed;
+      ++result_.fixed_t_junctions;
     }
   }
 
@@ -275,6 +290,7 @@ class Smoothing {
   std::vector<glm::uvec3> triangles_;      // Their corners are such first ones.
   std::vector<std::uint32_t> link_start_;  // For each vertex: its place in links_.
   std::vector<Link> links_;
+  std::vector<glm::uvec2> open_;  // The edges of one triangle.
   std::vector<Kind> kind_;
   std::vector<double> strength_;
   std::vector<std::uint32_t> faces_;

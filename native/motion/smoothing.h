@@ -45,6 +45,7 @@ struct SmoothingResult {
   std::size_t welded = 0;          ///< The number of vertices treated as one with an earlier one at the same place.
   std::size_t fixed_boundary = 0;  ///< The number of vertices that stay because they are on the boundary.
   std::size_t fixed_non_manifold = 0;  ///< The number that stay because an edge there has more than two faces.
+  std::size_t fixed_t_junctions = 0;   ///< The number of others that stay because they hold a T-junction together.
   FaceCount outside;                   ///< Input faces that are not within the tolerance and are kept as they are.
   FaceCount uncovered;                 ///< Faces of the reference that are not within the tolerance of the input.
   std::string method, renderer;        ///< The check that decided; empty without a volume.
@@ -54,7 +55,7 @@ struct SmoothingResult {
 /// A step of a vertex is half the umbrella vector (the weighted mean of its neighbours less itself), or, bilaplacian,
 /// less a quarter of the umbrella vector of these vectors: the largest at which no component of a shape overshoots. All
 /// new positions are computed from the old ones and then go as far as the tolerance lets them (PullBack), so that every
-/// iteration ends inside. `volume` null: without bound, and bit for bit what a volume that holds nothing back gives.
+/// iteration ends inside. What holds T-junctions together (topology/t_junctions.h) stays. `volume` null: without bound, and bit for bit what a volume that holds nothing back gives.
 ///
 /// Throws InvalidInput for a bad mesh or bad arrays, naming the first offender, and like constrain(); Cancelled. About
 /// 0.3 us an iteration and vertex, and some us for each that is held back; two-sided half as much again, and up to

@@ -75,6 +75,7 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
   py::dict fixed;
   fixed["boundary"] = r.fixed_boundary;
   fixed["non-manifold"] = r.fixed_non_manifold;
+  fixed["T-junction"] = r.fixed_t_junctions;
   result.report["held_back"] = r.held_back;
   result.report["kept_from_crossing"] = r.kept_from_crossing;
   result.report["largest_motion"] = r.largest_motion;
@@ -99,7 +100,7 @@ held_back : for each iteration the number of vertices that did not go all the wa
 kept_from_crossing : for each iteration the number of these that went back so that no faces cross
 largest_motion : the longest way of a vertex from the input to the result, in world units
 welded : the number of vertices that were treated as one with an earlier vertex at the same place
-fixed : a dict of `boundary` and `non-manifold`, the number of vertices that stay for that cause
+fixed : a dict of `boundary`, `non-manifold` and `T-junction`, the number of vertices that stay for that cause
 outside : a dict of `faces`, the number of input faces that were outside and were kept, `first`, the first of them, and
     `reference_faces`, the number of reference faces that were beyond the tolerance of the input
 method, renderer : which check was used, and what computed it
@@ -114,7 +115,8 @@ seconds : the time that the call took)doc");
              R"doc(Smooth a mesh within the tolerance of a volume.
 
 Every iteration ends with all faces inside and the whole reference within the tolerance of them. Vertices at an edge
-with more than two faces stay where they are.
+with more than two faces stay where they are, and so does what holds a T-junction together: a vertex of an open edge
+that lies on another edge or on the inside of a face, and the corners there.
 
 Parameters
 ----------

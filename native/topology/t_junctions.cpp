@@ -15,6 +15,8 @@ namespace tolvol {
 namespace {
 
 constexpr double kUnits = 4;
+/// The rounding of vertices that are so many times farther from the origin than the others does not count.
+constexpr double kFar = 8;
 constexpr std::size_t kBlock = 256;
 
 double largest(const glm::dvec3& p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
@@ -23,24 +25,19 @@ bool before(const glm::dvec3& a, const glm::dvec3& b) {
   return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
-/// Whether `p` lies between the ends, and not where one of them may have been before rounding.
-bool lies_on(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b, double unit) {
-  const glm::dvec3 edge = b - a, to_p = p - a;
-  const double along = glm::dot(edge, to_p), length2 = glm::dot(edge, edge);
-  if (!(along > 0 && along < length2)) return false;
-  const double reach = kUnits * unit * std::max({largest(a), largest(b), largest(p)});
-  const glm::dvec3 away = to_p - along / length2 * edge;
-  return glm::dot(away, away) <= reach * reach && glm::length(p - a) > reach && glm::length(p - b) > reach;
-}
-
 class TJunctions {
  public:
   TJunctions(TriangleMesh mesh, std::span<const glm::uvec2> open, double unit) : mesh_(std::move(mesh)), unit_(unit) {
-    for (const glm::dvec3& p : mesh_.vertices) farthest_ = std::max(farthest_, largest(p));
+    double farthest = 0;
+    for (const glm::dvec3& p : mesh_.vertices) farthest = std::max(farthest, largest(p));
     // Squares of coordinates stay within double in a mesh of a size of about 1.
-    const double scale = farthest_ > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(farthest_), -1000, 1000)) : 1;
+    const double scale = farthest > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(farthest), -1000, 1000)) : 1;
     for (glm::dvec3& p : mesh_.vertices) p *= scale;
-    farthest_ *= scale;
+    std::vector<double> sizes;
+    for (const glm::dvec3& p : mesh_.vertices) sizes.push_back(largest(p));
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+    std::nth_element(sizes.begin(), middle, sizes.end());
+    usual_ = *middle;
     std::vector<bool> is_end(mesh_.vertices.size());
     for (const glm::uvec2& e : open) {
       is_end[e.x] = is_end[e.y] = true;
@@ -102,14 +99,29 @@ class TJunctions {
 
   const glm::dvec3& place(std::uint32_t vertex) const { return mesh_.vertices[vertex]; }
 
-  double reach(const glm::uvec3& t) const {
-    return kUnits * unit_ * std::max({largest(place(t.x)), largest(place(t.y)), largest(place(t.z))});
+  /// No vertex farther than this is on anything, whatever else the mesh has far away.
+  double most_reach(const glm::dvec3& p) const { return kUnits * unit_ * kFar * std::max(usual_, largest(p)); }
+  /// How far rounding may have put `p` from what has these corners.
+  double reach(const glm::dvec3& p, const glm::uvec3& t) const {
+    const double size = std::max({largest(p), largest(place(t.x)), largest(place(t.y)), largest(place(t.z))});
+    return std::min(kUnits * unit_ * size, most_reach(p));
+  }
+
+  /// Whether `p` lies between the ends, and not where one of them may have been before rounding.
+  bool lies_on(const glm::dvec3& p, std::uint32_t from, std::uint32_t to) const {
+    const glm::dvec3 &a = place(from), &b = place(to);
+    const glm::dvec3 edge = b - a, to_p = p - a;
+    const double along = glm::dot(edge, to_p), length2 = glm::dot(edge, edge);
+    if (!(along > 0 && along < length2)) return false;
+    const double room = reach(p, {from, to, to});
+    const glm::dvec3 away = to_p - along / length2 * edge;
+    return glm::dot(away, away) <= room * room && glm::length(p - a) > room && glm::length(p - b) > room;
   }
 
   bool is_segment(const glm::uvec3& t) const {
     for (int k = 0; k < 3; ++k) {
-      const glm::dvec3 &a = place(t[k]), &b = place(t[(k + 1) % 3]), &c = place(t[(k + 2) % 3]);
-      if (a == b || lies_on(c, a, b, unit_)) return true;
+      const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+      if (place(a) == place(b) || lies_on(place(t[(k + 2) % 3]), a, b)) return true;
     }
     return false;
   }
@@ -119,7 +131,7 @@ class TJunctions {
     const glm::dvec3 normal = glm::cross(place(t.y) - place(t.x), place(t.z) - place(t.x));
     const auto faces = std::ranges::equal_range(around_, end, {}, &std::pair<std::uint32_t, glm::uvec3>::first);
     return std::ranges::all_of(faces, [&](const auto& face) {
-      const double room = std::max(reach(t), reach(face.second)) * glm::length(normal);
+      const double room = std::max(reach(place(end), t), reach(place(end), face.second)) * glm::length(normal);
       for (int k = 0; k < 3; ++k) {
         if (std::abs(glm::dot(normal, place(face.second[k]) - place(t.x))) > room) return false;
       }
@@ -135,11 +147,11 @@ class TJunctions {
   void add(std::uint32_t vertex, const Hierarchy& hierarchy, std::vector<glm::dvec3>& places) const {
     const glm::dvec3& p = place(vertex);
     std::vector<Contact> contacts;
-    hierarchy.for_each_within(p, kUnits * unit_ * farthest_, [&](std::uint32_t index) {
+    hierarchy.for_each_within(p, most_reach(p), [&](std::uint32_t index) {
       const glm::uvec3& t = mesh_.triangles[index];
       for (int k = 0; k < 3; ++k) {
         const std::uint32_t a = t[k], b = t[(k + 1) % 3];
-        if (!lies_on(p, place(a), place(b), unit_)) continue;
+        if (!lies_on(p, a, b)) continue;
         contacts.push_back({std::minmax(a, b), lies_in_plane(vertex, t)});
         return;
       }
@@ -159,14 +171,14 @@ class TJunctions {
   /// Whether `p`, which lies on none of its edges, lies in a triangle and at none of its corners.
   bool lies_inside(const glm::dvec3& p, const glm::uvec3& t) const {
     const glm::dvec3 &a = place(t.x), &b = place(t.y), &c = place(t.z);
-    const double room = std::max(reach(t), kUnits * unit_ * largest(p));
+    const double room = reach(p, t);
     if (std::min({glm::length(p - a), glm::length(p - b), glm::length(p - c)}) <= room) return false;
     return closest_point(p, a, b, c).distance_squared <= room * room;
   }
 
   TriangleMesh mesh_;  // without the triangles that are no more than a segment
   double unit_;
-  double farthest_ = 0;  // the largest coordinate
+  double usual_ = 0;  // the median of the vertices' largest coordinates
   std::vector<Edge> open_;
   std::vector<std::pair<std::uint32_t, glm::uvec3>> around_;  // the ends of open edges, with the triangles around them
   std::vector<std::uint32_t> joined_;  // per vertex: a number that vertices have in common which segments join

@@ -138,6 +138,27 @@ TEST(Smoothing, TheBilaplacianKeepsTheSizeBetter) {
   EXPECT_LT(shrinkage(Operator::bilaplacian), 0.2 * shrinkage(Operator::laplacian));
 }
 
+TEST(Smoothing, WhatStandsOnAnEdgeStaysOnIt) {
+  // A rough plate, and triangles that stand with one corner each on the middle of an inner edge.
+  const unsigned n = 16;
+  TriangleMesh mesh = shapes::grid(n);
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) mesh.vertices[v].z = static_cast<double>(7 * v % 5) / 64;
+  std::vector<std::array<std::uint32_t, 3>> standing;  // the corner, and the ends of the edge
+  for (std::uint32_t i = 3; i < n; i += 4) {
+    const std::uint32_t a = i * (n + 1) + i, b = a + 1, foot = static_cast<std::uint32_t>(mesh.vertices.size());
+    const dvec3 middle = 0.5 * (mesh.vertices[a] + mesh.vertices[b]);
+    for (const double side : {0.0, 0.01, -0.01}) mesh.vertices.push_back(middle + dvec3(side, 0, side == 0 ? 0 : 1));
+    mesh.triangles.emplace_back(foot, foot + 1, foot + 2);
+    standing.push_back({foot, a, b});
+  }
+  const SmoothingResult r = free_smooth(mesh, {.kind = Operator::laplacian, .boundary = Boundary::along});
+  EXPECT_EQ(r.fixed_t_junctions, 3 * standing.size());
+  EXPECT_GT(r.largest_motion, 0.01);
+  for (const auto& [foot, a, b] : standing) {
+    EXPECT_LT(glm::length(r.vertices[foot] - 0.5 * (r.vertices[a] + r.vertices[b])), 1e-9);
+  }
+}
+
 TEST(Smoothing, TheBoundaryStaysOrIsSmoothedAlongItself) {
   const unsigned n = 12;
   TriangleMesh mesh = shapes::squares(n, [&](const dvec3& p) {

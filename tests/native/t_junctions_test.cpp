@@ -45,6 +45,16 @@ TEST(TJunctions, AreNotWhereCornersDifferByRounding) {
   }
 }
 
+TEST(TJunctions, DoNotComeFromOutliers) {
+  TriangleMesh mesh = shapes::joined(shapes::grid(8), shapes::grid(8));
+  for (std::size_t v = mesh.vertices.size() / 2; v < mesh.vertices.size(); ++v) mesh.vertices[v].z = 0.5;
+  std::vector<glm::uvec2> open;
+  for (std::uint32_t v = 0; v < 8; ++v) open.emplace_back(v, v + 1);
+  EXPECT_EQ(found(mesh, open), Indices{});
+  mesh.vertices.front() = dvec3(1e19);
+  EXPECT_EQ(found(mesh, open), Indices{});
+}
+
 TEST(TJunctions, AreFoundAtAnyScale) {
   for (const double scale : {1e-300, 1e-160, 1e160, 1e300}) {
     TriangleMesh mesh = kAlongALine;

@@ -65,7 +65,7 @@ def test_boundary():
     on_boundary = np.unique(meshes.boundary_segments(vertices, triangles))
     fixed, along = (tolvol.smooth(vertices, triangles, boundary=choice) for choice in ("fixed", "along"))
     assert np.array_equal(fixed.vertices[on_boundary], vertices[on_boundary])
-    assert fixed.report["fixed"] == {"boundary": len(on_boundary), "non-manifold": 0}
+    assert fixed.report["fixed"] == {"boundary": len(on_boundary), "non-manifold": 0, "T-junction": 0}
     assert np.ptp(along.vertices[4:13, 1]) < 0.01, "the zigzag was 0.03"
     assert along.report["fixed"]["boundary"] == 0
 
