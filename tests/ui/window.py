@@ -104,10 +104,14 @@ def draw_finely(fine):
                 overlay.show_outline_selected = overlay.show_floor = overlay.show_axis_x = overlay.show_axis_y = fine
 
 
+def _view_areas():
+    window = bpy.context.window_manager.windows[0]
+    return [area for area in window.screen.areas if area.type == "VIEW_3D"]
+
+
 def view():
     """Returns the window and the area of its 3D view."""
-    window = bpy.context.window_manager.windows[0]
-    return window, next(area for area in window.screen.areas if area.type == "VIEW_3D")
+    return bpy.context.window_manager.windows[0], _view_areas()[0]
 
 
 def region(kind):
@@ -183,17 +187,18 @@ def _find(copied, keys, across):
 
 
 def press(operator, across=0.33):
-    """Clicks the button of an operator in the sidebar. If necessary, it scrolls the sidebar down and back."""
+    """Clicks the button of an operator in the sidebar. If necessary, it scrolls the sidebar, and back up after that."""
     place = yield from find(operator, across)
     scrolled = place is None
-    if scrolled:
-        yield from scroll(_DOWN)
-        place = yield from find(operator, across)
+    for direction in (_UP, _DOWN):
+        if place is None:
+            yield from scroll(direction)
+            place = yield from find(operator, across)
     assert place is not None, f"no button for {operator}"
     yield 0.6  # After so many seconds no tooltip is in the way.
     click(*place)
     yield 0.3
-    if scrolled:
+    if scrolled and _view_areas():  # A file browser may fill the window now.
         yield from scroll(_UP)
 
 
