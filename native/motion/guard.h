@@ -34,8 +34,7 @@ class Guard {
 
   /// `positions`: three float32 coordinates a vertex, local, as Blender stores them. `faces`: `corners` indices a face,
   /// as in Pieces. Keeps a reference to `volume`. Throws InvalidInput like constrain(); Cancelled. About 1 us a vertex;
-  /// holds about 150 bytes a vertex and 60 a triangle, 72 and
-  /// 130 more where crossings are kept out.
+  /// holds about 150 bytes a vertex and 60 a triangle, and where crossings are kept out 72 and 130 more.
   Guard(std::span<const float> positions, std::vector<std::uint32_t> faces, int corners, const glm::dmat4& to_world,
         const ToleranceVolume& volume, const Options& options);
   Guard(const Guard&) = delete;

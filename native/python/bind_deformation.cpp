@@ -226,7 +226,8 @@ permitted_fraction : from 0 to 1, the share of the way at which the whole mesh i
 leaving : a dict of `faces`, the number of faces that the deformation as wished would not leave certified inside, and
     `first`, the first of them. If there are none, some that it would take from a part of the reference that has no
     other face within the tolerance
-crossing : a dict alike. If no faces are leaving: those that would cross others or become degenerate, and did not before
+crossing : the same for faces that would cross others or become degenerate, and did not before; it is only looked for if
+    no faces are leaving
 outside : a dict of `faces`, the number of faces that were outside before and were kept, `first`, the first of them, and
     `reference_faces`, the number of reference faces that were beyond the tolerance of the mesh before
 outside_lattice : the number of vertices that are not in the box
@@ -257,12 +258,12 @@ faces : (m, k) integer array, optional
 volume : ToleranceVolume, optional
     The result has to stay in it.
 mode : {"blocked", "farthest", "pull_back"}
-    What happens to a deformation that is not certified inside as a whole, or by which faces would cross. "blocked" moves nothing, and the report says
-    how far the deformation may go. "farthest" moves every vertex that permitted share of its way. "pull_back" moves each
-    vertex as far as it may go, as constrain does.
+    What happens to a deformation that is not certified inside as a whole, or by which faces would cross. "blocked"
+    moves nothing, and the report says how far the deformation may go. "farthest" moves every vertex that permitted
+    share of its way. "pull_back" moves each vertex as far as it may go, as constrain does.
 two_sided, outside
     As for constrain. A mesh that is beyond the tolerance before the deformation is no error if it is within it
-    afterwards.
+    afterwards and no faces cross that must not.
 crossings : {"keep_out", "allow"}
     As for constrain. Without a volume nothing is held back.
 to_world, threads, progress
