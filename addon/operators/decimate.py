@@ -172,11 +172,15 @@ object. An object without a reference gets one first, as by Set Reference"""
                 stack.enter_context(transfer.Writing(ob.data, source, result))
                 for ob, (source, _, result, _) in zip(self.objects, outcomes)
             ]
+            without = [ob for ob in self.objects if ob.tolvol.snapshot is None]
+            # If anything fails until the meshes are written, the objects have no reference, as before.
+            stack.callback(lambda: [snapshots.clear_reference(ob) for ob in without])
             for ob, (_, reference, _, _) in zip(self.objects, outcomes):
-                if ob.tolvol.snapshot is None:
+                if ob in without:
                     snapshots.set_reference(ob, reference)
             for write in writes:
                 write.write()
+            without.clear()
         for ob, (_, _, _, run) in zip(self.objects, outcomes):
             self._keep(ob, run, f"{ob.name}: " if len(self.objects) > 1 else "")
 

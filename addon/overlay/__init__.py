@@ -33,6 +33,7 @@ def refresh():
     """
     if not preferences.use_gl(bpy.context):
         reasons.broken.clear()  # When drawing is turned on again, the driver is tried again.
+    markers.refresh()
     names = _wanted()
     if not names:
         _end()
@@ -118,12 +119,19 @@ def _note_frame(*_):
         surface.touch(True)
 
 
+@persistent
+def _forget_places(*_):
+    places.forget()
+
+
 def register():
+    bpy.app.handlers.load_post.append(_forget_places)
     snapshots.listeners.append(refresh)
     places.listeners.append(markers.refresh)
 
 
 def unregister():
+    bpy.app.handlers.load_post.remove(_forget_places)
     places.forget()
     places.listeners.remove(markers.refresh)
     markers.end()

@@ -154,6 +154,11 @@ class Deformation {
       result_.vertices = after_;
       return;
     }
+    if (is_whole()) {
+      throw InvalidInput("the deformation would bring the mesh within the tolerance, but " +
+                         std::to_string(crossing(after_).size()) +
+                         " faces would then cross others; allow it (crossings=\"allow\")");
+    }
     if (!outside.empty()) refuse_outside(FaceCount::of(outside));
     take_uncovered(uncovered, Outside::error);
   }

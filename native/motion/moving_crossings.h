@@ -41,8 +41,9 @@ class MovingCrossings {
   bool moves(std::uint32_t vertex) const { return trial_[vertex] != state_[vertex]; }
 
   /// Returns faces of new crossings and new degenerate faces on trial, ascending; none if there are none. A face that
-  /// crosses very many is not returned with all of them. Every face must be asked about after the last change to a
-  /// corner. Throws Cancelled; take_back() has to follow then. About 1 us a face that moves, for a quad 5 us.
+  /// crosses very many is not returned with all of them, so that what was returned has to be asked about again. Every
+  /// face must be asked about after the last change to a corner. Throws Cancelled; take_back() has to follow then.
+  /// About 1 us a face that moves, for a quad 5 us.
   std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Progress* progress);
   /// Makes the trial of these vertices the state, for which failing() found no face last.
   void accept(std::span<const std::uint32_t> vertices);

@@ -369,7 +369,7 @@ void PullBack::raise(Held& held, Mode mode, bool search) {
 void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Progress* progress) {
   if (crossings_) start_crossings(held, wish);
   // Crossings are looked for among the faces whose corners have moved since they were last.
-  std::vector<std::uint32_t> changed, lost, untested = wish.moving.faces, since;
+  std::vector<std::uint32_t> changed, lost, untested = wish.moving.faces, since, again;
   bool is_renewed = false;
   std::size_t rounds = 0;
   for (;;) {
@@ -387,8 +387,15 @@ void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Pr
     }
     const bool cross = failed.empty() && crossings_;
     if (cross) {
-      if (rounds > 0) untested = mesh_.faces_around(since);
+      if (rounds > 0) {
+        // A face that crosses very many is not returned with all of them, and may be back in the state by now.
+        untested = mesh_.faces_around(since);
+        untested.insert(untested.end(), again.begin(), again.end());
+        std::sort(untested.begin(), untested.end());
+        untested.erase(std::unique(untested.begin(), untested.end()), untested.end());
+      }
       failed = crossings_->failing(untested, progress);
+      again = failed;
       since.clear();
       ++rounds;
     }

@@ -30,6 +30,9 @@ constexpr int kMostTries = 32, kMostTriesOfLong = 8;
 constexpr std::size_t kLong = 200;  ///< corners
 /// A loop is given up after so many of its triangles were refused, in all searches together.
 constexpr std::size_t kMostRefused = 50000;
+/// Where the triangles of a loop cross more faces than so many, each further triangle is compared with all faces near
+/// it instead of with these.
+constexpr std::size_t kMostObstacles = 64;
 /// An edge across a hole is probed in so many points before any triangle at it is proved.
 constexpr int kProbes = 7;
 
@@ -315,11 +318,37 @@ class Closing::Filling {
       const bool is_inside = facing && certificate.bound_in_any_order(placed, bounds) != TriangleCertificate::kUnproved;
       return refuse(is_inside ? LoopOutcome::turned : LoopOutcome::outside);
     }
+    return goes_around(stored) || refuse(LoopOutcome::crossing);
+  }
+
+  /// Calls visit(corners) for the faces of the input, and of the fillings that the loop has to keep apart from, whose
+  /// boxes meet that of a triangle. A visit that returns false is the last one.
+  template <class Visit>
+  void for_each_near(const Corners& stored, Visit&& visit) const {
     const Box box = box_of(stored);
-    for (const Obstacle& obstacle : obstacles_) {
-      if (meet(box, obstacle.box) && faces_cross(stored, obstacle.corners)) return refuse(LoopOutcome::crossing);
+    bool more = true;
+    std::size_t met = 0;
+    closing_.tree_.for_each_meeting(box, [&](std::uint32_t face) {
+      if (++met % 64 == 0) poll();
+      return more = visit(closing_.mesh_.corners(face));
+    });
+    if (!before_ || !more) return;
+    closing_.new_tree_.for_each_meeting(box, [&](std::uint32_t face) {
+      return closing_.loop_of_[face] >= *before_ || visit(closing_.new_faces_[face]);
+    });
+  }
+
+  /// Whether a triangle crosses nothing that an earlier try crossed.
+  bool goes_around(const Corners& stored) const {
+    if (obstacles_.size() <= kMostObstacles) {
+      const Box box = box_of(stored);
+      return std::ranges::none_of(obstacles_, [&](const Obstacle& obstacle) {
+        return meet(box, obstacle.box) && faces_cross(stored, obstacle.corners);
+      });
     }
-    return true;
+    bool clear = true;
+    for_each_near(stored, [&](const Corners& other) { return clear = !faces_cross(stored, other); });
+    return clear;
   }
 
   /// Whether the triangles cross no face of the input, and none of the fillings that the loop has to keep apart from.
@@ -327,19 +356,14 @@ class Closing::Filling {
   /// most of the time to ask about all triangles whether they cross any face.
   bool is_clear() {
     bool clear = true;
-    const auto look = [&](const Corners& stored, const Corners& other) {
-      if (!faces_cross(stored, other)) return;
-      clear = refuse(LoopOutcome::crossing);
-      obstacles_.push_back({other, box_of(other)});
-    };
     for (const glm::uvec3& face : loop_.faces) {
       poll();
       const Corners stored = closing_.corners_of(loop_, face);
-      const Box box = box_of(stored);
-      closing_.tree_.for_each_meeting(box, [&](std::uint32_t other) { look(stored, closing_.mesh_.corners(other)); });
-      if (!before_) continue;
-      closing_.new_tree_.for_each_meeting(box, [&](std::uint32_t other) {
-        if (closing_.loop_of_[other] < *before_) look(stored, closing_.new_faces_[other]);
+      for_each_near(stored, [&](const Corners& other) {
+        if (!faces_cross(stored, other)) return true;
+        clear = refuse(LoopOutcome::crossing);
+        obstacles_.push_back({other, box_of(other)});
+        return obstacles_.size() <= kMostObstacles;
       });
     }
     return clear;

@@ -79,7 +79,7 @@ class Triangulation {
     if (choices_.empty() || (!is_whole && !rules_.admits_edge(i, j))) return;
     for (Choice& choice : choices_) choice.sum += weight(i, choice.corner, j);
     while (!choices_.empty()) {
-      poll();
+      if (choices_.size() % 16 == 0) poll();
       const auto best = std::min_element(choices_.begin(), choices_.end());
       if (rules_.admits_triangle({i, best->corner, j})) {
         settle(i, j, best->sum, best->corner);

@@ -28,6 +28,9 @@ class FaceTree {
   /// less.
   void change(std::span<const std::uint32_t> faces, std::span<const Box> boxes);
 
+  /// A box around all faces, which is empty if there are none.
+  Box box() const { return nodes_.empty() ? Box() : nodes_.front(); }
+
   /// The sum of the sizes of the leaves' boxes along the axes: the larger it has become since the tree was built, the
   /// more a search has to look at.
   double extent() const;

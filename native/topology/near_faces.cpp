@@ -5,6 +5,7 @@
 #include "topology/near_faces.h"
 
 #include <map>
+#include <numeric>
 
 #include "base/call.h"
 
@@ -64,6 +65,11 @@ NearFaces::NearFaces(std::span<const std::uint32_t> faces, std::span<const Corne
     group.number = static_cast<std::uint32_t>(crowds_.size());
     crowds_.push_back({hub, FaceTree(group.faces, group.boxes, team), FaceTree(group.faces, group.rims, team)});
   }
+  std::vector<std::uint32_t> numbers(crowds_.size());
+  std::iota(numbers.begin(), numbers.end(), 0u);
+  std::vector<Box> places;
+  for (const Crowd& crowd : crowds_) places.push_back(crowd.whole.box());
+  places_ = FaceTree(numbers, places, team);
   rest.number = static_cast<std::uint32_t>(crowds_.size());
   others_ = FaceTree(rest.faces, rest.boxes, team);
   faces_.assign(faces.begin(), faces.end());
@@ -81,6 +87,7 @@ void NearFaces::change(std::uint32_t face, const Corners& corners) {
   whole_[place] = box_of(corners);
   crowd.whole.change(face, whole_[place]);
   crowd.rims.change(face, rim(corners, crowd.hub));
+  places_.change(crowd_of_[place], crowd.whole.box());
 }
 
 void NearFaces::remove(std::uint32_t face) {
@@ -92,6 +99,7 @@ void NearFaces::remove(std::uint32_t face) {
   Crowd& crowd = crowds_[crowd_of_[place]];
   crowd.whole.change(face, Box());
   crowd.rims.change(face, Box());
+  places_.change(crowd_of_[place], crowd.whole.box());
 }
 
 }  // namespace tolvol

@@ -83,6 +83,7 @@ class NearFaces {
 
   FaceTree others_;  ///< all faces without a hub
   std::vector<Crowd> crowds_;
+  FaceTree places_;  ///< of the crowds: the box around the faces of each
   // These are empty if there is no crowd.
   std::vector<std::uint32_t> faces_;     ///< in rising order
   std::vector<std::uint32_t> crowd_of_;  ///< for each of faces_; crowds_.size() for one without a hub
@@ -94,8 +95,9 @@ void NearFaces::for_each_near(const Box& all, const Faces& own, Visit&& visit) c
   bool more = true;
   const auto next = [&](std::uint32_t face) { return more = visit(face); };
   others_.for_each_meeting(all, next);
-  for (std::size_t i = 0; i < crowds_.size() && more; ++i) {
-    const Crowd& crowd = crowds_[i];
+  if (!more) return;
+  places_.for_each_meeting(all, [&](std::uint32_t number) {
+    const Crowd& crowd = crowds_[number];
     Box sharing, opposite, strange;  // Of those of `own` that share the hub, of their rims, and of the rest.
     for (const auto& face : own) {
       if (has_corner(face.corners, crowd.hub)) {
@@ -107,10 +109,11 @@ void NearFaces::for_each_near(const Box& all, const Faces& own, Visit&& visit) c
     Box first = opposite;
     first.add(strange);
     if (!first.empty()) crowd.whole.for_each_meeting(first, next);
-    if (!more || sharing.empty()) continue;
+    if (!more || sharing.empty()) return more;
     crowd.rims.for_each_meeting(sharing,
                                 [&](std::uint32_t face) { return meet(whole_[place_of(face)], first) || next(face); });
-  }
+    return more;
+  });
 }
 
 }  // namespace tolvol

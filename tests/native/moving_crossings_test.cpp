@@ -98,6 +98,28 @@ struct Motion {
 constexpr PullBack::Mode kModes[] = {PullBack::Mode::pull_back, PullBack::Mode::settle, PullBack::Mode::halve,
                                      PullBack::Mode::reset};
 
+TEST(MovingCrossings, AFaceThatWouldMeetVeryManyKeepsAwayFromAll) {
+  // A large triangle that slides a little, and many small ones above it that move down through it.
+  for (const unsigned count : {40u, 60u, 200u}) {
+    TriangleMesh mesh{{{-1, -1, 0}, {30, -1, 0}, {-1, 30, 0}}, {{0, 1, 2}}};
+    for (unsigned i = 0; i < count; ++i) {
+      const dvec3 place(0.5 * (i % 20), 0.5 * (i / 20), 0);
+      const auto v = static_cast<std::uint32_t>(mesh.vertices.size());
+      for (const dvec3& p : {dvec3(0, 0, 0.1), dvec3(0.1, 0, 0.1), dvec3(0, 0, 0.2)})
+        mesh.vertices.push_back(place + p);
+      mesh.triangles.emplace_back(v, v + 1, v + 2);
+    }
+    const Motion motion(shapes::stored(mesh), 2);
+    const std::vector<dvec3> wish =
+        motion.wish([](const dvec3& p) { return p + (p.z == 0 ? dvec3(0.01, 0, 0) : dvec3(0, 0, -0.15)); });
+    for (const auto mode : {PullBack::Mode::reset, PullBack::Mode::halve, PullBack::Mode::pull_back}) {
+      ConstrainOptions options;
+      options.mode = mode, options.two_sided = false;
+      EXPECT_EQ(pairs_of(motion.run(wish, options).vertices, mesh.triangles), Pairs()) << count;
+    }
+  }
+}
+
 TEST(MovingCrossings, SheetsThatArePushedTogetherStayApart) {
   // In the middle each goes towards the other by more than the gap, and the tolerance permits it.
   const Motion motion(sandwich(), 0.3);
