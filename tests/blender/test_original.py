@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from addon.mesh import mesh_io
+from addon.mesh import mesh_io, transfer
 from addon.mesh.mesh_io import column
 from addon.operators import original
 from addon.reference import originals
@@ -160,6 +160,19 @@ def test_the_mesh_that_was_changed_meanwhile_is_not_kept_as_the_original():
     assert len(bpy.data.meshes) == 1
     ob.data.vertices[5].co.z += 1e-3
     assert originals.copy_of(ob, arrays) is None and len(bpy.data.meshes) == 1
+
+
+def test_a_decimation_that_cannot_write_the_mesh_leaves_no_reference(monkeypatch):
+    ob = rich()
+    before = state(ob.data)
+
+    def fail(_writing):
+        raise RuntimeError("no memory")
+
+    monkeypatch.setattr(transfer.Writing, "write", fail)
+    with pytest.raises(RuntimeError, match="no memory"):
+        bpy.ops.tolvol.decimate(tolerance_percent=1)
+    assert ob.tolvol.snapshot is None and ob.tolvol.original is None and state(ob.data) == before
 
 
 def test_an_earlier_file_has_only_the_shape():

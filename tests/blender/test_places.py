@@ -172,3 +172,12 @@ def test_places_are_those_of_one_object():
     assert places.shown(other)[0] == [] and places.shown(ob)[0] and places.shown(None)[0] == []
     activate(ob)
     assert operators.TOLVOL_OT_next_place.poll(bpy.context)
+
+
+def test_places_do_not_outlive_their_file(tmp_path):
+    peaked()
+    assert bpy.ops.tolvol.worst_point() == {"FINISHED"} and places.any_shown()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    assert places.any_shown()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "scene.blend"))
+    assert not places.any_shown()
