@@ -46,7 +46,7 @@ constexpr double kComfort = 0.97;
 /// inside after a further way of the share kLast of the same distance.
 constexpr double kSettled = 0.965, kLast = 0.04;
 /// The number of tries to find where a vertex leaves the volume; a plane takes one.
-constexpr int kCrossings = 8;
+constexpr int kLeavingTries = 8;
 /// The search ends within this share of the provable distance.
 constexpr double kClose = 0.002;
 /// The number of vertices that a thread takes at a time, for work of a few us each.
@@ -178,11 +178,11 @@ void PullBack::place(Held& held, const Along& along) {
 /// Finds a place where the vertex itself is about `target` from the reference, at the most, between a place where it is
 /// nearer and one where it is farther. The method is false position in which an end that stays twice counts half
 /// (Illinois).
-PullBack::Along PullBack::crossing(const Held& held, double target, Along inner, Along outer) const {
+PullBack::Along PullBack::leaving_point(const Held& held, double target, Along inner, Along outer) const {
   const double close = kClose * mesh_.limit(), aim = target - close / 2;
   double inner_excess = inner.bound.distance - aim, outer_excess = outer.bound.distance - aim;
   bool was_outside = false;
-  for (int i = 0; i < kCrossings && inner.bound.distance < target - close; ++i) {
+  for (int i = 0; i < kLeavingTries && inner.bound.distance < target - close; ++i) {
     const double factor = inner.factor + (outer.factor - inner.factor) * inner_excess / (inner_excess - outer_excess);
     const Along next = along(held, factor, inner.bound.triangle);
     const bool outside = !(next.bound.distance <= target), stays_twice = i > 0 && was_outside == outside;
@@ -231,11 +231,11 @@ void PullBack::release(Held& held, Mode mode) {
   const bool known = exit == 1 && held.wish.triangle != Hierarchy::kNone;
   const Along outer = known ? Along{1, held.wish} : along(held, exit, inner.bound.triangle);
   Along end = start;
-  if (inner.bound.distance < comfort * limit) end = crossing(held, kComfort * limit, inner, outer);
+  if (inner.bound.distance < comfort * limit) end = leaving_point(held, kComfort * limit, inner, outer);
   if (mode == Mode::settle && end.factor > 0) {
     held.largest_factor = end.factor;
   } else if (mode != Mode::halve && inner.bound.distance < limit) {
-    held.largest_factor = crossing(held, limit, end.factor > 0 ? end : inner, outer).factor;
+    held.largest_factor = leaving_point(held, limit, end.factor > 0 ? end : inner, outer).factor;
   }
   place(held, end);
 }

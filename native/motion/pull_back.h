@@ -115,7 +115,7 @@ class PullBack {
   Result finish(const Wish& wish, Mode mode, Progress* progress);
   std::vector<Held> hold(const Wish& wish, std::vector<std::uint32_t> failed, Progress* progress);
   Along along(const Held& held, double factor, std::uint32_t hint) const;
-  Along crossing(const Held& held, double target, Along inner, Along outer) const;
+  Along leaving_point(const Held& held, double target, Along inner, Along outer) const;
   void release(Held& held, Mode mode);
   void pull(std::vector<Held>& held, Mode mode, Progress* progress);
   void let_go(std::vector<Held>& held, Mode mode, Progress* progress);
