@@ -55,7 +55,7 @@ class TJunctions {
       return true;
     });
     for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) joined_.push_back(joined.find(v));
-    std::ranges::stable_sort(around_, {}, &std::pair<std::uint32_t, glm::uvec3>::first);
+    std::ranges::stable_sort(around_, {}, &Around::first);
   }
 
   /// The places of what holds the T-junctions together.
@@ -88,13 +88,12 @@ class TJunctions {
 
  private:
   using Edge = std::pair<std::uint32_t, std::uint32_t>;  // the lower vertex first
+  using Around = std::pair<std::uint32_t, glm::uvec3>;   // a vertex, and a triangle around it
 
   /// An edge that a vertex lies on, as a side of one triangle.
   struct Contact {
     Edge edge;
     bool in_plane;  // of that triangle, all faces around the vertex
-
-    auto operator<=>(const Contact& other) const = default;
   };
 
   const glm::dvec3& place(std::uint32_t vertex) const { return mesh_.vertices[vertex]; }
@@ -129,14 +128,14 @@ class TJunctions {
   /// Whether all faces around an end of an open edge lie in the plane of a triangle.
   bool lies_in_plane(std::uint32_t end, const glm::uvec3& t) const {
     const glm::dvec3 normal = glm::cross(place(t.y) - place(t.x), place(t.z) - place(t.x));
-    const auto faces = std::ranges::equal_range(around_, end, {}, &std::pair<std::uint32_t, glm::uvec3>::first);
-    return std::ranges::all_of(faces, [&](const auto& face) {
-      const double room = std::max(reach(place(end), t), reach(place(end), face.second)) * glm::length(normal);
+    auto face = std::ranges::lower_bound(around_, end, {}, &Around::first);
+    for (; face != around_.end() && face->first == end; ++face) {
+      const double room = std::max(reach(place(end), t), reach(place(end), face->second)) * glm::length(normal);
       for (int k = 0; k < 3; ++k) {
-        if (std::abs(glm::dot(normal, place(face.second[k]) - place(t.x))) > room) return false;
+        if (std::abs(glm::dot(normal, place(face->second[k]) - place(t.x))) > room) return false;
       }
-      return true;
-    });
+    }
+    return true;
   }
 
   bool is_joined(std::uint32_t vertex, const Edge& edge) const {
@@ -159,7 +158,7 @@ class TJunctions {
       places.insert(places.end(), {p, place(t.x), place(t.y), place(t.z)});
     });
     // The sides on one edge stand together, and those in whose plane the faces lie are first.
-    std::ranges::sort(contacts, std::greater<>());
+    std::ranges::sort(contacts, std::greater<>(), [](const Contact& c) { return std::pair(c.edge, c.in_plane); });
     for (std::size_t i = 0; i < contacts.size(); ++i) {
       const auto& [edge, lies_upon_a_face] = contacts[i];
       if ((i > 0 && contacts[i - 1].edge == edge) || is_joined(vertex, edge)) continue;
@@ -180,7 +179,7 @@ class TJunctions {
   double unit_;
   double usual_ = 0;  // the median of the vertices' largest coordinates
   std::vector<Edge> open_;
-  std::vector<std::pair<std::uint32_t, glm::uvec3>> around_;  // the ends of open edges, with the triangles around them
+  std::vector<Around> around_;         // the ends of open edges, with the triangles around them
   std::vector<std::uint32_t> joined_;  // per vertex: a number that vertices have in common which segments join
 };
 
