@@ -9,6 +9,7 @@
 #include "many.h"
 #include "shapes.h"
 #include "topology/sides.h"
+#include "without.h"
 
 namespace {
 
@@ -18,17 +19,6 @@ using glm::dvec3;
 std::vector<BoundaryLoop> of(const TriangleMesh& mesh, unsigned threads = 1) {
   Team team(threads);
   return boundary_loops(mesh.vertices, weld_equal_positions(mesh.vertices), mesh.triangles, team);
-}
-
-/// The mesh without the triangles for which drop(index) holds.
-template <class Drop>
-TriangleMesh without(TriangleMesh mesh, Drop&& drop) {
-  std::vector<glm::uvec3> kept;
-  for (unsigned t = 0; t < mesh.triangles.size(); ++t) {
-    if (!drop(t)) kept.push_back(mesh.triangles[t]);
-  }
-  mesh.triangles = std::move(kept);
-  return mesh;
 }
 
 std::uint32_t vertex_of(const TriangleMesh& mesh, Side corner) {

@@ -18,6 +18,7 @@
 #include "topology/crossings.h"
 #include "topology/sides.h"
 #include "topology/solidity.h"
+#include "without.h"
 
 namespace {
 
@@ -37,17 +38,6 @@ HoleClosingResult close(const TriangleMesh& mesh, double tolerance, const CloseH
 Solidity solidity_of(const TriangleMesh& mesh) {
   Team team(1);
   return solidity(mesh.vertices, mesh.triangles, team);
-}
-
-/// The mesh without the triangles for which drop(index) holds.
-template <class Drop>
-TriangleMesh without(TriangleMesh mesh, Drop&& drop) {
-  std::vector<glm::uvec3> kept;
-  for (unsigned t = 0; t < mesh.triangles.size(); ++t) {
-    if (!drop(t)) kept.push_back(mesh.triangles[t]);
-  }
-  mesh.triangles = std::move(kept);
-  return mesh;
 }
 
 /// The mesh without triangles that run through the same three places as an earlier one in the same direction.
