@@ -4,12 +4,13 @@
 Blender's readers turn coordinates that are not finite into zeros, drop faces that name a missing vertex, and read a
 truncated STL file as an empty one. check() finds such damage in the file itself. It also counts the faces of the file,
 so that the faces that a reader drops (repeated faces and faces with a repeated corner) can be reported. check() builds
-no mesh: Blender does that.
+no mesh: plain_files.py or Blender does that.
 """
 
 import re
 import struct
 import warnings
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,15 +32,28 @@ _PLY_TYPES = {
 }
 
 
+@dataclass(frozen=True)
+class Content:
+    """What the check of a file has read.
+
+    faces: the number of faces that the file declares
+    polygons: (vertices, faces) of a PLY file that holds nothing but positions, normals and faces with equally many
+        corners, as (n, 3) float64 and (m, k) integers; else None
+    """
+
+    faces: int
+    polygons: tuple | None = None
+
+
 def check(extension, data, folder):
-    """Returns the number of faces that a file's content declares. `folder` holds the files that the content may name.
+    """Returns the Content of a file. `folder` holds the files that the content may name.
 
     Raises Refused with a message that says what is wrong and does not name the file.
     """
     if not data:
         raise Refused("the file is empty")
     if extension in (".gltf", ".glb"):
-        return gltf_check.check(data, folder)
+        return Content(gltf_check.check(data, folder))
     return {".obj": _check_obj, ".ply": _check_ply, ".stl": _check_stl}[extension](data)
 
 
@@ -101,7 +115,7 @@ def _check_obj(data):
         starts = np.cumsum(sizes) - sizes
         lowest, highest = np.minimum.reduceat(indices, starts), np.maximum.reduceat(indices, starts)
         _require_indices(lowest, highest, len(lines), 1)
-    return len(faces)
+    return Content(len(faces))
 
 
 def _absolute(text, indices, sizes):
@@ -113,6 +127,8 @@ def _absolute(text, indices, sizes):
 
 
 # PLY ----------------------------------------------------------------------------------------------------------------
+
+_POSITIONS_AND_NORMALS = {"x", "y", "z", "nx", "ny", "nz"}
 
 
 def _check_ply(data):
@@ -127,7 +143,7 @@ def _check_ply(data):
             (name, count, [(field, counted and "f8", "f8") for field, counted, _ in properties])
             for name, count, properties in elements
         ]
-    offset, vertices, faces = 0, None, 0
+    offset, vertices, polygons, faces = 0, None, None, 0
     for name, count, properties in elements:
         try:
             rows, offset = _ply_element(body, offset, count, properties, order)
@@ -142,14 +158,19 @@ def _check_ply(data):
             if vertices is None:
                 raise Refused("its faces stand before its vertices: save it again with another program")
             indices = rows.get("vertex_indices", rows.get("vertex_index"))
-            if indices is None:
+            if indices is None or not isinstance(indices, tuple) and not indices.size:
                 raise Refused("its faces name no vertices")
             lowest, highest = indices if isinstance(indices, tuple) else (indices.min(1), indices.max(1))
             _require_indices(lowest.astype(np.int64), highest.astype(np.int64), len(vertices), 0)
             faces = count
+            polygons = None if isinstance(indices, tuple) else indices
     if vertices is None:
         raise Refused("it has no vertices")
-    return faces
+    fields = {name: {field for field, _, _ in properties} for name, _, properties in elements}
+    plain = (
+        fields.keys() == {"vertex", "face"} and fields["vertex"] <= _POSITIONS_AND_NORMALS and len(fields["face"]) == 1
+    )
+    return Content(faces, polygons=(vertices, polygons) if plain and polygons is not None else None)
 
 
 def _ply_header(data):
@@ -235,7 +256,7 @@ def _check_stl(data):
     count = struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else 0
     if len(data) == 84 + count * _STL_TRIANGLE.itemsize:
         _require_finite(np.frombuffer(data, _STL_TRIANGLE, count, 84)["corners"].reshape(-1, 3))
-        return count
+        return Content(count)
     corners = re.findall(rb"^[ \t]*vertex[ \t]+([^\r\n]*)", data, re.MULTILINE)
     faces = len(re.findall(rb"^[ \t]*endfacet", data, re.MULTILINE))
     if not data.lstrip().startswith(b"solid") or not faces or len(corners) != 3 * faces:
@@ -247,4 +268,4 @@ def _check_stl(data):
     if coordinates is None or len(coordinates) != 9 * faces:
         raise Refused("a vertex is not three numbers")
     _require_finite(coordinates.reshape(-1, 3))
-    return faces
+    return Content(faces)

@@ -118,17 +118,18 @@ def move_edited(mesh, indices, places):
     return edited
 
 
-def new_mesh(name, vertices, triangles):
-    """Returns a new datablock that holds these coordinates, rounded to float32, and these triangles."""
+def new_mesh(name, vertices, faces):
+    """Returns a new datablock that holds these coordinates, rounded to float32, and these faces, (m, k)."""
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(vertices))
     mesh.vertices.foreach_set("co", np.ascontiguousarray(vertices, np.float32).ravel())
-    mesh.loops.add(triangles.size)
-    mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(triangles, np.int32).ravel())
-    mesh.polygons.add(len(triangles))
-    mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+    mesh.loops.add(faces.size)
+    mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(faces, np.int32).ravel())
+    mesh.polygons.add(len(faces))
+    corners = faces.shape[1]
+    mesh.polygons.foreach_set("loop_start", np.arange(0, faces.size, corners, dtype=np.int32))
     if bpy.app.version < (4, 0):  # From 4.0 on Blender computes loop_total, and it is read-only.
-        mesh.polygons.foreach_set("loop_total", np.full(len(triangles), 3, np.int32))
+        mesh.polygons.foreach_set("loop_total", np.full(len(faces), corners, np.int32))
     mesh.update(calc_edges=True)
     return mesh
 

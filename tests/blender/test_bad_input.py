@@ -82,6 +82,7 @@ BAD_FILES = {
     "truncated.ply": (ply(SQUARE, ["0 1 2", "0 2 3"])[:-6], ["ends inside", "face"]),
     "truncated.stl": (bytes(80) + (2).to_bytes(4, "little") + bytes(50), ["it is truncated"]),
     "no faces.ply": (ply(SQUARE, []), ["no faces"]),
+    "no corners.ply": (ply(SQUARE, [""]), ["name no vertices"]),
     "no faces.obj": ("".join(f"v {v}\n" for v in SQUARE).encode(), ["no faces"]),
     "nan.ply": (ply(["0 0 0", "1 nan 0", *SQUARE[2:]], ["0 1 2"]), ["vertex 2", "not finite", "nan"]),
     "infinite.obj": (b"v 0 0 0\nv 1 0 0\nv 0 inf 0\nf 1 2 3\n", ["vertex 3", "not finite", "inf"]),

@@ -324,7 +324,7 @@ def test_the_files_that_a_file_names(tmp_path):
 
 
 def checked(found, binary, tmp_path):
-    return file_check.check(".glb", glb(found, binary), tmp_path)
+    return file_check.check(".glb", glb(found, binary), tmp_path).faces
 
 
 def test_faces_are_counted(tmp_path):
@@ -339,10 +339,10 @@ def test_faces_are_counted(tmp_path):
     del found["meshes"][0]["primitives"][0]["indices"]
     assert checked(found, binary, tmp_path) == 2
     found["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(binary).decode()
-    assert file_check.check(".gltf", json.dumps(found).encode(), tmp_path) == 2
+    assert file_check.check(".gltf", json.dumps(found).encode(), tmp_path).faces == 2
     found["buffers"][0]["uri"] = "a%20b.bin"
     (tmp_path / "a b.bin").write_bytes(binary)
-    assert file_check.check(".gltf", json.dumps(found).encode(), tmp_path) == 2
+    assert file_check.check(".gltf", json.dumps(found).encode(), tmp_path).faces == 2
 
 
 def set_at(path, value):
@@ -432,4 +432,4 @@ def test_truncated_and_foreign_files(tmp_path):
     ):
         with pytest.raises(Refused, match=words):
             file_check.check(".gltf", data, tmp_path)
-    assert file_check.check(".gltf", b'{"asset": {"version": "2.0"}}', tmp_path) == 0
+    assert file_check.check(".gltf", b'{"asset": {"version": "2.0"}}', tmp_path).faces == 0

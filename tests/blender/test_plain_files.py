@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A PLY file that plain_files.py reads becomes the mesh that Blender's own reader makes of it."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.files import file_io, plain_files
+from addon.mesh import mesh_io
+
+needs_python_reader = pytest.mark.skipif(
+    "ply_import" in dir(bpy.ops.wm), reason="the reader of PLY files in this Blender is not slow, and is used"
+)
+POSITIONS = [("x", "f4"), ("y", "f4"), ("z", "f4")]
+NAMES = {"f4": "float", "f8": "double", "u1": "uchar", "i4": "int"}
+
+
+def scattered(corners, count=60, vertices=40):
+    """Returns (n, 3) points and (m, corners) faces, some of which repeat a corner or another face."""
+    random = np.random.default_rng(corners)
+    faces = random.integers(0, vertices, (count, corners))
+    faces[7] = faces[3]
+    faces[9, 1] = faces[9, 0]
+    faces[11, [1, 2]] = 5, 0
+    return random.normal(size=(vertices, 3)) * 1e3, faces
+
+
+def write(path, form, fields, columns, faces, index="vertex_indices"):
+    """Writes a PLY file. fields: [(name, type)] of the vertices; columns: their values, (n, fields)."""
+    order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[form]
+    header = [
+        "ply",
+        f"format {form} 1.0",
+        f"element vertex {len(columns)}",
+        *(f"property {NAMES[kind]} {name}" for name, kind in fields),
+        f"element face {len(faces)}",
+        f"property list uchar int {index}",
+        "end_header",
+    ]
+    if form == "ascii":
+        rows = [" ".join(repr(np.dtype(kind).type(v).item()) for v, (_, kind) in zip(row, fields)) for row in columns]
+        rows += [" ".join(map(str, [len(face), *face])) for face in faces]
+        body = "\n".join([*rows, ""]).encode()
+    else:
+        points = np.empty(len(columns), [(name, order + kind) for name, kind in fields])
+        for (name, _), column in zip(fields, np.transpose(columns)):
+            points[name] = column
+        lists = [np.uint8(len(face)).tobytes() + np.asarray(face, order + "i4").tobytes() for face in faces]
+        body = points.tobytes() + b"".join(lists)
+    path.write_bytes("\n".join([*header, ""]).encode() + body)
+    return path
+
+
+def stored(ob):
+    """Returns all that the mesh of an object holds, and the object's name without its number."""
+    mesh = ob.data
+    return {
+        "name": ob.name.split(".")[0],
+        "positions": mesh_io.column(mesh.vertices, "co", 3).view(np.uint32).tolist(),
+        "edges": mesh_io.column(mesh.edges, "vertices", 2, np.int32).tolist(),
+        "corners": mesh_io.column(mesh.loops, "vertex_index", 1, np.int32).tolist(),
+        "corner edges": mesh_io.column(mesh.loops, "edge_index", 1, np.int32).tolist(),
+        "first corners": mesh_io.column(mesh.polygons, "loop_start", 1, np.int32).tolist(),
+        "numbers of corners": mesh_io.column(mesh.polygons, "loop_total", 1, np.int32).tolist(),
+        "smooth": mesh_io.column(mesh.polygons, "use_smooth", 1, bool).tolist(),
+        "attributes": sorted(attribute.name for attribute in mesh.attributes),
+    }
+
+
+@needs_python_reader
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian", "binary_big_endian"])
+@pytest.mark.parametrize("corners", [3, 4, 5])
+@pytest.mark.parametrize("kind", ["f4", "f8"])
+def test_the_mesh_is_that_of_blenders_reader(tmp_path, monkeypatch, form, corners, kind):
+    points, faces = scattered(corners)
+    fields, columns = [(name, kind) for name, _ in POSITIONS], points
+    if corners == 3:  # Blender's reader leaves out normals.
+        fields, columns = [*fields, ("nx", "f4"), ("ny", "f4"), ("nz", "f4")], np.hstack([points, points[::-1]])
+    path = write(tmp_path / "in file.ply", form, fields, columns, faces)
+    reads, read = [], plain_files.read
+    monkeypatch.setattr(plain_files, "read", lambda *given: reads.append(read(*given)) or reads[-1])
+    own = stored(file_io.read_file(path).objects[0])
+    assert reads == [True]
+    monkeypatch.setattr(plain_files, "read", lambda *_: False)
+    assert own == stored(file_io.read_file(path).objects[0])
+
+
+@needs_python_reader
+def test_what_only_blenders_reader_knows_is_left_to_it(tmp_path, monkeypatch):
+    points, faces = scattered(3)
+    ragged = [*faces[:5].tolist(), [0, 1, 2, 3]]
+    colours = np.hstack([points, np.full((len(points), 3), 51)])
+    channels = [("red", "u1"), ("green", "u1"), ("blue", "u1")]
+    form = "binary_little_endian"
+    files = [
+        write(tmp_path / "colours.ply", form, POSITIONS + channels, colours, faces),
+        write(tmp_path / "ragged.ply", form, POSITIONS, points, ragged),
+    ]
+    read = plain_files.read
+    monkeypatch.setattr(plain_files, "read", lambda *given: pytest.fail("taken") if read(*given) else False)
+    coloured, mixed = (file_io.read_file(path).objects[0].data for path in files)
+    assert coloured.color_attributes[0].data[0].color_srgb[0] == pytest.approx(51 / 255, abs=1e-3)
+    assert max(polygon.loop_total for polygon in mixed.polygons) == 4
