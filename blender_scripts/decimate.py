@@ -131,7 +131,8 @@ class Command:
     def __init__(self, options, staged):
         self.options = options
         self.staged = staged
-        self.started = time.perf_counter()
+        self.last_stage_ended = time.perf_counter()
+        self.seconds = {}
         file_io.extension_of(options.input)
         extension = file_io.extension_of(options.output)
         self.target = safe_files.Target(options.output, "OUT")
@@ -200,7 +201,8 @@ class Command:
         whole = self._write(source, names, inputs, references, runs, tolerance, size)
         whole["input"] = whole_input
         whole["repairs"] = repairs + whole["repairs"]
-        whole["seconds"]["total"] = time.perf_counter() - self.started
+        self._end_stage("write")
+        whole["seconds"] = {**self.seconds, "total": sum(self.seconds.values())}
         if self.report:
             self.staged.write(self.report, (json.dumps(whole, indent=1) + "\n").encode())
         # OUT itself is moved last: once it is there, all of its side files are, too.
@@ -212,14 +214,22 @@ class Command:
         return 0
 
     def _read(self, what, path):
-        start = time.perf_counter()
         found = file_io.read_file(path)
-        self._stage(f"{what} {path}: {found.counts['triangles']:,} triangles", start)
+        took = self._end_stage("read")
+        self._say(f"{what} {path}: {found.counts['triangles']:,} triangles", took)
         return found
 
+    def _end_stage(self, stage):
+        """Adds the time since the end of the stage before to `stage`, and returns it. So the stages sum to the total."""
+        now = time.perf_counter()
+        took = now - self.last_stage_ended
+        self.last_stage_ended = now
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + took
+        return took
+
     @staticmethod
-    def _stage(text, start):
-        print(f"{text}, {report.duration(time.perf_counter() - start)}", flush=True)
+    def _say(text, took):
+        print(f"{text}, {report.duration(took)}", flush=True)
 
     def _pair(self, objects, reference_file):
         """Returns, for each object, the object to which its tolerance refers."""
@@ -257,7 +267,6 @@ class Command:
 
     def _decimate(self, ob, reference, tolerance, target):
         """Decimates one object and returns the operator's report."""
-        start = time.perf_counter()
         if ob.data.users > 1:  # Objects of a glTF file may share a mesh.
             ob.data = ob.data.copy()
         for other in bpy.context.view_layer.objects:
@@ -291,15 +300,17 @@ class Command:
                 raise
             raise cli.Stop(f"{ob.name}: {message}", cli.NOT_PROVED if NOT_PROVED in message else cli.USAGE) from None
         run = json.loads(ob.tolvol.last_run)
-        self._stage(f"decimated {ob.name}: {report.counts(run)}", start)
+        took = self._end_stage("transfer")
+        for stage, part in run["seconds"].items():
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + part
+            self.seconds["transfer"] -= part
+        self._say(f"decimated {ob.name}: {report.counts(run)}", took)
         return run
 
     def _write(self, source, names, inputs, references, runs, tolerance, size):
         """Writes OUT beside its place, reads the file back and certifies it. Returns the report of the whole file."""
-        start = time.perf_counter()
         written = self._export(source.objects)
-        self._stage(f"wrote {self.exported.name} and read it back", start)
-        start = time.perf_counter()
+        self._say(f"wrote {self.exported.name} and read it back", self._end_stage("write"))
         found = {ob.name: snapshots.surface_of(ob) for ob in written.objects}
         if found.keys() == set(names):
             judged = [
@@ -310,9 +321,12 @@ class Command:
             kept = sum(run["outside"]["faces"] for run in runs)
             judged = [self._certify(snapshots.joined(found.values()), snapshots.joined(references), tolerance, kept)]
         whole = self._summary(names, runs, judged, tolerance, size)
-        whole["solidity"] = solidity.compared(
-            *(solidity.facts(snapshots.joined(surfaces), self.options.threads) for surfaces in (inputs, found.values()))
-        )
+        if len(runs) == 1:
+            before = runs[0]["solidity"]["before"]
+        else:
+            before = solidity.facts(snapshots.joined(inputs), self.options.threads)
+        after = solidity.facts(snapshots.joined(found.values()), self.options.threads)
+        whole["solidity"] = solidity.compared(before, after)
         pairs = {when: whole["solidity"][when]["crossing_pairs"] for when in ("before", "after")}
         whole["crossings"] = pairs
         if self.options.crossings == "keep_out" and pairs["after"] > pairs["before"]:
@@ -325,17 +339,15 @@ class Command:
             if lost := count - written.extras.get(kind, 0):
                 message = f"{lost} of the {count} {kind} of IN are not in OUT"
                 whole["repairs"].append({"kind": kind, "count": lost, "message": message})
-        whole["seconds"]["certify"] += time.perf_counter() - start
-        self._stage("certified both ways", start)
+        self._say("certified both ways", self._end_stage("certify"))
         print(f"{self.exported.name}: {solidity.line(whole['solidity']['after'])}")
         if not report.proved(whole):
             raise cli.Stop(
                 f"{NOT_PROVED}: {report.intervals(whole)}; {self.options.output} was not written", cli.NOT_PROVED
             )
         if self.picture:
-            start = time.perf_counter()
             self._draw(snapshots.joined(found.values()), snapshots.joined(references), tolerance, size)
-            self._stage(f"drew {self.options.picture}", start)
+            self._say(f"drew {self.options.picture}", self._end_stage("picture"))
         return whole
 
     def _export(self, objects):
@@ -410,7 +422,6 @@ class Command:
             "outside": outside,
             "normals": _normals(runs),
             "holes": _holes(runs),
-            "seconds": {stage: sum(run["seconds"][stage] for run in runs) for stage in runs[0]["seconds"]},
             "repairs": [
                 {**repair, "message": f"{name}: {repair['message']}" if several else repair["message"]}
                 for name, run in zip(names, runs)
