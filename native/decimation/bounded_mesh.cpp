@@ -19,7 +19,6 @@ BoundedMesh::BoundedMesh(BoundedMeshInput input, Bounds* bounds, Team& team)
       pinned_(std::move(input.pinned)),
       shares_(std::move(input.shares)),
       joined_(input.joined.begin(), input.joined.end()),
-      touching_(input.touching.begin(), input.touching.end()),
       slots_(std::move(input.slots)),
       wedges_(std::move(input.wedges)) {
   for (const VertexPosition& s : input.positions) positions_.push_back(s.position), stored_.push_back(s.stored);
@@ -35,7 +34,6 @@ void BoundedMesh::build(std::span<const std::uint32_t> mates, Team& team) {
   connect(n, triangles_, mates, mesh_, team);
   triangle_count_ = m;
   joined_.resize(n, false);
-  touching_.resize(n, false);
   for (std::uint32_t v = 0; v < n; ++v) {
     if (slots_[v] == v) continue;
     copies_.try_emplace(slots_[v], 1, slots_[v]).first->second.push_back(v);
@@ -130,7 +128,6 @@ void BoundedMesh::place(std::uint32_t vertex, const VertexPosition& target) {
     Occupied& occupied = occupied_[occupied_by_[vertex]];
     occupied.remove(stored_[vertex]), occupied.add(target.stored);
   }
-  touching_[vertex] = touching_[vertex] && target.stored == stored_[vertex];
   left_original_[vertex] = left_original_[vertex] || target.position != positions_[vertex];
   positions_[vertex] = target.position;
   stored_[vertex] = target.stored;
@@ -148,7 +145,6 @@ void BoundedMesh::merge_copies(const Change& change) {
   for (const std::uint32_t v : change.carried()) {
     slots_[v] = kept;
     place(v, change.position());
-    touching_[v] = change.touching();
   }
   for (const std::uint32_t v : copies(kept_vertex)) joined_[v] = true;
 }
@@ -185,14 +181,13 @@ void BoundedMesh::apply(const Change& change) {
     }
   }
   place(*change.vertex(), change.position());
-  if (change.kind() == Change::Kind::collapse) touching_[*change.vertex()] = change.touching();
 }
 
 BoundedMesh::Saved BoundedMesh::save(std::span<const std::uint32_t> vertices,
                                      std::span<const std::uint32_t> faces) const {
   Saved saved;
   for (const std::uint32_t v : vertices) {
-    saved.vertices.push_back({v, vertex_position(v), share(v), left_original(v), touching(v)});
+    saved.vertices.push_back({v, vertex_position(v), share(v), left_original(v)});
   }
   for (const std::uint32_t f : faces) {
     saved.faces.push_back(
@@ -241,7 +236,7 @@ void BoundedMesh::restore(const Saved& saved) {
     mesh_.status(handle(s.vertex)).set_deleted(false);
     positions_[s.vertex] = s.position.position, stored_[s.vertex] = s.position.stored;
     if (!shares_.empty()) shares_[s.vertex] = s.share;
-    left_original_[s.vertex] = s.left_original, touching_[s.vertex] = s.touching;
+    left_original_[s.vertex] = s.left_original;
     merged_into_[s.vertex] = s.vertex;
   }
 }

@@ -39,8 +39,7 @@ struct BoundedMeshInput {
       pinned;  ///< For each vertex: it neither moves nor vanishes, and an edge between two such vertices stays.
   std::vector<double>
       shares;  ///< For each vertex: the share of the forward bound that new faces around it may use. May be empty.
-  std::vector<std::uint32_t> slots;  ///< For each vertex: equal for copies, which are one vertex of the result.
-  std::vector<bool> touching;        ///< For each vertex: the touching of a CutMesh. May be empty.
+  std::vector<std::uint32_t> slots;  ///< For each vertex: equal for copies, which stay at one place: one of them.
   std::vector<bool> joined;          ///< For each vertex: an edge of it lies on edges of other sheets. May be empty.
   std::vector<glm::uvec3> wedges;    ///< For each corner: equal at a vertex where attributes are equal. May be empty.
   bool subset = false;               ///< Every surviving vertex keeps its position.
@@ -96,15 +95,8 @@ class BoundedMesh {
   }
   /// The slot of the vertex, which is equal for copies: the number of one of them.
   std::uint32_t slot(std::uint32_t vertex) const { return slots_[vertex]; }
-  /// Whether an edge joins two vertices in the result that is not the one between these two but one between copies.
+  /// Whether an edge lies between the places of two vertices that is not the one between these two: one between copies.
   bool joined_by_other(std::uint32_t a, std::uint32_t b) const;
-  /// Whether another sheet merely touches that of the vertex where the vertex is. A new edge between two such vertices
-  /// may lie on an edge of the other sheet.
-  bool touching(std::uint32_t vertex) const { return touching_[vertex] != 0; }
-  /// Whether an edge joins two vertices in the result, be it one between copies of them.
-  bool joined_by_edge(std::uint32_t a, std::uint32_t b) const {
-    return mesh_.find_halfedge(handle(a), handle(b)).is_valid() || joined_by_other(a, b);
-  }
   bool pinned(std::uint32_t vertex) const { return pinned_[vertex]; }
   /// Whether the corners of faces have wedges.
   bool has_wedges() const { return !wedges_.empty(); }
@@ -152,7 +144,7 @@ class BoundedMesh {
       std::uint32_t vertex;
       VertexPosition position;
       double share;
-      bool left_original, touching;
+      bool left_original;
     };
     struct OfFace {
       std::uint32_t face;
@@ -194,7 +186,7 @@ class BoundedMesh {
   std::vector<std::atomic<std::uint32_t>> faces_around_;  ///< Regions share the vertices between them.
   std::vector<std::uint8_t> left_original_;               ///< Threads would share bits.
   std::vector<double> shares_;
-  std::vector<std::uint8_t> joined_, touching_;  ///< Threads would share bits.
+  std::vector<std::uint8_t> joined_;  ///< Threads would share bits.
   std::vector<std::uint32_t> slots_;
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>>
       copies_;  ///< By slot, where a slot has several vertices.

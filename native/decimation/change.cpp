@@ -39,7 +39,7 @@ bool Change::meets_another() const {
 }
 
 void Change::clear(Kind kind, const VertexPosition& target) {
-  kind_ = kind, position_ = target, touching_ = false, share_ = 1;
+  kind_ = kind, position_ = target, share_ = 1;
   elements_.clear(), faces_.clear(), removed_.clear(), new_wedges_.clear();
 }
 
@@ -47,8 +47,6 @@ bool Change::prepare_collapse(Halfedge h, const VertexPosition& target) {
   clear(Kind::collapse, target);
   halfedge_ = h, vertex_ = mesh_->to(h);
   share_ = std::min(mesh_->share(vertex_), mesh_->share(mesh_->from(h)));
-  const auto is_touched_at = [&](std::uint32_t v) { return mesh_->touching(v) && target.stored == mesh_->stored(v); };
-  touching_ = is_touched_at(vertex_) || is_touched_at(mesh_->from(h));
   collapses_.assign(1, h), carried_.clear();
   if (mesh_->joined(mesh_->from(h)) && !gather_copies(h)) return false;
   for (const Halfedge each : collapses_) {
@@ -60,7 +58,6 @@ bool Change::prepare_collapse(Halfedge h, const VertexPosition& target) {
     gather_side(v, target.position, glm::length(mesh_->position(v) - target.position), kNoFace, kNoFace);
   }
   if (mesh_->has_copies() && !slots_fit()) return false;
-  if (joins_touching()) return false;
   for (const Halfedge each : collapses_) {
     for (Face& face : faces_) {
       if (face.vertices[face.corner] == mesh_->from(each)) face.vertices[face.corner] = mesh_->to(each);
@@ -87,9 +84,7 @@ bool Change::prepare_flip(Edge e) {
   const std::uint32_t a = mesh_->to(h), b = mesh_->to(o), c = mesh_->to(mesh.next_halfedge_handle(h)),
                       d = mesh_->to(mesh.next_halfedge_handle(o));
   if (mesh_->pinned(a) && mesh_->pinned(b)) return false;
-  if ((mesh_->has_copies() && mesh_->joined_by_other(c, d)) || (mesh_->touching(c) && mesh_->touching(d))) {
-    return false;
-  }
+  if (mesh_->has_copies() && mesh_->joined_by_other(c, d)) return false;
   const std::uint32_t first = static_cast<std::uint32_t>(mesh.face_handle(h).idx()),
                       second = static_cast<std::uint32_t>(mesh.face_handle(o).idx());
   constexpr double kAnywhere = std::numeric_limits<double>::infinity();  // The change carries no point of a face along.
@@ -304,22 +299,6 @@ bool Change::slots_fit() {
     }
   }
   return true;
-}
-
-/// Whether a collapse makes an edge between two places where other sheets touch. If one of them has an edge there, the
-/// sheets become one surface for whoever joins faces by their positions.
-bool Change::joins_touching() const {
-  if (!touching_) return false;
-  const std::uint32_t from = mesh_->from(halfedge_);
-  const std::uint32_t there = position_.stored == mesh_->stored(vertex_) ? vertex_ : from;  // was at this place before
-  for (const Face& face : faces_) {
-    if (!face.moves) continue;
-    for (const int k : {1, 2}) {
-      const std::uint32_t v = face.vertices[(face.corner + k) % 3];
-      if (v != vertex_ && v != from && mesh_->touching(v) && !mesh_->joined_by_edge(there, v)) return true;
-    }
-  }
-  return false;
 }
 
 bool Change::folds_over() const {

@@ -68,8 +68,6 @@ class Change {
   std::optional<std::uint32_t> vertex() const { return kind_ == Kind::flip ? std::nullopt : std::optional(vertex_); }
   /// Where that vertex goes.
   const VertexPosition& position() const { return position_; }
-  /// Whether other sheets merely touch there.
-  bool touching() const { return touching_; }
   const std::vector<NewWedge>& new_wedges() const { return new_wedges_; }
   /// How much of the forward bound the vertex may use, and the points of a face.
   double share() const { return share_; }
@@ -88,7 +86,6 @@ class Change {
   bool wedges_fit(Halfedge h);
   bool gather_copies(Halfedge h);
   bool slots_fit();
-  bool joins_touching() const;
 
   const BoundedMesh* mesh_;
   Kind kind_ = Kind::collapse;
@@ -98,7 +95,6 @@ class Change {
   Edge edge_;
   std::uint32_t vertex_ = 0;  ///< The vertex that moves.
   VertexPosition position_{};
-  bool touching_ = false;
   double share_ = 1;
   std::vector<Coverage::Element> elements_;
   std::vector<Face> faces_;

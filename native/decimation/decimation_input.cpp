@@ -281,7 +281,7 @@ BoundedMeshInput DecimationInput::take_mesh() {
     input.positions.push_back({stored_[v], positions_[v]});
   }
   // What holds for a vertex holds for its copies.
-  const std::vector<std::uint32_t>& slots = cut_.output_slot;
+  const std::vector<std::uint32_t>& slots = cut_.copies_of;
   std::vector<bool> pinned(positions_.size(), false);
   for (std::size_t v = 0; v < positions_.size(); ++v) pinned[slots[v]] = pinned[slots[v]] || pinned_[v];
   for (const std::uint32_t slot : slots) input.pinned.push_back(pinned[slot]);
@@ -295,7 +295,6 @@ BoundedMeshInput DecimationInput::take_mesh() {
   }
   for (const CutCause cause : cut_.cause) input.joined.push_back(cause == CutCause::non_manifold);
   input.slots = slots;
-  input.touching = std::move(cut_.touching);
   if (!options_.wedges.empty()) {
     // Labels name wedges at one input vertex; vertices welded from several hold those of all of them.
     std::unordered_map<std::uint64_t, std::uint32_t> dense;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/call.h"
+#include "base/union_find.h"
 #include "decimation/certified_bounds.h"
 #include "geometry/hierarchy.h"
 
@@ -17,13 +18,23 @@ constexpr std::uint32_t kNone = CutMesh::kNone;
 class Output {
  public:
   Output(const DecimationInput& input, const BoundedMesh& mesh, DecimationResult& result)
-      : input_(input), cut_(input.cut()), mesh_(mesh), result_(result) {}
+      : input_(input), cut_(input.cut()), mesh_(mesh), result_(result), same_(input.positions().size()) {
+    for (std::uint32_t v = 0; v < input.positions().size(); ++v) {
+      same_.join(v, cut_.output_slot[v]), same_.join(v, mesh.survivor(v));
+    }
+  }
 
   void write() {
     // Result vertices are in the order of the input vertices that they continue.
     std::vector<std::uint32_t> order;
     std::vector<std::uint32_t> used(input_.positions().size(), kNone);
-    const auto slot = [&](std::uint32_t v) { return mesh_.slot(mesh_.survivor(v)); };
+    // Copies that were several vertices of the input stay several, unless they have become one with the same vertex.
+    std::vector<std::uint32_t> chosen(input_.positions().size(), kNone);
+    const auto slot = [&](std::uint32_t v) {
+      const std::uint32_t survivor = mesh_.survivor(v), same = same_.find(survivor), copy = mesh_.slot(survivor);
+      if (chosen[same] == kNone) chosen[same] = same_.find(copy) == same ? copy : survivor;
+      return chosen[same];
+    };
     // This is corner k of a result triangle, in the order of the input triangle that it continues.
     const auto corner = [&](std::uint32_t input, std::uint32_t t, int k) {
       return slot(t == kNone ? cut_.input_vertex[input_.triangles()[input][k]]
@@ -120,7 +131,7 @@ class Output {
     repair(cut_.duplicates, "duplicate", "exact duplicate faces dropped");
     repair(cut_.degenerate_on_edge, "degenerate", "degenerate faces on an edge of another face dropped");
     repair(cut_.aside.size(), "kept_degenerate", "degenerate faces kept as they are");
-    repair(cut_.welded, "welded", "vertices at exactly the position of another joined to it");
+    repair(cut_.welded, "welded", "vertices at exactly the position of another stay with it");
     repair(cut_.cut_edges, "cut", "non-manifold edges, which collapse along themselves alone");
     repair(cut_.reversed_count, "misoriented", "faces against their neighbours' orientation, kept so");
     std::size_t unused = 0;
@@ -161,6 +172,7 @@ class Output {
   const CutMesh& cut_;
   const BoundedMesh& mesh_;
   DecimationResult& result_;
+  UnionFind same_;                   ///< Holds the vertices of the cut mesh that are one vertex of the result.
   std::vector<std::uint32_t> kept_;  ///< For each result triangle: its triangle in the cut mesh.
 };
 

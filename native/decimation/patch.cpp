@@ -9,7 +9,7 @@ std::uint32_t Patch::add_vertex(std::uint32_t id) {
   if (vertex_count_ == vertices_.size()) vertices_.emplace_back();
   Vertex& v = vertices_[vertex_count_++];
   v.id = id, v.position = mesh_->position(id), v.share = mesh_->share(id);
-  v.free = false, v.touching = mesh_->touching(id), v.pinned = mesh_->pinned(id);
+  v.free = false, v.pinned = mesh_->pinned(id);
   v.faces.clear();
   return at->second;
 }
@@ -88,7 +88,6 @@ void Patch::free_vertices(const Change& collapse, bool boundary_free) {
     const std::uint32_t v = find_vertex(id);
     if (v == kNone) return;
     vertices_[v].position = collapse.position().position;
-    vertices_[v].touching = collapse.touching();
   };
   place(*collapse.vertex());
   Vertex& kept = vertices_[find_vertex(*collapse.vertex())];
@@ -173,7 +172,6 @@ bool Patch::can_flip(std::uint32_t face, int k, Flipped& flipped) const {
   const std::uint32_t a = first.corners[a1], b = first.corners[b1], c = first.corners[c1], d = second.corners[d2];
   if (c == d || (vertices_[a].pinned && vertices_[b].pinned) || joined_by_edge(c, d)) return false;
   if (mesh_->has_copies() && mesh_->joined_by_other(vertices_[c].id, vertices_[d].id)) return false;
-  if (vertices_[c].touching && vertices_[d].touching) return false;
   if (first.wedges[a1] != second.wedges[a2] || first.wedges[b1] != second.wedges[b2]) return false;
   flipped = {{face, other},
              {{b, d, c}, {a, c, d}},

@@ -27,7 +27,6 @@ class Patch {
     glm::dvec3 position;
     bool free;                         ///< Whether it may move: all its faces are in the patch then.
     double share;                      ///< The share of the forward bound that faces around it may use.
-    bool touching;                     ///< Whether other sheets merely touch where it is.
     bool pinned;                       ///< Whether an edge to another pinned vertex has to stay.
     std::vector<std::uint32_t> faces;  ///< The faces of the patch around it, in no order.
   };

@@ -125,19 +125,10 @@ void PatchTrial::round_positions() {
   }
 }
 
-/// Whether the vertex that is kept would be where other sheets touch one of the two, although the collapse was prepared
-/// for another place. The collapse may make an edge that is not allowed from there.
-bool PatchTrial::returns_to_touched(const VertexPosition& kept) const {
-  if (change_.touching()) return false;
-  const auto is_touched_at = [&](std::uint32_t v) { return mesh_.touching(v) && kept.stored == mesh_.stored(v); };
-  return is_touched_at(*change_.vertex()) || is_touched_at(vanished_);
-}
-
 bool PatchTrial::meets_another() {
   for (std::uint32_t v = 0; v < positions_.size(); ++v) {
     if (!patch_.vertices()[v].free) continue;
     const std::uint32_t id = patch_.vertices()[v].id;
-    if (id == *change_.vertex() && returns_to_touched(positions_[v])) return true;
     if (mesh_.meets_another(positions_[v], id, id == *change_.vertex() ? vanished_ : id)) met_another_ = true;
     for (std::uint32_t w = 0; w < v; ++w) {
       if (positions_[v].stored == positions_[w].stored) return true;

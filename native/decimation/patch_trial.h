@@ -62,7 +62,6 @@ class PatchTrial {
   bool relax();
   bool certify();
   void round_positions();
-  bool returns_to_touched(const VertexPosition& kept) const;
   bool meets_another();
   bool changed(std::uint32_t face) const;
   bool pieces_hold();

@@ -286,7 +286,7 @@ class Cutter {
     cut_.reversed = flip_;
     add_aside_vertices();
     join_slots();
-    find_touching();
+    tie_copies();
   }
 
   /// Triangles set aside need vertices that outlive the decimation. These are tied vertices of the manifold if there
@@ -332,30 +332,19 @@ class Cutter {
     }
   }
 
-  void find_touching() {
-    if (!renamed_) return;                                 // All vertices at one position are copies then.
-    std::vector<std::uint32_t> slot(weld_.size(), kNone);  // of a vertex at each weld representative
-    std::vector<bool> touched(weld_.size(), false);        // tells where there are several slots
-    bool any = false;
-    for (std::uint32_t v = 0; v < cut_.output_slot.size(); ++v) {
+  void tie_copies() {
+    std::vector<std::uint32_t> first(weld_.size(), kNone);  // is the first vertex at each weld representative
+    cut_.copies_of.resize(cut_.vertex_input.size());
+    for (std::uint32_t v = 0; v < cut_.copies_of.size(); ++v) {
       poll_at(v);
-      const std::uint32_t at = weld_[cut_.vertex_input[v]];
-      if (slot[at] != kNone && slot[at] != cut_.output_slot[v]) any = touched[at] = true;
-      slot[at] = cut_.output_slot[v];
+      std::uint32_t& at = first[weld_[cut_.vertex_input[v]]];
+      if (at == kNone) at = v;
+      cut_.copies_of[v] = at;
+      if (at == v) continue;
+      for (const std::uint32_t copy : {at, v}) {
+        if (cut_.cause[copy] == CutCause::none) cut_.cause[copy] = CutCause::non_manifold;
+      }
     }
-    if (!any) return;
-    // Where an edge lies on an edge of another sheet, the sheets do not merely touch.
-    std::vector<Side> sides;
-    for (Side s = 0; s < mate_.size(); ++s) {
-      if (touched[welded(s)] && touched[welded(next_corner(s))]) sides.push_back(s);
-    }
-    const auto end_of = [&](Side corner) { return welded(corner); };
-    by_ends(sides, weld_.size(), team_, end_of, [&](const std::vector<Side>& alike) {
-      if (alike.size() == 1 || (alike.size() == 2 && mate_[alike[0]] == alike[1])) return;
-      touched[welded(alike[0])] = touched[welded(next_corner(alike[0]))] = false;
-    });
-    cut_.touching.resize(cut_.vertex_input.size());
-    for (std::uint32_t v = 0; v < cut_.touching.size(); ++v) cut_.touching[v] = touched[weld_[cut_.vertex_input[v]]];
   }
 
   Team& team_;

@@ -12,8 +12,8 @@
 
 namespace tolvol {
 
-/// The reason why a vertex of the cut mesh is tied to other vertices, its copies. They are one vertex again in the
-/// result. Copies move and vanish together (non_manifold), or must neither move nor vanish (degenerate).
+/// The reason why a vertex of the cut mesh is tied to others, its copies, which are at the same place. Copies move and
+/// vanish together (non_manifold), or must neither move nor vanish (degenerate).
 enum class CutCause : std::uint8_t { none, non_manifold, degenerate };
 
 struct CutMesh {
@@ -27,11 +27,9 @@ struct CutMesh {
   std::vector<std::uint32_t> vertex_input;    ///< is the lowest input vertex that each vertex stands for
   std::vector<CutCause> cause;                ///< has one entry for each vertex
   std::vector<glm::uvec2> boundary;           ///< are open edges, in the direction of their triangle, without cut edges
-  /// Tells which vertices are where a vertex of another sheet is that merely touches theirs: the two are no copies, and
-  /// no edges from there lie on each other. May be empty.
-  std::vector<bool> touching;
   // These members lead back to the input.
-  std::vector<std::uint32_t> output_slot;   ///< is equal for vertices that are one vertex of the result
+  std::vector<std::uint32_t> copies_of;     ///< is equal for copies: one of them. A vertex without copies has its own
+  std::vector<std::uint32_t> output_slot;   ///< is equal for vertices, copies all, that are one vertex of the input
   std::vector<std::uint32_t> input_vertex;  ///< is the manifold vertex of each input vertex, kNone if it is not used
   std::vector<std::uint32_t> aside;         ///< are input triangles that no manifold holds; they are kept as they are
   std::vector<std::uint32_t> stand_in;      ///< is for each input triangle the one that holds its points, mostly itself
@@ -46,9 +44,10 @@ struct CutMesh {
 };
 
 /// Joins triangles across edges by vertex index first and, where that leaves an edge open, by exactly equal position,
-/// so that soups and seam splits decimate without cracks while sheets that merely touch stay apart. Edges of more than
-/// two triangles are cut. O(m) expected. After A. Guéziec et al., "Cutting and stitching: converting sets of polygons
-/// to manifold surfaces", 2001. The same on any number of threads.
+/// so that soups and seam splits decimate without cracks. Edges of more than two triangles are cut. Vertices at exactly
+/// the same position are copies, also of sheets that merely touch: those stay several vertices, but at one place. O(m)
+/// expected. After A. Guéziec et al., "Cutting and stitching: converting sets of polygons to manifold surfaces", 2001.
+/// The same on any number of threads.
 CutMesh cut_to_manifold(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, Team& team);
 
 }  // namespace tolvol

@@ -102,16 +102,24 @@ TEST(ManifoldCut, SplitsTwoFansAtAVertex) {
   EXPECT_EQ(tied(result), 2u);
 }
 
-TEST(ManifoldCut, KeepsTouchingSheetsApart) {
-  // Two boxes that share the positions of one face, but no vertex.
+TEST(ManifoldCut, TiesTouchingSheetsWithoutJoiningThem) {
+  // Two boxes that share the positions of one face, 9 of them, but no vertex.
   TriangleMesh second = shapes::box(2);
   for (glm::dvec3& p : second.vertices) p.x += 1;
   const TriangleMesh mesh = shapes::joined(shapes::box(2), second);
   const CutMesh result = cut(mesh);
   expect_manifold(result);
   EXPECT_EQ(result.cut_edges, 0u);
-  EXPECT_EQ(tied(result), 0u);
+  EXPECT_EQ(tied(result), 18u);
   EXPECT_EQ(result.vertex_input.size(), mesh.vertices.size());
+  std::size_t second_copies = 0;
+  for (std::uint32_t v = 0; v < result.vertex_input.size(); ++v) {
+    second_copies += result.copies_of[v] != v;
+    EXPECT_EQ(result.output_slot[v], v) << "vertices of their own in the result";
+    const std::uint32_t copy = result.copies_of[v];
+    EXPECT_EQ(mesh.vertices[result.vertex_input[v]], mesh.vertices[result.vertex_input[copy]]);
+  }
+  EXPECT_EQ(second_copies, 9u);
 }
 
 TEST(ManifoldCut, DropsExactDuplicatesOnly) {
@@ -203,6 +211,7 @@ TEST(ManifoldCut, AnySoupBecomesAManifold) {
       EXPECT_EQ(other.cause, result.cause);
       EXPECT_EQ(other.boundary, result.boundary);
       EXPECT_EQ(other.output_slot, result.output_slot);
+      EXPECT_EQ(other.copies_of, result.copies_of);
       EXPECT_EQ(other.input_vertex, result.input_vertex);
       EXPECT_EQ(other.stand_in, result.stand_in);
       EXPECT_EQ(other.cut_edges, result.cut_edges);
