@@ -40,11 +40,14 @@ struct ConstrainResult {
 /// and `before` where f is 0. Every face of the result is inside as it is stored, corners with different factors
 /// included. `faces` has `corners` (1 to 4) indices for each face, as in Pieces.
 ///
-/// A vertex that touches no face that failed has factor 1. One-sided, with Mode::pull_back, and where crossings are
-/// allowed, no single factor can rise by 1/64 alone (or to 1, where that is less), and none is below that of
-/// Mode::reset, whose factors are 0 and 1. Two-sided, vertices go back farther where the reference would lose its
-/// witness, by at least 1/16 of their way, and so they do where faces would cross that do not cross in `before`, or
-/// would become degenerate.
+/// Vertices at one place in `before`, and at one place in `after`, have the same factor, so that soups and seams stay
+/// whole. What holds a T-junction together (topology/t_junctions.h) does not move, and a warning counts it.
+///
+/// A vertex has factor 1 where neither it nor a vertex at its place touches a face that failed. One-sided, with
+/// Mode::pull_back, and where crossings are allowed, no single factor can rise by 1/64 alone (or to 1, where that is
+/// less), and none is below that of Mode::reset, whose factors are 0 and 1. Two-sided, vertices go back farther where
+/// the reference would lose its witness, by at least 1/16 of their way, and so they do where faces would cross that do
+/// not cross in `before`, or would become degenerate.
 ///
 /// Throws InvalidInput for bad arrays, naming the first offender, for a mesh that is not within the tolerance in
 /// `before` (unless Outside::keep) and where the stored type cannot hold the tolerance; Cancelled. Starting costs what

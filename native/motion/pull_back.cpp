@@ -14,14 +14,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
 #include "base/errors.h"
 #include "base/parallel.h"
 #include "check/input_checks.h"
+#include "geometry/triangle_mesh.h"
 #include "motion/moving_coverage.h"
 #include "motion/moving_crossings.h"
+#include "topology/sides.h"
+#include "topology/t_junctions.h"
 
 namespace tolvol {
 namespace {
@@ -63,11 +67,16 @@ PullBack::~PullBack() = default;
 PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, const StartOptions& options, Progress* progress) {
   if (options.two_sided) require_area_to_cover(mesh_.corners());
   held_index_.assign(stored.size(), kNone);
+  link_twins(stored);
   coverage_.reset(), crossings_.reset();
   MovingMesh::Start start = mesh_.start(stored, progress);
   if (!start.outside.empty() && options.outside == Outside::error) refuse_outside(FaceCount::of(start.outside));
   Start result{std::move(start.outside), {}, {}};
   if (start.warning) result.warnings.push_back(*start.warning);
+  if (const std::size_t fixed = options.t_junctions ? hold_t_junctions(stored) : 0) {
+    result.warnings.push_back(std::to_string(fixed) + (fixed == 1 ? " vertex holds" : " vertices hold") +
+                              " T-junctions together and cannot move");
+  }
   if (options.crossings == Crossings::keep_out && mesh_.corners() >= 3) {
     crossings_ = std::make_unique<MovingCrossings>(mesh_.faces(), mesh_.corners(), stored, mesh_.threads());
     if (options.short_ways && mesh_.corners() == 3) crossings_->skip_short_ways(mesh_);
@@ -372,6 +381,7 @@ void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Pr
   std::vector<std::uint32_t> changed, lost, untested = wish.moving.faces, since, again;
   bool is_renewed = false;
   std::size_t rounds = 0;
+  if (!next_twin_.empty()) hold_twins(wish, wish.moving.vertices, held, changed);
   for (;;) {
     // A face may fail because some of its corners went back and others did not.
     std::vector<std::uint32_t> failed = mesh_.failing(mesh_.faces_around(changed), progress);
@@ -417,7 +427,89 @@ void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Pr
       h.kept_from_crossing = h.kept_from_crossing || cross;
       retreat(h, is_hasty ? Mode::reset : mode, cross ? kRise : little(h));
     }
+    if (!next_twin_.empty()) hold_twins(wish, std::vector(changed), held, changed);
     if (crossings_) since.insert(since.end(), changed.begin(), changed.end());
+  }
+}
+
+void PullBack::link_twins(std::span<const glm::dvec3> stored) {
+  const std::vector<std::uint32_t> first = weld_equal_positions(stored);
+  next_twin_.clear();
+  for (std::uint32_t v = 0; v < first.size(); ++v) {
+    if (first[v] == v) continue;
+    if (next_twin_.empty()) {
+      next_twin_.resize(stored.size());
+      std::iota(next_twin_.begin(), next_twin_.end(), 0u);
+    }
+    next_twin_[v] = std::exchange(next_twin_[first[v]], v);
+  }
+}
+
+/// Faces that meet in a T-junction share no vertex by which they could be kept together while they move. Returns the
+/// number of vertices that are held.
+std::size_t PullBack::hold_t_junctions(std::span<const glm::dvec3> stored) {
+  if (mesh_.corners() < 3) return 0;
+  TriangleMesh mesh{{stored.begin(), stored.end()}, {}};
+  std::vector<std::uint32_t> place = weld_equal_positions(stored);
+  for (std::uint32_t f = 0; f < mesh_.face_count(); ++f) {
+    const std::span<const std::uint32_t> c = mesh_.corners_of(f);
+    for (std::size_t k = 1; k + 1 < c.size(); ++k) {
+      const glm::uvec3 t(place[c[0]], place[c[k]], place[c[k + 1]]);
+      if (t.x != t.y && t.y != t.z && t.z != t.x) mesh.triangles.push_back(t);
+    }
+  }
+  Team team(mesh_.threads());
+  std::vector<Side> sides(3 * mesh.triangles.size());
+  std::iota(sides.begin(), sides.end(), 0u);
+  const auto end_of = [&](Side corner) { return mesh.triangles[corner / 3][corner % 3]; };
+  std::vector<glm::uvec2> open;
+  by_ends(sides, stored.size(), team, end_of, [&](const std::vector<Side>& alike) {
+    if (alike.size() == 1) open.emplace_back(end_of(alike[0]), end_of(next_corner(alike[0])));
+  });
+  const double unit = mesh_.space().storage() == Storage::float32 ? 0x1p-24 : 0x1p-53;
+  std::size_t count = 0;
+  for (const std::uint32_t v : t_junctions(std::move(mesh), open, unit, team)) {
+    count += !mesh_.frozen(v);
+    mesh_.freeze(v);
+  }
+  return count;
+}
+
+/// Sends vertices back to where their twins are, the vertices that were at their place at the start and have the same
+/// way now: these vertices' twins and the other way round. Adds the vertices that went back to `changed`.
+void PullBack::hold_twins(const Wish& wish, std::span<const std::uint32_t> vertices, std::vector<Held>& held,
+                          std::vector<std::uint32_t>& changed) {
+  const std::vector<std::uint32_t>& moving = wish.moving.vertices;
+  const auto place_of = [&](std::uint32_t v) {
+    const auto found = std::lower_bound(moving.begin(), moving.end(), v);
+    return found != moving.end() && *found == v ? static_cast<std::size_t>(found - moving.begin()) : moving.size();
+  };
+  const auto factor_of = [&](std::uint32_t v) {
+    return mesh_.frozen(v) ? 0 : held_index_[v] == kNone ? 1 : held[held_index_[v]].factor;
+  };
+  for (const std::uint32_t v : vertices) {
+    if (next_twin_[v] == v) continue;
+    const std::size_t own = place_of(v);
+    const auto visit_twins = [&](auto&& visit) {
+      for (std::uint32_t twin = next_twin_[v]; twin != v; twin = next_twin_[twin]) {
+        const std::size_t other = place_of(twin);
+        if (other == moving.size() || wish.before[other] != wish.before[own] || wish.after[other] != wish.after[own])
+          continue;
+        visit(twin);
+      }
+    };
+    double least = factor_of(v);
+    visit_twins([&](std::uint32_t twin) { least = std::min(least, factor_of(twin)); });
+    const auto lower = [&](std::uint32_t vertex) {
+      if (!(factor_of(vertex) > least)) return;
+      Held& h = held_index_[vertex] == kNone ? hold(vertex, wish, held) : held[held_index_[vertex]];
+      h.factor = least;
+      least > 0 ? place(h, {least, {}}) : mesh_.take_back(vertex);
+      if (crossings_) crossings_->try_at(vertex, stored_at(h, least));
+      changed.push_back(vertex);
+    };
+    lower(v);
+    visit_twins(lower);
   }
 }
 

@@ -56,6 +56,7 @@ class PullBack {
     bool two_sided = true;  ///< Keeps the backward direction, too: see MovingCoverage.
     Crossings crossings = Crossings::keep_out;
     bool short_ways = false;  ///< Says that all vertices will move by little, again and again.
+    bool t_junctions = true;  ///< Holds what holds T-junctions together (topology/t_junctions.h).
   };
   /// What the state is short of, and will be after any motion.
   struct Start {
@@ -73,7 +74,8 @@ class PullBack {
 
   /// Moves each vertex from `before`, its stored position now, towards `after`, and makes where it ends the new state.
   /// All faces of the new state are inside, the reference is covered, and nothing crosses that did not at the start;
-  /// see constrain.h for what else holds of the factors. Throws InvalidInput, for a wish that is not finite, and
+  /// see constrain.h for what else holds of the factors. Vertices that were at one place at the start and have the same
+  /// `before` and `after` have the same factor. Throws InvalidInput, for a wish that is not finite, and
   /// Cancelled; both change nothing. A settled face costs about 10 ns, and a face near the tolerance about 1 us for
   /// each try. Keeping crossings out costs about 1 us a face.
   Result move(const Moving& moving, std::span<const glm::dvec3> before, std::span<const glm::dvec3> after, Mode mode,
@@ -126,6 +128,10 @@ class PullBack {
   void raise(Held& held, Mode mode, bool search);
   bool attempt(Held& held, double factor);
   void back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Progress* progress);
+  void link_twins(std::span<const glm::dvec3> stored);
+  std::size_t hold_t_junctions(std::span<const glm::dvec3> stored);
+  void hold_twins(const Wish& wish, std::span<const std::uint32_t> vertices, std::vector<Held>& held,
+                  std::vector<std::uint32_t>& changed);
   void start_crossings(const std::vector<Held>& held, const Wish& wish);
   bool is_away(std::uint32_t vertex) const;
   void widen(std::vector<std::uint32_t>& vertices, std::size_t rings);
@@ -135,6 +141,8 @@ class PullBack {
   std::unique_ptr<MovingCoverage> coverage_;    // Null if only the forward direction is kept.
   std::unique_ptr<MovingCrossings> crossings_;  // Null if faces may cross.
   std::vector<std::uint32_t> held_index_;       // For each vertex: its place among the held ones, or kNone.
+  /// For each vertex: the next one that was at its place at the start, all around. Empty if there are none.
+  std::vector<std::uint32_t> next_twin_;
 };
 
 }  // namespace tolvol

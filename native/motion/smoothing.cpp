@@ -170,7 +170,7 @@ class Smoothing {
     for (const glm::uvec3& t : triangles_) faces_.insert(faces_.end(), {t.x, t.y, t.z});
     pull_back_ = std::make_unique<PullBack>(*volume_, space_, faces_, 3, positions_.size(), options_.threads);
     PullBack::Start start = pull_back_->start(
-        positions_, {options_.outside, options_.two_sided, options_.crossings, true}, options_.progress);
+        positions_, {options_.outside, options_.two_sided, options_.crossings, true, false}, options_.progress);
     result_.outside = FaceCount::of(start.outside);
     result_.uncovered = start.uncovered;
     result_.warnings = std::move(start.warnings);

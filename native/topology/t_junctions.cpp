@@ -38,9 +38,9 @@ class TJunctions {
     const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
     std::nth_element(sizes.begin(), middle, sizes.end());
     usual_ = *middle;
-    std::vector<bool> is_end(mesh_.vertices.size());
+    is_end_.resize(mesh_.vertices.size());
     for (const glm::uvec2& e : open) {
-      is_end[e.x] = is_end[e.y] = true;
+      is_end_[e.x] = is_end_[e.y] = true;
       open_.emplace_back(std::minmax(e.x, e.y));
     }
     std::ranges::sort(open_);
@@ -48,7 +48,7 @@ class TJunctions {
     UnionFind joined(mesh_.vertices.size());
     std::erase_if(mesh_.triangles, [&](const glm::uvec3& t) {
       for (int k = 0; k < 3; ++k) {
-        if (is_end[t[k]]) around_.emplace_back(t[k], t);
+        if (is_end_[t[k]]) around_.emplace_back(t[k], t);
       }
       if (!is_segment(t)) return false;
       joined.join(t.x, t.y), joined.join(t.x, t.z);
@@ -71,6 +71,7 @@ class TJunctions {
     });
     std::vector<glm::dvec3> result;
     for (const std::vector<glm::dvec3>& f : found) result.insert(result.end(), f.begin(), f.end());
+    add_on_open_edges(team, result);
     return result;
   }
 
@@ -125,12 +126,12 @@ class TJunctions {
     return false;
   }
 
-  /// Whether all faces around an end of an open edge lie in the plane of a triangle.
-  bool lies_in_plane(std::uint32_t end, const glm::uvec3& t) const {
+  /// Whether all faces around a vertex lie in the plane of a triangle. `around` holds them, sorted by their vertices.
+  bool lies_in_plane(std::uint32_t vertex, const glm::uvec3& t, const std::vector<Around>& around) const {
     const glm::dvec3 normal = glm::cross(place(t.y) - place(t.x), place(t.z) - place(t.x));
-    auto face = std::ranges::lower_bound(around_, end, {}, &Around::first);
-    for (; face != around_.end() && face->first == end; ++face) {
-      const double room = std::max(reach(place(end), t), reach(place(end), face->second)) * glm::length(normal);
+    auto face = std::ranges::lower_bound(around, vertex, {}, &Around::first);
+    for (; face != around.end() && face->first == vertex; ++face) {
+      const double room = std::max(reach(place(vertex), t), reach(place(vertex), face->second)) * glm::length(normal);
       for (int k = 0; k < 3; ++k) {
         if (std::abs(glm::dot(normal, place(face->second[k]) - place(t.x))) > room) return false;
       }
@@ -151,10 +152,10 @@ class TJunctions {
       for (int k = 0; k < 3; ++k) {
         const std::uint32_t a = t[k], b = t[(k + 1) % 3];
         if (!lies_on(p, a, b)) continue;
-        contacts.push_back({std::minmax(a, b), lies_in_plane(vertex, t)});
+        contacts.push_back({std::minmax(a, b), lies_in_plane(vertex, t, around_)});
         return;
       }
-      if (!lies_inside(p, t) || lies_in_plane(vertex, t)) return;
+      if (!lies_inside(p, t) || lies_in_plane(vertex, t, around_)) return;
       places.insert(places.end(), {p, place(t.x), place(t.y), place(t.z)});
     });
     // The sides on one edge stand together, and those in whose plane the faces lie are first.
@@ -164,6 +165,57 @@ class TJunctions {
       if ((i > 0 && contacts[i - 1].edge == edge) || is_joined(vertex, edge)) continue;
       const bool is_open = std::ranges::binary_search(open_, edge);
       if (is_open || !lies_upon_a_face) places.insert(places.end(), {p, place(edge.first), place(edge.second)});
+    }
+  }
+
+  /// A vertex at no open edge, a triangle with an open edge that it lies on, and that edge.
+  struct OnOpenEdge {
+    std::uint32_t vertex;
+    glm::uvec3 triangle;
+    Edge edge;
+  };
+
+  /// Adds the places of vertices at no open edge that lie on one, and of its ends.
+  void add_on_open_edges(Team& team, std::vector<glm::dvec3>& places) const {
+    const auto is_open = [&](std::uint32_t a, std::uint32_t b) {
+      return is_end_[a] && is_end_[b] && std::ranges::binary_search(open_, Edge(std::minmax(a, b)));
+    };
+    TriangleMesh rim{mesh_.vertices, {}};
+    for (const glm::uvec3& t : mesh_.triangles) {
+      if (is_open(t.x, t.y) || is_open(t.y, t.z) || is_open(t.z, t.x)) rim.triangles.push_back(t);
+    }
+    if (rim.triangles.empty()) return;
+    const Hierarchy hierarchy(rim);
+    std::vector<std::vector<OnOpenEdge>> found((mesh_.vertices.size() + kBlock - 1) / kBlock);
+    team.run(mesh_.vertices.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+      for (auto v = static_cast<std::uint32_t>(begin); v < end; ++v) {
+        if (is_end_[v]) continue;
+        hierarchy.for_each_within(place(v), most_reach(place(v)), [&](std::uint32_t index) {
+          const glm::uvec3& t = rim.triangles[index];
+          for (int k = 0; k < 3; ++k) {
+            const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+            if (!is_open(a, b) || !lies_on(place(v), a, b) || is_joined(v, std::minmax(a, b))) continue;
+            found[begin / kBlock].push_back({v, t, std::minmax(a, b)});
+          }
+        });
+      }
+    });
+    std::vector<bool> is_found(mesh_.vertices.size());
+    for (const auto& block : found) {
+      for (const OnOpenEdge& f : block) is_found[f.vertex] = true;
+    }
+    std::vector<Around> around;
+    for (const glm::uvec3& t : mesh_.triangles) {
+      for (int k = 0; k < 3; ++k) {
+        if (is_found[t[k]]) around.emplace_back(t[k], t);
+      }
+    }
+    std::ranges::stable_sort(around, {}, &Around::first);
+    for (const auto& block : found) {
+      for (const OnOpenEdge& f : block) {
+        if (lies_in_plane(f.vertex, f.triangle, around)) continue;  // so does a vertex that no face uses
+        places.insert(places.end(), {place(f.vertex), place(f.edge.first), place(f.edge.second)});
+      }
     }
   }
 
@@ -177,7 +229,8 @@ class TJunctions {
 
   TriangleMesh mesh_;  // without the triangles that are no more than a segment
   double unit_;
-  double usual_ = 0;  // the median of the vertices' largest coordinates
+  double usual_ = 0;          // the median of the vertices' largest coordinates
+  std::vector<bool> is_end_;  // tells for each vertex whether it is an end of an open edge
   std::vector<Edge> open_;
   std::vector<Around> around_;         // the ends of open edges, with the triangles around them
   std::vector<std::uint32_t> joined_;  // per vertex: a number that vertices have in common which segments join

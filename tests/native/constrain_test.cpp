@@ -228,6 +228,59 @@ TEST(Constrain, NoFactorCanRiseAlone) {
   }
 }
 
+// A soup has a vertex of its own for each corner.
+TEST(Constrain, VerticesAtOnePlaceMoveAsOne) {
+  Scene scene = scenes().front();
+  scene.mesh = shapes::soup(scene.mesh);
+  const std::vector<std::uint32_t> place = weld_equal_positions(scene.mesh.vertices);
+  auto shake = noise(3);
+  Points ways(place.size());
+  for (dvec3& way : ways) way = shake(0);
+  const Points wish = scene.wish([&](std::size_t v) { return ways[place[v]]; });
+  for (const auto mode : {Mode::pull_back, Mode::settle, Mode::reset}) {
+    for (const auto crossings : {PullBack::Crossings::keep_out, PullBack::Crossings::allow}) {
+      ConstrainOptions options;
+      options.mode = mode, options.crossings = crossings;
+      const ConstrainResult r = run(scene, wish, options);
+      expect_inside(scene, r, true);
+      expect_on_the_way(scene, wish, r);
+      EXPECT_GT(r.held_back, 0u);
+      if (mode != Mode::reset) EXPECT_LT(r.held_back, place.size());
+      for (std::size_t v = 0; v < place.size(); ++v) {
+        ASSERT_EQ(r.factors[v], r.factors[place[v]]);
+        ASSERT_TRUE(same_bits(r.vertices[v], r.vertices[place[v]]));
+      }
+    }
+  }
+  // One of them alone is asked to go elsewhere, and may.
+  Points apart = scene.mesh.vertices;
+  const auto copy =
+      std::find_if(place.begin(), place.end(),
+                   [&](const std::uint32_t& p) { return p != static_cast<std::uint32_t>(&p - place.data()); }) -
+      place.begin();
+  apart[copy] = scene.wish([](std::size_t) { return dvec3(0.1); })[copy];
+  EXPECT_EQ(run(scene, apart).held_back, 0u);
+}
+
+TEST(Constrain, WhatHoldsTJunctionsTogetherStays) {
+  Scene scene = scenes().front();
+  // Two plates side by side, one of which has twice as many vertices along the edge where they meet.
+  TriangleMesh coarse = shapes::grid(4), fine = shapes::grid(8);
+  for (dvec3& p : fine.vertices) p.x += 1;
+  scene.mesh = shapes::stored(shapes::joined(coarse, fine));
+  const Points wish = scene.wish([](std::size_t v) { return dvec3(0, 0, v % 3 * 0.2); });
+  const ConstrainResult r = run(scene, wish);
+  expect_inside(scene, r, true);
+  std::size_t held = 0;
+  for (std::size_t v = 0; v < wish.size(); ++v) {
+    const bool between = scene.mesh.vertices[v].x == 1;
+    held += between;
+    EXPECT_TRUE(same_bits(r.vertices[v], between ? scene.mesh.vertices[v] : wish[v])) << v;
+  }
+  ASSERT_EQ(r.warnings.size(), 1u);
+  EXPECT_EQ(r.warnings.front(), std::to_string(held) + " vertices hold T-junctions together and cannot move");
+}
+
 TEST(Constrain, TheResultDoesNotDependOnThreads) {
   const Scene scene{shapes::torus(across(80))};
   const Points wish = scene.wish(noise(0.6));

@@ -94,6 +94,18 @@ TEST(TJunctions, AreAlsoOnTheInsideOfFacesAndOnEdgesThatAreNotOpen) {
   EXPECT_EQ(standing_on({3, 1, 1e-3}, {3.5, 2, 1e-3}), Indices{});
 }
 
+TEST(TJunctions, AreWhereAVertexInsideOfASheetLiesOnAnOpenEdge) {
+  // A tent of four triangles around vertex 0, and a triangle that stands on its tip with the middle of an edge.
+  const TriangleMesh mesh{{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}, {-1, 0, 1}, {1, 0, 1}, {0, 0, 2}},
+                          {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}, {5, 6, 7}}};
+  const std::vector<glm::uvec2> open{{1, 2}, {2, 3}, {3, 4}, {4, 1}, {5, 6}, {6, 7}, {7, 5}};
+  EXPECT_EQ(found(mesh, open), (Indices{0, 5, 6}));
+  TriangleMesh flat = mesh;  // The triangle lies upon the tent's four, all in one plane.
+  flat.vertices[0].z = flat.vertices[5].z = flat.vertices[6].z = 0;
+  flat.vertices[5].x = -0.5, flat.vertices[6].x = 0.5, flat.vertices[7] = {0, 0.25, 0};
+  EXPECT_EQ(found(flat, open), Indices{});
+}
+
 TEST(TJunctions, AreNotWhereASheetLiesUponAnotherInItsPlane) {
   // Two squares at a right angle, and a triangle upon one of them that reaches the edge between them.
   const TriangleMesh mesh{
