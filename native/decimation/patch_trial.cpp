@@ -5,6 +5,9 @@
 #include <cassert>
 #include <limits>
 
+#include "base/call.h"
+#include "decimation/separation.h"
+
 namespace tolvol {
 namespace {
 
@@ -106,7 +109,10 @@ bool PatchTrial::certify() {
   round_positions();
   if (meets_another()) return false;
   gather_elements();
-  return pieces_hold() && faces_hold() && boundary_holds() && uncrossed();
+  // A sheet that was in the way once likely still is, and the other questions take longer.
+  const bool asked = relaxation_.has_separations();
+  if (asked && !uncrossed()) return false;
+  return pieces_hold() && faces_hold() && boundary_holds() && (asked || uncrossed());
 }
 
 /// Puts the vertices where the stored type can hold them.
@@ -278,7 +284,41 @@ bool PatchTrial::uncrossed() {
     if (corners != around_->corners(elements_[f].id)) crossings_.faces.push_back({elements_[f].id, corners});
   }
   gather_removed(change_, crossings_.removed);
-  return around_->allow(crossings_);
+  if (around_->allow(crossings_)) return true;
+  learnt_ = keep_sheets_apart();
+  return false;
+}
+
+/// Adds what holds the changed faces on their sides of the faces near by, in place of what was added before. Returns
+/// whether they are not there yet.
+bool PatchTrial::keep_sheets_apart() {
+  const auto corners = [&](std::uint32_t face) {
+    const glm::uvec3& t = mesh_.triangle(face);
+    return Corners{mesh_.position(t.x), mesh_.position(t.y), mesh_.position(t.z)};
+  };
+  std::vector<Corners> sheet;
+  for (const Coverage::Element& e : elements_) sheet.push_back(corners(e.id));
+  for (const Coverage::Removed& r : removed_) sheet.push_back(corners(r.id));
+  const double reach = bounds_.forward().limit();
+  std::vector<Separation> separations;
+  relaxation_.drop_separations();
+  for (const std::uint32_t id : around_->near(crossings_)) {
+    poll();
+    if (id >= mesh_.connectivity().n_faces()) continue;  // It never changes, and the frame does not have it.
+    const Corners other = corners(id);
+    Box near = box_of(other);
+    near.lower -= reach, near.upper += reach;
+    for (std::uint32_t f = 0; f < elements_.size(); ++f) {
+      const auto& [a, b, c] = elements_[f].corners;
+      const Corners face{a, b, c};
+      if (!changed(f) || !meet(box_of(face), near)) continue;
+      separations.clear();
+      separate(face, other, sheet, reach, separations);
+      for (const Separation& s : separations) relaxation_.add_separation(f, s, kHeldWeight);
+    }
+  }
+  relaxation_.renew();
+  return !relaxation_.enough();
 }
 
 Box PatchTrial::carry_out(BoundedMesh& mesh) {

@@ -69,6 +69,7 @@ class PatchTrial {
   FaceBound prove(std::uint32_t face) const;
   bool boundary_holds();
   bool uncrossed();
+  bool keep_sheets_apart();
   void gather_elements();
   void add_face_points(std::uint32_t face);
 
@@ -88,7 +89,7 @@ class PatchTrial {
   std::vector<Coverage::Removed> removed_, boundary_removed_;
   Coverage::Trial backward_, boundary_backward_;
   Surroundings::Trial crossings_;
-  bool learnt_ = false;  ///< Whether the certificates have named points that the relaxation did not see.
+  bool learnt_ = false;  ///< Whether a refusal has named points that the relaxation did not see.
   bool met_another_ = false;
 };
 

@@ -108,7 +108,7 @@ double cosine_of(const glm::dvec3& a, const glm::dvec3& b) {
 
 void Relaxation::start(Patch& patch) {
   patch_ = &patch;
-  points_.clear(), added_points_.clear(), terms_.clear();
+  points_.clear(), added_points_.clear(), separations_.clear(), terms_.clear();
   free_.clear(), unknown_.clear();
   for (std::uint32_t v = 0; v < patch.vertices().size(); ++v) {
     const bool free = patch.vertices()[v].free;
@@ -161,6 +161,13 @@ void Relaxation::add(std::span<const SurfaceSample> samples, std::uint32_t face)
 void Relaxation::add_face_point(std::uint32_t face, const glm::dvec3& weights, double weight) {
   const auto& c = patch_->faces()[face].corners;
   added_points_.push_back({{c[0], c[1], c[2]}, weights, weight, scale_of(face)});
+}
+
+void Relaxation::add_separation(std::uint32_t face, const Separation& separation, double weight) {
+  const auto& c = patch_->faces()[face].corners;
+  const double tolerance = 1 / std::sqrt(unit2_);
+  separations_.push_back(
+      {{{c[0], c[1], c[2]}, separation.weights, weight, 1}, separation.normal, separation.offset + tolerance});
 }
 
 void Relaxation::renew() {
@@ -220,14 +227,23 @@ Relaxation::Term Relaxation::nearest(const glm::dvec3& point, std::uint32_t face
   return best;
 }
 
-Relaxation::Term Relaxation::toward_reference(const FacePoint& p) const {
+glm::dvec3 Relaxation::place(const FacePoint& p) const {
   const auto vertices = patch_->vertices();
-  const glm::dvec3 x = p.weights.x * vertices[p.vertices[0]].position + p.weights.y * vertices[p.vertices[1]].position +
-                       p.weights.z * vertices[p.vertices[2]].position;
+  return p.weights.x * vertices[p.vertices[0]].position + p.weights.y * vertices[p.vertices[1]].position +
+         p.weights.z * vertices[p.vertices[2]].position;
+}
+
+Relaxation::Term Relaxation::toward_reference(const FacePoint& p) const {
+  const glm::dvec3 x = place(p);
   const auto q = forward_->nearby_point(x);
   if (!q) return {Patch::kNone, p.weights, glm::dvec3(0), kFarSquare};
   const glm::dvec3 residual = *q - x;
   return {Patch::kNone, p.weights, residual, glm::dot(residual, residual) * unit2_ * p.scale};
+}
+
+Relaxation::Term Relaxation::into_half_space(const HeldPoint& p) const {
+  const double missing = std::max(0.0, p.offset - glm::dot(p.normal, place(p.point)));
+  return {Patch::kNone, p.point.weights, missing * p.normal, missing * missing * unit2_};
 }
 
 /// Finds the terms of all points, as the patch is now. The search for a nearest face begins at that of terms_.
@@ -239,6 +255,7 @@ void Relaxation::evaluate(bool look_around, std::vector<Term>& terms) const {
   for (const auto* all : {&own_points_, &added_points_}) {
     for (const FacePoint& p : *all) terms.push_back(toward_reference(p));
   }
+  for (const HeldPoint& p : separations_) terms.push_back(into_half_space(p));
 }
 
 Relaxation::State Relaxation::sum(const std::vector<Term>& terms, int power) const {

@@ -12,6 +12,7 @@
 
 #include "check/certificate.h"
 #include "decimation/patch.h"
+#include "decimation/separation.h"
 
 namespace tolvol {
 
@@ -35,6 +36,12 @@ class Relaxation {
   void add(std::span<const SurfaceSample> samples, std::uint32_t face);
   /// Adds a point of a face, by its barycentric coordinates, to be held near the reference.
   void add_face_point(std::uint32_t face, const glm::dvec3& weights, double weight);
+  /// Adds a point of a face to be held in a half-space. Its deviation is 1 at the half-space's end and 0 one tolerance
+  /// inside.
+  void add_separation(std::uint32_t face, const Separation& separation, double weight);
+  /// Drops all points that are held in half-spaces.
+  void drop_separations() { separations_.clear(); }
+  bool has_separations() const { return !separations_.empty(); }
   /// Finds the deviations of all points that were added, as the patch is now. The other functions need it after points
   /// were added or positions were changed.
   void renew();
@@ -72,6 +79,11 @@ class Relaxation {
     double weight;
     double scale;  ///< 1 / share^2, by the least share of the tolerance that a vertex of the face may use.
   };
+  struct HeldPoint {
+    FacePoint point;
+    glm::dvec3 normal;
+    double offset;  ///< The deviation is 0 from here on along the normal.
+  };
   /// A point of a face and the point beyond it that it has to come near to.
   struct Term {
     std::uint32_t face;   ///< The face that is nearest to a point of the reference.
@@ -87,10 +99,14 @@ class Relaxation {
   Term at(const glm::dvec3& point, std::uint32_t face, const glm::dvec3& a, const glm::dvec3& b,
           const glm::dvec3& c) const;
   Term toward_reference(const FacePoint& p) const;
+  Term into_half_space(const HeldPoint& p) const;
+  glm::dvec3 place(const FacePoint& p) const;
   void evaluate(bool look_around, std::vector<Term>& terms) const;
   State sum(const std::vector<Term>& terms, int power) const;
   const FacePoint& face_point(std::size_t i) const {
-    return i < own_points_.size() ? own_points_[i] : added_points_[i - own_points_.size()];
+    if (i < own_points_.size()) return own_points_[i];
+    i -= own_points_.size();
+    return i < added_points_.size() ? added_points_[i] : separations_[i - added_points_.size()].point;
   }
   double weight(std::size_t term) const {
     return term < points_.size() ? points_[term].weight : face_point(term - points_.size()).weight;
@@ -112,9 +128,10 @@ class Relaxation {
   Patch* patch_ = nullptr;
   std::vector<SurfaceSample> points_;                 ///< of the reference
   std::vector<FacePoint> own_points_, added_points_;  ///< Those of every vertex, edge and face; those that were added.
-  std::vector<Term> terms_, tried_;                   ///< Of points_, own_points_ and added_points_, in this order.
-  std::vector<std::uint32_t> unknown_;                ///< For each vertex: its place among the free ones, or kNone.
-  std::vector<std::uint32_t> free_;                   ///< The free vertices.
+  std::vector<HeldPoint> separations_;
+  std::vector<Term> terms_, tried_;     ///< Of points_, own_points_, added_points_ and separations_, in this order.
+  std::vector<std::uint32_t> unknown_;  ///< For each vertex: its place among the free ones, or kNone.
+  std::vector<std::uint32_t> free_;     ///< The free vertices.
   std::vector<double> matrix_, factor_, gradient_, move_;
   std::vector<glm::dvec3> before_, normals_, new_normals_;
   std::vector<bool> turned_;

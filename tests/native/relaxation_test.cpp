@@ -85,6 +85,32 @@ TEST(Relaxation, HoldsPointsThatAreAdded) {
   EXPECT_GT(f.height(), 0.35) << "the surface has come towards the point";
 }
 
+TEST(Relaxation, HoldsPointsInHalfSpaces) {
+  Fixture f(0);
+  const std::uint32_t face = f.patch.vertices()[f.patch.find_vertex(kMiddle)].faces.front();
+  const dvec3 weights(0.5, 0.25, 0.25);
+  const auto height = [&] {
+    double z = 0;
+    for (int k = 0; k < 3; ++k) z += weights[k] * f.patch.position(face, k).z;
+    return z / f.unit;
+  };
+  for (const double side : {1.0, -1.0}) {
+    const Separation separation{weights, dvec3(0, 0, side), 0.3 * f.unit};
+    f.relaxation->add_separation(face, separation, 0.05);
+    EXPECT_TRUE(f.relaxation->has_separations());
+    f.relaxation->renew();
+    EXPECT_NEAR(f.relaxation->state().largest, 1 + 0.3 - side * height(), 1e-6);
+    f.relaxation->lower_largest(16);
+    EXPECT_TRUE(f.relaxation->enough());
+    EXPECT_GT(side * height(), 0.3);
+    EXPECT_LT(f.height(), 1) << "and no farther than the tolerance";
+    f.relaxation->drop_separations();
+    EXPECT_FALSE(f.relaxation->has_separations());
+    f.relaxation->renew();
+    EXPECT_TRUE(f.relaxation->enough());
+  }
+}
+
 TEST(Relaxation, HoldsPointsOfFaces) {
   Fixture f(0.9);
   const std::uint32_t middle = f.patch.find_vertex(kMiddle);
