@@ -112,6 +112,7 @@ void CollapseLoop::run(const Until& until, Progress* progress) {
       progress->update(static_cast<double>(shared_.before - left) / static_cast<double>(shared_.before));
     }
     const auto entry = queue_.pop();
+    if (!entry && call_back_met()) continue;
     if (!entry || entry->cost >= until.cost) break;
     if (deleted(entry->edge)) continue;
     if (rationed(entry->edge)) {
@@ -252,6 +253,7 @@ void CollapseLoop::carry_out(std::uint32_t edge, Tried& tried) {
     }
     const auto [kept, changed] = collapse_.carry_out(*tried.attempt);
     ahead_.note_change(changed);
+    if (called_back_) changes_.push_back(changed);
     const bool stayed = mesh_.position(kept) == before && !mesh_.joined(kept);
     if (stayed && mesh_.faces_around(kept) > kGreatMany) {
       renew_ring(kept);
@@ -262,12 +264,33 @@ void CollapseLoop::carry_out(std::uint32_t edge, Tried& tried) {
   } else if (tried.outcome == EdgeCollapse::Outcome::refused) {
     note_refusal(edge, tried);
     if (!later_) shared_.refused[edge].store(true, std::memory_order_relaxed);
+    // Crossings are looked for last, so that all else would have held.
+    if (!regions_ && !tried.read.empty()) met_.push_back({edge, tried.read, changes_.size()});
   }
   ahead_.drop(edge);
 }
 
 void CollapseLoop::renew(std::uint32_t edge) {
   if (own(edge)) add(edge, collapse_.cost(edge));
+}
+
+/// Puts back the edges that were refused because faces would have crossed, and returns whether there are any: what was
+/// in the way may be a sheet that is no neighbour. After the first time only those come back near which something has
+/// changed since they were refused.
+bool CollapseLoop::call_back_met() {
+  bool any = false;
+  std::erase_if(met_, [&](Met& met) {
+    if (deleted(met.edge) || !shared_.refused[met.edge]) return true;
+    const auto since = std::span(changes_).subspan(met.changes);
+    met.changes = 0;
+    if (called_back_ && std::ranges::none_of(since, [&](const Box& box) { return meet(box, met.read); })) return false;
+    shared_.refused[met.edge].store(false, std::memory_order_relaxed);
+    renew(met.edge);
+    return any = true;
+  });
+  changes_.clear();
+  called_back_ = true;
+  return any;
 }
 
 /// After a collapse, renews the costs that it changes, and calls back edges that may now be possible.

@@ -68,6 +68,13 @@ class CollapseLoop {
     std::uint64_t work;   ///< All faces, and parts of the reference's pieces, that the tries looked at.
   };
 
+  /// An edge that was refused because faces would have crossed.
+  struct Met {
+    std::uint32_t edge;
+    Box read;             ///< What was in the way is in this box.
+    std::size_t changes;  ///< How many of changes_ were there then.
+  };
+
   bool deleted(std::uint32_t edge) const;
   bool rationed(std::uint32_t edge) const;
   void note_refusal(std::uint32_t edge, const Tried& tried);
@@ -88,6 +95,7 @@ class CollapseLoop {
   void renew_around(std::uint32_t vertex);
   void renew_ring(std::uint32_t vertex);
   void call_back(std::uint32_t vertex);
+  bool call_back_met();
 
   Shared& shared_;
   EdgeCollapse& collapse_;
@@ -107,6 +115,9 @@ class CollapseLoop {
   std::vector<std::uint32_t> ring_;        ///< The neighbours of the vertex that vanished last.
   /// The crowds by vertex: those with many faces around them where a try was refused.
   std::unordered_map<std::uint32_t, Crowd> crowds_;
+  std::vector<Met> met_;      ///< The edges that were refused so, if there are no regions.
+  bool called_back_ = false;  ///< Whether these were called back once.
+  std::vector<Box> changes_;  ///< The boxes in which faces have changed since they were called back last.
   /// Attempts that are kept for their memory. The last one given back is taken first, because it is in the cache.
   std::vector<std::unique_ptr<Attempt>> idle_;
   std::mutex idle_mutex_;  ///< It guards idle_.
