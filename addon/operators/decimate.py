@@ -20,6 +20,7 @@ from ..proof import kept_warnings, measure, report, solidity, verdict
 from ..proof.certify import certify
 from ..properties import PLACEMENTS, automatic_placement, tolerance_settings
 from ..reference import measurements, snapshots, tolerances, volumes
+from . import original
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
 
@@ -63,9 +64,13 @@ def draw_protect_settings(layout, settings, ob):
 
 
 def targets(context):
-    """Returns the objects to decimate: the active one first, then all other selected meshes."""
-    active = context.active_object
-    return [active, *(ob for ob in context.selected_objects if ob.type == "MESH" and ob != active)]
+    """Returns the objects to decimate: the active one first, then all other selected meshes.
+
+    While the original of the active object is shown, they are the same as before.
+    """
+    active = original.active(context)
+    others = {ob for ob in (active, original.stand_in()) if ob is not None}
+    return [active, *(ob for ob in context.selected_objects if ob.type == "MESH" and ob not in others)]
 
 
 def _choose_placement(operator, _context):

@@ -110,6 +110,11 @@ def active(context):
     return context.active_object or (_shown[0].ob if _shown else None)
 
 
+def stand_in():
+    """Returns the object that shows the original now, or None. It is no object of the user's."""
+    return _shown[0].twin if _shown else None
+
+
 def _end():
     while _shown:
         _shown.pop().end()

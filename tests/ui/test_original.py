@@ -6,7 +6,7 @@ import numpy as np
 
 import scenes
 from addon.mesh import mesh_io
-from addon.operators import original
+from addon.operators import decimate, original
 from window import (
     centre,
     find_hold,
@@ -72,6 +72,25 @@ def test_the_original_is_shown_while_its_key_is_held_in_object_and_sculpt_mode()
         assert set(bpy.data.objects) == objects
     with window_context():
         bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_the_button_of_decimate_counts_the_same_objects_while_the_original_is_shown():
+    yield from decimated()
+    other = scenes.torus("other")
+    scenes.activate(torus())
+    for selected, count in ((False, 1), (True, 2)):
+        other.select_set(selected)
+        xdotool("mousemove", *on_screen(region("WINDOW"), 200, 600))
+        yield 0.5
+        xdotool("keydown", "y")
+        yield from finished(original.shown)
+        yield 1.0
+        screenshot(f"original shown beside {count - 1} other objects")
+        with window_context():
+            targets = decimate.targets(bpy.context)
+        assert targets == [torus(), other][:count]
+        xdotool("keyup", "y")
+        yield from finished(lambda: not original.shown())
 
 
 def test_the_original_is_shown_while_its_button_is_held_and_asks_before_it_comes_back():
