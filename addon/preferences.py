@@ -9,7 +9,7 @@ from . import native
 from .reference import snapshots, volumes
 
 # The tolerance of an object for which no other was chosen, in percent of the size.
-TOLERANCE = 0.5
+TOLERANCE = 0.2
 # The options of all properties that hold a tolerance in percent of the size.
 PERCENT = {
     "min": 1e-6,

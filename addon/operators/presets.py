@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A menu of common tolerances, each shown as a length and as a share of the size."""
 
+import math
+
 import bpy
 from bpy.props import EnumProperty, FloatProperty
 
 from ..properties import TOLERANCE_UNITS
-from ..reference import measurements
-from ..units import length
+from ..reference import measurements, tolerances
+from ..units import length, shortest
 from .blocked import allowed, object_blocked
 
-# (unit, value)
-_PRESETS = (("LENGTH", 0.05), ("LENGTH", 0.1), ("PERCENT", 0.1), ("PERCENT", 0.5), ("PERCENT", 1.0))
+# A preset counts as the present tolerance if it differs by less than this share, which is more than float32 rounds away.
+_SAME = 1e-6
+# (name, percent of the size)
+BY_SIZE = (("Coarse", 1.0), ("Normal", 0.2), ("Fine", 0.05))
+# In millimetres: the layers of printers are about as high.
+FOR_PRINTERS = (0.1, 0.05)
 
 
 class TOLVOL_OT_set_tolerance(bpy.types.Operator):
@@ -47,15 +53,48 @@ class TOLVOL_MT_tolerances(bpy.types.Menu):
     bl_description = "Choose a common tolerance. Each is shown as a length and as a share of the size"
 
     def draw(self, context):
-        size = measurements.shown_size(context.active_object)
-        for mode, value in _PRESETS:
-            choice = self.layout.operator("tolvol.set_tolerance", text=label(context, mode, value, size))
-            choice.mode, choice.value = mode, value
+        ob = context.active_object
+        size = measurements.shown_size(ob)
+        present = tolerances.tolerance_length(ob.tolvol, size) if size else None
+        for title, choices in offered(context, size):
+            self.layout.label(text=title)
+            for mode, value, text in choices:
+                length_of = value if mode == "LENGTH" else value / 100 * (size or 0)
+                chosen = present is not None and math.isclose(length_of, present, rel_tol=_SAME)
+                choice = self.layout.operator(
+                    "tolvol.set_tolerance", text=text, icon="CHECKMARK" if chosen else "BLANK1"
+                )
+                choice.mode, choice.value = mode, value
 
 
-def label(context, mode, value, size):
-    """Returns the text of a preset: the value in its own unit, then as a length, a share of the size or both."""
-    if mode == "LENGTH":
-        share = [f"{100 * value / size:.3g} % of size"] if size else []
-        return f"{value:g} in file units:  " + ",  ".join([length(context, value), *share])
-    return f"{value:g} % of size" + (f":  {length(context, value / 100 * size)}" if size else "")
+def offered(context, size):
+    """Returns the presets as [(title, [(unit, value, text)])].
+
+    size: the length that is 100 %, or None if it is not known. The value of a length is in the units of the file. A
+    printer's millimetre is one of the scene, or a unit of the file if the file is in millimetres: Blender takes each unit of
+    such a file for a metre.
+    """
+
+    def text(name, *facts):
+        facts = [fact for fact in facts if fact]
+        return f"{name}:  {',  '.join(facts)}" if facts else name
+
+    def share(value):
+        return size and f"{100 * value / size:.3g} % of size"
+
+    groups = {
+        "By Size": [
+            ("PERCENT", percent, text(name, f"{percent:g} % of size", size and length(context, percent / 100 * size)))
+            for name, percent in BY_SIZE
+        ]
+    }
+    units = context.scene.unit_settings
+    millimetre = 1 if units.system == "NONE" else 0.001 / shortest(units.scale_length)
+    if not math.isclose(millimetre, 1):
+        groups["For a Printer"] = [
+            ("LENGTH", mm * millimetre, text(f"{mm:g} mm", share(mm * millimetre))) for mm in FOR_PRINTERS
+        ]
+    groups["For a Printer, File in Millimetres"] = [
+        ("LENGTH", mm, text(f"{mm:g} mm", f"shown as {length(context, mm)}", share(mm))) for mm in FOR_PRINTERS
+    ]
+    return list(groups.items())

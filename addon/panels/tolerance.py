@@ -29,10 +29,10 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
         if settings.reference_kind == "OBJECT":
             layout.prop(settings, "reference_object")
         column = layout.column(align=True)
-        column.prop(settings, "tolerance_percent" if settings.tolerance_mode == "PERCENT" else "tolerance_length")
         row = column.row(align=True)
-        row.prop(settings, "tolerance_mode", text=" ")
+        row.prop(settings, "tolerance_percent" if settings.tolerance_mode == "PERCENT" else "tolerance_length")
         row.menu("TOLVOL_MT_tolerances", text="", icon="PRESET")
+        column.prop(settings, "tolerance_mode", text=" ")
         right(layout, self._other_form(context, ob))
         layout.prop(settings, "keep")
         row = layout.row(align=True)

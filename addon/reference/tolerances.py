@@ -8,6 +8,10 @@ import numpy as np
 
 from ..units import shortest, typed
 
+# A converted number with at most so many digits but for this relative rounding error is meant to be the number of these
+# digits.
+_DIGITS, _ROUNDING = 12, 1e-15
+
 
 def tolerance_length(settings, size):
     """Returns the tolerance in world units. `settings` has the properties of properties.tolerance_settings()."""
@@ -34,8 +38,9 @@ def convert_tolerance(settings, size, mode):
         name, value = "tolerance_length", _chosen(settings, "tolerance_percent") / 100 * size
     else:
         name, value = "tolerance_percent", 100 * _chosen(settings, "tolerance_length") / size
-        # A percentage that is converted to a length and back has to be the typed number again, without rounding errors.
-        if math.isclose(shortest(value), value, rel_tol=1e-15):
-            value = shortest(value)
+    # A number that is converted to the other unit and back has to be the typed number again, without rounding errors.
+    decimal = float(f"{value:.{_DIGITS}g}")
+    if math.isclose(decimal, value, rel_tol=_ROUNDING):
+        value = decimal
     setattr(settings, name, value)
     setattr(settings, f"{name}_converted", repr(value))

@@ -7,7 +7,7 @@ import pytest
 from mathutils import Matrix
 
 import addon
-from addon import native, overlay, preferences
+from addon import native, overlay, preferences, units
 from addon.mesh import mesh_io
 from addon.operators import blocked, presets, reference
 from addon.overlay import draw, reasons
@@ -560,7 +560,11 @@ def chosen_preferences():
 
 def test_tolerance_begins_as_the_preferences_say_and_stays_once_a_reference_is_set(chosen_preferences):
     ob = link(bpy.data.objects.new("new", torus().data.copy()))
-    assert ob.tolvol.tolerance_percent == 0.5 and ob.tolvol.tolerance_mode == "PERCENT" and ob.tolvol.keep == "BOTH"
+    assert (
+        ob.tolvol.tolerance_percent == np.float32(0.2)
+        and ob.tolvol.tolerance_mode == "PERCENT"
+        and ob.tolvol.keep == "BOTH"
+    )
     chosen_preferences.tolerance = 0.25
     assert ob.tolvol.tolerance_percent == 0.25
     bpy.ops.tolvol.set_reference()
@@ -568,16 +572,52 @@ def test_tolerance_begins_as_the_preferences_say_and_stays_once_a_reference_is_s
     assert ob.tolvol.tolerance_percent == 0.25
 
 
-def test_presets_are_shown_as_length_and_share():
+def offered(ob):
+    """Returns {title: [(unit, value, text)]} of the presets, with plain spaces."""
+    groups = presets.offered(bpy.context, measurements.shown_size(ob) if ob else None)
+    return {title: [(*choice, text.replace("\u00a0", " ")) for *choice, text in choices] for title, choices in groups}
+
+
+def test_presets_by_size_are_shown_as_length_and_share():
     ob = torus()
     size = measurements.shown_size(ob)
-    assert bpy.ops.tolvol.set_tolerance(mode="LENGTH", value=0.05) == {"FINISHED"}
-    assert tolerances.tolerance_length(ob.tolvol, size) == 0.05
-    said = presets.label(bpy.context, "LENGTH", 0.05, size).replace("\u00a0", " ")
-    assert said == f"0.05 in file units:  5 cm,  {5 / size:.3g} % of size"
-    bpy.ops.tolvol.set_tolerance(mode="PERCENT", value=0.1)
-    assert tolerances.tolerance_length(ob.tolvol, size) == 0.001 * size
-    assert presets.label(bpy.context, "PERCENT", 0.1, None) == "0.1 % of size"
+    choices = offered(ob)["By Size"]
+    assert [text.split(":")[0] for *_, text in choices] == ["Coarse", "Normal", "Fine"]
+    assert [(unit, value) for unit, value, _ in choices] == [("PERCENT", 1.0), ("PERCENT", 0.2), ("PERCENT", 0.05)]
+    assert choices[1][2] == f"Normal:  0.2 % of size,  {units.length(bpy.context, 0.002 * size)}".replace("\u00a0", " ")
+    for unit, value, _ in choices:
+        assert bpy.ops.tolvol.set_tolerance(mode=unit, value=value) == {"FINISHED"}
+        assert (
+            ob.tolvol.tolerance_mode == "PERCENT" and tolerances.tolerance_length(ob.tolvol, size) == value / 100 * size
+        )
+    assert offered(None)["By Size"][0][2] == "Coarse:  1 % of size"
+    assert preferences.TOLERANCE == dict(presets.BY_SIZE)["Normal"]
+
+
+@pytest.mark.parametrize(
+    ("system", "scale", "real"),
+    (
+        ("METRIC", 1.0, 5e-5),
+        ("METRIC", 0.01, 0.005),
+        ("METRIC", 0.001, None),
+        ("IMPERIAL", 1.0, 5e-5),
+        ("NONE", 1.0, None),
+    ),
+)
+def test_presets_for_printers_are_millimetres_of_the_scene_or_of_the_file(system, scale, real):
+    ob, settings = torus(), bpy.context.scene.unit_settings
+    settings.system, settings.scale_length = system, scale
+    size, groups = measurements.shown_size(ob), offered(ob)
+    wanted = {"For a Printer": real, "For a Printer, File in Millimetres": 0.05}
+    assert set(groups) == {"By Size", *(title for title, value in wanted.items() if value)}
+    for title, wish in wanted.items():
+        if wish is None:
+            continue
+        _, (unit, value, text) = groups[title]
+        assert text.startswith("0.05 mm:  ") and text.endswith(f"{100 * wish / size:.3g} % of size")
+        assert bpy.ops.tolvol.set_tolerance(mode=unit, value=value) == {"FINISHED"}
+        assert tolerances.tolerance_length(ob.tolvol, size) == wish
+    assert f"shown as {units.length(bpy.context, 0.05)}".replace("\u00a0", " ") in text
 
 
 def test_every_setting_has_a_tooltip():
@@ -653,6 +693,24 @@ def test_a_quarter_of_a_metre():
     assert ob.tolvol.tolerance_length == pytest.approx(0.00075, rel=1e-6)
     assert bpy.ops.tolvol.decimate(tolerance_percent=0.3) == {"FINISHED"}
     assert ob.tolvol.tolerance_mode == "PERCENT" and ob.tolvol.tolerance_length == pytest.approx(0.00075, rel=1e-6)
+
+
+@pytest.mark.parametrize("mm", (0.5, 0.05, 0.1, 1.75, 0.3, 7e-4))
+def test_there_and_back_a_typed_number_is_the_same_to_the_last_bit(mm):
+    """The sides of the plate are 3 : 4 : 5, so that its size is 250."""
+    ob = add_object("plate", [(0, 0, 0), (150, 0, 0), (150, 200, 0), (0, 200, 0)], [(0, 1, 2, 3)])
+    settings = ob.tolvol
+    for typed, other in (("LENGTH", "PERCENT"), ("PERCENT", "LENGTH")):
+        settings.tolerance_mode = typed
+        setattr(settings, f"tolerance_{typed.lower()}", mm if typed == "LENGTH" else mm / 2.5)
+        before = tolerances.tolerance_length(settings, 250.0)
+        assert before == pytest.approx(mm, rel=1e-15)
+        for _ in range(3):
+            settings.tolerance_mode = other
+            settings.tolerance_mode = typed
+        assert tolerances.tolerance_length(settings, 250.0) == before
+    settings.tolerance_mode = "LENGTH"
+    assert tolerances.tolerance_length(settings, 250.0) == mm  # 0.3 % of 250 are 0.75 and no neighbour of it.
 
 
 def test_a_length_typed_in_a_unit_of_the_scene_is_that_length():
