@@ -6,6 +6,7 @@ import math
 import bpy
 from bpy.props import (
     BoolProperty,
+    CollectionProperty,
     EnumProperty,
     FloatProperty,
     FloatVectorProperty,
@@ -16,6 +17,7 @@ from bpy.props import (
 
 from . import preferences
 from .operation_settings import decimate_settings, modifier_settings, smooth_settings
+from .redraw import redraw_views
 from .reference import measurements, snapshots, tolerances
 
 TOLERANCE_UNITS = (
@@ -168,6 +170,23 @@ class TOLVOL_PG_measurement(bpy.types.PropertyGroup):
         return bool(self.fingerprint) and not any(math.isnan(getattr(self, name)) for name in _LENGTHS)
 
 
+class TOLVOL_PG_label(bpy.types.PropertyGroup):
+    """The distance at one point of the mesh or of its reference, and the state in which it was read."""
+
+    place: FloatVectorProperty(size=3, description="The point, in the space of the object")
+    on_reference: BoolProperty(description="Whether it is a point of the reference and not of the mesh")
+    side: StringProperty(
+        description="The side of the other surface on which the point lies. It is empty if none is known"
+    )
+    share: FloatProperty(default=1, description="Share of the tolerance that Decimate may use there")
+    distance_digits: StringProperty(description="The distance of the point from the other surface")
+    fingerprint: StringProperty(description="The fingerprint of the mesh that was read")
+    matrix: FloatVectorProperty(size=16, description="The matrix of the object when the distance was read")
+    reference: StringProperty(description="The reference from which the distance was read, and its place")
+
+    distance = _double("distance_digits")
+
+
 class TOLVOL_PG_smooth(bpy.types.PropertyGroup):
     __annotations__ = smooth_settings()
 
@@ -188,6 +207,10 @@ def _percent_changed(settings, _context):
 def _length_changed(settings, _context):
     settings.tolerance_length_converted = ""
     snapshots.notify()
+
+
+def _label_chosen(_settings, _context):
+    redraw_views()
 
 
 def _unit_changed(settings, _context):
@@ -335,12 +358,21 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     guard: PointerProperty(type=TOLVOL_PG_guard)
 
     measurement: PointerProperty(type=TOLVOL_PG_measurement)
+    labels: CollectionProperty(type=TOLVOL_PG_label, description="The labels that the probe has left")
+    label_index: IntProperty(name="Label", description="The chosen label", update=_label_chosen)
     warnings: StringProperty(description="The warnings of the last operation, as JSON")
     last_run: StringProperty(description="The report of the last decimation, as JSON")
     last_run_of: StringProperty(description="The fingerprint of the mesh that the last decimation left")
 
 
-_CLASSES = (TOLVOL_PG_measurement, TOLVOL_PG_smooth, TOLVOL_PG_modifiers, TOLVOL_PG_guard, TOLVOL_PG_settings)
+_CLASSES = (
+    TOLVOL_PG_measurement,
+    TOLVOL_PG_label,
+    TOLVOL_PG_smooth,
+    TOLVOL_PG_modifiers,
+    TOLVOL_PG_guard,
+    TOLVOL_PG_settings,
+)
 
 
 def register():

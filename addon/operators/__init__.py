@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Registers the operators in bpy.ops.tolvol: set_tolerance, set_reference, clear_reference, show_original,
-restore_original, new_original, check, select_outside, worst_point, next_place, clear_places, select_crossing,
-select_staying, save_report, decimate, smooth, apply_modifier, fit_modifier and deform."""
+restore_original, new_original, check, select_outside, worst_point, next_place, clear_places, probe, add_label,
+renew_labels, remove_label, select_crossing, select_staying, save_report, decimate, smooth, apply_modifier,
+fit_modifier and deform."""
 
 import bpy
 
@@ -14,6 +15,7 @@ from .modifiers import TOLVOL_OT_apply_modifier, TOLVOL_OT_fit_modifier
 from .original import TOLVOL_OT_new_original, TOLVOL_OT_restore_original, TOLVOL_OT_show_original
 from .places import TOLVOL_OT_clear_places, TOLVOL_OT_next_place, TOLVOL_OT_worst_point
 from .presets import TOLVOL_MT_tolerances, TOLVOL_OT_set_tolerance
+from .probe import TOLVOL_OT_add_label, TOLVOL_OT_probe, TOLVOL_OT_remove_label, TOLVOL_OT_renew_labels
 from .reference import TOLVOL_OT_clear_reference, TOLVOL_OT_set_reference
 from .report import TOLVOL_OT_save_report
 from .smooth import TOLVOL_OT_smooth
@@ -32,6 +34,10 @@ _CLASSES = (
     TOLVOL_OT_worst_point,
     TOLVOL_OT_next_place,
     TOLVOL_OT_clear_places,
+    TOLVOL_OT_probe,
+    TOLVOL_OT_add_label,
+    TOLVOL_OT_renew_labels,
+    TOLVOL_OT_remove_label,
     TOLVOL_OT_select_crossing,
     TOLVOL_OT_select_staying,
     TOLVOL_OT_save_report,

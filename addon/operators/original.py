@@ -16,7 +16,7 @@ from .blocked import allowed, mesh_blocked, object_blocked
 
 _SHOWN_IN = {"OBJECT", "SCULPT"}
 # While the original is shown, these events go on to Blender, so that the view can be turned and moved.
-_OF_THE_VIEW = {
+OF_THE_VIEW = {
     *("MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "TRACKPADPAN", "TRACKPADZOOM", "MOUSEROTATE", "MOUSESMARTZOOM"),
     *("LEFT_SHIFT", "RIGHT_SHIFT", "LEFT_CTRL", "RIGHT_CTRL"),
 }
@@ -158,7 +158,7 @@ changed. The view can be turned meanwhile"""
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        if event.type in _OF_THE_VIEW:
+        if event.type in OF_THE_VIEW:
             return {"PASS_THROUGH"}
         held = event.type == self._held
         over = held and event.value == "RELEASE" or not held and event.value == "PRESS"

@@ -9,7 +9,8 @@ from bpy.props import StringProperty
 from ..errors import Refused
 from ..files import safe_files
 from ..mesh import mesh_io
-from ..proof import deviation, report
+from ..proof import deviation, labels, report
+from ..reference import snapshots, tolerances
 from .check import Comparison
 
 # The report gives the share of the area in the bands between these shares of the tolerance.
@@ -65,6 +66,9 @@ read (.html), a table (.csv) or all numbers (.json)"""
         holes = report.remembered_holes(self.ob.tolvol.last_run)
         if holes and self.ob.tolvol.last_run_of == mesh_io.read_mesh(self.ob.data).fingerprint():
             self._about["a"]["holes"] = holes
+        if self.ob.tolvol.labels:
+            tolerance = tolerances.tolerance_length(self.ob.tolvol, snapshots.snapshot_size(self.ob))
+            self._about["labels"] = labels.listed(self.ob, tolerance)
         units = context.scene.unit_settings
         self._unit = "m" if units.system != "NONE" and units.scale_length == 1 else "units"
         return super().prepare(context)

@@ -11,10 +11,11 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .. import native, preferences
-from ..proof import places
+from ..proof import labels as kept_labels
+from ..proof import places, probing
 from ..redraw import redraw_views
 from ..reference import snapshots
-from . import draw, field, legend, markers, reasons, shaders, shares, work
+from . import draw, field, labels, legend, markers, reasons, shaders, shares, work
 from .surface import Surface
 
 _surfaces = {}  # name of an object that shows its deviation -> Surface
@@ -34,6 +35,7 @@ def refresh():
     if not preferences.use_gl(bpy.context):
         reasons.broken.clear()  # When drawing is turned on again, the driver is tried again.
     markers.refresh()
+    labels.refresh()
     names = _wanted()
     if not names:
         _end()
@@ -128,6 +130,8 @@ def register():
     bpy.app.handlers.load_post.append(_forget_places)
     snapshots.listeners.append(refresh)
     places.listeners.append(markers.refresh)
+    for listeners in (kept_labels.listeners, probing.listeners):
+        listeners.append(labels.refresh)
 
 
 def unregister():
@@ -135,6 +139,9 @@ def unregister():
     places.forget()
     places.listeners.remove(markers.refresh)
     markers.end()
+    for listeners in (kept_labels.listeners, probing.listeners):
+        listeners.remove(labels.refresh)
+    labels.end()
     snapshots.listeners.remove(refresh)
     _end()
     reasons.broken.clear()

@@ -13,7 +13,7 @@ from . import legend, reasons, shaders
 # Pixels at an interface scale of 1: the arms of a cross, the gap in its middle, and the label's distance from it.
 _ARM, _PRESENT_ARM, _GAP = 6, 16, 4
 _ROW, _MARGIN = 17, 8
-_INK, _EDGE = (1, 1, 1, 1), (0, 0, 0, 0.8)
+INK, EDGE = (1, 1, 1, 1), (0, 0, 0, 0.8)
 
 _drawing = []
 
@@ -49,7 +49,7 @@ def _draw():
                 _cross(page, *spot, _PRESENT_ARM if i == at else _ARM)
         spot = location_3d_to_region_2d(context.region, context.region_data, found[at].position)
         if spot is not None:
-            _label(page, context, *spot, described(context, ob))
+            beside(page, context, *spot, described(context, ob), 2 * _PRESENT_ARM * page.scale)
     except (RuntimeError, SystemError) as error:  # The driver refuses: the panel says so.
         reasons.broken[:] = [str(error)]
         bpy.app.timers.register(end, first_interval=0)
@@ -58,22 +58,22 @@ def _draw():
 def _cross(page, x, y, arm):
     scale = page.scale
     arm, gap = arm * scale, _GAP * scale
-    for thick, colour in ((3 * scale, _EDGE), (scale, _INK)):
+    for thick, colour in ((3 * scale, EDGE), (scale, INK)):
         for begin in (gap, -gap - arm):
             page.rectangle(x + begin, y - thick / 2, arm, thick, shaders.FLAT, colour)
             page.rectangle(x - thick / 2, y + begin, thick, arm, shaders.FLAT, colour)
 
 
-def _label(page, context, x, y, lines):
-    """Draws the lines beside the place, inside the view."""
+def beside(page, context, x, y, lines, away, faint=False):
+    """Draws lines of text in a box beside a place, inside the view. away: the gap between them in pixels."""
     scale = page.scale
     margin, row = _MARGIN * scale, _ROW * scale
     width, height = max(map(page.width, lines)) + 2 * margin, len(lines) * row + margin
-    left, bottom = x + 2 * _PRESENT_ARM * scale, y - height / 2
+    left, bottom = x + away, y - height / 2
     if left + width > legend.free_part(context)[0]:
-        left = x - 2 * _PRESENT_ARM * scale - width
-    left = max(left, 0)
+        left = x - away - width
+    left, bottom = max(left, 0), min(max(bottom, 0), context.region.height - height)
     page.rectangle(left, bottom, width, height, shaders.FLAT, page.paper)
     for i, line in enumerate(lines):
-        page.text(left + margin, bottom + height - margin / 2 - (i + 0.5) * row, line, faint=i > 0)
+        page.text(left + margin, bottom + height - margin / 2 - (i + 0.5) * row, line, faint=faint or i > 0)
     gpu.state.blend_set("NONE")

@@ -6,7 +6,7 @@ import bpy
 from . import menus
 from .decimate import TOLVOL_PT_advanced, TOLVOL_PT_decimate, TOLVOL_PT_protect
 from .deform import TOLVOL_PT_deform
-from .deviation import TOLVOL_PT_deviation, TOLVOL_PT_show_deviation
+from .deviation import TOLVOL_PT_deviation, TOLVOL_PT_labels, TOLVOL_PT_show_deviation, TOLVOL_UL_labels
 from .guard import TOLVOL_PT_guard
 from .modifiers import TOLVOL_PT_modifiers
 from .smooth import TOLVOL_PT_smooth
@@ -18,6 +18,8 @@ _CLASSES = (
     TOLVOL_PT_protect,
     TOLVOL_PT_advanced,
     TOLVOL_PT_deviation,
+    TOLVOL_UL_labels,
+    TOLVOL_PT_labels,
     TOLVOL_PT_show_deviation,
     TOLVOL_PT_smooth,
     TOLVOL_PT_modifiers,

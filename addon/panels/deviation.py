@@ -4,8 +4,9 @@
 import bpy
 
 from .. import overlay
+from ..operators.probe import TOLVOL_OT_probe, distance_text, tolerance_of
 from ..overlay import reasons
-from ..proof import kept_warnings, report, verdict
+from ..proof import kept_warnings, labels, report, verdict
 from ..reference import measurements
 from ..units import length
 from .layout import AMBER, GREEN, GREY, RED, SubPanel, active, is_narrow, right, text_lines
@@ -27,6 +28,7 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         for back, icon in ((True, "TRIA_LEFT"), (False, "TRIA_RIGHT")):
             row.operator("tolvol.next_place", text="", icon=icon).back = back
         row.operator("tolvol.clear_places", text="", icon="X")
+        layout.operator("tolvol.probe", icon="EYEDROPPER", depress=TOLVOL_OT_probe.running())
         row = layout.row(align=True)
         row.operator("tolvol.select_crossing", text="Crossing Faces")
         row.operator("tolvol.save_report", text="Save Report...")
@@ -125,3 +127,37 @@ class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
         column.prop(ob.tolvol, "deviation_opacity")
         if reason := reasons.hidden(ob) or unsigned:
             text_lines(context, column, reason, "INFO")
+
+
+class TOLVOL_UL_labels(bpy.types.UIList):
+    """The labels of an object: number, distance with its side, share of the tolerance."""
+
+    def draw_item(self, context, layout, settings, label, _icon, _active, _name, index):
+        ob = settings.id_data
+        found, true, narrow = labels.reading(ob, label), labels.current(ob, label), is_narrow(context)
+        row = layout.row()
+        row.active = true
+        text = length(context, found.distance) if narrow else distance_text(context, found)
+        row.label(text=f"{index + 1}:  {text}", icon="NONE" if true else "ERROR")
+        if not narrow:
+            right(row, report.percent(found.distance, tolerance_of(ob)) if true else "out of date")
+
+
+class TOLVOL_PT_labels(SubPanel, bpy.types.Panel):
+    """The labels that the probe has left."""
+
+    bl_label = "Labels"
+    bl_parent_id = "TOLVOL_PT_deviation"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and len(active(context).tolvol.labels) > 0
+
+    def draw(self, context):
+        ob = active(context)
+        row = self.layout.row()
+        row.template_list("TOLVOL_UL_labels", "", ob.tolvol, "labels", ob.tolvol, "label_index", rows=3, maxrows=8)
+        column = row.column(align=True)
+        column.operator("tolvol.remove_label", text="", icon="REMOVE").everything = False
+        column.operator("tolvol.remove_label", text="", icon="X").everything = True
+        column.operator("tolvol.renew_labels", text="", icon="FILE_REFRESH")

@@ -7,6 +7,7 @@ import bpy
 _IN_OBJECT_MENU = (
     *("set_reference", "clear_reference", "restore_original", "new_original"),
     *("check", "worst_point", "select_outside", "select_crossing", "select_staying", "save_report"),
+    *("probe", "add_label", "renew_labels", "remove_label"),
     *("decimate", "smooth", "apply_modifier", "fit_modifier", "deform"),
 )
 

@@ -11,6 +11,9 @@ number:
     verdict                       PASS or FAIL (verdict.py), or None without a tolerance
     a, b                          {name or file, vertices, triangles}; a also has `holes`, as in report.py, if the last
                                   decimation closed holes
+    labels                        only if the probe has left some: [{on, position, distance, side, share_of_tolerance,
+                                  current}]; on: "mesh" or "reference"; side: "inside", "outside" or None; current: whether
+                                  the label was read in this state of both, or before a change
     solidity                      {a, b}: facts about both (solidity.py); {change}: solidity.change(), a against b
     forward, backward             a from b, and b from a; each:
         largest, position, triangle, face               position: the point with the largest distance found, in this
@@ -155,11 +158,24 @@ def table(run):
         rows += [("", f"{name} {key}", "", "" if value is None else value, "", "") for key, value in facts]
     change = run["solidity"]["change"].items()
     rows += [("", f"change of {key}", "", "" if value is None else value, "", "") for key, value in change]
+    for i, label in enumerate(run.get("labels", ())):
+        rows += [
+            ("", f"label {i + 1} {key}", "", "" if value is None else value, "", "") for key, value in _flat(label)
+        ]
     for way in ("forward", "backward"):
         rows += [(way, *row) for row in _rows(run[way])]
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([_harmless(cell) for cell in row] for row in rows)
     return text.getvalue()
+
+
+def _flat(label):
+    """Yields the entries of a label, each coordinate of its position by itself."""
+    for key, value in label.items():
+        if key == "position":
+            yield from zip("xyz", value)
+        else:
+            yield key, value
 
 
 def _harmless(cell):

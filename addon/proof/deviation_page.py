@@ -66,6 +66,7 @@ def page(run, pictures=()):
 {_verdict(run)}
 <p>{a}: {escape(solidity.line(run["solidity"]["a"]))}<br>{b}: {escape(solidity.line(run["solidity"]["b"]))}{_change(run)}</p>
 <div class="ways">{articles}</div>
+{_labels(run)}
 {figures}
 <footer>{_notes(run)}</footer>
 </body></html>
@@ -271,6 +272,24 @@ def _histogram(run, way, highest):
 <pattern id="stripes-{way}" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)">
 <rect width="6" height="6" fill="{_BEYOND}"/><rect width="2" height="6" fill="#fff"/></pattern></defs>
 {"".join(parts)}</svg>"""
+
+
+def _labels(run):
+    """Returns the table of the labels that the probe has left, or nothing without labels."""
+    rows = [
+        (
+            i + 1,
+            label["on"],
+            ", ".join(f"{x:.6g}" for x in label["position"]),
+            f"{label['distance']:.4g}",
+            label["side"] or "",
+            f"{100 * label['share_of_tolerance']:.3g}&nbsp;%",
+            "" if label["current"] else "before a change: out of date",
+        )
+        for i, label in enumerate(run.get("labels", ()))
+    ]
+    head = ("label", "on", f"point{_in_unit(run)}", f"distance{_in_unit(run)}", "side", "of tolerance", "")
+    return f"<h2>Labels</h2>{_table(head, rows)}" if rows else ""
 
 
 def _notes(run):

@@ -47,6 +47,21 @@ def test_shares_follow_the_mesh_its_place_and_the_edges():
     assert tree.shares(*sphere, edges, threads=1) == tree.shares(*sphere, edges)
 
 
+def test_signed_distances_are_negative_inside_and_follow_the_place():
+    sphere, place = meshes.sphere(4), meshes.matrix(2 * np.eye(3), (5, 0, 0))
+    volume = tolvol.ToleranceVolume(*sphere, 0.1, to_world=place)
+    tree = tolvol.DisplayTree(volume)
+    points = np.random.default_rng(1).uniform(-3, 3, (200, 3)) + (5, 0, 0)
+    found, exact = tree.signed_distance(points), volume.distance(points)
+    assert np.allclose(np.abs(found), exact, atol=2 * tree.ROUNDING / tree.scale)
+    radius = np.linalg.norm(points - (5, 0, 0), axis=1)
+    clear = np.abs(radius - 2) > 0.02
+    assert (np.sign(found) == np.sign(radius - 2))[clear].all() and clear.sum() > 150 and (radius < 2).sum() > 10
+    local = (points - (5, 0, 0)) / 2
+    assert np.allclose(tree.signed_distance(local, to_world=place, threads=1), found, atol=1e-12)
+    assert tree.signed_distance(points[:1] + 1e6)[0] == pytest.approx(volume.distance(points[:1] + 1e6)[0], rel=1e-6)
+
+
 def test_open_references_are_said():
     assert not display(meshes.plate(9)).closed
 
@@ -56,6 +71,14 @@ def test_bad_input_is_named():
     for edges in ((0, float("nan")), (1, 0)):
         with pytest.raises(tolvol.InvalidInput, match="ascending"):
             tree.shares(*meshes.sphere(2), edges)
+    with pytest.raises(tolvol.InvalidInput, match="point 1 is not finite"):
+        tree.signed_distance(np.array([[0, 0, 0], [0, np.nan, 0]]))
+    with pytest.raises(tolvol.InvalidInput, match="points"):
+        tree.signed_distance(np.zeros((3, 2)))
+    progress = tolvol.Progress()
+    progress.cancel()
+    with pytest.raises(tolvol.Cancelled):
+        tree.signed_distance(np.zeros((3000, 3)), progress=progress)
     with pytest.raises(tolvol.InvalidInput, match="9"):
         tree.shares(np.zeros((3, 3)), np.array([[0, 1, 9]]), (0,))
     progress = tolvol.Progress()

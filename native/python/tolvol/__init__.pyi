@@ -136,6 +136,14 @@ class DisplayTree:
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> list[float]: ...
+    def signed_distance(
+        self,
+        points: _Vertices,
+        *,
+        to_world: ArrayLike | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> NDArray[np.float64]: ...
 
 class ConstrainResult:
     @property

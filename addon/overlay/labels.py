@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Draws the labels of the active object into the 3D views, and beside the mouse what the probe reads."""
+
+import bpy
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+
+from ..operators.probe import described, distance_text, tolerance_of
+from ..proof import labels, probing, report
+from ..redraw import redraw_views
+from . import legend, markers, reasons, shaders
+
+# Pixels at an interface scale of 1.
+_DOT, _BESIDE, _ROW, _MARGIN = 6, 14, 17, 6
+
+_drawing = []
+
+
+def refresh():
+    """Adds the draw handler while an object has labels or the probe is at work, and removes it afterwards."""
+    if bpy.app.background:
+        return
+    wanted = probing.hover() is not None or any(ob.type == "MESH" and ob.tolvol.labels for ob in bpy.data.objects)
+    if wanted and not reasons.off():
+        if not _drawing:
+            _drawing.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
+    else:
+        end()
+    redraw_views()
+
+
+def end():
+    while _drawing:
+        bpy.types.SpaceView3D.draw_handler_remove(_drawing.pop(), "WINDOW")
+
+
+def _draw():
+    context = bpy.context
+    try:
+        page = legend.Page(context, True)
+        if context.space_data.overlay.show_overlays:
+            _draw_labels(context, page, context.active_object)
+        _draw_hover(context, page, probing.hover())
+    except (RuntimeError, SystemError) as error:  # The driver refuses: the panel says so.
+        reasons.broken[:] = [str(error)]
+        bpy.app.timers.register(end, first_interval=0)
+
+
+def _draw_labels(context, page, ob):
+    if ob is None or ob.type != "MESH" or not ob.tolvol.labels or not ob.visible_in_viewport_get(context.space_data):
+        return
+    settings = ob.tolvol
+    for i, label in enumerate(settings.labels):
+        found, true = labels.reading(ob, label), labels.current(ob, label)
+        spot = location_3d_to_region_2d(context.region, context.region_data, found.position)
+        if spot is None:
+            continue
+        if not true:
+            lines = [f"{i + 1}: {distance_text(context, found)}, out of date"]
+        elif i == settings.label_index:
+            lines = described(context, ob, found)
+            lines[0] = f"{i + 1}: {lines[0]}"
+        else:
+            share = report.percent(found.distance, tolerance_of(ob))
+            lines = [f"{i + 1}: {distance_text(context, found)}, {share}"]
+        _dot(page, *spot)
+        markers.beside(page, context, *spot, lines, _BESIDE * page.scale, faint=not true)
+
+
+def _draw_hover(context, page, hover):
+    if hover is None or hover.region != context.region.as_pointer() or not hover.lines:
+        return
+    if hover.position is not None:
+        spot = location_3d_to_region_2d(context.region, context.region_data, hover.position)
+        if spot is not None:
+            _dot(page, *spot)
+    markers.beside(page, context, *hover.mouse, hover.lines, 2 * _BESIDE * page.scale)
+
+
+def _dot(page, x, y):
+    for size, colour in ((_DOT + 2, markers.EDGE), (_DOT, markers.INK)):
+        size *= page.scale
+        page.rectangle(x - size / 2, y - size / 2, size, size, shaders.FLAT, colour)

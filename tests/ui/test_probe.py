@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The probe reads what is under the mouse, and a click leaves a label."""
+
+import bpy
+import numpy as np
+
+from addon.mesh import mesh_io
+from addon.operators.probe import TOLVOL_OT_probe
+from addon.proof import labels, probing
+from test_layout import dark, drag_sidebar, light
+from window import (
+    click,
+    finished,
+    key,
+    on_screen,
+    open_tab,
+    press,
+    region,
+    reset,
+    screenshot,
+    view,
+    window_context,
+    xdotool,
+)
+
+
+def ball():
+    """A ball that was blown up on its left side after its reference was set."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5)
+    ob = bpy.context.object
+    ob.name = "ball"
+    bpy.ops.tolvol.set_reference()
+    co = mesh_io.column(ob.data.vertices, "co", 3)
+    co *= np.where(co[:, :1] < 0, np.float32(1.05), np.float32(1))
+    ob.data.vertices.foreach_set("co", co.ravel())
+    ob.data.update()
+    view()[1].spaces[0].region_3d.view_distance = 6
+
+
+def the_ball():
+    return bpy.data.objects["ball"]
+
+
+def places():
+    """Returns two places on the screen: on the side of the ball that was blown up, and on the one that was not."""
+    middle = region("WINDOW")
+    return [on_screen(middle, middle.width // 2 + across, middle.height // 2) for across in (-60, 60)]
+
+
+def reads(far):
+    """Whether the probe shows a large or a small distance."""
+    hover = probing.hover()
+    return bool(hover and hover.lines) and ("outside" in hover.lines[0]) == far
+
+
+def test_the_probe_reads_under_the_mouse_and_leaves_labels():
+    yield from reset(ball)
+    yield from open_tab()
+    view()[1].spaces[0].region_3d.view_rotation = (0.7071, 0.7071, 0, 0)  # from the front
+    yield 0.5
+    left, right = places()
+    yield from press("tolvol.probe", across=0.5)
+    yield from finished(TOLVOL_OT_probe.running)
+    xdotool("mousemove", *left)
+    yield from finished(lambda: reads(True))
+    yield 0.5
+    screenshot("probe 1 beyond")
+    lines = [line.replace("\u00a0", " ") for line in probing.hover().lines]
+    assert lines == ["4.99 cm outside, 721 % of the tolerance", "Tolerance 6.93 mm: beyond"]
+    assert (
+        TOLVOL_OT_probe._running._said
+        == f"ball: {', '.join(probing.hover().lines)}    Click: Leave a Label    Esc: End"
+    )
+    assert len(the_ball().tolvol.labels) == 0
+    # The view can be turned meanwhile: what is under the mouse is then read without a move.
+    xdotool("click", 4)
+    yield 0.5
+    xdotool("mousemove", *right)
+    yield from finished(lambda: reads(False))
+    screenshot("probe 2 within")
+    click(*left)
+    yield from finished(lambda: len(the_ball().tolvol.labels) == 1)
+    click(*right)
+    yield from finished(lambda: len(the_ball().tolvol.labels) == 2)
+    xdotool("mousemove", *on_screen(region("WINDOW"), 200, 600))  # beside the ball
+    yield from finished(lambda: not probing.hover().lines)
+    yield 0.5
+    screenshot("probe 3 two labels")
+    click(*on_screen(region("WINDOW"), 200, 600))
+    yield 0.5
+    first, second = the_ball().tolvol.labels
+    assert first.side == "outside" and 0.045 < first.distance < 0.0501 and second.distance < 1e-6
+    assert np.linalg.norm(first.place) > 1.04 and labels.current(the_ball(), first)
+    # Ctrl Z takes the last label back, and the probe goes on.
+    xdotool("mousemove", *left, "key", "ctrl+z")
+    yield from finished(lambda: len(the_ball().tolvol.labels) == 1)
+    yield from finished(lambda: reads(True))
+    xdotool("key", "ctrl+shift+z")
+    yield from finished(lambda: len(the_ball().tolvol.labels) == 2)
+    # The sidebar works meanwhile.
+    the_ball().tolvol.tolerance_percent = 5
+    xdotool("mousemove", left[0] + 2, left[1])
+    yield from finished(lambda: reads(True) and "beyond" not in probing.hover().lines[1])
+    key("Escape")
+    yield from finished(lambda: not TOLVOL_OT_probe.running())
+    assert probing.hover() is None
+
+
+def test_the_table_of_labels_in_the_sidebar():
+    yield from reset(ball)
+    yield from open_tab()
+    for position in ((-1, 0, 0), (1, 0, 0), (0, 0, 1)):
+        bpy.ops.tolvol.add_label(position=position)
+    bpy.ops.ed.undo_push(message="labels")
+    yield from press("tolvol.remove_label", across=0.775)
+    yield from finished(lambda: len(the_ball().tolvol.labels) == 2)
+    the_ball().data.vertices[0].co.z += 0.01
+    the_ball().data.update()
+    bpy.ops.ed.undo_push(message="edit")
+    yield 1.0
+    screenshot("probe 4 out of date")
+    yield from press("tolvol.renew_labels", across=0.775)
+    yield from finished(lambda: all(labels.current(the_ball(), label) for label in the_ball().tolvol.labels))
+    yield 0.5
+    key("ctrl+z")
+    yield from finished(lambda: not any(labels.current(the_ball(), label) for label in the_ball().tolvol.labels))
+
+
+def test_the_probe_in_themes_widths_scales_and_quad_view():
+    yield from reset(ball)
+    yield from open_tab()
+    bpy.ops.tolvol.add_label(position=(-1, -0.5, 0))
+    left, _ = places()
+    try:
+        light()
+        yield from drag_sidebar(60)
+        yield from press("tolvol.probe", across=0.5)
+        xdotool("mousemove", *left)
+        yield from finished(lambda: probing.hover() and probing.hover().lines)
+        yield 1.0
+        screenshot("probe 5 light and narrow")
+        key("Escape")
+        yield from finished(lambda: not TOLVOL_OT_probe.running())
+        yield from drag_sidebar(-60)
+        dark()
+        with window_context():
+            bpy.ops.screen.region_quadview()
+        yield 1.0
+        yield from press("tolvol.probe", across=0.5)
+        seen = set()
+        for share in ((0.25, 0.25), (0.62, 0.25), (0.25, 0.75)):
+            area = view()[1]
+            place = area.x + int(share[0] * area.width), view()[0].height - area.y - int(share[1] * area.height)
+            xdotool("mousemove", *place)
+            yield 1.0
+            if probing.hover().lines:
+                seen.add(probing.hover().region)
+        screenshot("probe 6 quad view")
+        assert len(seen) == 3
+        xdotool("click", 3)  # The right button ends it, too.
+        yield from finished(lambda: not TOLVOL_OT_probe.running())
+        with window_context():
+            bpy.ops.screen.region_quadview()
+        bpy.context.preferences.view.ui_scale = 2
+        yield 3.0
+        with window_context():
+            bpy.ops.tolvol.probe("INVOKE_DEFAULT")
+        xdotool("mousemove", *left)
+        yield from finished(lambda: probing.hover() and probing.hover().lines)
+        yield 1.0
+        screenshot("probe 7 twice as large")
+        key("Escape")
+        yield from finished(lambda: not TOLVOL_OT_probe.running())
+    finally:
+        bpy.context.preferences.view.ui_scale = 1
+        dark()
+    yield 1.0
+
+
+def test_the_probe_ends_when_its_object_or_file_does():
+    yield from reset(ball)
+    yield from open_tab()
+    left, _ = places()
+    yield from press("tolvol.probe", across=0.5)
+    assert TOLVOL_OT_probe.running()
+    yield from press("tolvol.probe", across=0.5)  # The same button ends it.
+    yield from finished(lambda: not TOLVOL_OT_probe.running())
+    yield from press("tolvol.probe", across=0.5)
+    yield from finished(TOLVOL_OT_probe.running)
+    xdotool("mousemove", *left)
+    yield from finished(lambda: probing.hover().lines)
+    # Keys that would change the mesh do nothing meanwhile.
+    xdotool("key", "Tab")
+    yield 0.5
+    assert the_ball().mode == "OBJECT"
+    the_ball().data.vertices[0].co.z += 0.01
+    the_ball().data.update()
+    yield from finished(lambda: probing.hover().lines and probing.hover().lines != ["Preparing"])
+    bpy.data.objects.remove(the_ball())
+    yield from finished(lambda: not TOLVOL_OT_probe.running())
+    assert probing.hover() is None
