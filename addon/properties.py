@@ -158,6 +158,9 @@ class TOLVOL_PG_measurement(bpy.types.PropertyGroup):
         ),
         "matrix": FloatVectorProperty(size=16, description="The matrix of the object when the mesh was measured"),
         "share_outside": FloatProperty(description="Share of the mesh's area that is beyond the tolerance"),
+        "statistics": StringProperty(
+            description="Mean and the like of this state, as JSON. It is empty if not measured"
+        ),
     } | {f"{name}_digits": StringProperty(description=text) for name, text in _LENGTHS.items()}
 
     tolerance, size = _double("tolerance_digits"), _double("size_digits")
@@ -228,6 +231,13 @@ DEVIATION_KINDS = (
 )
 
 
+DEVIATION_RANGES = (
+    ("TOLERANCE", "Tolerance", "The colours end at the tolerance"),
+    ("AUTOMATIC", "Automatic", "The colours end at the largest distance of the mesh, or at the next round number"),
+    ("FIXED", "Fixed", "The colours end at a length, so that the colours of several objects can be compared"),
+)
+
+
 class TOLVOL_PG_guard(bpy.types.PropertyGroup):
     """The settings that choose which of Blender's own tools are kept within the tolerance."""
 
@@ -283,6 +293,37 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
         min=0.0,
         max=1.0,
         subtype="FACTOR",
+        update=_changed,
+    )
+
+    deviation_range: EnumProperty(
+        name="Range",
+        description="The distance at which the colours end. Parts beyond the tolerance are striped in any case",
+        items=DEVIATION_RANGES,
+        update=_changed,
+    )
+    deviation_limit: FloatProperty(
+        name="Limit",
+        description="The distance at which the colours end. Larger distances have the last colour",
+        default=0.01,
+        min=1e-12,
+        soft_max=1.0,
+        step=1,
+        precision=5,
+        subtype="DISTANCE",
+        update=_changed,
+    )
+    use_bands: BoolProperty(
+        name="Bands",
+        description="Show the distance in bands of one colour each instead of a smooth change",
+        update=_changed,
+    )
+    band_count: IntProperty(
+        name="Number of Bands",
+        description="The number of bands between the first and the last colour. With an odd number, one of them is around 0",
+        default=9,
+        min=2,
+        max=20,
         update=_changed,
     )
 

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Registers the operators in bpy.ops.tolvol: set_tolerance, set_reference, clear_reference, show_original,
-restore_original, new_original, check, select_outside, worst_point, next_place, clear_places, probe, add_label,
-renew_labels, remove_label, select_crossing, select_staying, save_report, decimate, smooth, apply_modifier,
+restore_original, new_original, check, measure_statistics, select_outside, worst_point, next_place, clear_places, probe,
+add_label, renew_labels, remove_label, select_crossing, select_staying, save_report, decimate, smooth, apply_modifier,
 fit_modifier and deform."""
 
 import bpy
 
 from . import original
-from .check import TOLVOL_OT_check, TOLVOL_OT_select_outside
+from .check import TOLVOL_OT_check, TOLVOL_OT_measure_statistics, TOLVOL_OT_select_outside
 from .crossings import TOLVOL_OT_select_crossing
 from .decimate import TOLVOL_OT_decimate
 from .deform import TOLVOL_OT_deform
@@ -30,6 +30,7 @@ _CLASSES = (
     TOLVOL_OT_restore_original,
     TOLVOL_OT_new_original,
     TOLVOL_OT_check,
+    TOLVOL_OT_measure_statistics,
     TOLVOL_OT_select_outside,
     TOLVOL_OT_worst_point,
     TOLVOL_OT_next_place,

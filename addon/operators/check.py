@@ -11,7 +11,7 @@ from bpy.props import IntProperty
 from .. import native, preferences
 from ..job import JobOperator
 from ..mesh import mesh_io
-from ..proof import measure, report
+from ..proof import measure, report, statistics
 from ..proof.certify import outside
 from ..proof.verdict import BEYOND, ONE_WAY, WITHIN, Verdict
 from ..reference import measurements, snapshots, tolerances
@@ -72,6 +72,25 @@ the share of the mesh that is beyond the tolerance"""
         self.remember(surface, found)
         level = "INFO" if found.kind == WITHIN else "WARNING"
         self.report({level}, said(found))
+
+
+class TOLVOL_OT_measure_statistics(Comparison, bpy.types.Operator):
+    """Measure as Check does, and estimate mean, root mean square and 95th percentile of the distance over the area, \
+from the mesh to the reference and from the reference to the mesh"""
+
+    bl_idname = "tolvol.measure_statistics"
+    bl_label = "Measure Statistics"
+    bl_options = {"REGISTER", "UNDO"}
+
+    def compare(self, surface, reference, tolerance, threads, progress):
+        found = self.judge(surface, reference, tolerance, threads, progress)
+        return surface, found, statistics.measure(surface, reference, threads, progress)
+
+    def finish(self, context, outcome):
+        surface, found, measured = outcome
+        self.remember(surface, found)
+        statistics.keep(self.ob, measured)
+        self.report({"INFO" if found.passed else "WARNING"}, said(found))
 
 
 def said(found):

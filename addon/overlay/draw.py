@@ -8,7 +8,9 @@ from ..mesh import mesh_io
 from ..proof import verdict
 from ..redraw import redraw_views
 from ..reference import measurements, tolerances
+from ..units import typed
 from . import field, legend, reasons, shaders, shares
+from .scale import Scale
 
 _STRIPE = 12  # pixels from one stripe to the next
 
@@ -37,6 +39,24 @@ def _signed(ob, tree):
     return ob.tolvol.deviation_kind == "SIGNED" and tree.closed
 
 
+def scale_of(context, ob, tree):
+    """Returns the Scale of the colours of `ob`."""
+    settings, tolerance = ob.tolvol, _tolerance(ob)
+    reach = tolerance
+    if settings.deviation_range == "AUTOMATIC":
+        reach = shares.automatic_reach(ob) or tolerance
+    elif settings.deviation_range == "FIXED":
+        reach = typed(settings.deviation_limit, context.scene.unit_settings)
+    bands = settings.band_count if settings.use_bands else 0
+    return Scale(tolerance, _signed(ob, tree), max(reach, field.finest(tree)), bands)
+
+
+def _shares(ob, surface, found, scale):
+    """Returns the shares of the bands of the present Scale, or None while they are not known."""
+    automatic = ob.tolvol.deviation_range == "AUTOMATIC"
+    return shares.known(ob, surface, found, scale, automatic, redraw_views)
+
+
 def surfaces(context, shown):
     """Draws the surfaces of the objects in view. shown: {name of the object: Surface}."""
     objects = [ob for ob in _in_view(context, shown) if not reasons.hidden(ob)]
@@ -62,6 +82,8 @@ def _draw(context, ob, surface, found):
     shading = context.space_data.shading
     x_ray = shading.type == "SOLID" and shading.show_xray
     to_frame = field.vertex_to_frame(found, ob)
+    if ob.tolvol.deviation_range == "AUTOMATIC":
+        _shares(ob, surface, found, scale_of(context, ob, found.tree))  # It finds the range.
     told = shaders.told(
         context.region_data.perspective_matrix,
         ob.matrix_world,
@@ -69,7 +91,7 @@ def _draw(context, ob, surface, found):
         _eye(context.region_data, to_frame @ np.linalg.inv(mesh_io.matrix_array(ob.matrix_world))),
         _tolerance(ob) * found.tree.scale,
         found.leaves,
-        _signed(ob, found.tree),
+        scale_of(context, ob, found.tree),
         _STRIPE * context.preferences.system.ui_scale,
         ob.tolvol.deviation_opacity * (shading.xray_alpha if x_ray else 1),
     )
@@ -117,9 +139,9 @@ def legend_of_one(context, shown):
     if found is None:
         legend.draw_note(context, f"{heading}: {reason}. {verdict.word(ob)}")
         return
-    signed, tolerance = _signed(ob, found.tree), _tolerance(ob)
-    bands = shares.known(ob, shown[ob.name], found, tolerance, redraw_views)
-    legend.draw(context, heading, note(ob), verdict.word(ob), signed, tolerance, bands and shares.fold(bands, signed))
+    scale = scale_of(context, ob, found.tree)
+    bands = _shares(ob, shown[ob.name], found, scale)
+    legend.draw(context, heading, note(ob), verdict.word(ob), scale, bands)
 
 
 def note(ob):

@@ -78,9 +78,14 @@ def field_of(ob, tolerance, changed):
             functools.partial(_finish, key, changed),
         )
         return None, "Preparing"
-    if tolerance * field.tree.scale < _FINEST * native.module.DisplayTree.ROUNDING:
+    if tolerance < finest(field.tree):
         return None, "The tolerance is too small to be shown by colours"
     return field, None
+
+
+def finest(tree):
+    """Returns the least distance that colours can show, in world units."""
+    return _FINEST * tree.ROUNDING / tree.scale
 
 
 def at_hand(ob):

@@ -13,6 +13,7 @@ _POINTS = 11
 # The sizes are in pixels at an interface scale of 1.
 _BAR = 14, 132
 _ROW = 17
+_BAND_ROW = 15
 _GAP = 10  # between the parts of the legend and around them
 _MARGIN = 14  # between the legend and the edges of the view
 _STRIPE = 12
@@ -54,14 +55,15 @@ class Page:
         self.signed = signed
         blf.size(_FONT, _POINTS * self.scale)
 
-    def rectangle(self, x, y, width, height, kind, colour=(0, 0, 0, 0)):
+    def rectangle(self, x, y, width, height, kind, colour=(0, 0, 0, 0), bands=0):
         shader = shaders.legend()
         shader.bind()
         shader.uniform_sampler("transfer", shaders.transfer(self.signed))
         corners = [2 * at / size - 1 for at, size in zip((x, y, x + width, y + height), self.region * 2)]
         shader.uniform_float("corners", corners)
         shader.uniform_float("flat_colour", colour)
-        shader.uniform_float("fill", (kind, shaders.lowest(self.signed), _STRIPE * self.scale))
+        detail = bands if kind == shaders.BAR else _STRIPE * self.scale
+        shader.uniform_float("fill", (kind, shaders.lowest(self.signed), detail))
         gpu.state.blend_set("ALPHA")
         _square().draw(shader)
         gpu.state.blend_set("NONE")
@@ -85,29 +87,34 @@ def width_of(text):
     return blf.dimensions(_FONT, text)[0]
 
 
-def draw(context, heading, note, word, signed, tolerance, shares):
+def draw(context, heading, note, word, colours, shares):
     """Draws the legend.
 
     note: the lowest line.
     word: the verdict, in large letters on top.
-    shares: the shares of the surface in the four bands from the lowest colour on and beyond the tolerance; None while
-    they are not known.
+    colours: the Scale.
+    shares: the shares of the surface in the bands from the lowest colour on and beyond the tolerance; None while they are not
+    known.
+
+    Where the rows of many bands have no room, their shares are left out. Where the legend has no room, it is the word alone.
     """
-    page = Page(context, signed)
+    page = Page(context, colours.signed)
     scale = page.scale
-    lowest = -tolerance if signed else 0.0
-    labels = [(part, _label(context, lowest + part * (tolerance - lowest), signed)) for part in (0, 0.5, 1)]
-    bands = [percent(share) for share in shares] if shares is not None else [""] * 5
-    bar_width, bar_height = (size * scale for size in _BAR)
-    row, gap = _ROW * scale, _GAP * scale
-    label_width = max([width_of(text) for _, text in labels] + [width_of("Outside")])
-    share_width = max(width_of(text) for text in [*bands, "88.8 %"])
-    width = max(bar_width + label_width + share_width + 2 * gap, width_of(heading), width_of(note)) + 2 * gap
-    width = max(width, page.width(word, _LARGE) + _MARK * scale + 3 * gap)
-    height = 3 * row + _WORD * scale + bar_height + 4 * gap
-    place = _corner(context, width, height, _MARGIN * scale)
-    right, low = free_part(context)
-    if place is None or width > _MOST_WIDTH * right or height > _MOST_HEIGHT * (context.region.height - low):
+    texts = [percent(share) for share in shares] if shares is not None else [""] * (colours.counted + 1)
+    for rows in (texts[:-1], []):
+        bar_height = max(_BAR[1], len(rows) * _BAND_ROW) * scale
+        labels = _labels(context, colours, _ROW * scale / bar_height)
+        bar_width = _BAR[0] * scale
+        row, gap = _ROW * scale, _GAP * scale
+        label_width = max([width_of(text) for _, text in labels] + [width_of("Outside")])
+        share_width = max(width_of(text) for text in [*texts, "88.8 %"])
+        width = max(bar_width + label_width + share_width + 2 * gap, width_of(heading), width_of(note)) + 2 * gap
+        width = max(width, page.width(word, _LARGE) + _MARK * scale + 3 * gap)
+        height = 3 * row + _WORD * scale + bar_height + 4 * gap
+        place = _place(context, width, height, scale)
+        if place is not None or len(rows) * _BAND_ROW <= _BAR[1]:
+            break
+    if place is None:
         _draw_word(context, page, word)
         return
     left, bottom = place
@@ -118,20 +125,44 @@ def draw(context, heading, note, word, signed, tolerance, shares):
     y += row
     page.rectangle(x, y - bar_width / 2, bar_width, bar_width, shaders.STRIPES)
     page.text(label_x, y, "Outside")
-    page.text(right - width_of(bands[4]), y, bands[4])
+    page.text(right - width_of(texts[-1]), y, texts[-1])
     y += row / 2 + gap
-    page.rectangle(x, y, bar_width, bar_height, shaders.BAR)
+    page.rectangle(x, y, bar_width, bar_height, shaders.BAR, bands=colours.bands)
     for part, text in labels:
         at = y + part * bar_height
         page.rectangle(x + bar_width, at - scale / 2, 4 * scale, scale, shaders.FLAT, (*page.ink, 1))
         page.text(label_x, at, text)
-    for i, text in enumerate(bands[:4]):
-        page.text(right - width_of(text), y + (i + 0.5) / 4 * bar_height, text, faint=True)
+    for i, text in enumerate(rows):
+        page.text(right - width_of(text), y + (i + 0.5) / len(rows) * bar_height, text, faint=True)
     top = bottom + height - gap
     page.text(x, top - row / 2, heading)
     at, mark = top - row - _WORD * scale / 2, _MARK * scale
     page.rectangle(x, at - mark / 2, mark, mark, shaders.FLAT, (*_COLOURS[word], 1))
     page.text(x + mark + gap, at, word, points=_LARGE)
+
+
+def _labels(context, colours, row):
+    """Returns the labels of the bar as [(their height as a share of the bar, text)].
+
+    row: the height of a line as a share of the bar. The tolerance is marked where it is not at the end of the bar and has
+    room.
+    """
+    lowest, span = colours.lowest, colours.reach - colours.lowest
+    found = [(part, _label(context, lowest + part * span, colours.signed)) for part in (0, 0.5, 1)]
+    if colours.coloured_beyond:
+        for value in (-colours.tolerance, colours.tolerance) if colours.signed else (colours.tolerance,):
+            part = (value - lowest) / span
+            if min(abs(part - other) for other, _ in found) >= row:
+                found.append((part, f"{_label(context, value, colours.signed)} (tolerance)"))
+    return found
+
+
+def _place(context, width, height, scale):
+    """Returns left and bottom of the legend, or None if it would take too much of the view."""
+    right, low = free_part(context)
+    if width > _MOST_WIDTH * right or height > _MOST_HEIGHT * (context.region.height - low):
+        return None
+    return _corner(context, width, height, _MARGIN * scale)
 
 
 def _draw_word(context, page, word):

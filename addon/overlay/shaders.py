@@ -12,6 +12,7 @@ import gpu
 import numpy as np
 
 from .. import native
+from . import scale
 
 _ADDON = Path(__file__).resolve().parents[1]
 # In the package the folder shaders/ is beside the add-on's files; in a checkout it is at the top.
@@ -35,18 +36,31 @@ void main() {
 }
 """
 
+# Takes a distance as a share of the range of the colours to the middle of its band.
+_BANDED = """
+float banded(float part, float lowest, float bands) {
+  if (bands < 1.0) return part;
+  float d = lowest < 0.0 ? part : abs(part);
+  float band = clamp(floor((d - lowest) / (1.0 - lowest) * bands), 0.0, bands - 1.0);
+  return mix(lowest, 1.0, (band + 0.5) / bands);
+}
+"""
+
 _SURFACE_FRAGMENT = """
 void main() {
-  // The search reaches a little beyond the tolerance, so that a distance just beyond it is told from one within.
-  float reach = 1.001 * told.tolerance + 2.0 * ROUNDING;
+  // The search reaches a little beyond the tolerance, so that a distance just beyond it is told from one within. It reaches
+  // farther if what is beyond has colours.
+  float far = told.range > 1.0 ? FAR * told.range : 1.0;
+  float reach = 1.001 * far * told.tolerance + 2.0 * ROUNDING;
   float d = surface_distance(nodes, corners, int(told.leaves), place, reach, ROUNDING) / told.tolerance;
-  vec3 colour;
-  if (abs(d) > 1.0) {
+  vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
+  vec3 to_eye = normalize(told.eye.xyz - told.eye.w * place);
+  vec3 colour = head_light(normal, to_eye) *
+                distance_colour(transfer, banded(d / told.range, told.lowest, told.bands), told.lowest);
+  if (abs(d) > far) {
     colour = outside_colour(gl_FragCoord.xy, told.period, OUTSIDE, STRIPE);
-  } else {
-    vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
-    vec3 to_eye = normalize(told.eye.xyz - told.eye.w * place);
-    colour = head_light(normal, to_eye) * distance_colour(transfer, d, told.lowest);
+  } else if (abs(d) > 1.0) {
+    colour = outside_colour(gl_FragCoord.xy, told.period, OUTSIDE, colour);
   }
   shown = displayed(colour, told.opacity);
 }
@@ -62,7 +76,7 @@ struct Told {
   mat4 view_projection, model, to_frame;
   vec4 eye;
   float tolerance, lowest, period, opacity;
-  float leaves, unused_1, unused_2, unused_3;
+  float leaves, range, bands, unused;
 };
 """
 
@@ -73,11 +87,12 @@ void main() {
 }
 """
 
-# fill: the kind of filling, the lowest distance in tolerances, the period of the stripes in pixels.
+# fill: the kind of filling, the lowest distance as a share of the range, and the period of the stripes in pixels or the
+# number of bands.
 _LEGEND_FRAGMENT = """
 void main() {
   if (fill.x == BAR) {
-    shown = displayed(distance_colour(transfer, mix(fill.y, 1.0, part.y), fill.y), 1.0);
+    shown = displayed(distance_colour(transfer, banded(mix(fill.y, 1.0, part.y), fill.y, fill.z), fill.y), 1.0);
   } else if (fill.x == STRIPES) {
     shown = displayed(outside_colour(gl_FragCoord.xy, fill.z, OUTSIDE, STRIPE), 1.0);
   } else {
@@ -111,7 +126,7 @@ def _info(varying, position, vertex, fragment, shared=()):
         info.define(name, f"vec3({', '.join(f'{level / 255:.4f}' for level in colour)})")
     info.vertex_source(vertex)
     text = "".join((_SHARED / name).read_text(encoding="utf-8") for name in shared)
-    info.fragment_source(text + _DISPLAYED + fragment)
+    info.fragment_source(text + _DISPLAYED + _BANDED + fragment)
     return info
 
 
@@ -131,18 +146,20 @@ def surface():
     info.typedef_source(_SURFACE_TOLD)
     info.uniform_buf(0, "Told", "told")
     info.define("NEARER", "1e-6")
+    info.define("FAR", str(scale.FAR))
     return gpu.shader.create_from_info(info)
 
 
-def told(view_projection, model, to_frame, eye, tolerance, leaves, signed, period, opacity):
+def told(view_projection, model, to_frame, eye, tolerance, leaves, colours, period, opacity):
     """Returns the uniform buffer for surface() and lines().
 
     to_frame: matrix from the vertices to the frame of the tree, whose number of leaves is `leaves`.
     eye: in this frame, (x, y, z, 1) for an eye and (x, y, z, 0) for a direction.
-    tolerance: in this frame.
+    tolerance: in this frame. colours: the Scale.
     """
     matrices = [np.array(matrix, np.float32).T.ravel() for matrix in (view_projection, model, to_frame)]
-    numbers = tolerance, lowest(signed), period, opacity, leaves, 0, 0, 0
+    parts = colours.reach / colours.tolerance, colours.bands
+    numbers = tolerance, lowest(colours.signed), period, opacity, leaves, *parts, 0
     values = np.concatenate([*matrices, eye, numbers]).astype(np.float32)
     return gpu.types.GPUUniformBuf(gpu.types.Buffer("FLOAT", values.size, values))
 
@@ -171,7 +188,7 @@ def legend():
 
 
 def lowest(signed):
-    """Returns the distance, in tolerances, at which the colours begin."""
+    """Returns the distance at which the colours begin, as a share of the distance at which they end."""
     return -1.0 if signed else 0.0
 
 

@@ -2,48 +2,63 @@
 """Counts for the legend which share of a shown surface lies in each band of distances, in a thread."""
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 
 from . import field, work
+from .scale import rounded_up
 
 _EVERY = 0.25  # seconds between two counts while a mesh goes on changing
-_EIGHTHS = np.arange(-4, 5) / 4  # the ends of eight bands from -tolerance to tolerance, in tolerances
 
-# Name of an object -> ((state of the surface, field, tolerance, placement) that the shares are of, shares).
+# Name of an object -> ((state of the surface, field, tolerance, placement, scale) that the shares are of, Scale, shares).
 _known = {}
 
 
-def known(ob, surface, found, tolerance, changed):
-    """Returns the shares in the eight bands and beyond them at both ends, or None while they are not known.
+def known(ob, surface, found, scale, automatic, changed):
+    """Returns the shares in the bands of a Scale and beyond the tolerance, or None while they are not known.
 
-    If mesh, placement or tolerance have changed, the shares are counted anew, and then changed() is called.
+    automatic: whether the colours are to end at the largest distance; the shares are then those of automatic_scale(). If
+    mesh, placement or scale have changed, the shares are counted anew, and then changed() is called.
     """
     placement = np.linalg.inv(found.to_frame) @ field.vertex_to_frame(found, ob)
-    about = surface.changes, id(found), tolerance, placement.tobytes()
+    wanted = replace(scale, reach=scale.tolerance) if automatic else scale
+    about = surface.changes, id(found), scale.tolerance, placement.tobytes(), wanted, automatic
     name = ob.name
     last = _known.get(name)
     if last is not None and last[0] == about:
-        return last[1]
+        return last[2]
     if surface.triangles is not None and len(surface.triangles):
-        count = functools.partial(
-            found.tree.shares,
-            surface.vertices,
-            surface.triangles,
-            tolerance * _EIGHTHS,
-            to_world=placement,
-        )
         work.later(
             ("shares", name),
             _EVERY if last else 0,
-            lambda: lambda _progress: count(),
+            lambda: functools.partial(
+                _count, found.tree, surface.vertices, surface.triangles, placement, wanted, automatic
+            ),
             functools.partial(_finish, name, about, changed),
         )
     return None
 
 
-def _finish(name, about, changed, shares, error):
-    _known[name] = about, shares if error is None else None
+def _count(tree, vertices, triangles, placement, scale, automatic, progress):
+    """Returns (Scale, shares). Distances between the vertices may be larger than the automatic range by little."""
+    if automatic:
+        used = vertices[np.unique(triangles)]
+        largest = np.abs(tree.signed_distance(used, to_world=placement, progress=progress)).max()
+        if largest > tree.ROUNDING / tree.scale:
+            scale = replace(scale, reach=rounded_up(float(largest)))
+    counted = tree.shares(vertices, triangles, scale.edges(), to_world=placement, progress=progress)
+    return scale, scale.fold(counted)
+
+
+def automatic_reach(ob):
+    """Returns the distance at which the colours of `ob` end if that is automatic, or None while it is not known."""
+    last = _known.get(ob.name)
+    return last[1].reach if last is not None and last[0][-1] and last[1] is not None else None
+
+
+def _finish(name, about, changed, counted, error):
+    _known[name] = (about, *(counted if error is None else (None, None)))
     changed()
 
 
@@ -53,11 +68,3 @@ def forget(name=None):
         _known.clear()
     else:
         _known.pop(name, None)
-
-
-def fold(eighths, signed):
-    """Returns five shares: in the four bands from the lowest colour on, and beyond the tolerance."""
-    eighths = np.asarray(eighths)
-    within = eighths[1:-1]
-    bands = within.reshape(4, 2).sum(1) if signed else within[4:] + within[3::-1]
-    return [*bands, eighths[0] + eighths[-1]]

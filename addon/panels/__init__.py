@@ -6,7 +6,13 @@ import bpy
 from . import menus
 from .decimate import TOLVOL_PT_advanced, TOLVOL_PT_decimate, TOLVOL_PT_protect
 from .deform import TOLVOL_PT_deform
-from .deviation import TOLVOL_PT_deviation, TOLVOL_PT_labels, TOLVOL_PT_show_deviation, TOLVOL_UL_labels
+from .deviation import (
+    TOLVOL_PT_deviation,
+    TOLVOL_PT_labels,
+    TOLVOL_PT_show_deviation,
+    TOLVOL_PT_statistics,
+    TOLVOL_UL_labels,
+)
 from .guard import TOLVOL_PT_guard
 from .modifiers import TOLVOL_PT_modifiers
 from .smooth import TOLVOL_PT_smooth
@@ -20,6 +26,7 @@ _CLASSES = (
     TOLVOL_PT_deviation,
     TOLVOL_UL_labels,
     TOLVOL_PT_labels,
+    TOLVOL_PT_statistics,
     TOLVOL_PT_show_deviation,
     TOLVOL_PT_smooth,
     TOLVOL_PT_modifiers,

@@ -4,9 +4,9 @@
 import bpy
 
 from .. import overlay
-from ..operators.probe import TOLVOL_OT_probe, distance_text, tolerance_of
+from ..operators.probe import TOLVOL_OT_probe, tolerance_of
 from ..overlay import reasons
-from ..proof import kept_warnings, labels, report, verdict
+from ..proof import kept_warnings, labels, probing, report, statistics, verdict
 from ..reference import measurements
 from ..units import length
 from .layout import AMBER, GREEN, GREY, RED, SubPanel, active, is_narrow, right, text_lines
@@ -125,22 +125,38 @@ class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
         row.enabled = not unsigned
         row.prop(ob.tolvol, "deviation_kind", expand=True)
         column.prop(ob.tolvol, "deviation_opacity")
+        legend = column.column()
+        legend.use_property_split, legend.use_property_decorate = True, False
+        legend.prop(ob.tolvol, "deviation_range")
+        if ob.tolvol.deviation_range == "FIXED":
+            legend.prop(ob.tolvol, "deviation_limit")
+        row = legend.row(heading="Bands", align=True)
+        row.prop(ob.tolvol, "use_bands", text="")
+        count = row.row()
+        count.active = ob.tolvol.use_bands
+        count.prop(ob.tolvol, "band_count", text="")
         if reason := reasons.hidden(ob) or unsigned:
             text_lines(context, column, reason, "INFO")
 
 
+# As in the legend.
+_SIGNS = {probing.OUTSIDE: "+", probing.INSIDE: "\u2212"}
+
+
 class TOLVOL_UL_labels(bpy.types.UIList):
-    """The labels of an object: number, distance with its side, share of the tolerance."""
+    """The labels of an object: number, distance with its side, share of the tolerance. A ghost marks those on the reference."""
 
     def draw_item(self, context, layout, settings, label, _icon, _active, _name, index):
         ob = settings.id_data
-        found, true, narrow = labels.reading(ob, label), labels.current(ob, label), is_narrow(context)
-        row = layout.row()
+        true, narrow = labels.current(ob, label), is_narrow(context)
+        # An icon leaves no room for the share. The 3D view shows it at the label.
+        icon = "NONE" if narrow else "ERROR" if not true else "GHOST_ENABLED" if label.on_reference else "NONE"
+        alone = icon != "NONE" or narrow
+        row = layout.row() if alone else layout.split(factor=0.64)
         row.active = true
-        text = length(context, found.distance) if narrow else distance_text(context, found)
-        row.label(text=f"{index + 1}:  {text}", icon="NONE" if true else "ERROR")
-        if not narrow:
-            right(row, report.percent(found.distance, tolerance_of(ob)) if true else "out of date")
+        row.label(text=f"{index + 1}:  {_SIGNS.get(label.side, '')}{length(context, label.distance)}", icon=icon)
+        if not alone:
+            right(row, report.percent(label.distance, tolerance_of(ob)))
 
 
 class TOLVOL_PT_labels(SubPanel, bpy.types.Panel):
@@ -161,3 +177,24 @@ class TOLVOL_PT_labels(SubPanel, bpy.types.Panel):
         column.operator("tolvol.remove_label", text="", icon="REMOVE").everything = False
         column.operator("tolvol.remove_label", text="", icon="X").everything = True
         column.operator("tolvol.renew_labels", text="", icon="FILE_REFRESH")
+
+
+class TOLVOL_PT_statistics(SubPanel, bpy.types.Panel):
+    """Mean and the like of the deviation, both ways."""
+
+    bl_label = "Statistics"
+    bl_parent_id = "TOLVOL_PT_deviation"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        self.layout.operator("tolvol.measure_statistics", text="Measure")
+        ob, narrow = active(context), is_narrow(context)
+        found = statistics.of(ob)
+        for title, way in (("Of the Mesh", "forward"), ("Of the Reference", "backward")):
+            column = self.layout.box().column(align=True)
+            column.label(text=title)
+            for name, key in statistics.ROWS:
+                text = length(context, found[way][key]) if found else None
+                if found and not narrow:
+                    text += f"  {report.percent(found[way][key], tolerance_of(ob))}"
+                _row(column, name, text, narrow)

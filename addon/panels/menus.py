@@ -6,7 +6,15 @@ import bpy
 # All operators are in this menu, because Blender's menu search (F3) finds only entries of menus.
 _IN_OBJECT_MENU = (
     *("set_reference", "clear_reference", "restore_original", "new_original"),
-    *("check", "worst_point", "select_outside", "select_crossing", "select_staying", "save_report"),
+    *(
+        "check",
+        "measure_statistics",
+        "worst_point",
+        "select_outside",
+        "select_crossing",
+        "select_staying",
+        "save_report",
+    ),
     *("probe", "add_label", "renew_labels", "remove_label"),
     *("decimate", "smooth", "apply_modifier", "fit_modifier", "deform"),
 )

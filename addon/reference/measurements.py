@@ -26,6 +26,7 @@ def remember(ob, surface, certified, tolerance, share_outside=0.0):
     measurement.forward_lower, measurement.forward = certified["forward"]
     measurement.backward_lower, measurement.backward = certified["backward"]
     measurement.share_outside = share_outside
+    measurement.statistics = ""
     redraw_views()
 
 

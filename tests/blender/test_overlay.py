@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 import addon
-from addon import overlay, preferences
-from addon.overlay import field, legend, reasons, shares, surface, work
-from addon.reference import snapshots
-from scenes import add_object, sheet, torus
+from addon import native, overlay, preferences
+from addon.mesh import mesh_io
+from addon.overlay import draw, field, legend, reasons, shares, surface, work
+from addon.overlay.scale import Scale, rounded_up
+from addon.reference import snapshots, tolerances
+from scenes import add_object, sheet, torus, world_triangles
 
 
 def with_reference(ob):
@@ -125,12 +127,93 @@ def test_a_surface_is_read_again_only_after_a_change():
     assert found.changes == 2, "it was the same"
 
 
+def scale(tolerance=1.0, signed=True, reach=None, bands=0):
+    return Scale(tolerance, signed, tolerance if reach is None else reach, bands)
+
+
+def folded(scale, distances):
+    """Folds the shares of a surface that has equally many places at each of these distances."""
+    ends = [-np.inf, *scale.edges(), np.inf]
+    counts, _ = np.histogram(distances, ends)
+    counts[-1] += counts[0]  # What is farther than all edges, on either side, is in the last share.
+    counts[0] = 0
+    return scale.fold(counts / len(distances))
+
+
 def test_bands_of_the_legend():
-    eighths = [0.01, 0.02, 0.03, 0.04, 0.05, 0.1, 0.2, 0.3, 0.2, 0.05]
-    assert shares.fold(eighths, True) == pytest.approx([0.05, 0.09, 0.3, 0.5, 0.06])
-    assert shares.fold(eighths, False) == pytest.approx([0.15, 0.24, 0.33, 0.22, 0.06])
+    distances = [-1.5, -0.9, -0.6, -0.1, 0.0, 0.3, 0.6, 0.9, 0.95, 1.2]
+    assert folded(scale(), distances) == pytest.approx([0.2, 0.1, 0.2, 0.3, 0.2])
+    assert folded(scale(signed=False), distances) == pytest.approx([0.2, 0.1, 0.2, 0.3, 0.2])
+    assert len(scale().edges()) == 5 and len(scale(signed=False).edges()) == 9
     said = [legend.percent(share).replace("\u00a0", " ") for share in (0, 1e-5, 0.0123, 0.99999, 1)]
     assert said == ["0.0 %", "< 0.1 %", "1.2 %", "> 99.9 %", "100.0 %"]
+
+
+def test_as_many_bands_are_counted_as_are_shown():
+    distances = np.linspace(-0.99, 0.99, 1000)
+    for bands in (2, 9, 20):
+        *shown, outside = folded(scale(bands=bands), distances)
+        assert len(shown) == bands and outside == 0 and shown == pytest.approx([1 / bands] * bands, abs=0.01)
+        *shown, outside = folded(scale(signed=False, bands=bands), distances)
+        assert len(shown) == bands and shown == pytest.approx([1 / bands] * bands, abs=0.01)
+    assert len(folded(scale(bands=0), distances)) == 5
+
+
+def test_a_range_beyond_the_tolerance_colours_what_is_outside_and_a_shorter_one_ends_in_its_last_colour():
+    distances = [-30.0, -2.5, -0.9, 0.2, 0.9, 2.5]
+    # Both parts that are beyond the tolerance have a band. What is very far away has none, but is outside.
+    assert folded(scale(reach=3.0, bands=3), distances) == pytest.approx([1 / 6, 3 / 6, 1 / 6, 3 / 6])
+    assert folded(scale(reach=0.5, bands=2), distances) == pytest.approx([1 / 6, 2 / 6, 3 / 6])
+    assert folded(scale(reach=0.5, signed=False, bands=2), distances) == pytest.approx([1 / 6, 2 / 6, 3 / 6])
+
+
+@pytest.mark.parametrize(
+    ("distance", "up"), ((0.1, 0.1), (0.101, 0.12), (7.2, 8.0), (9.1, 10.0), (0.00034, 0.0004), (2, 2))
+)
+def test_an_automatic_range_ends_at_a_round_number(distance, up):
+    assert rounded_up(distance) == pytest.approx(up, rel=1e-12)
+
+
+def test_the_range_is_the_tolerance_a_fixed_length_or_the_largest_distance(monkeypatch):
+    monkeypatch.setattr(work, "later", lambda _about, _seconds, prepare, finish: finish(prepare()(None), None))
+    ob = with_reference(torus())
+    reference = world_triangles(ob)
+    ob.data.vertices[0].co.z += 0.3
+    ob.data.update()
+    bpy.context.view_layer.update()
+    shown = surface.Surface()
+    shown.update(ob, bpy.context.evaluated_depsgraph_get())
+    found, settings = field._prepare(ob.name, 0.05)(None), ob.tolvol
+
+    def present():
+        draw._shares(ob, shown, found, draw.scale_of(bpy.context, ob, found.tree))
+        return draw.scale_of(bpy.context, ob, found.tree)
+
+    def farthest():
+        (vertices, triangles), points = reference, mesh_io.column(ob.data.vertices, "co", 3)
+        return native.module.ToleranceVolume(vertices, triangles, 0.1).distance(points).max()
+
+    tolerance = tolerances.tolerance_length(settings, settings.snapshot_size)
+    assert present() == Scale(tolerance, True, tolerance, 0)
+    settings.use_bands, settings.band_count, settings.deviation_kind = True, 7, "MAGNITUDE"
+    assert present() == Scale(tolerance, False, tolerance, 7)
+    settings.deviation_range, settings.deviation_limit = "FIXED", 0.3
+    assert present().reach == 0.3
+    settings.deviation_limit = 1e-12
+    assert present().reach == field.finest(found.tree) > 1e-9
+    settings.deviation_range = "AUTOMATIC"
+    assert present().reach == rounded_up(farthest()) and farthest() > 2 * tolerance
+    ob.data.vertices[0].co.z += 1
+    ob.data.update()
+    bpy.context.view_layer.update()
+    shown.touch(True)
+    shown.update(ob, bpy.context.evaluated_depsgraph_get())
+    assert present().reach == rounded_up(farthest()) and farthest() > 0.8
+    shares.forget()
+    bpy.ops.tolvol.set_reference(replace=True)
+    found = field._prepare(ob.name, 0.05)(None)
+    assert present().reach == tolerances.tolerance_length(settings, settings.snapshot_size)  # Nothing deviates.
+    shares.forget()
 
 
 def test_shares_of_another_tolerance_or_mesh_are_left_blank(monkeypatch):
@@ -142,7 +225,7 @@ def test_shares_of_another_tolerance_or_mesh_are_left_blank(monkeypatch):
     made = field._prepare(ob.name, 0.05)(None)
 
     def known(tolerance):
-        return shares.known(ob, found, made, tolerance, lambda: None)
+        return shares.known(ob, found, made, scale(tolerance), False, lambda: None)
 
     def count():
         prepare, finish = waiting.pop()

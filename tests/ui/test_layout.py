@@ -92,8 +92,9 @@ def test_themes_widths_and_scales():
     drawn = []
     whole, word = legend.Page.rectangle, legend._draw_word
     legend._draw_word = lambda *arguments: drawn.append("word") or word(*arguments)
-    legend.Page.rectangle = lambda page, x, y, width, height, *rest: (
-        (drawn.append("legend") if height > 120 * page.scale else None) or whole(page, x, y, width, height, *rest)
+    legend.Page.rectangle = lambda page, x, y, width, height, *rest, **options: (
+        (drawn.append("legend") if height > 120 * page.scale else None)
+        or whole(page, x, y, width, height, *rest, **options)
     )
     yield from press("tolvol.decimate")
     yield from finished(lambda: verdict.word(torus()) == verdict.PASS)

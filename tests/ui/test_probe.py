@@ -148,7 +148,7 @@ def test_the_probe_in_themes_widths_scales_and_quad_view():
         yield 1.0
         yield from press("tolvol.probe", across=0.5)
         seen = set()
-        for share in ((0.25, 0.25), (0.62, 0.25), (0.25, 0.75)):
+        for share in ((0.25, 0.25), (0.72, 0.25), (0.25, 0.75), (0.72, 0.75)):
             area = view()[1]
             place = area.x + int(share[0] * area.width), view()[0].height - area.y - int(share[1] * area.height)
             xdotool("mousemove", *place)
@@ -156,7 +156,7 @@ def test_the_probe_in_themes_widths_scales_and_quad_view():
             if probing.hover().lines:
                 seen.add(probing.hover().region)
         screenshot("probe 6 quad view")
-        assert len(seen) == 3
+        assert len(seen) == 4
         xdotool("click", 3)  # The right button ends it, too.
         yield from finished(lambda: not TOLVOL_OT_probe.running())
         with window_context():
@@ -182,7 +182,7 @@ def test_the_probe_ends_when_its_object_or_file_does():
     yield from open_tab()
     left, _ = places()
     yield from press("tolvol.probe", across=0.5)
-    assert TOLVOL_OT_probe.running()
+    yield from finished(TOLVOL_OT_probe.running)
     yield from press("tolvol.probe", across=0.5)  # The same button ends it.
     yield from finished(lambda: not TOLVOL_OT_probe.running())
     yield from press("tolvol.probe", across=0.5)

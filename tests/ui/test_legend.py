@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The range and the bands of the legend, as they are drawn, and the statistics in the panel."""
+
+import bpy
+import numpy as np
+
+from addon import overlay, panels
+from addon.overlay import legend
+from addon.proof import statistics
+from test_layout import dark, drag_sidebar, light
+from test_show_deviation import striped, surface
+from window import (
+    finished,
+    on_screen,
+    open_tab,
+    press,
+    region,
+    reset,
+    screenshot,
+    scroll_down,
+    view,
+    window_context,
+    xdotool,
+)
+
+
+def ramp():
+    """A closed slab whose upper side goes up from one end to the other, by four tolerances, after its reference was set."""
+    bpy.ops.mesh.primitive_cube_add(size=2)
+    ob = bpy.context.object
+    ob.name = "ramp"
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.1
+    ob.tolvol.deviation_opacity = 1
+    bpy.ops.tolvol.set_reference()
+    for vertex in ob.data.vertices:
+        vertex.co.z += 0.2 * (vertex.co.x + 1) * (vertex.co.z > 0)
+    ob.data.update()
+    space = view()[1].spaces[0]
+    space.region_3d.view_perspective, space.region_3d.view_rotation = "ORTHO", (1, 0, 0, 0)  # from above
+    space.region_3d.view_distance = 5
+    space.show_gizmo = space.overlay.show_cursor = space.overlay.show_object_origins = False
+
+
+def the_ramp():
+    return bpy.data.objects["ramp"]
+
+
+def colours():
+    """Returns how many colours take a good part of the view, without those of the background."""
+    found, counts = np.unique(surface().reshape(-1, 3) // 3, axis=0, return_counts=True)
+    return int(((counts > 300) & (np.ptp(found, axis=1) > 4)).sum())
+
+
+def labels_of_the_legend():
+    """Records the texts that the legend draws from now on. Call the result to stop."""
+    said, text = [], legend.Page.text
+    legend.Page.text = lambda page, x, y, words, *rest, **options: (
+        said.append(words.replace("\u00a0", " ")) or text(page, x, y, words, *rest, **options)
+    )
+
+    def stop():
+        legend.Page.text = text
+
+    return said, stop
+
+
+def test_range_and_bands_of_the_colours():
+    yield from reset(ramp)
+    yield from open_tab()
+    settings = the_ramp().tolvol
+    said, stop = labels_of_the_legend()
+    try:
+        xdotool("mousemove", *on_screen(region("WINDOW"), 120, 600))
+        yield from finished(lambda: striped() > 10_000)
+        view()[1].tag_redraw()
+        yield from finished(lambda: "+10 cm" in said and "\u221210 cm" in said)
+        yield 1.0
+        screenshot("legend 1 tolerance")
+        # Each band within the tolerance has one colour: a quarter of the ramp has the upper half of them.
+        settings.use_bands, settings.band_count = True, 10
+        yield from finished(lambda: 5 <= colours() <= 7)
+        yield 1.0
+        screenshot("legend 2 ten bands")
+        said.clear()
+        settings.deviation_range = "AUTOMATIC"
+        yield from finished(lambda: "+40 cm" in said)
+        yield 1.0
+        screenshot("legend 3 automatic")
+        assert "+10 cm (tolerance)" in said and "\u221210 cm (tolerance)" in said
+        assert striped() > 10_000, "beyond the tolerance every colour is striped"
+        settings.use_bands = False
+        said.clear()
+        settings.deviation_range, settings.deviation_limit = "FIXED", 0.05
+        yield from finished(lambda: "+5 cm" in said)
+        yield 1.0
+        screenshot("legend 4 fixed")
+        settings.use_bands, settings.band_count = True, 20
+        said.clear()
+        yield from finished(lambda: sum(text.endswith(" %") for text in said) >= 21)
+        yield 1.0
+        light()
+        yield 1.0
+        screenshot("legend 5 twenty bands, light")
+        # Where twenty rows have no room, the bar has its usual height and no shares.
+        bpy.context.preferences.view.ui_scale = 1.3
+        yield 2.0
+        said.clear()
+        view()[1].tag_redraw()
+        yield from finished(lambda: "+5 cm" in said or "NOT CHECKED" in said)
+        yield 0.5
+        screenshot("legend 6 larger")
+        assert sum(text.endswith(" %") for text in said) <= 1 < len(said)
+    finally:
+        stop()
+        bpy.context.preferences.view.ui_scale = 1
+        dark()
+    with window_context():
+        bpy.ops.screen.region_quadview()
+    yield 1.5
+    screenshot("legend 7 quad view")
+    with window_context():
+        bpy.ops.screen.region_quadview()
+    view()[1].spaces[0].region_3d.view_perspective = "PERSP"
+    space = view()[1].spaces[0]
+    space.show_gizmo = space.overlay.show_cursor = space.overlay.show_object_origins = True
+    assert overlay.shows(the_ramp())
+
+
+def unfold(panel, options):
+    """Registers all panels anew, with other options of one of them."""
+    for cls in reversed(panels._CLASSES):
+        bpy.utils.unregister_class(cls)
+    panel.bl_options = options
+    for cls in panels._CLASSES:
+        bpy.utils.register_class(cls)
+
+
+def test_statistics_are_unfolded_and_measured():
+    yield from reset(ramp)
+    before = panels.TOLVOL_PT_statistics.bl_options
+    unfold(panels.TOLVOL_PT_statistics, set())
+    try:
+        yield from open_tab()
+        yield from press("tolvol.measure_statistics", across=0.4)
+        yield from finished(lambda: statistics.of(the_ramp()))
+        for width in (60, -60):
+            yield from scroll_down()
+            xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
+            yield 1.0
+            screenshot(f"legend 8 statistics {width}")
+            yield from drag_sidebar(width)
+    finally:
+        unfold(panels.TOLVOL_PT_statistics, before)
+    assert statistics.of(the_ramp())["forward"]["mean"] > 0.02
