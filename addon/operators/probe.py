@@ -42,10 +42,8 @@ def described(context, ob, reading):
     return lines
 
 
-def _what(ob, on_reference):
+def _what(ob):
     """Names the surface that is read."""
-    if on_reference:
-        return f"Reference of {ob.name}"
     on_top = measurements.on_top(ob)
     return f"Base mesh of {ob.name}, without its {' and '.join(on_top)}" if on_top else ob.name
 
@@ -89,6 +87,13 @@ label there. Esc, or another click on this button, ends it"""
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
+        try:
+            return self._handle(context, event)
+        except BaseException:
+            self._end(context)
+            raise
+
+    def _handle(self, context, event):
         if self._over:
             return self._end(context)
         # A step that is undone replaces all objects: only the name stays.
@@ -120,9 +125,8 @@ label there. Esc, or another click on this button, ends it"""
 
     def _read(self, context, ob, area, region, view):
         """Shows what is under the mouse, and returns its Reading or None."""
-        on_reference = False
         reading, lines = None, []
-        if self._ready(context, ob, on_reference):
+        if self._ready(context, ob):
             if region is not None:
                 at = self._mouse[0] - region.x, self._mouse[1] - region.y
                 reading = self._probe.along(
@@ -130,23 +134,25 @@ label there. Esc, or another click on this button, ends it"""
                 )
             if reading is not None:
                 lines = described(context, ob, reading)
-            status = f"{_what(ob, on_reference)}: {', '.join(lines) or 'no point under the mouse'}    {_KEYS}"
+            status = f"{_what(ob)}: {', '.join(lines) or 'no point under the mouse'}    {_KEYS}"
         else:
             lines, status = ["Preparing"], "Preparing    Esc: End"
         self._show(context, area, region, lines, reading, status)
         return reading
 
-    def _ready(self, context, ob, on_reference):
+    def _ready(self, context, ob):
         """Whether the probe reads the object as it is now. Else it is being made in a thread."""
         if self._job is not None:
             if not self._job.done():
                 return False
             job, self._job = self._job, None
-            self._probe = probing.Probe(self._source, job.outcome())
-        if self._probe is not None and self._probe.fits(ob, on_reference):
+            found = job.outcome()
+            if self._source.fits(ob):
+                self._probe = probing.Probe(self._source, found, ob)
+        if self._probe is not None and self._source.fits(ob):
             return True
         self._probe = None
-        self._source = probing.Source(ob, on_reference)
+        self._source = probing.Source(ob, False)
         self._job = Job(functools.partial(self._source.look_up, preferences.threads(context)), native.module.Progress())
         return False
 
@@ -221,7 +227,7 @@ class _Measuring(JobOperator):
         return work
 
     def finish(self, context, outcome):
-        self.read(context, {source.on_reference: probing.Probe(source, found) for source, found in outcome})
+        self.read(context, {source.on_reference: probing.Probe(source, found, self.ob) for source, found in outcome})
 
 
 class TOLVOL_OT_add_label(_Measuring, bpy.types.Operator):

@@ -9,7 +9,7 @@ from ..overlay import reasons
 from ..proof import kept_warnings, labels, probing, report, statistics, verdict
 from ..reference import measurements
 from ..units import length
-from .layout import AMBER, GREEN, GREY, RED, SubPanel, active, is_narrow, right, text_lines
+from .layout import AMBER, GHOST, GREEN, GREY, RED, SubPanel, active, is_narrow, right, text_lines
 
 
 class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
@@ -150,7 +150,7 @@ class TOLVOL_UL_labels(bpy.types.UIList):
         ob = settings.id_data
         true, narrow = labels.current(ob, label), is_narrow(context)
         # An icon leaves no room for the share. The 3D view shows it at the label.
-        icon = "NONE" if narrow else "ERROR" if not true else "GHOST_ENABLED" if label.on_reference else "NONE"
+        icon = "NONE" if narrow else "ERROR" if not true else GHOST if label.on_reference else "NONE"
         alone = icon != "NONE" or narrow
         row = layout.row() if alone else layout.split(factor=0.64)
         row.active = true

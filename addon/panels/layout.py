@@ -18,6 +18,7 @@ GREY = "RADIOBUT_OFF"
 # Blender's icons of coloured squares have other names in newer versions.
 _ICONS = bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
 _COLOR = "SEQUENCE_COLOR" if "SEQUENCE_COLOR_01" in _ICONS else "STRIP_COLOR"
+GHOST = "GHOST_ENABLED" if "GHOST_ENABLED" in _ICONS else "NONE"
 RED, AMBER, GREEN = f"{_COLOR}_01", f"{_COLOR}_02", f"{_COLOR}_04"
 
 

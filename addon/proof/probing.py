@@ -47,9 +47,12 @@ class Source:
         reference = snapshots.reference_of(ob)
         mesh = snapshots.surface_of(ob)
         self.own, self.other = (reference, mesh) if on_reference else (mesh, reference)
-        self.datablock = ob.tolvol.snapshot if on_reference else ob.data
         self.tolerance = tolerances.tolerance_length(ob.tolvol, reference.size())
         self.shares = None if on_reference else _shares(ob)
+
+    def fits(self, ob):
+        """Whether `ob` is still in the same state. It is quick enough to be asked at every move of the mouse."""
+        return self.state == state_of(ob)
 
     def look_up(self, threads, progress):
         """Returns what finds distances: the native volume of the other surface, and its tree, which knows sides.
@@ -70,19 +73,16 @@ def _shares(ob):
 class Probe:
     """Reads points of one surface. It is made in the main thread, 0.8 s for 250,000 triangles."""
 
-    def __init__(self, source, found):
+    def __init__(self, source, found, ob):
+        """source: made of `ob`, which is still in the same state. found: the result of its look_up()."""
         self._source, (self._volume, self._tree) = source, found
         mesh = bmesh.new()
         try:
-            mesh.from_mesh(source.datablock, face_normals=False)
+            mesh.from_mesh(ob.tolvol.snapshot if source.on_reference else ob.data, face_normals=False)
             self._faces = BVHTree.FromBMesh(mesh)
         finally:
             mesh.free()
         self._inverse = np.linalg.inv(source.own.matrix)
-
-    def fits(self, ob, on_reference):
-        """Whether the probe reads `ob` as it is now. It is quick enough to be asked at every move of the mouse."""
-        return self._source.on_reference == on_reference and self._source.state == state_of(ob)
 
     def along(self, origin, direction):
         """Returns the Reading where a ray through the world first meets the surface, or None. Both are (3,)."""

@@ -72,8 +72,9 @@ def tooltips(cls):
     """Yields (name, description) of a registered class, its properties and their choices."""
     rna, written = shown_text(cls)
     yield cls.__name__, written
+    blender_own = bpy.types.UIList.bl_rna.properties if issubclass(cls, bpy.types.UIList) else ()
     for item in rna.properties:
-        if item.identifier in ("rna_type", "name"):
+        if item.identifier in ("rna_type", "name") or item.identifier in blender_own:
             continue
         yield f"{cls.__name__}.{item.identifier}", item.description
         if item.type == "ENUM":

@@ -39,7 +39,7 @@ def lifted(height=0.1, **options):
 
 def probe(ob, on_reference=False):
     source = probing.Source(ob, on_reference)
-    return probing.Probe(source, source.look_up(1, None))
+    return probing.Probe(source, source.look_up(1, None), ob)
 
 
 def scaled_torus(factor):
@@ -163,13 +163,13 @@ def other_group(ob):
 
 
 @pytest.mark.parametrize("change", (move, edit, edit_mode, other_group))
-def test_a_probe_knows_when_it_no_longer_fits(change):
+def test_the_source_of_a_probe_knows_when_it_no_longer_fits(change):
     ob = lifted()
-    found = probe(ob)
+    found = probing.Source(ob, False)
     ob.tolvol.tolerance_percent = 3  # Distances do not depend on it.
-    assert found.fits(ob, False) and not found.fits(ob, True)
+    assert found.fits(ob)
     change(ob)
-    assert not found.fits(changed(ob), False)
+    assert not found.fits(changed(ob))
 
 
 def test_the_mouse_and_a_reference_are_needed():
@@ -331,7 +331,7 @@ def test_what_is_on_top_is_not_read():
     ob = lifted()
     ob.modifiers.new("up", "DISPLACE")
     assert probe(changed(ob)).along((0, 0, 5), (0, 0, -1)).distance == float(np.float32(0.1))
-    assert operators._what(ob, False) == "Base mesh of sheet, without its modifiers"
+    assert operators._what(ob) == "Base mesh of sheet, without its modifiers"
     assert measurements.on_top(ob) == ["modifiers"]
 
 

@@ -4,11 +4,13 @@
 import bpy
 import numpy as np
 
+from addon import overlay
 from addon.mesh import mesh_io
 from addon.operators.probe import TOLVOL_OT_probe
 from addon.proof import labels, probing
 from test_layout import dark, drag_sidebar, light
 from window import (
+    PICTURES,
     click,
     finished,
     key,
@@ -199,3 +201,17 @@ def test_the_probe_ends_when_its_object_or_file_does():
     bpy.data.objects.remove(the_ball())
     yield from finished(lambda: not TOLVOL_OT_probe.running())
     assert probing.hover() is None
+    yield from reset(ball)
+    path = str(PICTURES / "probe.blend")
+    bpy.ops.tolvol.add_label(position=(1, 0, 0))
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    with window_context():
+        bpy.ops.tolvol.probe("INVOKE_DEFAULT")
+    yield from finished(TOLVOL_OT_probe.running)
+    with window_context():
+        bpy.ops.wm.open_mainfile(filepath=path)
+    yield from finished(lambda: not TOLVOL_OT_probe.running())
+    yield 1.0
+    assert probing.hover() is None and len(the_ball().tolvol.labels) == 1
+    assert labels.current(the_ball(), the_ball().tolvol.labels[0]) and overlay.labels._drawing
+    screenshot("probe 8 file opened")
