@@ -79,7 +79,7 @@ std::vector<NamedCall> calls() {
          ToleranceVolume(wavy().vertices, wavy().triangles, space, kTolerance, {1, 1, nullptr, Field::fast_marching});
        }},
       {"signed_distance", [] { signed_distance(volume().reference(), volume().grid(), 1); }},
-      {"DisplayGrid", [] { DisplayGrid(wavy(), false, kTolerance, {.threads = 1}); }},
+      {"DisplayGrid", [] { DisplayGrid(wavy(), false, kTolerance, {.precision = 1, .threads = 1}); }},
       {"check",
        [] {
          Certificate(volume()).check({moved, space, faces}, {1, nullptr});

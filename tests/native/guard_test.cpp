@@ -99,8 +99,9 @@ TEST(Guard, AgreesWithConstrainButForTheLastFourPercentAlmostEverywhere) {
   // go back by shares of the way from where each of the two had put them.
   for (const bool two_sided : {false, true}) {
     std::size_t held = 0, apart = 0;
+    Sculpture s;
     for (std::size_t centre = 50; centre < 1'600; centre += 50) {
-      Sculpture s;
+      s.positions = Sculpture::flat(s.mesh.vertices);
       Guard guard = s.guard({.two_sided = two_sided});
       const std::vector<dvec3> before = s.mesh.vertices;
       s.dab(centre, 0.5, 0.08);
