@@ -12,6 +12,7 @@
 #include "check/methods.h"
 #include "decimation/change.h"
 #include "decimation/decimation.h"
+#include "many.h"
 #include "measure/hausdorff.h"
 #include "shapes.h"
 #ifdef TOLVOL_GL
@@ -116,7 +117,7 @@ double farthest_vertex(const TriangleMesh& from, const TriangleMesh& to) {
 }
 
 TEST(VertexSamples, KeepVerticesAndNoMore) {
-  const TriangleMesh mesh = shapes::torus(60, 0.004);
+  const TriangleMesh mesh = shapes::torus(across(60), 0.004);
   const ToleranceVolume volume = volume_of(mesh);
   for (const auto placement : {DecimationOptions::Placement::optimal, DecimationOptions::Placement::subset}) {
     baselines::VertexSamples samples(volume.frame_tolerance());
@@ -197,7 +198,7 @@ TEST(PermissionRing, RefusesWhatIsOutsideTheGrid) {
 }
 
 TEST(PermissionRing, KeepsTheTolerance) {
-  const TriangleMesh mesh = shapes::torus(60, 0.004);
+  const TriangleMesh mesh = shapes::torus(across(60), 0.004);
   const ToleranceVolume volume = volume_of(mesh);
   std::size_t before = mesh.triangles.size();
   for (const double precision : {2.0, 4.0, 8.0}) {

@@ -122,11 +122,11 @@ TEST(HostileReferences, NoWrongVerdict) {
     for (int exponent = 2; exponent <= 7; ++exponent) {
       const TriangleMesh reference = needles(std::pow(10.0, -exponent), dvec3(offset));
       const ToleranceVolume volume(reference.vertices, reference.triangles, kIdentity, tolerance);
-      const Candidates candidates = near_surface(reference, tolerance, 3000, unsigned(exponent));
+      const Candidates candidates = near_surface(reference, tolerance, many(3000), unsigned(exponent));
       const Score score = judge(reference, tolerance, candidates, check(volume, candidates));
       EXPECT_EQ(score.wrong_inside, 0) << "height 1e-" << exponent << " offset " << offset;
       EXPECT_EQ(score.wrong_outside, 0);
-      EXPECT_GT(score.inside, 100);
+      EXPECT_GT(score.inside, many(100));
     }
   }
 }

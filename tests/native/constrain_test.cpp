@@ -41,8 +41,13 @@ std::vector<std::uint32_t> flat(const std::vector<glm::uvec3>& triangles) {
   return indices;
 }
 
+ConstrainResult run(const Scene& scene, const ToleranceVolume& volume, const Points& wish,
+                    const ConstrainOptions& options) {
+  return constrain(scene.mesh.vertices, wish, flat(scene.mesh.triangles), 3, scene.space(), volume, options);
+}
+
 ConstrainResult run(const Scene& scene, const Points& wish, const ConstrainOptions& options = {}) {
-  return constrain(scene.mesh.vertices, wish, flat(scene.mesh.triangles), 3, scene.space(), *scene.volume(), options);
+  return run(scene, *scene.volume(), wish, options);
 }
 
 /// Noise of a standard deviation of so many tolerances along each axis.
@@ -62,7 +67,7 @@ bool all_inside(const std::vector<Verdict>& verdicts) {
   return std::all_of(verdicts.begin(), verdicts.end(), [](Verdict v) { return v == Verdict::inside; });
 }
 
-void expect_inside(const Scene& scene, const ConstrainResult& r, bool two_sided) {
+void expect_inside(const Scene& scene, const ToleranceVolume& volume, const ConstrainResult& r, bool two_sided) {
   const auto world = [&](Points points) {
     for (dvec3& p : points) p = scene.space().world(p);
     return TriangleMesh{points, scene.mesh.triangles};
@@ -74,7 +79,11 @@ void expect_inside(const Scene& scene, const ConstrainResult& r, bool two_sided)
   };
   EXPECT_LE(distance(after, before), tolerance);
   if (two_sided) EXPECT_LE(distance(before, after), tolerance);
-  EXPECT_TRUE(all_inside(verdicts(*scene.volume(), scene.space(), r.vertices, flat(scene.mesh.triangles))));
+  EXPECT_TRUE(all_inside(verdicts(volume, scene.space(), r.vertices, flat(scene.mesh.triangles))));
+}
+
+void expect_inside(const Scene& scene, const ConstrainResult& r, bool two_sided) {
+  expect_inside(scene, *scene.volume(), r, two_sided);
 }
 
 bool same_bits(const dvec3& a, const dvec3& b) { return std::memcmp(&a, &b, sizeof a) == 0; }
@@ -101,23 +110,23 @@ std::vector<Scene> scenes() {
   sheared[1][0] = 0.7, sheared[2][1] = -0.4, sheared[0][0] = 3;
   far_away[3] = {5000, -3000, 100, 1};
   tiny[3][3] = huge[3][3] = 1;
-  TriangleMesh slivers = shapes::grid(30);
+  TriangleMesh slivers = shapes::grid(across(30));
   for (dvec3& p : slivers.vertices) p = rounded_to_float32(dvec3(p.x, p.y * 1e-3, 0.05 * std::sin(9 * p.x)));
   TriangleMesh odd = shapes::box(6);  // faces that are points and segments, twice the same, a vertex without a face
   odd.triangles.insert(odd.triangles.end(), {{0, 0, 0}, {0, 1, 1}, odd.triangles[0], odd.triangles[7]});
   odd.vertices.emplace_back(100, 100, 100);
-  return {{shapes::torus(40, 0.002)},
-          {shapes::torus(40, 0.02), glm::dmat4(1), Storage::float64},
+  return {{shapes::torus(across(40), 0.002)},
+          {shapes::torus(across(40), 0.02), glm::dmat4(1), Storage::float64},
           {shapes::box(10)},
-          {shapes::stored(shapes::grid(30))},
-          {shapes::soup(shapes::torus(24))},
+          {shapes::stored(shapes::grid(across(30)))},
+          {shapes::soup(shapes::torus(across(24)))},
           {slivers},
           {odd},
-          {shapes::torus(30), mirrored},
-          {shapes::torus(30), sheared},
-          {shapes::torus(30), far_away},
-          {shapes::torus(30), tiny},
-          {shapes::torus(30), huge},
+          {shapes::torus(across(30)), mirrored},
+          {shapes::torus(across(30)), sheared},
+          {shapes::torus(across(30)), far_away},
+          {shapes::torus(across(30)), tiny},
+          {shapes::torus(across(30)), huge},
           {shapes::torus(24), glm::dmat4(1), Storage::float32, 0.05},
           {shapes::joined(shapes::box(6), shapes::grid(6)), glm::dmat4(1), Storage::float32, 10}};
 }
@@ -149,14 +158,15 @@ TEST(Constrain, EveryFaceIsInsideOnEveryMesh) {
   int number = 0;
   for (const Scene& scene : scenes()) {
     SCOPED_TRACE(testing::Message() << "scene " << number++);
+    const auto volume = scene.volume();
     const Points wish = scene.wish(noise(0.6));
     for (const bool two_sided : {false, true}) {
       using Crossings = PullBack::Crossings;
-      const ConstrainResult pulled = run(scene, wish, {.two_sided = two_sided, .crossings = Crossings::allow});
+      const ConstrainResult pulled = run(scene, *volume, wish, {.two_sided = two_sided, .crossings = Crossings::allow});
       const ConstrainResult reset =
-          run(scene, wish, {.mode = Mode::reset, .two_sided = two_sided, .crossings = Crossings::allow});
-      expect_inside(scene, pulled, two_sided);
-      expect_inside(scene, reset, two_sided);
+          run(scene, *volume, wish, {.mode = Mode::reset, .two_sided = two_sided, .crossings = Crossings::allow});
+      expect_inside(scene, *volume, pulled, two_sided);
+      expect_inside(scene, *volume, reset, two_sided);
       expect_on_the_way(scene, wish, pulled);
       expect_on_the_way(scene, wish, reset);
       EXPECT_GT(pulled.held_back, 0u);

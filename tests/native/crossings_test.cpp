@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "crossing_judge.h"
+#include "many.h"
 #include "shapes.h"
 #include "topology/faces_cross.h"
 
@@ -31,7 +32,7 @@ Pairs found(const TriangleMesh& mesh, unsigned threads = 2, std::size_t most = k
 // On a coarse lattice many corners and edges are shared, and many triangles lie in one plane.
 TEST(Crossings, AreThoseWhoseIntersectionIsMoreThanACornerOrAnEdge) {
   std::size_t total = 0;
-  for (unsigned seed = 0; seed < 24; ++seed) {
+  for (unsigned seed = 0; seed < unsigned(tolvol::many(24)); ++seed) {
     tolvol::shapes::Random random(seed);
     TriangleMesh mesh;
     const unsigned steps = 2 + seed % 6;
@@ -59,7 +60,7 @@ TEST(Crossings, AreThoseWhoseIntersectionIsMoreThanACornerOrAnEdge) {
     EXPECT_EQ(pairs, expected) << seed;
     total += pairs.size();
   }
-  EXPECT_GT(total, 1000u);
+  EXPECT_GT(total, std::size_t(tolvol::many(1000)));
 }
 
 TEST(Crossings, OfAClosedSurfaceAreNone) {

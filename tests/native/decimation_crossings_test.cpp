@@ -128,7 +128,7 @@ TEST(DecimationCrossings, ThoroughKeepsSheetsApart) {
 }
 
 TEST(DecimationCrossings, OptionsDoNotChangeThePromise) {
-  Case c{hollow(10, 0.01)};
+  Case c{hollow(across(10), 0.01)};
   std::vector<Options> all(4);
   all[0].two_sided = false;
   all[1].target_triangles = 500;
@@ -150,7 +150,7 @@ TEST(DecimationCrossings, AnyMatrixAndStorage) {
   far_away[3] = {5000, -3000, 100, 1};
   for (const glm::dmat4& to_world : {sheared, mirrored, far_away}) {
     for (const Storage storage : {Storage::float32, Storage::float64}) {
-      const Case c{hollow(9, 0.01), to_world, storage, 2};
+      const Case c{hollow(across(9), 0.01), to_world, storage, 2};
       const DecimationResult r = run(c);
       EXPECT_TRUE(crossings_by_cgal({r.vertices, r.triangles}).empty());
       EXPECT_LT(r.triangles.size(), c.mesh.triangles.size() / 2);
