@@ -24,7 +24,7 @@ LABELS = {
 }
 GL_METHODS = [method for method in LABELS if method != "certificate"]
 PLATE = meshes.plate(9)
-TORUS = meshes.torus(96, 48)
+TORUS = meshes.torus(48, 24)
 TOLERANCE = 0.05
 
 pytestmark = pytest.mark.usefixtures("gl")
