@@ -38,7 +38,13 @@ class FaceTree {
   /// Calls visit(face) for every face whose box meets `box`, and for no other. A visit that returns false ends the
   /// search.
   template <class Visit>
-  void for_each_meeting(const Box& box, Visit&& visit) const;
+  void for_each_meeting(const Box& box, Visit&& visit) const {
+    for_each_where([&](const Box& of_faces) { return meet(of_faces, box); }, visit);
+  }
+  /// The same for every face for whose box `may` holds. It has to hold of every box around such a box, too, and of no
+  /// empty one.
+  template <class May, class Visit>
+  void for_each_where(May&& may, Visit&& visit) const;
 
  private:
   static constexpr std::size_t kLeaf = 4;  ///< the most faces in a leaf
@@ -58,22 +64,22 @@ class FaceTree {
   std::vector<std::uint32_t> place_;  ///< per face of faces_: its slot
 };
 
-template <class Visit>
-void FaceTree::for_each_meeting(const Box& box, Visit&& visit) const {
+template <class May, class Visit>
+void FaceTree::for_each_where(May&& may, Visit&& visit) const {
   if (leaves_ == 0) return;
   std::array<std::uint32_t, 66> stack;  // at most one node a level waits beside the next: 32 levels
   std::size_t height = 0;
   stack[height++] = 0;
   while (height > 0) {
     const std::uint32_t node = stack[--height];
-    if (!meet(nodes_[node], box)) continue;
+    if (!may(nodes_[node])) continue;
     if (node + 1 < leaves_) {
       stack[height++] = 2 * node + 2, stack[height++] = 2 * node + 1;
       continue;
     }
     const std::size_t first = (node + 1 - leaves_) * kLeaf;
     for (std::size_t i = first; i < first + kLeaf; ++i) {
-      if (!meet(slots_[i].box, box)) continue;
+      if (!may(slots_[i].box)) continue;
       if constexpr (std::is_same_v<decltype(visit(slots_[i].face)), bool>) {
         if (!visit(slots_[i].face)) return;
       } else {

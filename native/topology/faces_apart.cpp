@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace tolvol {
@@ -122,6 +123,76 @@ bool surely_uncrossed(const Corners& a, const Corners& b) {
     default:
       return false;
   }
+}
+
+Box rim_of(const Corners& corners, const dvec3& hub) {
+  Box rim;
+  bool has_hub = false;
+  for (const dvec3& p : corners) {
+    if (p == hub) {
+      has_hub = true;
+    } else {
+      rim.add(p);
+    }
+  }
+  return has_hub && !rim.empty() ? rim : box_of(corners);
+}
+
+ApartFromFan::ApartFromFan(const Corners& own, const dvec3& hub)
+    : hub_(hub), whole_(box_of(own)), opposite_(rim_of(own, hub)) {
+  // A side through the hub is turned by so little that the triangle lies strictly on one side of it.
+  constexpr double kTurn = 1e-9;
+  const auto unit = [](const dvec3& v) { return glm::normalize(v / largest(v)); };
+  dvec3 from_hub[3];
+  for (int k = 0; k < 3; ++k) from_hub[k] = own[k] - hub;
+  const auto at = std::ranges::find(own, hub);
+  shares_hub_ = at != own.end();
+  if (shares_hub_) {
+    const auto first = static_cast<std::size_t>(at - own.begin());
+    const dvec3 one = unit(from_hub[(first + 1) % 3]), other = unit(from_hub[(first + 2) % 3]);
+    const dvec3 normal = unit(glm::cross(one, other)), inwards = kTurn * (one + other);
+    add(own, unit(glm::cross(one, normal)) - kTurn * one);
+    add(own, unit(glm::cross(normal, other)) - kTurn * other);
+    add(own, normal - inwards), add(own, -normal - inwards);
+    return;
+  }
+  const dvec3 normal = unit(glm::cross(own[1] - own[0], own[2] - own[0]));
+  add(own, glm::dot(normal, from_hub[0]) > 0 ? -normal : normal);
+  for (int k = 0; k < 3; ++k) {
+    const int next = (k + 1) % 3;
+    add(own, unit(glm::cross(own[next] - own[k], normal)));
+    const dvec3 one = unit(from_hub[k]), other = unit(from_hub[next]), across = unit(glm::cross(one, other));
+    const bool is_beyond = glm::dot(across, from_hub[(k + 2) % 3]) > 0;
+    add(own, (is_beyond ? -across : across) - kTurn * (one + other));
+  }
+}
+
+/// Adds a side if the triangle is surely on one side of it, and the hub on the other or on it.
+void ApartFromFan::add(const Corners& own, const dvec3& normal) {
+  double most = -std::numeric_limits<double>::infinity();
+  for (const dvec3& corner : own) {
+    if (shares_hub_ && corner == hub_) continue;
+    const dvec3 p = corner - hub_;
+    most = std::max(most, glm::dot(normal, p) + 4 * kRounding * sum(normal) * largest(p) + kSmallest);
+    if (!(most < 0)) return;  // also if rounding has left no direction
+  }
+  sides_[static_cast<std::size_t>(count_++)] = {normal, shares_hub_ ? 0 : most};
+}
+
+bool ApartFromFan::surely(const Box& rims) const {
+  // Two faces with a common corner cross only if what is opposite the corner in one of them meets the other.
+  Box faces = rims;
+  faces.add(hub_);
+  if (!meet(opposite_, faces) && !(shares_hub_ && meet(whole_, rims))) return true;
+  const dvec3 lower = rims.lower - hub_, upper = rims.upper - hub_;
+  const double size = std::max(largest(lower), largest(upper));
+  for (int i = 0; i < count_; ++i) {
+    const auto& [normal, most] = sides_[static_cast<std::size_t>(i)];
+    double least = -(4 * kRounding * sum(normal) * size + kSmallest);
+    for (int k = 0; k < 3; ++k) least += normal[k] * (normal[k] > 0 ? lower[k] : upper[k]);
+    if (least > most) return true;
+  }
+  return false;
 }
 
 }  // namespace tolvol

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The rule about faces with a common corner holds for degenerate ones, too: a segment from the hub that runs into a
 // face either ends on it, or leaves it through the edge opposite the hub. A face of a crowd that has lost its hub has
-// all of its corners in both trees, so that its boxes are compared as others' are.
+// all of its corners in the tree, so that the hull of the hub and of its box is around it as well.
 #include "topology/near_faces.h"
 
 #include <map>
@@ -10,14 +10,6 @@
 #include "base/call.h"
 
 namespace tolvol {
-
-Box NearFaces::rim(const Corners& corners, const glm::dvec3& hub) {
-  Box box;
-  for (const glm::dvec3& p : corners) {
-    if (p != hub) box.add(p);
-  }
-  return has_corner(corners, hub) ? box : box_of(corners);
-}
 
 std::vector<std::uint8_t> NearFaces::hubs_of(std::span<const glm::uvec3> triangles, std::size_t vertex_count) {
   std::vector<std::uint32_t> count(vertex_count, 0);
@@ -47,7 +39,7 @@ NearFaces::NearFaces(std::span<const std::uint32_t> faces, std::span<const Corne
   struct Group {
     std::uint32_t number;
     std::vector<std::uint32_t> faces{};
-    std::vector<Box> boxes{}, rims{};
+    std::vector<Box> rims{};
   };
   const auto before = [](const glm::dvec3& a, const glm::dvec3& b) {
     return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
@@ -58,23 +50,24 @@ NearFaces::NearFaces(std::span<const std::uint32_t> faces, std::span<const Corne
   for (std::size_t i = 0; i < faces.size(); ++i) {
     poll_at(i);
     if (hubs[i] != kNoHub) group_of[i] = &groups.try_emplace(corners[i][hubs[i]], Group{0}).first->second;
-    group_of[i]->faces.push_back(faces[i]), group_of[i]->boxes.push_back(boxes[i]);
-    if (hubs[i] != kNoHub) group_of[i]->rims.push_back(rim(corners[i], corners[i][hubs[i]]));
+    group_of[i]->faces.push_back(faces[i]);
+    group_of[i]->rims.push_back(hubs[i] == kNoHub ? boxes[i] : rim_of(corners[i], corners[i][hubs[i]]));
   }
   for (auto& [hub, group] : groups) {
     group.number = static_cast<std::uint32_t>(crowds_.size());
-    crowds_.push_back({hub, FaceTree(group.faces, group.boxes, team), FaceTree(group.faces, group.rims, team)});
+    crowds_.push_back({hub, group.faces, FaceTree(group.faces, group.rims, team), group.faces.size()});
   }
   std::vector<std::uint32_t> numbers(crowds_.size());
   std::iota(numbers.begin(), numbers.end(), 0u);
   std::vector<Box> places;
-  for (const Crowd& crowd : crowds_) places.push_back(crowd.whole.box());
+  for (const Crowd& crowd : crowds_) places.push_back(crowd.whole(crowd.rims.box()));
   places_ = FaceTree(numbers, places, team);
   rest.number = static_cast<std::uint32_t>(crowds_.size());
-  others_ = FaceTree(rest.faces, rest.boxes, team);
+  others_ = FaceTree(rest.faces, rest.rims, team);
   faces_.assign(faces.begin(), faces.end());
+  corners_.assign(corners.begin(), corners.end());
+  is_gone_.assign(faces.size(), false);
   for (const Group* const group : group_of) crowd_of_.push_back(group->number);
-  whole_ = std::move(boxes);
 }
 
 void NearFaces::change(std::uint32_t face, const Corners& corners) {
@@ -84,10 +77,35 @@ void NearFaces::change(std::uint32_t face, const Corners& corners) {
     return;
   }
   Crowd& crowd = crowds_[crowd_of_[place]];
-  whole_[place] = box_of(corners);
-  crowd.whole.change(face, whole_[place]);
-  crowd.rims.change(face, rim(corners, crowd.hub));
-  places_.change(crowd_of_[place], crowd.whole.box());
+  const bool strays = has_corner(corners_[place], crowd.hub) && !has_corner(corners, crowd.hub);
+  corners_[place] = corners;
+  if (is_gone_[place]) is_gone_[place] = false, ++crowd.alive;
+  crowd.rims.change(face, rim_of(corners, crowd.hub));
+  if (strays && 2 * ++crowd.strayed > crowd.alive) find_hub(crowd, corners);
+  places_.change(crowd_of_[place], crowd.whole(crowd.rims.box()));
+}
+
+/// Takes the corner of a face to which most of the crowd have gone as its hub, if there is one. This costs about as
+/// much as the changes that have led to it.
+void NearFaces::find_hub(Crowd& crowd, const Corners& corners) {
+  crowd.strayed = 0;
+  for (const glm::dvec3& corner : corners) {
+    std::size_t count = 0;
+    for (const std::uint32_t face : crowd.faces) {
+      const std::size_t place = place_of(face);
+      count += !is_gone_[place] && has_corner(corners_[place], corner);
+    }
+    if (2 * count <= crowd.alive) continue;
+    crowd.hub = corner;
+    std::vector<std::uint32_t> faces;
+    std::vector<Box> rims;
+    for (const std::uint32_t face : crowd.faces) {
+      const std::size_t place = place_of(face);
+      if (!is_gone_[place]) faces.push_back(face), rims.push_back(rim_of(corners_[place], corner));
+    }
+    crowd.rims.change(faces, rims);
+    return;
+  }
 }
 
 void NearFaces::remove(std::uint32_t face) {
@@ -97,9 +115,9 @@ void NearFaces::remove(std::uint32_t face) {
     return;
   }
   Crowd& crowd = crowds_[crowd_of_[place]];
-  crowd.whole.change(face, Box());
+  if (!is_gone_[place]) is_gone_[place] = true, --crowd.alive;
   crowd.rims.change(face, Box());
-  places_.change(crowd_of_[place], crowd.whole.box());
+  places_.change(crowd_of_[place], crowd.whole(crowd.rims.box()));
 }
 
 }  // namespace tolvol

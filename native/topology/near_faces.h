@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// The faces that some faces may cross, while faces change and vanish. It differs from a FaceTree of their boxes where
 /// very many faces meet in one corner: the boxes of all of them meet there, but two faces with a common corner cross
-/// (topology/faces_cross.h) only if the edge of one that is opposite the corner meets the other.
+/// (topology/faces_cross.h) only if the edge of one that is opposite the corner meets the other, and few of them do not
+/// lie beside each other as seen from the corner.
 #pragma once
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 #include "base/parallel.h"
 #include "geometry/triangle_mesh.h"
 #include "topology/face_tree.h"
+#include "topology/faces_apart.h"
 #include "topology/faces_cross.h"
 
 namespace tolvol {
@@ -50,9 +52,10 @@ class NearFaces {
   void change(std::uint32_t face, const Corners& corners);
   void remove(std::uint32_t face);
 
-  /// Calls visit(face) for all faces that one of `own` crosses, and for others whose boxes meet. `all` is a box around
-  /// `own`, whose elements have a member `corners`. A visit that returns false ends the search. Which faces a search
-  /// finds depends on `own` and the faces alone; their order also depends on those that the trees were built with.
+  /// Calls visit(face) for all faces that one of `own` crosses, and for some others whose boxes meet. `all` is a box
+  /// around `own`, whose elements have a member `corners`. A visit that returns false ends the search. Which faces a
+  /// search finds depends on `own` and the faces alone; their order also depends on those that the trees were built
+  /// with.
   template <class Faces, class Visit>
   void for_each_near(const Box& all, const Faces& own, Visit&& visit) const;
   /// The same near one face.
@@ -65,17 +68,28 @@ class NearFaces {
   }
 
  private:
-  /// The faces around one hub, in two trees: by their boxes, and by the boxes of their corners beside the hub.
+  /// Of at most so many faces each is asked whether it is apart from faces around a hub.
+  static constexpr std::size_t kFew = 32;
+
+  /// The faces around one hub, by the boxes of their corners beside the hub.
   struct Crowd {
     glm::dvec3 hub;
-    FaceTree whole, rims;
+    std::vector<std::uint32_t> faces;  ///< in rising order; those that were removed stay
+    FaceTree rims;
+    std::size_t alive;        ///< the number of faces that were not removed
+    std::size_t strayed = 0;  ///< how many have left the hub since it was last looked for
+
+    /// A box around faces whose rims are in a box.
+    Box whole(Box box) const {
+      box.add(hub);
+      return box;
+    }
   };
 
   static bool has_corner(const Corners& corners, const glm::dvec3& p) {
     return corners[0] == p || corners[1] == p || corners[2] == p;
   }
-  /// The box of the corners other than `hub`; of all if none of them is there.
-  static Box rim(const Corners& corners, const glm::dvec3& hub);
+  void find_hub(Crowd& crowd, const Corners& corners);
 
   std::size_t place_of(std::uint32_t face) const {
     return static_cast<std::size_t>(std::lower_bound(faces_.begin(), faces_.end(), face) - faces_.begin());
@@ -87,7 +101,8 @@ class NearFaces {
   // These are empty if there is no crowd.
   std::vector<std::uint32_t> faces_;     ///< in rising order
   std::vector<std::uint32_t> crowd_of_;  ///< for each of faces_; crowds_.size() for one without a hub
-  std::vector<Box> whole_;               ///< for each of faces_ that is in a crowd: its box
+  std::vector<Corners> corners_;         ///< for each of faces_ that is in a crowd
+  std::vector<bool> is_gone_;            ///< for each of faces_ that is in a crowd
 };
 
 template <class Faces, class Visit>
@@ -101,17 +116,23 @@ void NearFaces::for_each_near(const Box& all, const Faces& own, Visit&& visit) c
     Box sharing, opposite, strange;  // Of those of `own` that share the hub, of their rims, and of the rest.
     for (const auto& face : own) {
       if (has_corner(face.corners, crowd.hub)) {
-        sharing.add(box_of(face.corners)), opposite.add(rim(face.corners, crowd.hub));
+        sharing.add(box_of(face.corners)), opposite.add(rim_of(face.corners, crowd.hub));
       } else {
         strange.add(box_of(face.corners));
       }
     }
     Box first = opposite;
     first.add(strange);
-    if (!first.empty()) crowd.whole.for_each_meeting(first, next);
-    if (!more || sharing.empty()) return more;
-    crowd.rims.for_each_meeting(sharing,
-                                [&](std::uint32_t face) { return meet(whole_[place_of(face)], first) || next(face); });
+    std::vector<ApartFromFan> apart;
+    if (own.size() <= kFew) {
+      for (const auto& face : own) apart.emplace_back(face.corners, crowd.hub);
+    }
+    crowd.rims.for_each_where(
+        [&](const Box& rims) {
+          if (rims.empty() || !(meet(crowd.whole(rims), first) || meet(rims, sharing))) return false;
+          return apart.empty() || !std::ranges::all_of(apart, [&](const ApartFromFan& a) { return a.surely(rims); });
+        },
+        next);
     return more;
   });
 }

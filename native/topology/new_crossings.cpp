@@ -7,6 +7,8 @@
 #include <numeric>
 #include <optional>
 
+#include "base/call.h"
+#include "topology/faces_apart.h"
 #include "topology/succession.h"
 
 namespace tolvol {
@@ -29,46 +31,47 @@ std::optional<glm::dvec3> common_corner(std::span<const NewCrossings::Face> face
   return std::nullopt;
 }
 
-/// Calls visit(i) for the changed faces whose box meets `box`, until it returns false. Returns whether it never did.
-template <class Visit>
-bool for_each_meeting(const Box& box, std::span<const Box> boxes, const FaceTree& ring, Visit&& visit) {
-  bool all = true;
-  if (boxes.size() > kMany) {
-    ring.for_each_meeting(box, [&](std::uint32_t i) { return all = visit(i); });
+/// The faces of one change, to find those that others may cross.
+struct Ring {
+  std::span<const NewCrossings::Face> faces;
+  std::span<const Box> boxes;
+  const FaceTree& tree;  ///< of the faces, if there are many: by their rims if they have a hub
+  const std::optional<glm::dvec3>& hub;
+
+  /// Calls visit(i) for all that `own` crosses, and some others, until it returns false. Returns whether it never did.
+  template <class Visit>
+  bool for_each_near(const Corners& own, Visit&& visit) const {
+    bool all = true;
+    const auto next = [&](std::uint32_t i) { return all = visit(i); };
+    if (faces.size() > kMany && hub) {
+      const ApartFromFan apart(own, *hub);
+      tree.for_each_where([&](const Box& rims) { return !rims.empty() && !apart.surely(rims); }, next);
+    } else if (faces.size() > kMany) {
+      tree.for_each_meeting(box_of(own), next);
+    } else {
+      const Box box = box_of(own);
+      for (std::uint32_t i = 0; i < boxes.size() && all; ++i) {
+        if (meet(box, boxes[i])) next(i);
+      }
+    }
     return all;
   }
-  for (std::uint32_t i = 0; i < boxes.size() && all; ++i) {
-    if (meet(box, boxes[i])) all = visit(i);
-  }
-  return all;
-}
 
-/// Calls visit(i, k) for the pairs of changed faces that cross each other, until it returns false. Returns whether it
-/// never did. A pair may come twice.
-template <class Visit>
-bool for_each_crossing_within(std::span<const NewCrossings::Face> faces, std::span<const Box> boxes,
-                              const FaceTree& ring, Visit&& visit) {
-  if (faces.size() > kMany) {
-    const std::optional<glm::dvec3> common = common_corner(faces);
+  /// Calls visit(i, k) for the pairs that cross each other, until it returns false. Returns whether it never did. A
+  /// pair may come twice.
+  template <class Visit>
+  bool for_each_crossing(Visit&& visit) const {
+    const bool twice = faces.size() > kMany;
     for (std::uint32_t i = 0; i < faces.size(); ++i) {
-      Box searched;
-      for (const glm::dvec3& corner : faces[i].corners) {
-        if (!common || corner != *common) searched.add(corner);
-      }
-      const bool all = for_each_meeting(searched, boxes, ring, [&](std::uint32_t k) {
-        return i == k || !faces_cross(faces[i].corners, faces[k].corners) || visit(i, k);
+      if (twice) poll();
+      const bool all = for_each_near(faces[i].corners, [&](std::uint32_t k) {
+        return (twice ? k == i : k >= i) || !faces_cross(faces[i].corners, faces[k].corners) || visit(i, k);
       });
       if (!all) return false;
     }
     return true;
   }
-  for (std::uint32_t i = 0; i < faces.size(); ++i) {
-    for (std::uint32_t k = 0; k < i; ++k) {
-      if (meet(boxes[i], boxes[k]) && faces_cross(faces[i].corners, faces[k].corners) && !visit(i, k)) return false;
-    }
-  }
-  return true;
-}
+};
 
 }  // namespace
 
@@ -109,24 +112,28 @@ bool NewCrossings::none(const NearFaces& near, std::span<const Face> faces, std:
     std::vector<std::uint32_t> places(faces.size());
     std::iota(places.begin(), places.end(), 0u);
     Team alone(1);
-    trial.ring_ = FaceTree(places, trial.boxes_, alone);
+    trial.hub_ = common_corner(faces);
+    std::vector<Box> rims;
+    for (const Face& face : faces)
+      rims.push_back(trial.hub_ ? rim_of(face.corners, *trial.hub_) : box_of(face.corners));
+    trial.ring_ = FaceTree(places, rims, alone);
   }
+  const Ring ring{faces, trial.boxes_, trial.ring_, trial.hub_};
 
   for (const Face& face : faces) {
     if (is_degenerate(face.corners) && !is_degenerate(corners(face.id))) return false;
   }
   const auto crosses_any = [&](std::uint32_t other) {
     const Corners t = corners(other);
-    return !for_each_meeting(box_of(t), trial.boxes_, trial.ring_, [&](std::uint32_t i) {
+    return !ring.for_each_near(t, [&](std::uint32_t i) {
       return !faces_cross(faces[i].corners, t) || inherited(faces[i].id, other, removed);
     });
   };
   const auto stays = [&](std::uint32_t other) {
     return !std::binary_search(trial.replaced_.begin(), trial.replaced_.end(), other);
   };
-  const bool alone = for_each_crossing_within(faces, trial.boxes_, trial.ring_, [&](std::uint32_t i, std::uint32_t k) {
-    return inherited(faces[i].id, faces[k].id, removed);
-  });
+  const bool alone = ring.for_each_crossing(
+      [&](std::uint32_t i, std::uint32_t k) { return inherited(faces[i].id, faces[k].id, removed); });
   if (!alone) return false;
   if (trial.met_last_ != kNone && stays(trial.met_last_) && crosses_any(trial.met_last_)) {
     return share_out(near, faces, removed, trial);
@@ -166,7 +173,8 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
   if (members.empty()) return false;
 
   Succession succession(owners);
-  for_each_crossing_within(faces, trial.boxes_, trial.ring_, [&](std::uint32_t i, std::uint32_t k) {
+  const Ring ring{faces, trial.boxes_, trial.ring_, trial.hub_};
+  ring.for_each_crossing([&](std::uint32_t i, std::uint32_t k) {
     for (std::uint32_t a = 0; a < members.size(); ++a) {
       if (owners[a] != i) continue;
       for (std::uint32_t b = 0; b < members.size(); ++b) {
@@ -185,7 +193,7 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
     if (std::binary_search(trial.replaced_.begin(), trial.replaced_.end(), other)) return true;
     const Corners t = corners(other);
     std::vector<std::uint32_t> crossing;
-    for_each_meeting(box_of(t), trial.boxes_, trial.ring_, [&](std::uint32_t i) {
+    ring.for_each_near(t, [&](std::uint32_t i) {
       if (faces_cross(faces[i].corners, t)) crossing.push_back(i);
       return true;
     });

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -56,7 +57,8 @@ class NewCrossings {
     friend class NewCrossings;
     Box read_;
     std::vector<Box> boxes_;
-    FaceTree ring_;                        ///< of the changed faces by their places in the change, if there are many
+    FaceTree ring_;  ///< of the changed faces by their places in the change, if there are many; by their rims at a hub
+    std::optional<glm::dvec3> hub_;        ///< a corner that all changed faces have, if there are many
     std::vector<std::uint32_t> replaced_;  ///< sorted
     std::uint32_t met_last_ = kNone;       ///< the face that was in the way last, which likely still is
     std::vector<Given> given_;

@@ -104,3 +104,63 @@ TEST(FacesApart, NeighboursOnAFlatSurfaceAreToldApartWithoutExactArithmetic) {
   }
   EXPECT_GT(sure, pairs * 95 / 100);
 }
+
+TEST(FacesApart, WhatIsApartFromAFanCrossesNoFaceOfIt) {
+  shapes::Random random(5);
+  std::size_t apart = 0, cross = 0;
+  for (int i = 0; i < 20'000; ++i) {
+    const bool is_flat = i % 2 == 0, shares_hub = i % 3 == 0, shares_rim = i % 5 == 0;
+    const auto point = [&] {
+      const dvec3 p = random.point();
+      return is_flat ? dvec3(p.x, p.y, 0) : p;
+    };
+    const dvec3 hub = point(), middle = point();
+    const double size = i % 7 == 0 ? 1 : 0.2;
+    const auto on_rim = [&] { return middle + size * (point() - middle); };
+    Corners own{point(), point(), point()};
+    const Corners face{hub, on_rim(), on_rim()}, strayed{on_rim(), on_rim(), on_rim()};
+    Box rims;
+    for (const dvec3& p : {face[1], face[2], strayed[0], strayed[1], strayed[2]}) rims.add(p);
+    if (shares_hub) own[static_cast<std::size_t>(i) % 9 / 3] = hub;
+    if (shares_rim) own[static_cast<std::size_t>(i) % 9 / 3 == 0 ? 1 : 0] = face[1];
+    const bool crosses = faces_cross(own, face) || faces_cross(own, strayed);
+    cross += crosses;
+    if (!ApartFromFan(own, hub).surely(rims)) continue;
+    ++apart;
+    EXPECT_FALSE(crosses) << i;
+  }
+  EXPECT_GT(apart, 3000u);
+  EXPECT_GT(cross, 3000u);
+}
+
+TEST(FacesApart, SliversBesideEachOtherAreApartSeenFromTheirHub) {
+  // They all run from one place of a line to the hub. Some of them share an edge with the one that is looked at.
+  const dvec3 hub(1, 0.3, 0.2);
+  constexpr int kCount = 1000;
+  const auto on_line = [](int i) { return dvec3(double(i) / kCount, 0.001, 0); };
+  for (const int own : {3, 400, 998}) {
+    const ApartFromFan apart({on_line(own), on_line(own + 1), hub}, hub);
+    for (int i = 0; i < kCount; ++i) {
+      Box rim;
+      rim.add(on_line(i)), rim.add(on_line(i + 1));
+      EXPECT_EQ(apart.surely(rim), std::abs(i - own) > 1) << i;
+    }
+    Box after;
+    after.add(on_line(own + 2)), after.add(on_line(kCount));
+    EXPECT_EQ(apart.surely(after), own + 2 <= kCount);
+  }
+}
+
+TEST(FacesApart, CoordinatesOfAnySizeAreHandled) {
+  for (const double scale : {1e-150, 1e-20, 1.0, 1e20, 1e150}) {
+    const Corners own{scale * dvec3(0, 0, 0), scale * dvec3(1, 0, 0), scale * dvec3(0, 1, 0)};
+    Box through, beside;
+    through.add(scale * dvec3(0.2, 0.2, -1)), through.add(scale * dvec3(0.3, 0.3, 1));
+    beside.add(scale * dvec3(0.9, 0.9, -1)), beside.add(scale * dvec3(0.95, 0.95, 1));
+    const ApartFromFan apart(own, scale * dvec3(0.8, 0.8, 0));
+    EXPECT_FALSE(apart.surely(through)) << scale;
+    if (scale == 1) {
+      EXPECT_TRUE(apart.surely(beside));
+    }
+  }
+}

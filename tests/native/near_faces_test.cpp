@@ -67,6 +67,20 @@ struct Faces {
   }
 };
 
+/// Two flat fans of n triangles each, which together are a rectangle, turned out of the planes of the axes: their hubs
+/// are opposite corners, and so all of their slivers run aslant.
+TriangleMesh two_fans(unsigned n) {
+  TriangleMesh mesh;
+  for (const double y : {0.0, 0.35}) {
+    for (unsigned i = 0; i <= n; ++i) mesh.vertices.emplace_back(double(i) / n, 0.8 * y, 0.6 * y);
+  }
+  for (unsigned i = 0; i < n; ++i) {
+    mesh.triangles.emplace_back(i, i + 1, 2 * n + 1);
+    mesh.triangles.emplace_back(n + 1 + i, 0, n + 2 + i);
+  }
+  return mesh;
+}
+
 /// A fan with an accordion's rim, faces across it, and degenerate faces that run from the hub through others.
 TriangleMesh crossed_fan(std::mt19937& random) {
   TriangleMesh mesh = fan(300, 0.4);
@@ -115,6 +129,28 @@ TEST(NearFaces, AreFewAtAHub) {
     std::size_t found = 0;
     for (const Corners& own : faces.corners) found += faces.found(own).size();
     EXPECT_LE(found, 12u * n) << "without the hub's trees about n^2 / 4";
+  }
+}
+
+TEST(NearFaces, AreFewAtHubsWhoseFacesRunAslant) {
+  for (const unsigned n : {500u, 4000u}) {
+    Faces faces(two_fans(n));
+    const auto found_by_all = [&] {
+      std::size_t found = 0;
+      for (const Corners& own : faces.corners) found += faces.found(own).size();
+      return found;
+    };
+    EXPECT_LE(found_by_all(), 24u * n) << "by their boxes about n^2";
+    const dvec3 hub = faces.corners[0][2], moved = hub + dvec3(-0.001, 0.002, 0.001);
+    for (const std::uint32_t i : faces.numbers) {
+      for (dvec3& corner : faces.corners[i]) {
+        if (corner == hub) corner = moved;
+      }
+      faces.near.change(i, faces.corners[i]);
+    }
+    EXPECT_LE(found_by_all(), 24u * n) << "after one hub has gone elsewhere";
+    if (n > 500) continue;
+    for (std::uint32_t i = 0; i < faces.numbers.size(); i += 7) faces.expect_all_found(faces.corners[i]);
   }
 }
 
