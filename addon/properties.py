@@ -383,7 +383,7 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
         type=bpy.types.Object, description="The object that was chosen when the reference was set"
     )
     snapshot_matrix: FloatVectorProperty(
-        size=16, description="The placement of the snapshot in the world when the reference was set"
+        size=16, description="The matrix of the snapshot to the world when the reference was set"
     )
     snapshot_fingerprint: StringProperty(
         description="The fingerprint of the snapshot, which differs from those of others"

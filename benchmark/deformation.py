@@ -20,14 +20,14 @@ from addon import native  # noqa: E402
 
 TURNS = 5
 POINTS = 5  # control points of the lattice along each axis
-ROOM = 0.05  # space between the mesh and the lattice, as a share of the mesh's box
+MARGIN = 0.05  # space between the mesh and the lattice, as a share of the mesh's box
 
 
 def lattice(vertices, length):
     """Returns a lattice that moves every part of the mesh by less than `length`, and not all parts alike."""
     lower, size = vertices.min(0), np.ptp(vertices, axis=0)
-    domain = np.diag([*((1 + 2 * ROOM) * size), 1.0])
-    domain[:3, 3] = lower - ROOM * size
+    domain = np.diag([*((1 + 2 * MARGIN) * size), 1.0])
+    domain[:3, 3] = lower - MARGIN * size
     rest = native.module.lattice_points(POINTS, domain)
     moved = rest + np.random.default_rng(1).uniform(-length, length, rest.shape) / np.sqrt(3)
     return native.module.Lattice(moved, domain)

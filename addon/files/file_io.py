@@ -24,8 +24,8 @@ from . import file_check, gltf_check, plain_files
 _GLTF = (".gltf", ".glb")
 EXTENSIONS = (".obj", ".ply", ".stl", *_GLTF)
 
-# Blender's glTF reader turns the file's (x, y, z) to (x, -z, y). _TURN_BACK, the placement of an object named _AXES,
-# undoes this turn without rounding.
+# Blender's glTF reader turns the file's (x, y, z) to (x, -z, y). _TURN_BACK undoes this turn without rounding: it is the
+# matrix between the objects of the file and their parent, which is named _AXES.
 _AXES = "axes of the file"
 _TURN_BACK = Matrix(((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, 0), (0, 0, 0, 1)))
 
@@ -150,7 +150,7 @@ def _is_bone_shape(ob):
 
 
 def _turn_back(objects):
-    """Makes the objects that a glTF file brought children of an object whose placement undoes the reader's turn."""
+    """Makes the objects that a glTF file brought children of another, by a matrix that undoes the reader's turn."""
     axes = bpy.data.objects.new(_AXES, None)
     bpy.context.collection.objects.link(axes)
     for ob in objects:

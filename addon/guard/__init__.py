@@ -13,9 +13,9 @@ from bpy.app.handlers import persistent
 from .. import status_bar
 from . import edit, lattice, sculpt, undo
 
-# Setting of Object.tolvol.guard -> the module that does it. Each module has wanted(ob), blocked(ob),
+# Setting of Object.tolvol.guard -> the module that does it. Each has wanted(ob), blocked(ob),
 # follow(ob, restored, depsgraph), rest(ob) and watches.
-ROOMS = {"sculpting": sculpt, "editing": edit, "lattice": lattice}
+MODULES = {"sculpting": sculpt, "editing": edit, "lattice": lattice}
 
 _TICK = 0.1
 
@@ -27,14 +27,14 @@ def states(ob):
 
     on: whether it guards the mesh now; None while there is nothing to guard or the guard is being prepared.
     """
-    for setting, room in ROOMS.items():
+    for setting, module in MODULES.items():
         if getattr(ob.tolvol.guard, setting):
-            yield setting, *_state(ob, room)
+            yield setting, *_state(ob, module)
 
 
-def _state(ob, room):
-    watch = room.watches.shown(ob)
-    if reason := room.blocked(ob):
+def _state(ob, module):
+    watch = module.watches.shown(ob)
+    if reason := module.blocked(ob):
         return reason, False
     if watch is None:
         return None, None
@@ -51,19 +51,19 @@ def _after_update(_scene, depsgraph):
     followed = False
     for ob in objects:
         if ob.type == "MESH":
-            for room in ROOMS.values():
-                followed |= _follow(room, ob, depsgraph)
+            for module in MODULES.values():
+                followed |= _follow(module, ob, depsgraph)
     if followed:
         _restored = None
 
 
-def _follow(room, ob, depsgraph):
-    if not room.wanted(ob):
+def _follow(module, ob, depsgraph):
+    if not module.wanted(ob):
         return False
-    if room.blocked(ob):
-        room.watches.drop(ob.name)
+    if module.blocked(ob):
+        module.watches.drop(ob.name)
         return False
-    room.follow(ob, _restored, depsgraph)
+    module.follow(ob, _restored, depsgraph)
     _redraw_panels()
     if not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=_TICK)
@@ -72,28 +72,28 @@ def _follow(room, ob, depsgraph):
 
 def _sweep():
     """Drops watches that are no longer wanted: the mode or the setting changed, or the object was removed or renamed."""
-    for room in ROOMS.values():
-        for name, _ in room.watches:
+    for module in MODULES.values():
+        for name, _ in module.watches:
             ob = bpy.data.objects.get(name)
-            if ob is None or ob.type != "MESH" or not room.wanted(ob):
-                room.watches.drop(name)
+            if ob is None or ob.type != "MESH" or not module.wanted(ob):
+                module.watches.drop(name)
 
 
 def _tick():
     """A timer for work that cannot be done in a handler. Returns the seconds to its next call, None to end the timer."""
     _sweep()
     busy = undo.expect()
-    for room in ROOMS.values():
-        for name, watch in room.watches:
-            busy |= _look_after(room, bpy.data.objects[name], watch)
+    for module in MODULES.values():
+        for name, watch in module.watches:
+            busy |= _look_after(module, bpy.data.objects[name], watch)
     return _TICK if busy else None
 
 
-def _look_after(room, ob, watch):
+def _look_after(module, ob, watch):
     """Whether the timer has to call again for this watch."""
     if watch.preparing:
         if watch.settled():
-            _follow(room, ob, bpy.context.evaluated_depsgraph_get())
+            _follow(module, ob, bpy.context.evaluated_depsgraph_get())
         return True
     if watch.rest_at is None:
         return False
@@ -101,7 +101,7 @@ def _look_after(room, ob, watch):
         watch.rest_at = None
         if said := watch.said():
             status_bar.say(f"{ob.name}: {said}")
-        room.rest(ob)
+        module.rest(ob)
     return True
 
 
@@ -129,9 +129,9 @@ def _before_redo(*_):
 def _forget(*_):
     global _restored
     _restored = None
-    for room in ROOMS.values():
-        for name, _ in room.watches:
-            room.watches.drop(name)
+    for module in MODULES.values():
+        for name, _ in module.watches:
+            module.watches.drop(name)
 
 
 _HANDLERS = (

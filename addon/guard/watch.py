@@ -41,7 +41,7 @@ def blocked(ob):
 
 
 def situation(ob):
-    """Returns a value that identifies mesh, placement, tolerance, directions, crossings and reference. When it changes, a
+    """Returns a value that identifies mesh, matrix, tolerance, directions, crossings and reference. When it changes, a
     new watch is needed."""
     settings, key = ob.tolvol, ob.active_shape_key
     return (

@@ -11,11 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Smallest and largest ratio of successive values in the coarse steps: the farther from the tolerance, the larger.
+# Successive values in the coarse steps have a ratio between these two: the farther from the tolerance, the larger.
 _COARSE, _COARSEST = 1.2, 2.0
-NEAR = 2.0  # tolerances; the fine steps begin where the deviation is first below, because neighbours may differ by half
-_FINE = 1.015  # ratio of successive values in the fine steps
-_BARELY = 1.06  # tolerances; beside a value with a deviation below this one, values half a fine step away are tried
+# The fine steps begin where the deviation is first below so many tolerances, because neighbours may differ by half.
+NEAR = 2.0
+# Successive values in the fine steps have this ratio.
+_FINE = 1.015
+# Beside a value whose deviation is below so many tolerances, values half a fine step away are tried.
+_BARELY = 1.06
 
 
 def search(first, last):

@@ -11,9 +11,10 @@ from ..units import area, length
 from .blocked import allowed
 from .check import Comparison
 
-# A place fills about this share of the view or less: what is around has to be seen, too.
+# The eye is so many radii of a place away from it, or more: what is around has to be seen, too.
 _AROUND = 3.0
-_LEAST = 0.2  # of the size of the reference
+# The eye is never nearer than this share of the size of the reference.
+_LEAST = 0.2
 # The view is turned unless the surface at the place looks at the eye at least so much (a cosine).
 _FACING = 0.3
 

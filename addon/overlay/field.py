@@ -27,10 +27,10 @@ _failed = {}  # key -> the reason why the Field could not be made
 class Field:
     """A reference on the GPU."""
 
-    def __init__(self, tree, placement):
+    def __init__(self, tree, matrix):
         self.tree = tree
         self.to_frame = tree.to_frame
-        self.placement = placement  # the placement of the reference when the tree was made
+        self.matrix = matrix  # the matrix of the reference to the world when the tree was made
         self.leaves = len(tree.nodes) // 4
         self._textures = None
 
@@ -70,7 +70,7 @@ def field_of(ob, tolerance, changed):
         return None, reason
     own = ob.tolvol.snapshot_kind == "SELF"
     # A tree of a reference that was scaled since it was made has wrong distances.
-    if field is None or own and not measurements.same_shape(field.placement, snapshots.reference_matrix(ob)):
+    if field is None or own and not measurements.same_shape(field.matrix, snapshots.reference_matrix(ob)):
         work.later(
             ("field", key),
             0,
@@ -128,4 +128,4 @@ def keep_only(keys):
 def vertex_to_frame(field, ob):
     """Returns (4, 4): the matrix from the object's vertices to the frame of the field's tree."""
     own = ob.tolvol.snapshot_kind == "SELF"
-    return field.to_frame @ (field.placement if own else mesh_io.matrix_array(ob.matrix_world))
+    return field.to_frame @ (field.matrix if own else mesh_io.matrix_array(ob.matrix_world))

@@ -8,20 +8,22 @@ from ..proof.verdict import FAIL, NOT_CHECKED, PASS
 from ..units import NO_BREAK, length
 from . import shaders
 
-_FONT = 0  # Blender's own
-_POINTS = 11
-# The sizes are in pixels at an interface scale of 1.
+# Blender's own font has this number.
+_FONT = 0
+# The verdict is written in so many points, all other text in fewer.
+_LARGE, _POINTS = 20, 11
+# All further sizes are in pixels at an interface scale of 1. The bar of colours is so wide and, without bands, so high.
 _BAR = 14, 132
-_ROW = 17
-_BAND_ROW = 15
-_GAP = 10  # between the parts of the legend and around them
-_MARGIN = 14  # between the legend and the edges of the view
+# Lines of text follow one another at this distance, and bands at least at the second one.
+_ROW, _BAND_ROW = 17, 15
+# There is so much space between the parts of the legend and around them, and between the legend and the edges of the view.
+_GAP, _MARGIN = 10, 14
+# Stripes follow one another at this distance.
 _STRIPE = 12
-_WORD = 30  # the height of the line with the verdict
-_MARK = 16  # the coloured square beside the verdict
+# The line with the verdict is so high, and the coloured square beside the verdict so wide.
+_WORD, _MARK = 30, 16
 # The legend has room in a view of which it takes at most these shares of the width and the height.
 _MOST_WIDTH, _MOST_HEIGHT = 0.5, 0.75
-_LARGE = 20  # points of the verdict
 # The colours of Blender's icons in the panel. The word beside them says the same without colours.
 _COLOURS = {PASS: (0.47, 0.8, 0.43), FAIL: (0.88, 0.38, 0.35), NOT_CHECKED: (0.6, 0.6, 0.6)}
 

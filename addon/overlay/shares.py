@@ -11,7 +11,7 @@ from .scale import rounded_up
 
 _EVERY = 0.25  # seconds between two counts while a mesh goes on changing
 
-# Name of an object -> ((state of the surface, field, tolerance, placement, scale) that the shares are of, Scale, shares).
+# Name of an object -> ((state of the surface, field, tolerance, to_world, scale) that the shares are of, Scale, shares).
 _known = {}
 
 
@@ -19,11 +19,11 @@ def known(ob, surface, found, scale, automatic, changed):
     """Returns the shares in the bands of a Scale and beyond the tolerance, or None while they are not known.
 
     automatic: whether the colours are to end at the largest distance; the shares are then those of automatic_scale(). If
-    mesh, placement or scale have changed, the shares are counted anew, and then changed() is called.
+    mesh, matrix or scale have changed, the shares are counted anew, and then changed() is called.
     """
-    placement = np.linalg.inv(found.to_frame) @ field.vertex_to_frame(found, ob)
+    to_world = np.linalg.inv(found.to_frame) @ field.vertex_to_frame(found, ob)
     wanted = replace(scale, reach=scale.tolerance) if automatic else scale
-    about = surface.changes, id(found), scale.tolerance, placement.tobytes(), wanted, automatic
+    about = surface.changes, id(found), scale.tolerance, to_world.tobytes(), wanted, automatic
     name = ob.name
     last = _known.get(name)
     if last is not None and last[0] == about:
@@ -33,21 +33,21 @@ def known(ob, surface, found, scale, automatic, changed):
             ("shares", name),
             _EVERY if last else 0,
             lambda: functools.partial(
-                _count, found.tree, surface.vertices, surface.triangles, placement, wanted, automatic
+                _count, found.tree, surface.vertices, surface.triangles, to_world, wanted, automatic
             ),
             functools.partial(_finish, name, about, changed),
         )
     return None
 
 
-def _count(tree, vertices, triangles, placement, scale, automatic, progress):
+def _count(tree, vertices, triangles, to_world, scale, automatic, progress):
     """Returns (Scale, shares). Distances between the vertices may be larger than the automatic range by little."""
     if automatic:
         used = vertices[np.unique(triangles)]
-        largest = np.abs(tree.signed_distance(used, to_world=placement, progress=progress)).max()
+        largest = np.abs(tree.signed_distance(used, to_world=to_world, progress=progress)).max()
         if largest > tree.ROUNDING / tree.scale:
             scale = replace(scale, reach=rounded_up(float(largest)))
-    counted = tree.shares(vertices, triangles, scale.edges(), to_world=placement, progress=progress)
+    counted = tree.shares(vertices, triangles, scale.edges(), to_world=to_world, progress=progress)
     return scale, scale.fold(counted)
 
 

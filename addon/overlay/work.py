@@ -8,7 +8,8 @@ import bpy
 from .. import native
 from ..job import Job
 
-_TICK = 0.05  # seconds
+# The timer looks for work after so many seconds.
+_TICK = 0.05
 
 _waiting = {}  # key of a task -> (the time at which it may begin, prepare, finish)
 _running = None  # (about, finish, job)

@@ -22,7 +22,7 @@ class TOLVOL_PT_guard(SubPanel, bpy.types.Panel):
         ob = active(context)
         settings = ob.tolvol.guard
         states = {setting: state for setting, *state in guard.states(ob)}
-        for setting in guard.ROOMS:
+        for setting in guard.MODULES:
             layout.prop(settings, setting)
             if setting == "editing":
                 row = layout.row()

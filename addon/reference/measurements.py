@@ -46,7 +46,7 @@ def measurement_of(ob):
 
 
 def same_shape(matrix, other):
-    """Whether two placements differ only by a rigid motion, so that lengths are the same."""
+    """Whether two matrices to the world differ only by a rigid motion, so that lengths are the same."""
     metric, metric_other = (m[:3, :3].T @ m[:3, :3] for m in (matrix, other))
     return np.abs(metric - metric_other).max() <= _RIGID * np.abs(metric).max()
 

@@ -21,8 +21,10 @@ namespace {
 namespace py = pybind11;
 using Seconds = std::chrono::duration<double>;
 
-constexpr double kPermissionPrecision = 4;           // what Zelinka and Garland recommend
-constexpr std::optional<double> kCoarse = 1.0 / 16;  // of a volume that nobody asks
+/// Zelinka and Garland recommend so many cells per tolerance.
+constexpr double kPermissionPrecision = 4;
+/// A volume that nobody asks has so few nodes per tolerance.
+constexpr std::optional<double> kCoarse = 1.0 / 16;
 
 /// A baseline and what it needs, built within a time of its own.
 struct Baseline {

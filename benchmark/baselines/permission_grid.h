@@ -31,8 +31,10 @@ class PermissionGrid {
   const glm::ivec3& cells() const { return cells_; }
   std::size_t memory() const { return bits_.size(); }  ///< bytes held
 
-  static constexpr std::size_t kBudget = std::size_t{2} << 30;  ///< bytes of bits
-  static constexpr std::size_t kSlab = std::size_t{16} << 20;   ///< bytes of distances
+  /// The bits of a grid may take so many bytes.
+  static constexpr std::size_t kBudget = std::size_t{2} << 30;
+  /// The distances that a thread holds at a time take so many bytes, or those of one layer of cells if these are more.
+  static constexpr std::size_t kSlab = std::size_t{16} << 20;
 
  private:
   std::size_t byte_of(const glm::ivec3& c) const {

@@ -11,7 +11,9 @@
 namespace tolvol::baselines {
 namespace {
 
-constexpr double kSlack = 1e-9;  // of a cell: what rounding may hide
+/// A triangle counts as overlapping a cell if they are so near or nearer, in widths of a cell: rounding may hide that
+/// they overlap.
+constexpr double kSlack = 1e-9;
 
 /// A projection of the triangle along an axis, as what the lowest corner (x, y) of a unit cell must fulfil to overlap
 /// it: x * nx + y * ny + d >= 0 for each edge.

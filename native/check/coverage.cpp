@@ -93,7 +93,7 @@ bool Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
   bool all = true;
   std::vector<Part> stack{whole(triangle)};
   std::size_t looked = 0;
-  bool is_hopeless = false;
+  bool found_beyond = false;
   std::uint32_t hint = Hierarchy::kNone;
   while (!stack.empty()) {
     poll();
@@ -116,10 +116,10 @@ bool Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
     const double radius =
         std::sqrt(std::max({glm::dot(c[0] - centre, c[0] - centre), glm::dot(c[1] - centre, c[1] - centre),
                             glm::dot(c[2] - centre, c[2] - centre)}));
-    is_hopeless = is_hopeless || closest.distance > provable;
-    const double floor = (is_hopeless ? kFloor : kHeadroom) * limit_;
+    found_beyond = found_beyond || closest.distance > provable;
+    const double floor = (found_beyond ? kFloor : kHeadroom) * limit_;
     const bool finest = longest_squared(piece) <= floor * floor || piece.cuts == kMostCuts ||
-                        (++looked > kBudget && (is_hopeless || budget_of_first_ == 0 || --budget_of_first_ == 0));
+                        (++looked > kBudget && (found_beyond || budget_of_first_ == 0 || --budget_of_first_ == 0));
     if (closest.distance > provable + radius || finest) {
       nearest.push_back(closest.triangle);
       all = false;

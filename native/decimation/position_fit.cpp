@@ -63,9 +63,9 @@ void PositionFit::prepare(const Change& change) {
   }
 }
 
-/// It ends at the first deviation beyond the limit, as add_faces() does.
-void PositionFit::add_pieces(const Change& change, double hopeless, Sums& sums) const {
-  for (std::size_t first = 0; first < samples_.size() && sums.deviation() <= hopeless; first += 4) {
+/// It ends at the first deviation beyond `most`, as add_faces() does.
+void PositionFit::add_pieces(const Change& change, double most, Sums& sums) const {
+  for (std::size_t first = 0; first < samples_.size() && sums.deviation() <= most; first += 4) {
     const auto at = [&](std::size_t k) { return std::min(first + k, samples_.size() - 1); };
     if (first % kBetweenPolls == 0) poll();
     FourPoints points;
@@ -90,8 +90,8 @@ void PositionFit::add_pieces(const Change& change, double hopeless, Sums& sums) 
   }
 }
 
-void PositionFit::add_faces(const Change& change, double hopeless, Sums& sums) const {
-  for (std::size_t i = 0; i < faces_.size() && sums.deviation() <= hopeless; ++i) {
+void PositionFit::add_faces(const Change& change, double most, Sums& sums) const {
+  for (std::size_t i = 0; i < faces_.size() && sums.deviation() <= most; ++i) {
     const WitnessTriangle& t = faces_[i];
     const glm::dvec3 corners[3] = {t.a, t.a + t.ab, t.a + t.ac};
     const Change::Face& face = change.faces()[i];
@@ -105,15 +105,15 @@ void PositionFit::add_faces(const Change& change, double hopeless, Sums& sums) c
   }
 }
 
-PositionFit::Fit PositionFit::fit(const Change& change, const glm::dvec3& position, double hopeless) {
+PositionFit::Fit PositionFit::fit(const Change& change, const glm::dvec3& position, double most) {
   const double limit = bounds_->forward().limit();
   Sums sums{1 / (limit * limit)};
   prepare(change);
-  add_pieces(change, hopeless, sums);
-  add_faces(change, hopeless, sums);
+  add_pieces(change, most, sums);
+  add_faces(change, most, sums);
   const double trace = sums.m[0][0] + sums.m[1][1] + sums.m[2][2];
   const double deviation = sums.deviation();
-  if (!(trace > 0) || deviation > hopeless) return {sums.energy, deviation, position};
+  if (!(trace > 0) || deviation > most) return {sums.energy, deviation, position};
   for (int i = 0; i < 3; ++i) sums.m[i][i] += kDamping * trace;
   glm::dvec3 step = glm::inverse(sums.m) * sums.g;
   const double length = glm::length(step);
@@ -125,11 +125,11 @@ ChangeTrial::Outcome PositionFit::collapse(ChangeTrial& trial, Change::Halfedge 
                                            std::span<const double> give_up_above) {
   glm::dvec3 position = start;
   bool first = true;
-  for (const double hopeless : give_up_above) {
+  for (const double most : give_up_above) {
     if (!trial.prepare_collapse(h, mesh_->store(position))) return ChangeTrial::Outcome::impossible;
     if (std::exchange(first, false)) gather(trial.change());
-    const Fit found = fit(trial.change(), position, hopeless);
-    if (found.deviation > hopeless) break;
+    const Fit found = fit(trial.change(), position, most);
+    if (found.deviation > most) break;
     position = found.position;
     const ChangeTrial::Outcome outcome = trial.try_collapse(h, mesh_->store(position));
     if (outcome != ChangeTrial::Outcome::refused) return outcome;

@@ -29,8 +29,8 @@ class PositionFit {
     glm::dvec3 position;  ///< A position that lowers the energy, to first order.
   };
   /// The fit of the faces as the change would leave them, with its vertex at `position`. About 10 ns for each face and
-  /// piece. Where the deviation is beyond `hopeless`, only that is found.
-  Fit fit(const Change& change, const glm::dvec3& position, double hopeless = std::numeric_limits<double>::infinity());
+  /// piece. Where the deviation is beyond `most`, only that is found.
+  Fit fit(const Change& change, const glm::dvec3& position, double most = std::numeric_limits<double>::infinity());
   /// Tries a collapse at fitted positions: it takes a step from `start` for each of the limits, until the collapse is
   /// possible. It is refused where the deviation before a step, over the tolerance, is beyond the step's limit.
   ChangeTrial::Outcome collapse(ChangeTrial& trial, Change::Halfedge h, const glm::dvec3& start,
@@ -39,8 +39,8 @@ class PositionFit {
  private:
   struct Sums;
   void prepare(const Change& change);
-  void add_pieces(const Change& change, double hopeless, Sums& sums) const;
-  void add_faces(const Change& change, double hopeless, Sums& sums) const;
+  void add_pieces(const Change& change, double most, Sums& sums) const;
+  void add_faces(const Change& change, double most, Sums& sums) const;
 
   const BoundedMesh* mesh_;
   const CertifiedBounds* bounds_;

@@ -11,7 +11,9 @@
 namespace tolvol {
 namespace {
 
-constexpr double kFinestPrecision = 1;  // in nodes per tolerance; finer grids cost time and save the certificate none
+// Where no precision is given, a grid has at most so many nodes per tolerance: a finer one costs time and saves the
+// certificate none.
+constexpr double kFinestPrecision = 1;
 
 // Returns node counts as doubles, because a precision far too fine must not overflow an integer before it is refused.
 struct Layout {

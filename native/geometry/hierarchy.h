@@ -76,8 +76,9 @@ class Hierarchy {
 
  private:
   static constexpr int kWidth = OrientedBoxes::kWidth;
-  static constexpr std::uint32_t kTriangle = 0x80000000u;        // marks a place in the sorted order
-  static constexpr double kFloatReach = 64, kReach = 134217728;  // are in half sizes (hierarchy.cpp)
+  static constexpr std::uint32_t kTriangle = 0x80000000u;  // This bit marks a child as a place in the sorted order.
+  // Points farther out than so many half sizes are compared in double, or moved towards the centre (hierarchy.cpp).
+  static constexpr double kFloatReach = 64, kReach = 134217728;
 
   struct alignas(32) Node {
     float lower[3][kWidth], upper[3][kWidth];  // are local and rounded outwards; an empty child lies infinitely far
@@ -134,11 +135,12 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
   ClosestPoint closest{glm::dvec3(0), glm::dvec3(0), std::numeric_limits<double>::infinity()};
   const double reach = beyond_reach ? closest.distance_squared : radius * scale_;
   double bound = reach * reach * (1 + 1e-12);  // is a little larger; the end compares the distance
-  constexpr unsigned kCrowd = 16;              // triangles; most searches look at fewer, and gain nothing by planes
+  // Most searches look at fewer triangles than this, and would gain nothing by comparing with their planes.
+  constexpr unsigned kFew = 16;
   unsigned tried = 0;
   auto attempt = [&](std::uint32_t place) {
     const Corners& t = corners_[place];
-    if (++tried > kCrowd && is_beyond(q, t[0], t[1], t[2], closest.distance_squared)) return;
+    if (++tried > kFew && is_beyond(q, t[0], t[1], t[2], closest.distance_squared)) return;
     const ClosestPoint candidate = closest_point(q, t[0], t[1], t[2]);
     if (candidate.distance_squared > closest.distance_squared) return;
     std::uint32_t triangle = triangle_[place];

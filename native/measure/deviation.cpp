@@ -32,14 +32,20 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kPieces = 65536;        // is the first number of pieces, about 0.4 % of the size of a scan apart
-constexpr std::size_t kBudget = 524288;  // is the most pieces, or kBudgetPerTriangle for each triangle if that is more
-constexpr std::size_t kBudgetPerTriangle = 4;
-constexpr double kEnough = 0.001;               // is the width of the range of the mean over the largest distance
-constexpr double kNoise = 256 * kUnitRoundoff;  // in frame lengths; a range of the mean no wider than this is rounding
+// A surface is first cut into about so many pieces. Those of a scan are then about 0.4 % of its size apart.
+constexpr double kPieces = 65536;
+// There are at most so many pieces, or so many for each triangle if that is more.
+constexpr std::size_t kBudget = 524288, kBudgetPerTriangle = 4;
+// Pieces are cut until the range of the mean is no wider than this share of the largest distance.
+constexpr double kEnough = 0.001;
+// A range of the mean that is no wider than this, in the frame, is rounding.
+constexpr double kNoise = 256 * kUnitRoundoff;
+// Rounding changes a share by at most so much.
 constexpr double kShareRounding = 32 * kUnitRoundoff;
-constexpr std::size_t kChunk = 4096;  // pieces are handled between two looks at the progress
-constexpr std::size_t kBlock = 64;    // pieces are handed to a thread at once
+// The progress is looked at after so many pieces.
+constexpr std::size_t kChunk = 4096;
+// A thread takes so many pieces at once.
+constexpr std::size_t kBlock = 64;
 
 /// Returns the weight of a piece in the averages. It depends on the number of corners of the pieces.
 enum Measure { number = 1, length = 2, area = 3 };

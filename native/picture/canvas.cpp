@@ -12,7 +12,8 @@
 namespace tolvol {
 namespace {
 
-constexpr int kMostSamples = 8;  // along an axis of a pixel; more than 64 in all cannot be told apart in 8 bits
+// A pixel has at most so many samples along each axis: more than 64 in all cannot be told apart in 8 bits.
+constexpr int kMostSamples = 8;
 
 /// Averages the samples of a tile into its pixels of the image.
 void resolve(const std::vector<std::uint8_t>& drawn, int row, const glm::ivec2& from, const glm::ivec2& count,

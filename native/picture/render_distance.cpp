@@ -6,8 +6,10 @@
 namespace tolvol {
 namespace {
 
-constexpr int kTile = 1024;    // is in samples; a call can be cancelled between tiles
-constexpr float kStripe = 12;  // is in pixels, from one stripe to the next
+// A tile has so many samples along each axis. A call can be cancelled between tiles.
+constexpr int kTile = 1024;
+// Stripes follow one another at this distance, in pixels.
+constexpr float kStripe = 12;
 
 }  // namespace
 

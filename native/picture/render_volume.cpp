@@ -12,8 +12,11 @@
 namespace tolvol {
 namespace {
 
-constexpr int kTile = 256;     // is in samples; a call can be cancelled between tiles
-constexpr int kFarNodes = 40;  // along the longest side; more nodes cost more to fill than they save in steps
+// A tile has so many samples along each axis. A call can be cancelled between tiles.
+constexpr int kTile = 256;
+// The field far from the surface has so many nodes along the longest side of its box: more cost more to fill than they
+// save in steps.
+constexpr int kFarNodes = 40;
 
 glm::vec4 plane_in_nodes(const VolumeRenderer::Cut& cut, const Frame& frame, const PictureField& field) {
   const glm::dvec3 normal =

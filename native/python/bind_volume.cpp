@@ -186,7 +186,7 @@ groups : (m,) integer array, optional
 method : {"certificate", "gl_certificate", "occlusion_query", "paper", "paper_half_h"}
     "certificate" finds exact witnesses on the CPU, at any precision. It alone proves Verdict.OUTSIDE.
     "gl_certificate" does so in a compute shader, for batches of small faces. What it cannot prove is Verdict.UNPROVED.
-    "occlusion_query" draws a lattice of samples of each face and counts those that an interpolated distance shows to be
+    "occlusion_query" draws regular samples of each face and counts those that an interpolated distance shows to be
     outside. The volume needs a precision of 2 or more; 4 is good. With groups it makes one query for each: this is slow
     for small groups and fast for a single one.
     "paper" and "paper_half_h" are the check as it was published, with a margin of sqrt(3)/2 or 1/2 of the grid spacing.

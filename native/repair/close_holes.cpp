@@ -27,7 +27,8 @@ constexpr std::uint32_t kNone = HoleClosingResult::kNone;
 /// A loop is searched for a filling at most so many times, a long one less often. After each search but the last, faces
 /// that are in the way are gone around, and one of two triangles that cross, or that lie on one edge, is left out.
 constexpr int kMostTries = 32, kMostTriesOfLong = 8;
-constexpr std::size_t kLong = 200;  ///< corners
+/// A loop with more corners than this is long.
+constexpr std::size_t kLong = 200;
 /// A loop is given up after so many of its triangles were refused, in all searches together.
 constexpr std::size_t kMostRefused = 50000;
 /// Where the triangles of a loop cross more faces than so many, each further triangle is compared with all faces near
