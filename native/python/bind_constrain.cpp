@@ -137,7 +137,10 @@ warnings : a list of sentences)doc");
 
 Vertex v ends at before + f (after - before), rounded to the stored type, where f is its factor. All faces of the result
 are inside the volume, also where the factors of their corners differ, and every point of the reference is within the
-tolerance of the result. A vertex that touches no face that failed ends exactly at `after`, bit for bit.
+tolerance of the result. Vertices at one place in both arrays have one factor. What holds a T-junction together, where a
+vertex lies on an open edge or, at an open edge itself, on another edge or the inside of a face, stays; a warning counts
+it. Any other vertex ends exactly at `after`, bit for bit, if neither it nor a vertex at its place touches a face that
+failed.
 
 Parameters
 ----------
