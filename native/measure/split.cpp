@@ -51,13 +51,22 @@ Parts cut_at(const TriangleCorners& p, const std::array<double, 3>& side) {
   return {{{{p[i], on_j, on_k}, {on_j, p[j], on_k}, {on_k, p[j], p[k]}}}, 3};
 }
 
-/// Returns no part if no edge of t divides the piece.
+/// Returns no part if no edge of t divides the piece, nor an end of t if t is flat within rounding: a segment.
 Parts cut_along(const TriangleCorners& p, const TriangleCorners& t) {
   const dvec3 normal = glm::cross(t[1] - t[0], t[2] - t[0]);
+  int longest = 0;
+  std::array<double, 3> length;
+  for (int e = 0; e < 3; ++e) {
+    length[e] = glm::distance(t[e], t[(e + 1) % 3]);
+    if (length[e] > length[longest]) longest = e;
+  }
+  const bool flat = glm::length(normal) <= kNoise * length[longest];
+  const dvec3 segment = t[(longest + 1) % 3] - t[longest];
   std::array<double, 3> side{};
   double best = 0;
   for (int e = 0; e < 3; ++e) {
-    const dvec3 outward = glm::cross(t[(e + 1) % 3] - t[e], normal);
+    if (flat && e == (longest + 2) % 3) continue;  // is between the ends
+    const dvec3 outward = !flat ? glm::cross(t[(e + 1) % 3] - t[e], normal) : e == longest ? -segment : segment;
     const double norm = glm::length(outward);
     if (!(norm > 0)) continue;
     std::array<double, 3> s;

@@ -23,7 +23,8 @@ struct Parts {
 /// is as small as rounding. A segment, two corners of which are equal, has two segments with one common point as parts.
 /// `t` is the triangle of the other surface nearest to the piece. A piece that is much longer than `t` is cut in two at
 /// the middle of its longest edge. Any other piece is cut along the edge of `t` that divides it best, by the plane that
-/// is perpendicular to `t`: over a part above `t` the distance from `t` is largest at a corner. If none divides it, it
+/// is perpendicular to `t`: over a part above `t` the distance from `t` is largest at a corner. If `t` is flat within
+/// rounding, it has two ends instead, and the planes there are perpendicular to it. If no plane divides the piece, it
 /// is cut where `other` begins to be nearer than `t`, or else in two. `other` is the triangle nearest to the corner
 /// that is farthest from `t`; it may be `t`. O(1).
 Parts split(const TriangleCorners& piece, const TriangleCorners& t, const TriangleCorners& other);

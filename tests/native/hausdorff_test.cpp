@@ -306,6 +306,29 @@ TEST(Hausdorff, OutlinesTakeWorkInProportion) {
   }
 }
 
+// A straight line that is cut at other places is cut once at each of them, and not halved until the parts are rounding.
+TEST(Hausdorff, StraightOutlinesTakeFewPiecesForEachCut) {
+  shapes::Random random(5);
+  const auto line = [&](unsigned cuts, unsigned third) {
+    std::vector<double> at{0, 1};
+    for (unsigned i = 0; i < cuts; ++i) at.push_back(random.share());
+    std::sort(at.begin(), at.end());
+    TriangleMesh mesh;
+    for (const double x : at) mesh.vertices.push_back(x * dvec3(1, 0.3, -0.7));
+    for (unsigned i = 0; i <= cuts; ++i) mesh.triangles.emplace_back(i, i + 1, third == 0 ? i : i + 1);
+    return mesh;
+  };
+  for (const unsigned third : {0u, 1u}) {
+    std::array<std::size_t, 2> polls{};
+    for (const unsigned n : {2000u, 8000u}) {
+      const TriangleMesh a = line(n, third), b = line(n, third), one = line(0, third);
+      for (const auto& [from, to] : {std::pair{a, b}, {one, b}, {b, one}}) polls[n == 8000] += polls_of(from, to);
+    }
+    EXPECT_LT(polls[1], 6 * polls[0]) << third;
+    EXPECT_LT(polls[1], 6000u) << third;
+  }
+}
+
 // All triangles of a fan meet in one point, and the boxes of most of them hold any point near the middle.
 TEST(Hausdorff, FansTakeLittleForEachTriangle) {
   shapes::Random random(12);

@@ -54,6 +54,25 @@ TEST(Split, CutsAlongTheEdges) {
   EXPECT_NEAR(above, 0.5, 1e-12);
 }
 
+// A triangle without a width has no edges to cut along: it is a segment, and the piece is cut at its ends, whichever of
+// its corners are equal or between the others.
+TEST(Split, CutsAtTheEndsOfASegment) {
+  const dvec3 p(0, 0, 0.1), q(1, 0.5, 0.1), end(0.3, 0.15, 0), other_end(1.2, 0.6, 0);
+  const TriangleCorners piece{p, q, q};
+  for (const dvec3& third : {end, other_end, glm::mix(end, other_end, 0.25)}) {
+    for (int turn = 0; turn < 3; ++turn) {
+      TriangleCorners t;
+      t[turn] = end, t[(turn + 1) % 3] = other_end, t[(turn + 2) % 3] = third;
+      const Parts parts = split(piece, t, t);
+      ASSERT_EQ(parts.count, 2);
+      EXPECT_LT(glm::distance(parts.corners[0][1], dvec3(0.3, 0.15, 0.1)), 1e-15);
+      EXPECT_EQ(parts.corners[1][0], parts.corners[0][1]);
+    }
+  }
+  const dvec3 point(0.3, 0, 0);
+  EXPECT_EQ(split(piece, {point, point, point}, {point, point, point}).count, 2) << "a point has no ends: halved";
+}
+
 // A piece that stands between two sheets is cut where both are as near, so that each part has one that is nearest.
 TEST(Split, CutsBetweenTwoSheets) {
   const TriangleCorners below{dvec3(-9, -9, 0), dvec3(9, -9, 0), dvec3(0, 9, 0)};
