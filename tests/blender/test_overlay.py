@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Show Deviation without a window: its computations, and the reasons why it draws nothing. tests/ui tests the drawing."""
 
+import copy
+import threading
+
 import bpy
 import numpy as np
 import pytest
@@ -244,6 +247,35 @@ def test_shares_of_another_tolerance_or_mesh_are_left_blank(monkeypatch):
     found.touch(True)
     found.update(ob, bpy.context.evaluated_depsgraph_get())
     assert known(0.05) is None
+    shares.forget()
+
+
+def test_the_count_of_shares_is_cancelled_in_its_middle():
+    ob = with_reference(torus())
+    found = surface.Surface()
+    found.update(ob, bpy.context.evaluated_depsgraph_get())
+    made = field._prepare(ob.name, 0.05)(None)
+    began, outcomes = threading.Event(), []
+
+    class LongTree:
+        """Counts again and again, as long as it takes with a large mesh."""
+
+        def shares(self, *mesh, progress, **place):
+            try:
+                while True:
+                    made.tree.shares(*mesh, progress=progress, **place)
+                    began.set()
+            except Exception as error:
+                outcomes.append(error)
+                raise
+
+    slow = copy.copy(made)
+    slow.tree = LongTree()
+    assert shares.known(ob, found, slow, scale(0.05), False, lambda: None) is None
+    work._tick()
+    assert began.wait(60) and not outcomes
+    work.stop()  # waits for the thread
+    assert len(outcomes) == 1 and isinstance(outcomes[0], native.module.Cancelled)
     shares.forget()
 
 
