@@ -112,8 +112,9 @@ def _set_placement(settings, value):
 
 
 def _get_percent(settings):
-    """Returns the chosen percentage, or the default of the preferences if none was chosen."""
-    return settings.percent_choice or preferences.tolerance(bpy.context)
+    """Returns the chosen percentage, or the default of the preferences if none was chosen or if the file is damaged."""
+    choice = settings.percent_choice
+    return choice if snapshots.sound(choice) else preferences.tolerance(bpy.context)
 
 
 def _set_percent(settings, value):

@@ -3,6 +3,8 @@
 
 import json
 
+from .report import DAMAGED
+
 # The cause for which the vertices that have to stay can be found in the mesh.
 ISLANDS = "UV islands meet"
 # The cause of vertices that the user protected: it is no surprise.
@@ -23,5 +25,5 @@ def of(ob):
         kept = json.loads(ob.tolvol.warnings or '{"warnings": [], "staying": {}}')
         warnings = [text for text in kept["warnings"] if isinstance(text, str)]
         return warnings, {str(cause): int(count) for cause, count in kept["staying"].items()}
-    except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
+    except DAMAGED:
         return [], {}

@@ -12,6 +12,9 @@ from ..units import three_digits
 from . import solidity
 from .verdict import Interval
 
+# What reading JSON can raise that a damaged file holds in place of what was written.
+DAMAGED = (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError)
+
 # The distance of the reference counts as no larger than before if its upper end grew by at most this share, the width of a
 # certified interval (native/measure/hausdorff.h): equal distances count as equal.
 _RESOLUTION = 0.001
@@ -149,7 +152,7 @@ def remembered(text):
         if "solidity" in run:
             lines.append(solidity.summary(run["solidity"]["after"], run["solidity"]["change"]))
         return lines
-    except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
+    except DAMAGED:
         return None
 
 
@@ -158,7 +161,7 @@ def remembered_holes(text):
     try:
         holes = json.loads(text)["holes"]
         return holes if holes and holes_closed(holes) else None
-    except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
+    except DAMAGED:
         return None
 
 

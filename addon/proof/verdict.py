@@ -8,7 +8,7 @@ Verdict, so they always agree.
 import math
 from dataclasses import dataclass
 
-from ..reference import measurements, tolerances
+from ..reference import measurements, snapshots, tolerances
 from ..units import NO_BREAK, three_digits
 
 # The words for the outcome that are shown everywhere.
@@ -129,13 +129,26 @@ class Verdict:
         return f"Beyond the tolerance{share}"
 
 
+# A distance is this many times larger or smaller than the tolerance only if the file is damaged.
+_MOST = 1e300
+
+
+def _comparable(distance, tolerance):
+    return snapshots.sound(tolerance) and (distance == 0 or 1 / _MOST < distance / tolerance < _MOST)
+
+
 def of(ob):
-    """Returns the Verdict of the last measurement of `ob` for the present tolerance, or None without a measurement."""
+    """Returns the Verdict of the last measurement of `ob` for the present tolerance, or None.
+
+    It is None without a measurement, and if a number in the file is damaged.
+    """
     measured = measurements.measurement_of(ob)
     if measured is None:
         return None
     # A percentage is taken of the size that was measured: rotating the object changes its size by rounding.
     tolerance = tolerances.tolerance_length(ob.tolvol, measured.size)
+    if not all(_comparable(distance, tolerance) for distance in (measured.forward, measured.backward)):
+        return None
     return Verdict(
         tolerance,
         Interval(measured.forward_lower, measured.forward),

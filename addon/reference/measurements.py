@@ -38,7 +38,8 @@ def measurement_of(ob):
     measurement = ob.tolvol.measurement
     if ob.mode != "OBJECT" or not measurement.complete or measurement.fingerprint != shown_fingerprint(ob):
         return None
-    if not all(map(snapshots.sound, (measurement.tolerance, 1 + measurement.forward, 1 + measurement.backward))):
+    lengths = measurement.tolerance, measurement.size, 1 + measurement.forward, 1 + measurement.backward
+    if not all(map(snapshots.sound, lengths)):
         return None  # The file is damaged.
     before, now = snapshots.stored_matrix(measurement.matrix), mesh_io.matrix_array(ob.matrix_world)
     moves_along = ob.tolvol.snapshot_kind == "SELF" and same_shape(before, now)

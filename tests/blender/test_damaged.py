@@ -8,7 +8,7 @@ import bpy
 import pytest
 
 from addon import reference
-from addon.proof import report
+from addon.proof import kept_warnings, report, verdict
 from addon.reference import measurements, snapshots
 from scenes import torus
 
@@ -29,6 +29,8 @@ def damaged_runs(text):
     for key in ("input", "output", "outside", "solidity"):
         for value in (None, [], 3, "text", {}, {"triangles": None, "faces": "x"}, {"triangles": [], "faces": [1]}):
             yield json.dumps(run | {key: value})
+    for zeros in (400, 5000):  # no float can hold the first number, and JSON is not read with the second
+        yield text.replace(json.dumps(run["solidity"]["change"]["area"]), "1" + zeros * "0", 1)
 
 
 def test_a_damaged_run_is_no_run(decimated):
@@ -36,11 +38,56 @@ def test_a_damaged_run_is_no_run(decimated):
         assert report.remembered(text) is None, text[:200]
 
 
-@pytest.mark.parametrize("value", [math.nan, -1.0])
-@pytest.mark.parametrize("name", ["tolerance", "forward", "backward"])
-def test_a_damaged_measurement_is_none(decimated, name, value):
-    setattr(decimated.tolvol.measurement, name, value)
+def test_damaged_holes_are_none(decimated):
+    for holes in ({}, {"closed": 1}, {"closed": "x", "refused": 0}, {"closed": 1, "refused": {"outside": [10**400]}}):
+        assert report.remembered_holes(json.dumps({"holes": holes})) is None
+
+
+@pytest.mark.parametrize("count", ["Infinity", "-Infinity", "NaN", "1" * 5000, "[]", '"x"'])
+def test_damaged_warnings_are_none(decimated, count):
+    decimated.tolvol.warnings = f'{{"warnings": ["a"], "staying": {{"UV islands meet": {count}}}}}'
+    assert kept_warnings.of(decimated) == ([], {})
+
+
+@pytest.mark.parametrize("digits", ["", "x", "nan", "inf", "1e999", "-inf", "-1"])
+@pytest.mark.parametrize("name", ["tolerance", "size", "forward", "backward"])
+def test_a_damaged_measurement_is_none(decimated, name, digits):
+    setattr(decimated.tolvol.measurement, f"{name}_digits", digits)
     assert measurements.measurement_of(decimated) is None
+
+
+def test_a_measurement_of_nothing_is_none(decimated):
+    for name in ("tolerance", "size"):
+        setattr(decimated.tolvol.measurement, f"{name}_digits", "0")
+        assert measurements.measurement_of(decimated) is None
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -1.0])
+def test_a_damaged_percentage_is_the_default(decimated, value):
+    default = 0.5  # of the preferences
+    decimated.tolvol["percent_choice"] = value  # past the range of the property, as a file does it
+    assert decimated.tolvol.tolerance_percent == default and verdict.of(decimated).margin_percent()
+    assert bpy.ops.tolvol.check() == {"FINISHED"}
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -1.0, 0.0])
+def test_a_damaged_length_has_no_verdict_and_no_check(decimated, value):
+    decimated.tolvol.tolerance_mode = "LENGTH"
+    assert verdict.of(decimated).passed
+    decimated.tolvol["tolerance_length"] = value
+    assert measurements.measurement_of(decimated) is not None and verdict.of(decimated) is None
+    with pytest.raises(RuntimeError, match="tolerance in the file is damaged: enter it again"):
+        bpy.ops.tolvol.check()
+    decimated.tolvol.tolerance_length = 0.1
+    assert bpy.ops.tolvol.check() == {"FINISHED"} and verdict.of(decimated).passed
+
+
+@pytest.mark.parametrize("name", ["forward", "backward"])
+@pytest.mark.parametrize("digits", ["1e308", "1e-322"])
+def test_distances_that_cannot_be_compared_have_no_verdict(decimated, name, digits):
+    decimated.tolvol.tolerance_percent = 1e-9
+    setattr(decimated.tolvol.measurement, f"{name}_digits", digits)
+    assert verdict.of(decimated) is None
 
 
 def test_a_damaged_reference_has_to_be_set_anew(decimated):
