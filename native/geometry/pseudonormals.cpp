@@ -72,6 +72,19 @@ void for_edges(const HalfEdges& edges, Visit&& visit) {
   }
 }
 
+std::vector<glm::uvec3> welded_corners(const TriangleMesh& mesh) {
+  const std::vector<std::uint32_t> welded = weld_equal_positions(mesh.vertices);
+  std::vector<glm::uvec3> corners = mesh.triangles;
+  for (glm::uvec3& t : corners) t = {welded[t.x], welded[t.y], welded[t.z]};
+  return corners;
+}
+
+/// Tells whether two faces run along an edge in opposite directions, and no other face has it.
+bool closed_at(std::span<const HalfEdge> edge, const std::vector<glm::uvec3>& corners) {
+  const auto start = [&](const HalfEdge& e) { return corners[e.triangle()][e.corner()]; };
+  return edge.size() == 2 && start(edge[0]) != start(edge[1]);
+}
+
 /// Returns the angle of a triangle at its corner k.
 double angle(const TriangleMesh& mesh, const glm::uvec3& t, int k) {
   const glm::dvec3 p = mesh.vertices[t[k]], a = mesh.vertices[t[(k + 1) % 3]] - p,
@@ -81,13 +94,19 @@ double angle(const TriangleMesh& mesh, const glm::uvec3& t, int k) {
 
 }  // namespace
 
+bool is_closed(const TriangleMesh& mesh) {
+  const std::vector<glm::uvec3> corners = welded_corners(mesh);
+  bool closed = true;
+  for_edges(half_edges(corners, mesh.vertices.size()),
+            [&](std::span<const HalfEdge> edge) { closed = closed && closed_at(edge, corners); });
+  return closed;
+}
+
 Pseudonormals::Pseudonormals(const TriangleMesh& mesh)
-    : corners_(mesh.triangles), vertex_(mesh.vertices.size(), glm::dvec3(0)), edge_(mesh.triangles.size()) {
-  const std::vector<std::uint32_t> welded = weld_equal_positions(mesh.vertices);
+    : corners_(welded_corners(mesh)), vertex_(mesh.vertices.size(), glm::dvec3(0)), edge_(mesh.triangles.size()) {
   double magnitude = 0;
-  for (glm::uvec3& t : corners_) {
+  for (const glm::uvec3& t : corners_) {
     for (int k = 0; k < 3; ++k) {
-      t[k] = welded[t[k]];
       const glm::dvec3 p = glm::abs(mesh.vertices[t[k]]);
       magnitude = std::max({magnitude, p.x, p.y, p.z});
     }
@@ -110,8 +129,7 @@ Pseudonormals::Pseudonormals(const TriangleMesh& mesh)
     glm::dvec3 sum(0);
     for (const HalfEdge& e : edge) sum += face_[e.triangle()];
     for (const HalfEdge& e : edge) edge_[e.triangle()][e.corner()] = sum;
-    const auto start = [&](const HalfEdge& e) { return corners_[e.triangle()][e.corner()]; };
-    closed_ = closed_ && edge.size() == 2 && start(edge[0]) != start(edge[1]);
+    closed_ = closed_ && closed_at(edge, corners_);
   });
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     poll_at(i);

@@ -11,6 +11,10 @@
 
 namespace tolvol {
 
+/// Tells whether every edge has exactly two faces, which run along it in opposite directions. Vertices at equal
+/// positions count as one, and flat faces count. The mesh must be valid. O(m log valence).
+bool is_closed(const TriangleMesh& mesh);
+
 /// The normal of an edge is the sum of the normals of its faces, and that of a vertex is the sum of the normals of its
 /// faces, weighted by their angles there. Let q be the point nearest to p of a closed, consistently oriented mesh
 /// without self-intersections. Then p is inside exactly if (p - q) . at(q) < 0. [Botsch04, §2] interpolates vertex
@@ -29,7 +33,7 @@ class Pseudonormals {
   /// triangle and 24 for each vertex. O(m log valence), 40 ms for 270,000 triangles.
   explicit Pseudonormals(const TriangleMesh& mesh);
 
-  /// Tells whether every edge has exactly two faces, which run along it in opposite directions. Flat faces count.
+  /// Is the same as is_closed() of the mesh.
   bool closed() const { return closed_; }
 
   /// Returns the normal at the point of a triangle with these barycentric weights, which must be exactly zero on

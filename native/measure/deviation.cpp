@@ -46,6 +46,8 @@ constexpr double kShareRounding = 32 * kUnitRoundoff;
 constexpr std::size_t kChunk = 4096;
 // A thread takes so many pieces at once.
 constexpr std::size_t kBlock = 64;
+// Products of three numbers up to 2 to this power do not overflow.
+constexpr double kLargestExponent = 320;
 
 /// Returns the weight of a piece in the averages. It depends on the number of corners of the pieces.
 enum Measure { number = 1, length = 2, area = 3 };
@@ -171,31 +173,50 @@ class Distribution {
   std::vector<Step> steps_;
 };
 
-/// Tells inside from outside of a closed mesh. Nothing is inside of an open mesh.
+/// Returns the world mesh about the centre of the frame, as small as it takes for its volume, a sum of products of
+/// three coordinates, not to overflow.
+TriangleMesh for_volume(TriangleMesh mesh, const Frame& frame) {
+  double largest = 0;
+  std::size_t turn = 0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    poll_at(++turn);
+    for (int k = 0; k < 3; ++k) {
+      const dvec3 p = glm::abs(mesh.vertices[t[k]]);
+      largest = std::max({largest, p.x, p.y, p.z});
+    }
+  }
+  const double scale = std::min(frame.scale(), std::exp2(std::floor(kLargestExponent - std::log2(largest))));
+  for (dvec3& p : mesh.vertices) p = p * scale - frame.centre() * scale;
+  return mesh;
+}
+
+/// Tells inside from outside of a closed mesh. Nothing is inside of an open mesh. The normals are those of the part
+/// that the distances are measured from. Its cuts are never nearest, and everywhere else it has the faces of the whole
+/// mesh.
 class SideOf {
  public:
-  explicit SideOf(const TriangleMesh& b) : normals_(b) {
-    double volume = 0;
-    for (const glm::uvec3& t : b.triangles) {
-      volume += glm::dot(b.vertices[t.x], glm::cross(b.vertices[t.y], b.vertices[t.z]));
-    }
-    turn_ = volume < 0 ? -1 : 1;
+  SideOf(const PlacedPair& pair, const TriangleMesh& world_b) : normals_(pair.b) {
+    known_ = pair.whole ? normals_.closed() : is_closed(world_b);
+    turn_ = enclosed_volume(pair.whole ? pair.b : for_volume(world_b, pair.frame)) < 0 ? -1 : 1;
   }
 
-  bool known() const { return normals_.closed(); }
+  bool known() const { return known_; }
   bool inside(const dvec3& p, const Hierarchy::Nearest& nearest) const {
     return known() && turn_ * glm::dot(p - nearest.point, normals_.at(nearest.triangle, nearest.weights)) < 0;
   }
 
  private:
   Pseudonormals normals_;
+  bool known_;
   double turn_;
 };
 
 class Cover {
  public:
-  Cover(const TriangleMesh& a, const TriangleMesh& b, const DeviationOptions& options)
-      : b_(b), hierarchy_(b), sides_(b), options_(options) {
+  /// `world_b` is the mesh that pair.b is a part of.
+  Cover(const PlacedPair& pair, const TriangleMesh& world_b, const DeviationOptions& options)
+      : b_(pair.b), hierarchy_(pair.b), sides_(pair, world_b), options_(options) {
+    const TriangleMesh& a = pair.a;
     for (const Measure measure : {area, length, number}) {
       measure_ = measure;
       total_ = Sum();
@@ -405,9 +426,9 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
   }
   const Call call(options.progress);
   if (options.progress) options.progress->begin("averaging");
-  const PlacedPair pair(a, b, PlacedPair::Target::whole);  // a closed b that is cut would be open
+  const PlacedPair pair(a, b);
   const double scale = pair.frame.scale();
-  Cover cover(pair.a, pair.b, options);
+  Cover cover(pair, b, options);
   cover.measure();
   const std::vector<Piece>& pieces = cover.pieces();
 

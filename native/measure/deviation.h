@@ -56,7 +56,8 @@ struct Deviation {
 /// `mean_error`, which is about 0.05 % of the largest distance between a scan and a copy within 0.1 % of its size, and
 /// less if they are farther apart. The ranges are certain except for rounding, 1e-12 of the size of the meshes (more
 /// only if nearly all the area is in needles), and no estimate is outside of its range. Ranges are wide between
-/// surfaces nearer to each other than `spacing`. If a has no area, it is measured along the longest edges of its
+/// surfaces nearer to each other than `spacing`. Far corners of triangles of b do not count for the size, with the
+/// exceptions that measure/hausdorff.h names. If a has no area, it is measured along the longest edges of its
 /// triangles instead, and if these have no length either, all triangles count alike and `spacing` is 0.
 ///
 /// b is closed if each of its edges has two faces that run along it in opposite directions. Its angle-weighted

@@ -346,7 +346,7 @@ HausdorffInterval hausdorff(const TriangleMesh& a, const TriangleMesh& b, const 
   if (options.bound && !(*options.bound >= 0)) throw InvalidInput("bound is not a length of 0 or more");
   const Call call(options.progress);
   if (options.progress) options.progress->begin("measuring");
-  const PlacedPair pair(a, b, PlacedPair::Target::near);
+  const PlacedPair pair(a, b);
   const Frame& frame = pair.frame;
   Search search(pair.a, pair.b, options.bound ? *options.bound * frame.scale() : kInfinity, options);
   search.run();

@@ -77,14 +77,25 @@ class Cutter {
     const End on_c = cut(a, c), other = count == 1 ? cut(a, b) : cut(b, c);
     if (on_c.share == 1 && other.share == 1) return keep(t);
     const dvec3 far_b = count == 1 ? at(b) : other.point;
-    if (!beyond({on_c.point, other.point, far_b, at(c)})) return keep(t);
-    if (count == 1) return keep({a, vertex(other), vertex(on_c)});
-    const std::uint32_t v = vertex(other);
-    keep({a, b, v});
-    keep({a, v, vertex(on_c)});
+    const bool all = !beyond({on_c.point, other.point, far_b, at(c)});
+    // Also a triangle that stays is divided at the cuts, so that it still meets its neighbours along whole edges.
+    const std::uint32_t v = vertex(other), w = vertex(on_c);
+    if (count == 1) {
+      keep({a, v, w});
+      if (all && v != b) keep({v, b, c});
+      if (all && w != c) keep({v, c, w});
+    } else {
+      // The diagonal leads to a cut, or else it would be an edge.
+      keep(v == c ? glm::uvec3(a, b, w) : glm::uvec3(a, b, v));
+      keep(v == c ? glm::uvec3(b, c, w) : glm::uvec3(a, v, w));
+      if (all && v != c && w != c) keep({w, v, c});
+    }
   }
 
-  NearPart part() && { return std::move(part_); }
+  NearPart part() && {
+    part_.whole = part_.triangles == b_.triangles;
+    return std::move(part_);
+  }
 
  private:
   /// The end of a triangle along one of its edges.
@@ -146,7 +157,7 @@ NearPart near_part(const TriangleMesh& a, const TriangleMesh& b) {
   const Frame frame(box_a);
   const double radius = extent(box_a, frame), span = extent(box_b, frame);
   // Without a finite frame nothing can be proved.
-  if (span <= kNear * radius || !(span < kInfinity) || !std::isfinite(frame.scale())) return {b.triangles, {}};
+  if (span <= kNear * radius || !(span < kInfinity) || !std::isfinite(frame.scale())) return {b.triangles, {}, true};
   double nearest = kInfinity;
   std::size_t turn = 0;
   for (const glm::uvec3& t : b.triangles) {
@@ -154,7 +165,7 @@ NearPart near_part(const TriangleMesh& a, const TriangleMesh& b) {
     for (int k = 0; k < 3; ++k) nearest = std::min(nearest, norm(frame.from_world(b.vertices[t[k]])));
   }
   const double reach = (2 * radius + nearest) * (1 + 1e-6);
-  if (!(reach > 0) || span <= kNear * reach) return {b.triangles, {}};
+  if (!(reach > 0) || span <= kNear * reach) return {b.triangles, {}, true};
   Cutter cutter(b, frame, reach);
   for (const glm::uvec3& t : b.triangles) {
     poll_at(++turn);

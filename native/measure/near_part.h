@@ -27,14 +27,16 @@ struct NearPart {
 
   std::vector<glm::uvec3> triangles;  ///< index the vertices of the mesh, and after these `cuts`
   std::vector<Cut> cuts;
+  bool whole = true;  ///< tells whether `triangles` are those of b
 };
 
 /// Returns triangles that lie on the triangles of b and hold every point of b that is nearest to some point of a. Some
 /// vertex of b shows that such a point is within a distance R of the middle of a. Triangles within 40 R stay as they
-/// are. A triangle with a corner within 8 R is cut off between 24 R and 40 R, and a triangle without one is left out,
-/// but only if a plane proves that the rest lies beyond R: a triangle stays whole if it passes a while all its corners
-/// are far away, or if it opens to more than about 170 degrees at the one near corner. The meshes must be valid. O(n +
-/// m).
+/// are. A triangle with a corner within 8 R is cut between 24 R and 40 R, and what is beyond the cut is left out, as is
+/// a triangle without such a corner, but only if a plane proves that it lies beyond R: a triangle stays if it passes a
+/// while all its corners are far away, and what is beyond the cut stays if the triangle opens to more than about 170
+/// degrees at the one near corner. Triangles that share an edge are cut at the same vertex of it, so that each edge
+/// within R has the same faces as in b, in the same order of its ends. The meshes must be valid. O(n + m).
 NearPart near_part(const TriangleMesh& a, const TriangleMesh& b);
 
 }  // namespace tolvol

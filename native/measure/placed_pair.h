@@ -14,16 +14,15 @@ namespace tolvol {
 
 struct PlacedPair {
   Frame frame;
-  TriangleMesh a, b;
-
-  /// `near` takes the part of b that can be nearest to a point of a (measure/near_part.h), `whole` takes all of b.
-  enum class Target { whole, near };
+  TriangleMesh a, b;  ///< b is the part that can be nearest to a point of a (measure/near_part.h)
+  bool whole;         ///< tells whether that is all of b
 
   /// The frame fits the vertices that triangles use. Other vertices may lie anywhere. Throws InvalidInput if a mesh is
   /// not valid, or if both together are smaller than 1e-307.
-  PlacedPair(const TriangleMesh& world_a, const TriangleMesh& world_b, Target target) {
+  PlacedPair(const TriangleMesh& world_a, const TriangleMesh& world_b) {
     for (const TriangleMesh* mesh : {&world_a, &world_b}) validate(mesh->vertices, mesh->triangles);
-    const NearPart part = target == Target::near ? near_part(world_a, world_b) : NearPart{world_b.triangles, {}};
+    const NearPart part = near_part(world_a, world_b);
+    whole = part.whole;
     Box box;
     std::size_t turn = 0;
     const auto add = [&](const TriangleMesh& mesh, const std::vector<glm::uvec3>& triangles) {

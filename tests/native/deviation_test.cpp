@@ -179,6 +179,37 @@ TEST(Deviation, SignedWhereTheReferenceIsClosed) {
   EXPECT_FALSE(deviation(plate, box).sides.has_value());
 }
 
+// A corner of a closed mesh that lies far away costs no steps, widens no range, and leaves the sides as they are.
+TEST(Deviation, FarCornersCostNothing) {
+  TriangleMesh torus = shapes::torus(30);
+  TriangleMesh moved = torus;
+  for (dvec3& p : moved.vertices) p += dvec3(0.05, 0.02, 0.1);
+  const auto to_far = [&](double far) {
+    TriangleMesh target = torus;
+    target.vertices[7] = far * dvec3(1, 0.3, 1);
+    return deviation(moved, target);
+  };
+  const Deviation near = to_far(20), first = to_far(1e4);  // at 20 nothing is cut off
+  ASSERT_TRUE(near.sides.has_value());
+  EXPECT_NEAR(first.mean.value, near.mean.value, 0.02 * near.mean.value);
+  for (const double far : {1e7, 1e14, 1e19, 1e150, 1e300}) {
+    const Deviation d = to_far(far);
+    EXPECT_LE(d.steps, first.steps + first.steps / 100) << far;
+    EXPECT_NEAR(d.mean.value, first.mean.value, 0.001 * first.mean.value) << far;
+    EXPECT_LE(d.mean.range.upper - d.mean.range.lower, 0.01 * d.mean.value) << far;
+    ASSERT_TRUE(d.sides.has_value()) << far;
+    EXPECT_NEAR(d.sides->share_inside.value, near.sides->share_inside.value, 0.01) << far;
+    EXPECT_NEAR(d.sides->mean.value, near.sides->mean.value, 0.01 * near.mean.value) << far;
+  }
+  // The whole mesh decides whether it is closed, and which way round its faces run.
+  for (const double far : {20.0, 1e19, 1e300}) {
+    torus = shapes::turned(shapes::torus(30));
+    EXPECT_NEAR(to_far(far).sides->share_inside.value, near.sides->share_inside.value, 0.01) << far;
+    torus.triangles.pop_back();
+    EXPECT_FALSE(to_far(far).sides.has_value()) << far;
+  }
+}
+
 TEST(Deviation, WeightsAddUpToOne) {
   const Deviation d = deviation(shapes::torus(30, 0.01), shapes::torus(20));
   double sum = 0, mean = 0;

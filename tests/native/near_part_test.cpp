@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <random>
 
 #include "geometry/closest_point.h"
@@ -96,6 +97,40 @@ TEST(NearPart, WhatIsNotFarStaysAsItIs) {
     EXPECT_EQ(part.triangles, b.triangles);
     EXPECT_TRUE(part.cuts.empty());
   }
+}
+
+// Every edge that can be nearest has the faces that it has in the whole mesh, also beside triangles that stay because
+// they open widely at their only near corner.
+TEST(NearPart, EdgesKeepTheirFaces) {
+  std::mt19937 random(6);
+  std::normal_distribution<double> normal(0, 1);
+  int cuts = 0, divided = 0;
+  for (int round = 0; round < 100; ++round) {
+    const TriangleMesh torus = shapes::torus(10);
+    TriangleMesh target = torus;
+    for (int i = 0; i < 8; ++i) {
+      target.vertices[random() % 100] =
+          std::pow(10, 1 + 0.01 * double(random() % 300)) * dvec3(normal(random), normal(random), normal(random));
+    }
+    const NearPart part = near_part(torus, target);
+    const TriangleMesh near = mesh_of(part, target);
+    EXPECT_EQ(part.whole, near.triangles == target.triangles);
+    cuts += int(part.cuts.size());
+    divided += near.triangles.size() > target.triangles.size();
+    std::map<std::pair<std::uint32_t, std::uint32_t>, int> faces;
+    for (const glm::uvec3& t : near.triangles) {
+      for (int k = 0; k < 3; ++k) ++faces[{t[k], t[(k + 1) % 3]}];
+    }
+    for (const auto& [ends, count] : faces) {
+      const dvec3 &p = near.vertices[ends.first], &q = near.vertices[ends.second];
+      const double distance = std::sqrt(closest_point(dvec3(0), p, q, q).distance_squared);
+      if (distance > 3) continue;  // a torus of this size is within 3 of the origin, and so is what is nearest to it
+      EXPECT_EQ(count, 1) << round;
+      EXPECT_EQ((faces.count({ends.second, ends.first})), 1u) << round;
+    }
+  }
+  EXPECT_GT(cuts, 400);
+  EXPECT_GT(divided, 20);
 }
 
 // A far corner neither widens the interval of the distance nor moves it.

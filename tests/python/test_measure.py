@@ -165,6 +165,29 @@ def test_deviation_of_a_closed_reference_has_sides():
     assert turned.sides.share_inside == pytest.approx(result.sides.share_inside, abs=1e-3)
 
 
+def test_a_far_corner_of_the_other_mesh_widens_no_range():
+    vertices, triangles = meshes.sphere(3)
+    for far in (1e19, 1e300):
+        other = vertices.copy()
+        other[7] = [far, 0, 0]
+        largest = tolvol.directed_hausdorff(vertices, triangles, other, triangles)
+        assert largest.upper - largest.lower <= 0.001 * largest.upper < 0.001
+        found = tolvol.deviation(vertices, triangles, other, triangles)
+        lower, upper = found.mean_range
+        assert lower <= found.mean <= upper <= lower + 0.001 * largest.upper
+        assert found.mean < largest.upper and np.abs(found.distances).max() <= largest.upper
+
+
+def test_a_far_corner_of_the_mesh_itself_counts_for_its_size():
+    vertices, triangles = meshes.sphere(2)
+    far = vertices.copy()
+    far[7] = [1e19, 0, 0]
+    found = tolvol.directed_hausdorff(far, triangles, far, triangles)
+    assert found.lower == 0 < found.upper <= 1e5
+    both = tolvol.hausdorff(vertices, triangles, far, triangles)
+    assert both.forward.upper < 1 and 1e19 * (1 - 1e-3) <= both.lower <= both.backward.upper <= 1e19 * (1 + 1e-3)
+
+
 def test_deviation_refuses_percentiles_that_are_none():
     with pytest.raises(tolvol.InvalidInput, match="percentile 1 is not between 0 and 100"):
         tolvol.deviation(*meshes.plate(3), *meshes.plate(3), percentiles=(50, 101))
