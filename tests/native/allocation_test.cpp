@@ -26,7 +26,10 @@
 #include "motion/deformation.h"
 #include "motion/guard.h"
 #include "motion/smoothing.h"
+#include "repair/close_holes.h"
 #include "shapes.h"
+#include "topology/crossings.h"
+#include "topology/solidity.h"
 
 namespace {
 
@@ -86,10 +89,16 @@ void add(Numbers& numbers, const std::vector<dvec3>& points) {
   for (const dvec3& p : points) numbers.insert(numbers.end(), {p.x, p.y, p.z});
 }
 
+void add(Numbers& numbers, const std::vector<glm::uvec3>& triangles) {
+  for (const glm::uvec3& t : triangles) numbers.insert(numbers.end(), {double(t.x), double(t.y), double(t.z)});
+}
+
 const StoredSpace kStored(glm::dmat4(1), Storage::float32);
 
 struct Scene {
-  TriangleMesh mesh = shapes::torus(across(10), 0.02);
+  explicit Scene(unsigned n = across(10)) : mesh(shapes::torus(n, 0.02)) {}
+
+  TriangleMesh mesh;
   ToleranceVolume volume{mesh.vertices, mesh.triangles, kStored, 0.08, {.precision = 1, .threads = 1}};
   std::vector<std::uint32_t> faces = indices(mesh);
   std::vector<dvec3> wish = pushed(0.3);
@@ -115,7 +124,7 @@ struct Scene {
     const DecimationResult result = decimate(mesh.vertices, mesh.triangles, kStored, &volume, options);
     Numbers numbers;
     add(numbers, result.vertices);
-    for (const glm::uvec3& t : result.triangles) numbers.insert(numbers.end(), {double(t.x), double(t.y), double(t.z)});
+    add(numbers, result.triangles);
     return numbers;
   }
 };
@@ -199,6 +208,56 @@ TEST(Allocation, DecimationInEveryForm) {
   EXPECT_GT(fail_allocations([&] { return scene.decimated(options); }, 0.1), 100);
   options.effort = DecimationOptions::Effort::thorough;
   EXPECT_GT(fail_allocations([&] { return scene.decimated(options); }, 0.5), 100);
+}
+
+TEST(Allocation, ThoroughWithOptimalPlacement) {
+  const Scene scene(6);  // one decimation of the other scene takes as long as eight of this one
+  DecimationOptions options;
+  options.effort = DecimationOptions::Effort::thorough, options.threads = 1;
+  EXPECT_GT(fail_allocations([&] { return scene.decimated(options); }, 3), 100);
+}
+
+TEST(Allocation, CloseHoles) {
+  const Scene scene;
+  std::vector<glm::uvec3> rest = scene.mesh.triangles;
+  for (const int gone : {150, 60, 42, 41, 40}) rest.erase(rest.begin() + gone);
+  for (const unsigned threads : {1u, 2u}) {
+    CloseHolesOptions options;
+    options.threads = threads;
+    EXPECT_GT(fail_allocations(
+                  [&] {
+                    const HoleClosingResult result =
+                        close_holes(scene.mesh.vertices, rest, kStored, scene.volume, options);
+                    EXPECT_EQ(result.count(LoopOutcome::closed), 3u);
+                    Numbers numbers;
+                    add(numbers, result.triangles);
+                    return numbers;
+                  },
+                  0.1),
+              20);
+  }
+}
+
+TEST(Allocation, FactsAboutASurface) {
+  const Scene scene;
+  const std::vector<dvec3> tangled = scene.pushed(2);
+  for (const unsigned threads : {1u, 2u}) {
+    EXPECT_GT(fail_allocations([&] {
+                Team team(threads);
+                Numbers numbers;
+                for (const glm::uvec2& pair : crossings(tangled, scene.mesh.triangles, 1000, team, nullptr).pairs) {
+                  numbers.insert(numbers.end(), {double(pair.x), double(pair.y)});
+                }
+                return numbers;
+              }),
+              5);
+    EXPECT_GT(fail_allocations([&] {
+                Team team(threads);
+                const Solidity found = solidity(tangled, scene.mesh.triangles, team);
+                return Numbers{double(found.shells), double(found.open_edges)};
+              }),
+              5);
+  }
 }
 
 TEST(Allocation, VolumeAndChecks) {
