@@ -29,6 +29,9 @@ constexpr double kRounding = 0x1p-44;
 constexpr double kInflate = 0x1p-50;
 /// The numbers of faces or vertices that a thread takes at a time, for work of about 10 ns and of about 1 us each.
 constexpr std::size_t kBlock = 1024, kSmallBlock = 32;
+// A trial beyond this, in frame lengths, is here instead: the squares of its coordinates do not overflow, and it is as
+// far outside.
+constexpr double kFarthest = 0x1p500;
 
 bool finite(const glm::dvec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
@@ -292,8 +295,11 @@ void MovingMesh::try_all(std::span<const std::uint32_t> vertices, std::span<cons
   const std::size_t offender = first_of(vertices.size(), threads_, [&](std::size_t i) {
     const std::uint32_t v = vertices[i];
     if (frozen_[v]) return !finite(after[i]);
-    try_at(v, space_.frame(after[i]), {});
-    return !finite(after[i] - before[i]) || !finite(trial_[v].at) || !std::isfinite(step_[v]);
+    const glm::dvec3 at = space_.frame(after[i]);
+    try_at(v, glm::clamp(at, -kFarthest, kFarthest), {});
+    const glm::dvec3 way = at - state_[v].at;
+    if (at != trial_[v].at) step_[v] = std::hypot(way.x, way.y, way.z);
+    return !finite(after[i] - before[i]) || !finite(at);
   });
   if (offender == vertices.size()) return;
   for (const std::uint32_t v : vertices) take_back(v);

@@ -45,7 +45,7 @@ class MovingMesh {
   Start start(std::span<const glm::dvec3> stored, Progress* progress);
 
   /// Tries all these vertices at stored positions; those that may not move stay. Throws InvalidInput, changing nothing,
-  /// for the first position that is not finite.
+  /// for the first position that is not finite in the world or in the frame.
   void try_all(std::span<const std::uint32_t> vertices, std::span<const glm::dvec3> before,
                std::span<const glm::dvec3> after);
   /// Tries a vertex at a position. `bound` is what is known of that place.

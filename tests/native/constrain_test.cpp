@@ -384,6 +384,27 @@ void expect_refused(Call&& call, const std::string& text) {
   }
 }
 
+// However far away a wish is, its vertex goes as far towards it as the volume permits.
+TEST(Constrain, AFarWishIsAWishLikeOthers) {
+  const Scene scene{shapes::torus(20), glm::dmat4(1), Storage::float64};
+  const auto reached = [&](double far) {
+    Points wish = scene.mesh.vertices;
+    wish[5] += far * dvec3(1, 0.3, -0.5), wish[77] += far * dvec3(0, 0, 1), wish[78].x += far;
+    const ConstrainResult r = run(scene, wish);
+    EXPECT_EQ(r.held_back, 3u) << far;
+    for (const std::size_t v : {5, 77, 78}) {
+      EXPECT_LT(r.factors[v], 1) << far;
+      EXPECT_NE(r.vertices[v], scene.mesh.vertices[v]) << far;
+    }
+    return r.vertices;
+  };
+  const Points near = reached(1e6);
+  for (const double far : {1e100, 1e154, 1e160, 1e200, 1e300, 1e307}) {
+    const Points now = reached(far);
+    for (std::size_t v = 0; v < now.size(); ++v) EXPECT_LT(glm::distance(now[v], near[v]), 0.02) << far << ' ' << v;
+  }
+}
+
 TEST(Constrain, BadInput) {
   const Scene scene{shapes::torus(20)};
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
