@@ -24,7 +24,18 @@ import addon
 from addon import native
 from addon.errors import NotWritten, Refused
 from addon.files import safe_files, side_files
-from common import NOT_PROVED, NOT_WRITTEN, USAGE, Stop, angle, in_units, length, require_folder, whole_number  # noqa: F401
+from common import (
+    NOT_PROVED,
+    NOT_WRITTEN,
+    USAGE,
+    Stop,
+    angle,
+    file_name,
+    in_units,
+    length,
+    require_folder,
+    whole_number,
+)  # noqa: F401
 
 
 class Parser(argparse.ArgumentParser):

@@ -34,6 +34,13 @@ def whole_number(least):
     return parse
 
 
+def file_name(text):
+    """Parses the name of a file. An empty one, as from a variable that was never set, is no wish for no file."""
+    if not text:
+        raise argparse.ArgumentTypeError("the name of the file is empty")
+    return text
+
+
 def angle(text):
     """Parses an angle in degrees, from 1 to 180."""
     try:

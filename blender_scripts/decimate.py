@@ -43,12 +43,19 @@ them or none. Symbolic links are followed. OUT may be IN. No other file that is 
 
 def arguments():
     parser = cli.Parser("blender_scripts/decimate.py", description=_DESCRIPTION, epilog=_EPILOG)
-    parser.add_argument("input", metavar="IN", help="the mesh to decimate")
-    parser.add_argument("output", metavar="OUT", help="the file for the result; its extension chooses the format")
+    parser.add_argument("input", type=cli.file_name, metavar="IN", help="the mesh to decimate")
+    parser.add_argument(
+        "output", type=cli.file_name, metavar="OUT", help="the file for the result; its extension chooses the format"
+    )
     parser.add_argument(
         "--tolerance", required=True, type=cli.length, metavar="T", help="N%% of size, or a length in the file's units"
     )
-    parser.add_argument("--reference", metavar="REF", help="a file that the tolerance refers to (default: IN itself)")
+    parser.add_argument(
+        "--reference",
+        type=cli.file_name,
+        metavar="REF",
+        help="a file that the tolerance refers to (default: IN itself)",
+    )
     parser.add_argument(
         "--one-sided",
         action="store_true",
@@ -112,9 +119,10 @@ def arguments():
         help="how to treat faces of IN that are not within the tolerance of the reference: stop with an error, or keep "
         "them as they are (default: error)",
     )
-    parser.add_argument("--report", metavar="FILE.json", help="write all numbers to this file")
+    parser.add_argument("--report", type=cli.file_name, metavar="FILE.json", help="write all numbers to this file")
     parser.add_argument(
         "--picture",
+        type=cli.file_name,
         metavar="FILE.png",
         help="draw the result to this file, coloured by its distance to the reference; needs OpenGL",
     )

@@ -55,8 +55,8 @@ def report_file(text):
 
 def arguments():
     parser = cli.Parser("blender_scripts/report.py", description=_DESCRIPTION, epilog=_EPILOG)
-    parser.add_argument("a", metavar="A", help=" ".join(file_io.EXTENSIONS))
-    parser.add_argument("b", metavar="B")
+    parser.add_argument("a", type=cli.file_name, metavar="A", help=" ".join(file_io.EXTENSIONS))
+    parser.add_argument("b", type=cli.file_name, metavar="B")
     parser.add_argument(
         "--tolerance",
         type=cli.length,
@@ -88,7 +88,9 @@ def arguments():
         metavar="WORD,WORD",
         help=f"exit with code 3 unless A is all of this: {', '.join(solidity.REQUIREMENTS)}",
     )
-    parser.add_argument("--picture", metavar="FILE.png", help="draw A to this file, coloured by its distance from B")
+    parser.add_argument(
+        "--picture", type=cli.file_name, metavar="FILE.png", help="draw A to this file, coloured by its distance from B"
+    )
     parser.add_argument("--threads", type=cli.whole_number(1), metavar="N", help="default: all cores")
     return parser.parse()
 

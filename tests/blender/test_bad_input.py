@@ -36,6 +36,9 @@ def refused(done, *words):
         (["--tolerance", "1%", "--placement", "best"], ["--placement", "best"]),
         (["--tolerance", "1%", "--report", "/nowhere/r.json"], ["--report", "/nowhere"]),
         (["--tolerance", "1%", "--reference", "/nowhere/ref.ply"], ["/nowhere/ref.ply", "No such file"]),
+        (["--tolerance", "1%", "--report", ""], ["--report", "name of the file is empty"]),
+        (["--tolerance", "1%", "--picture", ""], ["--picture", "name of the file is empty"]),
+        (["--tolerance", "1%", "--reference="], ["--reference", "name of the file is empty"]),
         (["--tolerance", "500%"], ["more than the size"]),
         (["--tolerance", "4"], ["more than the size"]),
     ],
@@ -50,6 +53,8 @@ def test_bad_arguments(scan, tmp_path, arguments, words):
 def test_arguments_missing(tmp_path):
     refused(decimate(alone=True), "no arguments")
     refused(decimate("--tolerance", "1%"), "IN")
+    refused(decimate("", tmp_path / "out.ply", "--tolerance", "1%"), "IN", "name of the file is empty")
+    refused(decimate(tmp_path / "in.ply", "", "--tolerance", "1%"), "OUT", "name of the file is empty")
 
 
 def test_bad_places(scan, tmp_path):

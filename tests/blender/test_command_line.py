@@ -249,6 +249,9 @@ def test_report_refuses_bad_bounds_and_files(scan, tmp_path):
         ((scan, scan, "--bounds", ","), "no bound"),
         ((scan, tmp_path / "no.ply"), "no.ply"),
         ((scan,), "B"),
+        ((scan, ""), "name of the file is empty"),
+        ((scan, scan, "--report", ""), "--report"),
+        ((scan, scan, "--picture", ""), "name of the file is empty"),
     ):
         code, _, err = command("report.py", *arguments)
         assert code == 2 and word in err and len(err.splitlines()) == 1
