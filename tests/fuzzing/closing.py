@@ -39,12 +39,17 @@ def draw_close_holes(rng, case):
         case.options["largest_perimeter"] = float(case.size() * 10 ** rng.uniform(-2, 1)) or 1.0
     if rng.random() < 0.3:
         case.options["max_normal_angle"] = float(some(rng, 30, 90, 179, 180))
+    if rng.random() < 0.2:
+        n = len(case.vertices)
+        case.arrays["shares"] = np.full(n, some(rng, 0.1, 0.5, 0.9)) if rng.random() < 0.5 else rng.random(n)
+        case.arrays["shares"][rng.random(n) < 0.1] = 0
 
 
 def close_holes(run):
     case = run.case
     volume = run.volume()
     given = {name: case.options[name] for name in ("largest_perimeter", "max_normal_angle") if name in case.options}
+    given |= {name: case.arrays[name] for name in ("shares",) if name in case.arrays}
 
     def call(threads, progress):
         return tolvol.close_holes(
@@ -85,6 +90,8 @@ def _judge(run, closed, given):
         case.tolerance,
         "new faces to reference",
     )
+    if "shares" in given and len(added):
+        _judge_shares(run, added, given["shares"][added].min(1))
     pairs = run.call("crossing_pairs", lambda: tolvol.crossing_pairs(case.vertices, closed.triangles, most=10**6))
     if (pairs >= count).any():
         raise Finding("crossings", f"new faces cross others: {pairs[(pairs >= count).any(1)][:3].tolist()}")
@@ -117,6 +124,18 @@ def _judge(run, closed, given):
     at_rim = closed.borders >= 0
     if at_rim.sum() != corners[is_closed].sum():
         raise Finding("borders", f"{at_rim.sum()} sides at rims of {corners[is_closed].sum()} edges")
+
+
+def _judge_shares(run, added, share):
+    """Judges that each new triangle is within its share of the tolerance, in four groups of about equal shares."""
+    case = run.case
+    if not share.all():
+        raise Finding("shares", f"{(share == 0).sum()} new triangles are at vertices of share 0")
+    placed = case.world(case.vertices)
+    for group in np.array_split(np.argsort(share), 4):
+        if len(group):
+            narrow = max(share[group].max(), 1e-3) * case.tolerance
+            judges.within(run, (placed, added[group]), (placed, case.triangles), narrow, "new faces, by their shares")
 
 
 def _edges(vertices, triangles):

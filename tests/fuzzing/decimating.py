@@ -8,7 +8,7 @@ import judge
 
 from . import judges
 from .case import Finding
-from .parts import motion_of, moved, proved_inside, some
+from .parts import motion_of, moved, proved_inside, some, volume_of
 
 RESULT = (
     "vertices",
@@ -42,12 +42,16 @@ def draw_decimate(rng, case):
     if rng.random() < 0.15:
         options["moved"], options["outside"] = float(some(rng, 0.1, 0.5, 2)), some(rng, "error", "keep", "keep")
         case.arrays["motion"] = motion_of(rng, case, options["moved"])
+    options["crossings"] = "allow" if rng.random() < 0.2 else "keep_out"
+    if rng.random() < 0.05 and not options.get("moved"):
+        options["free"] = True
+        options.setdefault("target_triangles", int(rng.integers(1, len(case.triangles) + 2)))
 
 
 def decimate(run):
     case, options, arrays = run.case, run.case.options, run.case.arrays
     vertices, triangles = moved(run), case.triangles
-    volume = run.volume()
+    volume = volume_of(run)
     given = {
         name: options[name]
         for name in (
@@ -58,6 +62,7 @@ def decimate(run):
             "max_normal_angle",
             "target_triangles",
             "outside",
+            "crossings",
         )
         if name in options
     }
@@ -89,7 +94,7 @@ def _judge_decimation(run, result, vertices, triangles, volume, given, side):
         raise Finding("target", f"stopped at the target with {len(result.triangles)} triangles")
     if given.get("placement") == "subset" and not np.array_equal(result.vertices, vertices[result.vertex_source]):
         raise Finding("subset", "a vertex is not an original one")
-    if given.get("effort") != "thorough":
+    if given.get("effort") != "thorough" and volume is not None:
         try:
             judge.assert_sources(vertices, triangles, result, case.tolerance, case.to_world)
         except AssertionError as error:
@@ -101,6 +106,8 @@ def _judge_decimation(run, result, vertices, triangles, volume, given, side):
     if "locked" in given:
         _judge_locked(result, vertices, triangles, given["locked"])
 
+    if volume is None:
+        return
     kept = np.zeros(len(result.triangles), bool)
     if report["outside"]["faces"]:
         outside = ~proved_inside(run, vertices, triangles, volume)
@@ -117,8 +124,12 @@ def _judge_decimation(run, result, vertices, triangles, volume, given, side):
     if given["two_sided"] and not report["outside"]["reference_faces"]:
         judges.within(run, reference, (placed, result.triangles), case.tolerance, "reference to result")
     before, after = (vertices, triangles), (result.vertices, result.triangles)
-    if len(tolvol.crossing_pairs(*after, most=1)) and not len(tolvol.crossing_pairs(*before, most=1)):
-        raise Finding("crossings", "faces cross in the result and did not before")
+    now = judges.crossing_count(run, *after)
+    if now and given.get("crossings") != "allow" and (had := judges.crossing_count(run, *before)) < now:
+        raise Finding("crossings", f"{now} pairs of faces cross, {had} did before")
+    if vertices is case.vertices:
+        angle = given.get("max_normal_angle", 90)
+        judges.angles_kept(run, after, before, report, angle)
     judges.connected_alike(run, before, after)
     if not given["two_sided"] and vertices is case.vertices:
         judges.rims_alike(run, reference, (placed, result.triangles), case.tolerance)

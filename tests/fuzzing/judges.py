@@ -6,6 +6,7 @@ import subprocess
 import numpy as np
 import tolvol
 
+import judge
 import meshes
 
 from . import ROOT
@@ -87,6 +88,69 @@ def uncrossed(run, before, after, triangles):
     now = pairs(after)
     if now and (new := now - pairs(before)):
         raise Finding("crossings", f"{len(new)} pairs of faces cross that did not before: {min(new)}")
+
+
+def crossings_by_cgal(vertices, triangles, seconds=CGAL_SECONDS):
+    """Returns CGAL's number of pairs of triangles that cross.
+
+    Returns None if CGAL takes too long, or if the welded triangles are no oriented manifold or one has no area.
+    """
+    if not 0 < len(triangles) <= CGAL_FACES:
+        return None
+    places, label = np.unique(vertices + 0.0, axis=0, return_inverse=True)
+    faces = label.reshape(-1)[triangles]
+    a, b, c = places.astype(np.float64)[faces].transpose(1, 0, 2)
+    longest = np.maximum.reduce([((p - q) ** 2).sum(1) for p, q in ((a, b), (b, c), (c, a))])
+    if not (np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-12 * longest).all():
+        return None
+    head = np.array([len(places), len(faces)], np.float64)
+    data = b"".join(np.ascontiguousarray(array, np.float64).tobytes() for array in (head, places, faces))
+    try:
+        answer = subprocess.run([CGAL, "crossings"], input=data, capture_output=True, timeout=seconds)
+    except (subprocess.TimeoutExpired, FileNotFoundError):
+        return None
+    return int(answer.stdout) if answer.returncode == 0 else None
+
+
+def crossing_count(run, vertices, triangles, most=10**6):
+    """Returns the number of pairs of triangles that cross, at most `most`. It is CGAL's, too, where a case asks for it."""
+    count = len(run.call("crossing_pairs", lambda: tolvol.crossing_pairs(vertices, triangles, most=most)))
+    if run.case.options.get("cgal") and count < most:
+        by_cgal = crossings_by_cgal(vertices, triangles)
+        if by_cgal is not None and by_cgal != count:
+            raise Finding("CGAL: crossings", f"{count} pairs of triangles cross, by CGAL {by_cgal}")
+    return count
+
+
+ANGLE_PAIRS = 200_000  # of a face and a triangle of the reference; a second
+ANGLE_ROUNDING = 1e-3  # degrees
+
+
+def angles_kept(run, result, reference, report, angle):
+    """Requires that the faces of the result have the angle to the reference (vertices, triangles) that was asked for.
+
+    Neither is judged where a triangle is too thin for its normal, or where neighbours are oriented against each other.
+    """
+    case = run.case
+    faces, others = (case.world(vertices)[triangles] for vertices, triangles in (result, reference))
+    if len(faces) * len(others) > ANGLE_PAIRS or report["normals"] is None:
+        return
+    for a, b, c in (corners.transpose(1, 0, 2) / case.size() for corners in (faces, others)):
+        longest = np.maximum.reduce([((p - q) ** 2).sum(1) for p, q in ((a, b), (b, c), (c, a))])
+        if not (np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-6 * np.sqrt(longest)).all():
+            return
+    facts = run.call("solidity", lambda: tolvol.solidity(*reference))
+    if not (facts["manifold"] and facts["oriented"]):
+        return
+    found = judge.angles_of(others, faces, case.tolerance * (1 + 1e-9))
+    normals = report["normals"]
+    beyond = (found > angle + ANGLE_ROUNDING).sum()
+    if beyond > normals["exceeded_after"] + normals["unsure"]:
+        raise Finding(
+            "angle", f"{beyond} faces beyond {angle} degrees, up to {found.max()}, and by the report {normals}"
+        )
+    if normals["exceeded_after"] + normals["unsure"] == 0 and found.max() > normals["largest"] + ANGLE_ROUNDING:
+        raise Finding("angle", f"{found.max()} degrees, where the report has {normals['largest']} as the largest")
 
 
 def proper_faces(vertices, triangles):

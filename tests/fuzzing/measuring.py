@@ -8,10 +8,15 @@ from . import judges
 from .case import Finding
 from .parts import faces_of, motion_of, proved_inside, some, within_as_pieces
 
+SAMPLING = 0.02  # of the area: 65,536 random samples miss the share by less
+MOST_PAIRS = 10_000
+
 
 def draw_check(rng, case):
     case.options["corners"] = int(rng.integers(1, 5))
     case.arrays["motion"] = motion_of(rng, case, float(some(rng, 0, 1e-9, 0.3, 1, 3)))
+    if rng.random() < 0.1:
+        case.options["method"] = "gl_certificate"
 
 
 def check(run):
@@ -60,6 +65,14 @@ def check(run):
             raise Finding(
                 "parts", f"the face {inside[~parts][0]} is inside, its first {k} corners are not proved to be"
             )
+    if "method" in case.options:
+        try:
+            other = volume.check(points, faces, to_world=case.to_world, method=case.options["method"]).verdicts
+        except tolvol.GlUnavailable:
+            return
+        if (other == tolvol.Verdict.OUTSIDE).any():
+            raise Finding("method", f"{case.options['method']} says outside, which it cannot prove")
+        within_as_pieces(run, placed, faces[other == tolvol.Verdict.INSIDE], reference)
 
 
 def draw_distance(rng, case):
@@ -84,6 +97,72 @@ def distance(run):
         )
         if not far.lower - slack <= found[v] <= far.upper + slack:
             raise Finding("distance", f"point {v} is at {found[v]} and, by hausdorff, {far.lower} to {far.upper}")
+    _shares(run, volume, points)
+    _facts(run, points)
+
+
+def _shares(run, volume, points):
+    """Judges DisplayTree.shares by the ranges of deviation. Both are shares of the area of the moved mesh."""
+    case = run.case
+    tree = run.call("DisplayTree", lambda: tolvol.DisplayTree(volume))
+    bound = case.tolerance
+
+    class Shares:
+        def __init__(self, threads, progress):
+            self.values = tree.shares(
+                points, case.triangles, (-bound, bound), to_world=case.to_world, threads=threads, progress=progress
+            )
+
+    below, within, beyond = run.repeated("shares", Shares, ("values",)).values
+    total = below + within + beyond
+    if not (min(below, within, beyond) >= 0 and (abs(total - 1) < 1e-6 or total == 0)):
+        raise Finding("shares", f"{below}, {within} and {beyond} are no shares")
+    if total == 0:
+        return
+    placed, reference = (case.world(vertices) for vertices in (points, case.vertices))
+    # A distance in the tree errs by about a millionth of the size, of which either bound may fall short.
+    slack = 1e-5 * (np.abs(placed).max() + np.abs(reference).max())
+    if slack > 0.1 * bound:
+        return
+    bounds = bound - slack, bound + slack
+    spread = run.call(
+        "deviation",
+        lambda: tolvol.deviation(placed, case.triangles, reference, case.triangles, bounds=bounds, threads=1),
+    )
+    most, least = spread.share_beyond_range[0][1], spread.share_beyond_range[1][0]
+    if not least - SAMPLING <= below + beyond <= most + SAMPLING:
+        raise Finding("shares", f"{below + beyond} are beyond the tolerance, by deviation {least} to {most}")
+
+
+def _facts(run, points):
+    """Judges solidity by NumPy, and that crossing_pairs stops after as many pairs as it is to find."""
+    triangles = run.case.triangles
+
+    class Facts:
+        def __init__(self, threads, progress):
+            self.facts = tolvol.solidity(points, triangles, threads=threads, progress=progress)
+
+    facts = run.repeated("solidity", Facts, ("facts",)).facts
+    faces = np.unique(points + 0.0, axis=0, return_inverse=True)[1].reshape(-1)[triangles]
+    proper = faces[(faces != np.roll(faces, 1, axis=1)).all(1)]
+    sides = proper[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    edges, edge, count = np.unique(np.sort(sides, 1), axis=0, return_inverse=True, return_counts=True)
+    upwards = np.bincount(edge.reshape(-1), sides[:, 0] < sides[:, 1], minlength=len(edges))
+    wanted = {
+        "degenerate_triangles": len(faces) - len(proper),
+        "open_edges": (count == 1).sum(),
+        "non_manifold_edges": (count > 2).sum(),
+        "misoriented_edges": ((count == 2) & (upwards != 1)).sum(),
+        "closed": len(proper) > 0 and not (count == 1).any(),
+    }
+    found = {name: facts[name] for name in wanted}
+    if found != wanted:
+        raise Finding("solidity", f"{found}, by NumPy {wanted}")
+    all_pairs = run.call("crossing_pairs", lambda: tolvol.crossing_pairs(points, triangles, most=MOST_PAIRS))
+    most = len(all_pairs) // 2 + 1
+    some_pairs = run.call("crossing_pairs", lambda: tolvol.crossing_pairs(points, triangles, most=most))
+    if len(some_pairs) != min(most, len(all_pairs)):
+        raise Finding("crossing_pairs", f"{len(some_pairs)} pairs of {len(all_pairs)}, where {most} are asked for")
 
 
 def draw_hausdorff(rng, case):
@@ -113,6 +192,13 @@ def hausdorff(run):
         return _Interval(tolvol.directed_hausdorff(*a, *b, threads=threads, progress=progress))
 
     found = run.repeated("hausdorff", call, ("lower", "upper", "position", "triangle"))
+    both = run.call("hausdorff", lambda: tolvol.hausdorff(*a, *b, threads=1))
+    backward = run.call("hausdorff", lambda: tolvol.directed_hausdorff(*b, *a, threads=1))
+    ways = (found, backward), (both.forward, both.backward)
+    if any((x.lower, x.upper, x.triangle) != (y.lower, y.upper, y.triangle) for x, y in zip(*ways)):
+        raise Finding("both ways", "hausdorff differs from directed_hausdorff")
+    if (both.lower, both.upper) != tuple(max(getattr(way, end) for way in ways[0]) for end in ("lower", "upper")):
+        raise Finding("both ways", f"{both.lower} to {both.upper} is not the larger one of the two ways")
     together = np.concatenate([a[0], b[0]]).astype(np.float64)
     size = np.abs(together).max()
     if not np.ptp(together, axis=0).any():

@@ -8,6 +8,7 @@ from . import judges
 from .case import Finding
 from .parts import (
     covers,
+    draw_spline,
     faces_of,
     lattice_of,
     motion_of,
@@ -15,6 +16,7 @@ from .parts import (
     proved_inside,
     some,
     uncrossed_as_pieces,
+    volume_of,
     within_as_pieces,
 )
 
@@ -35,11 +37,13 @@ def draw_smooth(rng, case):
     if rng.random() < 0.2:
         options["moved"], options["outside"] = float(some(rng, 0.1, 0.5, 2)), some(rng, "error", "keep", "keep")
         case.arrays["motion"] = motion_of(rng, case, options["moved"])
+    if rng.random() < 0.1:
+        options["free"] = True
 
 
 def smooth(run):
     case, options, arrays = run.case, run.case.options, run.case.arrays
-    vertices, triangles, volume = moved(run), case.triangles, run.volume()
+    vertices, triangles, volume = moved(run), case.triangles, volume_of(run)
     names = ("iterations", "operator", "weights", "boundary", "mode", "two_sided", "outside", "crossings")
     given = {name: options[name] for name in names if name in options}
     given |= {name: arrays[name] for name in ("locked", "strength") if name in arrays}
@@ -57,12 +61,16 @@ def smooth(run):
 
 
 def _judge_motion(run, result, vertices, faces, volume, stay):
-    """Judges the promises that smooth, deform and constrain share."""
+    """Judges the promises that smooth, deform and constrain share. Without a volume nothing is held back."""
     case = run.case
     run.tell("judging")
     judges.valid(run, result.vertices, case.triangles, vertices.dtype)
     if not np.array_equal(result.vertices[stay], vertices[stay]):
         raise Finding("locked", f"vertex {np.flatnonzero(stay)[0]} or another that is to stay has moved")
+    if volume is None:
+        if np.any(result.report["held_back"]) or np.any(result.report["kept_from_crossing"]):
+            raise Finding("report", f"vertices are said to be held back: {result.report}")
+        return
     kept = np.zeros(len(faces), bool)
     if result.report["outside"]["faces"]:
         kept = ~proved_inside(run, vertices, faces, volume)
@@ -90,11 +98,15 @@ def draw_deform(rng, case):
     if case.operation == "deform" and rng.random() < 0.2:
         options["moved"], options["outside"] = float(some(rng, 0.1, 0.5, 2)), some(rng, "error", "keep", "keep")
         case.arrays["motion"] = motion_of(rng, case, options["moved"])
+    if case.operation == "deform":
+        draw_spline(rng, case)
+        if rng.random() < 0.1:
+            options["free"] = True
 
 
 def deform(run):
     case, options = run.case, run.case.options
-    vertices, triangles, volume = moved(run), case.triangles, run.volume()
+    vertices, triangles, volume = moved(run), case.triangles, volume_of(run)
     lattice = run.call("Lattice", lambda: lattice_of(run, vertices))
     given = {name: options[name] for name in ("mode", "two_sided", "outside", "crossings") if name in options}
 
@@ -176,11 +188,19 @@ def draw_guard(rng, case):
     case.options["two_sided"] = bool(rng.random() < 0.7)
     case.options["crossings"] = some(rng, "keep_out", "allow")
     case.options["amplitude"] = float(10 ** rng.uniform(-1, 2))
+    if rng.random() < 0.3:
+        case.options["moved"], case.options["outside"] = (
+            float(some(rng, 0.1, 0.5, 2)),
+            some(rng, "error", "keep", "keep"),
+        )
+        case.arrays["motion"] = motion_of(rng, case, case.options["moved"])
+    if rng.random() < 0.3:
+        case.options["resets"] = True
 
 
 def guard(run):
     case, options = run.case, run.case.options
-    volume = run.volume()
+    start, volume = moved(run), run.volume()
 
     class Edited:
         """Makes some edits, lets the guard correct each, and returns the mesh."""
@@ -188,32 +208,41 @@ def guard(run):
         def __init__(self, threads, progress):
             rng = np.random.default_rng(options["seed"])
             guard = tolvol.Guard(
-                case.vertices,
+                start,
                 case.triangles,
                 volume,
                 to_world=case.to_world,
                 two_sided=options["two_sided"],
+                outside=options.get("outside", "error"),
                 crossings=options["crossings"],
                 threads=threads,
                 progress=progress,
             )
-            self.vertices = case.vertices.copy()
+            self.vertices = start.copy()
             scale = 1 if case.to_world is None else np.linalg.norm(case.to_world[:3, :3], 2)
-            for _ in range(options["edits"]):
+            for edit in range(options["edits"]):
+                if options.get("resets") and edit == options["edits"] // 2:
+                    # As after opening another version: what was corrected, or what was there at first.
+                    self.vertices = self.vertices if rng.random() < 0.5 else start.copy()
+                    guard.reset(self.vertices, progress=progress)
                 touched = rng.random(len(self.vertices)) < rng.random()
                 motion = rng.standard_normal((touched.sum(), 3)) * options["amplitude"] * case.tolerance / scale
                 self.vertices[touched] += motion.astype(np.float32)
                 indices, back = guard.constrain(self.vertices)
                 self.vertices[indices] = back
             self.again = len(guard.constrain(self.vertices)[0])
+            self.outside, self.uncovered = guard.outside, guard.uncovered
 
-    result = run.repeated("Guard", Edited, ("vertices",))
+    result = run.repeated("Guard", Edited, ("vertices", "outside", "uncovered"))
     if result.again:
         raise Finding("guard", f"{result.again} vertices go back again, though nothing was edited")
     judges.valid(run, result.vertices, case.triangles, np.float32)
+    kept = case.triangles[result.outside]
+    if not np.array_equal(result.vertices[kept], start[kept]):
+        raise Finding("outside", "a face that was outside at the start has moved")
     reference = case.world(case.vertices), case.triangles
-    within_as_pieces(run, case.world(result.vertices), case.triangles, reference)
-    if options["two_sided"]:
+    within_as_pieces(run, case.world(result.vertices), np.delete(case.triangles, result.outside, axis=0), reference)
+    if options["two_sided"] and not result.uncovered:
         covers(run, case.world(result.vertices), case.triangles, reference)
     if options["crossings"] == "keep_out":
-        judges.uncrossed(run, case.vertices, result.vertices, case.triangles)
+        judges.uncrossed(run, start, result.vertices, case.triangles)

@@ -33,6 +33,11 @@ def moved(run):
     return (case.vertices + case.arrays["motion"]).astype(case.vertices.dtype)
 
 
+def volume_of(run):
+    """Returns the volume, or None for a case that goes without one."""
+    return None if run.case.options.get("free") else run.volume()
+
+
 def proved_inside(run, vertices, triangles, volume):
     """Returns for each face whether the check proves it to be inside."""
     verdicts = run.call(
@@ -87,6 +92,15 @@ def faces_of(case):
     return np.concatenate([np.array(quads, np.int32).reshape(-1, 4), rest])
 
 
+def draw_spline(rng, case):
+    """Gives the lattice of some cases a degree, weights and knots of its own."""
+    if rng.random() < 0.4:
+        points = case.options["points"]
+        case.options["degree"] = [int(rng.integers(1, n)) for n in points]
+        case.options["weighted"] = bool(rng.random() < 0.5)
+        case.options["knotted"] = bool(rng.random() < 0.5)
+
+
 def lattice_of(run, vertices):
     options = run.case.options
     placed = run.case.world(vertices)
@@ -95,6 +109,13 @@ def lattice_of(run, vertices):
     domain = meshes.matrix(np.diag(edges), lower - edges * 0.01)
     points = tolvol.lattice_points(options["points"], domain)
     rng = np.random.default_rng(options["seed"])
-    return tolvol.Lattice(
-        points + rng.standard_normal(points.shape) * options["amplitude"] * run.case.tolerance, domain
-    )
+    points = points + rng.standard_normal(points.shape) * options["amplitude"] * run.case.tolerance
+    spline = {}
+    if "degree" in options:
+        degree = spline["degree"] = options["degree"]
+        if options.get("weighted"):
+            spline["weights"] = rng.uniform(0.5, 2, points.shape[:3])
+        if options.get("knotted"):
+            inner = (np.sort(rng.random(n - d - 1)) for n, d in zip(options["points"], degree))
+            spline["knots"] = [np.concatenate([np.zeros(d + 1), k, np.ones(d + 1)]) for d, k in zip(degree, inner)]
+    return tolvol.Lattice(points, domain, **spline)

@@ -20,7 +20,7 @@ NEEDED = {
     "reach",
     "edits",
 }
-NEEDED |= {"every", "swapped", "outside"}
+NEEDED |= {"every", "swapped", "outside", "crossings"}
 
 
 class Shrink:

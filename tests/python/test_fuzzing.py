@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The fuzzer tests/fuzz.py itself: cases can be repeated, failures of all kinds are found, and findings are reduced."""
 
+import ast
 import os
 import sys
 import time
@@ -64,6 +65,104 @@ def test_a_tolerance_that_is_not_kept_is_found_and_made_small(monkeypatch):
     assert len(small.triangles) < len(case.triangles) / 4 and len(small.vertices) < len(case.vertices) / 2
 
 
+# Options that all calls share or that are judged in other ways, and the operations whose cases have the others.
+NOT_DRAWN = {"threads", "progress", "to_world", "bound", "edges", "bounds", "percentiles"}
+OWNERS = {
+    "decimate": "decimate",
+    "smooth": "smooth",
+    "deform": "deform",
+    "constrain": "constrain",
+    "close_holes": "close_holes",
+    "Guard": "guard",
+    "Lattice": "deform",
+    "check": "check",
+    "crossing_pairs": "distance",
+}
+
+
+def options_of(name):
+    """Returns the keyword-only arguments of a function, a class or a method of ToleranceVolume by the stub."""
+    for node in ast.walk(ast.parse(Path(tolvol.__file__).with_suffix(".pyi").read_text())):
+        if isinstance(node, ast.ClassDef) and node.name == name:
+            node = next(item for item in node.body if getattr(item, "name", "") == "__init__")
+        elif not (isinstance(node, ast.FunctionDef) and node.name == name):
+            continue
+        return {argument.arg for argument in node.args.kwonlyargs} - NOT_DRAWN
+    raise AssertionError(f"the stub has no {name}")
+
+
+@pytest.mark.parametrize("name", OWNERS)
+def test_every_option_is_drawn_and_handed_on(monkeypatch, name):
+    """Cases of the operation hand on every option, its less frequent values, and no volume where that is permitted."""
+    wanted = {(option,) for option in options_of(name)}
+    if ("crossings",) in wanted:
+        wanted |= {("crossings", "allow"), ("crossings", "keep_out")}
+    if ("outside",) in wanted:
+        wanted |= {("outside", "keep"), ("outside", "error")}
+    if name in ("decimate", "smooth", "deform"):
+        wanted.add(("no volume",))
+    if name == "Guard":
+        wanted.add(("reset",))
+
+    def recorded(function):
+        def call(*args, **more):
+            for option, value in more.items():
+                if value is not None:
+                    wanted.difference_update({(option,), (option, value if isinstance(value, str) else "")})
+            if any(arg is None for arg in args):
+                wanted.discard(("no volume",))
+            return function(*args, **more)
+
+        return call
+
+    class Volume(tolvol.ToleranceVolume):
+        check = recorded(tolvol.ToleranceVolume.check)
+
+    class Guard(tolvol.Guard):
+        __init__ = recorded(tolvol.Guard.__init__)
+
+        def reset(self, *args, **more):
+            wanted.discard(("reset",))
+            super().reset(*args, **more)
+
+    if name == "check":
+        monkeypatch.setattr(tolvol, "ToleranceVolume", Volume)
+    else:
+        monkeypatch.setattr(tolvol, name, Guard if name == "Guard" else recorded(getattr(tolvol, name)))
+    vertices, triangles = meshes.torus(8, 6, noise=0.01)
+    for seed in range(100):
+        case = Case("torus", OWNERS[name], vertices, triangles, tolerance=0.05)
+        operations.DRAW[case.operation](np.random.default_rng(seed), case)
+        found = outcome(case)
+        assert found[0] in ("passed", "refused"), found
+        if not wanted:
+            return
+    raise AssertionError(f"no case has {wanted}")
+
+
+def test_a_larger_angle_and_new_crossings_are_found(monkeypatch):
+    decimate = tolvol.decimate
+    wrong = Case("torus", "decimate", *meshes.torus(32, 16, noise=0.003), tolerance=0.05)
+    wrong.options.update(placement="optimal", two_sided=True, max_normal_angle=12.0)
+    # Two walls that are thinner than the tolerance, and two triangles that cross from the start.
+    walls = [meshes.sphere(3, radius) for radius in (1.0, 1.01)]
+    crossed = np.array([[3, 0, 0], [4, 0, 0], [3, 1, 0], [3.2, 0.2, -1], [3.2, 0.2, 1], [3.9, 0.9, 1]])
+    parts = [*walls, (crossed, np.arange(6).reshape(2, 3))]
+    shifts = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
+    triangles = np.concatenate([faces + shift for (_, faces), shift in zip(parts, shifts)]).astype(np.int32)
+    thin = Case("walls", "decimate", np.concatenate([v for v, _ in parts]), triangles, tolerance=0.05)
+    thin.options.update(placement="optimal", two_sided=True)
+    assert outcome(wrong)[0] == outcome(thin)[0] == "passed"
+
+    def careless(*mesh, **options):
+        options.pop("max_normal_angle", None)
+        return decimate(*mesh, **options, crossings="allow")
+
+    monkeypatch.setattr(tolvol, "decimate", careless)
+    assert outcome(wrong)[:2] == ("found", "angle")
+    assert outcome(thin)[:2] == ("found", "crossings")
+
+
 def test_a_crash_a_hang_and_an_exception_are_findings(monkeypatch):
     def fails(how):
         monkeypatch.setitem(operations.OPERATIONS, "decimate", lambda run: run.call("decimate", how))
@@ -88,3 +187,10 @@ def test_the_second_judge_agrees():
     a, b = meshes.sphere(2), meshes.sphere(2, 1.1)
     distance = tolvol.directed_hausdorff(*a, *b)
     assert distance.lower - 1e-4 <= judges.cgal_distance(a, b, 1e-4, seconds=None) <= distance.upper + 1e-4
+    shifted = b[0] + [0.3, 0, 0]
+    both = np.concatenate([a[0], shifted]), np.concatenate([a[1], b[1] + len(a[0])])
+    pairs = tolvol.crossing_pairs(*both)
+    assert judges.crossings_by_cgal(*both, seconds=None) == len(pairs) > 10
+    assert judges.crossings_by_cgal(*a, seconds=None) == 0
+    several = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+    assert judges.crossings_by_cgal(np.eye(5)[:, :3] * 3, several) is None, "no manifold"

@@ -9,50 +9,10 @@ import pytest
 import tolvol
 
 import meshes
-from judge import assert_promise, decimate
+from judge import assert_promise, decimate, largest_angles, unit_normals
 
 PLATES = meshes.non_manifold()
-STEPS = 6
-WEIGHTS = np.array([(i, j, STEPS - i - j) for i in range(STEPS + 1) for j in range(STEPS + 1 - i)]) / STEPS
 ROUNDING = 1e-4  # degrees
-
-
-def unit_normals(corners):
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
-
-
-def distances_to(points, corners):
-    """Returns the distance of each point to each triangle."""
-    p, (a, b, c) = points[:, None], corners.transpose(1, 0, 2)
-
-    def to_edge(start, end):
-        along, from_start = end - start, p - start
-        share = np.clip((from_start * along).sum(-1) / (along * along).sum(-1), 0, 1)
-        return np.linalg.norm(from_start - share[..., None] * along, axis=-1)
-
-    normals = np.cross(b - a, c - a)
-    squares = (normals * normals).sum(-1)
-    v = (np.cross(p - a, c - a) * normals).sum(-1) / squares
-    w = (np.cross(b - a, p - a) * normals).sum(-1) / squares
-    height = np.abs(((p - a) * normals).sum(-1)) / np.sqrt(squares)
-    to_edges = np.minimum(np.minimum(to_edge(a, b), to_edge(b, c)), to_edge(c, a))
-    return np.where((v >= 0) & (w >= 0) & (v + w <= 1), height, to_edges)
-
-
-def largest_angles(vertices, triangles, result, tolerance):
-    """For each face of the result: the least angle to a triangle near one of its points, at the worst of the points."""
-    reference = vertices[triangles].astype(float)
-    faces = result.vertices[result.triangles].astype(float)
-    angles = np.degrees(np.arccos(np.clip(unit_normals(faces) @ unit_normals(reference).T, -1, 1)))
-    low, high = reference.min(1) - tolerance, reference.max(1) + tolerance
-
-    def at_worst_point(face, angle):
-        candidates = ((low <= face.max(0)) & (high >= face.min(0))).all(1)
-        near = distances_to(WEIGHTS @ face, reference[candidates]) <= tolerance
-        return np.where(near, angle[candidates], 180).min(1).max()
-
-    return np.array([at_worst_point(face, angle) for face, angle in zip(faces, angles, strict=True)])
 
 
 def test_no_face_of_the_result_is_turned_over():
