@@ -24,7 +24,7 @@ import addon
 from addon import native
 from addon.errors import NotWritten, Refused
 from addon.files import safe_files, side_files
-from common import (
+from common import (  # noqa: F401
     NOT_PROVED,
     NOT_WRITTEN,
     USAGE,
@@ -35,7 +35,7 @@ from common import (
     length,
     require_folder,
     whole_number,
-)  # noqa: F401
+)
 
 
 class Parser(argparse.ArgumentParser):
