@@ -46,6 +46,8 @@ constexpr double kShareRounding = 32 * kUnitRoundoff;
 constexpr std::size_t kChunk = 4096;
 // A thread takes so many pieces at once.
 constexpr std::size_t kBlock = 64;
+// What is no larger than this, in the frame, is within rounding of a point.
+constexpr double kPoint = 4 * kUnitRoundoff;
 // Products of three numbers up to 2 to this power do not overflow.
 constexpr double kLargestExponent = 320;
 
@@ -190,24 +192,42 @@ TriangleMesh for_volume(TriangleMesh mesh, const Frame& frame) {
   return mesh;
 }
 
+/// Tells whether a mesh in the frame is a point within rounding, as it is if the other one has corners very far away.
+bool is_a_point(const TriangleMesh& mesh) {
+  Box box;
+  std::size_t turn = 0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    poll_at(++turn);
+    for (int k = 0; k < 3; ++k) box.add(mesh.vertices[t[k]]);
+  }
+  return glm::distance(box.lower, box.upper) <= kPoint;
+}
+
+/// Returns b, or one triangle of it if b is a point: to every search all of its triangles would be about as near.
+TriangleMesh searched(const TriangleMesh& b) {
+  return is_a_point(b) ? TriangleMesh{b.vertices, {b.triangles.front()}} : b;
+}
+
 /// Tells inside from outside of a closed mesh. Nothing is inside of an open mesh. The normals are those of the part
 /// that the distances are measured from. Its cuts are never nearest, and everywhere else it has the faces of the whole
 /// mesh.
 class SideOf {
  public:
-  SideOf(const PlacedPair& pair, const TriangleMesh& world_b) : normals_(pair.b) {
-    known_ = pair.whole ? normals_.closed() : is_closed(world_b);
+  SideOf(const PlacedPair& pair, const TriangleMesh& world_b) : normals_(pair.b), point_(is_a_point(pair.b)) {
+    known_ = pair.whole && !point_ ? normals_.closed() : is_closed(world_b);
     turn_ = enclosed_volume(pair.whole ? pair.b : for_volume(world_b, pair.frame)) < 0 ? -1 : 1;
   }
 
   bool known() const { return known_; }
   bool inside(const dvec3& p, const Hierarchy::Nearest& nearest) const {
-    return known() && turn_ * glm::dot(p - nearest.point, normals_.at(nearest.triangle, nearest.weights)) < 0;
+    return known() && !point_ &&
+           turn_ * glm::dot(p - nearest.point, normals_.at(nearest.triangle, nearest.weights)) < 0;
   }
 
  private:
   Pseudonormals normals_;
   bool known_;
+  bool point_;  // tells whether b has no inside beyond rounding
   double turn_;
 };
 
@@ -215,7 +235,7 @@ class Cover {
  public:
   /// `world_b` is the mesh that pair.b is a part of.
   Cover(const PlacedPair& pair, const TriangleMesh& world_b, const DeviationOptions& options)
-      : b_(pair.b), hierarchy_(pair.b), sides_(pair, world_b), options_(options) {
+      : b_(searched(pair.b)), hierarchy_(b_), sides_(pair, world_b), options_(options) {
     const TriangleMesh& a = pair.a;
     for (const Measure measure : {area, length, number}) {
       measure_ = measure;
@@ -360,7 +380,7 @@ class Cover {
     for (int i = 0; i < parts.count; ++i) visit(Simplex{parts.corners[i], area});
   }
 
-  const TriangleMesh& b_;
+  const TriangleMesh b_;
   Hierarchy hierarchy_;
   SideOf sides_;
   const DeviationOptions& options_;

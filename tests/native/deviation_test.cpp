@@ -210,6 +210,22 @@ TEST(Deviation, FarCornersCostNothing) {
   }
 }
 
+// From a mesh with such a corner the other mesh is a point, and all of its triangles are as near.
+TEST(Deviation, FarCornersOfTheMeshItselfCostNothing) {
+  const TriangleMesh torus = shapes::torus(30);
+  TriangleMesh far = torus;
+  for (const double at : {1e19, 1e50, 1e100}) {
+    far.vertices[7] = at * dvec3(1, 0, 0);
+    const Deviation d = deviation(far, torus);
+    EXPECT_LE(d.steps, 40 * d.distances.size()) << at;
+    EXPECT_NEAR(d.mean.value / at, 1 / 3.0, 1e-3) << at;  // of triangles with two corners at 0 and one at `at`
+    EXPECT_LE(d.mean.range.lower / at, 1 / 3.0);
+    EXPECT_GE(d.mean.range.upper / at, 1 / 3.0);
+    ASSERT_TRUE(d.sides.has_value());
+    EXPECT_LE(d.sides->share_inside.value, 1e-9);
+  }
+}
+
 TEST(Deviation, WeightsAddUpToOne) {
   const Deviation d = deviation(shapes::torus(30, 0.01), shapes::torus(20));
   double sum = 0, mean = 0;
