@@ -189,7 +189,7 @@ class Watch(Preparing):
                     lost = f"{lost}, and crossings allowed" if both else "Crossings allowed"
                 remark = f"{lost}: a face has {faces.largest} corners. Triangulate Faces helps"
             else:
-                remark = None
+                remark = next(iter(guard.warnings), None)
             return guard, kept and faces.outside(built, positions, options), remark
 
         self.begin(work)

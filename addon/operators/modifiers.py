@@ -146,7 +146,9 @@ moves as far as the tolerance permits. An object without a reference gets one fi
             self._add_key(ob, name, vertices)
         else:
             motion.write(ob, vertices, certified)
-        kept_warnings.keep(ob, [])
+        kept_warnings.keep(ob, motion.warnings)
+        for warning in motion.warnings:
+            self.report({"WARNING"}, warning)
         self.report({"INFO"}, f"{name}: {motion.line(motion.moved(vertices, wished), certified)}")
 
     @staticmethod

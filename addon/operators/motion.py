@@ -30,6 +30,7 @@ class Motion:
         self.crossings = ob.tolvol.crossings.lower()
         self.faces = mesh_io.whole_quads(ob.data, self.surface.arrays)
         self.threads = threads
+        self.warnings = []  # of hold()
         self._mesh = ob.data
 
     @property
@@ -41,10 +42,12 @@ class Motion:
         return volumes.native_volume(self.reference, self.tolerance, self.threads, progress)
 
     def hold(self, wished, progress):
-        """Moves every vertex towards `wished` as far as the tolerance and the crossings permit. Returns (n, 3).
+        """Moves every vertex towards `wished` as far as the tolerance and the crossings permit. Returns (n, 3), and keeps
+        the warnings.
 
         Quads keep the tolerance in both triangulations, and crossings out of both.
         """
+        self.warnings = []
         triangles = self.surface.arrays.triangles
         held = self._constrain(wished, triangles, "error", progress)
         # A bent quad may be beyond the tolerance from the start in the triangulation that Blender does not show: its
@@ -52,7 +55,7 @@ class Motion:
         return held if self.faces is triangles else self._constrain(held, self.faces, "keep", progress)
 
     def _constrain(self, wished, faces, outside, progress):
-        return native.module.constrain(
+        held = native.module.constrain(
             self.before,
             wished,
             faces,
@@ -63,7 +66,9 @@ class Motion:
             crossings=self.crossings,
             threads=self.threads,
             progress=progress,
-        ).vertices
+        )
+        self.warnings += [text for text in held.report["warnings"] if text not in self.warnings]
+        return held.vertices
 
     def certify(self, vertices, progress, triangles=None):
         """Returns the result of certify() for the moved mesh. Raises NotProved unless the mesh is within the tolerance."""

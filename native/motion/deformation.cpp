@@ -194,6 +194,11 @@ class Deformation {
     options.threads = options_.threads, options.progress = options_.progress;
     ConstrainResult held = constrain(before_, after_, faces_, static_cast<int>(corners_), space_, *volume_, options);
     result_.vertices = std::move(held.vertices), result_.kept_from_crossing = held.kept_from_crossing;
+    for (std::string& warning : held.warnings) {
+      if (std::ranges::find(result_.warnings, warning) == result_.warnings.end()) {
+        result_.warnings.push_back(std::move(warning));
+      }
+    }
   }
 
   void search(std::vector<std::uint32_t> failing) {

@@ -63,6 +63,18 @@ def sheet(name="sheet", matrix=None, **options):
     return add_object(name, *sheet_arrays(**options), matrix)
 
 
+def plates_with_t_junctions():
+    """Returns an object of two plates side by side, one with twice as many vertices along the line where they meet, x = 0."""
+    vertices, quads = [], []
+    for first, count in ((-1, 4), (0, 8)):
+        x, y = np.meshgrid(np.linspace(first, first + 1, count + 1), np.linspace(0, 1, count + 1), indexing="ij")
+        i, j = (index.ravel() for index in np.meshgrid(np.arange(count), np.arange(count), indexing="ij"))
+        corner = i * (count + 1) + j + sum(map(len, vertices))
+        quads.append(np.stack([corner, corner + count + 1, corner + count + 2, corner + 1], 1))
+        vertices.append(np.stack([x, y, 0 * x], -1).reshape(-1, 3).astype(np.float32))
+    return add_object("plates", np.concatenate(vertices), np.concatenate(quads))
+
+
 def world_triangles(ob):
     """Returns (vertices float64 in the world, triangles) of the stored mesh."""
     bpy.context.view_layer.update()

@@ -9,7 +9,7 @@ from mathutils import Matrix
 
 from addon import guard, native
 from addon.mesh import mesh_io
-from scenes import activate, add_object, sheet, sheet_arrays, world_triangles
+from scenes import activate, add_object, plates_with_t_junctions, sheet, sheet_arrays, world_triangles
 
 TOLERANCE = 0.02
 PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, -2, 0.5, 1))
@@ -192,6 +192,16 @@ def test_parts_of_the_reference_that_are_beyond_the_tolerance_are_named():
     ob.tolvol.keep = "ONE"
     updated(ob)
     assert state(ob)["sculpting"] == ("Within the tolerance", True)
+
+
+def test_what_holds_t_junctions_together_stays_and_the_guard_says_so():
+    ob = plates_with_t_junctions()
+    guarded(ob, "sculpting")
+    before = coordinates(ob)
+    between = before[:, 0] == 0
+    assert state(ob)["sculpting"] == (f"{between.sum()} vertices hold T-junctions together and cannot move", True)
+    moved = (dab(ob, before + [0, 0, 0.001]) != before).any(1)
+    assert np.array_equal(moved, ~between)
 
 
 def test_corners_of_a_concave_face_stay_where_they_are():

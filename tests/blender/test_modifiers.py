@@ -11,9 +11,9 @@ from addon.mesh import mesh_io
 from addon.mesh.evaluation import Evaluation
 from addon.mesh.mesh_io import column
 from addon.operators import fit
-from addon.proof import verdict
+from addon.proof import kept_warnings, verdict
 from addon.reference import snapshots
-from scenes import activate, add_object, link, torus, world_triangles
+from scenes import activate, add_object, link, plates_with_t_junctions, torus, world_triangles
 
 PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, 2, 0.5, 1))
 
@@ -94,6 +94,19 @@ def test_what_stays_within_is_what_blender_shows_bit_for_bit():
     wished = evaluated(ob)
     bpy.ops.tolvol.apply_modifier()
     assert np.array_equal(coordinates(ob), wished)
+
+
+def test_what_holds_t_junctions_together_stays_and_the_panel_says_so():
+    ob = plates_with_t_junctions()
+    activate(ob)
+    ob.modifiers.new("DISPLACE", "DISPLACE").strength = 0.1
+    before = coordinates(ob)
+    between = before[:, 0] == 0
+    bpy.ops.tolvol.apply_modifier()
+    moved = (coordinates(ob) != before).any(1)
+    assert not moved[between].any() and moved[~between].any()
+    warnings, _ = kept_warnings.of(ob)
+    assert warnings == [f"{between.sum()} vertices hold T-junctions together and cannot move"]
 
 
 def test_acts_on_the_base_mesh_without_other_modifiers_keys_and_animation():
