@@ -134,6 +134,15 @@ std::optional<glm::dvec3> TriangleCertificate::nearby_point(const glm::dvec3& p)
   return nearest;
 }
 
+std::optional<glm::dvec3> TriangleCertificate::nearest_point(const glm::dvec3& p, double radius,
+                                                             const Facing* facing) const {
+  const Hierarchy::Nearest nearest = hierarchy_->nearest_if(
+      p, [&](std::uint32_t triangle) { return !facing || facing->admits(triangle); }, radius);
+  if (nearest.triangle == Hierarchy::kNone) return std::nullopt;
+  const WitnessTriangle& t = (*reference_)[nearest.triangle];
+  return closest_point(p, t.a, t.a + t.ab, t.a + t.ac).point;
+}
+
 bool TriangleCertificate::shows_outside(const glm::dvec3 (&corners)[3]) const {
   const auto& [a, b, c] = corners;
   const double longest = std::sqrt(std::max({squared_length(b - a), squared_length(c - b), squared_length(a - c)}));
@@ -160,10 +169,10 @@ inline double TriangleCertificate::bound_by_corners(const glm::dvec3 (&corners)[
   return room > 0 && longest2 <= 3 * room * room ? corner + std::sqrt(longest2 * (1.0 / 3)) : kUnproved;
 }
 
-/// Sets `farthest` if the verdict is inside.
+/// Sets `farthest` if the verdict is inside, or else `open`, if it is not null, to the centre of the last part.
 template <TriangleCertificate::Search kSearch>
 Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::uvec3& hints, Facing* facing,
-                                    double& farthest) const {
+                                    double& farthest, glm::dvec3* open) const {
   constexpr bool kProve = kSearch == Search::verdict;
   thread_local std::vector<Part> queue;
   thread_local NearTriangles around;
@@ -179,6 +188,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
     Part part = queue[next];
     const auto& [a, b, c] = part.corners;
     const glm::dvec3 centre = (a + b + c) * (1.0 / 3);
+    if (open) *open = centre;
     FourPoints points;
     points.set(a, b, c, centre);
     double centre2 = std::numeric_limits<double>::infinity();  // the best known squared distance of the centre
@@ -275,17 +285,17 @@ double TriangleCertificate::bound(const glm::dvec3 (&corners)[3], const glm::dve
 
 template <TriangleCertificate::Search kSearch>
 double TriangleCertificate::bound_by(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& hints,
-                                     Facing* facing) const {
+                                     Facing* facing, glm::dvec3* open) const {
   if (facing) facing->begin();
   double farthest = bound_by_corners(corners, bounds);
   if (farthest != kUnproved && (!facing || facing->take_corners())) return farthest;
-  return search<kSearch>(corners, hints, facing, farthest) == Verdict::inside ? farthest : kUnproved;
+  return search<kSearch>(corners, hints, facing, farthest, open) == Verdict::inside ? farthest : kUnproved;
 }
 
 double TriangleCertificate::bound_in_any_order(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                                               const glm::uvec3& hints, Facing* facing) const {
+                                               const glm::uvec3& hints, Facing* facing, glm::dvec3* open) const {
   const Ordered ordered(corners, hints);
-  return bound_by<Search::fine>(ordered.corners, bounds, ordered.hints, facing);
+  return bound_by<Search::fine>(ordered.corners, bounds, ordered.hints, facing, open);
 }
 
 double TriangleCertificate::bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,

@@ -58,9 +58,11 @@ class TriangleCertificate {
   double bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, Facing* facing = nullptr) const;
 
   /// The same by a longer search, whose result does not depend on the order of the corners. A triangle that has a bound
-  /// here has the verdict inside.
+  /// here has the verdict inside. If there is no bound and `open` is not null, it is set to a point of the triangle
+  /// around which the search found no witness: most often it is farther than limit() from all that `facing` admits.
   double bound_in_any_order(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                            const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone), Facing* facing = nullptr) const;
+                            const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone), Facing* facing = nullptr,
+                            glm::dvec3* open = nullptr) const;
 
   /// Tells whether there is a proof in any order of the corners, and if not, whether a point outside proves that there
   /// is none. The reference must be as large as in a frame, see witness_error(). `facing` is as for bound(): a point is
@@ -90,6 +92,9 @@ class TriangleCertificate {
   /// The point of the reference that is nearest to p among the triangles that the grid's nodes around p name. Where the
   /// reference is far from p, it may have a nearer point; that is rare.
   std::optional<glm::dvec3> nearby_point(const glm::dvec3& p) const;
+  /// The point of the reference that is nearest to p, at most `radius` away, among the triangles that `facing` admits,
+  /// or among all if it is null.
+  std::optional<glm::dvec3> nearest_point(const glm::dvec3& p, double radius, const Facing* facing) const;
 
   double limit() const { return limit_; }
   /// Returns a certificate with `share`, 0 to 1, of the provable distance.
@@ -104,10 +109,11 @@ class TriangleCertificate {
 
   double bound_by_corners(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds) const;
   template <Search kSearch>
-  double bound_by(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& hints,
-                  Facing* facing) const;
+  double bound_by(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& hints, Facing* facing,
+                  glm::dvec3* open = nullptr) const;
   template <Search kSearch>
-  Verdict search(const glm::dvec3 (&corners)[3], const glm::uvec3& hints, Facing* facing, double& farthest) const;
+  Verdict search(const glm::dvec3 (&corners)[3], const glm::uvec3& hints, Facing* facing, double& farthest,
+                 glm::dvec3* open = nullptr) const;
 
   const std::vector<WitnessTriangle>* reference_;
   const DistanceGrid* grid_;

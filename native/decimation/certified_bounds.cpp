@@ -42,16 +42,16 @@ bool CertifiedBounds::start(std::uint32_t triangle, const glm::dvec3 (&corners)[
 }
 
 FaceBound CertifiedBounds::prove(std::uint32_t triangle, const glm::dvec3 (&corners)[3], const PointBound (&known)[3],
-                                 double share, Search search) const {
+                                 double share, Search search, glm::dvec3* open) const {
   std::optional<Facing> facing;
   if (!start(triangle, corners, facing)) return {};
   if (facing) facing->set_corners({known[0].triangle, known[1].triangle, known[2].triangle});
   Facing* const rule = facing ? &*facing : nullptr;
   const glm::dvec3 bounds(known[0].distance, known[1].distance, known[2].distance);
   const TriangleCertificate certificate = forward().narrowed(share);
-  const double distance = search == Search::with_room
-                              ? certificate.bound_with_room(corners, bounds, rule)
-                              : certificate.bound_in_any_order(corners, bounds, glm::uvec3(Hierarchy::kNone), rule);
+  const double distance = search == Search::with_room ? certificate.bound_with_room(corners, bounds, rule)
+                                                      : certificate.bound_in_any_order(
+                                                            corners, bounds, glm::uvec3(Hierarchy::kNone), rule, open);
   return {distance, facing ? facing->angle() : std::numbers::pi};
 }
 

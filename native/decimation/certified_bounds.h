@@ -77,9 +77,11 @@ class CertifiedBounds final : public Bounds {
   /// How prove() searches: it may prefer to leave room below the limit for the faces to come, or search longer so that
   /// the result does not depend on the order of the corners.
   enum class Search { with_room, in_any_order };
-  /// Returns what can be proved of a face with these corners, of which `known` is known, below `share` of the limit.
+  /// Returns what can be proved of a face with these corners, of which `known` is known, below `share` of the limit. A
+  /// search in any order that finds no proof sets `open`, if it is not null, to a point of the face that it leaves
+  /// open.
   FaceBound prove(std::uint32_t triangle, const glm::dvec3 (&corners)[3], const PointBound (&known)[3], double share,
-                  Search search) const;
+                  Search search, glm::dvec3* open = nullptr) const;
 
   /// What is known of some vertices and faces, to go back to when the mesh does.
   struct Saved {

@@ -31,12 +31,7 @@ constexpr int kFacePoints = 24;
 }  // namespace
 
 PatchTrial::PatchTrial(const BoundedMesh& mesh, const SurfaceSamples& samples, Surroundings* around)
-    : mesh_(mesh),
-      bounds_(*mesh.certified()),
-      samples_(samples),
-      around_(around),
-      change_(mesh),
-      relaxation_(bounds_.forward(), bounds_.forward().limit()) {
+    : mesh_(mesh), bounds_(*mesh.certified()), samples_(samples), around_(around), change_(mesh), relaxation_(bounds_) {
   backward_.look_for_failures(kLookedAt);
 }
 
@@ -202,26 +197,28 @@ bool PatchTrial::faces_hold() {
   }
   bool hold = true;
   for (std::uint32_t f = 0; f < elements_.size(); ++f) {
-    face_bounds_.push_back(changed(f) ? prove(f) : bounds_.face_bound(elements_[f].id));
+    glm::dvec3 open(kAnywhere);
+    face_bounds_.push_back(changed(f) ? prove(f, open) : bounds_.face_bound(elements_[f].id));
     if (!changed(f) || face_bounds_[f].distance != TriangleCertificate::kUnproved) continue;
     hold = false;
-    add_face_points(f);
+    if (!add_face_points(f)) add_open_point(f, open);
   }
   return hold;
 }
 
-/// What can be proved of a face that has changed.
-FaceBound PatchTrial::prove(std::uint32_t face) const {
+/// What can be proved of a face that has changed. If nothing can, sets `open` to a point of it, or leaves it where the
+/// face has no sure normal.
+FaceBound PatchTrial::prove(std::uint32_t face, glm::dvec3& open) const {
   const auto& c = patch_.faces()[face].corners;
   const auto share = [&](int k) { return patch_.vertices()[c[k]].share; };
   const CertifiedBounds::PointBound known[3] = {vertex_bounds_[c[0]], vertex_bounds_[c[1]], vertex_bounds_[c[2]]};
   return bounds_.prove(elements_[face].id, elements_[face].corners, known, std::min({share(0), share(1), share(2)}),
-                       CertifiedBounds::Search::in_any_order);
+                       CertifiedBounds::Search::in_any_order, &open);
 }
 
 /// Adds the points of a face that are farthest from the reference, near each of its corners one, if they are beyond
-/// what is enough.
-void PatchTrial::add_face_points(std::uint32_t face) {
+/// what is enough. Returns whether there are any.
+bool PatchTrial::add_face_points(std::uint32_t face) {
   glm::dvec3 worst[3];
   double largest[3] = {Relaxation::kEnough, Relaxation::kEnough, Relaxation::kEnough};
   for (int i = 0; i <= kFacePoints; ++i) {
@@ -232,11 +229,28 @@ void PatchTrial::add_face_points(std::uint32_t face) {
       if (deviation > largest[corner]) largest[corner] = deviation, worst[corner] = weights;
     }
   }
+  bool any = false;
   for (int k = 0; k < 3; ++k) {
     if (!(largest[k] > Relaxation::kEnough)) continue;
     relaxation_.add_face_point(face, worst[k], kHeldWeight);
-    learnt_ = true;
+    any = learnt_ = true;
   }
+  return any;
+}
+
+/// Adds the point that the search for a proof of a face left open, if it is beyond what is enough from all that the
+/// face may stand for: the face may be near the reference and turned from it, or too far between the points looked at.
+void PatchTrial::add_open_point(std::uint32_t face, const glm::dvec3& open) {
+  const auto& [a, b, c] = elements_[face].corners;
+  const glm::dvec3 normal = glm::cross(b - a, c - a);
+  const double square = glm::dot(normal, normal);
+  if (!(square > 0) || open.x == kAnywhere) return;
+  const double of_b = glm::dot(glm::cross(open - a, c - a), normal) / square;
+  const double of_c = glm::dot(glm::cross(b - a, open - a), normal) / square;
+  const glm::dvec3 weights(1 - of_b - of_c, of_b, of_c);
+  if (!(relaxation_.admitted_deviation_of(face, weights) > Relaxation::kEnough)) return;
+  relaxation_.add_open_point(face, weights, kHeldWeight);
+  learnt_ = true;
 }
 
 /// Whether the boundary edges of the patch keep the bounds of boundaries, if there are any.

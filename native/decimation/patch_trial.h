@@ -66,12 +66,13 @@ class PatchTrial {
   bool changed(std::uint32_t face) const;
   bool pieces_hold();
   bool faces_hold();
-  FaceBound prove(std::uint32_t face) const;
+  FaceBound prove(std::uint32_t face, glm::dvec3& open) const;
   bool boundary_holds();
   bool uncrossed();
   bool keep_sheets_apart();
   void gather_elements();
-  void add_face_points(std::uint32_t face);
+  bool add_face_points(std::uint32_t face);
+  void add_open_point(std::uint32_t face, const glm::dvec3& open);
 
   const BoundedMesh& mesh_;
   CertifiedBounds& bounds_;

@@ -49,6 +49,8 @@ constexpr double kLookEverywhereAbove = 0.98;
 constexpr int kMostCrossings = 16;
 /// The squared deviation of a face's point that is too far from the reference to see it.
 constexpr double kFarSquare = 4;
+/// A triangle that the rule of facing admits is looked for within so many tolerances.
+constexpr double kAdmittedReach = 3;
 
 /// x^n for a small n.
 double power_of(double x, int n) {
@@ -159,8 +161,22 @@ void Relaxation::add(std::span<const SurfaceSample> samples, std::uint32_t face)
 }
 
 void Relaxation::add_face_point(std::uint32_t face, const glm::dvec3& weights, double weight) {
+  added_points_.push_back(point_of(face, weights, weight));
+}
+
+void Relaxation::add_open_point(std::uint32_t face, const glm::dvec3& weights, double weight) {
+  added_points_.push_back(open_point_of(face, weights, weight));
+}
+
+Relaxation::FacePoint Relaxation::point_of(std::uint32_t face, const glm::dvec3& weights, double weight) const {
   const auto& c = patch_->faces()[face].corners;
-  added_points_.push_back({{c[0], c[1], c[2]}, weights, weight, scale_of(face)});
+  return {{c[0], c[1], c[2]}, weights, weight, scale_of(face)};
+}
+
+Relaxation::FacePoint Relaxation::open_point_of(std::uint32_t face, const glm::dvec3& weights, double weight) const {
+  FacePoint point = point_of(face, weights, weight);
+  point.ruled_by = patch_->faces()[face].id;
+  return point;
 }
 
 void Relaxation::add_separation(std::uint32_t face, const Separation& separation, double weight) {
@@ -235,10 +251,21 @@ glm::dvec3 Relaxation::place(const FacePoint& p) const {
 
 Relaxation::Term Relaxation::toward_reference(const FacePoint& p) const {
   const glm::dvec3 x = place(p);
-  const auto q = forward_->nearby_point(x);
+  const auto q = p.ruled_by == Patch::kNone ? bounds_->forward().nearby_point(x) : nearest_admitted(p, x);
   if (!q) return {Patch::kNone, p.weights, glm::dvec3(0), kFarSquare};
   const glm::dvec3 residual = *q - x;
   return {Patch::kNone, p.weights, residual, glm::dot(residual, residual) * unit2_ * p.scale};
+}
+
+/// A face without a sure normal is steered as if it were free of the rule.
+std::optional<glm::dvec3> Relaxation::nearest_admitted(const FacePoint& p, const glm::dvec3& x) const {
+  const auto vertices = patch_->vertices();
+  const glm::dvec3 corners[3] = {vertices[p.vertices[0]].position, vertices[p.vertices[1]].position,
+                                 vertices[p.vertices[2]].position};
+  std::optional<Facing> facing;
+  bounds_->start(p.ruled_by, corners, facing);
+  const TriangleCertificate& forward = bounds_->forward();
+  return forward.nearest_point(x, kAdmittedReach * forward.limit(), facing ? &*facing : nullptr);
 }
 
 Relaxation::Term Relaxation::into_half_space(const HeldPoint& p) const {
@@ -278,8 +305,11 @@ double Relaxation::deviation(const glm::dvec3& point, std::uint32_t& face) const
 }
 
 double Relaxation::deviation_of(std::uint32_t face, const glm::dvec3& weights) const {
-  const auto& c = patch_->faces()[face].corners;
-  return std::sqrt(toward_reference({{c[0], c[1], c[2]}, weights, 0, scale_of(face)}).square);
+  return std::sqrt(toward_reference(point_of(face, weights, 0)).square);
+}
+
+double Relaxation::admitted_deviation_of(std::uint32_t face, const glm::dvec3& weights) const {
+  return std::sqrt(toward_reference(open_point_of(face, weights, 0)).square);
 }
 
 bool Relaxation::lower_sum(int steps, bool flip) {

@@ -7,10 +7,12 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "check/certificate.h"
+#include "decimation/certified_bounds.h"
 #include "decimation/patch.h"
 #include "decimation/separation.h"
 
@@ -25,10 +27,10 @@ struct SurfaceSample {
 
 class Relaxation {
  public:
-  /// `forward` finds the points of the reference that are near to points of faces. Deviations are in units of
-  /// `tolerance`, in the frame. Keeps a reference to `forward`.
-  Relaxation(const TriangleCertificate& forward, double tolerance)
-      : forward_(&forward), unit2_(1 / (tolerance * tolerance)) {}
+  /// `bounds` finds the points of the reference that are near to points of faces. Deviations are in units of the limit
+  /// of its forward direction, in the frame. Keeps a reference to it.
+  explicit Relaxation(const CertifiedBounds& bounds)
+      : bounds_(&bounds), unit2_(1 / (bounds.forward().limit() * bounds.forward().limit())) {}
 
   /// Starts with the faces and positions of a patch. Keeps a reference to the patch until the next start.
   void start(Patch& patch);
@@ -36,6 +38,9 @@ class Relaxation {
   void add(std::span<const SurfaceSample> samples, std::uint32_t face);
   /// Adds a point of a face, by its barycentric coordinates, to be held near the reference.
   void add_face_point(std::uint32_t face, const glm::dvec3& weights, double weight);
+  /// The same for a point that has no proof: it is held near those triangles of the reference that the rule of facing
+  /// admits for the face, as it is turned at every step. A search of the reference finds them, in some microseconds.
+  void add_open_point(std::uint32_t face, const glm::dvec3& weights, double weight);
   /// Adds a point of a face to be held in a half-space. Its deviation is 1 at the half-space's end and 0 one tolerance
   /// inside.
   void add_separation(std::uint32_t face, const Separation& separation, double weight);
@@ -68,6 +73,8 @@ class Relaxation {
   double deviation(const glm::dvec3& point, std::uint32_t& face) const;
   /// The deviation of a point of a face from the reference, over the tolerance.
   double deviation_of(std::uint32_t face, const glm::dvec3& weights) const;
+  /// The same from the triangles of the reference that the rule of facing admits for the face; 2 if it is beyond 3.
+  double admitted_deviation_of(std::uint32_t face, const glm::dvec3& weights) const;
 
   /// Deviations up to this share of the tolerance are enough; the rest is for what the samples do not see.
   static constexpr double kEnough = 0.994;
@@ -78,6 +85,7 @@ class Relaxation {
     glm::dvec3 weights;
     double weight;
     double scale;  ///< 1 / share^2, by the least share of the tolerance that a vertex of the face may use.
+    std::uint32_t ruled_by = Patch::kNone;  ///< The face of the mesh whose rule of facing holds for it, or kNone.
   };
   struct HeldPoint {
     FacePoint point;
@@ -99,6 +107,9 @@ class Relaxation {
   Term at(const glm::dvec3& point, std::uint32_t face, const glm::dvec3& a, const glm::dvec3& b,
           const glm::dvec3& c) const;
   Term toward_reference(const FacePoint& p) const;
+  std::optional<glm::dvec3> nearest_admitted(const FacePoint& p, const glm::dvec3& x) const;
+  FacePoint point_of(std::uint32_t face, const glm::dvec3& weights, double weight) const;
+  FacePoint open_point_of(std::uint32_t face, const glm::dvec3& weights, double weight) const;
   Term into_half_space(const HeldPoint& p) const;
   glm::dvec3 place(const FacePoint& p) const;
   void evaluate(bool look_around, std::vector<Term>& terms) const;
@@ -123,8 +134,8 @@ class Relaxation {
   double energy_if(const Patch::Flipped& flipped, int power, double limit) const;
   double energy_now(const Patch::Flipped& flipped, int power) const;
 
-  const TriangleCertificate* forward_;
-  double unit2_;  ///< It is 1 / tolerance^2.
+  const CertifiedBounds* bounds_;
+  double unit2_;  ///< It is 1 / limit^2.
   Patch* patch_ = nullptr;
   std::vector<SurfaceSample> points_;                 ///< of the reference
   std::vector<FacePoint> own_points_, added_points_;  ///< Those of every vertex, edge and face; those that were added.

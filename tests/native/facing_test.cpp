@@ -96,8 +96,15 @@ struct Wall {
     const auto below = certificate->nearest((corners[0] + corners[1] + corners[2]) * (1.0 / 3), 1.0).triangle;
     const double ordered = certificate->bound(corners, anywhere, glm::uvec3(below), facing ? &*facing : nullptr);
     if (facing && ordered != TriangleCertificate::kUnproved) EXPECT_LE(facing->angle(), kRight);
-    const double any =
-        certificate->bound_in_any_order(corners, anywhere, glm::uvec3(below), facing ? &*facing : nullptr);
+    Facing* const admits = facing ? &*facing : nullptr;
+    dvec3 open(std::numeric_limits<double>::quiet_NaN());
+    const double any = certificate->bound_in_any_order(corners, anywhere, glm::uvec3(below), admits, &open);
+    if (any == TriangleCertificate::kUnproved) {
+      EXPECT_FALSE(certificate->nearest_point(open, certificate->limit(), admits)) << "nothing near it is admitted";
+      const auto found = certificate->nearest_point(open, 10 * certificate->limit(), admits);
+      EXPECT_TRUE(found && glm::distance(*found, open) > certificate->limit());
+      EXPECT_TRUE(certificate->nearest_point(open, certificate->limit(), nullptr)) << "though the other side is near";
+    }
     EXPECT_EQ(ordered == TriangleCertificate::kUnproved, any == TriangleCertificate::kUnproved);
     return ordered;
   }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "certified_mesh.h"
 #include "decimation/surface_samples.h"
@@ -28,7 +29,7 @@ struct Fixture {
     for (Patch::Vertex& v : patch.vertices()) {
       if (v.free) v.position.z += lift * unit;
     }
-    relaxation.emplace(*plate.certificate, unit);
+    relaxation.emplace(*plate.bounds);
     relaxation->start(patch);
     for (std::uint32_t f = 0; f < patch.faces().size(); ++f) relaxation->add(samples.of(patch.faces()[f].id), f);
     for (const Coverage::Removed& r : change.removed()) relaxation->add(samples.of(r.id), r.successor);
@@ -124,6 +125,46 @@ TEST(Relaxation, HoldsPointsOfFaces) {
   EXPECT_TRUE(f.relaxation->enough());
 }
 
+TEST(Relaxation, HoldsOpenPointsNearWhatTheFaceMayStandFor) {
+  // Half a tolerance above the plate there is another one that faces down.
+  TriangleMesh both = Fixture::flat();
+  const auto count = static_cast<std::uint32_t>(both.vertices.size());
+  for (std::uint32_t v = 0; v < count; ++v) both.vertices.push_back(both.vertices[v] + dvec3(0, 0, 0.01));
+  for (std::size_t t = 0, n = both.triangles.size(); t < n; ++t) {
+    const glm::uvec3 corners = both.triangles[t];
+    both.triangles.emplace_back(corners.x + count, corners.z + count, corners.y + count);
+  }
+  CertifiedMesh c(both, both.vertices, 0.02);
+  const double unit = c.certificate->limit();
+  const FacingRule rule(c.volume->reference(), 1e-15, 1e-15, 0.5 * std::numbers::pi);
+  std::vector<dvec3> positions;
+  for (std::uint32_t v = 0; v < both.vertices.size(); ++v) positions.push_back(c.mesh->position(v));
+  const CertifiedBounds bounds({*c.certificate, &*c.coverage, nullptr, nullptr, &rule}, {both.triangles, positions});
+  Change change(*c.mesh);
+  const auto h = c.mesh->connectivity().find_halfedge(BoundedMesh::handle(kMiddle - 1), BoundedMesh::handle(kMiddle));
+  ASSERT_TRUE(change.prepare_collapse(h, c.mesh->vertex_position(kMiddle)));
+  Patch patch;
+  patch.gather(change, 2, true);
+  Relaxation relaxation(bounds);
+  relaxation.start(patch);
+  const std::uint32_t face = patch.vertices()[patch.find_vertex(kMiddle)].faces.front();
+  const double before = patch.position(face, 0).z;
+  for (Patch::Vertex& v : patch.vertices()) {
+    if (v.free) v.position.z += 1.2 * unit;
+  }
+  const dvec3 centre(1.0 / 3);
+  EXPECT_LT(relaxation.deviation_of(face, centre), 0.8) << "It is near the upper plate, and turned from it.";
+  EXPECT_NEAR(relaxation.admitted_deviation_of(face, centre), 1.2, 0.01);
+  relaxation.renew();
+  EXPECT_TRUE(relaxation.enough());
+  relaxation.add_open_point(face, centre, 1);
+  relaxation.renew();
+  EXPECT_NEAR(relaxation.state().largest, 1.2, 0.01);
+  relaxation.lower_largest(16);
+  EXPECT_TRUE(relaxation.enough());
+  EXPECT_LT((patch.position(face, 0).z + patch.position(face, 1).z + patch.position(face, 2).z) / 3 - before, unit);
+}
+
 TEST(Relaxation, WhatWasBeyondBeforeMayStay) {
   Fixture f(0);
   std::uint32_t face = 0;
@@ -166,7 +207,7 @@ TEST(Relaxation, FlipsEdgesAlongARidge) {
     Patch patch;
     patch.gather(change, 2, true);
     for (Patch::Vertex& v : patch.vertices()) v.free = false;  // Flips alone have to do it.
-    Relaxation relaxation(*c.certificate, c.certificate->limit());
+    Relaxation relaxation(*c.bounds);
     relaxation.start(patch);
     // The points of the ridge itself, of which one diagonal of each square has all and the other one none.
     std::vector<SurfaceSample> samples;
