@@ -29,9 +29,9 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
             row.operator("tolvol.next_place", text="", icon=icon).back = back
         row.operator("tolvol.clear_places", text="", icon="X")
         layout.operator("tolvol.probe", icon="EYEDROPPER", depress=TOLVOL_OT_probe.running())
-        row = layout.row(align=True)
-        row.operator("tolvol.select_crossing", text="Crossing Faces")
-        row.operator("tolvol.save_report", text="Save Report...")
+        # Beside another button its name would have no room.
+        layout.operator("tolvol.select_crossing")
+        layout.operator("tolvol.save_report", text="Save Report...")
         row = layout.row(align=True)
         row.prop(context.window_manager, "tolvol_show_original", toggle=True)
         row.operator("tolvol.restore_original", text="", icon="LOOP_BACK")

@@ -2,6 +2,7 @@
 """The facts about a surface, what report.py requires of it, and Select Crossing Faces."""
 
 import json
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -11,6 +12,7 @@ from addon.mesh import mesh_io
 from addon.proof import report, solidity
 from addon.reference import snapshots
 from commands import command, save
+from drawn import deviation_panel
 from scenes import activate, add_object, sheet, torus, torus_arrays
 
 CUBE = (
@@ -127,3 +129,11 @@ def test_select_crossing_faces():
         activate(whole)
         bpy.ops.tolvol.select_crossing()
         assert whole.mode == "OBJECT"
+
+
+def test_the_button_has_the_name_of_the_manual(monkeypatch):
+    activate(torus())
+    buttons, _ = deviation_panel(monkeypatch)
+    assert buttons["tolvol.select_crossing"] == "Select Crossing Faces"
+    manual = Path(__file__).resolve().parents[2] / "docs" / "manual.md"
+    assert "*Select Crossing Faces*" in manual.read_text()
