@@ -339,8 +339,9 @@ class Command:
         whole["crossings"] = pairs
         if self.options.crossings == "keep_out" and pairs["after"] > pairs["before"]:
             whole["warnings"].append(
-                f"{pairs['after']:,} pairs of faces cross in the file, {pairs['before']:,} did before: the file rounds "
-                "coordinates, and objects are decimated one by one"
+                f"{solidity.pair_count(pairs['after'])} pairs of faces cross in the file, "
+                f"{solidity.pair_count(pairs['before'])} did before: the file rounds coordinates, and objects are "
+                "decimated one by one"
             )
         whole["output"] = {"file": self.options.output, **written.counts}
         for kind, count in source.extras.items():

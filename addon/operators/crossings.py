@@ -10,7 +10,7 @@ from bpy.props import IntProperty
 from .. import native, preferences
 from ..job import JobOperator
 from ..mesh import mesh_io
-from ..proof.solidity import MOST_PAIRS
+from ..proof import solidity
 from ..reference import snapshots
 from .blocked import allowed, object_blocked
 from .staying import show_selected
@@ -42,13 +42,14 @@ corners and edges that they share"""
     @staticmethod
     def find(arrays, threads, progress):
         pairs = native.module.crossing_pairs(
-            arrays.vertices, arrays.triangles, most=MOST_PAIRS, threads=threads or None, progress=progress
+            arrays.vertices, arrays.triangles, most=solidity.MOST_PAIRS, threads=threads or None, progress=progress
         )
         polygons = arrays.polygons[pairs]
         # A face that is not flat is several triangles, which are not compared with each other.
-        return polygons[polygons[:, 0] != polygons[:, 1]]
+        return polygons[polygons[:, 0] != polygons[:, 1]], len(pairs) >= solidity.MOST_PAIRS
 
-    def finish(self, context, polygons):
+    def finish(self, context, outcome):
+        polygons, more = outcome
         mesh = self.ob.data
         faces = np.zeros(len(mesh.polygons), bool)
         faces[polygons] = True
@@ -57,4 +58,5 @@ corners and edges that they share"""
             return
         mesh_io.select_faces(mesh, faces)
         show_selected(context, (False, False, True))
-        self.report({"WARNING"}, f"{faces.sum():,} of {len(faces):,} faces cross others")
+        at_least = "at least " if more else ""
+        self.report({"WARNING"}, f"{at_least}{faces.sum():,} of {len(faces):,} faces cross others")

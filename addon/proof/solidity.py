@@ -39,6 +39,11 @@ def crossing_count(arrays, threads=None, progress=None):
     )
 
 
+def pair_count(pairs):
+    """Returns a number of crossing pairs as text. They are counted up to MOST_PAIRS only."""
+    return f"at least {MOST_PAIRS:,}" if pairs >= MOST_PAIRS else f"{pairs:,}"
+
+
 def facts(surface, threads=None, progress=None):
     """Returns the facts about a Surface. About 2.5 us for each triangle."""
     arrays = surface.arrays
@@ -57,8 +62,8 @@ def compared(before, after):
 def lacking(found):
     """Returns what keeps a surface of these facts from bounding a solid: texts by the names of REQUIREMENTS."""
 
-    def counted(key, one, several):
-        return f"{found[key]:,} {one if found[key] == 1 else several}"
+    def counted(key, one, several, text="{:,}".format):
+        return f"{text(found[key])} {one if found[key] == 1 else several}"
 
     manifold = (
         counted("non_manifold_edges", "edge of more than two faces", "edges of more than two faces"),
@@ -68,7 +73,7 @@ def lacking(found):
         "closed": counted("boundary_loops", "boundary loop", "boundary loops"),
         "manifold": " and ".join(text for text in manifold if not text.startswith("0 ")),
         "oriented": counted("misoriented_edges", "edge between turned faces", "edges between turned faces"),
-        "uncrossed": counted("crossing_pairs", "crossing pair of faces", "crossing pairs of faces"),
+        "uncrossed": counted("crossing_pairs", "crossing pair of faces", "crossing pairs of faces", pair_count),
     }
     return {name: texts[name] for name in REQUIREMENTS if not found[name]}
 

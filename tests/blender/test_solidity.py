@@ -2,6 +2,7 @@
 """The facts about a surface, what report.py requires of it, and Select Crossing Faces."""
 
 import json
+import re
 from pathlib import Path
 
 import bpy
@@ -137,3 +138,17 @@ def test_the_button_has_the_name_of_the_manual(monkeypatch):
     assert buttons["tolvol.select_crossing"] == "Select Crossing Faces"
     manual = Path(__file__).resolve().parents[2] / "docs" / "manual.md"
     assert "*Select Crossing Faces*" in manual.read_text()
+
+
+def test_more_pairs_than_are_counted_are_at_least_so_many(monkeypatch, capfd):
+    monkeypatch.setattr(solidity, "MOST_PAIRS", 10)
+    found = facts(CUBE, moved(CUBE, [0.5, 0.4, 0.3]))
+    assert found["crossing_pairs"] == 10 and "at least 10 crossing pairs of faces" in solidity.line(found)
+    ob = bpy.context.active_object
+    bpy.ops.tolvol.decimate(target_triangles=10**6)
+    assert json.loads(ob.tolvol.last_run)["crossings"] == {"before": 10, "after": 10}
+    assert "at least 10 pairs of faces cross, before at least 10" in capfd.readouterr().out
+    bpy.ops.tolvol.select_crossing()
+    said = re.search(r"at least (\d+) of \d+ faces cross others", capfd.readouterr().out)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert int(said[1]) == mesh_io.column(ob.data.polygons, "select", 1, bool).sum() > 0
