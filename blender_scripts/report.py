@@ -86,7 +86,8 @@ def arguments():
         type=requirements,
         default=[],
         metavar="WORD,WORD",
-        help=f"exit with code 3 unless A is all of this: {', '.join(solidity.REQUIREMENTS)}",
+        help=f"exit with code 3 unless A is all of this: {', '.join(solidity.REQUIREMENTS)}; a closed surface is oriented "
+        "only if its faces look outwards",
     )
     parser.add_argument(
         "--picture", type=cli.file_name, metavar="FILE.png", help="draw A to this file, coloured by its distance from B"

@@ -11,7 +11,11 @@ Vertices at the same position are one vertex. Facts are a dictionary:
                                                   share; at most MOST_PAIRS are counted
     degenerate_triangles                          with two equal corners; left out of all the above but the crossings
     shells                                        groups of triangles that hang together by edges
-    area, volume                                  in the units of the world; volume: None unless closed and oriented
+    area, volume                                  in the units of the world; volume: None unless closed and oriented,
+                                                  below 0 if the faces look inwards
+
+A surface whose volume is below 0 is turned inside out. Shells are not compared with each other: a shell inside another one
+bounds a cavity if it looks inwards, and its volume is taken off; whether shells inside look the right way is not said.
 
 All but the last two are exact. tolvol.solidity() finds all but the crossings.
 """
@@ -60,7 +64,10 @@ def compared(before, after):
 
 
 def lacking(found):
-    """Returns what keeps a surface of these facts from bounding a solid: texts by the names of REQUIREMENTS."""
+    """Returns what keeps a surface of these facts from bounding a solid: texts by the names of REQUIREMENTS.
+
+    Oriented is required to be outwards: faces that look inwards are in the way, although they agree with each other.
+    """
 
     def counted(key, one, several, text="{:,}".format):
         return f"{text(found[key])} {one if found[key] == 1 else several}"
@@ -75,7 +82,11 @@ def lacking(found):
         "oriented": counted("misoriented_edges", "edge between turned faces", "edges between turned faces"),
         "uncrossed": counted("crossing_pairs", "crossing pair of faces", "crossing pairs of faces", pair_count),
     }
-    return {name: texts[name] for name in REQUIREMENTS if not found[name]}
+    missing = {name for name in REQUIREMENTS if not found[name]}
+    if found["volume"] is not None and found["volume"] < 0:
+        texts["oriented"] = "faces look inwards"
+        missing.add("oriented")
+    return {name: texts[name] for name in REQUIREMENTS if name in missing}
 
 
 def line(found):

@@ -51,14 +51,18 @@ def surface_of(ob):
 
 
 def joined(surfaces):
-    """Joins several Surfaces to one with world coordinates in double precision. A single Surface is returned as it is."""
+    """Joins several Surfaces to one with world coordinates in double precision. A single Surface is returned as it is.
+
+    Triangles of a mirrored surface run the other way round in the world, as Blender shows them.
+    """
     surfaces = list(surfaces)
     if len(surfaces) == 1:
         return surfaces[0]
     vertices, triangles, base = [], [], 0
     for surface in surfaces:
         vertices.append(surface.world())
-        triangles.append(surface.arrays.triangles + base)
+        mirrored = np.linalg.det(surface.matrix[:3, :3]) < 0
+        triangles.append(surface.arrays.triangles[:, :: -1 if mirrored else 1] + base)
         base += len(surface.arrays.vertices)
     arrays = mesh_io.MeshArrays(np.concatenate(vertices), np.concatenate(triangles).astype(np.int32), None, None)
     return Surface(arrays, np.eye(4))

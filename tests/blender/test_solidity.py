@@ -62,6 +62,30 @@ def test_a_turned_face_is_found():
     assert (found["oriented"], found["misoriented_edges"], found["volume"]) == (False, 4, None) and found["closed"]
 
 
+def test_a_solid_that_is_turned_inside_out_is_not_printable(tmp_path):
+    vertices, faces = CUBE
+    inward = faces[:, ::-1]
+    found = facts((vertices, inward))
+    assert found["oriented"] and found["volume"] == pytest.approx(-1)
+    assert solidity.line(found) == "not printable: faces look inwards"
+    assert solidity.line(facts((vertices, inward), matrix=np.diag([2.0, 1, -3, 1]))) == solidity.line(found)
+    # A mirror turns no solid inside out, alone or beside another object, and neither does a cavity.
+    mirror = np.diag([2.0, 1, -3, 1])
+    assert solidity.line(facts(CUBE, matrix=mirror)).endswith(": printable")
+    objects = add_object("plain", *moved(CUBE, 5)), add_object("mirrored", *CUBE, mirror)
+    found = solidity.facts(snapshots.joined(snapshots.surface_of(ob) for ob in objects))
+    assert found["volume"] == pytest.approx(1 + 6)
+    cavity = 0.5 * vertices + np.float32(0.25), inward
+    assert solidity.line(facts(CUBE, cavity)).endswith(": printable")
+    turned = save(tmp_path / "turned.ply", ("turned", vertices, inward))
+    whole = save(tmp_path / "whole.ply", ("whole", *CUBE))
+    code, out, err = command("report.py", turned, whole, "--require", "closed,oriented")
+    assert code == 3 and "A: not printable: faces look inwards" in out and "B: closed, manifold" in out
+    assert err == "--require: A is not oriented (faces look inwards)\n"
+    assert command("report.py", turned, whole, "--require", "closed,manifold,uncrossed")[0] == 0
+    assert command("report.py", whole, turned, "--require", "oriented")[0] == 0
+
+
 def test_sheets_that_share_an_edge_or_a_vertex_are_no_manifold():
     at_edge, at_vertex = facts(CUBE, moved(CUBE, [1, 1, 0])), facts(CUBE, moved(CUBE, 1))
     assert (at_edge["non_manifold_edges"], at_edge["non_manifold_vertices"], at_edge["shells"]) == (1, 0, 1)
