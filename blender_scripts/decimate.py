@@ -22,7 +22,7 @@ try:
     from addon import units
     from addon.errors import NOT_PROVED, NotWritten, Refused
     from addon.files import file_io, safe_files, side_files
-    from addon.mesh import mesh_io
+    from addon.mesh import filling, mesh_io
     from addon.proof import report, solidity
     from addon.proof.certify import certify
     from addon.reference import snapshots
@@ -465,7 +465,8 @@ def _holes(runs):
         for reason, count in run["holes"]["refused"].items():
             refused[reason] = refused.get(reason, 0) + count
     counts = {key: sum(run["holes"][key] for run in runs) for key in ("closed", "triangles_added")}
-    return {**counts, "refused": refused, "largest_perimeter": runs[0]["holes"]["largest_perimeter"]}
+    places = filling.largest([place for run in runs for place in run["holes"]["places"]])
+    return {**counts, "refused": refused, "places": places, "largest_perimeter": runs[0]["holes"]["largest_perimeter"]}
 
 
 def _not_above(length):

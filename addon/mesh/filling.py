@@ -8,6 +8,9 @@ import numpy as np
 from ..errors import Refused
 from .mesh_io import MeshArrays, column
 
+# The report has the places of so many closed holes, the largest ones.
+MOST_PLACES = 100
+
 
 @dataclass(frozen=True)
 class FilledArrays(MeshArrays):
@@ -24,6 +27,8 @@ class FilledArrays(MeshArrays):
 
 def filled(arrays, result, allowed=None, uvs=None):
     """Returns (FilledArrays, the report of the closed holes) for the result of the native close_holes() for `arrays`.
+
+    The report: closed, triangles_added; refused: {reason: count}; places: see largest().
 
     allowed: (polygons,) bool, or None for all: holes with another polygon at their rim stay open. uvs: the values of UV
     maps at the mesh's corners, or None.
@@ -57,8 +62,23 @@ def filled(arrays, result, allowed=None, uvs=None):
         like,
         np.concatenate([np.zeros(count, np.int32), numbers[kept].astype(np.int32)]),
     )
-    closed = len(np.unique(result.triangle_loop[kept]))
-    return added, {"closed": closed, "triangles_added": int(kept.sum()), "refused": refused}
+    loops = result.loops
+    closed = [loops[loop] for loop in np.unique(result.triangle_loop[kept])]
+    places = [{"centre": list(loop["centre"]), "perimeter": loop["perimeter"]} for loop in closed]
+    return added, {
+        "closed": len(closed),
+        "triangles_added": int(kept.sum()),
+        "refused": refused,
+        "places": largest(places),
+    }
+
+
+def largest(places):
+    """Returns the MOST_PLACES largest of the places of closed holes, the largest first.
+
+    A place is {centre, perimeter}: the mean of the corners of the rim, and the length of the rim, both in world units.
+    """
+    return sorted(places, key=lambda place: -place["perimeter"])[:MOST_PLACES]
 
 
 def _meet_islands(arrays, result, uvs):

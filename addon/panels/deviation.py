@@ -74,7 +74,7 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
 def _draw_last_run(context, layout, ob):
     """Draws what is known about the last operation: until the mesh changes, but its warnings until the next operation."""
     if ob.tolvol.last_run and ob.tolvol.last_run_of == measurements.shown_fingerprint(ob):
-        lines = report.remembered(ob.tolvol.last_run)
+        lines = report.remembered(ob.tolvol.last_run, context)
         for line, icon in zip(lines or (), ("CHECKMARK", "MESH_DATA")):
             text_lines(context, layout, line, icon)
         if lines is None:

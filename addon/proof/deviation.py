@@ -36,7 +36,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import native
-from . import deviation_page, measure, solidity
+from . import deviation_page, measure, report, solidity
 from .verdict import Verdict
 
 PERCENTILES = (50, 90, 95, 99, 99.9)
@@ -153,7 +153,9 @@ def table(run):
             ("", "verdict", "", run["verdict"], "", ""),
         ]
     for name in ("a", "b"):
-        rows += [("", f"{name} {key}", "", value, "", "") for key, value in run[name].items()]
+        rows += [("", f"{name} {key}", "", value, "", "") for key, value in run[name].items() if key != "holes"]
+        holes = report.hole_rows(run[name]["holes"]) if "holes" in run[name] else ()
+        rows += [("", f"{name} {key}", at, value, "", "") for key, at, value in holes]
         facts = run["solidity"][name].items()
         rows += [("", f"{name} {key}", "", "" if value is None else value, "", "") for key, value in facts]
     change = run["solidity"]["change"].items()

@@ -11,6 +11,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from html import escape
 from pathlib import Path
 
+from ..units import NO_BREAK
 from . import report, solidity
 from .verdict import FAIL, PASS, Interval
 
@@ -62,7 +63,7 @@ def page(run, pictures=()):
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>Deviation of {a} and {b}</title><style>{_STYLE}</style></head><body>
 <h1>Deviation of {a} and {b}</h1>
-<p class="muted">{_counts(run["a"])}<br>{_counts(run["b"])}; size, which is 100&nbsp;%: {_length(run, run["size"])}</p>
+<p class="muted">{_counts(run, run["a"])}<br>{_counts(run, run["b"])}; size, which is 100&nbsp;%: {_length(run, run["size"])}</p>
 {_verdict(run)}
 <p>{a}: {escape(solidity.line(run["solidity"]["a"]))}<br>{b}: {escape(solidity.line(run["solidity"]["b"]))}{_change(run)}</p>
 <div class="ways">{articles}</div>
@@ -77,9 +78,12 @@ def _name(mesh):
     return mesh["name"] if "name" in mesh else Path(mesh["file"]).name
 
 
-def _counts(mesh):
+def _counts(run, mesh):
     whole = escape(str(mesh.get("file", mesh.get("name"))))
-    holes = f"; {escape(report.holes_closed(mesh['holes']))}" if "holes" in mesh else ""
+    holes = ""
+    if "holes" in mesh:
+        unit = f"{NO_BREAK}{run['unit']}" if run["unit"] else ""
+        holes = f"; {escape(report.holes_closed(mesh['holes'], lambda value: f'{value:.4g}{unit}'))}"
     return f"{whole}: {mesh['vertices']:,} vertices, {mesh['triangles']:,} triangles{holes}"
 
 

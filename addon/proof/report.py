@@ -4,11 +4,12 @@
 A run is a dictionary, as --report writes it (decimation_run()). Its lengths are in world units.
 """
 
+import functools
 import json
 import math
 
 from .. import native
-from ..units import three_digits
+from ..units import length, three_digits
 from . import solidity
 from .verdict import Interval
 
@@ -40,7 +41,8 @@ def decimation_run(source, result, native_report, volume, certified, options, se
     source: the MeshArrays of the input; result: the Decimated; native_report: the report of the native decimate();
     certified: the result of certify() for the mesh that will be stored, and "solidity", the result of solidity.compared();
     options: two_sided, placement, effort and target_triangles as they were given. holes: what became of the holes, a
-    dictionary of closed, triangles_added, refused, largest_perimeter and warnings, or None if none were to be closed.
+    dictionary of closed, triangles_added, refused, places, largest_perimeter, max_normal_angle and warnings, or None if
+    none were to be closed.
     """
     # The native report lists unused vertices as removed, but Blender keeps them: this is not a repair here.
     repairs = [repair for repair in native_report["repairs"] if repair["kind"] != "unused"]
@@ -104,14 +106,14 @@ def line(run, seconds=None):
     )
 
 
-def counts(run):
-    """Returns the numbers of triangles before and after a run as text, with remarks.
+def counts(run, as_text="{:.3g}".format):
+    """Returns the numbers of triangles before and after a run as text, with remarks. as_text: returns a length as text.
 
     The remarks say how many holes were closed and how many were not, why the run ended early or missed its target, how
     many faces outside the tolerance were kept, how many pairs of faces cross, and how many faces have a larger angle to
     the reference than they may have.
     """
-    remarks = [holes_closed(run["holes"])] if run.get("holes") else []
+    remarks = [holes_closed(run["holes"], as_text)] if run.get("holes") else []
     if run["target_triangles"] and run["stopped_by"] != "target":
         within = " within the tolerance" if run["stopped_by"] == "tolerance" else ""
         remarks.append(f"target {run['target_triangles']:,} not reached{within}")
@@ -123,7 +125,9 @@ def counts(run):
         remarks.append(f"{run['outside']['faces']:,} faces outside kept")
     pairs = run.get("crossings", {"after": 0})  # a file may keep a run of an earlier version
     if pairs["after"]:
-        remarks.append(f"{solidity.pair_count(pairs['after'])} pairs of faces cross, before {solidity.pair_count(pairs['before'])}")
+        remarks.append(
+            f"{solidity.pair_count(pairs['after'])} pairs of faces cross, before {solidity.pair_count(pairs['before'])}"
+        )
     turned = (run.get("normals") or {"exceeded_after": 0})["exceeded_after"]
     if turned:
         remarks.append(f"{turned:,} faces beyond the angle of Normals, before {run['normals']['exceeded_before']:,}")
@@ -131,24 +135,38 @@ def counts(run):
     return f"{run['input']['triangles']:,} -> {run['output']['triangles']:,} triangles{remark}"
 
 
-def holes_closed(holes):
-    """Returns the entry "holes" of a run as text."""
+def holes_closed(holes, as_text="{:.3g}".format):
+    """Returns the entry "holes" of a run as text. as_text: returns a length as text."""
     closed, refused = holes["closed"], holes["refused"]
     text = f"{closed:,} hole{'s' if closed != 1 else ''} closed"
+    if holes.get("places"):  # a file may keep a run of an earlier version
+        text += f", {'the longest' if closed > 1 else 'its'} rim {as_text(holes['places'][0]['perimeter'])}"
     if not refused:
         return text
     reasons = ", ".join(f"{refused[reason]:,} {words}" for reason, words in _LEFT_OPEN.items() if reason in refused)
     return f"{text}, {sum(refused.values()):,} left open: {reasons}"
 
 
-def remembered(text):
+def hole_rows(holes):
+    """Yields the entry "holes" of a run as (quantity, at, value): counts, and each place by itself."""
+    for key in ("closed", "triangles_added"):
+        yield f"holes {key}", "", holes[key]
+    for reason, count in holes["refused"].items():
+        yield "holes left open", reason, count
+    for i, place in enumerate(holes.get("places", ())):
+        yield f"hole {i + 1} perimeter", "", place["perimeter"]
+        for axis, value in zip("xyz", place["centre"]):
+            yield f"hole {i + 1} centre", axis, value
+
+
+def remembered(text, context):
     """Returns lines about a run that a .blend file keeps as JSON, or None if the text is damaged.
 
     The lines are counts() and, unless the run is of an earlier version, the facts about the result.
     """
     try:
         run = json.loads(text)
-        lines = [counts(run)]
+        lines = [counts(run, functools.partial(length, context))]
         if "solidity" in run:
             lines.append(solidity.summary(run["solidity"]["after"], run["solidity"]["change"]))
         return lines
@@ -160,7 +178,7 @@ def remembered_holes(text):
     """Returns the entry "holes" of a run that a .blend file keeps as JSON, or None if there is none that can be read."""
     try:
         holes = json.loads(text)["holes"]
-        return holes if holes and holes_closed(holes) else None
+        return holes if holes and holes_closed(holes) and [*hole_rows(holes)] else None
     except DAMAGED:
         return None
 

@@ -7,9 +7,10 @@ import math
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from addon import native
-from addon.mesh import mesh_io
+from addon.mesh import filling, mesh_io
 from addon.mesh.mesh_io import column
 from addon.proof import report
 from commands import decimate, save, succeeded, world
@@ -49,13 +50,77 @@ def test_pinholes_close_and_far_fewer_triangles_are_left():
             assert sum(holes["refused"].values()) == 1 and holes["largest_perimeter"] is None
             assert loops_of(ob) == 1
             assert report.counts(run_of(ob)).startswith("1,788 -> ")
-            assert "5 holes closed, 1 left open: 1 " in report.counts(run_of(ob))
-            assert "5 holes closed" in report.remembered(ob.tolvol.last_run)[0]
+            assert "5 holes closed, the longest rim 0.401, 1 left open: 1 " in report.counts(run_of(ob))
+            assert "5 holes closed, the longest rim 40.1\xa0cm" in report.remembered(ob.tolvol.last_run, bpy.context)[0]
             assert "close_holes" in run_of(ob)["seconds"] and ob.tolvol.close_holes
         else:
             assert holes is None and loops_of(ob) == 6
             assert "hole" not in report.counts(run_of(ob)) and not ob.tolvol.close_holes
     assert counts[True] < counts[False] / 2
+
+
+def rims(arrays, missing, matrix):
+    """Returns {centre: perimeter} of holes of one square each, in the world."""
+    corners = mesh_io.to_world(arrays[0], np.array(matrix))[arrays[1][list(missing)]]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).sum(1)
+    return {tuple(np.round(centre, 5)): side for centre, side in zip(corners.mean(1), sides)}
+
+
+def test_the_report_says_where_holes_were_closed(tmp_path, monkeypatch):
+    arrays, missing = sheet_arrays(), (100, 215, 430, 500)
+    matrix = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Scale(10, 4)
+    ob = add_object("placed", arrays[0], np.delete(arrays[1], missing, axis=0), matrix)
+    bpy.context.view_layer.update()
+    expected = rims(arrays, missing, matrix)
+    monkeypatch.setattr(filling, "MOST_PLACES", 3)
+    bpy.ops.tolvol.decimate(tolerance_percent=4, close_holes=True)
+    holes = run_of(ob)["holes"]
+    assert holes["closed"] == 4 and len(holes["places"]) == 3, "the number of places is limited, the count is not"
+    lengths = [place["perimeter"] for place in holes["places"]]
+    assert lengths == pytest.approx(sorted(expected.values(), reverse=True)[:3], rel=1e-6)
+    for place, centre in zip(holes["places"], sorted(expected, key=expected.get, reverse=True)):
+        assert place["centre"] == pytest.approx(centre, abs=1e-4)
+    for extension in (".csv", ".html"):
+        bpy.ops.tolvol.save_report(filepath=str(tmp_path / f"report{extension}"))
+    table = (tmp_path / "report.csv").read_text()
+    assert ",a holes closed,,4," in table and ",a holes left open," in table
+    x, _, z = holes["places"][2]["centre"]
+    assert f",a hole 3 centre,x,{x!r}," in table and f",a hole 3 centre,z,{z!r}," in table
+    assert f",a hole 1 perimeter,,{lengths[0]!r}," in table and "hole 4" not in table
+    assert f"4 holes closed, the longest rim {lengths[0]:.4g}\xa0m" in (tmp_path / "report.html").read_text()
+
+
+def test_the_report_of_a_file_has_the_places_of_all_objects(tmp_path):
+    arrays = sheet_arrays()
+    aside = arrays[0] * np.float32([2, 2, 1]) + np.float32([5, 0, 0])
+    meshes = [
+        (name, co, np.delete(arrays[1], hole, axis=0))
+        for name, co, hole in (("one", arrays[0], 430), ("two", aside, 500))
+    ]
+    path, told = save(tmp_path / "in.obj", *meshes), tmp_path / "report.json"
+    succeeded(decimate(path, tmp_path / "out.obj", "--tolerance", "4%", "--close-holes", "--report", told))
+    run = json.loads(told.read_text())
+    expected = {}
+    for co, hole in ((arrays[0], 430), (aside, 500)):
+        expected |= rims((co, arrays[1]), (hole,), np.eye(4))
+    assert run["holes"]["closed"] == 2
+    assert [place["perimeter"] for place in run["holes"]["places"]] == pytest.approx(
+        sorted(expected.values(), reverse=True), rel=1e-4
+    )
+    for place, centre in zip(run["holes"]["places"], sorted(expected, key=expected.get, reverse=True)):
+        assert place["centre"] == pytest.approx(centre, abs=1e-4)
+
+
+def test_places_of_a_damaged_file_are_none():
+    ob = holed()
+    bpy.ops.tolvol.decimate(tolerance_percent=4, close_holes=True)
+    run = run_of(ob)
+    assert report.remembered_holes(json.dumps(run)) == run["holes"]
+    for places in (3, [3], [{}], [{"perimeter": 1}], [{"perimeter": "long", "centre": [0, 0, 0]}]):
+        damaged = json.dumps(run | {"holes": run["holes"] | {"places": places}})
+        assert report.remembered_holes(damaged) is None, places
+    del run["holes"]["places"]  # as in a run of an earlier version
+    assert report.remembered_holes(json.dumps(run)) == run["holes"]
 
 
 def test_the_largest_perimeter_leaves_longer_holes_open():
@@ -64,7 +129,7 @@ def test_the_largest_perimeter_leaves_longer_holes_open():
     run = run_of(ob)
     assert run["holes"]["closed"] == 4 and run["holes"]["refused"] == {"perimeter": 2}
     assert run["holes"]["largest_perimeter"] == pytest.approx(0.35)
-    assert "4 holes closed, 2 left open: 2 beyond Largest Perimeter" in report.counts(run)
+    assert "4 holes closed, the longest rim 0.268, 2 left open: 2 beyond Largest Perimeter" in report.counts(run)
     assert loops_of(ob) == 2
 
 
@@ -202,6 +267,7 @@ def test_n_gons_and_several_objects():
         "closed": 2,
         "triangles_added": run_of(objects[1])["holes"]["triangles_added"],
         "refused": {},
+        "places": run_of(objects[1])["holes"]["places"],
         "largest_perimeter": None,
         "max_normal_angle": None,
     }
@@ -214,7 +280,9 @@ def test_save_report_tells_it(tmp_path):
     for name in ("report.json", "report.html"):
         bpy.ops.tolvol.save_report(filepath=str(tmp_path / name))
     assert json.loads((tmp_path / "report.json").read_text())["a"]["holes"] == run_of(ob)["holes"]
-    assert "; 5 holes closed, 1 left open: 1 " in (tmp_path / "report.html").read_text()
+    longest = run_of(ob)["holes"]["places"][0]["perimeter"]
+    page = (tmp_path / "report.html").read_text()
+    assert f"; 5 holes closed, the longest rim {longest:.4g}\xa0m, 1 left open: 1 " in page
     # Of a mesh that has changed since, the last decimation tells nothing.
     ob.data.vertices[0].co.z += 0.001
     bpy.ops.tolvol.save_report(filepath=str(tmp_path / "report.json"))
@@ -230,7 +298,7 @@ def test_on_the_command_line(tmp_path):
     done = succeeded(decimate(path, out, "--tolerance", "3%", "--close-holes", "--report", told))
     assert "holes closed" in done[3] and "hole" not in (plain[3] or "")
     holes = json.loads(told.read_text())["holes"]
-    assert holes["closed"] >= 2
+    assert holes["closed"] == len(holes["places"]) >= 2
     assert_within(world(out), world(path), 0.03001 * native.module.diagonal(*world(path)))
     limited = succeeded(
         decimate(path, out, "--tolerance", "3%", "--close-holes", "--largest-perimeter", "0.01%", "--report", told)

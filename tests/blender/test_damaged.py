@@ -17,7 +17,7 @@ from scenes import torus
 def decimated():
     ob = torus()
     bpy.ops.tolvol.decimate()
-    assert report.remembered(ob.tolvol.last_run) and measurements.measurement_of(ob)
+    assert report.remembered(ob.tolvol.last_run, bpy.context) and measurements.measurement_of(ob)
     return ob
 
 
@@ -35,7 +35,7 @@ def damaged_runs(text):
 
 def test_a_damaged_run_is_no_run(decimated):
     for text in damaged_runs(decimated.tolvol.last_run):
-        assert report.remembered(text) is None, text[:200]
+        assert report.remembered(text, bpy.context) is None, text[:200]
 
 
 def test_damaged_holes_are_none(decimated):

@@ -44,7 +44,9 @@ def test_faces_that_exceed_the_angle_are_named_in_the_counts():
     run["normals"] = {"largest": 4.0, "exceeded_before": 1200, "exceeded_after": 7}
     assert "7 faces beyond the angle of Normals, before 1,200" in report.counts(run)
     del run["normals"]
-    assert report.remembered(json.dumps(run))[0] == report.counts(run), "a file may keep a run of an earlier version"
+    assert report.remembered(json.dumps(run), bpy.context)[0] == report.counts(run), (
+        "a file may keep a run of an earlier version"
+    )
 
 
 def test_the_command_has_the_option(tmp_path):

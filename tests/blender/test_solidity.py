@@ -113,7 +113,7 @@ def test_the_panel_states_what_became_of_a_decimated_solid():
     assert found["after"] == pytest.approx(solidity.facts(snapshots.surface_of(ob)))
     assert found["before"]["area"] * (1 + found["change"]["area"]) == pytest.approx(found["after"]["area"])
     assert -0.1 < found["change"]["volume"] < 0.1
-    _, line = report.remembered(ob.tolvol.last_run)
+    _, line = report.remembered(ob.tolvol.last_run, bpy.context)
     assert line.startswith("Closed, manifold, no crossings, 1 shell, area ") and ", volume " in line
     holed = found["after"] | {"closed": False, "boundary_loops": 2, "shells": 3}
     assert solidity.summary(holed, {"area": None, "volume": None}) == "2 boundary loops, 3 shells"
