@@ -403,8 +403,9 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     labels: CollectionProperty(type=TOLVOL_PG_label, description="The labels that the probe has left")
     label_index: IntProperty(name="Label", description="The chosen label", update=_label_chosen)
     warnings: StringProperty(description="The warnings of the last operation, as JSON")
-    last_run: StringProperty(description="The report of the last decimation, as JSON")
-    last_run_of: StringProperty(description="The fingerprint of the mesh that the last decimation left")
+    last_run: StringProperty(description="The report of the last operation, as JSON")
+    last_run_of: StringProperty(description="The fingerprint of the mesh that the last operation left")
+    last_run_matrix: FloatVectorProperty(size=16, description="The matrix of the object after the last operation")
 
 
 _CLASSES = (

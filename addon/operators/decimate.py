@@ -3,7 +3,6 @@
 
 import contextlib
 import functools
-import json
 import math
 import time
 
@@ -16,7 +15,7 @@ from ..errors import NotProved, Refused
 from ..job import JobOperator, run_all
 from ..mesh import filling, mesh_io, protect, transfer
 from ..operation_settings import PROTECTED, decimate_settings
-from ..proof import kept_warnings, measure, report, solidity, verdict
+from ..proof import kept_warnings, last_run, measure, report, solidity, verdict
 from ..proof.certify import certify
 from ..properties import PLACEMENTS, automatic_placement, tolerance_settings
 from ..reference import measurements, snapshots, tolerances, volumes
@@ -193,8 +192,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         """Remembers the run at its object and reports it."""
         shared.give(self, ob.tolvol, _SHARED if self.own_placements else {*_SHARED, "placement"})
         measurements.remember(ob, snapshots.surface_of(ob), run, run["tolerance"]["absolute"])
-        ob.tolvol.last_run_of = ob.tolvol.measurement.fingerprint
-        ob.tolvol.last_run = json.dumps(run)
+        last_run.keep(ob, run)
         kept_warnings.keep(ob, run["warnings"], run["locked"])
         for warning in run["warnings"]:
             self.report({"WARNING"}, prefix + warning)

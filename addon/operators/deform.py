@@ -92,7 +92,7 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
             )
             raise Refused(f"{self.lattice} does not move {ob.name}: {why}")
         certified = motion.settle(result.vertices, certified)
-        motion.write(ob, result.vertices, certified)
+        motion.write(ob, result.vertices, certified, "deform")
         ob.tolvol.lattice, ob.tolvol.deform_mode = bpy.data.objects[self.lattice], self.mode
         warnings = [*run["warnings"], *_twice(ob)]
         kept_warnings.keep(ob, warnings)

@@ -16,7 +16,7 @@ from ..mesh import mesh_io
 from ..mesh.evaluation import Evaluation, same_faces
 from ..mesh.mesh_io import column
 from ..operation_settings import modifier_settings
-from ..proof import kept_warnings, measure, report
+from ..proof import kept_warnings, last_run, measure, report, solidity
 from ..proof.certify import certify
 from ..proof.verdict import Verdict
 from ..reference import measurements, snapshots, tolerances
@@ -145,7 +145,7 @@ moves as far as the tolerance permits. An object without a reference gets one fi
             motion.keep_reference(ob)
             self._add_key(ob, name, vertices)
         else:
-            motion.write(ob, vertices, certified)
+            motion.write(ob, vertices, certified, "apply_modifier")
         kept_warnings.keep(ob, motion.warnings)
         for warning in motion.warnings:
             self.report({"WARNING"}, warning)
@@ -238,6 +238,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         mesh.name = name
         kept_warnings.keep(ob, [])
         measurements.remember(ob, snapshots.surface_of(ob), certified, trial.tolerance)
+        last_run.keep(ob, {"operation": "fit_modifier", "solidity": certified["solidity"]})
 
 
 class _Trial:
@@ -279,7 +280,8 @@ class _Trial:
         return work
 
     def certified(self, arrays):
-        """Returns work that gives the result of certify() for the mesh as Blender will store it.
+        """Returns work that gives the result of certify() for the mesh as Blender will store it, and "solidity", the result
+        of solidity.compared().
 
         The work raises NotProved unless the mesh is within the tolerance both ways.
         """
@@ -294,7 +296,8 @@ class _Trial:
                     "result".format(*ways)
                 )
             self._left = len(arrays.triangles)
-            return found
+            facts = (solidity.facts(one, self._threads, progress) for one in (self.surface, surface))
+            return found | {"solidity": solidity.compared(*facts)}
 
         return work
 

@@ -9,7 +9,7 @@ import numpy as np
 from .. import native
 from ..errors import NotProved
 from ..mesh import mesh_io
-from ..proof import report
+from ..proof import last_run, report, solidity
 from ..proof.certify import certify
 from ..proof.verdict import Interval, Verdict
 from ..reference import measurements, snapshots, tolerances, volumes
@@ -32,6 +32,7 @@ class Motion:
         self.threads = threads
         self.warnings = []  # of hold()
         self._mesh = ob.data
+        self._facts_before = None
 
     @property
     def before(self):
@@ -71,7 +72,10 @@ class Motion:
         return held.vertices
 
     def certify(self, vertices, progress, triangles=None):
-        """Returns the result of certify() for the moved mesh. Raises NotProved unless the mesh is within the tolerance."""
+        """Returns the result of certify() for the moved mesh, and "solidity", the result of solidity.compared().
+
+        Raises NotProved unless the mesh is within the tolerance.
+        """
         arrays = replace(self.surface.arrays, vertices=vertices)
         if triangles is not None:
             arrays = replace(arrays, triangles=triangles)
@@ -82,7 +86,10 @@ class Motion:
             if not found.within(self.tolerance):
                 ends = (report.percent(end, self.size) for end in (found.lower, found.upper))
                 raise NotProved(said.format("between {} and {} of the size".format(*ends)))
-        return certified
+        facts = solidity.facts(moved, self.threads, progress)
+        if self._facts_before is None:
+            self._facts_before = solidity.facts(self.surface, self.threads, progress)
+        return certified | {"solidity": solidity.compared(self._facts_before, facts)}
 
     def settle(self, vertices, certified):
         """Returns `certified`, or a new result of certify() if Blender triangulates the moved faces differently."""
@@ -91,14 +98,18 @@ class Motion:
             return certified
         return self.certify(vertices, native.module.Progress(), triangles)
 
-    def write(self, ob, vertices, certified):
-        """Moves the vertices of `ob`, whose mesh is the one that was read or a copy of that mesh."""
+    def write(self, ob, vertices, certified, operation):
+        """Moves the vertices of `ob`, whose mesh is the one that was read or a copy of that mesh.
+
+        operation: its name, for the run that the object keeps.
+        """
         self.keep_reference(ob)
         if ob.mode == "EDIT":
             self._write_edited(ob, vertices)
         else:
             mesh_io.move_vertices(ob.data, self.before, vertices)
         measurements.remember(ob, snapshots.surface_of(ob), certified, self.tolerance)
+        last_run.keep(ob, {"operation": operation, "solidity": certified["solidity"]})
 
     def _write_edited(self, ob, vertices):
         """Moves vertices of the mesh that is in Edit Mode. Blender moves the other shape keys when Edit Mode is left."""

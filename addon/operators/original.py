@@ -11,6 +11,7 @@ from bpy.app.handlers import persistent
 from bpy.props import BoolProperty
 from mathutils import Matrix
 
+from ..proof import last_run
 from ..reference import originals, snapshots
 from .blocked import allowed, mesh_blocked, object_blocked
 
@@ -204,7 +205,8 @@ normals. The present mesh and all edits of it are discarded, after a question"""
         ob.data = mesh
         bpy.data.meshes.remove(before)  # mesh_blocked() has seen to it that no other object has this mesh.
         mesh.name = name
-        ob.tolvol.last_run = ob.tolvol.last_run_of = ob.tolvol.warnings = ""
+        ob.tolvol.warnings = ""
+        last_run.clear(ob)
         snapshots.notify()
         self.report({"INFO"}, f"{ob.name} is the original again: {len(mesh.polygons):,} faces")
         return {"FINISHED"}

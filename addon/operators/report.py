@@ -8,8 +8,7 @@ from bpy.props import StringProperty
 
 from ..errors import Refused
 from ..files import safe_files
-from ..mesh import mesh_io
-from ..proof import deviation, labels, report
+from ..proof import deviation, labels, last_run, report
 from ..reference import snapshots, tolerances
 from .check import Comparison
 
@@ -64,7 +63,7 @@ read (.html), a table (.csv) or all numbers (.json)"""
             "b": _counted("its reference", self.ob.tolvol.snapshot),
         }
         holes = report.remembered_holes(self.ob.tolvol.last_run)
-        if holes and self.ob.tolvol.last_run_of == mesh_io.read_mesh(self.ob.data).fingerprint():
+        if holes and last_run.stays(self.ob):
             self._about["a"]["holes"] = holes
         if self.ob.tolvol.labels:
             tolerance = tolerances.tolerance_length(self.ob.tolvol, snapshots.snapshot_size(self.ob))

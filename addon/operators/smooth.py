@@ -96,7 +96,7 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
         # All results are certified before the first mesh is changed.
         proved = [motion.settle(vertices, certified) for _, motion, vertices, _, certified in moved]
         for (ob, motion, vertices, run, _), certified in zip(moved, proved):
-            motion.write(ob, vertices, certified)
+            motion.write(ob, vertices, certified, "smooth")
             shared.give(self, ob.tolvol.smooth, smooth_settings())
             kept_warnings.keep(ob, run["warnings"])
             self._say(motion, vertices, run, certified, f"{ob.name}: " if len(moved) > 1 else "")

@@ -6,7 +6,7 @@ import bpy
 from .. import overlay
 from ..operators.probe import TOLVOL_OT_probe, tolerance_of
 from ..overlay import reasons
-from ..proof import kept_warnings, labels, probing, report, statistics, verdict
+from ..proof import kept_warnings, labels, last_run, probing, report, statistics, verdict
 from ..reference import measurements
 from ..units import length
 from .layout import AMBER, GHOST, GREEN, GREY, RED, SubPanel, active, is_narrow, right, text_lines
@@ -73,12 +73,13 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
 
 def _draw_last_run(context, layout, ob):
     """Draws what is known about the last operation: until the mesh changes, but its warnings until the next operation."""
-    if ob.tolvol.last_run and ob.tolvol.last_run_of == measurements.shown_fingerprint(ob):
-        lines = report.remembered(ob.tolvol.last_run, context)
+    if run := last_run.shown(ob):
+        lines = report.remembered(run, context)
         for line, icon in zip(lines or (), ("CHECKMARK", "MESH_DATA")):
-            text_lines(context, layout, line, icon)
+            if line:
+                text_lines(context, layout, line, icon)
         if lines is None:
-            damaged = "The report of the last run is damaged: decimate again to get a new one"
+            damaged = "The report of the last operation is damaged: the next operation makes a new one"
             text_lines(context, layout, damaged, "ERROR")
     warnings, staying = kept_warnings.of(ob)
     for warning in warnings:

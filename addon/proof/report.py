@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes the report of a run and texts from it.
 
-A run is a dictionary, as --report writes it (decimation_run()). Its lengths are in world units.
+A run is a dictionary, as --report writes it (decimation_run()), or that of another operation (last_run.py). Its lengths
+are in world units.
 """
 
 import functools
@@ -160,16 +161,18 @@ def hole_rows(holes):
 
 
 def remembered(text, context):
-    """Returns lines about a run that a .blend file keeps as JSON, or None if the text is damaged.
+    """Returns two lines about a run that a .blend file keeps as JSON, or None if the text is damaged.
 
-    The lines are counts() and, unless the run is of an earlier version, the facts about the result.
+    The lines are the counts() of a decimation, or None of another operation; and the facts about the result, or None if
+    the run is of an earlier version.
     """
     try:
         run = json.loads(text)
-        lines = [counts(run, functools.partial(length, context))]
-        if "solidity" in run:
-            lines.append(solidity.summary(run["solidity"]["after"], run["solidity"]["change"]))
-        return lines
+        decimated = "operation" not in run
+        counted = counts(run, functools.partial(length, context)) if decimated else None
+        if decimated and "solidity" not in run:
+            return counted, None
+        return counted, solidity.summary(run["solidity"]["after"], run["solidity"]["change"])
     except DAMAGED:
         return None
 

@@ -8,13 +8,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from addon.mesh import mesh_io
-from addon.proof import report, solidity
+from addon.proof import last_run, report, solidity
 from addon.reference import snapshots
 from commands import command, save
 from drawn import deviation_panel
-from scenes import activate, add_object, sheet, torus, torus_arrays
+from scenes import activate, add_object, link, sheet, torus, torus_arrays
 
 CUBE = (
     np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float32),
@@ -176,3 +177,94 @@ def test_more_pairs_than_are_counted_are_at_least_so_many(monkeypatch, capfd):
     said = re.search(r"at least (\d+) of \d+ faces cross others", capfd.readouterr().out)
     bpy.ops.object.mode_set(mode="OBJECT")
     assert int(said[1]) == mesh_io.column(ob.data.polygons, "select", 1, bool).sum() > 0
+
+
+# After every operation ------------------------------------------------------------------------------------------------
+
+
+def smooth(ob):
+    bpy.ops.tolvol.smooth(iterations=3)
+
+
+def smooth_in_edit_mode(ob):
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.tolvol.smooth(iterations=3)
+    assert last_run.shown(ob) == "", "edits that Python does not see may follow"
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def deform(ob):
+    cage = link(bpy.data.objects.new("cage", bpy.data.lattices.new("cage")))
+    cage.scale = (3, 3, 3)
+    cage.data.points[0].co_deform.x += 0.05
+    activate(ob)
+    bpy.ops.tolvol.deform(lattice=cage.name, mode="PULL_BACK")
+
+
+def apply_modifier(ob):
+    ob.modifiers.new("Smooth", "SMOOTH").iterations = 5
+    bpy.ops.tolvol.apply_modifier()
+
+
+def apply_to_a_new_object(ob):
+    ob.modifiers.new("Smooth", "SMOOTH").iterations = 5
+    bpy.ops.tolvol.apply_modifier(result="OBJECT")
+
+
+def fit_modifier(ob):
+    ob.modifiers.new("Decimate", "DECIMATE")
+    bpy.ops.tolvol.fit_modifier(value=0.8)
+
+
+OPERATIONS = (smooth, smooth_in_edit_mode, deform, apply_modifier, apply_to_a_new_object, fit_modifier)
+
+
+@pytest.mark.parametrize("operation", OPERATIONS, ids=lambda operation: operation.__name__)
+def test_the_panel_states_what_became_of_the_solid_in_each_operation(operation, monkeypatch):
+    # One quad is missing, so that a fact differs from what a decimation has said.
+    vertices, faces = torus_arrays(around=32, across=16, noise=0.01)
+    ob = add_object("torus", vertices, faces, np.diag([2.0, 1, 1, 1]))
+    ob.tolvol.tolerance_percent = 3
+    bpy.ops.tolvol.decimate(target_triangles=10**6)
+    assert "Closed, manifold, no crossings" in last_run_texts(monkeypatch)[-1]
+    holed = add_object("holed", vertices, faces[1:], np.diag([2.0, 1, 1, 1]))
+    holed.tolvol.last_run, holed.tolvol.last_run_of = ob.tolvol.last_run, ob.tolvol.last_run_of
+    holed.tolvol.tolerance_percent = 3
+    before = solidity.facts(snapshots.surface_of(holed))
+    operation(holed)
+    result = bpy.context.active_object
+    after = solidity.facts(snapshots.surface_of(result))
+    run = json.loads(last_run.shown(result))
+    assert run["solidity"]["before"] == pytest.approx(before) and run["solidity"]["after"] == pytest.approx(after)
+    assert run["solidity"]["change"]["area"] == pytest.approx(after["area"] / before["area"] - 1) and after != before
+    assert solidity.summary(after, run["solidity"]["change"]) in last_run_texts(monkeypatch)
+    # The facts are of this mesh, at this size.
+    bpy.ops.object.mode_set(mode="OBJECT")
+    result.matrix_world = Matrix.Translation((1, 2, 3)) @ result.matrix_world
+    bpy.context.view_layer.update()
+    assert last_run.shown(result)
+    result.scale *= 1.1
+    bpy.context.view_layer.update()
+    assert last_run.shown(result) == ""
+    result.scale /= 1.1
+    bpy.context.view_layer.update()
+    assert last_run.shown(result)
+    result.data.vertices[0].co.z += 0.01
+    result.data.update()
+    bpy.context.view_layer.update()
+    assert last_run.shown(result) == ""
+
+
+def last_run_texts(monkeypatch):
+    """Returns the texts of the panel."""
+    return deviation_panel(monkeypatch)[1]
+
+
+def test_an_operation_that_makes_a_shape_key_leaves_the_facts_of_the_base_mesh():
+    ob = torus(around=32, across=16, noise=0.01)
+    bpy.ops.tolvol.smooth(iterations=3)
+    before = last_run.shown(ob)
+    ob.modifiers.new("Smooth", "SMOOTH").iterations = 5
+    bpy.ops.tolvol.apply_modifier(result="SHAPE_KEY")
+    assert before and last_run.shown(ob) == before
