@@ -208,7 +208,10 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             bpy.data.meshes.remove(mesh)
             raise
         shared.give(self, settings, modifier_settings())
-        self._write(context, trial, mesh, certified)
+        warnings = _crossings(name, certified["solidity"])
+        self._write(context, trial, mesh, certified, warnings)
+        for warning in warnings:
+            self.report({"WARNING"}, warning)
         self.report({"INFO"}, f"{name}: {parameter.label} {self.value:.4g}, {trial.line(certified)}")
 
     def _best(self, evaluation, parameter, trial):
@@ -225,7 +228,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             setattr(evaluation.modifier, parameter.name, value)
             deviation = yield trial.measured(mesh_io.read_mesh(evaluation.mesh()))
 
-    def _write(self, context, trial, mesh, certified):
+    def _write(self, context, trial, mesh, certified, warnings):
         ob = self.target(context)
         if ob.tolvol.snapshot is None:
             snapshots.set_reference(ob, trial.reference)
@@ -236,9 +239,18 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         ob.data = mesh
         bpy.data.meshes.remove(before)
         mesh.name = name
-        kept_warnings.keep(ob, [])
+        kept_warnings.keep(ob, warnings)
         measurements.remember(ob, snapshots.surface_of(ob), certified, trial.tolerance)
         last_run.keep(ob, {"operation": "fit_modifier", "solidity": certified["solidity"]})
+
+
+def _crossings(name, compared):
+    """Returns a list with a warning if more pairs of faces cross than before: Blender's modifiers do not look for them."""
+    before, after = (compared[when]["crossing_pairs"] for when in ("before", "after"))
+    if after <= before:
+        return []
+    pairs = solidity.pair_count(after)
+    return [f"{name} makes faces cross: the number of crossing pairs of faces is {pairs}, and was {before:,} before"]
 
 
 class _Trial:

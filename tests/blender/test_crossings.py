@@ -11,7 +11,7 @@ from mathutils import Matrix
 
 from addon import guard, native
 from addon.mesh import mesh_io
-from addon.proof import report
+from addon.proof import kept_warnings, report
 from commands import decimate, save, succeeded, world
 from scenes import activate, add_object, link, sheet_arrays, world_triangles
 
@@ -120,6 +120,24 @@ def test_an_applied_modifier_makes_no_crossings_unless_they_are_allowed(choice):
     modifier.vertex_group = "upper"
     assert bpy.ops.tolvol.apply_modifier(modifier="Displace") == {"FINISHED"}
     assert bool(pairs(world_triangles(ob))) == (choice == "ALLOW")
+
+
+def test_a_fitted_modifier_that_makes_faces_cross_says_so(capfd):
+    for result in ("REPLACE", "OBJECT"):
+        ob = wall(result)
+        ob.modifiers.new("Collapse", "DECIMATE")
+        assert bpy.ops.tolvol.fit_modifier(result=result) == {"FINISHED"}
+        fitted = bpy.context.active_object
+        count = pairs(world_triangles(fitted))
+        warning = f"Collapse makes faces cross: the number of crossing pairs of faces is {count:,}, and was 0 before"
+        assert (
+            count > 0 and kept_warnings.of(fitted)[0] == [warning] and f"Warning: {warning}" in capfd.readouterr().out
+        )
+    activate(fitted)
+    fitted.modifiers.new("Collapse", "DECIMATE")
+    # Again with all triangles: the same pairs cross, and none of them is new.
+    bpy.ops.tolvol.fit_modifier(value=1, result="REPLACE")
+    assert kept_warnings.of(fitted) == ([], {}) and "Warning" not in capfd.readouterr().out
 
 
 @pytest.mark.parametrize("choice", ["KEEP_OUT", "ALLOW"])
