@@ -5,6 +5,8 @@ import bpy
 import numpy as np
 
 NO_BREAK = "\u00a0"  # between a number and its unit
+# Blender writes all digits of an area or a volume, and cuts the text off after 63.
+_LARGEST = 1e15
 
 
 def length(context, value):
@@ -19,12 +21,21 @@ def length(context, value):
 
 def area(context, value):
     """Returns an area of the world as text in the scene's units."""
+    return _of_power(context, value, "AREA", 2)
+
+
+def volume(context, value):
+    """Returns a volume in the world as text in the scene's units."""
+    return _of_power(context, value, "VOLUME", 3)
+
+
+def _of_power(context, value, category, power):
     units = context.scene.unit_settings
-    if units.system == "NONE":
-        return f"{value:.3g}"
-    return bpy.utils.units.to_string(units.system, "AREA", value * units.scale_length**2, precision=3).replace(
-        " ", NO_BREAK
-    )
+    if units.system != "NONE" and abs(value) < _LARGEST:
+        text = bpy.utils.units.to_string(units.system, category, value * units.scale_length**power, precision=3)
+        if value == 0 or any(digit in "123456789" for digit in text):
+            return text.replace(" ", NO_BREAK)
+    return f"{value:.3g}"
 
 
 def three_digits(value):

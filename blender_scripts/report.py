@@ -24,7 +24,7 @@ _DESCRIPTION = """\
 Measures the distances from the surface of A to that of B and from B to A: the largest distance as a certified interval, with its
 place; mean, root mean square and percentiles over the area; the share of the area that is farther than each bound; and the parts
 inside and outside, if the other surface is closed. Says of both whether they are closed, manifold, oriented and free of crossing
-faces, with the change of area and volume."""
+faces, with the number of shells, area and volume of both and the change from B to A."""
 
 _EPILOG = """\
 Percentages are of the size of B, which is the longest diagonal of its bounding box. Exit codes: 0 measured; 2 bad usage or input;
@@ -126,6 +126,7 @@ def _report(options, staged):
     result |= {"a": files[0], "b": files[1]}
     for label, name in (("A", "a"), ("B", "b")):
         print(f"{label}: {solidity.line(result['solidity'][name])}")
+    print(f"A: {solidity.measures_line(*(result['solidity'][key] for key in ('a', 'b', 'change')))}")
     for way, label in (("forward", "A from B"), ("backward", "B from A")):
         print(_line(result[way], label, size))
     drawn = _draw(surfaces, result, options)

@@ -35,6 +35,7 @@ article {{ border: 1px solid #d0d0d0; border-radius: .5rem; padding: 1.1rem 1.3r
 table {{ font-size: .93rem; border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }}
 th, td {{ text-align: right; white-space: nowrap; padding: .16rem .35rem; border-bottom: 1px solid #ececec; }}
 th:first-child, td:first-child {{ text-align: left; padding-left: 0; }}
+.measures table {{ width: auto; }}
 svg {{ display: block; width: 100%; height: auto; }}
 svg text {{ font-size: 12px; fill: #333; }}
 figure {{ margin: 1.5rem 0 0; }}
@@ -65,7 +66,8 @@ def page(run, pictures=()):
 <h1>Deviation of {a} and {b}</h1>
 <p class="muted">{_counts(run, run["a"])}<br>{_counts(run, run["b"])}; size, which is 100&nbsp;%: {_length(run, run["size"])}</p>
 {_verdict(run)}
-<p>{a}: {escape(solidity.line(run["solidity"]["a"]))}<br>{b}: {escape(solidity.line(run["solidity"]["b"]))}{_change(run)}</p>
+<p>{a}: {escape(solidity.line(run["solidity"]["a"]))}<br>{b}: {escape(solidity.line(run["solidity"]["b"]))}</p>
+{_measures(run, a, b)}
 <div class="ways">{articles}</div>
 {_labels(run)}
 {figures}
@@ -127,10 +129,15 @@ def _of(run):
     return "of tolerance" if run["tolerance"] else "of size"
 
 
-def _change(run):
-    change = run["solidity"]["change"]
-    texts = [f"{name} {100 * value:+.3g}&nbsp;%" for name, value in change.items() if value is not None]
-    return f"<br>change: {', '.join(texts)}" if texts else ""
+def _measures(run, a, b):
+    """Returns the table of shells, area and volume of both."""
+    of_a, of_b, changes = (run["solidity"][key] for key in ("a", "b", "change"))
+    units = ("", "&sup2;", "&sup3;")
+    rows = [
+        (f"{name.capitalize()}{f'{_in_unit(run)}{power}' if power and run['unit'] else ''}", *texts)
+        for (name, *texts), power in zip(solidity.measures(of_a, of_b, changes), units)
+    ]
+    return f'<div class="measures">{_table(("", a, b, "change"), rows)}</div>'
 
 
 def _verdict(run):

@@ -172,7 +172,7 @@ def remembered(text, context):
         counted = counts(run, functools.partial(length, context)) if decimated else None
         if decimated and "solidity" not in run:
             return counted, None
-        return counted, solidity.summary(run["solidity"]["after"], run["solidity"]["change"])
+        return counted, solidity.summary(run["solidity"], context)
     except DAMAGED:
         return None
 

@@ -21,7 +21,7 @@ All but the last two are exact. tolvol.solidity() finds all but the crossings.
 """
 
 from .. import native
-from ..units import NO_BREAK
+from ..units import NO_BREAK, area, volume
 
 # Where a mesh has so many pairs or more, they are not counted further: 100,000 faces on one place have five thousand million.
 MOST_PAIRS = 1_000_000
@@ -97,12 +97,44 @@ def line(found):
     return f"not printable: {', '.join(missing.values())}"
 
 
-def summary(found, changes):
-    """Returns the facts about a result as text for the panel, with the changes of its area and volume."""
+def summary(compared, context):
+    """Returns the facts about a result as text for the panel: the result of compared() in the scene's units."""
+    found = compared["after"]
     connected = ", ".join(lacking(found).values()) or "closed, manifold, no crossings"
-    shells = f"{found['shells']:,} shell{'s' * (found['shells'] != 1)}"
-    said = [f"{name} {100 * share:+.2g}{NO_BREAK}%" for name, share in changes.items() if share is not None]
-    return ", ".join([connected[:1].upper() + connected[1:], shells, *said])
+    changes = _changes(found, compared["before"], compared["change"])
+    said = [f"{found['shells']:,} shell{'s' * (found['shells'] != 1)}", f"area {area(context, found['area'])}"]
+    if found["volume"] is not None:
+        said.append(f"volume {volume(context, found['volume'])}")
+    said = [f"{text} ({change})" if change else text for text, change in zip(said, changes)]
+    return ", ".join([connected[:1].upper() + connected[1:], *said])
+
+
+def measures(of_a, of_b, changes):
+    """Returns rows (name, A's, B's, change of A against B) of shells, area and volume as text; "none": no volume."""
+
+    def rounded(value):
+        return "none" if value is None else f"{value:.4g}"
+
+    of_each = [(f"{found['shells']:,}", rounded(found["area"]), rounded(found["volume"])) for found in (of_a, of_b)]
+    return list(zip(("shells", "area", "volume"), *of_each, _changes(of_a, of_b, changes)))
+
+
+def measures_line(of_a, of_b, changes):
+    """Returns the rows of measures() as one line of text about A."""
+    rows = measures(of_a, of_b, changes)
+    return ", ".join(
+        f"{name} {a} (B: {b}{', ' if change else ''}{change.replace(NO_BREAK, ' ')})" for name, a, b, change in rows
+    )
+
+
+def _changes(of_a, of_b, changes):
+    """Returns the changes of shells, area and volume of A against B as text. "": none, or not known."""
+    shells = of_a["shells"] - of_b["shells"]
+    shares = (changes[name] for name in ("area", "volume"))
+    return [
+        f"{shells:+,}" if shells else "",
+        *("" if share is None else f"{100 * share:+.3g}{NO_BREAK}%" for share in shares),
+    ]
 
 
 def change(of_a, of_b):

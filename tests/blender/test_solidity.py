@@ -115,9 +115,24 @@ def test_the_panel_states_what_became_of_a_decimated_solid():
     assert found["before"]["area"] * (1 + found["change"]["area"]) == pytest.approx(found["after"]["area"])
     assert -0.1 < found["change"]["volume"] < 0.1
     _, line = report.remembered(ob.tolvol.last_run, bpy.context)
-    assert line.startswith("Closed, manifold, no crossings, 1 shell, area ") and ", volume " in line
-    holed = found["after"] | {"closed": False, "boundary_loops": 2, "shells": 3}
-    assert solidity.summary(holed, {"area": None, "volume": None}) == "2 boundary loops, 3 shells"
+    assert line.startswith("Closed, manifold, no crossings, 1 shell, area ")
+    parts = re.fullmatch(
+        r".*, area ([\d.]+)\xa0m² \(([+-][\d.]+)\xa0%\), volume ([\d.]+)\xa0m³ \(([+-][\d.]+)\xa0%\)", line
+    )
+    assert float(parts[1]) == pytest.approx(found["after"]["area"], rel=1e-2)
+    assert float(parts[2]) == pytest.approx(100 * found["change"]["area"], rel=1e-2)
+    assert float(parts[3]) == pytest.approx(found["after"]["volume"], rel=1e-2)
+    assert float(parts[4]) == pytest.approx(100 * found["change"]["volume"], rel=1e-2)
+    none = {"area": None, "volume": None}
+    holed = found["after"] | {"closed": False, "boundary_loops": 2, "shells": 3, "area": 0.25, "volume": None}
+    compared = {"before": found["before"], "after": holed, "change": none}
+    bpy.context.scene.unit_settings.system = "NONE"
+    assert solidity.summary(compared, bpy.context) == "2 boundary loops, 3 shells (+2), area 0.25"
+    bpy.context.scene.unit_settings.system = "METRIC"
+    bpy.context.scene.unit_settings.scale_length = 0.001
+    assert solidity.summary(compared, bpy.context) == "2 boundary loops, 3 shells (+2), area 0.25\xa0mm²"
+    assert ", volume 1e+300" in solidity.summary(compared | {"after": holed | {"volume": 1e300}}, bpy.context)
+    assert ", volume 0.5\xa0mm³" in solidity.summary(compared | {"after": holed | {"volume": 0.5}}, bpy.context)
 
 
 def test_the_command_requires(tmp_path):
@@ -138,6 +153,26 @@ def test_the_command_requires(tmp_path):
     assert ",a boundary_loops,,1,," in reports[2].read_text()
     assert command("report.py", holed, whole, "--require", "manifold,uncrossed")[0] == 0
     assert command("report.py", holed, whole, "--require", "solid")[0] == 2
+
+
+def test_reports_say_shells_area_and_volume(tmp_path):
+    two = np.concatenate([CUBE[0], 2 * CUBE[0] + 3]), np.concatenate([CUBE[1], CUBE[1] + 8])
+    one, both = save(tmp_path / "one.ply", ("one", 2 * CUBE[0], CUBE[1])), save(tmp_path / "both.ply", ("both", *two))
+    page = tmp_path / "report.html"
+    code, out, _ = command("report.py", both, one, "--report", page, "--unit", "mm")
+    assert code == 0 and "A: shells 2 (B: 1, +1), area 30 (B: 24, +25 %), volume 9 (B: 8, +12.5 %)\n" in out
+    cells = re.findall(r"<t[dh]>(.*?)</t[dh]>", page.read_text())
+    start = cells.index("Shells")
+    assert cells[start - 4 : start] == ["", "both.ply", "one.ply", "change"]
+    assert cells[start : start + 12] == [
+        *("Shells", "2", "1", "+1"),
+        *("Area in mm&sup2;", "30", "24", "+25\xa0%"),
+        *("Volume in mm&sup3;", "9", "8", "+12.5\xa0%"),
+    ]
+    holed = save(tmp_path / "holed.ply", ("holed", CUBE[0], CUBE[1][1:]))
+    code, out, _ = command("report.py", holed, one, "--report", page)
+    assert code == 0 and "A: shells 1 (B: 1), area 5 (B: 24, -79.2 %), volume none (B: 8)\n" in out
+    assert "<td>Area</td>" in page.read_text() and "<td>none</td>" in page.read_text()
 
 
 def test_select_crossing_faces():
@@ -238,7 +273,7 @@ def test_the_panel_states_what_became_of_the_solid_in_each_operation(operation, 
     run = json.loads(last_run.shown(result))
     assert run["solidity"]["before"] == pytest.approx(before) and run["solidity"]["after"] == pytest.approx(after)
     assert run["solidity"]["change"]["area"] == pytest.approx(after["area"] / before["area"] - 1) and after != before
-    assert solidity.summary(after, run["solidity"]["change"]) in last_run_texts(monkeypatch)
+    assert solidity.summary(run["solidity"], bpy.context) in last_run_texts(monkeypatch)
     # The facts are of this mesh, at this size.
     bpy.ops.object.mode_set(mode="OBJECT")
     result.matrix_world = Matrix.Translation((1, 2, 3)) @ result.matrix_world
