@@ -64,7 +64,7 @@ def test_a_measurement_of_nothing_is_none(decimated):
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -1.0])
 def test_a_damaged_percentage_is_the_default(decimated, value):
-    default = 0.5  # of the preferences
+    default = 0.2  # of the preferences
     decimated.tolvol["percent_choice"] = value  # past the range of the property, as a file does it
     assert decimated.tolvol.tolerance_percent == default and verdict.of(decimated).margin_percent()
     assert bpy.ops.tolvol.check() == {"FINISHED"}

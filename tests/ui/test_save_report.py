@@ -17,7 +17,7 @@ def test_save_report_by_mouse():
     yield from reset(monkey)
     yield from open_tab()
     yield from press("tolvol.decimate")
-    yield from finished(lambda: len(suzanne().data.polygons) < 1000)
+    yield from finished(lambda: len(suzanne().data.polygons) < 3000)
     yield 1.0
     home = os.environ["HOME"]
     with tempfile.TemporaryDirectory() as folder:

@@ -190,9 +190,13 @@ def press(operator, across=0.33):
     """Clicks the button of an operator in the sidebar. If necessary, it scrolls the sidebar, and back up after that."""
     place = yield from find(operator, across)
     scrolled = place is None
-    for direction in (_UP, _DOWN):
+    if scrolled:
+        yield from scroll(_UP)
+        place = yield from find(operator, across)
+    # The sidebar may be several times as high as the window.
+    for _ in range(_PAGES):
         if place is None:
-            yield from scroll(direction)
+            yield from scroll(_DOWN, _PAGE)
             place = yield from find(operator, across)
     assert place is not None, f"no button for {operator}"
     yield 0.6  # After so many seconds no tooltip is in the way.
@@ -203,13 +207,14 @@ def press(operator, across=0.33):
 
 
 _UP, _DOWN = 4, 5  # X counts the two directions of the wheel as these buttons of the mouse.
+_PAGE, _PAGES = 6, 6  # Steps of the wheel after which a part of the sidebar is still seen, and how often that is done.
 
 
-def scroll(button=_UP):
-    """Turns the wheel over the sidebar until it no longer scrolls."""
+def scroll(button=_UP, steps=30):
+    """Turns the wheel over the sidebar. After 30 steps it no longer scrolls."""
     sidebar = region("UI")
     middle = on_screen(sidebar, sidebar.width // 2, sidebar.height // 2)
-    xdotool("mousemove", *middle, "sleep", "0.1", "click", "--repeat", 30, "--delay", 20, button)
+    xdotool("mousemove", *middle, "sleep", "0.1", "click", "--repeat", steps, "--delay", 20, button)
     yield 0.5
 
 
