@@ -218,7 +218,7 @@ TEST(Allocation, ThoroughWithOptimalPlacement) {
 }
 
 TEST(Allocation, CloseHoles) {
-  const Scene scene;
+  const Scene scene(10);
   std::vector<glm::uvec3> rest = scene.mesh.triangles;
   for (const int gone : {150, 60, 42, 41, 40}) rest.erase(rest.begin() + gone);
   for (const unsigned threads : {1u, 2u}) {
