@@ -73,11 +73,12 @@ std::uint32_t BoundedMesh::survivor(std::uint32_t v) const {
 }
 
 bool BoundedMesh::joined_by_other(std::uint32_t a, std::uint32_t b) const {
+  // Many sheets may meet at one of the two places.
+  if (copies(a).size() > copies(b).size()) std::swap(a, b);
   for (const std::uint32_t x : copies(a)) {
-    for (const std::uint32_t y : copies(b)) {
-      if ((x != a || y != b) && mesh_.find_halfedge(handle(x), handle(y)).is_valid()) {
-        return true;
-      }
+    for (const auto near : mesh_.vv_range(handle(x))) {
+      const auto y = static_cast<std::uint32_t>(near.idx());
+      if (slots_[y] == slots_[b] && (x != a || y != b)) return true;
     }
   }
   return false;
@@ -146,7 +147,16 @@ void BoundedMesh::merge_copies(const Change& change) {
     slots_[v] = kept;
     place(v, change.position());
   }
-  for (const std::uint32_t v : copies(kept_vertex)) joined_[v] = true;
+  // What holds for a vertex holds for its copies.
+  const auto of_all = copies(kept_vertex);
+  const bool is_pinned = std::ranges::any_of(of_all, [&](std::uint32_t v) { return pinned_[v]; });
+  double least = change.share();
+  for (const std::uint32_t v : of_all) least = std::min(least, share(v));
+  for (const std::uint32_t v : of_all) {
+    joined_[v] = true;
+    if (is_pinned) pinned_[v] = true;
+    if (!shares_.empty()) shares_[v] = least;
+  }
 }
 
 void BoundedMesh::apply(const Change& change) {

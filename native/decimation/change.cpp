@@ -84,7 +84,7 @@ bool Change::prepare_flip(Edge e) {
   const std::uint32_t a = mesh_->to(h), b = mesh_->to(o), c = mesh_->to(mesh.next_halfedge_handle(h)),
                       d = mesh_->to(mesh.next_halfedge_handle(o));
   if (mesh_->pinned(a) && mesh_->pinned(b)) return false;
-  if (mesh_->has_copies() && mesh_->joined_by_other(c, d)) return false;
+  if (mesh_->has_copies() && (mesh_->slot(c) == mesh_->slot(d) || mesh_->joined_by_other(c, d))) return false;
   const std::uint32_t first = static_cast<std::uint32_t>(mesh.face_handle(h).idx()),
                       second = static_cast<std::uint32_t>(mesh.face_handle(o).idx());
   constexpr double kAnywhere = std::numeric_limits<double>::infinity();  // The change carries no point of a face along.
@@ -257,7 +257,7 @@ bool Change::gather_copies(Halfedge h) {
 }
 
 /// The link condition of the result, in which copies are one vertex: a vertex next to both ends is next to the edge,
-/// and no face comes to lie on another.
+/// no face comes to lie on another, and none has two corners at one place.
 bool Change::slots_fit() {
   const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
   apexes_.clear();
@@ -293,6 +293,7 @@ bool Change::slots_fit() {
     const std::uint32_t a = mesh_->slot(face.vertices[(face.corner + 1) % 3]),
                         b = mesh_->slot(face.vertices[(face.corner + 2) % 3]);
     if (face.vertices[face.corner] == vertex_) continue;
+    if (a == b || a == mesh_->slot(vertex_) || b == mesh_->slot(vertex_)) return false;
     if (is_apex(a) && is_apex(b) && has_face(a, b)) return false;
     for (const std::uint32_t slot : {a, b}) {
       if (!is_apex(slot) && std::binary_search(around_.begin(), around_.end(), slot)) return false;

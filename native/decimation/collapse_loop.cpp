@@ -279,15 +279,21 @@ void CollapseLoop::renew(std::uint32_t edge) {
 /// changed since they were refused.
 bool CollapseLoop::call_back_met() {
   bool any = false;
-  std::erase_if(met_, [&](Met& met) {
-    if (deleted(met.edge) || !shared_.refused[met.edge]) return true;
+  std::vector<Met> waiting;
+  for (const Met& met : met_) {
+    poll();
+    if (deleted(met.edge) || !shared_.refused[met.edge]) continue;
     const auto since = std::span(changes_).subspan(met.changes);
-    met.changes = 0;
-    if (called_back_ && std::ranges::none_of(since, [&](const Box& box) { return meet(box, met.read); })) return false;
+    if (called_back_ && std::ranges::none_of(since, [&](const Box& box) { return meet(box, met.read); })) {
+      waiting.push_back(met);
+      waiting.back().changes = 0;
+      continue;
+    }
     shared_.refused[met.edge].store(false, std::memory_order_relaxed);
     renew(met.edge);
-    return any = true;
-  });
+    any = true;
+  }
+  met_ = std::move(waiting);
   changes_.clear();
   called_back_ = true;
   return any;

@@ -9,7 +9,7 @@ std::uint32_t Patch::add_vertex(std::uint32_t id) {
   if (vertex_count_ == vertices_.size()) vertices_.emplace_back();
   Vertex& v = vertices_[vertex_count_++];
   v.id = id, v.position = mesh_->position(id), v.share = mesh_->share(id);
-  v.free = false, v.pinned = mesh_->pinned(id);
+  v.free = false, v.pinned = mesh_->pinned(id), v.joined = mesh_->joined(id);
   v.faces.clear();
   return at->second;
 }
@@ -92,6 +92,7 @@ void Patch::free_vertices(const Change& collapse, bool boundary_free) {
   place(*collapse.vertex());
   Vertex& kept = vertices_[find_vertex(*collapse.vertex())];
   kept.share = collapse.share();
+  kept.joined = kept.joined || mesh_->joined(mesh_->from(collapse.halfedge()));
   // Copies that are carried along do not move any further, so that the vertex to which they are carried must not.
   if (!collapse.carried().empty()) kept.free = false;
   for (const std::uint32_t v : collapse.carried()) place(v);
@@ -171,7 +172,8 @@ bool Patch::can_flip(std::uint32_t face, int k, Flipped& flipped) const {
   const int b1 = k, a1 = (k + 1) % 3, c1 = (k + 2) % 3, a2 = j, b2 = (j + 1) % 3, d2 = (j + 2) % 3;
   const std::uint32_t a = first.corners[a1], b = first.corners[b1], c = first.corners[c1], d = second.corners[d2];
   if (c == d || (vertices_[a].pinned && vertices_[b].pinned) || joined_by_edge(c, d)) return false;
-  if (mesh_->has_copies() && mesh_->joined_by_other(vertices_[c].id, vertices_[d].id)) return false;
+  // The collapse or another flip of this patch may make an edge between copies of the two.
+  if (vertices_[c].joined && vertices_[d].joined) return false;
   if (first.wedges[a1] != second.wedges[a2] || first.wedges[b1] != second.wedges[b2]) return false;
   flipped = {{face, other},
              {{b, d, c}, {a, c, d}},

@@ -28,6 +28,7 @@ class Patch {
     bool free;                         ///< Whether it may move: all its faces are in the patch then.
     double share;                      ///< The share of the forward bound that faces around it may use.
     bool pinned;                       ///< Whether an edge to another pinned vertex has to stay.
+    bool joined;                       ///< Whether it has copies, or will have when the collapse is carried out.
     std::vector<std::uint32_t> faces;  ///< The faces of the patch around it, in no order.
   };
   struct Face {

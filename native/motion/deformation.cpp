@@ -167,9 +167,16 @@ class Deformation {
   /// what is nearest to uncovered parts of the reference.
   void keep_outside() {
     const std::vector<std::uint32_t> outside = options_.two_sided ? outside_ : not_inside(before_, faces_);
-    const auto keep = [&](std::uint32_t v) {
-      result_.held_back += after_[v] != before_[v];
-      after_[v] = before_[v];
+    const std::vector<std::uint32_t> place = weld_equal_positions(before_);
+    std::vector<bool> is_kept(place.size());
+    const auto keep = [&](std::uint32_t v) { is_kept[place[v]] = true; };
+    // What is at the place of a vertex that stays has to stay as well.
+    const auto keep_places = [&] {
+      for (std::uint32_t v = 0; v < after_.size(); ++v) {
+        if (!is_kept[place[v]]) continue;
+        result_.held_back += after_[v] != before_[v];
+        after_[v] = before_[v];
+      }
     };
     result_.outside = FaceCount::of(outside);
     if (!outside.empty()) kept_.assign(faces_.size() / corners_, false);
@@ -177,13 +184,14 @@ class Deformation {
       kept_[face] = true;
       for (const std::uint32_t v : corners_of(face)) keep(v);
     }
-    if (!options_.two_sided) return;
-    result_.uncovered = coverage_->uncovered();
-    if (!result_.uncovered.faces) return;
-    result_.warnings.push_back(take_uncovered(result_.uncovered, Outside::keep));
-    for (std::uint32_t v = 0; v < after_.size(); ++v) {
-      if (mesh_->frozen(v)) keep(v);
+    if (options_.two_sided) result_.uncovered = coverage_->uncovered();
+    if (result_.uncovered.faces) {
+      result_.warnings.push_back(take_uncovered(result_.uncovered, Outside::keep));
+      for (std::uint32_t v = 0; v < after_.size(); ++v) {
+        if (mesh_->frozen(v)) keep(v);
+      }
     }
+    keep_places();
   }
 
   void pull_back() {

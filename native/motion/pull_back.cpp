@@ -16,8 +16,10 @@
 #include <cmath>
 #include <numeric>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
+#include "base/call.h"
 #include "base/errors.h"
 #include "base/parallel.h"
 #include "check/input_checks.h"
@@ -439,6 +441,7 @@ void PullBack::link_twins(std::span<const glm::dvec3> stored) {
     if (first[v] == v) continue;
     if (next_twin_.empty()) {
       next_twin_.resize(stored.size());
+      twin_seen_.assign(stored.size(), 0);
       std::iota(next_twin_.begin(), next_twin_.end(), 0u);
     }
     next_twin_[v] = std::exchange(next_twin_[first[v]], v);
@@ -487,29 +490,40 @@ void PullBack::hold_twins(const Wish& wish, std::span<const std::uint32_t> verti
   const auto factor_of = [&](std::uint32_t v) {
     return mesh_.frozen(v) ? 0 : held_index_[v] == kNone ? 1 : held[held_index_[v]].factor;
   };
+  std::vector<std::size_t> twins;  // The places in `moving` of those of one cycle that move, alike ones together.
+  const auto order = [&](std::size_t one, std::size_t other) {
+    const auto key = [&](std::size_t i) {
+      const glm::dvec3 &from = wish.before[i], &to = wish.after[i];
+      return std::tuple(from.x, from.y, from.z, to.x, to.y, to.z);
+    };
+    return key(one) < key(other);
+  };
+  ++twin_turn_;
   for (const std::uint32_t v : vertices) {
-    if (next_twin_[v] == v) continue;
-    const std::size_t own = place_of(v);
-    const auto visit_twins = [&](auto&& visit) {
-      for (std::uint32_t twin = next_twin_[v]; twin != v; twin = next_twin_[twin]) {
-        const std::size_t other = place_of(twin);
-        if (other == moving.size() || wish.before[other] != wish.before[own] || wish.after[other] != wish.after[own])
-          continue;
-        visit(twin);
+    poll();
+    if (next_twin_[v] == v || twin_seen_[v] == twin_turn_) continue;
+    twins.clear();
+    std::uint32_t twin = v;
+    do {
+      twin_seen_[twin] = twin_turn_;
+      if (const std::size_t place = place_of(twin); place < moving.size()) twins.push_back(place);
+      twin = next_twin_[twin];
+    } while (twin != v);
+    std::ranges::sort(twins, order);
+    for (auto first = twins.begin(); first != twins.end();) {
+      const auto end = std::upper_bound(first, twins.end(), *first, order);
+      double least = 1;
+      for (auto i = first; i != end; ++i) least = std::min(least, factor_of(moving[*i]));
+      for (; first != end; ++first) {
+        const std::uint32_t vertex = moving[*first];
+        if (!(factor_of(vertex) > least)) continue;
+        Held& h = held_index_[vertex] == kNone ? hold(vertex, wish, held) : held[held_index_[vertex]];
+        h.factor = least;
+        least > 0 ? place(h, {least, {}}) : mesh_.take_back(vertex);
+        if (crossings_) crossings_->try_at(vertex, stored_at(h, least));
+        changed.push_back(vertex);
       }
-    };
-    double least = factor_of(v);
-    visit_twins([&](std::uint32_t twin) { least = std::min(least, factor_of(twin)); });
-    const auto lower = [&](std::uint32_t vertex) {
-      if (!(factor_of(vertex) > least)) return;
-      Held& h = held_index_[vertex] == kNone ? hold(vertex, wish, held) : held[held_index_[vertex]];
-      h.factor = least;
-      least > 0 ? place(h, {least, {}}) : mesh_.take_back(vertex);
-      if (crossings_) crossings_->try_at(vertex, stored_at(h, least));
-      changed.push_back(vertex);
-    };
-    lower(v);
-    visit_twins(lower);
+    }
   }
 }
 

@@ -143,6 +143,8 @@ class PullBack {
   std::vector<std::uint32_t> held_index_;       // For each vertex: its place among the held ones, or kNone.
   /// For each vertex: the next one that was at its place at the start, all around. Empty if there are none.
   std::vector<std::uint32_t> next_twin_;
+  std::vector<std::uint64_t> twin_seen_;  // For each vertex: in which turn of hold_twins() it was looked at.
+  std::uint64_t twin_turn_ = 0;           // The number of these turns.
 };
 
 }  // namespace tolvol

@@ -334,17 +334,42 @@ class Cutter {
 
   void tie_copies() {
     std::vector<std::uint32_t> first(weld_.size(), kNone);  // is the first vertex at each weld representative
+    std::vector<bool> several(weld_.size(), false);         // tells where there are several
     cut_.copies_of.resize(cut_.vertex_input.size());
     for (std::uint32_t v = 0; v < cut_.copies_of.size(); ++v) {
       poll_at(v);
-      std::uint32_t& at = first[weld_[cut_.vertex_input[v]]];
-      if (at == kNone) at = v;
-      cut_.copies_of[v] = at;
-      if (at == v) continue;
-      for (const std::uint32_t copy : {at, v}) {
-        if (cut_.cause[copy] == CutCause::none) cut_.cause[copy] = CutCause::non_manifold;
+      const std::uint32_t at = weld_[cut_.vertex_input[v]];
+      if (first[at] == kNone) {
+        first[at] = v;
+      } else {
+        several[at] = true;
       }
     }
+    const std::vector<bool> is_apart = find_double_sheets(several);
+    for (std::uint32_t v = 0; v < cut_.copies_of.size(); ++v) {
+      const std::uint32_t at = weld_[cut_.vertex_input[v]];
+      if (several[at] && !is_apart[at] && cut_.cause[v] == CutCause::none) cut_.cause[v] = CutCause::non_manifold;
+      cut_.copies_of[v] = cut_.cause[v] == CutCause::none ? v : first[at];
+    }
+  }
+
+  /// Tells for each weld representative at which there are several vertices whether sheets lie on each other there,
+  /// none of which ends there. Tied together, sheets with different diagonals could not be decimated at all.
+  std::vector<bool> find_double_sheets(const std::vector<bool>& several) const {
+    std::vector<bool> result(weld_.size(), false);
+    std::vector<Side> sides;
+    for (Side s = 0; s < mate_.size(); ++s) {
+      if (several[welded(s)] && several[welded(next_corner(s))]) sides.push_back(s);
+    }
+    const auto end_of = [&](Side corner) { return welded(corner); };
+    by_ends(sides, weld_.size(), team_, end_of, [&](const std::vector<Side>& alike) {
+      if (alike.size() == 1 || (alike.size() == 2 && mate_[alike[0]] == alike[1])) return;
+      result[welded(alike[0])] = result[welded(next_corner(alike[0]))] = true;
+    });
+    for (Side s = 0; s < mate_.size(); ++s) {
+      if (mate_[s] == kNone) result[welded(s)] = result[welded(next_corner(s))] = false;
+    }
+    return result;
   }
 
   Team& team_;

@@ -66,7 +66,7 @@ def test_a_measurement_of_nothing_is_none(decimated):
 def test_a_damaged_percentage_is_the_default(decimated, value):
     default = 0.2  # of the preferences
     decimated.tolvol["percent_choice"] = value  # past the range of the property, as a file does it
-    assert decimated.tolvol.tolerance_percent == default and verdict.of(decimated).margin_percent()
+    assert decimated.tolvol.tolerance_percent == pytest.approx(default) and verdict.of(decimated).margin_percent()
     assert bpy.ops.tolvol.check() == {"FINISHED"}
 
 
