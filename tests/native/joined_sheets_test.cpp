@@ -337,6 +337,33 @@ TEST(JoinedSheets, WhatHoldsForAVertexHoldsForItsCopies) {
   }
 }
 
+/// Two wavy plates that lie on each other and look in opposite directions, each with vertices of its own.
+Case double_sheet(unsigned n) {
+  TriangleMesh front = shapes::grid(n);
+  for (dvec3& p : front.vertices) p.z = 0.05 * std::sin(9 * p.x) * std::sin(7 * p.y);
+  Case c{shapes::stored(shapes::joined(front, shapes::turned(front)))};
+  c.percent = 0.1;
+  return c;
+}
+
+// A flip that is found possible must still be so after the collapse and the other flips of its patch.
+TEST(JoinedSheets, ThoroughKeepsTheToleranceAndWhatIsLocked) {
+  for (const Case& c : {shelves(2, 6, 1), wall_on_a_floor(12), double_sheet(14), torn_wave(14)}) {
+    const auto locked = std::make_unique<bool[]>(c.mesh.vertices.size());
+    for (std::size_t v = 0; v < c.mesh.vertices.size(); ++v) locked[v] = v % 17 == 0;
+    Options options;
+    options.effort = Options::Effort::thorough;
+    options.locked = {locked.get(), c.mesh.vertices.size()};
+    const DecimationResult r = run(c, options);
+    cases::expect_within(c, r);
+    for (std::size_t v = 0; v < c.mesh.vertices.size(); ++v) {
+      if (!locked[v] || r.vertex_map[v] < 0) continue;
+      EXPECT_EQ(r.vertices[static_cast<std::size_t>(r.vertex_map[v])], c.mesh.vertices[v]);
+    }
+    for (const glm::uvec3& t : r.triangles) EXPECT_TRUE(t.x != t.y && t.y != t.z && t.z != t.x);
+  }
+}
+
 TEST(JoinedSheets, OneWayTheirSharedEdgesStay) {
   const Case c = shelves(2, 4);
   Options options;
