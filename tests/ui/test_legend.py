@@ -6,6 +6,7 @@ import numpy as np
 
 from addon import overlay, panels
 from addon.overlay import legend
+from addon.panels.layout import SubPanel
 from addon.proof import statistics
 from test_layout import dark, drag_sidebar, light
 from test_show_deviation import striped, surface
@@ -126,19 +127,27 @@ def test_range_and_bands_of_the_colours():
     assert overlay.shows(the_ramp())
 
 
-def unfold(panel, options):
-    """Registers all panels anew, with other options of one of them."""
-    for cls in reversed(panels._CLASSES):
+class Unfolded(SubPanel, bpy.types.Panel):
+    """The panel of the statistics under another name: for each name Blender remembers whether the panel was last open."""
+
+    bl_idname, bl_label = "TOLVOL_TEST_PT_statistics", panels.TOLVOL_PT_statistics.bl_label
+    bl_parent_id = panels.TOLVOL_PT_statistics.bl_parent_id
+    draw = panels.TOLVOL_PT_statistics.draw
+
+
+def replace(classes, others):
+    """Registers other panels in the place of these."""
+    for cls in reversed(classes):
         bpy.utils.unregister_class(cls)
-    panel.bl_options = options
-    for cls in panels._CLASSES:
+    for cls in others:
         bpy.utils.register_class(cls)
 
 
 def test_statistics_are_unfolded_and_measured():
     yield from reset(ramp)
-    before = panels.TOLVOL_PT_statistics.bl_options
-    unfold(panels.TOLVOL_PT_statistics, set())
+    shipped = panels._CLASSES
+    unfolded = [Unfolded if cls is panels.TOLVOL_PT_statistics else cls for cls in shipped]
+    replace(shipped, unfolded)
     try:
         yield from open_tab()
         yield from press("tolvol.measure_statistics", across=0.4)
@@ -150,5 +159,5 @@ def test_statistics_are_unfolded_and_measured():
             screenshot(f"legend 8 statistics {width}")
             yield from drag_sidebar(width)
     finally:
-        unfold(panels.TOLVOL_PT_statistics, before)
+        replace(unfolded, shipped)
     assert statistics.of(the_ramp())["forward"]["mean"] > 0.02
