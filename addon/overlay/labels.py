@@ -8,11 +8,10 @@ from ..operators.probe import described, distance_text, tolerance_of
 from ..proof import labels, probing, report
 from ..redraw import redraw_views
 from . import legend, markers, reasons, shaders
+from .view_drawing import ViewDrawing
 
 # Pixels at an interface scale of 1.
 _DOT, _BESIDE, _ROW, _MARGIN = 6, 14, 17, 6
-
-_drawing = []
 
 
 def refresh():
@@ -20,29 +19,22 @@ def refresh():
     if bpy.app.background:
         return
     wanted = probing.hover() is not None or any(ob.type == "MESH" and ob.tolvol.labels for ob in bpy.data.objects)
-    if wanted and not reasons.off():
-        if not _drawing:
-            _drawing.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
-    else:
-        end()
+    _drawing.show(wanted and not reasons.off())
     redraw_views()
 
 
 def end():
-    while _drawing:
-        bpy.types.SpaceView3D.draw_handler_remove(_drawing.pop(), "WINDOW")
+    _drawing.end()
 
 
-def _draw():
-    context = bpy.context
-    try:
-        page = legend.Page(context, True)
-        if context.space_data.overlay.show_overlays:
-            _draw_labels(context, page, context.active_object)
-        _draw_hover(context, page, probing.hover())
-    except (RuntimeError, SystemError) as error:  # The driver refuses: the panel says so.
-        reasons.broken[:] = [str(error)]
-        bpy.app.timers.register(end, first_interval=0)
+def _draw(context):
+    page = legend.Page(context, True)
+    if context.space_data.overlay.show_overlays:
+        _draw_labels(context, page, context.active_object)
+    _draw_hover(context, page, probing.hover())
+
+
+_drawing = ViewDrawing(_draw)
 
 
 def _draw_labels(context, page, ob):

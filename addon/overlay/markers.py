@@ -9,50 +9,42 @@ from ..operators.places import described
 from ..proof import places
 from ..redraw import redraw_views
 from . import legend, reasons, shaders
+from .view_drawing import ViewDrawing
 
 # Pixels at an interface scale of 1: the arms of a cross, the gap in its middle, and the label's distance from it.
 _ARM, _PRESENT_ARM, _GAP = 6, 16, 4
 _ROW, _MARGIN = 17, 8
 INK, EDGE = (1, 1, 1, 1), (0, 0, 0, 0.8)
 
-_drawing = []
-
 
 def refresh():
     """Adds the draw handler while there are places, and removes it afterwards."""
     if bpy.app.background:
         return
-    wanted = places.any_shown() and not reasons.off()
-    if wanted and not _drawing:
-        _drawing.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
-    elif not wanted:
-        end()
+    _drawing.show(places.any_shown() and not reasons.off())
     redraw_views()
 
 
 def end():
-    while _drawing:
-        bpy.types.SpaceView3D.draw_handler_remove(_drawing.pop(), "WINDOW")
+    _drawing.end()
 
 
-def _draw():
-    context = bpy.context
+def _draw(context):
     ob = context.active_object
     found, at, _ = places.shown(ob)
     if not found or not context.space_data.overlay.show_overlays or not ob.visible_in_viewport_get(context.space_data):
         return
-    try:
-        page = legend.Page(context, True)
-        for i, place in enumerate(found):
-            spot = location_3d_to_region_2d(context.region, context.region_data, place.position)
-            if spot is not None:
-                _cross(page, *spot, _PRESENT_ARM if i == at else _ARM)
-        spot = location_3d_to_region_2d(context.region, context.region_data, found[at].position)
+    page = legend.Page(context, True)
+    for i, place in enumerate(found):
+        spot = location_3d_to_region_2d(context.region, context.region_data, place.position)
         if spot is not None:
-            beside(page, context, *spot, described(context, ob), 2 * _PRESENT_ARM * page.scale)
-    except (RuntimeError, SystemError) as error:  # The driver refuses: the panel says so.
-        reasons.broken[:] = [str(error)]
-        bpy.app.timers.register(end, first_interval=0)
+            _cross(page, *spot, _PRESENT_ARM if i == at else _ARM)
+    spot = location_3d_to_region_2d(context.region, context.region_data, found[at].position)
+    if spot is not None:
+        beside(page, context, *spot, described(context, ob), 2 * _PRESENT_ARM * page.scale)
+
+
+_drawing = ViewDrawing(_draw)
 
 
 def _cross(page, x, y, arm):

@@ -50,6 +50,17 @@ def torus(name="torus", matrix=None, **options):
     return add_object(name, *torus_arrays(**options), matrix)
 
 
+def changed_ball(change):
+    """Returns a ball of 5,120 triangles, whose vertices went to change(positions) after its reference was set."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5)
+    ob = bpy.context.object
+    ob.name = "ball"
+    bpy.ops.tolvol.set_reference()
+    ob.data.vertices.foreach_set("co", change(mesh_io.column(ob.data.vertices, "co", 3)).ravel())
+    ob.data.update()
+    return ob
+
+
 def sheet_arrays(count=30, bumps=0.05):
     """Vertices and quads of an open wavy square."""
     x, y = np.meshgrid(np.linspace(-1, 1, count + 1), np.linspace(-1, 1, count + 1), indexing="ij")

@@ -29,17 +29,15 @@ from window import (
 
 def ball():
     """A ball with a dent in front and a peak at the back."""
-    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5)
-    ob = bpy.context.object
-    ob.name = "ball"
-    bpy.ops.tolvol.set_reference()
-    co = mesh_io.column(ob.data.vertices, "co", 3)
-    for direction, factor in (((0.6, -0.6, 0.5), 0.9), ((-0.6, 0.6, -0.5), 1.2)):
-        towards = np.array(direction) / np.linalg.norm(direction)
-        near = co @ towards > 0.985
-        co[near] *= factor
-    ob.data.vertices.foreach_set("co", co.ravel())
-    ob.data.update()
+
+    def dented(co):
+        for direction, factor in (((0.6, -0.6, 0.5), 0.9), ((-0.6, 0.6, -0.5), 1.2)):
+            towards = np.array(direction) / np.linalg.norm(direction)
+            near = co @ towards > 0.985
+            co[near] *= factor
+        return co
+
+    scenes.changed_ball(dented)
 
 
 def the_ball():

@@ -4,8 +4,8 @@
 import bpy
 import numpy as np
 
+import scenes
 from addon import overlay
-from addon.mesh import mesh_io
 from addon.operators.probe import TOLVOL_OT_probe
 from addon.proof import labels, probing
 from test_layout import dark, drag_sidebar, light
@@ -28,14 +28,7 @@ from window import (
 
 def ball():
     """A ball that was blown up on its left side after its reference was set."""
-    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5)
-    ob = bpy.context.object
-    ob.name = "ball"
-    bpy.ops.tolvol.set_reference()
-    co = mesh_io.column(ob.data.vertices, "co", 3)
-    co *= np.where(co[:, :1] < 0, np.float32(1.05), np.float32(1))
-    ob.data.vertices.foreach_set("co", co.ravel())
-    ob.data.update()
+    scenes.changed_ball(lambda co: co * np.where(co[:, :1] < 0, np.float32(1.05), np.float32(1)))
     view()[1].spaces[0].region_3d.view_distance = 6
 
 
