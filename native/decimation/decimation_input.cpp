@@ -86,8 +86,9 @@ void DecimationInput::pin_t_junctions(Team& team) {
   if (cut_.boundary.empty()) return;
   TriangleMesh stored{std::vector<glm::dvec3>(cut_.vertex_input.size()), cut_.triangles};
   for (std::size_t v = 0; v < stored.vertices.size(); ++v) stored.vertices[v] = vertices_[cut_.vertex_input[v]];
-  const double unit = space_.storage() == Storage::float32 ? 0x1p-24 : 0x1p-53;
-  for (const std::uint32_t v : t_junctions(std::move(stored), cut_.boundary, unit, team)) pin(v, "T-junction");
+  for (const std::uint32_t v : t_junctions(std::move(stored), cut_.boundary, space_.unit_roundoff(), team)) {
+    pin(v, "T-junction");
+  }
 }
 
 /// Calls visit(input vertex, vertex of the manifold) for all vertices that hold an input vertex: the one that it

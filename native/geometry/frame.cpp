@@ -141,7 +141,7 @@ double StoredSpace::mapping_error(std::span<const glm::dvec3> stored, double rea
 double StoredSpace::storage_step(std::span<const glm::dvec3> stored) const {
   // A coordinate is off by half a unit in the last place, and in double precision by as much again in the last sum of
   // store().
-  const double rounding = storage_ == Storage::float32 ? 0x1p-24 : 2 * kUnitRoundoff;
+  const double rounding = (storage_ == Storage::float32 ? 1 : 2) * unit_roundoff();
   glm::dvec3 extent{0};
   for (const glm::dvec3& p : stored) extent = glm::max(extent, glm::abs(p));
   glm::dvec3 step{0};

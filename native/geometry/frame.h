@@ -74,6 +74,8 @@ class StoredSpace {
   bool mirrors() const { return mirrors_; }
   const glm::dmat4& to_world() const { return to_world_; }
   Storage storage() const { return storage_; }
+  /// Returns half the distance from 1 to the next number that can be stored.
+  double unit_roundoff() const { return storage_ == Storage::float32 ? 0x1p-24 : kUnitRoundoff; }
 
  private:
   void set_anchor();

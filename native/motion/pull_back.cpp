@@ -69,15 +69,19 @@ PullBack::~PullBack() = default;
 PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, const StartOptions& options, Progress* progress) {
   if (options.two_sided) require_area_to_cover(mesh_.corners());
   held_index_.assign(stored.size(), kNone);
-  link_twins(stored);
+  next_twin_.clear();
   coverage_.reset(), crossings_.reset();
   MovingMesh::Start start = mesh_.start(stored, progress);
   if (!start.outside.empty() && options.outside == Outside::error) refuse_outside(FaceCount::of(start.outside));
   Start result{std::move(start.outside), {}, {}};
   if (start.warning) result.warnings.push_back(*start.warning);
-  if (const std::size_t fixed = options.t_junctions ? hold_t_junctions(stored) : 0) {
-    result.warnings.push_back(std::to_string(fixed) + (fixed == 1 ? " vertex holds" : " vertices hold") +
-                              " T-junctions together and cannot move");
+  if (options.together) {
+    const std::vector<std::uint32_t> place = weld_equal_positions(stored);
+    link_twins(place);
+    if (const std::size_t fixed = hold_t_junctions(stored, place)) {
+      result.warnings.push_back(std::to_string(fixed) + (fixed == 1 ? " vertex holds" : " vertices hold") +
+                                " T-junctions together and cannot move");
+    }
   }
   if (options.crossings == Crossings::keep_out && mesh_.corners() >= 3) {
     crossings_ = std::make_unique<MovingCrossings>(mesh_.faces(), mesh_.corners(), stored, mesh_.threads());
@@ -434,26 +438,24 @@ void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Pr
   }
 }
 
-void PullBack::link_twins(std::span<const glm::dvec3> stored) {
-  const std::vector<std::uint32_t> first = weld_equal_positions(stored);
-  next_twin_.clear();
-  for (std::uint32_t v = 0; v < first.size(); ++v) {
-    if (first[v] == v) continue;
+/// `place` names for each vertex the first one at its position.
+void PullBack::link_twins(std::span<const std::uint32_t> place) {
+  for (std::uint32_t v = 0; v < place.size(); ++v) {
+    if (place[v] == v) continue;
     if (next_twin_.empty()) {
-      next_twin_.resize(stored.size());
-      twin_seen_.assign(stored.size(), 0);
+      next_twin_.resize(place.size());
+      twin_seen_.assign(place.size(), 0);
       std::iota(next_twin_.begin(), next_twin_.end(), 0u);
     }
-    next_twin_[v] = std::exchange(next_twin_[first[v]], v);
+    next_twin_[v] = std::exchange(next_twin_[place[v]], v);
   }
 }
 
 /// Faces that meet in a T-junction share no vertex by which they could be kept together while they move. Returns the
 /// number of vertices that are held.
-std::size_t PullBack::hold_t_junctions(std::span<const glm::dvec3> stored) {
+std::size_t PullBack::hold_t_junctions(std::span<const glm::dvec3> stored, std::span<const std::uint32_t> place) {
   if (mesh_.corners() < 3) return 0;
   TriangleMesh mesh{{stored.begin(), stored.end()}, {}};
-  std::vector<std::uint32_t> place = weld_equal_positions(stored);
   for (std::uint32_t f = 0; f < mesh_.face_count(); ++f) {
     const std::span<const std::uint32_t> c = mesh_.corners_of(f);
     for (std::size_t k = 1; k + 1 < c.size(); ++k) {
@@ -469,9 +471,8 @@ std::size_t PullBack::hold_t_junctions(std::span<const glm::dvec3> stored) {
   by_ends(sides, stored.size(), team, end_of, [&](const std::vector<Side>& alike) {
     if (alike.size() == 1) open.emplace_back(end_of(alike[0]), end_of(next_corner(alike[0])));
   });
-  const double unit = mesh_.space().storage() == Storage::float32 ? 0x1p-24 : 0x1p-53;
   std::size_t count = 0;
-  for (const std::uint32_t v : t_junctions(std::move(mesh), open, unit, team)) {
+  for (const std::uint32_t v : t_junctions(std::move(mesh), open, mesh_.space().unit_roundoff(), team)) {
     count += !mesh_.frozen(v);
     mesh_.freeze(v);
   }

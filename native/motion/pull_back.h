@@ -56,7 +56,8 @@ class PullBack {
     bool two_sided = true;  ///< Keeps the backward direction, too: see MovingCoverage.
     Crossings crossings = Crossings::keep_out;
     bool short_ways = false;  ///< Says that all vertices will move by little, again and again.
-    bool t_junctions = true;  ///< Holds what holds T-junctions together (topology/t_junctions.h).
+    /// Keeps vertices at one place together, and what holds T-junctions together (topology/t_junctions.h) where it is.
+    bool together = true;
   };
   /// What the state is short of, and will be after any motion.
   struct Start {
@@ -66,7 +67,8 @@ class PullBack {
   };
   /// Takes the stored positions as the state. Throws what MovingMesh::start() throws, FacesOutside as the options say,
   /// and InvalidInput for two_sided where the faces have fewer than 3 corners. About 1 us a vertex and, two-sided, 2 us
-  /// a face of the reference; nothing for faces of the reference itself. Keeping crossings out costs 0.2 us a face.
+  /// a face of the reference; nothing for faces of the reference itself. Keeping crossings out costs 0.2 us a face, and
+  /// keeping places and T-junctions together as much.
   Start start(std::span<const glm::dvec3> stored, const StartOptions& options, Progress* progress);
   bool frozen(std::uint32_t vertex) const { return mesh_.frozen(vertex); }
 
@@ -128,8 +130,8 @@ class PullBack {
   void raise(Held& held, Mode mode, bool search);
   bool attempt(Held& held, double factor);
   void back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Progress* progress);
-  void link_twins(std::span<const glm::dvec3> stored);
-  std::size_t hold_t_junctions(std::span<const glm::dvec3> stored);
+  void link_twins(std::span<const std::uint32_t> place);
+  std::size_t hold_t_junctions(std::span<const glm::dvec3> stored, std::span<const std::uint32_t> place);
   void hold_twins(const Wish& wish, std::span<const std::uint32_t> vertices, std::vector<Held>& held,
                   std::vector<std::uint32_t>& changed);
   void start_crossings(const std::vector<Held>& held, const Wish& wish);

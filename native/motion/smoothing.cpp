@@ -148,8 +148,7 @@ class Smoothing {
   void fix_t_junctions() {
     if (open_.empty()) return;
     Team team(thread_count(options_.threads));
-    const double unit = space_.storage() == Storage::float32 ? 0x1p-24 : 0x1p-53;
-    for (const std::uint32_t v : t_junctions({positions_, triangles_}, open_, unit, team)) {
+    for (const std::uint32_t v : t_junctions({positions_, triangles_}, open_, space_.unit_roundoff(), team)) {
       if (kind_[v] == Kind::fixed) continue;
       kind_[v] = Kind::fixed;
       ++result_.fixed_t_junctions;
