@@ -87,25 +87,11 @@ class _Claim:
         return mesh.as_pointer(), len(mesh.vertices), len(mesh.loops), len(mesh.polygons), self._ob.mode
 
 
-def run_all(tasks, progress):
-    """Returns the outcomes of task.run(progress). With several tasks an error begins with the name of its task."""
-    if len(tasks) == 1:
-        return [tasks[0].run(progress)]
-    outcomes = []
-    for task in tasks:
-        try:
-            outcomes.append(task.run(progress))
-        except native.module.Cancelled:
-            raise
-        except (Refused, native.module.TolvolError) as error:
-            raise Refused(f"{task.name}: {native.said(error)}") from None
-    return outcomes
-
-
 class JobOperator:
     """A base class for an Operator with prepare(context), which returns work(progress), and finish(context, outcome)."""
 
     doing = ""  # text for the status bar in place of the native stage
+    part = ""  # which part of the work is under way, such as "Level 2 of 3", if there are several
 
     _steps = None
     _progress = None
@@ -126,6 +112,25 @@ class JobOperator:
         after the last yield."""
         outcome = yield self.prepare(context)
         self.finish(context, outcome)
+
+    def each(self, tasks):
+        """A generator for steps(): yields the work of one task after another, and returns the outcomes of task.run(progress).
+
+        With several tasks an error begins with the name of its task.
+        """
+        outcomes = []
+        for i, task in enumerate(tasks):
+            if len(tasks) > 1:
+                self.part = f"{task.name}, {i + 1} of {len(tasks)}"
+            try:
+                outcomes.append((yield task.run))
+            except native.module.Cancelled:
+                raise
+            except (Refused, native.module.TolvolError) as error:
+                if len(tasks) == 1:
+                    raise
+                raise Refused(f"{task.name}: {native.said(error)}") from None
+        return outcomes
 
     def execute(self, context):
         self._begin(context)
@@ -164,7 +169,7 @@ class JobOperator:
             if ended:
                 self._leave(context)
                 return ended
-            context.workspace.status_text_set(_status(self._progress, self.doing))
+            context.workspace.status_text_set(_status(self._progress, self.doing, self.part))
         return {"RUNNING_MODAL"}
 
     def cancel(self, context):
@@ -250,14 +255,15 @@ def _improving(progress):
     return progress.stage == "refining" and not progress.finishing
 
 
-def _status(progress, doing):
+def _status(progress, doing, part):
     if progress.cancelled:
         return "Stopping"
     # In these two stages the count is the number of triangles left.
     left = f", {progress.count:,} triangles left" if progress.stage in {"decimating", "refining"} else ""
     share = f" {progress.fraction:.0%}" if progress.fraction else ""
     escape = "Keep Present Result" if _improving(progress) else "Cancel"
-    return f"{doing or progress.stage.capitalize() + share + left}    Esc: {escape}"
+    prefix = f"{part}: " if part else ""
+    return f"{prefix}{doing or progress.stage.capitalize() + share + left}    Esc: {escape}"
 
 
 def _interrupt(happens):

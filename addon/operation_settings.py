@@ -6,7 +6,17 @@ Each function returns {name: property}. `options` are Blender's property options
 
 import math
 
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    IntVectorProperty,
+    StringProperty,
+)
+
+FEWEST_LEVELS, MOST_LEVELS = 2, 6  # of a chain of levels of detail
 
 PROTECTED = (
     ("BOUNDARY", "Boundary", "Edges that belong to only one face", 1),
@@ -220,6 +230,110 @@ def modifier_settings(options=frozenset()):
                     "modifier. This is not possible for a modifier that changes the faces",
                 ),
             ),
+            options=set(options),
+        ),
+    }
+
+
+def lod_settings(options=frozenset()):
+    """Returns the settings of a chain of levels of detail. Each vector has a number for each of the most levels."""
+    return {
+        "by": EnumProperty(
+            name="Levels By",
+            description="What is given for each level",
+            items=(
+                (
+                    "TOLERANCE",
+                    "Tolerance",
+                    "A tolerance for each level, within which it has as few triangles as possible",
+                ),
+                (
+                    "COUNT",
+                    "Count",
+                    "A number of triangles for each level. How far it deviates is found out. No level may deviate by more "
+                    "than 10 % of the size",
+                ),
+                (
+                    "PIXELS",
+                    "Pixels",
+                    "A number of pixels for each level, which its deviation may cover in a picture from a distance",
+                ),
+            ),
+            options=set(options),
+        ),
+        "levels": IntProperty(
+            name="Levels",
+            description="The number of levels",
+            default=3,
+            min=FEWEST_LEVELS,
+            max=MOST_LEVELS,
+            options=set(options),
+        ),
+        "in_length": BoolProperty(
+            name="Lengths",
+            description="Give the tolerances as lengths in the world, and not in percent of the reference's size",
+            options=set(options),
+        ),
+        "percentages": FloatVectorProperty(
+            name="Tolerances",
+            description="The tolerance of each level, in percent of the reference's size",
+            size=MOST_LEVELS,
+            default=(0.1, 0.5, 2, 4, 8, 16),
+            min=1e-6,
+            max=100,
+            precision=3,
+            options=set(options),
+        ),
+        "lengths": FloatVectorProperty(
+            name="Tolerances",
+            description="The tolerance of each level",
+            size=MOST_LEVELS,
+            default=(0.001, 0.005, 0.02, 0.04, 0.08, 0.16),
+            min=1e-12,
+            precision=5,
+            unit="LENGTH",
+            options=set(options),
+        ),
+        "counts": IntVectorProperty(
+            name="Triangles",
+            description="The number of triangles of each level",
+            size=MOST_LEVELS,
+            default=(10_000, 3000, 1000, 300, 100, 30),
+            min=1,
+            options=set(options),
+        ),
+        "pixels": FloatVectorProperty(
+            name="Pixels",
+            description="The number of pixels that the deviation of each level may cover",
+            size=MOST_LEVELS,
+            default=(1, 2, 4, 8, 16, 32),
+            min=0.001,
+            precision=2,
+            options=set(options),
+        ),
+        "distance": FloatProperty(
+            name="Distance",
+            description="The distance from the camera at which the pixels are counted",
+            default=10,
+            min=1e-6,
+            subtype="DISTANCE",
+            options=set(options),
+        ),
+        "fov": FloatProperty(
+            name="Field of View",
+            description="The vertical angle of view of the camera",
+            default=math.radians(50),
+            min=math.radians(1),
+            max=math.radians(179),
+            subtype="ANGLE",
+            options=set(options),
+        ),
+        "height": IntProperty(
+            name="Height",
+            description="The height of the picture in pixels",
+            default=1080,
+            min=1,
+            subtype="PIXEL",
             options=set(options),
         ),
     }

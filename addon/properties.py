@@ -16,7 +16,7 @@ from bpy.props import (
 )
 
 from . import preferences
-from .operation_settings import decimate_settings, modifier_settings, smooth_settings
+from .operation_settings import decimate_settings, lod_settings, modifier_settings, smooth_settings
 from .redraw import redraw_views
 from .reference import measurements, snapshots, tolerances
 
@@ -197,6 +197,10 @@ class TOLVOL_PG_smooth(bpy.types.PropertyGroup):
 
 class TOLVOL_PG_modifiers(bpy.types.PropertyGroup):
     __annotations__ = modifier_settings()
+
+
+class TOLVOL_PG_lod(bpy.types.PropertyGroup):
+    __annotations__ = lod_settings()
 
 
 def _changed(_settings, _context):
@@ -397,6 +401,8 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
 
     smooth: PointerProperty(type=TOLVOL_PG_smooth)
     modifiers: PointerProperty(type=TOLVOL_PG_modifiers)
+    lod: PointerProperty(type=TOLVOL_PG_lod)
+    lods: PointerProperty(type=bpy.types.Collection, description="The collection of the levels that were made last")
     guard: PointerProperty(type=TOLVOL_PG_guard)
 
     measurement: PointerProperty(type=TOLVOL_PG_measurement)
@@ -413,6 +419,7 @@ _CLASSES = (
     TOLVOL_PG_label,
     TOLVOL_PG_smooth,
     TOLVOL_PG_modifiers,
+    TOLVOL_PG_lod,
     TOLVOL_PG_guard,
     TOLVOL_PG_settings,
 )

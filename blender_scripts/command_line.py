@@ -29,11 +29,13 @@ from common import (  # noqa: F401
     NOT_WRITTEN,
     USAGE,
     Stop,
+    above_zero,
     angle,
     file_name,
     in_units,
     length,
     require_folder,
+    several,
     whole_number,
 )
 

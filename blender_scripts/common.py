@@ -63,6 +63,26 @@ def length(text):
     return value, bool(match[2])
 
 
+def several(parse, least, most):
+    """Returns a parser of values that commas separate. An error names the faulty one."""
+
+    def parse_all(text):
+        values = [parse(part) for part in text.split(",")]
+        if not least <= len(values) <= most:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a list of {least} to {most} values")
+        return values
+
+    return parse_all
+
+
+def above_zero(text):
+    """Parses a finite number above 0."""
+    value, percent = length(text)
+    if percent:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a plain number")
+    return value
+
+
 def in_units(value_and_percent, size):
     value, is_percent = value_and_percent
     return value / 100 * size if is_percent else value

@@ -19,13 +19,14 @@ try:
 
     import command_line as cli
     import pictures
-    from addon import units
+    from addon import operation_settings, units
     from addon.errors import NOT_PROVED, NotWritten, Refused
     from addon.files import file_io, safe_files, side_files
+    from addon.files.gltf_extras import GEOMETRIC_ERROR
     from addon.mesh import filling, mesh_io
     from addon.proof import report, solidity
     from addon.proof.certify import certify
-    from addon.reference import snapshots
+    from addon.reference import snapshots, tolerances
 except ImportError as error:  # After an uncaught exception Blender would end with exit code 0.
     print(f"decimate.py: Blender's Python lacks a package: {error}; install Debian's python3-numpy", file=sys.stderr)
     sys.exit(2)
@@ -47,8 +48,40 @@ def arguments():
     parser.add_argument(
         "output", type=cli.file_name, metavar="OUT", help="the file for the result; its extension chooses the format"
     )
+    asked = parser.add_mutually_exclusive_group(required=True)
+    asked.add_argument("--tolerance", type=cli.length, metavar="T", help="N%% of size, or a length in the file's units")
+    levels = operation_settings.FEWEST_LEVELS, operation_settings.MOST_LEVELS
+    asked.add_argument(
+        "--lod",
+        type=cli.several(cli.length, *levels),
+        metavar="T,T,...",
+        help="make a chain of levels of detail, one for each of 2 to 6 growing tolerances: OUT_LOD0, OUT_LOD1, ... with OUT's "
+        "extension. Each is decimated from IN and proved both ways; in glTF, geometricError in the extras of a node is its "
+        "deviation",
+    )
+    asked.add_argument(
+        "--lod-pixels",
+        type=cli.several(cli.above_zero, *levels),
+        metavar="N,N,...",
+        help="do the same, with as many pixels as the deviation of each level may cover in a picture from --distance",
+    )
     parser.add_argument(
-        "--tolerance", required=True, type=cli.length, metavar="T", help="N%% of size, or a length in the file's units"
+        "--distance",
+        type=cli.length,
+        metavar="D",
+        help="N%% of size, or a length in the file's units, for --lod-pixels",
+    )
+    parser.add_argument(
+        "--fov",
+        type=cli.angle,
+        metavar="A",
+        help="the vertical angle of view in degrees, for --lod-pixels (default: 50)",
+    )
+    parser.add_argument(
+        "--height",
+        type=cli.whole_number(1),
+        metavar="N",
+        help="the height of the picture in pixels, for --lod-pixels (default: 1080)",
     )
     parser.add_argument(
         "--reference",
@@ -130,31 +163,54 @@ def arguments():
     options = parser.parse()
     if options.largest_perimeter and not options.close_holes:
         parser.error("--largest-perimeter needs --close-holes")
+    if options.lod_pixels and options.distance is None:
+        parser.error("--lod-pixels needs --distance")
+    for name in ("distance", "fov", "height"):
+        if getattr(options, name) is not None and not options.lod_pixels:
+            parser.error(f"--{name} needs --lod-pixels")
+    if options.fov == 180:
+        parser.error("--fov: an angle of view of 180 degrees has no picture")
+    for name in ("one_sided", "target_triangles"):
+        if getattr(options, name) and options.tolerance is None:
+            parser.error(f"--{name.replace('_', '-')} cannot be used with levels of detail")
     return options
 
 
-class Command:
-    """One run: reads IN, decimates each object, writes beside OUT, reads that file back, certifies it, moves it to OUT."""
+class Output:
+    """One file that is written: OUT, or a level of detail beside OUT's name, with its side files and its picture."""
 
-    def __init__(self, options, staged):
-        self.options = options
-        self.staged = staged
-        self.last_stage_ended = time.perf_counter()
-        self.seconds = {}
-        file_io.extension_of(options.input)
-        extension = file_io.extension_of(options.output)
-        self.target = safe_files.Target(options.output, "OUT")
+    def __init__(self, path, extension, picture):
+        self.path = path
+        self.target = safe_files.Target(path, "OUT")
         place = self.target.place
         # A symbolic link may lead to a name without the extension, but the exporter needs the extension.
         self.exported = place if place.suffix.lower() == extension else place.with_name(place.name + extension)
         self.sides = [
             safe_files.Target(path, "OUT's side file") for path in side_files.written_with(self.exported, extension)
         ]
+        self.picture = safe_files.Target(picture, "--picture") if picture else None
         for target in (self.target, *self.sides):
             if target.is_device:
                 raise cli.Stop(f"{target.name}: this is a device or a pipe, not a file")
+
+
+class Command:
+    """One run: for OUT, or for each level of detail, reads IN, decimates each object, writes beside OUT, reads that file back
+    and certifies it. At the end all files are moved to their places."""
+
+    def __init__(self, options, staged):
+        self.options = options
+        self.staged = staged
+        self.last_stage_ended = time.perf_counter()
+        self.seconds = {}
+        self.textures = set()  # the places of the textures that are written
+        file_io.extension_of(options.input)
+        extension = file_io.extension_of(options.output)
+        self.outputs = [
+            Output(self._level_name(options.output, i), extension, self._level_name(options.picture, i))
+            for i in range(self._levels())
+        ]
         self.report = safe_files.Target(options.report, "--report") if options.report else None
-        self.picture = safe_files.Target(options.picture, "--picture") if options.picture else None
         self._require_apart()
         if options.picture:
             pictures.require("--picture", options.picture)
@@ -162,6 +218,16 @@ class Command:
         for target in self._targets_written():
             if not target.is_device:
                 staged.folder(target)
+
+    def _levels(self):
+        return len(self.options.lod or self.options.lod_pixels or [None])
+
+    def _level_name(self, path, level):
+        """Returns the name of a file of one level, or `path` itself if there are no levels or if it is None."""
+        if self.options.tolerance or not path:
+            return path
+        path = Path(path)
+        return str(path.with_name(f"{path.stem}_LOD{level}{path.suffix}"))
 
     def _require_apart(self):
         """Refuses a written file that is also read. Only OUT may be IN; their side files may then be the same, too."""
@@ -171,16 +237,45 @@ class Command:
             reference_is_in = safe_files.identity(self.options.reference) == safe_files.identity(self.options.input)
         else:
             reference, reference_is_in = [], True
-        outputs = [(target.name, target.place) for target in (self.target, *self.sides)]
-        others = [(target.name, target.place) for target in (self.report, self.picture) if target]
+        outputs = [(target.name, target.place) for one in self.outputs for target in (one.target, *one.sides)]
+        pictures_too = [self.report, *(one.picture for one in self.outputs)]
+        others = [(target.name, target.place) for target in pictures_too if target]
         safe_files.require_apart(outputs + others, [])
         safe_files.require_apart(others, read + reference)
-        if safe_files.identity(self.target.place) != safe_files.identity(self.options.input):
+        out_is_in = safe_files.identity(self.options.input) in {
+            safe_files.identity(one.target.place) for one in self.outputs
+        }
+        if not out_is_in:
             safe_files.require_apart(outputs, read + reference)
         elif not reference_is_in:
             safe_files.require_apart(outputs, reference)
 
     def run(self):
+        wholes = [self._level(i, output) for i, output in enumerate(self.outputs)]
+        seconds = {**self.seconds, "total": sum(self.seconds.values())}
+        if self.options.tolerance:
+            written = {**wholes[0], "seconds": seconds}
+        else:
+            written = {"version": wholes[0]["version"], "levels": wholes, "seconds": seconds}
+        if self.report:
+            self.staged.write(self.report, (json.dumps(written, indent=1) + "\n").encode())
+        # OUT itself is moved last: once it is there, all of its side files are, too.
+        for output in self.outputs:
+            self.staged.add(output.target, self.staged.folder(output.target) / output.exported.name)
+        self.staged.publish()
+        for whole in wholes:
+            for note in [*(repair["message"] for repair in whole["repairs"]), *whole["warnings"]]:
+                print(f"note: {note}")
+        for whole, output in zip(wholes, self.outputs):
+            name = "" if self.options.tolerance else f"{output.exported.name}: "
+            print(f"{name}{report.line(whole, whole['seconds']['total'])}")
+        return 0
+
+    def _level(self, level, output):
+        """Writes one file beside its place. Returns its report. Each level reads IN anew, so none comes from another."""
+        seconds_before = dict(self.seconds)
+        if level:
+            bpy.ops.wm.read_factory_settings(use_empty=True)
         reference_file = self._read("--reference", self.options.reference) if self.options.reference else None
         for ob in reference_file.objects if reference_file else ():
             ob.name = "reference " + ob.name  # This leaves the plain names to the objects of IN, which are read next.
@@ -190,11 +285,13 @@ class Command:
         reference_objects = self._pair(source.objects, reference_file)
         references = [snapshots.surface_of(ob) for ob in reference_objects]
         inputs = [snapshots.surface_of(ob) for ob in source.objects]
-        tolerance, size = self._tolerance(references)
-        working = tolerance - file_io.rounding(self.exported, source.objects)
+        size = snapshots.joined(references).size()
+        tolerance = self._tolerances(size)[level]
+        rounding = file_io.rounding(output.exported, source.objects)
+        working = tolerance - rounding
         if working <= 0:
             raise cli.Stop(
-                f"--tolerance: {tolerance:.3g} is less than the rounding when {self.exported.suffix} is written; "
+                f"{self._asked()}: {tolerance:.3g} is less than the rounding when {output.exported.suffix} is written; "
                 "use .ply for OUT, and objects without location, rotation and scale in IN"
             )
         perimeter = self.options.largest_perimeter
@@ -205,21 +302,19 @@ class Command:
                 source.objects, reference_objects, references, self._targets(source.objects)
             )
         ]
+        if not self.options.tolerance:
+            for ob, run in zip(source.objects, runs):
+                ob[GEOMETRIC_ERROR] = _deviation(run) + rounding
         repairs = source.repairs + (reference_file.repairs if reference_file else [])
-        whole = self._write(source, names, inputs, references, runs, tolerance, size)
+        whole = self._write(output, source, names, inputs, references, runs, tolerance, size)
         whole["input"] = whole_input
         whole["repairs"] = repairs + whole["repairs"]
+        if not self.options.tolerance:
+            whole[GEOMETRIC_ERROR] = _deviation(whole)
         self._end_stage("write")
-        whole["seconds"] = {**self.seconds, "total": sum(self.seconds.values())}
-        if self.report:
-            self.staged.write(self.report, (json.dumps(whole, indent=1) + "\n").encode())
-        # OUT itself is moved last: once it is there, all of its side files are, too.
-        self.staged.add(self.target, self.staged.folder(self.target) / self.exported.name)
-        self.staged.publish()
-        for note in [*(repair["message"] for repair in whole["repairs"]), *whole["warnings"]]:
-            print(f"note: {note}")
-        print(report.line(whole, whole["seconds"]["total"]))
-        return 0
+        seconds = {stage: took - seconds_before.get(stage, 0.0) for stage, took in self.seconds.items()}
+        whole["seconds"] = {**seconds, "total": sum(seconds.values())}
+        return whole
 
     def _read(self, what, path):
         found = file_io.read_file(path)
@@ -258,13 +353,29 @@ class Command:
         bpy.context.collection.objects.link(joined)
         return [joined]
 
-    def _tolerance(self, references):
-        """Returns (the tolerance, the size that is 100 %) for the whole file."""
-        size = snapshots.joined(references).size()
-        tolerance = cli.in_units(self.options.tolerance, size)
-        if tolerance > size:
-            raise cli.Stop(f"--tolerance: {tolerance:.6g} is more than the size of the reference, {size:.6g}")
-        return tolerance, size
+    def _asked(self):
+        """Returns the option that gives the tolerance, or the tolerances of the levels."""
+        return "--tolerance" if self.options.tolerance else "--lod" if self.options.lod else "--lod-pixels"
+
+    def _tolerances(self, size):
+        """Returns the tolerance of each output as a length. Stops at one that is too large, or out of order."""
+        if self.options.lod_pixels:
+            distance = cli.in_units(self.options.distance, size)
+            view = self.options.fov or 50, self.options.height or 1080
+            found = [tolerances.seen_as(pixels, distance, *view) for pixels in self.options.lod_pixels]
+        else:
+            found = [cli.in_units(asked, size) for asked in self.options.lod or [self.options.tolerance]]
+        for i, tolerance in enumerate(found):
+            level = "" if self.options.tolerance else f"level {i}: "
+            if tolerance > size:
+                raise cli.Stop(
+                    f"{self._asked()}: {level}{tolerance:.6g} is more than the size of the reference, {size:.6g}"
+                )
+            if i and tolerance <= found[i - 1]:
+                raise cli.Stop(
+                    f"{self._asked()}: {level}{tolerance:.6g} is not more than {found[i - 1]:.6g} of level {i - 1}"
+                )
+        return found
 
     def _targets(self, objects):
         target = self.options.target_triangles
@@ -315,10 +426,10 @@ class Command:
         self._say(f"decimated {ob.name}: {report.counts(run)}", took)
         return run
 
-    def _write(self, source, names, inputs, references, runs, tolerance, size):
-        """Writes OUT beside its place, reads the file back and certifies it. Returns the report of the whole file."""
-        written = self._export(source.objects)
-        self._say(f"wrote {self.exported.name} and read it back", self._end_stage("write"))
+    def _write(self, output, source, names, inputs, references, runs, tolerance, size):
+        """Writes a file beside its place, reads it back and certifies it. Returns the report of the whole file."""
+        written = self._export(output, source.objects)
+        self._say(f"wrote {output.exported.name} and read it back", self._end_stage("write"))
         found = {ob.name: snapshots.surface_of(ob) for ob in written.objects}
         if found.keys() == set(names):
             judged = [
@@ -343,39 +454,40 @@ class Command:
                 f"{solidity.pair_count(pairs['before'])} did before: the file rounds coordinates, and objects are "
                 "decimated one by one"
             )
-        whole["output"] = {"file": self.options.output, **written.counts}
+        whole["output"] = {"file": output.path, **written.counts}
         for kind, count in source.extras.items():
             if lost := count - written.extras.get(kind, 0):
                 message = f"{lost} of the {count} {kind} of IN are not in OUT"
                 whole["repairs"].append({"kind": kind, "count": lost, "message": message})
         self._say("certified both ways", self._end_stage("certify"))
-        print(f"{self.exported.name}: {solidity.line(whole['solidity']['after'])}")
+        print(f"{output.exported.name}: {solidity.line(whole['solidity']['after'])}")
         if not report.proved(whole):
-            raise cli.Stop(
-                f"{NOT_PROVED}: {report.intervals(whole)}; {self.options.output} was not written", cli.NOT_PROVED
-            )
-        if self.picture:
-            self._draw(snapshots.joined(found.values()), snapshots.joined(references), tolerance, size)
-            self._say(f"drew {self.options.picture}", self._end_stage("picture"))
+            raise cli.Stop(f"{NOT_PROVED}: {report.intervals(whole)}; {output.path} was not written", cli.NOT_PROVED)
+        if output.picture:
+            self._draw(output, snapshots.joined(found.values()), snapshots.joined(references), tolerance, size)
+            self._say(f"drew {output.picture.path}", self._end_stage("picture"))
         return whole
 
-    def _export(self, objects):
-        """Writes objects with their side files beside the place of OUT. Returns the MeshFile that is read back from there."""
-        folder = self.staged.folder(self.target)
-        file = folder / self.exported.name
+    def _export(self, output, objects):
+        """Writes objects with their side files beside the place of `output`. Returns the MeshFile that is read back there."""
+        folder = self.staged.folder(output.target)
+        file = folder / output.exported.name
         try:
-            file_io.write_file(file, objects, self.exported.parent)
+            file_io.write_file(file, objects, output.exported.parent)
             textures = []
             if file.suffix.lower() == ".gltf":
                 meant = [safe_files.identity(target.place) for target in self._targets_written()]
                 textures = side_files.keep_textures(
-                    file, self.exported.parent, lambda path: safe_files.identity(path) in meant
+                    file, output.exported.parent, lambda path: safe_files.identity(path) in meant
                 )
         except OSError as error:
-            raise self.target.failed(error) from None
+            raise output.target.failed(error) from None
         for texture in textures:
-            self.staged.add(safe_files.Target(self.exported.with_name(texture.name), "the texture"), texture, new=True)
-        for side in self.sides:
+            place = output.exported.with_name(texture.name)
+            if place not in self.textures:  # Levels share their textures.
+                self.staged.add(safe_files.Target(place, "the texture"), texture, new=True)
+                self.textures.add(place)
+        for side in output.sides:
             if (folder / side.path.name).exists():
                 self.staged.add(side, folder / side.path.name)
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -384,21 +496,22 @@ class Command:
         except Refused as error:
             reason = str(error).removeprefix(f"{file}: ")
             raise NotWritten(
-                f"{self.target.name}: the written file cannot be read back ({reason}); check the free space on the disk"
+                f"{output.target.name}: the written file cannot be read back ({reason}); check the free space on the disk"
             ) from None
 
     def _targets_written(self):
-        return [target for target in (self.target, *self.sides, self.report, self.picture) if target]
+        of_outputs = [target for one in self.outputs for target in (one.target, *one.sides, one.picture)]
+        return [target for target in (*of_outputs, self.report) if target]
 
     def _certify(self, surface, reference, tolerance, kept):
         return certify(surface, reference, tolerance, kept, self.options.threads)
 
-    def _draw(self, result, reference, tolerance, size):
+    def _draw(self, output, result, reference, tolerance, size):
         surfaces = [(surface.world(), surface.arrays.triangles) for surface in (result, reference)]
         like = self.options.reference or self.options.input
         png = io.BytesIO()
         pictures.save_deviation(png, *surfaces, tolerance, size, like, self.options.threads)
-        self.staged.write(self.picture, png.getvalue())
+        self.staged.write(output.picture, png.getvalue())
 
     def _summary(self, names, runs, judged, tolerance, size):
         """Returns the report of the whole file. Its distances are the largest of all objects, as certified in the file."""
@@ -442,6 +555,11 @@ class Command:
             ],
             "objects": [{"name": name, **run} for name, run in zip(names, runs)],
         }
+
+
+def _deviation(run):
+    """Returns the larger of both proved distances of a run."""
+    return max(run["forward"][1], run["backward"][1])
 
 
 def _normals(runs):

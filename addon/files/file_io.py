@@ -173,6 +173,22 @@ def _as_imported():
         bpy.context.view_layer.update()
 
 
+@contextlib.contextmanager
+def _known_to_the_exporter():
+    """Enters this add-on in the preferences while the context lasts if it was not installed: there the exporter of glTF looks
+    for gltf_extras.py."""
+    name, addons = __package__.removesuffix(".files"), bpy.context.preferences.addons
+    if name in addons:
+        yield
+        return
+    entry = addons.new()
+    entry.module = name
+    try:
+        yield
+    finally:
+        addons.remove(entry)
+
+
 def _import(extension, path, groups):
     operators = dir(bpy.ops.wm)
     if extension == ".obj":
@@ -239,7 +255,7 @@ def _export(extension, path, objects):
         )
     else:
         form = "GLB" if extension == ".glb" else "GLTF_SEPARATE"
-        with _as_imported() as turned:
+        with _as_imported() as turned, _known_to_the_exporter():
             bpy.ops.export_scene.gltf(
                 filepath=path, export_format=form, use_selection=True, export_apply=False, export_yup=turned
             )

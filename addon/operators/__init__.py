@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Registers the operators in bpy.ops.tolvol: set_tolerance, set_reference, clear_reference, show_original,
 restore_original, new_original, check, measure_statistics, select_outside, worst_point, next_place, clear_places, probe,
-add_label, renew_labels, remove_label, select_crossing, select_staying, save_report, decimate, smooth, apply_modifier,
-fit_modifier and deform."""
+add_label, renew_labels, remove_label, select_crossing, select_staying, save_report, decimate, make_lods, smooth,
+apply_modifier, fit_modifier and deform."""
 
 import bpy
 
@@ -11,6 +11,7 @@ from .check import TOLVOL_OT_check, TOLVOL_OT_measure_statistics, TOLVOL_OT_sele
 from .crossings import TOLVOL_OT_select_crossing
 from .decimate import TOLVOL_OT_decimate
 from .deform import TOLVOL_OT_deform
+from .lod import TOLVOL_OT_make_lods
 from .modifiers import TOLVOL_OT_apply_modifier, TOLVOL_OT_fit_modifier
 from .original import TOLVOL_OT_new_original, TOLVOL_OT_restore_original, TOLVOL_OT_show_original
 from .places import TOLVOL_OT_clear_places, TOLVOL_OT_next_place, TOLVOL_OT_worst_point
@@ -43,6 +44,7 @@ _CLASSES = (
     TOLVOL_OT_select_staying,
     TOLVOL_OT_save_report,
     TOLVOL_OT_decimate,
+    TOLVOL_OT_make_lods,
     TOLVOL_OT_smooth,
     TOLVOL_OT_apply_modifier,
     TOLVOL_OT_fit_modifier,

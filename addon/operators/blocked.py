@@ -58,7 +58,12 @@ def mesh_blocked(ob, modes=_OBJECT_MODE):
 
 def decimate_blocked(ob, modes=_OBJECT_MODE):
     """Why the mesh of `ob` cannot be changed within the tolerance now, or None."""
-    if reason := mesh_blocked(ob, modes):
+    return mesh_blocked(ob, modes) or surface_blocked(ob, modes)
+
+
+def surface_blocked(ob, modes=_OBJECT_MODE):
+    """Why no new mesh can be made of the mesh of `ob` within the tolerance now, or None."""
+    if reason := object_blocked(ob, modes):
         return reason
     if not ob.data.polygons:
         return f"{ob.name} has no faces"

@@ -2,24 +2,18 @@
 """Decimates meshes within the tolerance: computes and certifies on arrays, then writes each mesh in one go."""
 
 import contextlib
-import functools
-import math
-import time
 
 import bpy
-import numpy as np
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
-from .. import native, preferences
-from ..errors import NotProved, Refused
-from ..job import JobOperator, run_all
-from ..mesh import filling, mesh_io, protect, transfer
+from .. import preferences
+from ..errors import Refused
+from ..job import JobOperator
+from ..mesh import transfer
 from ..operation_settings import PROTECTED, decimate_settings
-from ..proof import kept_warnings, last_run, measure, report, solidity, verdict
-from ..proof.certify import certify
 from ..properties import PLACEMENTS, automatic_placement, tolerance_settings
-from ..reference import measurements, snapshots, tolerances, volumes
-from . import original
+from ..reference import snapshots, tolerances
+from . import decimation, original
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
 
@@ -128,7 +122,7 @@ object. An object without a reference gets one first, as by Set Reference"""
     def targets(self, context):
         return targets(context)
 
-    def prepare(self, context):
+    def steps(self, context):
         context.view_layer.update()
         self._take_settings(self.ob.tolvol)
         tasks = []
@@ -139,37 +133,16 @@ object. An object without a reference gets one first, as by Set Reference"""
         # The tolerance is stored in the other unit too, so that changing the unit in Adjust Last Operation keeps it.
         other = "PERCENT" if self.tolerance_mode == "LENGTH" else "LENGTH"
         tolerances.convert_tolerance(self, tasks[0].reference.size(), other)
-        return functools.partial(run_all, tasks)
+        self.finish((yield from self.each(tasks)))
 
     def _task(self, context, ob):
-        surface, reference = snapshots.surface_of(ob), snapshots.reference_of(ob)
-        task = _Task(
-            ob.name,
-            surface,
-            reference,
-            tolerances.tolerance_length(self, reference.size()),
-            self._options(context, ob.data),
-        )
-        task.uvs = mesh_io.corner_uvs(ob.data)
-        task.locked[mesh_io.loose_edges(ob.data)] = True
-        task.locked |= protect.on_edges(ob.data, self.protect)
-        task.locked |= protect.on_planes(ob.data, self.symmetry)
-        if self.only_selected:
-            task.locked |= protect.unselected(ob)
-            task.selected = mesh_io.column(ob.data.polygons, "select", 1, bool)
-        if self.close_holes:
-            angle = task.options["max_normal_angle"]
-            task.close_holes = {
-                "largest_perimeter": self.largest_perimeter or None,
-                # Left as it is, *Normals* would leave open the ends of tubes, which are at right angles to the tubes.
-                "max_normal_angle": None if angle == 90 else angle,
-            }
-        task.shares = protect.group_weights(ob, self.vertex_group, self.invert_vertex_group)
-        if task.shares is not None:
-            task.locked |= task.shares == 0
-        return task
+        reference = snapshots.reference_of(ob)
+        tolerance = tolerances.tolerance_length(self, reference.size())
+        placement = automatic_placement(ob.data) if self.own_placements else self.placement
+        options = decimation.options(self, placement, self.threads or preferences.threads(context))
+        return decimation.task(ob, reference, tolerance, self, options | {"outside": self.outside.lower()})
 
-    def finish(self, context, outcomes):
+    def finish(self, outcomes):
         # Entering all contexts checks that Blender can hold all results before the first mesh is changed.
         with contextlib.ExitStack() as stack:
             writes = [
@@ -186,17 +159,8 @@ object. An object without a reference gets one first, as by Set Reference"""
                 write.write()
             without.clear()
         for ob, (_, _, _, run) in zip(self.objects, outcomes):
-            self._keep(ob, run, f"{ob.name}: " if len(self.objects) > 1 else "")
-
-    def _keep(self, ob, run, prefix):
-        """Remembers the run at its object and reports it."""
-        shared.give(self, ob.tolvol, _SHARED if self.own_placements else {*_SHARED, "placement"})
-        measurements.remember(ob, snapshots.surface_of(ob), run, run["tolerance"]["absolute"])
-        last_run.keep(ob, run)
-        kept_warnings.keep(ob, run["warnings"], run["locked"])
-        for warning in run["warnings"]:
-            self.report({"WARNING"}, prefix + warning)
-        self.report({"INFO"}, f"{prefix}{verdict.word(ob)}: {report.line(run)}")
+            shared.give(self, ob.tolvol, _SHARED if self.own_placements else {*_SHARED, "placement"})
+            decimation.keep(self, ob, run, f"{ob.name}: " if len(self.objects) > 1 else "")
 
     def _take_settings(self, settings):
         """Takes the settings of the active object for all objects, so that Adjust Last Operation shows the ones used."""
@@ -211,121 +175,5 @@ object. An object without a reference gets one first, as by Set Reference"""
             self.placement = settings.placement
             self.own_placements = settings.placement_choice < 0
 
-    def _options(self, context, mesh):
-        placement = automatic_placement(mesh) if self.own_placements else self.placement
-        return {
-            "placement": placement.lower(),
-            "two_sided": self.keep == "BOTH",
-            "effort": self.effort.lower(),
-            "crossings": self.crossings.lower(),
-            # A property holds a float32, in which 90 and 180 degrees are slightly more.
-            "max_normal_angle": round(math.degrees(self.max_normal_angle), 4),
-            "max_seconds": self.max_seconds or None,
-            "target_triangles": self.target_triangles if self.use_target else None,
-            "outside": self.outside.lower(),
-            "threads": self.threads or preferences.threads(context),
-        }
-
 
 _SHARED = {*tolerance_settings(), *decimate_settings()}
-
-
-class _Task:
-    """The work on one object in the thread: it reads and returns arrays and numbers, no data of Blender."""
-
-    def __init__(self, name, surface, reference, tolerance, options):
-        self.name = name
-        self.surface = surface
-        self.reference = reference
-        self.tolerance = tolerance
-        self.options = options
-        self.locked = np.zeros(len(surface.arrays.vertices), bool)
-        self.shares = None
-        self.uvs = None
-        self.close_holes = None  # the options of close_holes(), if holes are to be closed
-        self.selected = None  # (polygons,) bool, if only the selected ones are to be changed
-
-    def run(self, progress):
-        clock = [time.perf_counter()]
-        threads = self.options["threads"]
-        built = volumes.native_volume(self.reference, self.tolerance, threads, progress)
-        clock.append(time.perf_counter())
-        arrays, matrix = self.surface.arrays, self.surface.matrix
-        holes, stages = None, ["field", "decimate", "certify"]
-        if self.close_holes is not None:
-            arrays, holes = self._close(arrays, built, progress)
-            stages.insert(1, "close_holes")
-            clock.append(time.perf_counter())
-        wedges = None
-        if self.uvs is not None:
-            values = self.uvs[arrays.corners]
-            if holes is not None:
-                number = arrays.hole.astype(np.float32)[:, None, None]
-                values = np.concatenate([values, np.broadcast_to(number, (*values.shape[:2], 1))], 2)
-            wedges = native.module.wedges(arrays.triangles, np.ascontiguousarray(values))
-        computed = native.module.decimate(
-            arrays.vertices,
-            arrays.triangles,
-            built,
-            to_world=matrix,
-            locked=self.locked if self.locked.any() else None,
-            shares=self.shares,
-            wedges=wedges,
-            progress=progress,
-            **self.options,
-        )
-        result = transfer.Decimated.of(computed, arrays)
-        clock.append(time.perf_counter())
-        decimated = snapshots.Surface(mesh_io.MeshArrays(result.vertices, result.triangles, None, None), matrix)
-        kept = computed.report["outside"]["faces"]
-        certified = certify(decimated, self.reference, self.tolerance, kept, threads, progress)
-        if kept:
-            before = measure.largest_distance(
-                (self.reference.world(), self.reference.arrays.triangles),
-                (self.surface.world(), self.surface.arrays.triangles),
-                self.tolerance,
-                threads,
-                progress,
-            )
-            certified["outside"]["backward_before"] = before.upper
-        certified["solidity"] = solidity.compared(
-            *(solidity.facts(surface, threads, progress) for surface in (self.surface, decimated))
-        )
-        clock.append(time.perf_counter())
-        seconds = dict(zip(stages, np.diff(clock).tolist()))
-        run = report.decimation_run(
-            self.surface.arrays, result, computed.report, built, certified, self.options, seconds, holes
-        )
-        if wedges is not None:
-            self._name_corners(run, arrays.triangles, wedges)
-        if not report.proved(run):
-            raise NotProved(report.intervals(run))
-        return arrays, self.reference, result, run
-
-    def _close(self, arrays, volume, progress):
-        """Returns the arrays with holes closed, and the report of them."""
-        closed = native.module.close_holes(
-            arrays.vertices,
-            arrays.triangles,
-            volume,
-            to_world=self.surface.matrix,
-            shares=self.shares,
-            threads=self.options["threads"],
-            progress=progress,
-            **self.close_holes,
-        )
-        arrays, holes = filling.filled(arrays, closed, self.selected, self.uvs)
-        return arrays, holes | self.close_holes | {"warnings": closed.report["warnings"]}
-
-    def _name_corners(self, run, triangles, wedges):
-        """Counts the vertices where three or more UV islands meet. They have to stay, so a UV map of many islands leaves
-        little to decimate: the run warns of that."""
-        meeting = int(protect.meeting(triangles, wedges).sum())
-        if meeting:
-            run["locked"][kept_warnings.ISLANDS] = meeting
-        vertices = len(np.unique(triangles))
-        if 2 * meeting > vertices:
-            run["warnings"].append(
-                f"{meeting:,} of {vertices:,} vertices have to stay, because three or more UV islands meet at each of "
-                "them; remove UV maps that are not needed"
-            )

@@ -46,7 +46,7 @@ def restore_blocked(ob):
     return None
 
 
-def _twin(ob, mesh):
+def twin_of(ob, mesh):
     """Returns a new object with `mesh` at the place of the reference of `ob`, in no collection yet.
 
     If the reference is the object's own mesh, the new object has the object's modifiers and materials, too.
@@ -75,7 +75,7 @@ class _Shown:
     def __init__(self, context, ob):
         self.ob = ob
         self._was_hidden, self._was_selected = ob.hide_get(), ob.select_get()
-        self.twin = _twin(ob, originals.kept(ob))
+        self.twin = twin_of(ob, originals.kept(ob))
         self.twin.name = f".{ob.name} original"
         _link(context, ob, self.twin)
         ob.hide_set(True)
@@ -245,7 +245,7 @@ class TOLVOL_OT_new_original(bpy.types.Operator):
         ob = context.active_object
         mesh = originals.kept(ob).copy()
         mesh.name = f"{ob.name} original"
-        twin = _twin(ob, mesh)
+        twin = twin_of(ob, mesh)
         twin.name = f"{ob.name} original"
         _link(context, ob, twin)
         for other in context.selected_objects:

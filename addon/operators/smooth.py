@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Smooths meshes within the tolerance."""
 
-import functools
-
 import bpy
 import numpy as np
 from bpy.props import IntProperty
 
 from .. import native, preferences
 from ..errors import Refused
-from ..job import JobOperator, run_all
+from ..job import JobOperator
 from ..mesh import mesh_io, protect
 from ..operation_settings import smooth_settings
 from ..proof import kept_warnings
@@ -53,13 +51,13 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
         edited = [ob for ob in context.view_layer.objects if ob.type == "MESH" and ob.mode == "EDIT" and ob != active]
         return [active, *(edited if active.mode == "EDIT" else [])]
 
-    def prepare(self, context):
+    def steps(self, context):
         context.view_layer.update()
         shared.take(self, self.ob.tolvol.smooth, smooth_settings())
         self._chosen = [ob for ob in self.objects if _anything_to_smooth(ob)]
         if not self._chosen:
             raise Refused(f"No vertex of {_names(self.objects)} is selected")
-        return functools.partial(run_all, [self._task(context, ob) for ob in self._chosen])
+        self.finish((yield from self.each([self._task(context, ob) for ob in self._chosen])))
 
     def _task(self, context, ob):
         if reason := decimate_blocked(ob, _MODES):
@@ -82,7 +80,7 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
         }
         return _Task(ob.name, motion, options)
 
-    def finish(self, context, outcomes):
+    def finish(self, outcomes):
         moved = [
             (ob, *outcome)
             for ob, outcome in zip(self._chosen, outcomes)

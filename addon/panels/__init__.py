@@ -14,6 +14,7 @@ from .deviation import (
     TOLVOL_UL_labels,
 )
 from .guard import TOLVOL_PT_guard
+from .lod import TOLVOL_PT_lod
 from .modifiers import TOLVOL_PT_modifiers
 from .smooth import TOLVOL_PT_smooth
 from .tolerance import TOLVOL_PT_tolerance
@@ -28,6 +29,7 @@ _CLASSES = (
     TOLVOL_PT_labels,
     TOLVOL_PT_statistics,
     TOLVOL_PT_show_deviation,
+    TOLVOL_PT_lod,
     TOLVOL_PT_smooth,
     TOLVOL_PT_modifiers,
     TOLVOL_PT_deform,

@@ -20,6 +20,21 @@ def tolerance_length(settings, size):
     return _chosen(settings, "tolerance_percent") / 100 * size
 
 
+def set_length(settings, length):
+    """Sets the tolerance to a length in double precision."""
+    settings.tolerance_mode = "LENGTH"
+    settings.tolerance_length = length
+    settings.tolerance_length_converted = repr(length)
+
+
+def seen_as(pixels, distance, fov, height):
+    """Returns the length that covers so many pixels of a picture at this distance from the camera.
+
+    fov: the vertical angle of view in degrees; height: the height of the picture in pixels.
+    """
+    return pixels * 2 * distance * math.tan(math.radians(fov) / 2) / height
+
+
 def _chosen(settings, name):
     """Returns a property in double precision: the value converted from the other unit, or the decimal that was typed."""
     value = getattr(settings, name)

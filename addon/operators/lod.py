@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Makes a chain of levels of detail. Each level is decimated from the original, never from another level, and proved against
+the reference in both directions."""
+
+import contextlib
+import math
+
+import bpy
+from bpy.props import IntProperty
+
+from .. import native, preferences
+from ..errors import Refused
+from ..files.gltf_extras import GEOMETRIC_ERROR
+from ..job import JobOperator
+from ..mesh import transfer
+from ..operation_settings import lod_settings
+from ..properties import automatic_placement
+from ..reference import originals, snapshots, tolerances
+from ..units import length, shortest, three_digits, typed
+from . import decimation
+from . import settings as shared
+from .blocked import allowed, surface_blocked
+from .original import twin_of
+
+# A level by count may deviate by at most this share of the size.
+_WIDEST = 0.1
+
+
+def draw_lod_settings(layout, settings):
+    """Draws the settings of the levels, for the panel and for Adjust Last Operation."""
+    layout.prop(settings, "by", expand=True)
+    layout.prop(settings, "levels")
+    if settings.by == "TOLERANCE":
+        layout.prop(settings, "in_length")
+        vector = "lengths" if settings.in_length else "percentages"
+    else:
+        vector = {"COUNT": "counts", "PIXELS": "pixels"}[settings.by]
+    if settings.by == "PIXELS":
+        column = layout.column(align=True)
+        for name in ("distance", "fov", "height"):
+            column.prop(settings, name)
+    column = layout.column(align=True)
+    for i in range(settings.levels):
+        unit = " (%)" if vector == "percentages" else ""
+        column.prop(settings, vector, index=i, text=f"LOD{i + 1}{unit}")
+
+
+class TOLVOL_OT_make_lods(JobOperator, bpy.types.Operator):
+    """Make 2 to 6 levels of detail as new objects in a collection. Each is decimated from the original with the settings of \
+Decimate, and proved both ways. Its custom property geometricError is its deviation"""
+
+    bl_idname = "tolvol.make_lods"
+    bl_label = "Make LOD Chain"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = lod_settings({"SKIP_SAVE"})
+    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+
+    @classmethod
+    def poll(cls, context):
+        return allowed(cls, surface_blocked(context.active_object))
+
+    def draw(self, _context):
+        self.layout.use_property_split = True
+        draw_lod_settings(self.layout, self)
+
+    def steps(self, context):
+        context.view_layer.update()
+        shared.take(self, self.ob.tolvol.lod, lod_settings())
+        outcomes = []
+        for i, task in enumerate(self._tasks(context)):
+            self.part = f"Level {i + 1} of {self.levels}"
+            try:
+                outcomes.append((yield task.run))
+            except native.module.Cancelled:
+                raise
+            except (Refused, native.module.TolvolError) as error:
+                raise Refused(f"Level {i + 1}: {native.said(error)}") from None
+        self._write(context, outcomes)
+
+    def _tasks(self, context):
+        ob = self.ob
+        reference = snapshots.reference_of(ob)
+        limits = self._limits(context, reference.size())
+        with _original(ob) as original:
+            settings = ob.tolvol
+            chosen = settings.placement_choice >= 0
+            placement = settings.placement if chosen else automatic_placement(original.data)
+            asked = decimation.options(settings, placement, self.threads or preferences.threads(context))
+            asked |= {"two_sided": True, "target_triangles": None}
+            tasks = [decimation.task(original, reference, limit, settings, dict(asked)) for limit in limits]
+        if self.by == "COUNT":
+            triangles = len(tasks[0].surface.arrays.triangles)
+            for i, (task, count) in enumerate(zip(tasks, self.counts)):
+                if count >= triangles:
+                    raise Refused(f"Level {i + 1}: {count:,} triangles, but {ob.name} has {triangles:,}")
+                task.options["target_triangles"] = count
+        return tasks
+
+    def _limits(self, context, size):
+        """Returns the tolerance of each level as a length. Raises Refused, which names the level, for levels out of order."""
+        if self.by == "COUNT":
+            _require_order(self.counts[: self.levels], lambda count: f"{count:,} triangles", falling=True)
+            return [_WIDEST * size] * self.levels
+        if self.by == "PIXELS":
+            pixels = [shortest(value) for value in self.pixels[: self.levels]]
+            _require_order(pixels, lambda value: f"{value:g} pixels")
+            distance, fov = typed(self.distance, context.scene.unit_settings), round(math.degrees(self.fov), 4)
+            limits = [tolerances.seen_as(value, distance, fov, self.height) for value in pixels]
+        elif self.in_length:
+            limits = [typed(value, context.scene.unit_settings) for value in self.lengths[: self.levels]]
+            _require_order(limits, lambda value: length(context, value))
+        else:
+            percentages = [shortest(value) for value in self.percentages[: self.levels]]
+            _require_order(percentages, lambda value: f"{value:g} %")
+            limits = [value / 100 * size for value in percentages]
+        for i, limit in enumerate(limits):
+            if limit > size:
+                share = three_digits(100 * limit / size)
+                raise Refused(
+                    f"Level {i + 1}: a tolerance of {share} % of the size of {self.ob.name} leaves nothing of it"
+                )
+        return limits
+
+    def _write(self, context, outcomes):
+        """Makes the objects of all levels, or none of them."""
+        ob = self.ob
+        with contextlib.ExitStack() as undo:
+            meshes = []
+            undo.callback(lambda: [bpy.data.meshes.remove(mesh) for mesh in meshes])
+            source = _source(ob)
+            for arrays, _, result, _ in outcomes:
+                meshes.append(source.copy())
+                with transfer.Writing(meshes[-1], arrays, result) as writing:
+                    writing.write()
+            if ob.tolvol.snapshot is None:
+                undo.callback(snapshots.clear_reference, ob)
+                snapshots.set_reference(ob, outcomes[0][1])
+            undo.pop_all()
+        shared.give(self, ob.tolvol.lod, lod_settings())
+        collection = bpy.data.collections.new(f"{ob.name}_LODs")
+        context.scene.collection.children.link(collection)
+        for i, (mesh, (_, _, _, run)) in enumerate(zip(meshes, outcomes)):
+            level = ob.copy()
+            level.name = mesh.name = f"{ob.name}_LOD{i + 1}"
+            level.data = mesh
+            collection.objects.link(level)
+            self._set(level.tolvol, i, run["tolerance"]["absolute"])
+            level[GEOMETRIC_ERROR] = max(run["forward"][1], run["backward"][1])
+            context.view_layer.update()
+            decimation.keep(self, level, run, f"{level.name}: ")
+        ob.tolvol.lods = collection
+
+    def _set(self, settings, level, tolerance):
+        """Sets the copied settings of a level."""
+        settings.labels.clear()
+        settings.lods = None
+        settings.keep = "BOTH"
+        if self.by == "COUNT" or self.by == "TOLERANCE" and not self.in_length:
+            settings.tolerance_mode = "PERCENT"
+            settings.tolerance_percent = 100 * _WIDEST if self.by == "COUNT" else self.percentages[level]
+        else:
+            tolerances.set_length(settings, tolerance)
+
+
+def _source(ob):
+    """Returns the mesh that the levels are made from: the original, if the object is its own reference."""
+    own = ob.tolvol.snapshot is not None and ob.tolvol.snapshot_kind == "SELF"
+    return originals.kept(ob) if own else ob.data
+
+
+@contextlib.contextmanager
+def _original(ob):
+    """Gives an object with the mesh that the levels are made from, and removes it at the end unless it is `ob`."""
+    source = _source(ob)
+    if source == ob.data:
+        yield ob
+        return
+    twin = twin_of(ob, source)
+    try:
+        yield twin
+    finally:
+        bpy.data.objects.remove(twin)
+
+
+def _require_order(values, as_text, falling=False):
+    for i, (before, value) in enumerate(zip(values, values[1:])):
+        if value <= before if not falling else value >= before:
+            than = "fewer" if falling else "more"
+            raise Refused(
+                f"Level {i + 2}: {as_text(value)}, which is not {than} than the {as_text(before)} of level {i + 1}"
+            )

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from ..files.gltf_extras import GEOMETRIC_ERROR
+from ..operators.blocked import object_blocked, surface_blocked
+from ..operators.lod import draw_lod_settings
+from ..units import length
+from .layout import SubPanel, active, right, text_lines
+
+
+class TOLVOL_PT_lod(SubPanel, bpy.types.Panel):
+    """The settings of the levels of detail, and the levels that were made last."""
+
+    bl_label = "LOD Chain"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        ob = active(context)
+        draw_lod_settings(layout, ob.tolvol.lod)
+        layout.operator("tolvol.make_lods")
+        if (reason := surface_blocked(ob)) and not object_blocked(ob):
+            text_lines(context, layout, reason, "ERROR")
+        column = layout.column(align=True)
+        for level in ob.tolvol.lods.objects if ob.tolvol.lods else ():
+            row = column.split(factor=0.6)
+            row.label(text=level.name, icon="MESH_DATA")
+            right(row, f"{len(level.data.polygons):,}" if level.type == "MESH" else "")
+            error = level.get(GEOMETRIC_ERROR)
+            if isinstance(error, float):
+                right(column, f"deviates by {length(context, error)}")

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Make LOD Chain: each level is a decimation of the original, proved on the stored mesh, and all are made or none."""
+
+import math
+import types
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+import addon
+from addon import native
+from addon.mesh import mesh_io
+from addon.mesh.mesh_io import column
+from addon.operators.lod import TOLVOL_OT_make_lods
+from addon.proof import verdict
+from addon.reference import snapshots
+from scenes import activate, torus, world_triangles
+
+PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, 2, 0.5, 1))
+
+
+def make(**options):
+    assert bpy.ops.tolvol.make_lods(**options) == {"FINISHED"}
+    return list(bpy.context.active_object.tolvol.lods.objects)
+
+
+def padded(*values):
+    """The values of a vector property, which has a number for each of the most levels."""
+    return (*values, *[values[-1]] * (6 - len(values)))
+
+
+def datablocks():
+    return [len(blocks) for blocks in (bpy.data.objects, bpy.data.meshes, bpy.data.collections)]
+
+
+def deviation(level, reference):
+    """Judges a level by the native measure, and returns the upper end of the larger direction."""
+    return native.module.hausdorff(*world_triangles(level), *reference).upper
+
+
+def fresh_count(**options):
+    """Returns the number of triangles that Decimate leaves of the active object, and takes it back."""
+    ob = bpy.context.active_object
+    mesh = ob.data.copy()
+    bpy.ops.tolvol.decimate(**options)
+    count, ob.data = len(ob.data.polygons), mesh
+    return count
+
+
+@pytest.mark.parametrize("matrix", [Matrix(), PLACED], ids=["local", "placed"])
+def test_each_level_is_proved_against_the_original_and_is_what_decimate_leaves(matrix):
+    ob = torus(matrix=matrix)
+    reference, before = world_triangles(ob), column(ob.data.vertices, "co", 3).tobytes()
+    size = snapshots.surface_of(ob).size()
+    levels = make(levels=3, percentages=padded(0.3, 1, 3))
+    assert [level.name for level in levels] == ["torus_LOD1", "torus_LOD2", "torus_LOD3"]
+    assert [collection.name for collection in bpy.context.scene.collection.children] == ["torus_LODs"]
+    assert column(ob.data.vertices, "co", 3).tobytes() == before and ob.tolvol.snapshot is not None
+    for level, percent in zip(levels, (0.3, 1, 3)):
+        error = level["geometricError"]
+        found = native.module.hausdorff(*world_triangles(level), *reference, bound=percent / 100 * size)
+        assert found.upper <= percent / 100 * size
+        # The property is an upper bound of the true deviation, and narrow.
+        assert found.lower <= error <= percent / 100 * size and error <= 1.01 * found.lower
+        assert verdict.of(level).kind == verdict.WITHIN and level.tolvol.tolerance_percent == pytest.approx(percent)
+    counts = [len(level.data.polygons) for level in levels]
+    assert counts == sorted(counts, reverse=True) and counts[0] > 3 * counts[2]
+    activate(ob)
+    assert counts == [fresh_count(tolerance_percent=percent) for percent in (0.3, 1, 3)]
+
+
+def test_the_levels_of_a_decimated_object_are_made_from_its_original():
+    ob = torus()
+    reference = world_triangles(ob)
+    bpy.ops.tolvol.decimate(tolerance_percent=4)
+    left = len(ob.data.polygons)
+    levels = make(levels=2, percentages=padded(0.2, 1))
+    assert all(len(level.data.polygons) > left for level in levels)
+    for level, percent in zip(levels, (0.2, 1)):
+        assert deviation(level, reference) <= percent / 100 * snapshots.snapshot_size(ob) * 1.001
+    assert len(ob.data.polygons) == left
+
+
+def test_the_reference_may_be_another_object():
+    reference = torus("reference", around=96, across=48)
+    ob = torus("ob", noise=0)
+    ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", reference
+    for level in make(levels=2, percentages=padded(2, 4)):
+        assert (
+            level["geometricError"]
+            >= native.module.hausdorff(*world_triangles(level), *world_triangles(reference)).lower
+        )
+        assert verdict.of(level).passed
+
+
+def test_by_count():
+    ob = torus()
+    reference = world_triangles(ob)
+    levels = make(by="COUNT", levels=2, counts=padded(500, 120))
+    assert [len(level.data.polygons) for level in levels] == [500, 120]
+    for level in levels:
+        assert deviation(level, reference) <= level["geometricError"] * 1.001 < 0.1 * snapshots.snapshot_size(ob)
+    activate(ob)
+    assert fresh_count(tolerance_percent=10, target_triangles=500) == 500
+
+
+def test_by_pixels_from_a_distance():
+    ob = torus()
+    make(by="PIXELS", levels=2, pixels=padded(2, 8), distance=5, fov=math.radians(60), height=500)
+    across = 2 * 5 * math.tan(math.radians(30))  # what the picture shows from top to bottom
+    for level, pixels in zip(ob.tolvol.lods.objects, (2, 8)):
+        limit = pixels / 500 * across
+        assert level.tolvol.tolerance_mode == "LENGTH"
+        assert verdict.of(level).tolerance == pytest.approx(limit, rel=1e-12)
+        assert 0.5 * limit < level["geometricError"] <= limit
+
+
+def test_by_lengths_and_the_settings_of_decimate():
+    ob = torus()
+    ob.tolvol.placement = "SUBSET"
+    ob.tolvol.keep = "ONE"
+    ob.tolvol.use_target, ob.tolvol.target_triangles = True, 900
+    levels = make(levels=2, in_length=True, lengths=padded(0.02, 0.05))
+    before = {tuple(row) for row in column(ob.data.vertices, "co", 3).tolist()}
+    for level, limit in zip(levels, (0.02, 0.05)):
+        assert {tuple(row) for row in column(level.data.vertices, "co", 3).tolist()} <= before
+        assert verdict.of(level).tolerance == limit and verdict.of(level).two_sided
+        assert len(level.data.polygons) < 900
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"percentages": padded(1, 0.5)}, "Level 2: 0.5 %, which is not more than the 1 % of level 1"),
+        ({"percentages": padded(0.5, 1, 1), "levels": 3}, "Level 3: 1 %, which is not more than the 1 % of level 2"),
+        (
+            {"in_length": True, "lengths": padded(0.1, 0.05)},
+            "Level 2: 5 cm, which is not more than the 10 cm of level 1",
+        ),
+        ({"in_length": True, "lengths": padded(0.1, 50)}, "Level 2: a tolerance of .* leaves nothing of it"),
+        ({"by": "PIXELS", "pixels": padded(2, 2)}, "Level 2: 2 pixels, which is not more than the 2 pixels of level 1"),
+        (
+            {"by": "COUNT", "counts": padded(100, 200)},
+            "Level 2: 200 triangles, which is not fewer than the 100 triangles",
+        ),
+        ({"by": "COUNT", "counts": padded(9999, 200)}, "Level 1: 9,999 triangles, but torus has 2,304"),
+    ],
+)
+def test_levels_out_of_order_are_refused_by_name(options, said):
+    torus()
+    before = datablocks()
+    with pytest.raises(RuntimeError, match=said.replace(" cm", "\u00a0cm")):
+        bpy.ops.tolvol.make_lods(**{"levels": 2, **options})
+    assert datablocks() == before
+
+
+@pytest.mark.parametrize("fails", [0, 1])
+def test_a_level_that_fails_leaves_nothing(monkeypatch, fails):
+    ob = torus()
+    before, calls = datablocks(), []
+    decimate = native.module.decimate
+
+    def failing(*arguments, **options):
+        calls.append(arguments)
+        if len(calls) > fails:
+            raise native.module.Cancelled("cancelled") if fails else native.module.TolvolError("broken", "internal")
+        return decimate(*arguments, **options)
+
+    monkeypatch.setattr(native.module, "decimate", failing)
+    if fails:
+        assert bpy.ops.tolvol.make_lods(levels=2) == {"CANCELLED"}
+    else:
+        with pytest.raises(RuntimeError, match="Level 1: "):
+            bpy.ops.tolvol.make_lods(levels=2)
+    assert datablocks() == before and ob.tolvol.snapshot is None and ob.tolvol.lods is None
+
+
+def test_a_mesh_that_blender_cannot_hold_leaves_nothing(monkeypatch):
+    from addon.mesh import transfer
+
+    ob = torus()
+    before, calls = datablocks(), []
+    compare = transfer._compare
+
+    def failing(*arguments):
+        calls.append(arguments)
+        if len(calls) == 2:
+            raise transfer.MeshMismatch("no")
+        return compare(*arguments)
+
+    monkeypatch.setattr(transfer, "_compare", failing)
+    with pytest.raises(RuntimeError, match="cannot hold"):
+        bpy.ops.tolvol.make_lods(levels=2)
+    assert datablocks() == before and ob.tolvol.snapshot is None
+
+
+def test_progress_names_the_level(monkeypatch):
+    torus()
+    parts = []
+    each = TOLVOL_OT_make_lods._next_work
+    monkeypatch.setattr(TOLVOL_OT_make_lods, "_next_work", lambda self: (each(self), parts.append(self.part))[0])
+    make(levels=3, percentages=padded(1, 2, 3))
+    assert parts == ["Level 1 of 3", "Level 2 of 3", "Level 3 of 3"]
+
+
+def test_uv_maps_materials_and_modifiers_are_kept():
+    ob = torus()
+    ob.data.uv_layers.new(name="map")
+    ob.data.materials.append(bpy.data.materials.new("red"))
+    ob.modifiers.new("bevel", "BEVEL")
+    for level in make(levels=2, percentages=padded(1, 2)):
+        assert level.data.uv_layers.keys() == ["map"] and level.data.materials.keys() == ["red"]
+        assert level.modifiers.keys() == ["bevel"] and not level.tolvol.labels
+
+
+def test_blenders_gltf_exporter_is_told_the_deviation():
+    ob = torus()
+    level = make(levels=2, percentages=padded(1, 2))[0]
+    hook = addon.glTF2ExportUserExtension()
+    for extras in (None, {"mine": 1, "tolvol": {"keep": 0}}):
+        node = types.SimpleNamespace(extras=extras)
+        hook.gather_node_hook(node, level, {})
+        assert node.extras == {**({"mine": 1} if extras else {}), "geometricError": level["geometricError"]}
+    for other in (ob, None):
+        node = types.SimpleNamespace(extras={"mine": 1})
+        hook.gather_node_hook(node, other, {})
+        assert node.extras == {"mine": 1}
+
+
+def test_the_original_may_be_shared():
+    """Other objects with the same mesh are no obstacle: the mesh stays as it is."""
+    ob = torus()
+    other = ob.copy()
+    bpy.context.collection.objects.link(other)
+    levels = make(levels=2, percentages=padded(1, 2))
+    assert len(levels) == 2 and ob.data == other.data and len(mesh_io.read_mesh(ob.data).triangles) == 2304
+    assert not np.array_equal(mesh_io.read_mesh(levels[0].data).triangles, mesh_io.read_mesh(ob.data).triangles)
