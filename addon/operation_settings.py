@@ -239,7 +239,7 @@ def lod_settings(options=frozenset()):
     """Returns the settings of a chain of levels of detail. Each vector has a number for each of the most levels."""
     return {
         "by": EnumProperty(
-            name="Levels By",
+            name="By",
             description="What is given for each level",
             items=(
                 (

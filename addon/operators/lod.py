@@ -28,7 +28,7 @@ _WIDEST = 0.1
 
 def draw_lod_settings(layout, settings):
     """Draws the settings of the levels, for the panel and for Adjust Last Operation."""
-    layout.prop(settings, "by", expand=True)
+    layout.prop(settings, "by")
     layout.prop(settings, "levels")
     if settings.by == "TOLERANCE":
         layout.prop(settings, "in_length")
@@ -145,6 +145,7 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             level.name = mesh.name = f"{ob.name}_LOD{i + 1}"
             level.data = mesh
             collection.objects.link(level)
+            level.select_set(False)  # Otherwise the next Decimate would decimate the levels, too.
             self._set(level.tolvol, i, run["tolerance"]["absolute"])
             level[GEOMETRIC_ERROR] = max(run["forward"][1], run["backward"][1])
             context.view_layer.update()

@@ -25,9 +25,8 @@ class TOLVOL_PT_lod(SubPanel, bpy.types.Panel):
             text_lines(context, layout, reason, "ERROR")
         column = layout.column(align=True)
         for level in ob.tolvol.lods.objects if ob.tolvol.lods else ():
-            row = column.split(factor=0.6)
-            row.label(text=level.name, icon="MESH_DATA")
+            row = column.row()
+            row.label(text=level.name.removeprefix(f"{ob.name}_"))
             right(row, f"{len(level.data.polygons):,}" if level.type == "MESH" else "")
             error = level.get(GEOMETRIC_ERROR)
-            if isinstance(error, float):
-                right(column, f"deviates by {length(context, error)}")
+            right(row, length(context, error) if isinstance(error, float) else "")

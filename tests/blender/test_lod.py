@@ -57,6 +57,7 @@ def test_each_level_is_proved_against_the_original_and_is_what_decimate_leaves(m
     levels = make(levels=3, percentages=padded(0.3, 1, 3))
     assert [level.name for level in levels] == ["torus_LOD1", "torus_LOD2", "torus_LOD3"]
     assert [collection.name for collection in bpy.context.scene.collection.children] == ["torus_LODs"]
+    assert bpy.context.selected_objects == [ob]
     assert column(ob.data.vertices, "co", 3).tobytes() == before and ob.tolvol.snapshot is not None
     for level, percent in zip(levels, (0.3, 1, 3)):
         error = level["geometricError"]

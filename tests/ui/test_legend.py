@@ -6,8 +6,8 @@ import numpy as np
 
 from addon import overlay, panels
 from addon.overlay import legend
-from addon.panels.layout import SubPanel
 from addon.proof import statistics
+from panels_open import unfolded
 from test_layout import dark, drag_sidebar, light
 from test_show_deviation import striped, surface
 from window import (
@@ -127,28 +127,9 @@ def test_range_and_bands_of_the_colours():
     assert overlay.shows(the_ramp())
 
 
-class Unfolded(SubPanel, bpy.types.Panel):
-    """The panel of the statistics under another name: for each name Blender remembers whether the panel was last open."""
-
-    bl_idname, bl_label = "TOLVOL_TEST_PT_statistics", panels.TOLVOL_PT_statistics.bl_label
-    bl_parent_id = panels.TOLVOL_PT_statistics.bl_parent_id
-    draw = panels.TOLVOL_PT_statistics.draw
-
-
-def replace(classes, others):
-    """Registers other panels in the place of these."""
-    for cls in reversed(classes):
-        bpy.utils.unregister_class(cls)
-    for cls in others:
-        bpy.utils.register_class(cls)
-
-
 def test_statistics_are_unfolded_and_measured():
     yield from reset(ramp)
-    shipped = panels._CLASSES
-    unfolded = [Unfolded if cls is panels.TOLVOL_PT_statistics else cls for cls in shipped]
-    replace(shipped, unfolded)
-    try:
+    with unfolded(panels.TOLVOL_PT_statistics):
         yield from open_tab()
         yield from press("tolvol.measure_statistics", across=0.4)
         yield from finished(lambda: statistics.of(the_ramp()))
@@ -158,6 +139,4 @@ def test_statistics_are_unfolded_and_measured():
             yield 1.0
             screenshot(f"legend 8 statistics {width}")
             yield from drag_sidebar(width)
-    finally:
-        replace(unfolded, shipped)
     assert statistics.of(the_ramp())["forward"]["mean"] > 0.02

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shows a panel of the sidebar open that is closed at first."""
+
+import contextlib
+
+import bpy
+
+from addon import panels
+from addon.panels.layout import SubPanel
+
+
+def _replace(classes, others):
+    for cls in reversed(classes):
+        bpy.utils.unregister_class(cls)
+    for cls in others:
+        bpy.utils.register_class(cls)
+
+
+@contextlib.contextmanager
+def unfolded(panel):
+    """Registers a panel under another name while the context lasts: for each name Blender remembers whether the panel was
+    last open."""
+    name = panel.__name__.replace("TOLVOL_PT", "TOLVOL_TEST_PT")
+    told = {"bl_idname": name, "bl_label": panel.bl_label, "bl_parent_id": panel.bl_parent_id, "draw": panel.draw}
+    shipped = panels._CLASSES
+    shown = [type(name, (SubPanel, bpy.types.Panel), told) if cls is panel else cls for cls in shipped]
+    _replace(shipped, shown)
+    try:
+        yield
+    finally:
+        _replace(shown, shipped)

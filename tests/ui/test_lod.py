@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""LOD Chain by mouse and keyboard: the levels, one undo step, and Esc in the middle of a chain."""
+
+import bpy
+
+import scenes
+from addon import job, panels
+from panels_open import unfolded
+from test_panel import assert_proved, monkey, stored, suzanne
+from window import centre, finished, key, on_screen, open_tab, press, region, reset, screenshot, scroll_down, xdotool
+
+
+def levels():
+    return [ob.name for ob in bpy.data.objects if "_LOD" in ob.name]
+
+
+def test_levels_by_mouse_and_one_ctrl_z():
+    yield from reset(monkey)
+    reference, before, said, status = scenes.world_triangles(suzanne()), stored(), [], job._status
+    job._status = lambda *shown: said.append(status(*shown)) or said[-1]
+    with unfolded(panels.TOLVOL_PT_lod):
+        yield from open_tab()
+        yield from press("tolvol.make_lods")
+        yield from finished(lambda: len(levels()) == 3 and not job._under_way)
+        job._status = status
+        yield from scroll_down()
+        xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
+        yield 1.0
+        screenshot("lod 1 made")
+    assert stored() == before
+    for name, percent in zip(levels(), (0.1, 0.5, 2)):
+        assert_proved(bpy.data.objects[name], reference, percent)
+    assert any(text.startswith("Level 1 of 3: ") for text in said), said
+    xdotool("mousemove", *centre())
+    yield
+    key("ctrl+z")
+    yield from finished(lambda: not levels())
+    assert suzanne().tolvol.snapshot is None and not bpy.data.collections.get("Suzanne_LODs")
+
+
+def test_escape_in_a_chain_leaves_nothing():
+    yield from reset(monkey)
+    meshes = len(bpy.data.meshes)
+    suzanne().tolvol.effort = "THOROUGH"
+    said, status = [], job._status
+    job._status = lambda *shown: said.append(status(*shown)) or said[-1]
+    with unfolded(panels.TOLVOL_PT_lod):
+        yield from open_tab()
+        yield from press("tolvol.make_lods")
+        yield from finished(lambda: any(text.startswith("Level 1 of 3: ") for text in said))
+        screenshot("lod 2 under way")
+        for _ in range(2):  # The first Esc may keep the present result of a level.
+            key("Escape")
+        yield from finished(lambda: not job._under_way)
+        job._status = status
+    assert not levels() and suzanne().tolvol.snapshot is None and len(bpy.data.meshes) == meshes
