@@ -107,6 +107,10 @@ class JobOperator:
     def ob(self):
         return self.objects[0]
 
+    def improving(self):
+        """Whether Esc keeps the present result. A second Esc cancels."""
+        return self._progress.stage == "refining" and not self._progress.finishing
+
     def steps(self, context):
         """A generator in the main thread: yields work(progress) and is sent its outcome. It may change Blender's data only
         after the last yield."""
@@ -156,7 +160,7 @@ class JobOperator:
             self.report({"WARNING"}, self._interrupted)
             return {"CANCELLED"}
         if event.type == "ESC" and event.value == "PRESS":
-            if _improving(self._progress):
+            if self.improving():
                 self._progress.finish()
             else:
                 self._progress.cancel()
@@ -169,7 +173,7 @@ class JobOperator:
             if ended:
                 self._leave(context)
                 return ended
-            context.workspace.status_text_set(_status(self._progress, self.doing, self.part))
+            context.workspace.status_text_set(_status(self._progress, self.doing, self.part, self.improving()))
         return {"RUNNING_MODAL"}
 
     def cancel(self, context):
@@ -250,18 +254,13 @@ class JobOperator:
         context.workspace.status_text_set(None)
 
 
-def _improving(progress):
-    """Whether Esc keeps the present result. A second Esc cancels."""
-    return progress.stage == "refining" and not progress.finishing
-
-
-def _status(progress, doing, part):
+def _status(progress, doing, part, improving):
     if progress.cancelled:
         return "Stopping"
     # In these two stages the count is the number of triangles left.
     left = f", {progress.count:,} triangles left" if progress.stage in {"decimating", "refining"} else ""
     share = f" {progress.fraction:.0%}" if progress.fraction else ""
-    escape = "Keep Present Result" if _improving(progress) else "Cancel"
+    escape = "Keep Present Result" if improving else "Cancel"
     prefix = f"{part}: " if part else ""
     return f"{prefix}{doing or progress.stage.capitalize() + share + left}    Esc: {escape}"
 

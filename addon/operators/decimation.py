@@ -96,24 +96,8 @@ class Task:
             arrays, holes = self._close(arrays, built, progress)
             stages.insert(1, "close_holes")
             clock.append(time.perf_counter())
-        wedges = None
-        if self.uvs is not None:
-            values = self.uvs[arrays.corners]
-            if holes is not None:
-                number = arrays.hole.astype(np.float32)[:, None, None]
-                values = np.concatenate([values, np.broadcast_to(number, (*values.shape[:2], 1))], 2)
-            wedges = native.module.wedges(arrays.triangles, np.ascontiguousarray(values))
-        computed = native.module.decimate(
-            arrays.vertices,
-            arrays.triangles,
-            built,
-            to_world=matrix,
-            locked=self.locked if self.locked.any() else None,
-            shares=self.shares,
-            wedges=wedges,
-            progress=progress,
-            **self.options,
-        )
+        wedges = self._wedges(arrays)
+        computed = self._decimate(arrays, built, wedges, progress)
         result = transfer.Decimated.of(computed, arrays)
         clock.append(time.perf_counter())
         decimated = snapshots.Surface(mesh_io.MeshArrays(result.vertices, result.triangles, None, None), matrix)
@@ -141,6 +125,35 @@ class Task:
         if not report.proved(run):
             raise NotProved(report.intervals(run))
         return arrays, self.reference, result, run
+
+    def count(self, progress):
+        """Returns the number of triangles that run() leaves if it closes no holes, without a proof."""
+        built = volumes.native_volume(self.reference, self.tolerance, self.options["threads"], progress)
+        arrays = self.surface.arrays
+        return len(self._decimate(arrays, built, self._wedges(arrays), progress).triangles)
+
+    def _wedges(self, arrays):
+        """Returns the wedge at each corner of the triangles, or None without UV maps."""
+        if self.uvs is None:
+            return None
+        values = self.uvs[arrays.corners]
+        if isinstance(arrays, filling.FilledArrays):
+            number = arrays.hole.astype(np.float32)[:, None, None]
+            values = np.concatenate([values, np.broadcast_to(number, (*values.shape[:2], 1))], 2)
+        return native.module.wedges(arrays.triangles, np.ascontiguousarray(values))
+
+    def _decimate(self, arrays, volume, wedges, progress):
+        return native.module.decimate(
+            arrays.vertices,
+            arrays.triangles,
+            volume,
+            to_world=self.surface.matrix,
+            locked=self.locked if self.locked.any() else None,
+            shares=self.shares,
+            wedges=wedges,
+            progress=progress,
+            **self.options,
+        )
 
     def _close(self, arrays, volume, progress):
         """Returns the arrays with holes closed, and the report of them."""

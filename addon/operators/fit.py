@@ -2,55 +2,101 @@
 """Searches by trial the value of a modifier's parameter that leaves the fewest triangles within the tolerance.
 
 Over the range of the parameter the deviation falls, but not from each value to the next: a mesh of 300 triangles may be
-within the tolerance while one of 310 is not, so bisection may miss the best value. Instead, coarse steps go from the end
-with the fewest triangles until a value is within the tolerance. Then fine steps go over the last part of this way, from
-the value where the deviation first came near to the tolerance.
+within the tolerance while one of 310 is not, so bisection may miss the best value. The search goes from coarse to fine. Large
+steps, as large as the deviation suggests, find a value within the tolerance, and some more bring it near to the limit. From
+there fine steps go towards fewer triangles, to the value where the deviation is so large that no neighbour can be within.
 """
 
+import math
 from dataclasses import dataclass
 
-import numpy as np
-
-# Successive values in the coarse steps have a ratio between these two: the farther from the tolerance, the larger.
-_COARSE, _COARSEST = 1.2, 2.0
-# The fine steps begin where the deviation is first below so many tolerances, because neighbours may differ by half.
-NEAR = 2.0
-# Successive values in the fine steps have this ratio.
-_FINE = 1.015
+# The fine steps end where the deviation is above so many tolerances, because neighbours may differ by half.
+_NEAR = 2.0
+# Successive values in the fine steps have at least this ratio.
+_FINE = math.log(1.015)
+# The logarithm of the deviation changes by at most about so much for each unit of the logarithm of the value: where the
+# deviation is larger, the next step may be larger.
+_STEEPEST = 25
 # Beside a value whose deviation is below so many tolerances, values half a fine step away are tried.
 _BARELY = 1.06
+# The logarithm of the deviation falls by about so much for each unit of the logarithm of the value, and surely within these
+# limits; so the large steps find their way.
+_SLOPE, _FLATTEST, _STEEPEST_FALL = 0.75, 0.5, 2.0
+_SMALLEST_STEP, _LARGEST_STEP = math.log(1.2), math.log(1000)
+# Where the fine steps begin is known with this ratio.
+_CLOSE = math.log(1.06)
+_LEAST_KNOWN, _MOST_KNOWN = math.exp(-3), 1e6  # deviations beyond these steer as if they were these
+
+# Blender needs as long for each value as for the mesh without the modifier: all values together take as long as so many
+# triangles.
+_TRIANGLES = 560_000
+_LEAST_VALUES, _MOST_VALUES = 6, 99
 
 
-def search(first, last):
-    """A generator: yields a value, is sent the deviation at this value in tolerances, and returns the best value or None.
+def most_values(triangles):
+    """Returns how many values are tried for a mesh of so many triangles."""
+    return min(max(_TRIANGLES // max(triangles, 1), _LEAST_VALUES), _MOST_VALUES)
 
-    The best value is always the last tried value that was within the tolerance. first: the end of the range with the
-    fewest triangles.
+
+def search(first, last, most=_MOST_VALUES):
+    """A generator: yields a value, is sent the deviation at this value in tolerances, and ends when no better one is expected.
+
+    first: the end of the range with the fewest triangles; most: how many values are tried at most, unless none of them is
+    within the tolerance. It returns the best value, the one nearest to `first` whose deviation was at most 1, or None.
     """
     onward = 1 if last > first else -1
-    value, missed = first, []
-    while (deviation := (yield value)) > 1:
-        if value == last:
-            return None
-        missed.append((value, deviation))
-        step = min(max((deviation / NEAR) ** 0.5, _COARSE), _COARSEST)
-        value = onward * min(onward * value * step**onward, onward * last)
-    if not missed:
-        return value
-    near = next((i for i, (_, deviation) in enumerate(missed) if deviation <= NEAR), len(missed))
-    start, barely = missed[max(near - 1, 0)][0], []
-    for i in range(1, int(np.log(value / start) / np.log(_FINE) * onward) + 1):
-        finer = start * _FINE ** (onward * i)
-        deviation = yield finer
+    start, end = onward * math.log(first), onward * math.log(last)
+    tried = 0
+
+    def ask(place):
+        nonlocal tried
+        tried += 1
+        value = first if place <= start else last if place >= end else math.exp(onward * place)
+        return value, min(max((yield value), _LEAST_KNOWN), _MOST_KNOWN)
+
+    place, missed, slope = start, None, _SLOPE
+    while True:
+        value, deviation = yield from ask(place)
         if deviation <= 1:
-            value = finer
             break
-        if deviation <= _BARELY:
-            barely.append(finer)
-    for finer in (beside * _FINE ** (onward * half) for beside in barely for half in (-0.5, 0.5)):
-        if (yield finer) <= 1:
-            return finer
-    return value
+        if place >= end:
+            return None
+        if missed and missed[1] > deviation:
+            slope = math.log(missed[1] / deviation) / (place - missed[0])
+        missed = place, deviation
+        step = math.log(deviation) / min(max(slope, _FLATTEST), _STEEPEST_FALL)
+        place = min(place + min(max(step, _SMALLEST_STEP), _LARGEST_STEP), end)
+    best, within = value, (place, deviation)
+    if missed is None:
+        return best
+    while within[0] - missed[0] > _CLOSE and tried < most:
+        above, below = math.log(missed[1]), -math.log(within[1])
+        share = min(max(above / (above + below), 0.25), 0.75)
+        place = missed[0] + share * (within[0] - missed[0])
+        value, deviation = yield from ask(place)
+        if deviation <= 1:
+            best, within = value, (place, deviation)
+        else:
+            missed = place, deviation
+    place, deviation, barely = within[0], 1.0, []
+    while tried < most:
+        place -= max(_FINE, math.log(deviation) / _STEEPEST)
+        if place <= start:
+            break
+        value, deviation = yield from ask(place)
+        if deviation <= 1:
+            best, within, deviation = value, (place, deviation), 1.0
+        elif deviation > _NEAR:
+            break
+        elif deviation <= _BARELY:
+            barely.append(place)
+    for place in (beside + half * _FINE for beside in sorted(barely) for half in (-0.5, 0.5)):
+        if place >= within[0] or tried >= most:
+            continue
+        value, deviation = yield from ask(place)
+        if deviation <= 1:
+            return value
+    return best
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from bpy.props import FloatProperty, IntProperty, StringProperty
 
-from .. import preferences
+from .. import native, preferences
 from ..errors import NotProved, Refused
 from ..job import JobOperator
 from ..mesh import mesh_io
@@ -19,8 +19,9 @@ from ..operation_settings import modifier_settings
 from ..proof import kept_warnings, last_run, measure, report, solidity
 from ..proof.certify import certify
 from ..proof.verdict import Verdict
+from ..properties import automatic_placement
 from ..reference import measurements, snapshots, tolerances
-from . import fit
+from . import decimation, fit
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
 from .motion import Motion
@@ -184,6 +185,10 @@ ways, and apply the modifier to the base mesh. An object without a reference get
     )
     threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
 
+    def targets(self, context):
+        self._found = []  # (number of triangles, value) of each value at which no sample is beyond the tolerance
+        return super().targets(context)
+
     def draw(self, _context):
         self.layout.use_property_split = True
         self.layout.prop(self, "value")
@@ -198,35 +203,77 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         parameter = trial.parameter(modifier)
         with Evaluation(ob, name) as evaluation:
             # Adjust Last Operation passes the value that was found, or one that the user typed: no search is needed.
-            self.value = self.value or (yield from self._best(evaluation, parameter, trial))
-            setattr(evaluation.modifier, parameter.name, self.value)
-            mesh = evaluation.new_mesh()
+            values = [self.value] if self.value else (yield from self._search(evaluation, parameter, trial))
+            self.value, mesh, certified = yield from self._proved(evaluation, parameter, trial, values)
         try:
-            certified = yield trial.certified(mesh_io.read_mesh(mesh))
+            plain = None if self._progress.finishing else (yield from self._plain(context, trial))
             settings = self.ob.tolvol.modifiers
         except BaseException:
             bpy.data.meshes.remove(mesh)
             raise
         shared.give(self, settings, modifier_settings())
         warnings = _crossings(name, certified["solidity"])
+        if plain is not None and plain < trial.left:
+            warnings.append(
+                f"Decimate leaves fewer triangles within this tolerance: {plain:,}, and {name} {trial.left:,}"
+            )
         self._write(context, trial, mesh, certified, warnings)
         for warning in warnings:
             self.report({"WARNING"}, warning)
         self.report({"INFO"}, f"{name}: {parameter.label} {self.value:.4g}, {trial.line(certified)}")
 
-    def _best(self, evaluation, parameter, trial):
-        name, search, deviation = evaluation.modifier.name, fit.search(parameter.first, parameter.last), None
-        while True:
+    def improving(self):
+        return bool(self._found) and not self._progress.finishing
+
+    def _search(self, evaluation, parameter, trial):
+        """Returns the values at which no sample was beyond the tolerance, the one with the fewest triangles first."""
+        name, triangles = evaluation.modifier.name, len(trial.surface.arrays.triangles)
+        search, deviation = fit.search(parameter.first, parameter.last, fit.most_values(triangles)), None
+        while not self._progress.finishing:
             try:
                 value = search.send(deviation)
-            except StopIteration as end:
-                if end.value is None:
-                    text = f"No {parameter.label} of {name} keeps {self.ob.name} within the tolerance both ways"
-                    raise Refused(text) from None
-                return end.value
-            self.doing = f"Fitting {name}: {parameter.label} {value:.4g}"
+            except StopIteration:
+                break
+            best = f", {min(self._found)[0]:,} triangles so far" if self._found else ""
+            self.doing = f"Fitting {name}: {parameter.label} {value:.4g}{best}"
             setattr(evaluation.modifier, parameter.name, value)
-            deviation = yield trial.measured(mesh_io.read_mesh(evaluation.mesh()))
+            arrays = mesh_io.read_mesh(evaluation.mesh())
+            deviation = yield trial.measured(arrays)
+            if deviation <= 1:
+                self._found.append((len(arrays.triangles), value))
+        return [value for _, value in sorted(self._found)]
+
+    def _proved(self, evaluation, parameter, trial, values):
+        """Returns (value, mesh, the result of certified()) for the first of the values whose mesh is proved to be within."""
+        for i, value in enumerate(values):
+            self.doing = f"Proving {evaluation.modifier.name}: {parameter.label} {value:.4g}"
+            setattr(evaluation.modifier, parameter.name, value)
+            mesh = evaluation.new_mesh()
+            try:
+                return value, mesh, (yield trial.certified(mesh_io.read_mesh(mesh)))
+            except BaseException as error:
+                bpy.data.meshes.remove(mesh)
+                if not isinstance(error, NotProved) or i + 1 == len(values):
+                    raise
+        name = evaluation.modifier.name
+        raise Refused(f"No {parameter.label} of {name} keeps {self.ob.name} within the tolerance both ways")
+
+    def _plain(self, context, trial):
+        """Returns how many triangles Decimate would leave with its default settings."""
+        self.doing = "Comparing with Decimate"
+        settings = self.ob.tolvol
+        options = decimation.options(settings, automatic_placement(self.ob.data), trial.threads)
+        options |= {"two_sided": True, "effort": "fast", "target_triangles": None, "max_seconds": None}
+        task = decimation.Task(self.ob.name, trial.surface, trial.reference, trial.tolerance, options)
+        task.uvs = mesh_io.corner_uvs(self.ob.data)
+        try:
+            return (yield task.count)
+        except native.module.Cancelled:
+            raise
+        except (
+            native.module.TolvolError
+        ):  # The mesh may be beyond the tolerance, so that Decimate cannot begin with it.
+            return None
 
     def _write(self, context, trial, mesh, certified, warnings):
         ob = self.target(context)
@@ -253,6 +300,17 @@ def _crossings(name, compared):
     return [f"{name} makes faces cross: the number of crossing pairs of faces is {pairs}, and was {before:,} before"]
 
 
+# The number of vertices of the reference that are looked at first.
+_FEW = 4000
+
+
+def _samples(vertices, triangles):
+    """Returns points of a surface: the corners, the centre and the middles of the edges of each triangle."""
+    corners = vertices[triangles]
+    middles = (corners + corners[:, [1, 2, 0]]) / 2
+    return np.concatenate([vertices[np.unique(triangles)], corners.mean(1), middles.reshape(-1, 3)])
+
+
 class _Trial:
     """Compares meshes of one object with its reference. measured() and certified() return work for the thread."""
 
@@ -261,9 +319,9 @@ class _Trial:
         self.reference = snapshots.reference_of(ob)
         self.size = self.reference.size()
         self.tolerance = tolerances.tolerance_length(ob.tolvol, self.size)
-        self._threads = threads
+        self.threads = threads
         self._pair = self.reference.world(), self.reference.arrays.triangles
-        self._left = 0
+        self.left = 0
 
     def parameter(self, modifier):
         arrays = self.surface.arrays
@@ -272,22 +330,22 @@ class _Trial:
         return fit.parameter(modifier, len(arrays.triangles), size, self.tolerance * size / self.surface.size())
 
     def measured(self, arrays):
-        """Returns work that gives the larger of the deviations both ways, in tolerances: at most 1 exactly if certified."""
+        """Returns work that gives the larger of the deviations both ways, in tolerances. It is above 1 if a sample proves that
+        the mesh is beyond the tolerance. If it is at most 1, certified() decides.
+        """
 
         def work(progress):
             if not len(arrays.triangles):
                 return np.inf
             pair = snapshots.Surface(arrays, self.surface.matrix).world(), arrays.triangles
-            deviation = 0.0
-            for one, other in ((self._pair, pair), (pair, self._pair)):
-                found = measure.largest_distance(one, other, self.tolerance, self._threads, progress)
-                share = (
-                    found.upper if found.within(self.tolerance) else max(found.lower, self.tolerance * 1.001)
-                ) / self.tolerance
-                deviation = max(deviation, share)
-                if deviation > fit.NEAR:
+            vertices, triangles = self._pair
+            all_vertices, largest = vertices[np.unique(triangles)], 0.0
+            few = all_vertices[:: max(len(all_vertices) // _FEW, 1)]
+            for points, other in ((few, pair), (_samples(*pair), self._pair), (all_vertices, pair)):
+                largest = max(largest, measure.sampled_distance(points, other, self.threads, progress))
+                if largest > self.tolerance:
                     break
-            return deviation
+            return largest / self.tolerance
 
         return work
 
@@ -300,15 +358,15 @@ class _Trial:
 
         def work(progress):
             surface = snapshots.Surface(arrays, self.surface.matrix)
-            found = certify(surface, self.reference, self.tolerance, 0, self._threads, progress)
+            found = certify(surface, self.reference, self.tolerance, 0, self.threads, progress)
             if not Verdict.certified(found, self.tolerance).passed:
                 ways = (report.percent(found[way][1], self.size) for way in ("forward", "backward"))
                 raise NotProved(
                     "the result is up to {} of the size from the reference, and the reference up to {} from the "
                     "result".format(*ways)
                 )
-            self._left = len(arrays.triangles)
-            facts = (solidity.facts(one, self._threads, progress) for one in (self.surface, surface))
+            self.left = len(arrays.triangles)
+            facts = (solidity.facts(one, self.threads, progress) for one in (self.surface, surface))
             return found | {"solidity": solidity.compared(*facts)}
 
         return work
@@ -318,7 +376,7 @@ class _Trial:
         forward, backward = (report.percent(certified[way][1], self.size) for way in ("forward", "backward"))
         word = Verdict.certified(certified, self.tolerance).word
         return (
-            f"{word}: {len(self.surface.arrays.triangles):,} -> {self._left:,} triangles, tolerance "
+            f"{word}: {len(self.surface.arrays.triangles):,} -> {self.left:,} triangles, tolerance "
             f"{100 * self.tolerance / self.size:.4g} % = {self.tolerance:.3g}, result within {forward}, reference within "
             f"{backward} (certified)"
         )

@@ -3,6 +3,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from .. import native
 from .verdict import Interval
 
@@ -27,6 +29,12 @@ def largest_distance(from_surface, to_surface, tolerance=None, threads=None, pro
         best = max(interval, decided, key=lambda found: found.lower)
         interval = replace(best, upper=min(interval.upper, decided.upper))
     return interval
+
+
+def sampled_distance(points, to_surface, threads=None, progress=None):
+    """Returns the largest distance of the points, (n, 3), from a surface: a lower bound of that of a surface through them."""
+    corners = np.repeat(np.arange(len(points), dtype=np.int32)[:, None], 3, 1)
+    return native.module.directed_hausdorff(points, corners, *to_surface, threads=threads, progress=progress).lower
 
 
 def both_ways(surface, reference, tolerance=None, threads=None, progress=None):

@@ -10,7 +10,8 @@ from addon import native
 from addon.mesh import mesh_io
 from addon.mesh.evaluation import Evaluation
 from addon.mesh.mesh_io import column
-from addon.operators import fit
+from addon.operators import fit, modifiers
+from addon.operators.modifiers import TOLVOL_OT_fit_modifier
 from addon.proof import kept_warnings, verdict
 from addon.reference import snapshots
 from scenes import activate, add_object, link, plates_with_t_junctions, torus, world_triangles
@@ -255,6 +256,73 @@ def test_the_search_finds_lone_values_before_the_others():
         assert deviation(found) <= 1 and tries < 100
         worse += found > 1.03 * best
     assert worse <= 1  # The search may miss values in a range of less than half a step.
+
+
+def searched(deviation, most):
+    """Returns (the value that a search finds, how many values it tries)."""
+    search, sent, tries = fit.search(0.0001, 1.0, most), None, 0
+    while True:
+        try:
+            value = search.send(sent)
+        except StopIteration as end:
+            return end.value, tries
+        sent, tries = deviation(value), tries + 1
+
+
+@pytest.mark.parametrize("place", [0.002, 0.02, 0.11, 0.7])
+def test_a_large_mesh_needs_few_values_and_comes_near_to_the_best(place):
+    most = fit.most_values(70_000)
+    assert most == 8 and fit.most_values(1_000) == 99
+    for slope in (0.6, 0.75, 1.1):
+        found, tries = searched(lambda value, slope=slope: (place / value) ** slope, most)
+        assert tries <= most and place <= found <= 1.08 * place
+
+
+def test_a_search_ends_where_nothing_is_within():
+    assert searched(lambda value: 2 + 1 / value, 8)[0] is None
+    assert searched(lambda value: 0.5, 8) == (0.0001, 1)
+
+
+def test_a_mesh_of_which_only_the_proof_shows_that_it_is_beyond_is_passed_over(monkeypatch):
+    ob = modified("DECIMATE")
+    reference, tolerance = world_triangles(ob), 0.01 * snapshots.surface_of(ob).size()
+    # The samples are made to see no deviation of any mesh with so many points, so that the proof alone decides.
+    monkeypatch.setattr(modifiers.measure, "sampled_distance", lambda points, *_: 0.0 if len(points) > 500 else 9.0)
+    bpy.ops.tolvol.fit_modifier()
+    for pair in ((world_triangles(ob), reference), (reference, world_triangles(ob))):
+        assert native.module.directed_hausdorff(*pair[0], *pair[1], bound=tolerance).upper <= tolerance
+
+
+def test_a_search_that_is_ended_keeps_the_best_so_far(monkeypatch):
+    ob = modified("DECIMATE")
+    asked, advance, measured = [], TOLVOL_OT_fit_modifier._advance, modifiers._Trial.measured
+
+    def until_one_is_within(operator):
+        if operator._job is not None and operator.improving():
+            operator._progress.finish()
+        return advance(operator)
+
+    def noted(trial, arrays):
+        asked.append(len(arrays.triangles))
+        return measured(trial, arrays)
+
+    monkeypatch.setattr(TOLVOL_OT_fit_modifier, "_advance", until_one_is_within)
+    monkeypatch.setattr(modifiers._Trial, "measured", noted)
+    bpy.ops.tolvol.fit_modifier()
+    assert len(asked) < 8 and len(world_triangles(ob)[1]) in asked and verdict.of(ob).passed
+    assert not any("Decimate leaves" in warning for warning in kept_warnings.of(ob)[0])
+
+
+def test_says_if_decimate_would_leave_fewer_triangles():
+    ob = modified("DECIMATE")
+    before = ob.data.copy()
+    bpy.ops.tolvol.fit_modifier()
+    fitted, (warning, *_) = len(world_triangles(ob)[1]), kept_warnings.of(ob)[0]
+    ob.data = before
+    bpy.ops.tolvol.decimate()
+    plain = len(world_triangles(ob)[1])
+    assert warning == f"Decimate leaves fewer triangles within this tolerance: {plain:,}, and DECIMATE {fitted:,}"
+    assert plain < fitted
 
 
 def test_a_value_that_is_given_is_certified_and_not_searched_for():
