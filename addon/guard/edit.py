@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guard Editing: moved vertices stop at the tolerance, and an edit of the faces that leaves the tolerance is undone."""
+"""Guard Editing: moved vertices stop at the tolerance, and an edit of the faces that leaves the tolerance, on either side, is
+undone."""
 
 import bmesh
 import bpy
@@ -25,16 +26,16 @@ def follow(ob, restored, _depsgraph):
     """Called after every change of `ob`. restored: "undo" or "redo" if one of these made the change, else None."""
     ob.update_from_editmode()
     mesh = ob.data
-    if not mesh.polygons:
-        watches.drop(ob.name)
-        return
     positions = mesh_io.column(watch.points_of(ob), "co", 3)
     topology = watch.topology(mesh)
     wish = topology + watch.fingerprint(positions)
     known = _corrections.get(wish) if restored else None
     if known:
         positions[known[0]] = known[1]
-    current = watches.of(ob, topology, lambda followed: watch.Watch(ob, positions.copy(), followed))
+    current = watches.of(ob, topology, lambda before: watch.Watch(ob, positions.copy(), before, edits_faces=True))
+    # A mesh without faces has no point that is outside.
+    if not mesh.polygons and ob.tolvol.keep != "BOTH":
+        current.followed = False
     # An undo by the user leads to a mesh of before the guard, which the guard leaves as it is. Adjust Last Operation also
     # undoes, but it keeps its operator in the list of operators; it counts as an edit.
     if restored == "undo" and not _undoing and not bpy.context.window_manager.operators:
@@ -44,7 +45,7 @@ def follow(ob, restored, _depsgraph):
     changed = known[0] if known else np.empty(0, np.int32)
     wished = positions.copy() if restored else None
     held = current.hold(positions)
-    if len(held) and not (restored and watches.restart(ob, wished)):
+    if len(held) and not (restored and watches.restart(ob, wished, edits_faces=True)):
         changed = np.union1d(changed, held)
         _corrections[wish] = changed, positions[changed]
     if len(changed):
@@ -57,7 +58,8 @@ def rest(ob):
 
 
 def outside():
-    """Returns an object that an edit of its faces took out of the tolerance, or None. The operator may still be running."""
+    """Returns an object that an edit of its faces took out of the tolerance, or its reference out of that of the mesh, or None.
+    The operator may still be running."""
     for name, current in watches:
         if current.followed and not current.on and not current.preparing:
             return bpy.data.objects.get(name)

@@ -32,7 +32,7 @@ def wanted(ob):
 
 def blocked(ob):
     """Why no lattice of `ob` can be guarded, or None."""
-    if reason := watch.blocked(ob):
+    if reason := watch.blocked(ob) or watch.without_faces(ob):
         return reason
     return None if cages_of(ob) else f"{ob.name} has no Lattice modifier with a lattice"
 
@@ -133,7 +133,7 @@ def follow(ob, restored, depsgraph):
     finally:
         evaluated.to_mesh_clear()
     made_for = len(arrays.vertices), [(cage.name, len(places)) for cage, places in zip(cages, points)]
-    current = watches.of(ob, made_for, lambda _followed: LatticeWatch(ob))
+    current = watches.of(ob, made_for, lambda _before: LatticeWatch(ob))
     if not current.settled() or not current.ready:
         return
     corrected = current.judge(arrays, points)

@@ -15,7 +15,7 @@ def wanted(ob):
 
 def blocked(ob):
     """Why sculpting on `ob` cannot be guarded, or None."""
-    if reason := watch.blocked(ob):
+    if reason := watch.blocked(ob) or watch.without_faces(ob):
         return reason
     if ob.use_dynamic_topology_sculpting:
         return "Switch off Dyntopo: it makes new vertices under the brush"
@@ -28,7 +28,7 @@ def follow(ob, restored, _depsgraph):
     """Called after every change of `ob`. restored: "undo" or "redo" if one of these made the change, else None."""
     points = watch.points_of(ob)
     positions = mesh_io.column(points, "co", 3)
-    current = watches.of(ob, _topology(ob.data), lambda followed: watch.Watch(ob, positions.copy(), followed))
+    current = watches.of(ob, _topology(ob.data), lambda before: watch.Watch(ob, positions.copy(), before))
     if not current.settled() or not current.on:
         return
     wished = positions.copy() if restored or ob.active_shape_key else None

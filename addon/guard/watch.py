@@ -35,9 +35,12 @@ def blocked(ob):
         return native.reason
     if reason := snapshots.reference_missing(ob):
         return reason
-    if not ob.data.polygons:
-        return f"{ob.name} has no faces"
     return None
+
+
+def without_faces(ob):
+    """Why a mesh that has no faces cannot be guarded, or None."""
+    return None if ob.data.polygons else f"{ob.name} has no faces"
 
 
 def situation(ob):
@@ -109,8 +112,13 @@ class Preparing:
     followed: whether it takes over from a watch that was on, for the same mesh with other faces.
     """
 
-    def __init__(self, followed=False):
-        self.followed = followed
+    uncovered = (
+        None  # (m,) bool: the faces of the reference that may be uncovered all the same; None if that is not known
+    )
+
+    def __init__(self, before=None):
+        """before: the watch from which this one takes over, or None."""
+        self.followed = before is not None
         self.reason = None
         self.on = False
         self.rest_at = None  # the time at which the current stroke counts as over; None if nothing was held back in it
@@ -148,15 +156,24 @@ def needed(ob):
 
 
 class Watch(Preparing):
-    """Guards the coordinates of one mesh. Edits that are made before the watch is ready are checked when it is ready."""
+    """Guards the coordinates of one mesh. Edits that are made before the watch is ready are checked when it is ready.
 
-    def __init__(self, ob, positions, followed=False):
-        super().__init__(followed)
+    A watch that takes over from another one guards the mesh only if the edit of the faces, which lies between the two, kept
+    the tolerance: the mesh has to be inside, and no face of the reference may be uncovered that was covered before.
+    """
+
+    def __init__(self, ob, positions, before=None, edits_faces=False):
+        """edits_faces: whether another watch may take over from this one."""
+        super().__init__(before)
         self.remark = None  # what the guard cannot keep, or why something cannot move
         self._guard = None
         self._last = positions
         self._held = np.zeros(len(positions), bool)
         self._edited_at = 0.0
+        self.uncovered = before and before.uncovered
+        if reason := without_faces(ob):
+            self.reason = reason
+            return
         try:
             faces = Faces.of(ob.data)
             reference, tolerance, matrix, threads = needed(ob)
@@ -190,17 +207,26 @@ class Watch(Preparing):
                 remark = f"{lost}: a face has {faces.largest} corners. Triangulate Faces helps"
             else:
                 remark = next(iter(guard.warnings), None)
-            return guard, kept and faces.outside(built, positions, options), remark
+            uncovered = None
+            if edits_faces and both:
+                uncovered = np.zeros(len(reference.arrays.triangles), bool)
+                if guard.uncovered or not two_sided:
+                    uncovered = uncovered_faces(reference, positions, faces.shown, tolerance, options)
+            return guard, kept and faces.outside(built, positions, options), uncovered, remark
 
         self.begin(work)
 
     def prepared(self, outcome):
-        guard, outside, self.remark = outcome
-        self.on = not outside
-        if outside:
-            self.reason = outside_reason(outside)
+        guard, outside, uncovered, self.remark = outcome
+        lost = 0
+        if self.uncovered is None:
+            self.uncovered = uncovered
         else:
-            self._guard = guard
+            lost = int(np.count_nonzero(uncovered & ~self.uncovered))
+        if outside or lost:
+            self.reason = outside_reason(outside) if outside else lost_reason(lost)
+        else:
+            self._guard, self.on = guard, True
 
     @property
     def held_back(self):
@@ -237,8 +263,24 @@ class Watch(Preparing):
         return self.remark
 
 
+def uncovered_faces(reference, positions, triangles, tolerance, options):
+    """Returns (m,) bool: the faces of the reference that are not proved to be within the tolerance of a mesh. options: of a
+    check, for the mesh."""
+    threads, progress = options["threads"], options["progress"]
+    # The mesh is another one after the next edit, so that the volume is not kept.
+    volume = native.module.ToleranceVolume(positions, triangles, tolerance, **options)
+    own = reference.arrays
+    found = volume.check(own.vertices, own.triangles, to_world=reference.matrix, threads=threads, progress=progress)
+    return found.verdicts < native.module.Verdict.INSIDE
+
+
 def outside_reason(count):
     return f"{count:,} faces are outside: Select Outside in Object Mode shows them"
+
+
+def lost_reason(count):
+    faces = "1 face of the reference is" if count == 1 else f"{count:,} faces of the reference are"
+    return f"{faces} no longer within the tolerance of the mesh"
 
 
 class Watches:
@@ -251,19 +293,20 @@ class Watches:
         return iter([(name, watch) for name, (_, watch) in self._of.items()])
 
     def of(self, ob, topology, make):
-        """Returns the watch of `ob`. If its situation or topology has changed, make(followed) makes a new watch first."""
+        """Returns the watch of `ob`. If its situation or topology has changed, make(before) makes a new watch first, which
+        takes over from the watch `before` if that is not None."""
         key = situation(ob), topology
         known, watch = self._of.get(ob.name, (None, None))
         if known != key:
             followed = watch is not None and known[0] == key[0] and (watch.on or watch.followed)
             self.drop(ob.name)
-            watch = make(followed)
+            watch = make(watch if followed else None)
             self._of[ob.name] = key, watch
         return watch
 
-    def restart(self, ob, positions):
+    def restart(self, ob, positions, edits_faces=False):
         """Replaces the watch of `ob` by a new one for these positions if they are inside. Returns whether they are."""
-        watch = Watch(ob, positions)
+        watch = Watch(ob, positions, edits_faces=edits_faces)
         watch.settled(None)
         if watch.on:
             self._of[ob.name] = self._of[ob.name][0], watch

@@ -369,6 +369,70 @@ def test_new_faces_that_are_inside_are_guarded_on():
     assert 0.95 < lower and upper <= 1
 
 
+def remove_faces(ob, chosen, kind="FACE"):
+    """Deletes or dissolves the faces for whose middle chosen() is true, as a user does in Edit Mode."""
+    edited = bmesh.from_edit_mesh(ob.data)
+    bpy.ops.mesh.select_mode(type="FACE")
+    for face in edited.faces:
+        face.select = chosen(face.calc_center_median())
+    bmesh.update_edit_mesh(ob.data)
+    if kind == "DISSOLVE":
+        bpy.ops.mesh.dissolve_faces()
+    else:
+        bpy.ops.mesh.delete(type=kind)
+    bpy.context.view_layer.update()
+
+
+def in_the_middle(co):
+    return max(abs(co.x), abs(co.y)) < 0.25
+
+
+@pytest.mark.parametrize("many_corners", (False, True))
+@pytest.mark.parametrize("keep", ("BOTH", "ONE"))
+def test_a_hole_is_put_back_unless_one_way_is_asked_for(keep, many_corners):
+    ob = sheet(count=20, bumps=0.0)
+    ob.tolvol.keep = keep
+    guarded(ob, "editing", mode="EDIT")
+    if many_corners:
+        remove_faces(ob, lambda co: co.x < -0.7, "DISSOLVE")
+        assert max(len(face.vertices) for face in ob.data.polygons) > 4
+        assert guard.edit.outside() is None and state(ob)["editing"][1], "nothing was lost"
+    remove_faces(ob, in_the_middle)
+    if keep == "ONE":
+        assert guard.edit.outside() is None and state(ob)["editing"][1]
+        return
+    assert guard.edit.outside() == ob
+    text, on = state(ob)["editing"]
+    assert not on and text.endswith("faces of the reference are no longer within the tolerance of the mesh")
+
+
+@pytest.mark.parametrize("keep", ("BOTH", "ONE"))
+def test_a_mesh_of_which_all_faces_were_deleted_is_put_back(keep):
+    ob = sheet(count=10, bumps=0.0)
+    ob.tolvol.keep = keep
+    guarded(ob, "editing", mode="EDIT")
+    remove_faces(ob, lambda _: True, "ONLY_FACE")
+    assert not ob.data.polygons and state(ob)["editing"] == ("sheet has no faces", False)
+    assert guard.edit.outside() == (ob if keep == "BOTH" else None)
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.delete(type="VERT")
+    bpy.context.view_layer.update()
+    assert guard.edit.outside() == (ob if keep == "BOTH" else None)
+
+
+def test_a_hole_that_was_there_before_the_guard_stays_and_grows_no_larger():
+    ob = sheet(count=20, bumps=0.0)
+    guarded(ob, mode="EDIT")
+    remove_faces(ob, in_the_middle)
+    ob.tolvol.guard.editing = True
+    updated(ob)
+    assert state(ob)["editing"][1]
+    remove_faces(ob, lambda co: co.x < -0.7, "DISSOLVE")
+    assert guard.edit.outside() is None and state(ob)["editing"][1]
+    remove_faces(ob, lambda co: co.y > 0.7)
+    assert guard.edit.outside() == ob
+
+
 # Lattices -----------------------------------------------------------------------------------------------------------
 
 
