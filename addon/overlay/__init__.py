@@ -15,7 +15,7 @@ from ..proof import labels as kept_labels
 from ..proof import places, probing
 from ..redraw import redraw_views
 from ..reference import snapshots
-from . import draw, field, labels, legend, markers, reasons, shaders, shares, work
+from . import draw, field, labels, legend, markers, measuring, reasons, shaders, shares, work
 from .surface import Surface
 
 _surfaces = {}  # name of an object that shows its deviation -> Surface
@@ -34,6 +34,12 @@ def refresh():
     """
     if not preferences.use_gl(bpy.context):
         reasons.broken.clear()  # When drawing is turned on again, the driver is tried again.
+    _refresh_surfaces()
+    measuring.refresh()
+    redraw_views()
+
+
+def _refresh_surfaces():
     markers.refresh()
     labels.refresh()
     names = _wanted()
@@ -48,7 +54,6 @@ def refresh():
     field.keep_only({field.key_of(bpy.data.objects[name]) for name in names})
     if not _drawing:
         _begin()
-    redraw_views()
 
 
 def _wanted():
@@ -127,6 +132,7 @@ def _forget_places(*_):
 
 
 def register():
+    measuring.register()
     bpy.app.handlers.load_post.append(_forget_places)
     snapshots.listeners.append(refresh)
     places.listeners.append(markers.refresh)
@@ -144,4 +150,6 @@ def unregister():
     labels.end()
     snapshots.listeners.remove(refresh)
     _end()
+    measuring.unregister()
+    work.stop()
     reasons.broken.clear()

@@ -48,6 +48,12 @@ def _tick():
     return _TICK if _waiting or _running is not None else None
 
 
+def cancel(about):
+    """Cancels the task with this key if it runs. Its finish() is called with the error Cancelled."""
+    if _running is not None and _running[0] == about:
+        _running[2].progress.cancel()
+
+
 def stop():
     """Cancels the running task and forgets the waiting ones."""
     global _running

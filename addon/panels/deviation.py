@@ -98,6 +98,8 @@ def _row(column, name, text, narrow):
 
 
 def _why_not_checked(ob):
+    if overlay.measuring.wanted(ob):
+        return "Being measured"
     if ob.mode != "OBJECT":
         return "Switch to Object Mode to measure or decimate"
     return "Press Check to measure it" if ob.tolvol.snapshot else "Set the reference first"

@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps the last measurement of an object and tells whether it is still valid. Caches the numbers that panels show."""
+"""Keeps the last measurement of an object and tells whether it is still valid. Caches the numbers that panels show.
+
+What an operator measures is stored with the object. What is measured in Edit and Sculpt Mode, without an operator and thus
+without an undo step, is kept in memory alone.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,13 +36,70 @@ def remember(ob, surface, certified, tolerance, share_outside=0.0):
     redraw_views()
 
 
-def measurement_of(ob):
-    """Returns the last measurement, or None if the mesh, its place or the reference has changed since then.
+@dataclass(frozen=True)
+class Passing:
+    """A measurement that is kept in memory, with the same names as the one that is stored with an object."""
 
-    Outside Object Mode the result is None: Blender may be changing the mesh there, and Python does not see the changes.
-    """
-    measurement = ob.tolvol.measurement
-    if ob.mode != "OBJECT" or not measurement.complete or measurement.fingerprint != shown_fingerprint(ob):
+    fingerprint: str
+    matrix: tuple
+    tolerance: float
+    size: float
+    forward_lower: float
+    forward: float
+    backward_lower: float
+    backward: float
+    reference: tuple  # about_reference() of the object
+    complete: bool = True
+    share_outside: float = 0.0
+    statistics: str = ""
+
+
+_passing = {}  # name of an object -> Passing
+_present = set()  # the names of those whose mesh has not changed since it was measured
+
+
+def remember_passing(ob, surface, certified, tolerance):
+    """Keeps the certified distances of the object's mesh as it is now in Edit or Sculpt Mode."""
+    lengths = *certified["forward"], *certified["backward"]
+    place = tuple(surface.matrix.ravel())
+    about = surface.arrays.fingerprint(), place, tolerance, snapshots.snapshot_size(ob), *lengths
+    _passing[ob.name] = Passing(*about, about_reference(ob))
+    _present.add(ob.name)
+
+
+def outdate(name):
+    """Notes that the mesh of an object has changed in Edit or Sculpt Mode."""
+    _present.discard(name)
+
+
+def is_present(ob):
+    """Whether the mesh has been measured as it is now in Edit or Sculpt Mode."""
+    return ob.name in _present
+
+
+def about_reference(ob):
+    """Returns a value that is equal for equal references at the same place."""
+    return ob.tolvol.snapshot_fingerprint, tuple(ob.tolvol.snapshot_matrix)
+
+
+def _passing_of(ob):
+    found = _passing.get(ob.name)
+    if found is None or ob.tolvol.snapshot is None or found.reference != about_reference(ob):
+        return None
+    # In Object Mode the fingerprint tells whether it is still the same mesh. In the other modes Python does not see changes.
+    true = found.fingerprint == shown_fingerprint(ob) if ob.mode == "OBJECT" else is_present(ob)
+    return found if true else None
+
+
+def _stored_of(ob):
+    found = ob.tolvol.measurement
+    return found if ob.mode == "OBJECT" and found.complete and found.fingerprint == shown_fingerprint(ob) else None
+
+
+def measurement_of(ob):
+    """Returns the last measurement, or None if the mesh, its place or the reference has changed since then."""
+    measurement = _stored_of(ob) or _passing_of(ob)
+    if measurement is None:
         return None
     lengths = measurement.tolerance, measurement.size, 1 + measurement.forward, 1 + measurement.backward
     if not all(map(snapshots.sound, lengths)):
@@ -84,3 +147,8 @@ def shown_fingerprint(ob):
 
 def forget():
     _shown.clear()
+
+
+def forget_passing():
+    _passing.clear()
+    _present.clear()

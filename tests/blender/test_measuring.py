@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""In Edit and Sculpt Mode a mesh is measured by itself. Blender calls the handlers and the timer; here the tests do."""
+
+import time
+
+import bmesh
+import bpy
+import pytest
+
+from addon.overlay import measuring, work
+from addon.proof import statistics, verdict
+from addon.proof.verdict import FAIL, NOT_CHECKED, PASS
+from addon.reference import measurements
+from scenes import sheet
+
+
+@pytest.fixture(autouse=True)
+def _nothing_left():
+    yield
+    work.stop()
+    measurements.forget_passing()
+
+
+def in_mode(mode, **settings):
+    """A flat sheet that is its own reference, in this mode."""
+    ob = sheet(count=20, bumps=0.0)
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    for name, value in settings.items():
+        setattr(ob.tolvol, name, value)
+    bpy.ops.object.mode_set(mode=mode)
+    measuring.note(ob)
+    return ob
+
+
+def measured():
+    """Does what the timer does until nothing waits."""
+    end = time.monotonic() + 60
+    while work._waiting or work._running is not None:
+        assert time.monotonic() < end
+        work._tick()
+        time.sleep(0.01)
+
+
+def cut_a_hole(ob):
+    edited = bmesh.from_edit_mesh(ob.data)
+    chosen = [face for face in edited.faces if face.calc_center_median().length < 0.3]
+    bmesh.ops.delete(edited, geom=chosen, context="FACES")
+    bmesh.update_edit_mesh(ob.data)
+    measuring.note(ob)
+
+
+def test_a_hole_is_a_failure_at_once_and_its_numbers_are_those_of_check():
+    ob = in_mode("EDIT")
+    measured()
+    assert verdict.word(ob) == PASS and verdict.of(ob).largest < 1e-12
+    cut_a_hole(ob)
+    assert verdict.word(ob) == NOT_CHECKED, "what was measured was another mesh"
+    measured()
+    found = verdict.of(ob)
+    assert found.word == FAIL and found.ways == "the reference" and found.forward.upper < 1e-12
+    assert statistics.of(ob) is None
+    # It is no operator: nothing is stored with the object, whose undo steps stay as they are.
+    assert not ob.tolvol.measurement.complete
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert verdict.of(ob) == found, "it is still the same mesh"
+    assert bpy.ops.tolvol.check() == {"FINISHED"}
+    assert verdict.of(ob).backward == found.backward and ob.tolvol.measurement.complete
+
+
+def test_a_change_of_the_mesh_tolerance_or_reference_counts():
+    ob = in_mode("SCULPT")
+    ob.data.vertices[200].co.z += 0.05
+    measuring.note(ob)
+    measured()
+    assert verdict.word(ob) == FAIL
+    ob.tolvol.tolerance_percent = 5
+    assert verdict.word(ob) == PASS
+    bpy.ops.object.mode_set(mode="OBJECT")
+    ob.data.vertices[200].co.z += 1
+    ob.data.update()
+    bpy.context.view_layer.update()
+    assert verdict.word(ob) == NOT_CHECKED
+    ob.data.vertices[200].co.z = 0.05
+    ob.data.update()
+    bpy.context.view_layer.update()
+    assert bpy.ops.tolvol.set_reference(replace=True) == {"FINISHED"}
+    assert verdict.word(ob) == NOT_CHECKED
+
+
+def test_a_mesh_that_changes_meanwhile_is_measured_again():
+    ob = in_mode("EDIT")
+    work._tick()
+    while work._running is None:
+        work._tick()
+    cut_a_hole(ob)
+    assert work._running is None or work._running[2].progress.cancelled
+    measured()
+    assert verdict.word(ob) == FAIL
+
+
+def test_only_what_is_shown_or_guarded_is_measured():
+    ob = in_mode("EDIT", show_deviation=False)
+    measured()
+    assert verdict.word(ob) == NOT_CHECKED and not measuring.wanted(ob)
+    ob.tolvol.guard.editing = True
+    measuring.refresh()
+    measuring.note(ob)
+    measured()
+    assert verdict.word(ob) == PASS
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert not measuring.wanted(ob), "there is Check"
