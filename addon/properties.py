@@ -230,6 +230,23 @@ def _unit_changed(settings, _context):
     snapshots.notify()
 
 
+DEVIATION_SURFACES = (
+    ("MESH", "Mesh", "Colour the mesh by its distance to the reference"),
+    (
+        "REFERENCE",
+        "Reference",
+        "Colour the reference by its distance to the mesh, over everything else: it shows what the mesh has lost, such as a "
+        "part in which a hole was cut",
+    ),
+)
+
+
+DEVIATION_PALETTES = (
+    ("SAFE", "Safe for All Eyes", "Colours that can be told apart by the colour-blind, too"),
+    ("NOMINAL", "Green to Red", "Green where nothing deviates, red at the end; what is inside the reference is blue"),
+)
+
+
 DEVIATION_KINDS = (
     ("SIGNED", "Signed", "Show the distance with its side: blue is inside the reference, red is outside"),
     ("MAGNITUDE", "Magnitude", "Show the distance without its side"),
@@ -280,9 +297,21 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
 
     show_deviation: BoolProperty(
         name="Show Deviation",
-        description="Colour the mesh in the 3D view by its distance to the reference while it changes. Parts beyond the "
+        description="Colour the mesh, or its reference, in the 3D view by the distance while it changes. Parts beyond the "
         "tolerance are striped. The colours prove nothing: use Check for a proof",
         default=True,
+        update=_changed,
+    )
+    deviation_surface: EnumProperty(
+        name="Surface",
+        description="The surface that is coloured",
+        items=DEVIATION_SURFACES,
+        update=_changed,
+    )
+    deviation_palette: EnumProperty(
+        name="Colours",
+        description="The colours that stand for the distances",
+        items=DEVIATION_PALETTES,
         update=_changed,
     )
     deviation_kind: EnumProperty(

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Show Deviation colours the mesh in the 3D view at every pixel by its distance to the reference, and draws a legend.
+"""Show Deviation colours the mesh in the 3D view at every pixel by its distance to the reference, or the reference by its
+distance to the mesh, and draws a legend.
 
 While no object shows its deviation, the overlay has no handlers and holds no memory. The graphics driver computes the
 distances: they are shown, not proved.
@@ -15,7 +16,7 @@ from ..proof import labels as kept_labels
 from ..proof import places, probing
 from ..redraw import redraw_views
 from ..reference import snapshots
-from . import draw, field, labels, legend, markers, measuring, reasons, shaders, shares, work
+from . import coloured, draw, field, labels, legend, markers, moving, reasons, shaders, shares, work
 from .surface import Surface
 
 _surfaces = {}  # name of an object that shows its deviation -> Surface
@@ -34,12 +35,6 @@ def refresh():
     """
     if not preferences.use_gl(bpy.context):
         reasons.broken.clear()  # When drawing is turned on again, the driver is tried again.
-    _refresh_surfaces()
-    measuring.refresh()
-    redraw_views()
-
-
-def _refresh_surfaces():
     markers.refresh()
     labels.refresh()
     names = _wanted()
@@ -51,9 +46,14 @@ def _refresh_surfaces():
         shares.forget(name)
     for name in names:
         _surfaces.setdefault(name, Surface()).touch(True)
-    field.keep_only({field.key_of(bpy.data.objects[name]) for name in names})
+    objects = [bpy.data.objects[name] for name in names]
+    field.keep_only({field.key_of(ob) for ob in objects})
+    references = [ob for ob in objects if coloured.is_reference(ob)]
+    field.keep_only_meshes({ob.name for ob in references})
+    coloured.keep_only(references)
     if not _drawing:
         _begin()
+    redraw_views()
 
 
 def _wanted():
@@ -83,6 +83,8 @@ def _end():
     _surfaces.clear()
     shares.forget()
     field.keep_only(set())
+    field.keep_only_meshes(set())
+    coloured.keep_only([])
     legend.free()
     shaders.free()
 
@@ -129,10 +131,11 @@ def _note_frame(*_):
 @persistent
 def _forget_places(*_):
     places.forget()
+    legend.forget_moved()
 
 
 def register():
-    measuring.register()
+    moving.register()
     bpy.app.handlers.load_post.append(_forget_places)
     snapshots.listeners.append(refresh)
     places.listeners.append(markers.refresh)
@@ -150,6 +153,6 @@ def unregister():
     labels.end()
     snapshots.listeners.remove(refresh)
     _end()
-    measuring.unregister()
+    moving.unregister()
     work.stop()
     reasons.broken.clear()

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Draws the surfaces of the objects that show their deviation, and the legend of one of them, into the 3D views."""
 
+from dataclasses import dataclass, replace
+
 import gpu
 import numpy as np
 
-from ..mesh import mesh_io
 from ..proof import verdict
-from ..redraw import redraw_views
-from ..reference import measurements, tolerances
+from ..reference import measurements
 from ..units import typed
-from . import field, legend, reasons, shaders, shares
+from . import coloured, field, legend, reasons, shaders, shares
+from .coloured import Coloured, tolerance_of
 from .scale import Scale
 
 _STRIPE = 12  # pixels from one stripe to the next
@@ -31,83 +32,106 @@ def _in_view(context, names):
     ]
 
 
-def _tolerance(ob):
-    return tolerances.tolerance_length(ob.tolvol, ob.tolvol.snapshot_size)
+@dataclass(frozen=True)
+class Drawn:
+    """What is drawn of an object, and how."""
+
+    what: Coloured
+    scale: Scale
+    palette: str
 
 
-def _signed(ob, tree):
-    return ob.tolvol.deviation_kind == "SIGNED" and tree.closed
-
-
-def scale_of(context, ob, tree):
-    """Returns the Scale of the colours of `ob`."""
-    settings, tolerance = ob.tolvol, _tolerance(ob)
-    reach = tolerance
+def _scale_of(context, ob, what, settings):
+    """Returns the Scale of a Coloured alone. settings: those of the object that chooses range and bands."""
+    reach = tolerance = tolerance_of(ob)
     if settings.deviation_range == "AUTOMATIC":
-        reach = shares.automatic_reach(ob) or tolerance
+        reach = shares.automatic_reach(ob.name, what) or 0.0
     elif settings.deviation_range == "FIXED":
         reach = typed(settings.deviation_limit, context.scene.unit_settings)
     bands = settings.band_count if settings.use_bands else 0
-    return Scale(tolerance, _signed(ob, tree), max(reach, field.finest(tree)), bands)
+    return Scale(tolerance, what.signed, reach, bands)
 
 
-def _shares(ob, surface, found, scale):
-    """Returns the shares of the bands of the present Scale, or None while they are not known."""
-    automatic = ob.tolvol.deviation_range == "AUTOMATIC"
-    return shares.known(ob, surface, found, scale, automatic, redraw_views)
+def with_scales(context, found):
+    """Returns {object: Drawn} for {object: Coloured}. Selected objects get one scale, as the active one of them demands."""
+    selected = [ob for ob in found if ob.select_get()]
+    leader = context.active_object if context.active_object in selected else None
+    groups = [[ob] for ob in found if not leader or ob not in selected] + ([selected] if leader else [])
+    drawn = {}
+    for group in groups:
+        settings = (leader if leader in group else group[0]).tolvol
+        scales = [_scale_of(context, ob, found[ob], settings) for ob in group]
+        # Where nothing deviates, an automatic range ends at the tolerance.
+        reach = max(scale.reach for scale in scales) or max(scale.tolerance for scale in scales)
+        reach = max(reach, *(field.finest(found[ob].tree) for ob in group))
+        signed = all(scale.signed for scale in scales)
+        for ob, scale in zip(group, scales):
+            drawn[ob] = Drawn(found[ob], replace(scale, reach=reach, signed=signed), settings.deviation_palette)
+    return drawn
+
+
+def _drawn(context, shown):
+    """Returns ({object: Drawn} of the objects in view, {object: why nothing is drawn of it}). shown: {name: Surface}."""
+    found, missing = {}, {}
+    for ob in _in_view(context, shown):
+        reason = reasons.hidden(ob)
+        if not reason:
+            shown[ob.name].update(ob, context.evaluated_depsgraph_get())
+            found[ob], reason = coloured.of(ob, shown[ob.name])
+        if reason:
+            found.pop(ob, None)
+            missing[ob] = reason
+    return with_scales(context, found), missing
 
 
 def surfaces(context, shown):
     """Draws the surfaces of the objects in view. shown: {name of the object: Surface}."""
-    objects = [ob for ob in _in_view(context, shown) if not reasons.hidden(ob)]
-    if not objects:
+    drawn, _ = _drawn(context, shown)
+    if not drawn:
         return
-    depsgraph = context.evaluated_depsgraph_get()
     gpu.state.depth_test_set("LESS_EQUAL")
     # NEARER may let two layers pass the depth test at one pixel. Writing depths makes the nearer layer visible.
     gpu.state.depth_mask_set(True)
     gpu.state.blend_set("ALPHA")
-    for ob in objects:
-        surface = shown[ob.name]
-        surface.update(ob, depsgraph)
-        found, _ = field.field_of(ob, _tolerance(ob), redraw_views)
-        if found is not None:
-            _draw(context, ob, surface, found)
+    references = [ob for ob in drawn if coloured.is_reference(ob)]
+    for ob in drawn.keys() - set(references):
+        _draw(context, ob, drawn[ob])
+    if references:
+        # The mesh, which lies about where the reference is, would cover parts of it: references are drawn over everything.
+        gpu.state.active_framebuffer_get().clear(depth=1.0)
+    for ob in references:
+        _draw(context, ob, drawn[ob])
     gpu.state.blend_set("NONE")
     gpu.state.depth_mask_set(False)
     gpu.state.depth_test_set("NONE")
 
 
-def _draw(context, ob, surface, found):
-    shading = context.space_data.shading
+def _draw(context, ob, drawn):
+    what, shading = drawn.what, context.space_data.shading
     x_ray = shading.type == "SOLID" and shading.show_xray
-    to_frame = field.vertex_to_frame(found, ob)
-    if ob.tolvol.deviation_range == "AUTOMATIC":
-        _shares(ob, surface, found, scale_of(context, ob, found.tree))  # It finds the range.
     told = shaders.told(
         context.region_data.perspective_matrix,
-        ob.matrix_world,
-        to_frame,
-        _eye(context.region_data, to_frame @ np.linalg.inv(mesh_io.matrix_array(ob.matrix_world))),
-        _tolerance(ob) * found.tree.scale,
-        found.leaves,
-        scale_of(context, ob, found.tree),
+        what.model,
+        _eye(context.region_data, what.to_frame @ np.linalg.inv(what.model)),
+        drawn.scale.tolerance * what.tree.scale,
+        what.field.leaves,
+        drawn.scale,
         _STRIPE * context.preferences.system.ui_scale,
         ob.tolvol.deviation_opacity * (shading.xray_alpha if x_ray else 1),
     )
     shader = shaders.surface()
     shader.bind()
-    shader.uniform_sampler("transfer", shaders.transfer(_signed(ob, found.tree)))
-    found.bind(shader)
+    shader.uniform_sampler("transfer", shaders.transfer(drawn.scale.signed, drawn.palette))
+    what.field.bind(shader)
     shader.uniform_block("told", told)
-    if x_ray:
-        # In X-ray mode the depth buffer is empty. A first pass writes the depths, so that the second draws only the
+    if x_ray or coloured.is_reference(ob):
+        # The depth buffer is empty, or was cleared. A first pass writes the depths, so that the second draws only the
         # nearest layer.
         gpu.state.color_mask_set(False, False, False, False)
-        surface.draw(shader)
+        what.triangles.draw(shader, what.to_frame)
         gpu.state.color_mask_set(True, True, True, True)
-    surface.draw(shader)
-    if ob.mode == "EDIT" and not x_ray:
+    what.triangles.draw(shader, what.to_frame)
+    if ob.mode == "EDIT" and not x_ray and not coloured.is_reference(ob):
         # The coloured surface covers Blender's edges but not its vertices, so the edges are drawn again.
         theme = context.preferences.themes[0].view_3d
         shader = shaders.lines()
@@ -115,7 +139,7 @@ def _draw(context, ob, surface, found):
         shader.uniform_block("told", told)
         for selected, colour in ((False, theme.wire_edit), (True, theme.edge_select)):
             shader.uniform_float("flat_colour", (*colour, 1))
-            surface.draw_edges(shader, selected)
+            what.triangles.draw_edges(shader, what.to_frame, selected)
 
 
 def _eye(view, world_to_frame):
@@ -126,22 +150,33 @@ def _eye(view, world_to_frame):
 
 
 def legend_of_one(context, shown):
-    """Draws the legend of the active object if that is in view, else of another object."""
+    """Draws the legend of the active object if that is in view, else of another object. Selected objects have one legend."""
+    legend.forget_box(context.region)
     quarters = context.space_data.region_quadviews
-    objects = _in_view(context, shown)
-    if not objects or (quarters and context.region_data != quarters[-1]):
+    if quarters and context.region_data != quarters[-1]:
+        return
+    drawn, missing = _drawn(context, shown)
+    objects = [*drawn, *missing]
+    if not objects:
         return
     ob = context.active_object if context.active_object in objects else objects[0]
-    found, reason = None, reasons.hidden(ob)
-    if not reason:
-        found, reason = field.field_of(ob, _tolerance(ob), redraw_views)
-    heading = f"Deviation of {ob.name}"
-    if found is None:
-        legend.draw_note(context, f"{heading}: {reason}. {verdict.word(ob)}")
+    of_reference = "the reference of " if coloured.is_reference(ob) else ""
+    if ob in missing:
+        legend.draw_note(context, f"Deviation of {of_reference}{ob.name}: {missing[ob]}. {verdict.word(ob)}")
         return
-    scale = scale_of(context, ob, found.tree)
-    bands = _shares(ob, shown[ob.name], found, scale)
-    legend.draw(context, heading, note(ob), verdict.word(ob), scale, bands)
+    together = [other for other in drawn if other.select_get()] if ob.select_get() else [ob]
+    scale = drawn[ob].scale
+    counted = shares.together(shares.known(other.name, drawn[other].what, drawn[other].scale) for other in together)
+    if len(together) == 1:
+        heading, below = f"Deviation of {of_reference}{ob.name}", note(ob)
+    else:
+        heading, below = f"Deviation of {len(together)} objects", "Colours not proved"
+        if any(drawn[other].scale.tolerance != scale.tolerance for other in together):
+            scale = replace(scale, tolerance=scale.reach)  # There is no one tolerance to be marked.
+    if not all(drawn[other].what.present for other in together):
+        below = "Colours of before the last change"
+    word = verdict.together(verdict.word(other) for other in together)
+    legend.draw(context, heading, below, word, scale, counted, drawn[ob].palette)
 
 
 def note(ob):

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps a tree of triangles for each reference that is shown: the shader finds distances in it.
+"""Keeps a tree of triangles for each surface from which distances are shown: the shader finds distances in it.
 
-A tree is made in a thread and kept while an object shows its deviation from the reference. It does not depend on the
+A tree of a reference is made in a thread and kept while an object shows its deviation from the reference. Where the reference
+is shown by its distance from the mesh, the tree is of the mesh, and is made anew after each change. No tree depends on the
 tolerance.
 """
 
@@ -20,17 +21,24 @@ from . import shaders, work
 # A tolerance below so many times the rounding error of the shader cannot be shown.
 _FINEST = 4
 
+# A tree of a mesh needs little of the volume from which it is made: a grid of so many nodes per tolerance.
+_COARSE = 1 / 64
+_EVERY = 0.1  # seconds between two trees of a mesh that goes on changing
+
 _fields = {}  # key -> Field
 _failed = {}  # key -> the reason why the Field could not be made
+_of_meshes = {}  # name of an object -> Field of its mesh
+_meshes_failed = {}  # name of an object -> (number of the change, the reason why the Field could not be made)
 
 
 class Field:
-    """A reference on the GPU."""
+    """A surface on the GPU, from which distances are measured."""
 
-    def __init__(self, tree, matrix):
+    def __init__(self, tree, matrix, change=0):
         self.tree = tree
         self.to_frame = tree.to_frame
-        self.matrix = matrix  # the matrix of the reference to the world when the tree was made
+        self.matrix = matrix  # the matrix of the surface to the world when the tree was made
+        self.change = change  # which change of the surface the tree is of
         self.leaves = len(tree.nodes) // 4
         self._textures = None
 
@@ -83,6 +91,68 @@ def field_of(ob, tolerance, changed):
     return field, None
 
 
+def field_of_mesh(ob, surface, tolerance, changed):
+    """Returns (Field, None) of the mesh that the 3D view shows, or (None, why there is no Field yet).
+
+    surface: the Surface of `ob`. The Field may be of the mesh before its last change: is_of() tells. A missing Field is made
+    in a thread, and then changed() is called.
+    """
+    name, field = ob.name, _of_meshes.get(ob.name)
+    failed = _meshes_failed.get(name)
+    if failed is not None and failed[0] == surface.changes:
+        return None, failed[1]
+    if field is None or not is_of(field, ob, surface):
+        work.later(
+            ("mesh", name),
+            _EVERY if field else 0,
+            functools.partial(_prepare_mesh, name, surface, tolerance),
+            functools.partial(_finish_mesh, name, surface.changes, changed),
+        )
+    if field is None:
+        return None, "Preparing"
+    if tolerance < finest(field.tree):
+        return None, "The tolerance is too small to be shown by colours"
+    return field, None
+
+
+def is_of(field, ob, surface):
+    """Whether a Field of a mesh is of the mesh as it is now."""
+    return field.change == surface.changes and measurements.same_shape(
+        field.matrix, mesh_io.matrix_array(ob.matrix_world)
+    )
+
+
+def _prepare_mesh(name, surface, tolerance):
+    ob = bpy.data.objects.get(name)
+    if ob is None or surface.all_triangles is None:
+        return None
+    matrix, threads = mesh_io.matrix_array(ob.matrix_world), preferences.threads(bpy.context)
+    vertices, triangles, change = surface.vertices, surface.all_triangles, surface.changes
+
+    def make(progress):
+        volume = native.module.ToleranceVolume(
+            vertices, triangles, tolerance, to_world=matrix, precision=_COARSE, threads=threads, progress=progress
+        )
+        return Field(native.module.DisplayTree(volume, progress=progress), matrix, change)
+
+    return make
+
+
+def _finish_mesh(name, change, changed, field, error):
+    if error is None:
+        _of_meshes[name] = field
+    elif not isinstance(error, native.module.Cancelled):
+        _meshes_failed[name] = change, str(error) or "not enough memory"
+    changed()
+
+
+def keep_only_meshes(names):
+    """Forgets the fields of all meshes except those of the objects with these names."""
+    for kept in (_of_meshes, _meshes_failed):
+        for name in kept.keys() - names:
+            del kept[name]
+
+
 def finest(tree):
     """Returns the least distance that colours can show, in world units."""
     return _FINEST * tree.ROUNDING / tree.scale
@@ -126,6 +196,14 @@ def keep_only(keys):
 
 
 def vertex_to_frame(field, ob):
-    """Returns (4, 4): the matrix from the object's vertices to the frame of the field's tree."""
+    """Returns (4, 4): the matrix from the object's vertices to the frame of the tree of its reference."""
     own = ob.tolvol.snapshot_kind == "SELF"
     return field.to_frame @ (field.matrix if own else mesh_io.matrix_array(ob.matrix_world))
+
+
+def reference_to_frame(field, ob):
+    """Returns (4, 4): the matrix from the vertices of the object's reference to the frame of the tree of its mesh."""
+    if ob.tolvol.snapshot_kind == "SELF":
+        return field.to_frame @ field.matrix
+    moved = field.matrix @ np.linalg.inv(mesh_io.matrix_array(ob.matrix_world))
+    return field.to_frame @ moved @ snapshots.reference_matrix(ob)

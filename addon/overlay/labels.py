@@ -28,7 +28,7 @@ def end():
 
 
 def _draw(context):
-    page = legend.Page(context, True)
+    page = legend.Page(context)
     if context.space_data.overlay.show_overlays:
         _draw_labels(context, page, context.active_object)
     _draw_hover(context, page, probing.hover())

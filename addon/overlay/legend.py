@@ -14,6 +14,8 @@ _FONT = 0
 _LARGE, _POINTS = 20, 11
 # All further sizes are in pixels at an interface scale of 1. The bar of colours is so wide and, without bands, so high.
 _BAR = 14, 132
+# The bars of the histogram are at most so long.
+_BINS_WIDTH = 44
 # Lines of text follow one another at this distance, and bands at least at the second one.
 _ROW, _BAND_ROW = 17, 15
 # There is so much space between the parts of the legend and around them, and between the legend and the edges of the view.
@@ -44,23 +46,24 @@ def _square():
 def free():
     global _unit_square
     _unit_square = None
+    _boxes.clear()
 
 
 class Page:
     """Draws rectangles and text. Coordinates are in pixels of the region, with y upwards."""
 
-    def __init__(self, context, signed):
+    def __init__(self, context, signed=True, palette="SAFE"):
         self.scale = context.preferences.system.ui_scale
         self.region = context.region.width, context.region.height
         theme = context.preferences.themes[0].user_interface.wcol_tooltip
         self.ink, self.paper = tuple(theme.text), tuple(theme.inner)
-        self.signed = signed
+        self.signed, self.palette = signed, palette
         blf.size(_FONT, _POINTS * self.scale)
 
     def rectangle(self, x, y, width, height, kind, colour=(0, 0, 0, 0), bands=0):
         shader = shaders.legend()
         shader.bind()
-        shader.uniform_sampler("transfer", shaders.transfer(self.signed))
+        shader.uniform_sampler("transfer", shaders.transfer(self.signed, self.palette))
         corners = [2 * at / size - 1 for at, size in zip((x, y, x + width, y + height), self.region * 2)]
         shader.uniform_float("corners", corners)
         shader.uniform_float("flat_colour", colour)
@@ -89,28 +92,30 @@ def width_of(text):
     return blf.dimensions(_FONT, text)[0]
 
 
-def draw(context, heading, note, word, colours, shares):
+def draw(context, heading, note, word, colours, shares, palette):
     """Draws the legend.
 
     note: the lowest line.
     word: the verdict, in large letters on top.
     colours: the Scale.
-    shares: the shares of the surface in the bands from the lowest colour on and beyond the tolerance; None while they are not
-    known.
+    shares: the Shares, or None while they are not known.
 
     Where the rows of many bands have no room, their shares are left out. Where the legend has no room, it is the word alone.
     """
-    page = Page(context, colours.signed)
+    page = Page(context, colours.signed, palette)
     scale = page.scale
-    texts = [percent(share) for share in shares] if shares is not None else [""] * (colours.counted + 1)
+    texts = [""] * (colours.counted + 1)
+    if shares is not None:
+        texts = [percent(share) for share in (*shares.bands, shares.outside)]
     for rows in (texts[:-1], []):
         bar_height = max(_BAR[1], len(rows) * _BAND_ROW) * scale
         labels = _labels(context, colours, _ROW * scale / bar_height)
-        bar_width = _BAR[0] * scale
+        bar_width, bins_width = _BAR[0] * scale, _BINS_WIDTH * scale
         row, gap = _ROW * scale, _GAP * scale
         label_width = max([width_of(text) for _, text in labels] + [width_of("Outside")])
         share_width = max(width_of(text) for text in [*texts, "88.8 %"])
-        width = max(bar_width + label_width + share_width + 2 * gap, width_of(heading), width_of(note)) + 2 * gap
+        columns = bins_width + bar_width + label_width + share_width + 2 * gap
+        width = max(columns, width_of(heading), width_of(note)) + 2 * gap
         width = max(width, page.width(word, _LARGE) + _MARK * scale + 3 * gap)
         height = 3 * row + _WORD * scale + bar_height + 4 * gap
         place = _place(context, width, height, scale)
@@ -120,16 +125,18 @@ def draw(context, heading, note, word, colours, shares):
         _draw_word(context, page, word)
         return
     left, bottom = place
-    page.rectangle(left, bottom, width, height, shaders.FLAT, page.paper)
-    x, y = left + gap, bottom + gap + row / 2
+    _paper(context, page, left, bottom, width, height)
+    x, y = left + gap + bins_width, bottom + gap + row / 2
     label_x, right = x + bar_width + gap, left + width - gap
-    page.text(x, y, note, faint=True)
+    page.text(left + gap, y, note, faint=True)
     y += row
     page.rectangle(x, y - bar_width / 2, bar_width, bar_width, shaders.STRIPES)
     page.text(label_x, y, "Outside")
     page.text(right - width_of(texts[-1]), y, texts[-1])
     y += row / 2 + gap
     page.rectangle(x, y, bar_width, bar_height, shaders.BAR, bands=colours.bands)
+    if shares is not None:
+        _draw_histogram(page, x, y, bins_width, bar_height, shares.histogram)
     for part, text in labels:
         at = y + part * bar_height
         page.rectangle(x + bar_width, at - scale / 2, 4 * scale, scale, shaders.FLAT, (*page.ink, 1))
@@ -137,10 +144,21 @@ def draw(context, heading, note, word, colours, shares):
     for i, text in enumerate(rows):
         page.text(right - width_of(text), y + (i + 0.5) / len(rows) * bar_height, text, faint=True)
     top = bottom + height - gap
-    page.text(x, top - row / 2, heading)
+    page.text(left + gap, top - row / 2, heading)
     at, mark = top - row - _WORD * scale / 2, _MARK * scale
-    page.rectangle(x, at - mark / 2, mark, mark, shaders.FLAT, (*_COLOURS[word], 1))
-    page.text(x + mark + gap, at, word, points=_LARGE)
+    page.rectangle(left + gap, at - mark / 2, mark, mark, shaders.FLAT, (*_COLOURS[word], 1))
+    page.text(left + mark + 2 * gap, at, word, points=_LARGE)
+
+
+def _draw_histogram(page, x, y, width, height, histogram):
+    """Draws the bins beside the bar of colours, at the height of their distances. They grow to the left, from x on."""
+    most = max(histogram)
+    for i, share in enumerate(histogram):
+        if share > 0:
+            # What is there has to be seen, be it little.
+            long = max(share / most * (width - 2 * page.scale), page.scale)
+            at, step = y + i / len(histogram) * height, height / len(histogram)
+            page.rectangle(x - 2 * page.scale - long, at, long, step, shaders.FLAT, (*page.ink, 0.5))
 
 
 def _labels(context, colours, row):
@@ -172,7 +190,7 @@ def _draw_word(context, page, word):
     gap, mark = _GAP * page.scale, _MARK * page.scale
     width, height = page.width(word, _LARGE) + mark + 3 * gap, _WORD * page.scale
     if place := _corner(context, width, height, _MARGIN * page.scale):
-        page.rectangle(*place, width, height, shaders.FLAT, page.paper)
+        _paper(context, page, *place, width, height)
         x, y = place[0] + gap, place[1] + height / 2
         page.rectangle(x, y - mark / 2, mark, mark, shaders.FLAT, (*_COLOURS[word], 1))
         page.text(x + mark + gap, y, word, points=_LARGE)
@@ -180,11 +198,11 @@ def _draw_word(context, page, word):
 
 def draw_note(context, text):
     """Draws one line of text in place of the legend."""
-    page = Page(context, True)
+    page = Page(context)
     gap = _GAP * page.scale
     width, height = width_of(text) + 2 * gap, _ROW * page.scale + gap
     if place := _corner(context, width, height, _MARGIN * page.scale):
-        page.rectangle(*place, width, height, shaders.FLAT, page.paper)
+        _paper(context, page, *place, width, height)
         page.text(place[0] + gap, place[1] + height / 2, text)
 
 
@@ -218,15 +236,78 @@ def free_part(context):
     return right, bottom
 
 
+# Pointer of a 3D view -> where the user has put its legend: the share of the free way from the left and from below.
+_moved = {}
+# Pointer of a region -> (left, bottom, width, height) of the legend that was last drawn there.
+_boxes = {}
+
+
+def _paper(context, page, left, bottom, width, height):
+    page.rectangle(left, bottom, width, height, shaders.FLAT, page.paper)
+    _boxes[context.region.as_pointer()] = left, bottom, width, height
+
+
+def box(region):
+    """Returns (left, bottom, width, height) of the legend in a region, or None."""
+    return _boxes.get(region.as_pointer())
+
+
+def forget_box(region):
+    """Notes that a region is about to be drawn anew: it may have no legend then."""
+    _boxes[region.as_pointer()] = None
+
+
+def any_drawn():
+    """Whether regions are drawn that may have a legend."""
+    return bool(_boxes)
+
+
+def move(context, left, bottom):
+    """Puts the legend of a 3D view to a place, or as near to it as it stays in the free part of the view."""
+    _, _, width, height = box(context.region)
+    low, room = _room(context, width, height, _MARGIN * context.preferences.system.ui_scale)
+    shares = [(at - least) / free if free > 0 else 0 for at, least, free in zip((left, bottom), low, room)]
+    _moved[context.space_data.as_pointer()] = tuple(min(max(share, 0), 1) for share in shares)
+
+
+def moved(context):
+    """Returns where the user has put the legend of a 3D view, for move_back(), or None."""
+    return _moved.get(context.space_data.as_pointer())
+
+
+def move_back(context, place):
+    """Puts the legend of a 3D view to a place that moved() has returned."""
+    if place is None:
+        _moved.pop(context.space_data.as_pointer(), None)
+    else:
+        _moved[context.space_data.as_pointer()] = place
+
+
+def forget_moved():
+    """Brings the legends of all views back to their first places."""
+    _moved.clear()
+
+
+def _room(context, width, height, margin):
+    """Returns the least left and bottom that a box may have in the free part of the view, and how far it may go from there."""
+    right, low = free_part(context)
+    return (margin, low + margin), (right - width - 2 * margin, context.region.height - low - height - 2 * margin)
+
+
 def _corner(context, width, height, margin):
-    """Returns left and bottom of a box in the lower right corner of the free part of the view.
+    """Returns left and bottom of a box where the user has put it, or else in the lower right corner of the free part of the
+    view.
 
     Returns None if there is no room for the box.
     """
-    right, bottom = free_part(context)
-    left, bottom = right - width - margin, bottom + margin
+    low, room = _room(context, width, height, margin)
+    if min(room) < 0:
+        return None
+    if place := moved(context):
+        return tuple(least + share * free for least, share, free in zip(low, place, room))
+    left, bottom = low[0] + room[0], low[1]
     for other in context.area.regions:
         # Adjust Last Operation lies in the lower left corner.
         if other.type == "HUD" and other.width > 1 and other.x - context.region.x + other.width > left:
             bottom = max(bottom, other.y - context.region.y + other.height)
-    return (left, bottom) if left >= margin and bottom + height + margin <= context.region.height else None
+    return (left, bottom) if bottom <= low[1] + room[1] else None

@@ -34,7 +34,7 @@ def _draw(context):
     found, at, _ = places.shown(ob)
     if not found or not context.space_data.overlay.show_overlays or not ob.visible_in_viewport_get(context.space_data):
         return
-    page = legend.Page(context, True)
+    page = legend.Page(context)
     for i, place in enumerate(found):
         spot = location_3d_to_region_2d(context.region, context.region_data, place.position)
         if spot is not None:

@@ -10,6 +10,8 @@ import numpy as np
 FAR = 8.0
 # The shares of so many bands are counted where the colours are smooth.
 _SMOOTH_BANDS = 4
+# A histogram has about so many bins: the same number of them in each band.
+_BINS = 48
 # The leading digits of an automatic range.
 _ROUNDING = 1e-9  # relative; the power of ten is rounded
 _ROUND = (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10)
@@ -32,13 +34,18 @@ class Scale:
         return self.bands or _SMOOTH_BANDS
 
     @property
+    def bins(self):
+        """The number of bins of the histogram."""
+        return self.counted * max(round(_BINS / self.counted), 1)
+
+    @property
     def coloured_beyond(self):
         """Whether parts beyond the tolerance have colours of their distance between the stripes."""
         return self.reach > self.tolerance
 
     def edges(self):
         """Returns the distances, ascending and signed, between which shares have to be counted for fold()."""
-        ends = np.linspace(self.lowest, self.reach, self.counted + 1)
+        ends = np.linspace(self.lowest, self.reach, self.bins + 1)
         others = [self.tolerance] + [FAR * self.reach] * self.coloured_beyond
         return np.unique(np.concatenate([ends, -ends, others, np.negative(others)]))
 
@@ -48,15 +55,23 @@ class Scale:
         shares: those between edges() and beyond them at both ends. What is beyond the last colour counts to its band. What is
         beyond the tolerance counts to a band only if it has its colour.
         """
+        bands, outside = self._binned(shares, self.counted)
+        return [*bands, outside]
+
+    def histogram(self, shares):
+        """Returns the shares in `bins` equal intervals of distances, counted as those of the bands."""
+        return self._binned(shares, self.bins)[0]
+
+    def _binned(self, shares, count):
         edges, shares = self.edges(), np.asarray(shares)
         middles = (edges[1:] + edges[:-1]) / 2
         distances = middles if self.signed else np.abs(middles)
-        band = np.floor((distances - self.lowest) / (self.reach - self.lowest) * self.counted).astype(int)
-        band = np.clip(band, 0, self.counted - 1)
+        at = np.floor((distances - self.lowest) / (self.reach - self.lowest) * count).astype(int)
+        at = np.clip(at, 0, count - 1)
         outside = np.abs(middles) > self.tolerance
         shown = shares[1:-1] * (1 if self.coloured_beyond else ~outside)
-        bands = np.bincount(band, shown, self.counted)
-        return [*bands.tolist(), float(shares[1:-1][outside].sum() + shares[0] + shares[-1])]
+        bins = np.bincount(at, shown, count)
+        return bins.tolist(), float(shares[1:-1][outside].sum() + shares[0] + shares[-1])
 
 
 def rounded_up(distance):

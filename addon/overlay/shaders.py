@@ -30,7 +30,7 @@ vec4 displayed(vec3 colour, float opacity) {
 # NEARER moves the surface towards the eye by more than this rounding: by some steps of a depth buffer of 24 bits.
 _SURFACE_VERTEX = """
 void main() {
-  place = (told.to_frame * vec4(position, 1.0)).xyz;
+  place = framed;
   gl_Position = told.view_projection * vec4((told.model * vec4(position, 1.0)).xyz, 1.0);
   gl_Position.z -= NEARER * gl_Position.w;
 }
@@ -73,7 +73,7 @@ void main() { shown = displayed(flat_colour.rgb, flat_colour.a); }
 # The layout is that of std140: vectors of four come first, and the numbers are filled up to a multiple of sixteen bytes.
 _SURFACE_TOLD = """
 struct Told {
-  mat4 view_projection, model, to_frame;
+  mat4 view_projection, model;
   vec4 eye;
   float tolerance, lowest, period, opacity;
   float leaves, range, bands, unused;
@@ -108,17 +108,22 @@ ROW = 2048
 FLAT, BAR, STRIPES = 0.0, 1.0, 2.0
 
 
-def _info(varying, position, vertex, fragment, shared=()):
+# The attributes of a vertex: local, and in the frame of the tree.
+_VERTEX = [("VEC3", "position"), ("VEC3", "framed")]
+
+
+def _info(varying, attributes, vertex, fragment, shared=()):
     """Returns a GPUShaderCreateInfo.
 
     varying: (type, name) of the value that the vertex shader passes to the fragment shader.
-    position: (type, name) of the attribute that the vertex shader reads.
+    attributes: (type, name) of each attribute that the vertex shader reads.
     shared: files in shaders/ whose functions the fragment shader uses.
     """
     interface = gpu.types.GPUStageInterfaceInfo(f"tolvol_{varying[1]}")
     interface.smooth(*varying)
     info = gpu.types.GPUShaderCreateInfo()
-    info.vertex_in(0, *position)
+    for i, attribute in enumerate(attributes):
+        info.vertex_in(i, *attribute)
     info.vertex_out(interface)
     info.fragment_out(0, "VEC4", "shown")
     info.push_constant("BOOL", "srgbTarget")
@@ -137,7 +142,7 @@ def surface():
     The result of told() has to be bound as the uniform block `told`.
     """
     shared = "surface_distance.glsl", "distance_colour.glsl"
-    info = _info(("VEC3", "place"), ("VEC3", "position"), _SURFACE_VERTEX, _SURFACE_FRAGMENT, shared)
+    info = _info(("VEC3", "place"), _VERTEX, _SURFACE_VERTEX, _SURFACE_FRAGMENT, shared)
     info.sampler(0, "FLOAT_1D", "transfer")
     info.sampler(1, "FLOAT_2D", "nodes")
     info.sampler(2, "FLOAT_2D", "corners")
@@ -150,14 +155,13 @@ def surface():
     return gpu.shader.create_from_info(info)
 
 
-def told(view_projection, model, to_frame, eye, tolerance, leaves, colours, period, opacity):
+def told(view_projection, model, eye, tolerance, leaves, colours, period, opacity):
     """Returns the uniform buffer for surface() and lines().
 
-    to_frame: matrix from the vertices to the frame of the tree, whose number of leaves is `leaves`.
-    eye: in this frame, (x, y, z, 1) for an eye and (x, y, z, 0) for a direction.
-    tolerance: in this frame. colours: the Scale.
+    eye: in the frame of the tree, (x, y, z, 1) for an eye and (x, y, z, 0) for a direction.
+    tolerance: in this frame. leaves: how many the tree has. colours: the Scale.
     """
-    matrices = [np.array(matrix, np.float32).T.ravel() for matrix in (view_projection, model, to_frame)]
+    matrices = [np.array(matrix, np.float32).T.ravel() for matrix in (view_projection, model)]
     parts = colours.reach / colours.tolerance, colours.bands
     numbers = tolerance, lowest(colours.signed), period, opacity, leaves, *parts, 0
     values = np.concatenate([*matrices, eye, numbers]).astype(np.float32)
@@ -167,7 +171,7 @@ def told(view_projection, model, to_frame, eye, tolerance, leaves, colours, peri
 @functools.cache
 def lines():
     """Returns the shader that draws edges over the surface, in the colour `flat_colour`."""
-    info = _info(("VEC3", "place"), ("VEC3", "position"), _SURFACE_VERTEX, _LINES_FRAGMENT)
+    info = _info(("VEC3", "place"), _VERTEX, _SURFACE_VERTEX, _LINES_FRAGMENT)
     info.push_constant("VEC4", "flat_colour")
     info.typedef_source(_SURFACE_TOLD)
     info.uniform_buf(0, "Told", "told")
@@ -178,7 +182,7 @@ def lines():
 @functools.cache
 def legend():
     """Returns the shader that fills rectangles. Their corners are in clip space."""
-    info = _info(("VEC2", "part"), ("VEC2", "position"), _LEGEND_VERTEX, _LEGEND_FRAGMENT, ("distance_colour.glsl",))
+    info = _info(("VEC2", "part"), [("VEC2", "position")], _LEGEND_VERTEX, _LEGEND_FRAGMENT, ("distance_colour.glsl",))
     info.sampler(0, "FLOAT_1D", "transfer")
     for constant in (("VEC4", "corners"), ("VEC4", "flat_colour"), ("VEC3", "fill")):
         info.push_constant(*constant)
@@ -192,10 +196,27 @@ def lowest(signed):
     return -1.0 if signed else 0.0
 
 
+# Colours of the palette NOMINAL, evenly spaced, sRGB: from inside over nothing to outside, and from nothing to the limit.
+_NOMINAL = {
+    True: ((40, 60, 200), (40, 160, 230), (60, 190, 90), (245, 220, 60), (215, 40, 40)),
+    False: ((60, 190, 90), (245, 220, 60), (215, 40, 40)),
+}
+_NOMINAL_TEXELS = 257
+
+
+def colours_of(signed, palette):
+    """Returns (k, 3): a table of colours, sRGB from 0 to 255. It is the module's own, or that of the palette NOMINAL."""
+    if palette == "SAFE":
+        return native.module.transfer_colours("signed" if signed else "magnitude")
+    stops = np.array(_NOMINAL[signed], np.float32)
+    at = np.linspace(0, len(stops) - 1, _NOMINAL_TEXELS)
+    return np.stack([np.interp(at, range(len(stops)), channel) for channel in stops.T], axis=1)
+
+
 @functools.cache
-def transfer(signed):
-    """Returns the module's table of colours as a texture."""
-    colours = native.module.transfer_colours("signed" if signed else "magnitude")
+def transfer(signed, palette="SAFE"):
+    """Returns a table of colours as a texture."""
+    colours = colours_of(signed, palette)
     texels = np.ones((len(colours), 4), np.float32)
     texels[:, :3] = colours / np.float32(255)
     return gpu.types.GPUTexture(

@@ -1,70 +1,107 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Counts for the legend which share of a shown surface lies in each band of distances, in a thread."""
+"""Counts for the legend which share of a coloured surface lies in each band of distances, in a thread."""
 
 import functools
-from dataclasses import replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from . import field, work
+from ..redraw import redraw_views
+from . import work
 from .scale import rounded_up
 
 _EVERY = 0.25  # seconds between two counts while a mesh goes on changing
 
-# Name of an object -> ((state of the surface, field, tolerance, to_world, scale) that the shares are of, Scale, shares).
-_known = {}
+_largest = {}  # name of an object -> (state that was measured, the largest distance as a round number or None)
+_counted = {}  # name of an object -> ((state that was counted, Scale), Shares or None)
 
 
-def known(ob, surface, found, scale, automatic, changed):
-    """Returns the shares in the bands of a Scale and beyond the tolerance, or None while they are not known.
+@dataclass(frozen=True)
+class Shares:
+    bands: list  # of each band, from the lowest colour on
+    outside: float  # of what is beyond the tolerance
+    histogram: list  # of equal intervals of distances, from the lowest colour on
+    area: float  # of the surface, in the world
 
-    automatic: whether the colours are to end at the largest distance; the shares are then those of automatic_scale(). If
-    mesh, matrix or scale have changed, the shares are counted anew, and then changed() is called.
+
+def together(every):
+    """Returns the Shares of several surfaces taken for one, or None if those of one are not known. The scale is the same."""
+    every = list(every)
+    if any(each is None for each in every):
+        return None
+    areas = np.array([each.area for each in every])
+    weights = areas / areas.sum() if areas.sum() > 0 else np.zeros(len(every))
+
+    def mean(name):
+        return (weights @ np.array([getattr(each, name) for each in every])).tolist()
+
+    return Shares(mean("bands"), mean("outside"), mean("histogram"), float(areas.sum()))
+
+
+def known(name, coloured, scale):
+    """Returns the Shares of a Coloured in the bands of a Scale, or None while they are not known.
+
+    name: that of the object. If surface, matrix or scale have changed, the shares are counted anew, and the views are drawn
+    again.
     """
-    to_world = np.linalg.inv(found.to_frame) @ field.vertex_to_frame(found, ob)
-    wanted = replace(scale, reach=scale.tolerance) if automatic else scale
-    about = surface.changes, id(found), scale.tolerance, to_world.tobytes(), wanted, automatic
-    name = ob.name
-    last = _known.get(name)
+    about = coloured.state, scale
+    last = _counted.get(name)
     if last is not None and last[0] == about:
-        return last[2]
-    if surface.triangles is not None and len(surface.triangles):
-        work.later(
-            ("shares", name),
-            _EVERY if last else 0,
-            lambda: functools.partial(
-                _count, found.tree, surface.vertices, surface.triangles, to_world, wanted, automatic
-            ),
-            functools.partial(_finish, name, about, changed),
-        )
+        return last[1]
+    if coloured.present:
+        _later("shares", name, last, coloured, functools.partial(_count, scale), _counted, about)
     return None
 
 
-def _count(tree, vertices, triangles, to_world, scale, automatic, progress):
-    """Returns (Scale, shares). Distances between the vertices may be larger than the automatic range by little."""
-    if automatic:
-        used = vertices[np.unique(triangles)]
-        largest = np.abs(tree.signed_distance(used, to_world=to_world, progress=progress)).max()
-        if largest > tree.ROUNDING / tree.scale:
-            scale = replace(scale, reach=rounded_up(float(largest)))
+def automatic_reach(name, coloured):
+    """Returns the largest distance of a Coloured as a round number, or None.
+
+    If surface or matrix have changed, it is measured anew, and until then the last one is returned. It is None if nothing
+    deviates, too.
+    """
+    last = _largest.get(name)
+    if coloured.present and (last is None or last[0] != coloured.state):
+        _later("largest", name, last, coloured, _measure, _largest, coloured.state)
+    return last[1] if last is not None else None
+
+
+def _later(kind, name, last, coloured, work_of, kept, about):
+    triangles = coloured.triangles
+    if triangles.triangles is None or not len(triangles.triangles):
+        return
+    tree, to_world, vertices, corners = coloured.tree, coloured.to_world, triangles.vertices, triangles.triangles
+    work.later(
+        (kind, name),
+        _EVERY if last else 0,
+        lambda: functools.partial(work_of, tree, vertices, corners, to_world),
+        functools.partial(_finish, kept, name, about),
+    )
+
+
+def _count(scale, tree, vertices, triangles, to_world, progress):
     counted = tree.shares(vertices, triangles, scale.edges(), to_world=to_world, progress=progress)
-    return scale, scale.fold(counted)
+    *bands, outside = scale.fold(counted)
+    corners = vertices.astype(np.float64)[triangles] @ to_world[:3, :3].T
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    return Shares(bands, outside, scale.histogram(counted), float(area))
 
 
-def automatic_reach(ob):
-    """Returns the distance at which the colours of `ob` end if that is automatic, or None while it is not known."""
-    last = _known.get(ob.name)
-    return last[1].reach if last is not None and last[0][-1] and last[1] is not None else None
+def _measure(tree, vertices, triangles, to_world, progress):
+    """Returns the largest distance at a vertex, rounded up. Distances between the vertices may be larger by little."""
+    used = vertices[np.unique(triangles)]
+    largest = np.abs(tree.signed_distance(used, to_world=to_world, progress=progress)).max()
+    return rounded_up(float(largest)) if largest > tree.ROUNDING / tree.scale else None
 
 
-def _finish(name, about, changed, counted, error):
-    _known[name] = (about, *(counted if error is None else (None, None)))
-    changed()
+def _finish(kept, name, about, outcome, error):
+    kept[name] = about, outcome if error is None else None
+    redraw_views()
 
 
 def forget(name=None):
     """Forgets the shares of one object, or of all objects if no name is given."""
-    if name is None:
-        _known.clear()
-    else:
-        _known.pop(name, None)
+    for kept in (_largest, _counted):
+        if name is None:
+            kept.clear()
+        else:
+            kept.pop(name, None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Holds the mesh of an object as the 3D view shows it now, and its buffers on the GPU."""
+"""Holds the triangles that the overlay colours, and their buffers on the GPU."""
 
 import gpu
 import numpy as np
@@ -7,18 +7,55 @@ import numpy as np
 from ..mesh import mesh_io
 
 
-class Surface:
-    """The triangles of an object. They are written to the GPU anew only after they changed."""
+class Triangles:
+    """Triangles and their places in the frame of a tree. They are written to the GPU anew only after they changed."""
+
+    def __init__(self, vertices=None, triangles=None):
+        self.vertices = vertices  # (n, 3) float32, local
+        self.triangles = triangles  # (m, 3) int32
+        self.changes = 0  # how often changed triangles were read
+        self._buffers = {}
+        self._to_frame = None  # the matrix with which the buffer of the vertices was made
+
+    def draw(self, shader, to_frame):
+        """Draws the triangles. to_frame: (4, 4) float64 from the vertices to the frame of the tree."""
+        if len(self.triangles):
+            self._batch(to_frame, "TRIS", lambda: self.triangles).draw(shader)
+
+    def _batch(self, to_frame, kind, corners, *which):
+        if "vertices" not in self._buffers or not np.array_equal(to_frame, self._to_frame):
+            layout = gpu.types.GPUVertFormat()
+            for name in ("position", "framed"):
+                layout.attr_add(id=name, comp_type="F32", len=3, fetch_mode="FLOAT")
+            vertices = gpu.types.GPUVertBuf(layout, len(self.vertices))
+            vertices.attr_fill("position", self.vertices)
+            vertices.attr_fill("framed", framed(self.vertices, to_frame))
+            self._buffers["vertices"], self._to_frame = vertices, to_frame
+        key = kind, *which
+        if key not in self._buffers:
+            self._buffers[key] = gpu.types.GPUIndexBuf(type=kind, seq=np.ascontiguousarray(corners(), np.uint32))
+        return gpu.types.GPUBatch(type=kind, buf=self._buffers["vertices"], elem=self._buffers[key])
+
+
+def framed(vertices, to_frame):
+    """Returns the places of vertices in the frame of a tree, (n, 3) float32.
+
+    They are computed in double precision. A shader has float32 alone, in which the product for vertices far from their origin
+    would lose all digits that count.
+    """
+    return mesh_io.to_world(vertices, to_frame).astype(np.float32)
+
+
+class Surface(Triangles):
+    """The triangles of an object as the 3D view shows it now."""
 
     def __init__(self):
-        self.vertices = None  # (n, 3) float32, local
-        self.triangles = None  # (m, 3) int32
-        self.changes = 0  # how often a changed mesh was read
+        super().__init__()
+        self.all_triangles = None  # (k, 3) int32, with those that are hidden in Edit and Sculpt Mode
         self._polygons = 0
         self._mode = None
         self._edges = None  # (k, 2) int32, in Edit Mode
         self._selected = None  # (k,) bool: whether the edge is selected, in Edit Mode
-        self._buffers = {}
         self._stale = True  # The positions may have changed.
         self._recut = True  # The triangles may have changed.
 
@@ -54,7 +91,7 @@ class Surface:
             return
         if recut:
             mesh.calc_loop_triangles()
-            self.triangles = mesh_io.column(mesh.loop_triangles, "vertices", 3, np.int32)
+            self.triangles = self.all_triangles = mesh_io.column(mesh.loop_triangles, "vertices", 3, np.int32)
             if hides:
                 hidden = mesh_io.column(mesh.polygons, "hide", 1, bool)
                 self.triangles = self.triangles[
@@ -74,26 +111,11 @@ class Surface:
         for selected in (False, True):
             self._buffers.pop(("LINES", selected), None)
 
-    def draw(self, shader):
-        if len(self.triangles):
-            self._batch("TRIS", lambda: self.triangles).draw(shader)
-
-    def draw_edges(self, shader, selected):
+    def draw_edges(self, shader, to_frame, selected):
         """Draws the selected edges or the edges that are not selected, in Edit Mode."""
         chosen = self._selected == selected
         if chosen.any():
-            self._batch("LINES", lambda: self._edges[chosen], selected).draw(shader)
-
-    def _batch(self, kind, corners, *which):
-        if "vertices" not in self._buffers:
-            layout = gpu.types.GPUVertFormat()
-            layout.attr_add(id="position", comp_type="F32", len=3, fetch_mode="FLOAT")
-            self._buffers["vertices"] = gpu.types.GPUVertBuf(layout, len(self.vertices))
-            self._buffers["vertices"].attr_fill("position", self.vertices)
-        key = kind, *which
-        if key not in self._buffers:
-            self._buffers[key] = gpu.types.GPUIndexBuf(type=kind, seq=np.ascontiguousarray(corners(), np.uint32))
-        return gpu.types.GPUBatch(type=kind, buf=self._buffers["vertices"], elem=self._buffers[key])
+            self._batch(to_frame, "LINES", lambda: self._edges[chosen], selected).draw(shader)
 
 
 def sculpted_vertices(ob):

@@ -3,7 +3,7 @@
 
 import bpy
 
-from .. import overlay
+from .. import measuring, overlay
 from ..operators.probe import TOLVOL_OT_probe, tolerance_of
 from ..overlay import reasons
 from ..proof import kept_warnings, labels, last_run, probing, report, statistics, verdict
@@ -60,8 +60,7 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         column = box.column(align=True)
         for text, side in (("Mesh", "forward"), ("Reference", "backward")):
             value = getattr(found, side).upper if found else None
-            share = report.percent(value, found.tolerance) if found else None
-            _row(column, text, share if narrow or not found else f"{length(context, value)}  {share}", narrow)
+            _row(column, text, _distance(context, value, found.tolerance, narrow) if found else None, narrow)
         if found:
             left = found.margin_percent()
             left = left if narrow else f"{length(context, abs(found.margin))}  {left}"
@@ -69,6 +68,14 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
             _row(column, name, left, narrow)
         else:
             _row(column, "Margin", None, narrow)
+
+
+def _distance(context, value, tolerance, narrow):
+    """Returns a proved distance as text: as a length and as a share of the tolerance, or as the share alone."""
+    if verdict.negligible(value, tolerance):
+        return "almost 0"
+    share = report.percent(value, tolerance)
+    return share if narrow else f"{length(context, value)}  {share}"
 
 
 def _draw_last_run(context, layout, ob):
@@ -98,7 +105,7 @@ def _row(column, name, text, narrow):
 
 
 def _why_not_checked(ob):
-    if overlay.measuring.wanted(ob):
+    if measuring.wanted(ob):
         return "Being measured"
     if ob.mode != "OBJECT":
         return "Switch to Object Mode to measure or decimate"
@@ -124,12 +131,14 @@ class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
         column = self.layout.column()
         column.active = ob.tolvol.show_deviation
         unsigned = reasons.unsigned(ob)
+        column.row().prop(ob.tolvol, "deviation_surface", expand=True)
         row = column.row()
         row.enabled = not unsigned
         row.prop(ob.tolvol, "deviation_kind", expand=True)
         column.prop(ob.tolvol, "deviation_opacity")
         legend = column.column()
         legend.use_property_split, legend.use_property_decorate = True, False
+        legend.prop(ob.tolvol, "deviation_palette")
         legend.prop(ob.tolvol, "deviation_range")
         if ob.tolvol.deviation_range == "FIXED":
             legend.prop(ob.tolvol, "deviation_limit")

@@ -129,6 +129,15 @@ class Verdict:
         return f"Beyond the tolerance{share}"
 
 
+# What is a smaller share of the tolerance is no more than rounding.
+_ROUNDING = 1e-6
+
+
+def negligible(distance, tolerance):
+    """Whether a distance is so small beside the tolerance that its digits say nothing."""
+    return distance < _ROUNDING * tolerance
+
+
 # A distance is this many times larger or smaller than the tolerance only if the file is damaged.
 _MOST = 1e300
 
@@ -162,3 +171,9 @@ def word(ob):
     """Returns the word for the present state of `ob`."""
     found = of(ob)
     return found.word if found else NOT_CHECKED
+
+
+def together(words):
+    """Returns the word for several objects: FAIL if one of them fails, PASS if all pass."""
+    words = set(words)
+    return FAIL if FAIL in words else NOT_CHECKED if NOT_CHECKED in words else PASS

@@ -7,7 +7,9 @@ import bmesh
 import bpy
 import pytest
 
-from addon.overlay import measuring, work
+from addon import measuring
+from addon.overlay import work
+from addon.panels import deviation
 from addon.proof import statistics, verdict
 from addon.proof.verdict import FAIL, NOT_CHECKED, PASS
 from addon.reference import measurements
@@ -96,6 +98,12 @@ def test_a_mesh_that_changes_meanwhile_is_measured_again():
     assert work._running is None or work._running[2].progress.cancelled
     measured()
     assert verdict.word(ob) == FAIL
+
+
+@pytest.mark.parametrize("share", (0.9e-6, 1.1e-6))
+def test_what_is_no_more_than_rounding_is_said_to_be_almost_nothing(share):
+    text = deviation._distance(bpy.context, share * 0.02, 0.02, False)
+    assert (text == "almost 0") == (share < 1e-6)
 
 
 def test_only_what_is_shown_or_guarded_is_measured():

@@ -4,6 +4,7 @@
 import copy
 import threading
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -11,10 +12,10 @@ import pytest
 import addon
 from addon import native, overlay, preferences
 from addon.mesh import mesh_io
-from addon.overlay import draw, field, legend, reasons, shares, surface, work
+from addon.overlay import coloured, draw, field, legend, reasons, shaders, shares, surface, work
 from addon.overlay.scale import Scale, rounded_up
 from addon.reference import snapshots, tolerances
-from scenes import add_object, sheet, torus, world_triangles
+from scenes import add_object, sheet, sheet_arrays, torus, world_triangles
 
 
 def with_reference(ob):
@@ -147,7 +148,8 @@ def test_bands_of_the_legend():
     distances = [-1.5, -0.9, -0.6, -0.1, 0.0, 0.3, 0.6, 0.9, 0.95, 1.2]
     assert folded(scale(), distances) == pytest.approx([0.2, 0.1, 0.2, 0.3, 0.2])
     assert folded(scale(signed=False), distances) == pytest.approx([0.2, 0.1, 0.2, 0.3, 0.2])
-    assert len(scale().edges()) == 5 and len(scale(signed=False).edges()) == 9
+    edges = scale().edges()
+    assert {-1, -0.5, 0, 0.5, 1} <= {*edges} and (np.diff(edges) > 0).all()
     said = [legend.percent(share).replace("\u00a0", " ") for share in (0, 1e-5, 0.0123, 0.99999, 1)]
     assert said == ["0.0 %", "< 0.1 %", "1.2 %", "> 99.9 %", "100.0 %"]
 
@@ -186,11 +188,13 @@ def test_the_range_is_the_tolerance_a_fixed_length_or_the_largest_distance(monke
     bpy.context.view_layer.update()
     shown = surface.Surface()
     shown.update(ob, bpy.context.evaluated_depsgraph_get())
-    found, settings = field._prepare(ob.name, 0.05)(None), ob.tolvol
+    settings = ob.tolvol
 
     def present():
-        draw._shares(ob, shown, found, draw.scale_of(bpy.context, ob, found.tree))
-        return draw.scale_of(bpy.context, ob, found.tree)
+        for _ in range(3):  # The first call has the tree made, the second has the largest distance measured.
+            what, _ = coloured.of(ob, shown)
+            drawn = what and draw.with_scales(bpy.context, {ob: what})
+        return drawn[ob].scale
 
     def farthest():
         (vertices, triangles), points = reference, mesh_io.column(ob.data.vertices, "co", 3)
@@ -203,7 +207,7 @@ def test_the_range_is_the_tolerance_a_fixed_length_or_the_largest_distance(monke
     settings.deviation_range, settings.deviation_limit = "FIXED", 0.3
     assert present().reach == 0.3
     settings.deviation_limit = 1e-12
-    assert present().reach == field.finest(found.tree) > 1e-9
+    assert present().reach == field.finest(field.at_hand(ob).tree) > 1e-9
     settings.deviation_range = "AUTOMATIC"
     assert present().reach == rounded_up(farthest()) and farthest() > 2 * tolerance
     ob.data.vertices[0].co.z += 1
@@ -214,9 +218,137 @@ def test_the_range_is_the_tolerance_a_fixed_length_or_the_largest_distance(monke
     assert present().reach == rounded_up(farthest()) and farthest() > 0.8
     shares.forget()
     bpy.ops.tolvol.set_reference(replace=True)
-    found = field._prepare(ob.name, 0.05)(None)
     assert present().reach == tolerances.tolerance_length(settings, settings.snapshot_size)  # Nothing deviates.
     shares.forget()
+
+
+def test_selected_objects_have_one_scale_as_the_active_one_demands(monkeypatch):
+    monkeypatch.setattr(work, "later", lambda _about, _seconds, prepare, finish: finish(prepare()(None), None))
+    objects, found = [sheet(bumps=0.0), torus()], {}
+    for ob, percent, height in zip(objects, (1, 2), (0.38, 0.0)):
+        bpy.ops.object.select_all(action="DESELECT")
+        bpy.context.view_layer.objects.active = ob
+        ob.select_set(True)
+        ob.tolvol.tolerance_percent = percent
+        with_reference(ob).data.vertices[0].co.z += height
+        ob.data.update()
+    bpy.context.view_layer.update()
+    for ob in objects:
+        shown = surface.Surface()
+        shown.update(ob, bpy.context.evaluated_depsgraph_get())
+        found[ob] = [coloured.of(ob, shown) for _ in range(2)][1][0]
+    plane, ring = objects
+
+    def scales():
+        for _ in range(2):
+            drawn = draw.with_scales(bpy.context, found)
+        return [drawn[ob].scale for ob in objects]
+
+    each = [coloured.tolerance_of(ob) for ob in objects]
+    alone = scales()
+    assert [scale.reach for scale in alone] == each and [scale.signed for scale in alone] == [False, True]
+    plane.select_set(True)
+    together = scales()
+    assert {scale.reach for scale in together} == {max(each)} and [scale.tolerance for scale in together] == each
+    assert not any(scale.signed for scale in together), "the sheet has no sides"
+    ring.tolvol.deviation_range, ring.tolvol.use_bands, ring.tolvol.band_count = "AUTOMATIC", True, 6
+    ring.tolvol.deviation_palette = "NOMINAL"
+    assert [(scale.reach, scale.bands) for scale in scales()] == [(0.4, 6)] * 2
+    assert {drawn.palette for drawn in draw.with_scales(bpy.context, found).values()} == {"NOMINAL"}
+    shares.forget()
+
+
+def test_shares_of_several_objects_count_by_their_areas():
+    small, large = (shares.Shares([part, 1 - part], 0.0, [part], area) for part, area in ((1.0, 1.0), (0.2, 3.0)))
+    both = shares.together([small, large])
+    assert both.bands == pytest.approx([0.4, 0.6]) and both.area == 4 and both.histogram == pytest.approx([0.4])
+    assert shares.together([small, None]) is None
+
+
+def test_colours_from_green_to_red():
+    for signed, first in ((False, (60, 190, 90)), (True, (40, 60, 200))):
+        table = shaders.colours_of(signed, "NOMINAL")
+        assert tuple(table[0]) == first and tuple(table[-1]) == (215, 40, 40)
+    assert tuple(table[len(table) // 2]) == (60, 190, 90), "nothing is green"
+
+
+def reference_shown(ob):
+    """Returns what is coloured of `ob` if that is its reference, once the tree of the mesh has been made."""
+    ob.tolvol.deviation_surface = "REFERENCE"
+    shown = surface.Surface()
+    shown.update(ob, bpy.context.evaluated_depsgraph_get())
+    return [coloured.of(ob, shown) for _ in range(2)][1][0]
+
+
+@pytest.mark.parametrize("own", (True, False))
+def test_the_reference_is_coloured_by_its_distance_from_the_present_mesh(monkeypatch, own):
+    monkeypatch.setattr(work, "later", lambda _about, _seconds, prepare, finish: finish(prepare()(None), None))
+    ob = sheet(count=20, bumps=0.0)
+    if not own:
+        ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", sheet("other", count=20, bumps=0.0)
+        bpy.context.view_layer.objects.active = ob
+    with_reference(ob)
+    bpy.ops.object.mode_set(mode="EDIT")
+    edited = bmesh.from_edit_mesh(ob.data)
+    lost = [face for face in edited.faces if face.calc_center_median().length < 0.5]
+    share = len(lost) / len(edited.faces)
+    bmesh.ops.delete(edited, geom=lost, context="FACES")
+    next(face for face in edited.faces).hide = True  # What is hidden is still there.
+    bmesh.update_edit_mesh(ob.data)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    ob.location.x += 0.5
+    bpy.context.view_layer.update()
+    what = reference_shown(ob)
+    corners = what.triangles.vertices
+    assert len(what.triangles.triangles) == 800 and not what.signed and what.present
+    # A reference of its own moves along with the object, another object's stays.
+    expected = 0 if own else 0.5
+    distance = what.tree.signed_distance(corners, to_world=what.to_world)
+    at_the_edge = np.abs(corners[:, 0] + 1) < 1e-6
+    assert np.abs(distance[at_the_edge]) == pytest.approx(expected, abs=1e-5)
+    middle = np.linalg.norm(corners, axis=1) < 1e-6
+    if own:
+        assert np.abs(distance[middle]).min() > 0.4
+        counted = shares.known(ob.name, what, scale(0.01, False)) or shares.known(ob.name, what, scale(0.01, False))
+        assert counted.outside == pytest.approx(share, abs=0.02) and counted.area == pytest.approx(4)
+    shares.forget()
+    field.keep_only_meshes(set())
+
+
+def test_a_tree_of_the_mesh_before_its_last_change_is_known_as_such(monkeypatch):
+    monkeypatch.setattr(work, "later", lambda _about, _seconds, prepare, finish: finish(prepare()(None), None))
+    ob = with_reference(sheet(count=10, bumps=0.0))
+    ob.tolvol.deviation_surface = "REFERENCE"
+    shown = surface.Surface()
+    shown.update(ob, bpy.context.evaluated_depsgraph_get())
+    what = [coloured.of(ob, shown) for _ in range(2)][1][0]
+    assert what.present
+    for change in (lambda: setattr(ob.data.vertices[0].co, "z", 1), lambda: setattr(ob, "scale", (2, 1, 1))):
+        change()
+        ob.data.update()
+        bpy.context.view_layer.update()
+        shown.touch(False)
+        shown.update(ob, bpy.context.evaluated_depsgraph_get())
+        # The views show it, but no shares of it are counted, until the next tree is there.
+        old, _ = coloured.of(ob, shown)
+        assert not old.present and shares.known(ob.name, old, scale(0.01, False)) is None
+        assert coloured.of(ob, shown)[0].present
+    field.keep_only_meshes(set())
+    shares.forget()
+
+
+def test_far_from_its_origin_an_untouched_mesh_does_not_deviate():
+    """A shader has float32 alone: the places in the frame are computed in double precision."""
+    far = np.array([1e5, -2e5, 3e4])
+    vertices, faces = sheet_arrays(count=20)
+    ob = with_reference(add_object("far", (vertices + far).astype(np.float32), faces))
+    shown = surface.Surface()
+    shown.update(ob, bpy.context.evaluated_depsgraph_get())
+    made = field._prepare(ob.name, 0.01)(None)
+    framed = surface.framed(shown.vertices, field.vertex_to_frame(made, ob))
+    corners = made.tree.corners[:, :3]
+    nearest = np.array([np.abs(corners - place).sum(1).min() for place in framed[:: len(framed) // 20]])
+    assert nearest.max() < made.tree.ROUNDING
 
 
 def test_shares_of_another_tolerance_or_mesh_are_left_blank(monkeypatch):
@@ -225,10 +357,10 @@ def test_shares_of_another_tolerance_or_mesh_are_left_blank(monkeypatch):
     found.update(ob, bpy.context.evaluated_depsgraph_get())
     waiting = []
     monkeypatch.setattr(work, "later", lambda _about, _seconds, prepare, finish: waiting.append((prepare, finish)))
-    made = field._prepare(ob.name, 0.05)(None)
+    field._fields[field.key_of(ob)] = field._prepare(ob.name, 0.05)(None)
 
     def known(tolerance):
-        return shares.known(ob, found, made, scale(tolerance), False, lambda: None)
+        return shares.known(ob.name, coloured.of(ob, found)[0], scale(tolerance))
 
     def count():
         prepare, finish = waiting.pop()
@@ -236,7 +368,9 @@ def test_shares_of_another_tolerance_or_mesh_are_left_blank(monkeypatch):
 
     assert known(0.05) is None
     count()
-    assert sum(known(0.05)) == pytest.approx(1) and not waiting
+    counted = known(0.05)
+    assert sum(counted.bands) + counted.outside == pytest.approx(1) and not waiting
+    assert sum(counted.histogram) == pytest.approx(sum(counted.bands)) and len(counted.histogram) == 48
     assert known(0.04) is None
     count()
     assert known(0.04) is not None and known(0.05) is None
@@ -271,7 +405,8 @@ def test_the_count_of_shares_is_cancelled_in_its_middle():
 
     slow = copy.copy(made)
     slow.tree = LongTree()
-    assert shares.known(ob, found, slow, scale(0.05), False, lambda: None) is None
+    what = coloured.Coloured(found, np.eye(4), np.eye(4), slow, True, True)
+    assert shares.known(ob.name, what, scale(0.05)) is None
     work._tick()
     assert began.wait(60) and not outcomes
     work.stop()  # waits for the thread

@@ -19,6 +19,7 @@ from window import (
     reset,
     screenshot,
     scroll_down,
+    sent,
     view,
     window_context,
     xdotool,
@@ -125,6 +126,56 @@ def test_range_and_bands_of_the_colours():
     space = view()[1].spaces[0]
     space.show_gizmo = space.overlay.show_cursor = space.overlay.show_object_origins = True
     assert overlay.shows(the_ramp())
+
+
+def test_the_legend_is_dragged_and_is_one_for_selected_objects():
+    yield from reset(ramp)
+    said, stop = labels_of_the_legend()
+    try:
+        xdotool("mousemove", *on_screen(region("WINDOW"), 120, 600))
+        view()[1].spaces[0].show_gizmo = True
+        place = region("WINDOW")
+        yield from finished(lambda: "Outside" in said and legend.box(place) is not None)
+        first = legend.box(place)
+        grip = on_screen(place, int(first[0]) + 20, place.height - int(first[1]) - 20)
+        # Blender has to see the mouse over the legend before the button goes down.
+        for by in (0, 1):
+            yield from sent("mousemove", grip[0] + by, grip[1])
+        xdotool("mousedown", 1)
+        for step in range(5):
+            yield 0.2
+            xdotool("mousemove", grip[0] + 1 - 50 * step, grip[1] - 40 * step)
+        yield 0.2
+        xdotool("mouseup", 1)
+        yield from finished(lambda: abs(legend.box(place)[0] - first[0] + 200) < 10)
+        assert abs(legend.box(place)[1] - first[1] - 160) < 10
+        screenshot("legend 9 dragged")
+        # It stays in the view, and each view has its own place for it.
+        with window_context():
+            legend.move(bpy.context, -500, 5000)
+        view()[1].tag_redraw()
+        yield from finished(lambda: 0 < legend.box(place)[0] < 100)
+        assert legend.box(place)[1] + legend.box(place)[3] < place.height
+        legend.forget_moved()
+        # The legend of several selected objects is one, with the largest of their ranges.
+        other = the_ramp().copy()
+        other.data, other.location.x = the_ramp().data.copy(), 2.5
+        bpy.context.collection.objects.link(other)
+        other.tolvol.tolerance_length = 0.3
+        other.select_set(True)
+        said.clear()
+        yield from finished(lambda: "Deviation of 2 objects" in said and "+30 cm" in said)
+        yield from finished(lambda: any(text.endswith(" %") for text in said))
+        yield 1.0
+        screenshot("legend 10 two objects")
+        other.select_set(False)
+        said.clear()
+        view()[1].tag_redraw()
+        yield from finished(lambda: "Deviation of ramp" in said and "+10 cm" in said)
+    finally:
+        stop()
+    view()[1].spaces[0].region_3d.view_perspective = "PERSP"
+    view()[1].spaces[0].overlay.show_cursor = view()[1].spaces[0].overlay.show_object_origins = True
 
 
 def test_statistics_are_unfolded_and_measured():

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The colours of Show Deviation: the tests count pixels of the screen."""
 
+import bmesh
 import bpy
 import numpy as np
+from mathutils import Vector
 
 import scenes
-from addon import native, overlay
+from addon import guard, native, overlay
 from addon.proof import verdict
 from test_panel import monkey, suzanne
 from window import (
@@ -35,6 +37,45 @@ def ball():
     bpy.context.object.tolvol.deviation_kind = "MAGNITUDE"
     bpy.context.object.tolvol.deviation_opacity = 1
     view()[1].spaces[0].region_3d.view_distance = 5
+
+
+def test_a_hole_that_is_cut_is_seen_on_the_reference_and_the_guard_puts_it_back():
+    yield from reset(ball)
+    ob = the_object()
+    bpy.ops.tolvol.set_reference()
+    xdotool("mousemove", *centre())
+    yield from finished(lambda: near() > 30_000)
+    ob.tolvol.deviation_surface = "REFERENCE"
+    to_mode("EDIT")
+    towards = view()[1].spaces[0].region_3d.view_rotation @ Vector((0, 0, 1))
+    edited = bmesh.from_edit_mesh(ob.data)
+    for face in edited.faces:
+        face.select = face.normal.dot(towards) > 0.9
+    with window_context():
+        bpy.ops.mesh.select_mode(type="FACE")
+    bmesh.update_edit_mesh(ob.data)
+    whole = len(edited.faces)
+    yield from finished(lambda: near() > 30_000 and verdict.word(ob) == verdict.PASS)
+    assert striped() == 0
+    xdotool("key", "x", "sleep", "0.5", "key", "f")
+    yield from finished(lambda: verdict.word(ob) == verdict.FAIL)
+    yield from finished(lambda: striped() > 1000)
+    screenshot("overlay 10 hole on the reference")
+    assert verdict.of(ob).ways == "the reference" and len(bmesh.from_edit_mesh(ob.data).faces) < whole
+    key("ctrl+z")
+    yield from finished(lambda: striped() == 0 and verdict.word(ob) == verdict.PASS)
+    undone, undo = [], guard.edit.undo
+    guard.edit.undo = lambda: undone.append(len(bmesh.from_edit_mesh(ob.data).faces)) or undo()
+    try:
+        ob.tolvol.guard.editing = True
+        ob.update_tag()
+        yield from finished(lambda: [on for _, _, on in guard.states(ob)] == [True])
+        xdotool("key", "x", "sleep", "0.5", "key", "f")
+        yield from finished(lambda: undone and verdict.word(ob) == verdict.PASS)
+    finally:
+        guard.edit.undo = undo
+    assert undone[0] < whole == len(bmesh.from_edit_mesh(ob.data).faces)
+    to_mode("OBJECT")
 
 
 def solid_monkey():
@@ -174,8 +215,8 @@ def shown_as_magnitude(ob, percent):
 
 def counted():
     """Returns the tolerance for which the legend shows shares, or None while they are blank."""
-    last = overlay.shares._known.get(the_object().name)
-    return last and last[0][2]
+    (_, scale), found = overlay.shares._counted.get(the_object().name) or ((None, None), None)
+    return found and scale.tolerance
 
 
 def far():

@@ -11,12 +11,12 @@ import time
 import bpy
 from bpy.app.handlers import persistent
 
-from .. import native, preferences
-from ..errors import Refused
-from ..proof import measure
-from ..redraw import redraw_views
-from ..reference import measurements, snapshots, tolerances
-from . import work
+from . import native, preferences
+from .errors import Refused
+from .overlay import work
+from .proof import measure
+from .redraw import redraw_views
+from .reference import measurements, snapshots, tolerances
 
 _MODES = {"EDIT", "SCULPT"}
 # A mesh rests if it has not changed for so many seconds.
@@ -126,12 +126,14 @@ def _forget(*_):
 
 
 def register():
+    snapshots.listeners.append(refresh)
     if not bpy.app.background:
         bpy.app.handlers.depsgraph_update_post.append(_note_changes)
     bpy.app.handlers.load_pre.append(_forget)
 
 
 def unregister():
+    snapshots.listeners.remove(refresh)
     if not bpy.app.background:
         bpy.app.handlers.depsgraph_update_post.remove(_note_changes)
     bpy.app.handlers.load_pre.remove(_forget)
