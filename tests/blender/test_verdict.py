@@ -129,8 +129,10 @@ _OTHERS = {
     ("addon/overlay/field.py", "finest"),  # whether colours can show the tolerance
     ("addon/overlay/scale.py", "self.tolerance"),  # the shares in the legend of the colours, which prove nothing
     ("addon/proof/deviation_page.py", "abs(lower)"),  # the bars of the histogram that are striped
+    ("addon/operators/modifiers.py", "largest > self.tolerance"),  # where sampling ends; the proof decides afterwards
     ("blender_scripts/decimate.py", "tolerance > size"),  # an argument that makes no sense
     ("blender_scripts/decimate.py", "left <= target"),  # numbers of triangles
+    ("blender_scripts/decimate.py", "tolerance <= found[i - 1]"),  # the order of the levels
 }
 
 
