@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The add-on's preferences, in Edit > Preferences > Add-ons: default tolerance, threads, and drawing in 3D views."""
 
+from pathlib import Path
+
 import bpy
 import gpu
 from bpy.props import BoolProperty, FloatProperty, IntProperty
@@ -20,6 +22,13 @@ PERCENT = {
     "precision": 3,
     "subtype": "PERCENTAGE",
 }
+
+
+def manual():
+    """Returns the path of the manual: in the package it is beside the add-on's files, in a checkout in docs/."""
+    folder = Path(__file__).resolve().parent
+    packed = folder / "manual.md"
+    return packed if packed.is_file() else folder.parent / "docs" / "manual.md"
 
 
 class TOLVOL_AP_preferences(bpy.types.AddonPreferences):
@@ -49,6 +58,7 @@ class TOLVOL_AP_preferences(bpy.types.AddonPreferences):
 
     def draw(self, context):
         self.layout.use_property_split = True
+        self.layout.operator("wm.url_open", text="Manual", icon="HELP").url = manual().as_uri()
         if native.module is None:
             self.layout.label(text=native.reason, icon="ERROR")
             return

@@ -9,6 +9,7 @@ from .deform import TOLVOL_PT_deform
 from .deviation import (
     TOLVOL_PT_deviation,
     TOLVOL_PT_labels,
+    TOLVOL_PT_objects,
     TOLVOL_PT_show_deviation,
     TOLVOL_PT_statistics,
     TOLVOL_UL_labels,
@@ -25,6 +26,7 @@ _CLASSES = (
     TOLVOL_PT_protect,
     TOLVOL_PT_advanced,
     TOLVOL_PT_deviation,
+    TOLVOL_PT_objects,
     TOLVOL_UL_labels,
     TOLVOL_PT_labels,
     TOLVOL_PT_statistics,

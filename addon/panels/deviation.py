@@ -72,10 +72,13 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
 
 def _distance(context, value, tolerance, narrow):
     """Returns a proved distance as text: as a length and as a share of the tolerance, or as the share alone."""
-    if verdict.negligible(value, tolerance):
-        return "almost 0"
-    share = report.percent(value, tolerance)
-    return share if narrow else f"{length(context, value)}  {share}"
+    share = _share(value, tolerance)
+    return share if narrow or verdict.negligible(value, tolerance) else f"{length(context, value)}  {share}"
+
+
+def _share(value, tolerance):
+    """Returns a proved distance as text, as a share of the tolerance."""
+    return "almost 0" if verdict.negligible(value, tolerance) else report.percent(value, tolerance)
 
 
 def _draw_last_run(context, layout, ob):
@@ -110,6 +113,46 @@ def _why_not_checked(ob):
     if ob.mode != "OBJECT":
         return "Switch to Object Mode to measure or decimate"
     return "Press Check to measure it" if ob.tolvol.snapshot else "Set the reference first"
+
+
+class TOLVOL_PT_objects(SubPanel, bpy.types.Panel):
+    """The verdicts of the selected objects that have a reference."""
+
+    bl_label = "Selected Objects"
+    bl_parent_id = "TOLVOL_PT_deviation"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and len(_listed(context)) > 1
+
+    def draw(self, context):
+        rows = verdicts(_listed(context))
+        column = self.layout.column(align=True)
+        for name, word, share in rows[:_MOST_LISTED]:
+            row = column.split(factor=0.5)
+            row.label(text=name, icon=_ICONS_OF[word])
+            right(row, word if share is None or is_narrow(context) else f"{word}  {share}")
+        if rest := [word for _, word, _ in rows[_MOST_LISTED:]]:
+            more = ", ".join(f"{rest.count(word):,} {word}" for word in _ICONS_OF if word in rest)
+            text_lines(context, column, f"and {more}", "BLANK1")
+
+
+_MOST_LISTED = 20
+# What needs attention comes first.
+_ICONS_OF = {verdict.FAIL: RED, verdict.NOT_CHECKED: GREY, verdict.PASS: GREEN}
+
+
+def _listed(context):
+    return [ob for ob in context.selected_objects if ob.type == "MESH" and ob.tolvol.snapshot is not None]
+
+
+def verdicts(objects):
+    """Returns (name, word, share of the tolerance as text or None) for each object, in the order of the list."""
+    rows = []
+    for ob in objects:
+        found = verdict.of(ob)
+        rows.append((ob.name, verdict.word(ob), found and _share(found.largest, found.tolerance)))
+    return sorted(rows, key=lambda row: ([*_ICONS_OF].index(row[1]), row[0]))
 
 
 class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):

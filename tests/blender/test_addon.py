@@ -16,7 +16,7 @@ import pytest
 import tomllib
 
 import addon
-from addon import native
+from addon import native, preferences
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -174,8 +174,26 @@ def test_package_holds_what_is_here():
     assert native.path.name in {Path(name).name for name in modules} and len(shaders) == 2
     assert others - libraries - shaders == {
         "tolerance_volumes/LICENSE",
+        "tolerance_volumes/manual.md",
         "tolerance_volumes/bin/tolvol/__init__.py",
     }
+
+
+def test_the_preferences_open_the_manual_of_the_package(tmp_path):
+    zipfile.ZipFile(package()).extractall(tmp_path)
+    out = run_blender(
+        f"""
+import sys
+sys.path.insert(0, {str(tmp_path)!r})
+from tolerance_volumes import preferences
+print("manual at", preferences.manual())
+ok()
+""",
+        tmp_path,
+    )
+    packed = tmp_path / "tolerance_volumes" / "manual.md"
+    assert f"manual at {packed}" in out and packed.read_text().startswith("# Manual\n")
+    assert preferences.manual() == ROOT / "docs" / "manual.md"
 
 
 DECIMATE = """

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from addon.mesh import mesh_io
+from addon.panels import deviation
 from addon.proof import verdict
 from addon.proof.verdict import FAIL, NOT_CHECKED, PASS, Interval, Verdict
 from scenes import sheet, torus
@@ -121,6 +122,28 @@ def test_operations_begin_their_message_with_the_word(capfd):
     assert "PASS: 2,304 -> " in capfd.readouterr().out
     assert bpy.ops.tolvol.smooth() == {"FINISHED"}
     assert "PASS: " in capfd.readouterr().out and verdict.word(ob) == PASS
+
+
+def test_the_list_of_the_selected_objects_has_their_verdicts_and_what_fails_first():
+    objects = [shifted(), torus("whole"), torus("another"), sheet("unknown")]
+    objects[0].tolvol.tolerance_length = 0.05
+    for ob in objects[1:]:
+        bpy.context.view_layer.objects.active = ob
+        assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    for ob in objects[:3]:
+        bpy.context.view_layer.objects.active = ob
+        assert bpy.ops.tolvol.check() == {"FINISHED"}
+    rows = deviation.verdicts(objects)
+    assert [row[:2] for row in rows] == [
+        ("sheet", FAIL),
+        ("unknown", NOT_CHECKED),
+        ("another", PASS),
+        ("whole", PASS),
+    ]
+    assert [row[2] for row in rows] == ["200 %", None, "almost 0", "almost 0"]
+    assert verdict.together(word for _, word, _ in rows) == FAIL
+    assert verdict.together(word for _, word, _ in rows[1:]) == NOT_CHECKED
+    assert verdict.together(word for _, word, _ in rows[2:]) == PASS
 
 
 # Comparisons with a tolerance that decide something else: (file, a part of the line).
