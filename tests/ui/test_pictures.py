@@ -14,7 +14,7 @@ from addon import guard
 from addon.proof import verdict
 from addon.reference import measurements
 from test_guard import all_panels, only_guard_panel
-from test_show_deviation import sides, solid_monkey, stroke, surface, the_object, to_mode
+from test_show_deviation import counted, sides, solid_monkey, stroke, surface, the_object, to_mode
 from window import (
     draw_finely,
     finished,
@@ -55,7 +55,8 @@ def test_pictures_for_the_documentation():
         bpy.context.tool_settings.sculpt.brush.strength = 1
         yield from draw(*_FOREHEAD)
         yield from finished(lambda: sides()[0] > 300)
-        yield 1.0  # By then the legend has its shares. The status bar shows its message for four seconds.
+        yield from finished(lambda: verdict.word(the_object()) == verdict.PASS and counted() is not None, pause=0.05)
+        yield 0.3
         picture("guard")
     finally:
         all_panels()
