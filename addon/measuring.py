@@ -31,7 +31,8 @@ def wanted(ob):
     settings = ob.tolvol
     if native.module is None or ob.type != "MESH" or ob.mode not in _MODES or snapshots.reference_missing(ob):
         return False
-    if ob.mode == "SCULPT" and ob.use_dynamic_topology_sculpting:
+    # What is sculpted with these two is not in the stored mesh.
+    if ob.mode == "SCULPT" and (ob.use_dynamic_topology_sculpting or any(m.type == "MULTIRES" for m in ob.modifiers)):
         return False
     return settings.show_deviation or (settings.guard.editing if ob.mode == "EDIT" else settings.guard.sculpting)
 

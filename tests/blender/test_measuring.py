@@ -117,3 +117,14 @@ def test_only_what_is_shown_or_guarded_is_measured():
     assert verdict.word(ob) == PASS
     bpy.ops.object.mode_set(mode="OBJECT")
     assert not measuring.wanted(ob), "there is Check"
+
+
+def test_what_is_sculpted_outside_of_the_stored_mesh_is_not_measured():
+    ob = in_mode("SCULPT")
+    assert measuring.wanted(ob)
+    bpy.ops.sculpt.dynamic_topology_toggle()
+    assert not measuring.wanted(ob)
+    bpy.ops.sculpt.dynamic_topology_toggle()
+    assert measuring.wanted(ob)
+    ob.modifiers.new("multires", "MULTIRES")
+    assert not measuring.wanted(ob)
