@@ -19,6 +19,7 @@
 #include "check/certificate.h"
 #include "decimation/decimation.h"
 #include "field/display_grid.h"
+#include "field/display_tree.h"
 #include "many.h"
 #include "measure/deviation.h"
 #include "measure/hausdorff.h"
@@ -28,8 +29,10 @@
 #include "motion/smoothing.h"
 #include "repair/close_holes.h"
 #include "shapes.h"
+#include "topology/area_and_volume.h"
 #include "topology/crossings.h"
 #include "topology/solidity.h"
+#include "topology/wedges.h"
 
 namespace {
 
@@ -254,21 +257,58 @@ TEST(Allocation, FactsAboutASurface) {
     EXPECT_GT(fail_allocations([&] {
                 Team team(threads);
                 const Solidity found = solidity(tangled, scene.mesh.triangles, team);
-                return Numbers{double(found.shells), double(found.open_edges)};
+                const AreaAndVolume extent =
+                    area_and_volume(tangled, scene.mesh.triangles, found.shell_of, glm::dmat3(1));
+                return Numbers{double(found.shells), double(found.open_edges), extent.area, extent.volume};
               }),
               5);
   }
 }
 
+TEST(Allocation, SeamsAndIslands) {
+  const Scene scene;
+  EXPECT_GT(fail_allocations([&] {
+              std::vector<float> values;  // a seam around the torus
+              for (std::size_t i = 0; i < scene.mesh.triangles.size(); ++i) {
+                values.insert(values.end(), 3, i < scene.mesh.triangles.size() / 2 ? 0.0f : 1.0f);
+              }
+              const std::vector<std::uint32_t> labels = wedge_labels(scene.mesh.triangles, values, 1);
+              std::vector<glm::uvec3> wedges;
+              for (std::size_t i = 0; i < labels.size(); i += 3) {
+                wedges.emplace_back(labels[i], labels[i + 1], labels[i + 2]);
+              }
+              const std::vector<std::uint32_t> islands = island_labels(scene.mesh.triangles, wedges);
+              Numbers numbers(labels.begin(), labels.end());
+              numbers.insert(numbers.end(), islands.begin(), islands.end());
+              return numbers;
+            }),
+            10);
+}
+
 TEST(Allocation, VolumeAndChecks) {
   const Scene scene;
-  const auto distances = [&](unsigned threads) {
+  const auto distances = [&](unsigned threads, Field field) {
     const ToleranceVolume volume(scene.mesh.vertices, scene.mesh.triangles, kStored, 0.08,
-                                 {.precision = 1, .threads = threads});
-    return Numbers(volume.grid().distance.begin(), volume.grid().distance.end());
+                                 {.precision = 1, .threads = threads, .field = field});
+    Numbers numbers(volume.grid().distance.begin(), volume.grid().distance.end());
+    const std::vector<float> with_signs = volume.signed_distance();
+    numbers.insert(numbers.end(), with_signs.begin(), with_signs.end());
+    return numbers;
   };
   for (const unsigned threads : {1u, 2u}) {
-    EXPECT_GT(fail_allocations([&] { return distances(threads); }), 10);
+    EXPECT_GT(fail_allocations([&] { return distances(threads, Field::scatter); }), 10);
+    EXPECT_GT(fail_allocations([&] { return distances(threads, Field::fast_marching); }), 10);
+    EXPECT_GT(fail_allocations([&] {
+                Numbers numbers(scene.wish.size());
+                parallel_for(numbers.size(), 16, threads, [&](std::size_t begin, std::size_t end) {
+                  for (std::size_t i = begin; i < end; ++i) {
+                    numbers[i] =
+                        scene.volume.hierarchy().nearest(scene.volume.frame().from_world(scene.wish[i])).distance;
+                  }
+                });
+                return numbers;
+              }),
+              0);
   }
   const auto verdicts = [&](unsigned threads) {
     std::vector<std::int32_t> groups(scene.mesh.triangles.size());
@@ -288,6 +328,21 @@ TEST(Allocation, VolumeAndChecks) {
               return Numbers(display.grid.distance.begin(), display.grid.distance.end());
             }),
             5);
+}
+
+TEST(Allocation, WhatAViewportShows) {
+  const Scene scene;
+  const std::vector<double> edges{-0.05, 0.0, 0.05};
+  for (const unsigned threads : {1u, 2u}) {
+    EXPECT_GT(fail_allocations([&] {
+                const DisplayTree tree(scene.volume.reference(), false);
+                Numbers numbers = area_shares(tree, scene.wish, scene.mesh.triangles, edges, threads);
+                for (const glm::vec4& c : tree.corners) numbers.insert(numbers.end(), {c.x, c.y, c.z});
+                for (const dvec3& p : scene.wish) numbers.push_back(tree.distance(p, 10));
+                return numbers;
+              }),
+              5);
+  }
 }
 
 TEST(Allocation, Motion) {
@@ -327,16 +382,20 @@ TEST(Allocation, Deformation) {
   lattice.points = rest_points(lattice.size, lattice.domain);
   for (std::size_t i = 0; i < lattice.points.size(); i += 3) lattice.points[i].z += 1;
   DeformationOptions options;
-  options.mode = DeformationOptions::Mode::pull_back, options.threads = 1;
-  EXPECT_GT(fail_each_place([&] {
-              const DeformationResult result = deform(scene.mesh.vertices, scene.faces, 3, kStored, &scene.volume,
-                                                      LatticeDeformation(lattice), options);
-              EXPECT_GT(result.held_back, 0u);
-              Numbers numbers;
-              add(numbers, result.vertices);
-              return numbers;
-            }),
-            20);
+  options.threads = 1;
+  using Mode = DeformationOptions::Mode;
+  for (const Mode mode : {Mode::blocked, Mode::farthest, Mode::pull_back}) {
+    options.mode = mode;
+    EXPECT_GT(fail_each_place([&] {
+                const DeformationResult result = deform(scene.mesh.vertices, scene.faces, 3, kStored, &scene.volume,
+                                                        LatticeDeformation(lattice), options);
+                EXPECT_GT(result.held_back, 0u);
+                Numbers numbers;
+                add(numbers, result.vertices);
+                return numbers;
+              }),
+              20);
+  }
 }
 
 TEST(Allocation, AGuardKeepsItsState) {
