@@ -10,6 +10,12 @@
 // A needle across the axes fills little of its box, and a search among many needles would look at most of them. A node
 // has boxes turned along the triangles instead if these are smaller by half (geometry/oriented_boxes).
 //
+// Needles that share a corner, the hub, do not fill turned boxes either: each is as wide at the hub as at the other
+// end, so that near the hub a search would look at all of them. They are cut into slices, each kTaper times as far from
+// the hub as the one before, with boxes of their own. A slice is a child like a triangle, and stands for the whole
+// triangle, so that no result depends on the slices. Their corners are computed in local coordinates, where they err by
+// less than 1e-15; kSliceRoom and the slack of the turned boxes are for that.
+//
 // The margins are as follows. A box may be skipped only if none of its triangles can be within the bound, equality
 // included, because ties go to the lower index. A local coordinate x has a relative error of at most 2^-53. The faces
 // of the box and the two ends that stand for the point are rounded to float and moved away by 2.4e-7 |x| + 1e-37: 2^-24
@@ -34,7 +40,16 @@ namespace {
 struct Key {
   std::uint64_t code;
   std::uint32_t triangle;
+  std::uint32_t slice = 0;  // counts from the one farthest from the hub
 };
+
+/// A corner that so many triangles share is a hub.
+constexpr std::uint32_t kHub = 64;
+constexpr float kTaper = 8;
+/// Widens the boxes of slices, in local coordinates.
+constexpr float kSliceRoom = 1e-14f;
+/// Slices overlap by this share, so that what rounding puts into the next one is in the box of either.
+constexpr double kOverlap = 1e-9;
 
 /// Sorts by the least significant digit first, which is stable, so that equal codes stay in the order of their index.
 void radix_sort(std::vector<Key>& keys) {
@@ -94,8 +109,11 @@ template void Hierarchy::box_distances(const Node&, const float (&)[3], const fl
 template void Hierarchy::box_distances(const Node&, const double (&)[3], const double (&)[3], double (&)[kWidth]);
 
 struct Hierarchy::Build {
+  using Outline = std::array<glm::dvec3, 4>;
+
   Hierarchy& tree;
   std::vector<Key> keys;
+  std::vector<Outline> outlines{};  // of the slices in the sorted order, local; empty if there are none
   struct Range {
     std::uint32_t begin, end;
   };
@@ -140,9 +158,109 @@ struct Hierarchy::Build {
     keys.resize(kept);
   }
 
+  /// Returns the Morton code of the middle of a box, in local coordinates.
+  static std::uint64_t code_of(const glm::dvec3& middle) {
+    std::uint64_t code = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double cell = (middle[k] + 1) * 0x1p20;
+      code |= spread_bits(std::uint64_t(std::clamp(cell, 0.0, double(0x1FFFFF)))) << k;
+    }
+    return code;
+  }
+
+  /// Returns for each triangle of `keys` its hub, or 3 if it has none, and into how many slices it is cut.
+  std::vector<std::pair<std::uint8_t, std::uint8_t>> find_hubs(const TriangleMesh& mesh) const {
+    // Corners at one place are counted by a hash. Another place with the same hash may make a hub of one that is none,
+    // which costs a little time.
+    const std::size_t slots = std::bit_ceil(2 * mesh.triangles.size());
+    std::vector<std::uint32_t> count(slots);
+    std::uint32_t most = 0;
+    const auto slot_of = [&](const Key& key, int k) {
+      std::uint64_t hash = 0;
+      const glm::dvec3 p = mesh.vertices[mesh.triangles[key.triangle][k]] + 0.0;  // makes 0 of -0
+      for (int i = 0; i < 3; ++i) {
+        hash = (hash ^ std::bit_cast<std::uint64_t>(p[i])) * 0x9E3779B97F4A7C15u;
+        hash ^= hash >> 32;
+      }
+      return hash & (slots - 1);
+    };
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      poll_at(i);
+      for (int k = 0; k < 3; ++k) most = std::max(most, ++count[slot_of(keys[i], k)]);
+    }
+    std::vector<std::pair<std::uint8_t, std::uint8_t>> hubs;
+    if (most < kHub) return hubs;
+    hubs.reserve(keys.size());
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      poll_at(i);
+      std::uint32_t sharing = kHub - 1;
+      std::pair<std::uint8_t, std::uint8_t> hub{std::uint8_t(3), std::uint8_t(1)};
+      for (std::uint8_t k = 0; k < 3; ++k) {
+        const std::uint32_t n = count[slot_of(keys[i], k)];
+        if (n > sharing) sharing = n, hub.first = k;
+      }
+      for (float reach = kTaper; hub.first < 3 && reach < float(sharing); reach *= kTaper) ++hub.second;
+      hubs.push_back(hub);
+    }
+    return hubs;
+  }
+
+  /// Returns the local corners of a slice, or of a whole triangle with the last one twice.
+  Outline outline(const Corners& triangle, const Slice& slice) const {
+    const Corners t{triangle[0] - tree.centre_, triangle[1] - tree.centre_, triangle[2] - tree.centre_};
+    if (slice.from == 0 && slice.to > 1) return {t[0], t[1], t[2], t[2]};
+    const glm::dvec3 &hub = t[slice.hub], b = t[(slice.hub + 1) % 3] - hub, c = t[(slice.hub + 2) % 3] - hub;
+    const double from = slice.from * (1 - kOverlap), to = std::min(1.0, slice.to * (1 + kOverlap));
+    return {hub + from * b, hub + to * b, hub + to * c, hub + from * c};
+  }
+
+  /// Cuts the triangles around hubs into slices, and sorts these among the other triangles.
+  void cut_at_hubs(const TriangleMesh& mesh) {
+    const std::vector<std::pair<std::uint8_t, std::uint8_t>> hubs = find_hubs(mesh);
+    if (hubs.empty()) return;
+    struct Cut {
+      Slice slice;
+      Outline outline;
+    };
+    std::vector<Key> all;
+    std::vector<Cut> cuts;
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      poll_at(i);
+      const auto& [hub, slices] = hubs[i];
+      const glm::uvec3& t = mesh.triangles[keys[i].triangle];
+      const Corners corners{tree.scaled(mesh.vertices[t.x]), tree.scaled(mesh.vertices[t.y]),
+                            tree.scaled(mesh.vertices[t.z])};
+      float to = std::numeric_limits<float>::infinity(), from = 1 / kTaper;
+      for (std::uint8_t k = 0; k < slices; ++k, to = from, from /= kTaper) {
+        const Slice slice{k + 1 == slices ? 0 : from, to, hub % 3u};
+        const Outline o = outline(corners, slice);
+        const glm::dvec3 middle = 0.5 * glm::min(glm::min(o[0], o[1]), glm::min(o[2], o[3])) +
+                                  0.5 * glm::max(glm::max(o[0], o[1]), glm::max(o[2], o[3]));
+        all.push_back({code_of(middle), keys[i].triangle, std::uint32_t(cuts.size())});
+        cuts.push_back({slice, o});
+      }
+    }
+    keys.swap(all);
+    radix_sort(keys);
+    for (const Key& key : keys) {
+      tree.slices_.push_back(cuts[key.slice].slice);
+      outlines.push_back(cuts[key.slice].outline);
+    }
+  }
+
   FloatBox triangle_box(std::uint32_t place) const {
-    const Corners& t = tree.corners_[place];
     FloatBox box;
+    if (!outlines.empty()) {
+      for (int k = 0; k < 3; ++k) {
+        const Outline& o = outlines[place];
+        const float lower = float(std::min({o[0][k], o[1][k], o[2][k], o[3][k]}));
+        const float upper = float(std::max({o[0][k], o[1][k], o[2][k], o[3][k]}));
+        box.lower[k] = lower - spread(lower) - kSliceRoom;
+        box.upper[k] = upper + spread(upper) + kSliceRoom;
+      }
+      return box;
+    }
+    const Corners& t = tree.corners_[place];
     for (int k = 0; k < 3; ++k) {
       const float lower = float(std::min({t[0][k], t[1][k], t[2][k]}) - tree.centre_[k]);
       const float upper = float(std::max({t[0][k], t[1][k], t[2][k]}) - tree.centre_[k]);
@@ -167,6 +285,11 @@ struct Hierarchy::Build {
     taken.assign(1, 0);
     for (std::size_t place = 0; place < tree.corners_.size(); ++place) {
       poll_at(place);
+      if (!outlines.empty()) {
+        const Outline& o = outlines[place];
+        taken.push_back(taken.back() + glm::length(glm::cross(o[2] - o[0], o[3] - o[1])));
+        continue;
+      }
       const Corners& t = tree.corners_[place];
       taken.push_back(taken.back() + glm::length(glm::cross(t[1] - t[0], t[2] - t[0])));
     }
@@ -189,8 +312,10 @@ struct Hierarchy::Build {
     OrientedBoxes boxes;
     double oriented = 0;
     for (std::size_t i = 0; i < parts.size(); ++i) {
-      const Corners* first = tree.corners_.data() + parts[i].begin;
-      oriented += boxes.fit(int(i), {first, parts[i].end - parts[i].begin}, tree.centre_);
+      const std::size_t count = parts[i].end - parts[i].begin;
+      oriented += outlines.empty()
+                      ? boxes.fit(int(i), std::span<const Corners>(&tree.corners_[parts[i].begin], count), tree.centre_)
+                      : boxes.fit(int(i), std::span<const Outline>(&outlines[parts[i].begin], count), glm::dvec3(0));
     }
     if (oriented > kSmaller * along_axes) return;
     tree.turned_.resize(tree.nodes_.size(), kNone);
@@ -258,15 +383,11 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh) {
     const glm::dvec3 &a = mesh.vertices[t.x], &b = mesh.vertices[t.y], &c = mesh.vertices[t.z];
     const glm::dvec3 middle =
         0.5 * scaled(glm::min(a, glm::min(b, c))) + 0.5 * scaled(glm::max(a, glm::max(b, c))) - centre_;
-    std::uint64_t code = 0;
-    for (int k = 0; k < 3; ++k) {
-      const double cell = (middle[k] + 1) * 0x1p20;
-      code |= spread_bits(std::uint64_t(std::clamp(cell, 0.0, double(0x1FFFFF)))) << k;
-    }
-    build.keys[i] = {code, std::uint32_t(i)};
+    build.keys[i] = {Build::code_of(middle), std::uint32_t(i)};
   }
   radix_sort(build.keys);
   build.join_twins(mesh);
+  build.cut_at_hubs(mesh);
   corners_.resize(build.keys.size());
   triangle_.resize(build.keys.size());
   for (std::uint32_t place = 0; place < build.keys.size(); ++place) {
@@ -280,6 +401,14 @@ Hierarchy::Hierarchy(const TriangleMesh& mesh) {
   build.sum_areas();
   build.make({0, std::uint32_t(build.keys.size())});
   if (!turned_.empty()) turned_.resize(nodes_.size(), kNone);
+}
+
+bool Hierarchy::is_nearest_slice(const glm::dvec3& q, std::uint32_t place) const {
+  const Slice& slice = slices_[place];
+  if (slice.from == 0 && slice.to > 1) return true;
+  const Corners& t = corners_[place];
+  const double at = std::max(0.0, 1 - closest_point(q, t[0], t[1], t[2]).weights[static_cast<int>(slice.hub)]);
+  return at >= slice.from && at < slice.to;
 }
 
 glm::dvec3 Hierarchy::local(const glm::dvec3& p, bool& beyond_reach) const {

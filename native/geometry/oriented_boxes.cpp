@@ -38,25 +38,26 @@ OrientedBoxes::OrientedBoxes() {
   std::fill_n(&upper_[0][0], 3 * kWidth, -kInfinity);
 }
 
-double OrientedBoxes::fit(int i, std::span<const Corners> triangles, const glm::dvec3& centre) {
+template <std::size_t kCorners>
+double OrientedBoxes::fit(int i, std::span<const std::array<glm::dvec3, kCorners>> faces, const glm::dvec3& centre) {
   // This polls at n + 1, because most calls have a few triangles and need no poll.
-  glm::dvec3 along(1, 0, 0), start(triangles[0][0]);
+  glm::dvec3 along(1, 0, 0), start(faces[0][0]);
   double longest = kShortest;
-  for (std::size_t n = 0; n < triangles.size(); ++n) {
+  for (std::size_t n = 0; n < faces.size(); ++n) {
     poll_at(n + 1);
-    const Corners& t = triangles[n];
-    for (int k = 0; k < 3; ++k) {
-      const glm::dvec3 edge = t[(k + 1) % 3] - t[k];
+    const std::array<glm::dvec3, kCorners>& face = faces[n];
+    for (std::size_t k = 0; k < kCorners; ++k) {
+      const glm::dvec3 edge = face[(k + 1) % kCorners] - face[k];
       const double squared = glm::dot(edge, edge);
-      if (squared > longest) longest = squared, along = edge, start = t[k];
+      if (squared > longest) longest = squared, along = edge, start = face[k];
     }
   }
   along = glm::normalize(along);
   glm::dvec3 across = any_perpendicular(along);
   double farthest = kNarrowest * longest;
-  for (std::size_t n = 0; n < triangles.size(); ++n) {
+  for (std::size_t n = 0; n < faces.size(); ++n) {
     poll_at(n + 1);
-    for (const glm::dvec3& corner : triangles[n]) {
+    for (const glm::dvec3& corner : faces[n]) {
       const glm::dvec3 off = corner - start, sideways = off - along * glm::dot(off, along);
       const double squared = glm::dot(sideways, sideways);
       if (squared > farthest) farthest = squared, across = sideways;
@@ -69,9 +70,9 @@ double OrientedBoxes::fit(int i, std::span<const Corners> triangles, const glm::
     glm::dvec3 stored;
     for (int j = 0; j < 3; ++j) stored[j] = axis_[k][j][i] = static_cast<float>(axis[k][j] * (1 - kShorter));
     double lower = std::numeric_limits<double>::infinity(), upper = -lower;
-    for (std::size_t n = 0; n < triangles.size(); ++n) {
+    for (std::size_t n = 0; n < faces.size(); ++n) {
       poll_at(n + 1);
-      for (const glm::dvec3& corner : triangles[n]) {
+      for (const glm::dvec3& corner : faces[n]) {
         const double x = glm::dot(stored, corner - centre);
         lower = std::min(lower, x), upper = std::max(upper, x);
       }
@@ -82,6 +83,8 @@ double OrientedBoxes::fit(int i, std::span<const Corners> triangles, const glm::
   const double x = upper_[0][i] - lower_[0][i], y = upper_[1][i] - lower_[1][i], z = upper_[2][i] - lower_[2][i];
   return x * y + y * z + z * x;
 }
+template double OrientedBoxes::fit(int, std::span<const std::array<glm::dvec3, 3>>, const glm::dvec3&);
+template double OrientedBoxes::fit(int, std::span<const std::array<glm::dvec3, 4>>, const glm::dvec3&);
 
 template <class Real>
 void OrientedBoxes::distances(const glm::dvec3& p, Real (&squared)[kWidth]) const {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <glm/glm.hpp>
 #include <span>
 
@@ -13,14 +14,14 @@ namespace tolvol {
 class OrientedBoxes {
  public:
   static constexpr int kWidth = 8;
-  using Corners = std::array<glm::dvec3, 3>;
 
   /// All boxes are empty at first, which means infinitely far from everything.
   OrientedBoxes();
 
-  /// Makes box i hold the triangles. Its first axis is the direction of their longest edge. `centre` is subtracted from
-  /// the corners first. Returns half the area of the box. O(triangles).
-  double fit(int i, std::span<const Corners> triangles, const glm::dvec3& centre);
+  /// Makes box i hold the triangles, or the faces of four corners. Its first axis is the direction of their longest
+  /// edge. `centre` is subtracted from the corners first. Returns half the area of the box. O(faces).
+  template <std::size_t kCorners>
+  double fit(int i, std::span<const std::array<glm::dvec3, kCorners>> faces, const glm::dvec3& centre);
 
   /// Computes the squared distance of p from each box. It never exceeds the squared distance of p from the triangles in
   /// the box, except by the rounding of the square.

@@ -125,6 +125,32 @@ TEST(Hierarchy, LooksAtFewOfManyNeedles) {
   }
 }
 
+// Near the hub of a fan each needle is far narrower than at the rim, and so are the slices that a search looks at.
+TEST(Hierarchy, LooksAtFewNearTheHubOfAFan) {
+  const unsigned count = 20000;
+  const TriangleMesh mesh = needles(count, true);
+  const Hierarchy hierarchy(mesh);
+  shapes::Random random(22);
+  for (const double from_hub : {0.1, 0.01, 0.002}) {
+    std::size_t looked_at = 0;
+    for (int i = 0; i < 100; ++i) {
+      const std::uint32_t below = random.below(count);
+      const glm::uvec3& t = mesh.triangles[below];
+      const dvec3 p = from_hub * 0.5 * (mesh.vertices[t.y] + mesh.vertices[t.z]) + 1e-7 * random.point();
+      const Hierarchy::Nearest found = hierarchy.nearest_if(p, [&](std::uint32_t) { return ++looked_at > 0; });
+      ASSERT_EQ(found.distance, brute(mesh, p, kInfinity, all).distance);
+      looked_at += found.nodes;
+      std::vector<std::uint32_t> within;
+      hierarchy.for_each_within(p, 1e-6, [&](std::uint32_t triangle) { within.push_back(triangle); });
+      looked_at += within.size();
+      std::ranges::sort(within);
+      ASSERT_EQ(std::ranges::adjacent_find(within), within.end()) << "once each";
+      ASSERT_TRUE(std::ranges::binary_search(within, below));
+    }
+    EXPECT_LT(looked_at, 100u * 200) << from_hub;
+  }
+}
+
 // All triangles around a vertex are at distance 0 from it, and boxes rounded the wrong way would lose some.
 TEST(Hierarchy, AgreesAtSharedVertices) {
   shapes::Random random(19);

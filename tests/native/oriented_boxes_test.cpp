@@ -15,7 +15,7 @@ namespace {
 
 using namespace tolvol;
 using glm::dvec3;
-using Corners = OrientedBoxes::Corners;
+using Corners = std::array<dvec3, 3>;
 
 /// Needles of any width down to none around a line, a point among them.
 std::vector<Corners> needles(shapes::Random& random, double width) {
@@ -38,7 +38,7 @@ TEST(OrientedBoxes, AreNeverFartherThanTheirTriangles) {
       const std::vector<Corners> triangles = needles(random, width);
       const dvec3 centre = 0.1 * random.point();
       OrientedBoxes boxes;
-      boxes.fit(round % 8, triangles, centre);
+      boxes.fit(round % 8, std::span<const Corners>(triangles), centre);
       for (int i = 0; i < 200; ++i) {
         const Corners& t = triangles[i % triangles.size()];
         const double off = i % 4 == 0 ? 0 : std::pow(10.0, -double(i % 16) + 4);
@@ -66,7 +66,7 @@ TEST(OrientedBoxes, LieCloselyAroundNeedles) {
     std::vector<Corners> triangles;
     for (int i = 0; i < 8; ++i) triangles.push_back({0.001 * i * across, along, 0.001 * (i + 1) * across});
     OrientedBoxes boxes;
-    EXPECT_LT(boxes.fit(0, triangles, dvec3(0)), 1.5 * 0.008);
+    EXPECT_LT(boxes.fit(0, std::span<const Corners>(triangles), dvec3(0)), 1.5 * 0.008);
     double squared[OrientedBoxes::kWidth];
     boxes.distances(0.5 * along - 0.02 * across, squared);
     EXPECT_GT(squared[0], 0.01 * 0.01);
