@@ -49,6 +49,15 @@ TEST(ReplacedFaces, BoundWhatLiesInTheirPlane) {
   }
 }
 
+// Each part of the triangle is near a few of the faces, and only these are compared with it.
+TEST(ReplacedFaces, LookAtTheFacesNearEachPart) {
+  const TriangleMesh mesh = fan(400, 0);
+  ReplacedFaces faces = faces_of(mesh, 0);
+  const dvec3 over_forty[3] = {mesh.vertices[1], mesh.vertices[41], 0.3 * mesh.vertices[21]};
+  ASSERT_LE(faces.bound(over_forty, kWithin, nullptr).distance, 1e-9 * kWithin);
+  EXPECT_LT(faces.looked_at(), 10u * 400);  // there are more than a hundred parts
+}
+
 TEST(ReplacedFaces, TakeAShareOfTheRoomThatIsLeftAndNoMore) {
   // A corner a little above their plane each time.
   const TriangleMesh mesh = fan(7, 0);
