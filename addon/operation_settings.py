@@ -80,7 +80,7 @@ def decimate_settings(options=frozenset()):
                     "THOROUGH",
                     "Thorough",
                     "After the pass of Fast, move the vertices around each further collapse together. This leaves a "
-                    "third fewer triangles in 5 to 23 times the processor time, at a tolerance of 0.1 % in 10 to 35 "
+                    "third fewer triangles in 4 to 16 times the processor time, at a tolerance of 0.1 % in 10 to 30 "
                     "times",
                 ),
             ),

@@ -103,7 +103,7 @@ def arguments():
         "--effort",
         choices=("fast", "thorough"),
         default="fast",
-        help="thorough: a third fewer triangles in 5 to 23 times the processor time, at a tolerance of 0.1%% in 10 to 35 "
+        help="thorough: a third fewer triangles in 4 to 16 times the processor time, at a tolerance of 0.1%% in 10 to 30 "
         "times (default: fast)",
     )
     parser.add_argument(

@@ -41,17 +41,6 @@ bool CertifiedBounds::start(std::uint32_t triangle, const glm::dvec3 (&corners)[
   return true;
 }
 
-std::optional<glm::dvec3> CertifiedBounds::normal_turned_from(std::uint32_t triangle, const glm::dvec3 (&corners)[3],
-                                                              const glm::dvec3& point) const {
-  std::optional<Facing> facing;
-  if (!start(triangle, corners, facing) || !facing) return std::nullopt;
-  const std::uint32_t nearest = forward().point_bound(point).triangle;
-  if (nearest == Hierarchy::kNone || facing->admits(nearest)) return std::nullopt;
-  const glm::dvec3& normal = directions_.facing->normals[nearest];
-  if (!(glm::dot(normal, normal) > 0)) return std::nullopt;  // It is not sure.
-  return rules_[triangle].reversed ? -normal : normal;
-}
-
 FaceBound CertifiedBounds::prove(std::uint32_t triangle, const glm::dvec3 (&corners)[3], const PointBound (&known)[3],
                                  double share, Search search, glm::dvec3* open) const {
   std::optional<Facing> facing;

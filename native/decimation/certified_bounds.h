@@ -74,11 +74,6 @@ class CertifiedBounds final : public Bounds {
   /// it. Returns false if the face would have to, but has no sure normal.
   bool start(std::uint32_t triangle, const glm::dvec3 (&corners)[3], std::optional<Facing>& facing) const;
 
-  /// Returns the normal of the triangle of the reference that is nearest to a point of a face with these corners,
-  /// turned over if the face is reversed, if the rule does not admit that triangle for the face.
-  std::optional<glm::dvec3> normal_turned_from(std::uint32_t triangle, const glm::dvec3 (&corners)[3],
-                                               const glm::dvec3& point) const;
-
   /// How prove() searches: it may prefer to leave room below the limit for the faces to come, or search longer so that
   /// the result does not depend on the order of the corners.
   enum class Search { with_room, in_any_order };

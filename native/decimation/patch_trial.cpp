@@ -16,7 +16,7 @@ constexpr double kAnywhere = std::numeric_limits<double>::infinity();
 /// The number of steps that fit the vertex of a collapse alone.
 constexpr int kStepsOfPrice = 8;
 /// The number of steps by the lower power, then by the higher one, and after the certificates have named points.
-constexpr int kStepsOfSum = 14, kStepsOfLargest = 16, kStepsAfterRefusal = 30;
+constexpr int kStepsOfSum = 14, kStepsOfLargest = 16, kStepsAfterRefusal = 10;
 /// Hardly ever does the higher power lead to success from a larger deviation, over the tolerance.
 constexpr double kWorthGoingOn = 1.25;
 /// The certificates are asked so many times.
@@ -250,9 +250,6 @@ void PatchTrial::add_open_point(std::uint32_t face, const glm::dvec3& open) {
   const glm::dvec3 weights(1 - of_b - of_c, of_b, of_c);
   if (!(relaxation_.admitted_deviation_of(face, weights) > Relaxation::kEnough)) return;
   relaxation_.add_open_point(face, weights, kHeldWeight);
-  const std::optional<glm::dvec3> turned_from =
-      bounds_.normal_turned_from(elements_[face].id, elements_[face].corners, open);
-  if (turned_from) relaxation_.add_tilt(face, *turned_from, kHeldWeight);
   learnt_ = true;
 }
 

@@ -16,16 +16,16 @@ namespace {
 /// Vertices less than so many edges away from a collapse move with it, in one round after another.
 constexpr int kRings[] = {2, 3, 4};
 /// A round ends after so many failures in a row, or this share of the edges if that is more.
-constexpr std::size_t kMostFailures = 160;
+constexpr std::size_t kMostFailures = 40;
 constexpr double kMostFailuresShare = 0.125;
 /// An edge is not tried if the deviation with its vertex alone moved is beyond so many tolerances.
-constexpr double kMostLargest = 2.2;
+constexpr double kMostLargest = 1.7;
 /// The number of steps that are tried at once, for each thread. More would often be in vain, because one before them
 /// succeeds near by.
 constexpr std::size_t kAhead = 2;
 /// An edge is not tried with more vertices moving if the deviation that it came to before is beyond so many tolerances;
 /// and edges that were not tried yet come before those that came to this one.
-constexpr double kMostReached = 1.4, kUntried = 1.1;
+constexpr double kMostReached = 1.2, kUntried = 1.1;
 
 }  // namespace
 

@@ -110,7 +110,7 @@ double cosine_of(const glm::dvec3& a, const glm::dvec3& b) {
 
 void Relaxation::start(Patch& patch) {
   patch_ = &patch;
-  points_.clear(), added_points_.clear(), separations_.clear(), tilts_.clear(), terms_.clear();
+  points_.clear(), added_points_.clear(), separations_.clear(), terms_.clear();
   free_.clear(), unknown_.clear();
   for (std::uint32_t v = 0; v < patch.vertices().size(); ++v) {
     const bool free = patch.vertices()[v].free;
@@ -184,12 +184,6 @@ void Relaxation::add_separation(std::uint32_t face, const Separation& separation
   const double tolerance = 1 / std::sqrt(unit2_);
   separations_.push_back(
       {{{c[0], c[1], c[2]}, separation.weights, weight, 1}, separation.normal, separation.offset + tolerance});
-}
-
-void Relaxation::add_tilt(std::uint32_t face, const glm::dvec3& normal, double weight) {
-  FacePoint corners = point_of(face, glm::dvec3(1.0 / 3), weight);
-  corners.scale = 1;
-  tilts_.push_back({corners, face, normal, static_cast<std::uint32_t>(added_points_.size() - 1)});
 }
 
 void Relaxation::renew() {
@@ -279,32 +273,6 @@ Relaxation::Term Relaxation::into_half_space(const HeldPoint& p) const {
   return {Patch::kNone, p.point.weights, missing * p.normal, missing * missing * unit2_};
 }
 
-/// In the view along the normal, a face whose front is seen has corners that are to the left of their opposite edges.
-/// The deviation is 1 where a corner is on the line of the longest edge, and 0 from a tolerance to the left of it on.
-/// It follows all three corners.
-Relaxation::Term Relaxation::upright(const Tilt& tilt) const {
-  const Term nothing{Patch::kNone, glm::dvec3(0), glm::dvec3(0), 0};
-  const auto& corners = patch_->faces()[tilt.id].corners;
-  if (!std::ranges::equal(corners, tilt.face.vertices)) return nothing;
-  if (toward_reference(added_points_[tilt.open]).square <= kEnough * kEnough) return nothing;
-  const auto at_corner = [&](int k) { return patch_->vertices()[corners[k % 3]].position; };
-  int apex = 0;
-  glm::dvec3 left(0);  // It is across the longest edge in the view, and as long.
-  for (int k = 0; k < 3; ++k) {
-    const glm::dvec3 across = glm::cross(tilt.normal, at_corner(k + 2) - at_corner(k + 1));
-    if (glm::dot(across, across) > glm::dot(left, left)) left = across, apex = k;
-  }
-  const double square = glm::dot(left, left), length = std::sqrt(square);
-  if (!(square > 0)) return nothing;
-  left *= 1 / length;
-  const glm::dvec3 along = glm::cross(left, tilt.normal), way = at_corner(apex) - at_corner(apex + 1);
-  const double foot = std::clamp(glm::dot(along, way) / length, 0.0, 1.0);
-  const double missing = std::max(0.0, 1 / std::sqrt(unit2_) - glm::dot(left, way));
-  Term term{Patch::kNone, glm::dvec3(0), missing * left, missing * missing * unit2_};
-  term.weights[apex] = 1, term.weights[(apex + 1) % 3] = foot - 1, term.weights[(apex + 2) % 3] = -foot;
-  return term;
-}
-
 /// Finds the terms of all points, as the patch is now. The search for a nearest face begins at that of terms_.
 void Relaxation::evaluate(bool look_around, std::vector<Term>& terms) const {
   terms.clear();
@@ -315,7 +283,6 @@ void Relaxation::evaluate(bool look_around, std::vector<Term>& terms) const {
     for (const FacePoint& p : *all) terms.push_back(toward_reference(p));
   }
   for (const HeldPoint& p : separations_) terms.push_back(into_half_space(p));
-  for (const Tilt& tilt : tilts_) terms.push_back(upright(tilt));
 }
 
 Relaxation::State Relaxation::sum(const std::vector<Term>& terms, int power) const {
@@ -469,7 +436,7 @@ void Relaxation::assemble(int power) {
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t p = unknown_[corners[k]];
       const double bk = t.weights[k];
-      if (p == Patch::kNone || bk == 0) continue;
+      if (p == Patch::kNone || !(bk > 0)) continue;
       for (int x = 0; x < 3; ++x) gradient_[3 * p + x] += force * bk * t.residual[x];
       for (int l = 0; l < 3; ++l) {
         const std::uint32_t q = unknown_[corners[l]];

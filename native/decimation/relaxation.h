@@ -41,9 +41,6 @@ class Relaxation {
   /// The same for a point that has no proof: it is held near those triangles of the reference that the rule of facing
   /// admits for the face, as it is turned at every step. A search of the reference finds them, in some microseconds.
   void add_open_point(std::uint32_t face, const glm::dvec3& weights, double weight);
-  /// Turns a face towards a normal, as long as the open point that was added last is not near the triangles that are
-  /// admitted. A point at a corner that stands still can come near to none of them in any other way.
-  void add_tilt(std::uint32_t face, const glm::dvec3& normal, double weight);
   /// Adds a point of a face to be held in a half-space. Its deviation is 1 at the half-space's end and 0 one tolerance
   /// inside.
   void add_separation(std::uint32_t face, const Separation& separation, double weight);
@@ -95,17 +92,10 @@ class Relaxation {
     glm::dvec3 normal;
     double offset;  ///< The deviation is 0 from here on along the normal.
   };
-  /// A face that is to show its front in the view along a normal.
-  struct Tilt {
-    FacePoint face;    ///< Its corners and the weight.
-    std::uint32_t id;  ///< Its number in the patch; a flip may give that to a face of other corners.
-    glm::dvec3 normal;
-    std::uint32_t open;  ///< The place in added_points_ of the point that makes it necessary.
-  };
-  /// A point of a face and the point beyond it that it has to come near to; or, of a Tilt, the height of a face.
+  /// A point of a face and the point beyond it that it has to come near to.
   struct Term {
     std::uint32_t face;   ///< The face that is nearest to a point of the reference.
-    glm::dvec3 weights;   ///< How much the point follows each corner: its barycentric coordinates.
+    glm::dvec3 weights;   ///< The barycentric coordinates of the point of the face.
     glm::dvec3 residual;  ///< From the point of the face to the other one.
     double square;        ///< The squared deviation, over the tolerance that the face may use.
   };
@@ -121,16 +111,13 @@ class Relaxation {
   FacePoint point_of(std::uint32_t face, const glm::dvec3& weights, double weight) const;
   FacePoint open_point_of(std::uint32_t face, const glm::dvec3& weights, double weight) const;
   Term into_half_space(const HeldPoint& p) const;
-  Term upright(const Tilt& tilt) const;
   glm::dvec3 place(const FacePoint& p) const;
   void evaluate(bool look_around, std::vector<Term>& terms) const;
   State sum(const std::vector<Term>& terms, int power) const;
   const FacePoint& face_point(std::size_t i) const {
     if (i < own_points_.size()) return own_points_[i];
     i -= own_points_.size();
-    if (i < added_points_.size()) return added_points_[i];
-    i -= added_points_.size();
-    return i < separations_.size() ? separations_[i].point : tilts_[i - separations_.size()].face;
+    return i < added_points_.size() ? added_points_[i] : separations_[i - added_points_.size()].point;
   }
   double weight(std::size_t term) const {
     return term < points_.size() ? points_[term].weight : face_point(term - points_.size()).weight;
@@ -153,8 +140,7 @@ class Relaxation {
   std::vector<SurfaceSample> points_;                 ///< of the reference
   std::vector<FacePoint> own_points_, added_points_;  ///< Those of every vertex, edge and face; those that were added.
   std::vector<HeldPoint> separations_;
-  std::vector<Tilt> tilts_;
-  std::vector<Term> terms_, tried_;     ///< Of points_, own_points_, added_points_, separations_ and tilts_, in order.
+  std::vector<Term> terms_, tried_;     ///< Of points_, own_points_, added_points_ and separations_, in this order.
   std::vector<std::uint32_t> unknown_;  ///< For each vertex: its place among the free ones, or kNone.
   std::vector<std::uint32_t> free_;     ///< The free vertices.
   std::vector<double> matrix_, factor_, gradient_, move_;

@@ -165,56 +165,6 @@ TEST(Relaxation, HoldsOpenPointsNearWhatTheFaceMayStandFor) {
   EXPECT_LT((patch.position(face, 0).z + patch.position(face, 1).z + patch.position(face, 2).z) / 3 - before, unit);
 }
 
-TEST(Relaxation, TiltsAFaceWhoseOpenPointStandsStill) {
-  const TriangleMesh flat = Fixture::flat();
-  CertifiedMesh c(flat, flat.vertices, 0.02);
-  const double unit = c.certificate->limit();
-  const FacingRule rule(c.volume->reference(), 1e-15, 1e-15, 0.5 * std::numbers::pi);
-  std::vector<dvec3> positions;
-  for (std::uint32_t v = 0; v < flat.vertices.size(); ++v) positions.push_back(c.mesh->position(v));
-  const CertifiedBounds bounds({*c.certificate, &*c.coverage, nullptr, nullptr, &rule}, {flat.triangles, positions});
-  Change change(*c.mesh);
-  const auto h = c.mesh->connectivity().find_halfedge(BoundedMesh::handle(kMiddle - 1), BoundedMesh::handle(kMiddle));
-  ASSERT_TRUE(change.prepare_collapse(h, c.mesh->vertex_position(kMiddle)));
-  Patch patch;
-  patch.gather(change, 1, true);
-  Patch::Vertex& middle = patch.vertices()[patch.find_vertex(kMiddle)];
-  const std::uint32_t face = middle.faces.front(), id = patch.faces()[face].id;
-  int k = 0;
-  while (patch.faces()[face].corners[k] != patch.find_vertex(kMiddle)) ++k;
-  const dvec3 a = patch.position(face, (k + 1) % 3), b = patch.position(face, (k + 2) % 3), foot = 0.5 * (a + b);
-  const auto normal = [&] {
-    return glm::cross(patch.position(face, 1) - patch.position(face, 0),
-                      patch.position(face, 2) - patch.position(face, 0));
-  };
-  const auto turned_from = [&] {
-    const dvec3 corners[3] = {patch.position(face, 0), patch.position(face, 1), patch.position(face, 2)};
-    return bounds.normal_turned_from(id, corners, a);
-  };
-  EXPECT_FALSE(turned_from());
-  // The one vertex that may move is half a tolerance above the opposite edge, and a little beyond it.
-  middle.position = foot - 0.1 * unit * glm::normalize(glm::cross(dvec3(0, 0, 1), b - a)) + dvec3(0, 0, 0.5 * unit);
-  ASSERT_LT(normal().z, 0);
-  dvec3 fixed_corner(0);
-  fixed_corner[(k + 1) % 3] = 1;
-  Relaxation relaxation(bounds);
-  relaxation.start(patch);
-  relaxation.add_open_point(face, fixed_corner, 1);
-  relaxation.renew();
-  relaxation.lower_largest(16);
-  EXPECT_NEAR(relaxation.state().largest, 2, 1e-9)
-      << "No way that the point could go leads to what the face may stand for.";
-  EXPECT_LT(normal().z, 0);
-  const auto up = turned_from();
-  ASSERT_TRUE(up);
-  EXPECT_NEAR(up->z, 1, 1e-9);
-  relaxation.add_tilt(face, *up, 1);
-  relaxation.renew();
-  relaxation.lower_largest(16);
-  EXPECT_TRUE(relaxation.enough());
-  EXPECT_GT(normal().z, 0);
-}
-
 TEST(Relaxation, WhatWasBeyondBeforeMayStay) {
   Fixture f(0);
   std::uint32_t face = 0;
