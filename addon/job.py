@@ -117,15 +117,18 @@ class JobOperator:
         outcome = yield self.prepare(context)
         self.finish(context, outcome)
 
-    def each(self, tasks):
+    def each(self, tasks, names=None):
         """A generator for steps(): yields the work of one task after another, and returns the outcomes of task.run(progress).
 
-        With several tasks an error begins with the name of its task.
+        With several tasks the status says which one is at work, and an error begins with its name. names: pairs of the text
+        for the status and the name, by default of the tasks' own names.
         """
+        if names is None:
+            names = [(f"{task.name}, {i + 1} of {len(tasks)}", task.name) for i, task in enumerate(tasks)]
         outcomes = []
-        for i, task in enumerate(tasks):
+        for task, (part, name) in zip(tasks, names):
             if len(tasks) > 1:
-                self.part = f"{task.name}, {i + 1} of {len(tasks)}"
+                self.part = part
             try:
                 outcomes.append((yield task.run))
             except native.module.Cancelled:
@@ -133,7 +136,7 @@ class JobOperator:
             except (Refused, native.module.TolvolError) as error:
                 if len(tasks) == 1:
                     raise
-                raise Refused(f"{task.name}: {native.said(error)}") from None
+                raise Refused(f"{name}: {native.said(error)}") from None
         return outcomes
 
     def execute(self, context):

@@ -112,9 +112,8 @@ class Preparing:
     followed: whether it takes over from a watch that was on, for the same mesh with other faces.
     """
 
-    uncovered = (
-        None  # (m,) bool: the faces of the reference that may be uncovered all the same; None if that is not known
-    )
+    # (m,) bool: the faces of the reference that may be uncovered all the same; None if that is not known.
+    uncovered = None
 
     def __init__(self, before=None):
         """before: the watch from which this one takes over, or None."""

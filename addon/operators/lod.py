@@ -8,7 +8,7 @@ import math
 import bpy
 from bpy.props import IntProperty
 
-from .. import native, preferences
+from .. import preferences
 from ..errors import Refused
 from ..files.gltf_extras import GEOMETRIC_ERROR
 from ..job import JobOperator
@@ -67,16 +67,8 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
     def steps(self, context):
         context.view_layer.update()
         shared.take(self, self.ob.tolvol.lod, lod_settings())
-        outcomes = []
-        for i, task in enumerate(self._tasks(context)):
-            self.part = f"Level {i + 1} of {self.levels}"
-            try:
-                outcomes.append((yield task.run))
-            except native.module.Cancelled:
-                raise
-            except (Refused, native.module.TolvolError) as error:
-                raise Refused(f"Level {i + 1}: {native.said(error)}") from None
-        self._write(context, outcomes)
+        names = [(f"Level {i + 1} of {self.levels}", f"Level {i + 1}") for i in range(self.levels)]
+        self._write(context, (yield from self.each(self._tasks(context), names)))
 
     def _tasks(self, context):
         ob = self.ob
@@ -186,7 +178,7 @@ def _original(ob):
 
 def _require_order(values, as_text, falling=False):
     for i, (before, value) in enumerate(zip(values, values[1:])):
-        if value <= before if not falling else value >= before:
+        if (value >= before) if falling else (value <= before):
             than = "fewer" if falling else "more"
             raise Refused(
                 f"Level {i + 2}: {as_text(value)}, which is not {than} than the {as_text(before)} of level {i + 1}"

@@ -270,9 +270,8 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             return (yield task.count)
         except native.module.Cancelled:
             raise
-        except (
-            native.module.TolvolError
-        ):  # The mesh may be beyond the tolerance, so that Decimate cannot begin with it.
+        except native.module.TolvolError:
+            # The mesh may be beyond the tolerance, so that Decimate cannot begin with it.
             return None
 
     def _write(self, context, trial, mesh, certified, warnings):
