@@ -5,23 +5,38 @@ An operator has three parts: prepare() reads Blender's data and returns the work
 no data of Blender; finish() writes the outcome in one go. An operator whose work needs Blender between its parts
 overrides steps(), a generator. For a script, for Adjust Last Operation and in Blender without a window the same parts
 run one after the other, and the call returns when they are done.
+
+While a job runs, Blender can be used: the operator takes Esc and passes all other events on. If the user changes what the job
+works on, the job ends, and it writes nothing.
 """
 
 import atexit
+import hashlib
+import json
 import threading
 import time
 
 import bpy
+import numpy as np
 from bpy.app.handlers import persistent
+from bpy.props import StringProperty
 
 from . import native, status_bar
 from .errors import Refused
+from .mesh import mesh_io
+from .redraw import redraw_sidebars
+from .reference import measurements
 
 # Blender waits so many seconds for a job before the status bar shows it: a short job makes no line flash up.
 _PATIENCE = 0.4
 _TICK = 0.1
+# How long a stage takes is told from what it has done by then: so many seconds, and such a share of it.
+_KNOWN_AFTER, _KNOWN_SHARE = 1.0, 0.05
+
+_MODES = {"OBJECT": "Object Mode", "EDIT_MESH": "Edit Mode"}
 
 # Only the main thread uses these lists.
+_edited = False  # whether Blender has reported a change of some mesh that no operator has looked at yet
 _at_work = []  # jobs whose threads may be running
 _under_way = []  # modal operators: Blender goes on while their jobs run
 _to_say = []  # messages for the status bar, to be shown once the next file is open
@@ -69,26 +84,51 @@ class _Claim:
     def __init__(self, ob):
         self._ob = ob
         self._name = ob.name
-        self._mesh = self._state()
+        self._mesh, self._content, self._place = self._state(), self._digest(), self._placed()
 
-    def check(self):
-        """Raises Refused unless the outcome can still be written to the object."""
+    def check(self, thoroughly):
+        """Raises Refused unless the outcome can still be written to the object. thoroughly: compare every vertex, too."""
         try:
             name = self._ob.name
         except ReferenceError:
             raise Refused(f"{self._name} was deleted meanwhile: nothing was changed") from None
         if name != self._name:
             raise Refused(f"{self._name} was renamed to {name} meanwhile: nothing was changed")
-        if self._state() != self._mesh:
+        if self._state() != self._mesh or thoroughly and self._digest() != self._content:
             raise Refused(f"The mesh or the mode of {name} was changed meanwhile: nothing more was changed")
+        (matrix, reference), (matrix_before, reference_before) = self._placed(), self._place
+        if reference != reference_before:
+            raise Refused(f"The reference of {name} was changed meanwhile: nothing more was changed")
+        # With a reference of its own kind the object may be moved and turned: the reference goes along.
+        own = self._ob.tolvol.reference_kind == "SELF" and measurements.same_shape(matrix_before, matrix)
+        if not own and not np.array_equal(matrix, matrix_before):
+            raise Refused(f"{name} was moved or scaled meanwhile: nothing more was changed")
 
     def _state(self):
         mesh = self._ob.data
         return mesh.as_pointer(), len(mesh.vertices), len(mesh.loops), len(mesh.polygons), self._ob.mode
 
+    def _digest(self):
+        """Returns a value that is equal for equal positions and faces."""
+        self._ob.update_from_editmode()
+        mesh = self._ob.data
+        digest = hashlib.blake2b(mesh_io.column(mesh.vertices, "co", 3).tobytes(), digest_size=16)
+        digest.update(mesh_io.column(mesh.loops, "vertex_index", 1, np.int32).tobytes())
+        return digest.digest()
+
+    def _placed(self):
+        settings = self._ob.tolvol
+        reference = settings.snapshot_fingerprint if settings.snapshot else "", settings.reference_kind
+        return mesh_io.matrix_array(self._ob.matrix_world), reference
+
 
 class JobOperator:
     """A base class for an Operator with prepare(context), which returns work(progress), and finish(context, outcome)."""
+
+    # Adjust Last Operation works on the same objects again, although another object may be active by then.
+    worked_on: StringProperty(
+        description="The names of the objects that the operator worked on, as JSON", options={"HIDDEN", "SKIP_SAVE"}
+    )
 
     doing = ""  # text for the status bar in place of the native stage
     part = ""  # which part of the work is under way, such as "Level 2 of 3", if there are several
@@ -139,6 +179,25 @@ class JobOperator:
                 raise Refused(f"{name}: {native.said(error)}") from None
         return outcomes
 
+    def shown(self):
+        """Returns what is known about the work under way, as lines of text for the panel, and its share that is done.
+
+        The share is None where it is not known.
+        """
+        progress = self._progress
+        if progress.cancelled:
+            return [self.bl_label, "Stopping"], None
+        lines = [self.bl_label, *([self.part] if self.part else [])]
+        stage, count, share = _stage(progress)
+        lines.append(self.doing or stage)
+        if count and not self.doing:
+            lines.append(count)
+        left = self._clock.seconds_left(progress)
+        if left is not None and not self.doing:
+            lines.append(f"About {_duration(left)} left of this stage")
+        lines.append(f"Esc: {_escape(self.improving())}")
+        return lines, None if self.doing else share
+
     def execute(self, context):
         self._begin(context)
         while not (ended := self._advance()):
@@ -146,6 +205,9 @@ class JobOperator:
         return ended
 
     def invoke(self, context, _event):
+        if _under_way:
+            self.report({"WARNING"}, f"{_under_way[0].bl_label} is at work: wait until it ends, or press Esc")
+            return {"CANCELLED"}
         self._begin(context)
         if ended := self._advance() or self._go_on(_PATIENCE):
             return ended
@@ -162,12 +224,16 @@ class JobOperator:
             self._leave(context)
             self.report({"WARNING"}, self._interrupted)
             return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS":
+        if event.type == "ESC":
+            if event.value != "PRESS":
+                return {"RUNNING_MODAL"}
             if self.improving():
                 self._progress.finish()
             else:
                 self._progress.cancel()
-        if event.type == "TIMER":
+            return {"RUNNING_MODAL"}
+        # An undo step of one mode does not hold a change that is made in another: the outcome waits until the mode is back.
+        if event.type == "TIMER" and context.mode == self._mode:
             try:
                 ended = self._go_on(_TICK) if self._job.done() else None
             except BaseException:
@@ -176,8 +242,12 @@ class JobOperator:
             if ended:
                 self._leave(context)
                 return ended
-            context.workspace.status_text_set(_status(self._progress, self.doing, self.part, self.improving()))
-        return {"RUNNING_MODAL"}
+        if event.type == "TIMER":
+            waits = "" if context.mode == self._mode else f"    Waits for {_MODES.get(self._mode, 'its mode')}"
+            status = _status(self._progress, self.doing, self.part, self.improving())
+            context.workspace.status_text_set(status + waits)
+            redraw_sidebars()
+        return {"PASS_THROUGH"}  # With RUNNING_MODAL beside it Blender would pass nothing on.
 
     def cancel(self, context):
         """Called when Blender closes the window or the file, or a dialog of the operator before its job has begun."""
@@ -195,15 +265,17 @@ class JobOperator:
 
     def _look(self):
         """Ends the job as soon as its outcome cannot be written any more."""
+        global _edited
         try:
-            self._check()
+            self._check(thoroughly=_edited)
         except Refused as error:
             self._interrupted = str(error)
             self._end()
+        _edited = False
 
-    def _check(self):
+    def _check(self, thoroughly=True):
         for claim in self._claims:
-            claim.check()
+            claim.check(thoroughly)
 
     def _end(self):
         self._progress.cancel()
@@ -211,7 +283,11 @@ class JobOperator:
         self._steps.close()
 
     def _begin(self, context):
-        self.objects = self.targets(context)
+        again = self.options.is_repeat and not self.options.is_repeat_last
+        named = [bpy.data.objects.get(name) for name in json.loads(self.worked_on or "[]")] if again else []
+        self.objects = named if named and all(named) else self.targets(context)
+        self.worked_on = json.dumps([ob.name for ob in self.objects])
+        self._mode, self._clock = context.mode, _Clock()
         self._claims = [_Claim(ob) for ob in self.objects]
         self._steps = self.steps(context)
         self._progress = native.module.Progress()
@@ -257,15 +333,52 @@ class JobOperator:
         context.workspace.status_text_set(None)
 
 
+class _Clock:
+    """Estimates how long the present stage of a job goes on."""
+
+    def __init__(self):
+        self._stage = None
+        self._began = 0.0
+
+    def seconds_left(self, progress):
+        """Returns the seconds, or None as long as too little of the stage is done."""
+        if progress.stage != self._stage or progress.fraction == 0:
+            self._stage, self._began = progress.stage, time.monotonic()
+        took, share = time.monotonic() - self._began, progress.fraction
+        return took * (1 - share) / share if took >= _KNOWN_AFTER and share >= _KNOWN_SHARE else None
+
+
+def _duration(seconds):
+    return f"{seconds:.0f} s" if seconds < 60 else f"{seconds / 60:.0f} min"
+
+
+def _stage(progress):
+    """Returns the native stage, what it counts, and its share that is done, or None."""
+    # In these two stages the count is the number of triangles left.
+    counts = progress.count and progress.stage in {"decimating", "refining"}
+    return (
+        progress.stage.capitalize(),
+        f"{progress.count:,} triangles left" if counts else "",
+        progress.fraction or None,
+    )
+
+
+def _escape(improving):
+    return "Keep Present Result" if improving else "Cancel"
+
+
 def _status(progress, doing, part, improving):
     if progress.cancelled:
         return "Stopping"
-    # In these two stages the count is the number of triangles left.
-    left = f", {progress.count:,} triangles left" if progress.stage in {"decimating", "refining"} else ""
-    share = f" {progress.fraction:.0%}" if progress.fraction else ""
-    escape = "Keep Present Result" if improving else "Cancel"
+    stage, count, share = _stage(progress)
+    native_stage = stage + (f" {share:.0%}" if share else "") + (f", {count}" if count else "")
     prefix = f"{part}: " if part else ""
-    return f"{prefix}{doing or progress.stage.capitalize() + share + left}    Esc: {escape}"
+    return f"{prefix}{doing or native_stage}    Esc: {_escape(improving)}"
+
+
+def under_way():
+    """Returns the operator whose job runs now, or None."""
+    return _under_way[0] if _under_way else None
 
 
 def _interrupt(happens):
@@ -295,7 +408,16 @@ def _after_load(*_):
     _to_say.clear()
 
 
+@persistent
+def _after_update(_scene, depsgraph):
+    """Notes a change of any mesh, so that the operators look whether it is one of theirs."""
+    global _edited
+    if _under_way and any(update.is_updated_geometry for update in depsgraph.updates):
+        _edited = True
+
+
 _HANDLERS = (
+    ("depsgraph_update_post", _after_update),
     ("load_pre", _before_load),
     ("undo_pre", _before_undo),
     ("redo_pre", _before_redo),

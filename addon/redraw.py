@@ -4,6 +4,16 @@
 import bpy
 
 
+def redraw_sidebars():
+    """Draws the sidebars of all 3D views again, without what the views show."""
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                for region in area.regions:
+                    if region.type == "UI":
+                        region.tag_redraw()
+
+
 def redraw_views():
     """Draws all 3D views again, with the panels in their sidebars."""
     for window in bpy.context.window_manager.windows:

@@ -132,5 +132,5 @@ reference, and bring them into view"""
             self.report({"INFO" if found.passed else "WARNING"}, f"No face of the mesh is outside. {said(found)}")
             return
         mesh_io.select_faces(mesh, faces)
-        show_selected(context, (False, False, True))
+        show_selected(context, self.ob, (False, False, True))
         self.report({"WARNING"}, f"{found.word}: {faces.sum():,} of {len(faces):,} faces are outside")

@@ -57,6 +57,6 @@ corners and edges that they share"""
             self.report({"INFO"}, "No faces cross")
             return
         mesh_io.select_faces(mesh, faces)
-        show_selected(context, (False, False, True))
+        show_selected(context, self.ob, (False, False, True))
         at_least = "at least " if more else ""
         self.report({"WARNING"}, f"{at_least}{faces.sum():,} of {len(faces):,} faces cross others")

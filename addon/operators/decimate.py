@@ -11,6 +11,7 @@ from ..errors import Refused
 from ..job import JobOperator
 from ..mesh import transfer
 from ..operation_settings import PROTECTED, decimate_settings
+from ..proof import report, verdict
 from ..properties import PLACEMENTS, automatic_placement, tolerance_settings
 from ..reference import snapshots, tolerances
 from . import decimation, original
@@ -161,6 +162,15 @@ object. An object without a reference gets one first, as by Set Reference"""
         for ob, (_, _, _, run) in zip(self.objects, outcomes):
             shared.give(self, ob.tolvol, _SHARED if self.own_placements else {*_SHARED, "placement"})
             decimation.keep(self, ob, run, f"{ob.name}: " if len(self.objects) > 1 else "")
+        if len(outcomes) > 1:
+            self._report_totals([run for _, _, _, run in outcomes])
+
+    def _report_totals(self, runs):
+        before, after = (sum(run[way]["triangles"] for run in runs) for way in ("input", "output"))
+        passed = sum(verdict.word(ob) == verdict.PASS for ob in self.objects)
+        seconds = sum(sum(run["seconds"].values()) for run in runs)
+        counts = f"{before:,} -> {after:,} triangles, {passed} of {len(runs)} {verdict.PASS}"
+        self.report({"INFO"}, f"{len(runs)} objects: {counts}, {report.duration(seconds)}")
 
     def _take_settings(self, settings):
         """Takes the settings of the active object for all objects, so that Adjust Last Operation shows the ones used."""

@@ -31,13 +31,14 @@ keeps these vertices, because the corners of all the islands end there"""
             self.report({"INFO"}, "Three or more UV islands meet nowhere")
             return {"FINISHED"}
         mesh_io.select_vertices(mesh, chosen)
-        show_selected(context, (True, False, False))
+        show_selected(context, context.active_object, (True, False, False))
         self.report({"INFO"}, f"{np.count_nonzero(chosen):,} of {len(chosen):,} vertices selected")
         return {"FINISHED"}
 
 
-def show_selected(context, mode):
-    """Enters Edit Mode with this selection mode and brings what is selected into view if there is a 3D view."""
+def show_selected(context, ob, mode):
+    """Enters Edit Mode of `ob` with this selection mode and brings what is selected into view if there is a 3D view."""
+    context.view_layer.objects.active = ob  # While a job ran, the user may have chosen another object.
     context.tool_settings.mesh_select_mode = mode
     bpy.ops.object.mode_set(mode="EDIT")
     area = context.area

@@ -3,7 +3,7 @@
 
 import bpy
 
-from .. import native
+from .. import job, native
 from ..operators import blocked
 from ..reference import measurements, snapshots, tolerances
 from ..units import length
@@ -14,6 +14,10 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
     bl_label = "Tolerance"
 
     def draw(self, context):
+        self._draw_settings(context)
+        draw_job(context, self.layout)
+
+    def _draw_settings(self, context):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -50,6 +54,21 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
         if ob.tolvol.tolerance_mode == "PERCENT":
             return f"= {length(context, tolerance)}"
         return f"= {100 * tolerance / size:.4g} % of size"
+
+
+def draw_job(context, layout):
+    """Shows what the job under way does, if there is one."""
+    operator = job.under_way()
+    if operator is None:
+        return
+    lines, share = operator.shown()
+    column = layout.box().column(align=True)
+    for i, line in enumerate(lines):
+        text_lines(context, column, line, "BLANK1" if i else "SORTTIME")
+    if share is not None and hasattr(bpy.types.UILayout, "progress"):  # from Blender 4.0 on
+        column.progress(factor=share, text=f"{share:.0%}")
+    elif share is not None:
+        right(column, f"{share:.0%}")
 
 
 def _status(context, layout, ob):

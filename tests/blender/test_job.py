@@ -7,6 +7,7 @@ import bpy
 import pytest
 
 from addon import job, native
+from addon.operators.decimate import TOLVOL_OT_decimate
 from addon.overlay import work
 from scenes import torus
 
@@ -127,3 +128,180 @@ def test_what_the_overlay_had_begun_ends_though_another_file_was_opened(monkeypa
     while not ended:
         work._tick()
     work.stop()
+
+
+# While a job runs, Blender can be used -------------------------------------------------------------------------------
+
+
+def nudge():
+    """Moves one vertex: the numbers of all elements stay."""
+    bpy.data.objects["torus"].data.vertices[7].co.x += 0.01
+
+
+def scale():
+    bpy.data.objects["torus"].scale = (2, 1, 1)
+    bpy.context.view_layer.update()
+
+
+def set_reference():
+    bpy.ops.tolvol.set_reference()
+
+
+@pytest.mark.parametrize(
+    ("happens", "said"),
+    [
+        (nudge, "The mesh or the mode of torus was changed meanwhile"),
+        (scale, "torus was moved or scaled meanwhile"),
+        (set_reference, "The reference of torus was changed meanwhile"),
+    ],
+)
+def test_a_job_whose_object_is_changed_unseen_writes_nothing(stand_in, happens, said):
+    torus()
+    stand_in.happens = staticmethod(happens)
+    with pytest.raises(RuntimeError, match=said):
+        bpy.ops.tolvol.stand_in()
+    assert not stand_in.written
+
+
+def turn():
+    bpy.data.objects["torus"].location.x = 3
+    bpy.data.objects["torus"].rotation_euler.z = 1
+    bpy.context.view_layer.update()
+
+
+def work_on_another():
+    other = bpy.data.objects["other"]
+    bpy.context.view_layer.objects.active = other
+    other.data.vertices[0].co.x += 1
+    bpy.data.objects["torus"].select_set(False)
+
+
+@pytest.mark.parametrize("happens", [turn, work_on_another])
+def test_what_does_not_concern_a_job_does_not_end_it(stand_in, happens):
+    torus("other")
+    torus()
+    stand_in.happens = staticmethod(happens)
+    assert bpy.ops.tolvol.stand_in() == {"FINISHED"} and stand_in.written
+
+
+def test_a_moved_object_with_another_reference_is_refused(stand_in):
+    other = torus("other")
+    ob = torus()
+    ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", other
+    stand_in.happens = staticmethod(turn)
+    with pytest.raises(RuntimeError, match="torus was moved or scaled meanwhile"):
+        bpy.ops.tolvol.stand_in()
+    assert not stand_in.written
+
+
+def event(kind, value="PRESS"):
+    return type("Event", (), {"type": kind, "value": value})()
+
+
+class Context:
+    """What modal() uses of Blender's context."""
+
+    mode = "OBJECT"
+
+    def __init__(self):
+        self.texts, self.removed = [], []
+        self.workspace = type("Workspace", (), {"status_text_set": self.texts.append})()
+        self.window_manager = type("Manager", (), {"event_timer_remove": self.removed.append})()
+
+
+class Modal(job.JobOperator):
+    """A job at work, without Blender's operator around it."""
+
+    bl_label = "Modal"
+
+    def __init__(self, work):
+        self.objects, self._claims, self.ended = [], [], []
+        self._progress, self._mode, self._clock, self._timer = native.module.Progress(), "OBJECT", job._Clock(), None
+        self._steps = self.steps(None)
+        self._job = job.Job(work, self._progress)
+        next(self._steps)
+        job._under_way.append(self)
+
+    def steps(self, _context):
+        self.ended.append((yield))
+
+    def report(self, kind, text):
+        self.said = text
+
+
+@pytest.fixture
+def waiting():
+    """(a job that ends when `go` is set, go)"""
+    go = threading.Event()
+    operator = Modal(lambda _progress: go.wait(60))
+    yield operator, go
+    go.set()
+    if operator in job._under_way:
+        job._under_way.remove(operator)
+
+
+def test_all_events_but_esc_are_passed_on(waiting):
+    operator, go = waiting
+    context = Context()
+    for kind in ("MIDDLEMOUSE", "WHEELUPMOUSE", "LEFTMOUSE", "G", "TAB", "MOUSEMOVE", "TIMER"):
+        assert operator.modal(context, event(kind)) == {"PASS_THROUGH"}
+    assert operator.modal(context, event("ESC", "RELEASE")) == {"RUNNING_MODAL"} and not operator._progress.cancelled
+    assert operator.modal(context, event("ESC")) == {"RUNNING_MODAL"} and operator._progress.cancelled
+    go.set()
+    operator._job.outcome()
+    assert operator.modal(context, event("TIMER")) == {"CANCELLED"} and not operator.ended
+    assert operator.said == "Modal was cancelled. It has changed nothing"
+
+
+def test_an_outcome_waits_until_the_mode_is_that_of_the_start(waiting):
+    operator, go = waiting
+    go.set()
+    operator._job.outcome()
+    context = Context()
+    context.mode = "EDIT_MESH"
+    assert operator.modal(context, event("TIMER")) == {"PASS_THROUGH"} and not operator.ended
+    assert context.texts[-1].endswith("Waits for Object Mode")
+    context.mode = "OBJECT"
+    assert operator.modal(context, event("TIMER")) == {"FINISHED"} and operator.ended == [True]
+
+
+def test_a_second_job_waits_for_the_first(waiting):
+    operator, _ = waiting
+    second = type("Second", (Modal,), {"__init__": lambda self: None})()
+    assert second.invoke(None, None) == {"CANCELLED"}
+    assert second.said == "Modal is at work: wait until it ends, or press Esc"
+
+
+class Progress:
+    stage, fraction, count, cancelled = "decimating", 0.0, 0, False
+
+
+def test_the_panel_is_told_stage_count_part_and_time_left(waiting, monkeypatch):
+    operator, _ = waiting
+    now = [100.0]
+    monkeypatch.setattr(job.time, "monotonic", lambda: now[0])
+    operator._progress = progress = Progress()
+    operator.improving = lambda: False
+    operator.part = "torus, 2 of 3"
+    assert operator.shown() == (["Modal", "torus, 2 of 3", "Decimating", "Esc: Cancel"], None)
+    now[0] += 10
+    progress.fraction, progress.count = 0.25, 12_400
+    lines, share = operator.shown()
+    assert lines[3:5] == ["12,400 triangles left", "About 30 s left of this stage"] and share == 0.25
+    progress.stage, progress.fraction = "measuring", 0.5
+    assert operator.shown()[0] == ["Modal", "torus, 2 of 3", "Measuring", "Esc: Cancel"]  # A new stage has just begun.
+    now[0] += 200
+    assert operator.shown()[0][3] == "About 3 min left of this stage"
+
+
+def test_a_batch_names_each_object_and_reports_totals(monkeypatch, capfd):
+    objects = [torus(name) for name in ("one", "two", "three")]
+    for ob in objects:
+        ob.select_set(True)
+    parts = []
+    work = TOLVOL_OT_decimate._next_work
+    monkeypatch.setattr(TOLVOL_OT_decimate, "_next_work", lambda self: (work(self), parts.append(self.part))[0])
+    bpy.ops.tolvol.decimate()
+    assert parts == ["three, 1 of 3", "one, 2 of 3", "two, 3 of 3"]
+    left = sum(len(ob.data.polygons) for ob in objects)
+    assert f"Info: 3 objects: 6,912 -> {left:,} triangles, 3 of 3 PASS, " in capfd.readouterr().out

@@ -8,7 +8,7 @@ import bpy
 
 from addon import job, status_bar
 from test_panel import monkey, stored, suzanne
-from window import finished, reset, view, window_context
+from window import centre, finished, open_tab, reset, screenshot, view, window_context, xdotool
 
 _SMOOTHER = 1  # levels of subdivision on top of the monkey's, which make the job slow enough
 
@@ -55,6 +55,37 @@ def test_an_undo_ends_a_job():
     with window_context():
         bpy.ops.ed.undo()
     yield from ends(said, "Decimate in Tolerance was stopped, because a step was undone. It has changed nothing")
+    assert stored() == before and suzanne().tolvol.snapshot is None
+
+
+def rotation():
+    return tuple(view()[1].spaces[0].region_3d.view_rotation)
+
+
+def test_the_view_is_turned_while_a_job_runs():
+    yield from reset(monkey)
+    yield from open_tab()
+    begin()
+    before = rotation()
+    xdotool("mousemove", *centre())
+    yield
+    xdotool("key", "KP_4")
+    yield from finished(lambda: rotation() != before, pause=0.05)
+    assert job._under_way
+    screenshot("job 1 turned")
+    xdotool("key", "Escape")
+    yield from finished(lambda: not job._under_way)
+    assert rotation() != before and suzanne().tolvol.snapshot is None
+
+
+def test_the_keyboard_ends_a_job_by_an_edit_of_its_mesh():
+    yield from reset(monkey)
+    said = begin()
+    before = stored()
+    xdotool("mousemove", *centre(), "key", "Tab")
+    yield from ends(said, "The mesh or the mode of Suzanne was changed meanwhile: nothing more was changed")
+    with window_context():
+        bpy.ops.object.mode_set(mode="OBJECT")
     assert stored() == before and suzanne().tolvol.snapshot is None
 
 
