@@ -186,11 +186,13 @@ class Watch(Preparing):
         keeps_out = ob.tolvol.guard.crossings
         # Its triangles cross each other as well.
         crossings = "keep_out" if keeps_out and faces.largest <= 4 else "allow"
+        # Some of them are turned over where the polygon is concave.
+        angle = None if faces.largest <= 4 else 180
 
         def work(progress):
             built = volumes.native_volume(reference, tolerance, threads, progress)
             options = {"to_world": matrix, "threads": threads, "progress": progress}
-            keep = {"two_sided": two_sided, "outside": "keep", "crossings": crossings}
+            keep = {"two_sided": two_sided, "outside": "keep", "crossings": crossings, "max_normal_angle": angle}
             guard = native.module.Guard(positions, faces.faces, built, **keep, **options)
             # A concave face may be inside in its present triangulation and outside in another one. The guard keeps the
             # corners of such a face where they are.

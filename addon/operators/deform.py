@@ -14,6 +14,9 @@ from ..properties import DEFORM_MODES
 from .blocked import allowed, decimate_blocked
 from .motion import Motion
 
+# What faces would do that stop a deformation, by the entry of the report.
+_WOULD = {"leaving": "leave the tolerance", "turning": "turn away from the reference", "crossing": "cross others"}
+
 
 class TOLVOL_OT_deform(JobOperator, bpy.types.Operator):
     """Deform the mesh by a lattice, as a B-spline of degree 3, within the tolerance of the reference. Vertices outside \
@@ -76,17 +79,17 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
     def finish(self, context, outcome):
         motion, result, certified = outcome
         ob, run = self.ob, result.report
-        stopped = run["leaving"]["faces"] or run["crossing"]["faces"]
+        stopped = _stopped(run)
         if self.mode == "BLOCKED" and stopped:
-            would = "leave the tolerance" if run["leaving"]["faces"] else "cross others"
+            why, count = stopped
             raise Refused(
-                f"Blocked: {stopped:,} faces of {ob.name} would {would}. "
+                f"Blocked: {count:,} faces of {ob.name} would {_WOULD[why]}. "
                 f"{100 * run['permitted_fraction']:.1f} % of the way is permitted: choose As Far as Permitted, "
                 "or choose Pull Back to hold back only the vertices of these faces"
             )
         if not run["moved"]:
             why = (
-                "the tolerance permits no movement, or faces would cross"
+                "the tolerance permits no movement, or faces would turn over or cross"
                 if stopped
                 else "the lattice is at rest, or the mesh is outside it"
             )
@@ -109,6 +112,11 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
         if chosen is None or chosen.type != "LATTICE":
             raise Refused(f"{self.lattice or self.ob.name}: choose a lattice object, or select one with the mesh")
         return chosen
+
+
+def _stopped(run):
+    """Returns what stopped the deformation and the number of faces that do it, or None."""
+    return next(((why, run[why]["faces"]) for why in _WOULD if run[why]["faces"]), None)
 
 
 def native_lattice(cage):
@@ -144,7 +152,7 @@ def _twice(ob):
 def _remarks(result):
     run = result.report
     remarks = [f"{run['moved']:,} of {len(result.vertices):,} vertices moved"]
-    if run["leaving"]["faces"] or run["crossing"]["faces"]:
+    if _stopped(run):
         if run["permitted_fraction"] is None:
             remarks.append(f"{run['held_back']:,} held back")
             if run["kept_from_crossing"]:

@@ -104,8 +104,8 @@ bool TriangleCertificate::leaves_room(double distance) const { return distance <
 TriangleCertificate::PointBound TriangleCertificate::nearest(const glm::dvec3& p, double radius) const {
   const std::uint32_t guess = grid_->triangle_near(p);
   if (guess != DistanceGrid::kNone) {
-    const double distance = distance_bound(p);
-    if (leaves_room(distance)) return {distance, guess};
+    const PointBound bound = point_bound(p);
+    if (leaves_room(bound.distance)) return bound;
   }
   const Hierarchy::Nearest found = hierarchy_->nearest(p, radius, guess);
   return found.triangle == Hierarchy::kNone ? PointBound{} : PointBound{found.distance, found.triangle};

@@ -21,6 +21,10 @@ namespace {
 constexpr double kRounding = 32 * kUnitRoundoff;
 /// Both normals may be wrong.
 constexpr double kBothNormals = 2.001 * kSureNormal;
+/// A smaller difference to the least angle that can be proved of a face does not matter.
+constexpr double kNearEnough = std::numbers::pi / 180;
+/// A face that keeps no smaller angle than this one is free.
+constexpr double kNearlyTurned = 0.99 * std::numbers::pi;
 
 /// The least cosine of two sure normals between which the angle is at most `limit`. It is rounded up to few digits, so
 /// that every platform gets one result although their cosines differ in the last ones.
@@ -52,7 +56,7 @@ double angle_bound(double cosine) {
 }
 
 FacingRule::FacingRule(const TriangleMesh& reference, double reference_error, double mesh_error, double angle)
-    : mesh_error(mesh_error), angle(angle) {
+    : mesh_error(mesh_error), angle(angle), least_cosine(tolvol::least_cosine(angle)) {
   normals.reserve(reference.triangles.size());
   for (const glm::uvec3& t : reference.triangles) {
     poll_at(normals.size());
@@ -64,6 +68,33 @@ FacingRule::FacingRule(const TriangleMesh& reference, double reference_error, do
 }
 
 Facing::Facing(const FacingRule& rule, const glm::dvec3& normal, double limit)
-    : rule_(&rule), normal_(normal), limit_(limit), least_cosine_(least_cosine(limit)) {}
+    : rule_(&rule),
+      normal_(normal),
+      limit_(limit),
+      least_cosine_(limit == rule.angle ? rule.least_cosine : least_cosine(limit)) {}
+
+bool start_facing(const FacingRule& rule, const FaceRule& of_face, const glm::dvec3 (&corners)[3],
+                  std::optional<Facing>& facing) {
+  if (!(of_face.limit < std::numbers::pi)) return true;
+  const std::optional<glm::dvec3> normal = sure_normal(corners[0], corners[1], corners[2], rule.mesh_error);
+  if (!normal) return of_face.may_be_unsure;
+  facing.emplace(rule, of_face.reversed ? -*normal : *normal, of_face.limit);
+  return true;
+}
+
+double least_limit(double angle, const std::function<std::optional<double>(double limit)>& prove) {
+  std::optional<double> proved = prove(kNearlyTurned);
+  if (!proved) return std::numbers::pi;
+  // A search notes the angle of the witnesses that it happens to find. Those with less may be there, too.
+  for (double least = angle; *proved - least > kNearEnough;) {
+    const double tried = (least + *proved) / 2;
+    if (const std::optional<double> found = prove(tried)) {
+      proved = found;
+    } else {
+      least = tried;
+    }
+  }
+  return *proved;
+}
 
 }  // namespace tolvol

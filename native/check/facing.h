@@ -9,7 +9,9 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
+#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -38,6 +40,14 @@ struct FacingRule {
   std::size_t unsure = 0;           ///< counts the triangles with an area but without a sure normal
   double mesh_error;
   double angle;
+  double least_cosine;  ///< is that of two sure normals between which the angle is at most `angle`
+};
+
+/// How one face keeps the rule, for as long as there is the face.
+struct FaceRule {
+  double limit = std::numbers::pi;  ///< is the largest angle; pi for a face that is free of the rule
+  bool reversed = false;            ///< tells whether the other side of the face has to face as its witnesses do
+  bool may_be_unsure = false;       ///< tells whether the face may have no sure normal, because its input face had none
 };
 
 /// The rule for one face, and what a search has found of it.
@@ -81,5 +91,23 @@ class Facing {
   glm::uvec3 corners_{kNone};
   double limit_, least_cosine_, least_ = 1;
 };
+
+/// How the faces of a result face the reference.
+struct Normals {
+  /// An upper bound, in degrees, on the angle of all faces but those below; none if no face has an angle.
+  std::optional<double> largest;
+  std::size_t unsure = 0;           ///< The number of faces without an angle, because rounding could turn them.
+  std::size_t exceeded_before = 0;  ///< The number of input faces with no proof of the angle that is kept.
+  std::size_t exceeded_after = 0;   ///< How many of them are left so.
+};
+
+/// Starts the rule of a face with these corners in `facing`, which stays empty where the face need not keep it. Returns
+/// false if the face would have to, but has no sure normal.
+bool start_facing(const FacingRule& rule, const FaceRule& of_face, const glm::dvec3 (&corners)[3],
+                  std::optional<Facing>& facing);
+
+/// Returns the limit of a face for which `angle` was not proved: the least angle that can be proved, to within a
+/// degree, or pi if hardly less than a half turn can. `prove` returns the angle that it finds within a limit, or none.
+double least_limit(double angle, const std::function<std::optional<double>(double limit)>& prove);
 
 }  // namespace tolvol

@@ -43,4 +43,20 @@ void require_area_to_cover(int corners) {
   throw InvalidInput("points and segments cannot cover a reference; keep one direction only (two_sided=False)");
 }
 
+void require_normal_angle(double degrees) {
+  if (degrees > 0 && degrees <= 180) return;
+  throw InvalidInput("max_normal_angle must be more than 0 and at most 180 degrees");
+}
+
+std::optional<FacingRule> facing_rule(const ToleranceVolume& volume, double mesh_error, double degrees,
+                                      std::vector<std::string>& warnings) {
+  if (degrees >= 180) return std::nullopt;
+  FacingRule rule(volume.reference(), volume.mapping_error(), mesh_error, glm::radians(degrees));
+  if (2 * rule.unsure <= rule.normals.size()) return rule;
+  warnings.push_back(
+      "no angle of normals is kept: rounding could turn most faces of the reference, which are too small or too thin "
+      "for its size; take the small parts as a mesh of their own");
+  return std::nullopt;
+}
+
 }  // namespace tolvol

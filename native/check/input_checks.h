@@ -7,7 +7,9 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
+#include "check/facing.h"
 #include "check/outside.h"
 #include "check/tolerance_volume.h"
 #include "geometry/frame.h"
@@ -28,5 +30,13 @@ std::string take_uncovered(const FaceCount& uncovered, Outside outside);
 
 /// Throws InvalidInput for faces of fewer than 3 corners, which have no area.
 void require_area_to_cover(int corners);
+
+/// Throws InvalidInput unless the angle, in degrees, is more than 0 and at most 180.
+void require_normal_angle(double degrees);
+
+/// Returns the rule that keeps this angle for a mesh whose mapping error is `mesh_error`. Returns none for 180 degrees,
+/// which keep no angle, and adds a warning and returns none where hardly any face would find a witness.
+std::optional<FacingRule> facing_rule(const ToleranceVolume& volume, double mesh_error, double degrees,
+                                      std::vector<std::string>& warnings);
 
 }  // namespace tolvol

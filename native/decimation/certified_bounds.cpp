@@ -32,13 +32,7 @@ CertifiedBounds::CertifiedBounds(const Directions& directions, MeshView mesh,
 
 bool CertifiedBounds::start(std::uint32_t triangle, const glm::dvec3 (&corners)[3],
                             std::optional<Facing>& facing) const {
-  if (!must_face(triangle)) return true;
-  const std::optional<glm::dvec3> normal =
-      sure_normal(corners[0], corners[1], corners[2], directions_.facing->mesh_error);
-  const FaceRule& rule = rules_[triangle];
-  if (!normal) return rule.may_be_unsure;
-  facing.emplace(*directions_.facing, rule.reversed ? -*normal : *normal, rule.limit);
-  return true;
+  return !must_face(triangle) || start_facing(*directions_.facing, rules_[triangle], corners, facing);
 }
 
 FaceBound CertifiedBounds::prove(std::uint32_t triangle, const glm::dvec3 (&corners)[3], const PointBound (&known)[3],

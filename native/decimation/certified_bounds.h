@@ -58,12 +58,6 @@ class CertifiedBounds final : public Bounds {
   void note(std::uint32_t vertex, const PointBound& bound) { vertices_[vertex] = bound; }
   void note_face(std::uint32_t triangle, const FaceBound& bound) { faces_[triangle] = bound; }
 
-  /// How a face keeps the rule of facing, for as long as there is the face.
-  struct FaceRule {
-    double limit;        ///< The largest angle; pi for a face that is free of the rule.
-    bool reversed;       ///< Whether the other side of the face is the one that has to face as its witnesses do.
-    bool may_be_unsure;  ///< Whether the face may have no sure normal, because its input face had none.
-  };
   const FaceRule& rule(std::uint32_t triangle) const { return rules_[triangle]; }
   void set_rule(std::uint32_t triangle, const FaceRule& rule) { rules_[triangle] = rule; }
   /// Whether there is a rule of facing that the face is not free of.

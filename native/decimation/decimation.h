@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "check/facing.h"
 #include "check/outside.h"
 #include "check/tolerance_volume.h"
 #include "decimation/ring_check.h"
@@ -66,15 +67,7 @@ struct DecimationResult {
   std::string method, renderer;     ///< The check that decided; empty without a volume.
   std::vector<Repair> repairs;
   std::map<std::string, std::size_t> locked;  ///< The number of vertices that could not move, by cause.
-  /// How the faces face the reference; none where no angle was kept.
-  struct Normals {
-    /// An upper bound, in degrees, on the angle of all faces but those below; none if no face has an angle.
-    std::optional<double> largest;
-    std::size_t unsure = 0;           ///< The number of faces without an angle, because rounding could turn them.
-    std::size_t exceeded_before = 0;  ///< The number of input faces with no proof of max_normal_angle.
-    std::size_t exceeded_after = 0;   ///< How many of them are left.
-  };
-  std::optional<Normals> normals;
+  std::optional<Normals> normals;             ///< How the faces face the reference; none where no angle was kept.
   FaceCount outside;    ///< Input faces that are not within the tolerance and are kept as they are.
   FaceCount uncovered;  ///< Faces of the reference that are not within the tolerance of the input.
   std::vector<std::string> warnings;

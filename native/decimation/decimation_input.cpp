@@ -33,9 +33,7 @@ void check(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> tri
       throw InvalidInput("shares must be from 0 to 1, that of vertex " + std::to_string(i) + " is not");
     }
   }
-  if (!(options.max_normal_angle > 0 && options.max_normal_angle <= 180)) {
-    throw InvalidInput("max_normal_angle must be more than 0 and at most 180 degrees");
-  }
+  require_normal_angle(options.max_normal_angle);
   if (!options.wedges.empty() && options.wedges.size() != 3 * triangles.size()) {
     throw InvalidInput("wedges must have one label for each corner of each triangle");
   }
@@ -175,17 +173,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
       }
     }
   }
-  if (options_.max_normal_angle < 180) {
-    facing_.emplace(volume_->reference(), volume_->mapping_error(), mapping_error,
-                    glm::radians(options_.max_normal_angle));
-    if (2 * facing_->unsure > facing_->normals.size()) {
-      // Hardly any face would find a witness, and hardly any vertex could go.
-      report_.warnings.push_back(
-          "no angle of normals is kept: rounding could turn most faces of the reference, which are too small or too "
-          "thin for its size; decimate the small parts as a mesh of their own");
-      facing_.reset();
-    }
-  }
+  facing_ = facing_rule(*volume_, mapping_error, options_.max_normal_angle, report_.warnings);
   if (facing_) {
     if (own_count_ > 0) face_as_cut(cut_, *facing_);
     directions.facing = &*facing_;

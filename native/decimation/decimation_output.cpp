@@ -147,7 +147,7 @@ class Output {
   void report_normals() {
     const CertifiedBounds* const bounds = mesh_.certified();
     if (!bounds || !input_.facing()) return;
-    DecimationResult::Normals normals;
+    Normals normals;
     std::optional<double> largest;
     for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
       poll_at(t);

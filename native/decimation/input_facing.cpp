@@ -16,10 +16,6 @@ namespace {
 constexpr std::uint32_t kNone = CutMesh::kNone;
 constexpr std::size_t kBlock = 64;
 constexpr double kAnywhere = std::numeric_limits<double>::infinity();
-/// A smaller difference to the least angle that can be proved of a face does not matter.
-constexpr double kNearEnough = std::numbers::pi / 180;
-/// A face that keeps no smaller angle than this one is free.
-constexpr double kNearlyTurned = 0.99 * std::numbers::pi;
 
 /// For each triangle, the first triangle of its connected part.
 std::vector<std::uint32_t> connected_parts(const CutMesh& cut) {
@@ -76,7 +72,7 @@ std::vector<std::uint32_t> face_as_reference(const CutMesh& cut, std::span<const
   std::vector<std::uint32_t> all(part.size()), below(part.size());
   for (std::uint32_t f = 0; f < all.size(); ++f) {
     all[f] = f, below[f] = places[f].below;
-    CertifiedBounds::FaceRule of_face = bounds.rule(f);
+    FaceRule of_face = bounds.rule(f);
     of_face.reversed = area[part[f]] < 0;
     bounds.set_rule(f, of_face);
   }
@@ -94,34 +90,20 @@ std::vector<std::uint32_t> keep_angles(const CutMesh& cut, std::span<const glm::
       const glm::uvec3& t = cut.triangles[f];
       const glm::dvec3 corners[3] = {positions[t.x], positions[t.y], positions[t.z]};
       const glm::uvec3 hint(hints.empty() ? kNone : hints[i], kNone, kNone);
-      CertifiedBounds::FaceRule of_face = bounds.rule(f);
-      const auto holds = [&](double limit) {
+      FaceRule of_face = bounds.rule(f);
+      const auto prove = [&](double limit) -> std::optional<double> {
         of_face.limit = limit;
         bounds.set_rule(f, of_face);
         std::optional<Facing> question;
         bounds.start(f, corners, question);
-        if (!question) return true;
-        if (certificate.verdict(corners, glm::dvec3(kAnywhere), hint, &*question) != Verdict::inside) return false;
+        if (!question) return 0;
+        if (certificate.verdict(corners, glm::dvec3(kAnywhere), hint, &*question) != Verdict::inside) return {};
         bounds.note_face(f, {bounds.face_bound(f).distance, question->angle()});
-        return true;
+        return question->angle();
       };
-      if (holds(rule.angle)) continue;
+      if (prove(rule.angle)) continue;
       exceeds[i] = 1;
-      if (!holds(kNearlyTurned)) {
-        of_face.limit = std::numbers::pi;
-      } else {
-        // A search notes the angle of the witnesses that it happens to find. Those with less may be there, too.
-        double least = rule.angle, proved = bounds.face_bound(f).angle;
-        while (proved - least > kNearEnough) {
-          const double tried = (least + proved) / 2;
-          if (holds(tried)) {
-            proved = bounds.face_bound(f).angle;
-          } else {
-            least = tried;
-          }
-        }
-        of_face.limit = proved;
-      }
+      of_face.limit = least_limit(rule.angle, prove);
       bounds.set_rule(f, of_face);
     }
   });

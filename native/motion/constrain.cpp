@@ -4,6 +4,7 @@
 #include "base/call.h"
 #include "base/errors.h"
 #include "check/certificate.h"
+#include "check/input_checks.h"
 
 namespace tolvol {
 
@@ -14,10 +15,11 @@ ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const gl
     throw InvalidInput("before has " + std::to_string(before.size()) + " vertices and after " +
                        std::to_string(after.size()) + "; both must be the same ones");
   }
+  require_normal_angle(options.max_normal_angle);
   const Call call(options.progress);
   PullBack pull_back(volume, space, faces, corners, before.size(), options.threads);
-  PullBack::Start start =
-      pull_back.start(before, {options.outside, options.two_sided, options.crossings}, options.progress);
+  PullBack::Start start = pull_back.start(
+      before, {options.outside, options.two_sided, options.crossings, options.max_normal_angle}, options.progress);
   ConstrainResult result;
   result.outside = FaceCount::of(start.outside);
   result.uncovered = start.uncovered;
@@ -36,6 +38,7 @@ ConstrainResult constrain(std::span<const glm::dvec3> before, std::span<const gl
   const PullBack::Result ends = pull_back.move(moving, from, to, options.mode, options.progress);
   result.vertices.assign(after.begin(), after.end());
   result.factors.assign(before.size(), 1);
+  result.normals = pull_back.normals();
   result.held_back = ends.held_back, result.kept_from_crossing = ends.kept_from_crossing;
   for (std::size_t i = 0; i < moving.vertices.size(); ++i) {
     result.vertices[moving.vertices[i]] = ends.reached[i];

@@ -21,6 +21,9 @@ struct ConstrainOptions {
   bool two_sided = true;             ///< Also keeps the whole reference within the tolerance of the mesh.
   Outside outside = Outside::error;  ///< What happens to a mesh that is not within the tolerance in `before`.
   PullBack::Crossings crossings = PullBack::Crossings::keep_out;
+  /// In degrees, more than 0 and at most 180: every point of a face keeps a witness within the tolerance whose normal
+  /// is within this angle of the face's (check/facing.h). 180 keeps no angle.
+  double max_normal_angle = 90;
   unsigned threads = 0;  ///< 0 is one for each core. It never changes the result.
   Progress* progress = nullptr;
 };
@@ -30,9 +33,10 @@ struct ConstrainResult {
   std::vector<double> factors;         ///< The share, 0 to 1, of each vertex's motion from `before` to `after`.
   std::size_t held_back = 0;           ///< The number of factors below 1.
   std::size_t kept_from_crossing = 0;  ///< The number of these vertices that went back so that no faces cross.
-  FaceCount outside;             ///< Faces of `before` that are not within the tolerance and are kept as they are.
-  FaceCount uncovered;           ///< Faces of the reference that are not within the tolerance of `before`.
-  std::string method, renderer;  ///< The check that decided.
+  FaceCount outside;               ///< Faces of `before` that are not within the tolerance and are kept as they are.
+  FaceCount uncovered;             ///< Faces of the reference that are not within the tolerance of `before`.
+  std::optional<Normals> normals;  ///< How the faces face the reference; none where no angle was kept.
+  std::string method, renderer;    ///< The check that decided.
   std::vector<std::string> warnings;
 };
 
@@ -44,10 +48,10 @@ struct ConstrainResult {
 /// whole. What holds a T-junction together (topology/t_junctions.h) does not move, and a warning counts it.
 ///
 /// A vertex has factor 1 where neither it nor a vertex at its place touches a face that failed. One-sided, with
-/// Mode::pull_back, and where crossings are allowed, no single factor can rise by 1/64 alone (or to 1, where that is
-/// less), and none is below that of Mode::reset, whose factors are 0 and 1. Two-sided, vertices go back farther where
-/// the reference would lose its witness, by at least 1/16 of their way, and so they do where faces would cross that do
-/// not cross in `before`, or would become degenerate.
+/// Mode::pull_back, and where crossings are allowed and no angle is kept, no single factor can rise by 1/64 alone (or
+/// to 1, where that is less), and none is below that of Mode::reset, whose factors are 0 and 1. Two-sided, vertices go
+/// back farther where the reference would lose its witness, by at least 1/16 of their way, and so they do where faces
+/// would cross that do not cross in `before`, or would become degenerate.
 ///
 /// Throws InvalidInput for bad arrays, naming the first offender, for a mesh that is not within the tolerance in
 /// `before` (unless Outside::keep) and where the stored type cannot hold the tolerance; Cancelled. Starting costs what

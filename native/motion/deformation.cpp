@@ -100,15 +100,19 @@ class Deformation {
   void bound() {
     result_.method = certificate_->method(), result_.renderer = certificate_->renderer();
     warn_of_rounding();
-    if (options_.two_sided) {
-      require_area_to_cover(static_cast<int>(corners_));
-      start(before_);
-      if (options_.outside == Outside::error && !is_whole()) return accept_only_if_whole();
-    }
+    require_normal_angle(options_.max_normal_angle);
+    if (options_.two_sided) require_area_to_cover(static_cast<int>(corners_));
+    place_ = weld_equal_positions(before_);
+    start(before_);
+    add_warnings(start_.warnings);
+    if (options_.outside == Outside::error && !is_whole()) return accept_only_if_whole();
+    hold_t_junctions();
     if (options_.outside == Outside::keep) keep_outside();
     std::vector<std::uint32_t> failing = leaving(after_);
     if (!failing.empty()) {
       result_.leaving = FaceCount::of(failing);
+    } else if (failing = turning(after_); !failing.empty()) {
+      result_.turning = FaceCount::of(failing);
     } else if (failing = crossing(after_); !failing.empty()) {
       result_.crossing = FaceCount::of(failing);
     }
@@ -117,6 +121,7 @@ class Deformation {
     } else {
       options_.mode == Mode::pull_back ? pull_back() : search(std::move(failing));
     }
+    if (!result_.normals) take_normals();
     for (std::size_t i = 0; i < after_.size(); ++i) result_.held_back += result_.vertices[i] != after_[i];
   }
 
@@ -133,47 +138,83 @@ class Deformation {
     }
   }
 
-  /// Begins to keep both directions, from this state on.
+  void add_warnings(std::vector<std::string>& warnings) {
+    for (std::string& warning : warnings) {
+      if (std::ranges::find(result_.warnings, warning) == result_.warnings.end()) {
+        result_.warnings.push_back(std::move(warning));
+      }
+    }
+  }
+
+  /// Begins to keep what is asked for, from this state on.
   void start(std::span<const glm::dvec3> stored) {
     coverage_.reset();
     if (!mesh_) {
       mesh_.emplace(*volume_, space_, faces_, static_cast<int>(corners_), before_.size(), options_.threads);
     }
-    outside_ = mesh_->start(stored, options_.progress).outside;
-    coverage_.emplace(*mesh_, options_.progress);
+    start_ = mesh_->start(stored, options_.max_normal_angle, place_, options_.progress);
+    if (options_.two_sided) coverage_.emplace(*mesh_, options_.progress);
   }
 
-  bool is_whole() const { return outside_.empty() && coverage_->uncovered().faces == 0; }
+  FaceCount uncovered() const { return coverage_ ? coverage_->uncovered() : FaceCount{}; }
+  bool is_whole() const { return start_.outside.empty() && uncovered().faces == 0; }
 
   /// A mesh that is not within the tolerance to begin with may be brought there as a whole, but not halfway.
   void accept_only_if_whole() {
-    const std::vector<std::uint32_t> outside = outside_;
-    const FaceCount uncovered = coverage_->uncovered();
+    const std::vector<std::uint32_t> outside = start_.outside;
+    std::vector<std::uint32_t> excused = mesh_->exceeding(), turned;
+    excused.insert(excused.end(), outside.begin(), outside.end());  // Of these, no angle is known.
+    std::ranges::sort(excused);
+    const FaceCount uncovered_before = uncovered();
     start(after_);
-    if (is_whole() && crossing(after_).empty()) {
+    std::ranges::set_difference(mesh_->exceeding(), excused, std::back_inserter(turned));
+    const std::size_t crossing_count = is_whole() && turned.empty() ? crossing(after_).size() : 0;
+    if (is_whole() && turned.empty() && crossing_count == 0) {
       result_.vertices = after_;
+      result_.normals = mesh_->normals();
       return;
     }
     if (is_whole()) {
-      throw InvalidInput("the deformation would bring the mesh within the tolerance, but " +
-                         std::to_string(crossing(after_).size()) +
-                         " faces would then cross others; allow it (crossings=\"allow\")");
+      const std::string but = "the deformation would bring the mesh within the tolerance, but ";
+      throw InvalidInput(turned.empty() ? but + std::to_string(crossing_count) +
+                                              " faces would then cross others; allow it (crossings=\"allow\")"
+                                        : but + std::to_string(turned.size()) +
+                                              " faces would then be turned away from the reference; allow it "
+                                              "(max_normal_angle=180)");
     }
     if (!outside.empty()) refuse_outside(FaceCount::of(outside));
-    take_uncovered(uncovered, Outside::error);
+    take_uncovered(uncovered_before, Outside::error);
+  }
+
+  /// Looks how the faces of the result face the reference.
+  void take_normals() {
+    result_.normals = mesh_->normals();
+    if (!result_.normals || result_.vertices == std::vector(before_.begin(), before_.end())) return;
+    const std::size_t before = result_.normals->exceeded_before;
+    mesh_->start(result_.vertices, options_.max_normal_angle, place_, options_.progress);
+    result_.normals = mesh_->normals();
+    result_.normals->exceeded_before = before;
+  }
+
+  void hold_t_junctions() {
+    if (const auto warning = mesh_->hold_t_junctions(before_, place_)) result_.warnings.push_back(*warning);
+    for (std::uint32_t v = 0; v < after_.size(); ++v) {
+      if (!mesh_->frozen(v)) continue;
+      result_.held_back += after_[v] != before_[v];
+      after_[v] = before_[v];
+    }
   }
 
   /// Keeps the faces that are outside to begin with as they are, and asks about them no more. Two-sided, it also keeps
   /// what is nearest to uncovered parts of the reference.
   void keep_outside() {
-    const std::vector<std::uint32_t> outside = options_.two_sided ? outside_ : not_inside(before_, faces_);
-    const std::vector<std::uint32_t> place = weld_equal_positions(before_);
-    std::vector<bool> is_kept(place.size());
-    const auto keep = [&](std::uint32_t v) { is_kept[place[v]] = true; };
+    const std::vector<std::uint32_t>& outside = start_.outside;
+    std::vector<bool> is_kept(place_.size());
+    const auto keep = [&](std::uint32_t v) { is_kept[place_[v]] = true; };
     // What is at the place of a vertex that stays has to stay as well.
     const auto keep_places = [&] {
       for (std::uint32_t v = 0; v < after_.size(); ++v) {
-        if (!is_kept[place[v]]) continue;
+        if (!is_kept[place_[v]]) continue;
         result_.held_back += after_[v] != before_[v];
         after_[v] = before_[v];
       }
@@ -184,7 +225,7 @@ class Deformation {
       kept_[face] = true;
       for (const std::uint32_t v : corners_of(face)) keep(v);
     }
-    if (options_.two_sided) result_.uncovered = coverage_->uncovered();
+    result_.uncovered = uncovered();
     if (result_.uncovered.faces) {
       result_.warnings.push_back(take_uncovered(result_.uncovered, Outside::keep));
       for (std::uint32_t v = 0; v < after_.size(); ++v) {
@@ -199,22 +240,15 @@ class Deformation {
     ConstrainOptions options;
     options.outside = options_.outside, options.two_sided = options_.two_sided;
     options.crossings = options_.crossings;
+    options.max_normal_angle = options_.max_normal_angle;
     options.threads = options_.threads, options.progress = options_.progress;
     ConstrainResult held = constrain(before_, after_, faces_, static_cast<int>(corners_), space_, *volume_, options);
     result_.vertices = std::move(held.vertices), result_.kept_from_crossing = held.kept_from_crossing;
-    for (std::string& warning : held.warnings) {
-      if (std::ranges::find(result_.warnings, warning) == result_.warnings.end()) {
-        result_.warnings.push_back(std::move(warning));
-      }
-    }
+    result_.normals = held.normals;
+    add_warnings(held.warnings);
   }
 
   void search(std::vector<std::uint32_t> failing) {
-    // Two-sided, start() has looked at the mesh before the deformation.
-    if (options_.outside == Outside::error && !options_.two_sided) {
-      const std::vector<std::uint32_t> outside = not_inside(before_, faces_);
-      if (!outside.empty()) refuse_outside(FaceCount::of(outside));
-    }
     result_.vertices.assign(before_.begin(), before_.end());
     std::vector<glm::dvec3> permitted = result_.vertices;
     double inside = 0, outside = 1;
@@ -225,6 +259,7 @@ class Deformation {
       std::vector<std::uint32_t> still = not_inside(state, only(failing));
       if (still.empty()) {
         still = leaving(state);
+        if (still.empty()) still = turning(state);
         if (still.empty()) still = crossing(state);
       } else {
         for (std::uint32_t& i : still) i = failing[i];
@@ -284,13 +319,23 @@ class Deformation {
     std::vector<std::uint32_t> result = not_inside(stored, faces_);
     if (!kept_.empty()) std::erase_if(result, [&](std::uint32_t face) { return kept_[face]; });
     if (!result.empty() || !coverage_) return result;
+    return coverage_->failing(try_at(stored));
+  }
+
+  /// Faces that would exceed their angle, where none are leaving.
+  std::vector<std::uint32_t> turning(std::span<const glm::dvec3> stored) {
+    return mesh_->turned(try_at(stored), options_.progress);
+  }
+
+  /// Has the mesh try these positions. Returns the faces that move.
+  std::vector<std::uint32_t> try_at(std::span<const glm::dvec3> stored) {
     std::vector<std::uint32_t> moving;
     std::vector<glm::dvec3> from, to;
     for (std::uint32_t v = 0; v < before_.size(); ++v) {
       if (after_[v] != before_[v]) moving.push_back(v), from.push_back(before_[v]), to.push_back(stored[v]);
     }
     mesh_->try_all(moving, from, to);
-    return coverage_->failing(mesh_->faces_around(moving));
+    return mesh_->faces_around(moving);
   }
 
   /// Faces that would cross others anew or become degenerate.
@@ -315,10 +360,11 @@ class Deformation {
   const LatticeDeformation& lattice_;
   const DeformationOptions& options_;
   std::optional<Certificate> certificate_;
-  std::optional<MovingMesh> mesh_;  // These two are empty if only the forward direction is kept.
-  std::optional<MovingCoverage> coverage_;
+  std::optional<MovingMesh> mesh_;
+  std::optional<MovingCoverage> coverage_;    // Empty if only the forward direction is kept.
   std::optional<MovingCrossings> crossings_;  // Made when it is first asked.
-  std::vector<std::uint32_t> outside_;        // The faces that were outside when mesh_ started.
+  MovingMesh::Start start_;                   // Of mesh_.
+  std::vector<std::uint32_t> place_;          // For each vertex: the first one at its place before the deformation.
   std::vector<glm::dvec3> after_;
   std::vector<bool> kept_;  // For each face; empty if none is kept.
   DeformationResult result_;

@@ -29,23 +29,28 @@ struct DeformationOptions {
   bool two_sided = true;             ///< Also keeps the whole reference within the tolerance of the mesh.
   Outside outside = Outside::error;  ///< What happens to a mesh that is not within the tolerance to begin with.
   PullBack::Crossings crossings = PullBack::Crossings::keep_out;  ///< It matters only with a volume.
-  unsigned threads = 0;  ///< 0 is one for each core. It never changes the result.
+  double max_normal_angle = 90;  ///< See ConstrainOptions; it matters only with a volume.
+  unsigned threads = 0;          ///< 0 is one for each core. It never changes the result.
   Progress* progress = nullptr;
 };
 
 struct DeformationResult {
   std::vector<glm::dvec3> vertices;  ///< In stored coordinates.
-  /// The share of the way, from 0 to 1, at which the whole mesh is certified to be inside and no faces cross that must
-  /// not; 1 without a volume. It is not looked for when vertices are pulled back. Bisection finds it to a thousandth: a
-  /// larger share may be permitted as well, and smaller shares were not looked at.
+  /// The share of the way, from 0 to 1, at which the whole mesh is certified to be inside and no faces are turned or
+  /// cross that must not; 1 without a volume. It is not looked for when vertices are pulled back. Bisection finds it to
+  /// a thousandth: a larger share may be permitted as well, and smaller shares were not looked at.
   std::optional<double> permitted_fraction = 1;
   /// Faces that the deformation as wished would not leave certified to be inside or, if there are none, some that it
   /// would take from a part of the reference that has no other face within the tolerance.
   FaceCount leaving;
-  /// If no faces are leaving: those that would cross others anew, or become degenerate, by the deformation as wished.
+  /// If no faces are leaving: those that would exceed the angle to the reference by the deformation as wished.
+  FaceCount turning;
+  /// If no faces are leaving or turning: those that would cross others anew, or become degenerate, by the deformation
+  /// as wished.
   FaceCount crossing;
   FaceCount outside;    ///< Faces that are outside to begin with, which are kept as they are.
   FaceCount uncovered;  ///< Faces of the reference that are not within the tolerance of the mesh to begin with.
+  std::optional<Normals> normals;  ///< How the faces face the reference; none where no angle was kept.
   std::size_t outside_lattice =
       0;                      ///< The number of vertices not in the box of the lattice, which stay where they are.
   std::size_t moved = 0;      ///< The number of vertices of the result that are not where they were.
@@ -58,12 +63,13 @@ struct DeformationResult {
 };
 
 /// `faces` has `corners` (1 to 4) indices for each face; without a volume it may be empty. Without a volume there is no
-/// tolerance. All faces of the result are inside, and two-sided the reference is covered, except for what is kept.
-/// Unless they are allowed to, no faces cross that do not cross to begin with.
-/// Throws InvalidInput for bad arrays, for a mesh that is not within the tolerance to begin with (unless Outside::keep,
-/// or the deformation brings it there without new crossings), and where the stored type cannot hold the tolerance;
-/// Cancelled. It takes about 0.4 us a vertex, and with a volume the time of one check, two-sided also of
-/// PullBack::start(); where that check fails, of about twelve checks or of constrain().
+/// tolerance. With one, what holds T-junctions together stays, and a warning counts it. All faces of the result are
+/// inside, and two-sided the reference is covered, except for what is kept. Unless they are allowed to, no faces exceed
+/// the angle to the reference or cross that do not do so to begin with. Throws InvalidInput for bad arrays, for a mesh
+/// that is not within the tolerance to begin with (unless Outside::keep, or the deformation brings it there without new
+/// crossings), and where the stored type cannot hold the tolerance; Cancelled. It takes about 0.4 us a vertex, and with
+/// a volume the time of one check and of PullBack::start(); where that check fails, of about twelve checks or of
+/// constrain().
 DeformationResult deform(std::span<const glm::dvec3> vertices, std::span<const std::uint32_t> faces, int corners,
                          const StoredSpace& space, const ToleranceVolume* volume, const LatticeDeformation& lattice,
                          const DeformationOptions& options);

@@ -7,6 +7,7 @@
 #include "base/call.h"
 #include "base/errors.h"
 #include "base/parallel.h"
+#include "check/input_checks.h"
 
 namespace tolvol {
 namespace {
@@ -29,6 +30,7 @@ Guard::Guard(std::span<const float> positions, std::vector<std::uint32_t> faces,
       options_(options),
       pull_back_(volume, StoredSpace(to_world, Storage::float32), faces_, corners, positions.size() / 3,
                  options.threads) {
+  require_normal_angle(options.max_normal_angle);
   begin(positions, options.progress);
 }
 
@@ -42,7 +44,8 @@ void Guard::begin(std::span<const float> positions, Progress* progress) {
   const Call call(progress);
   std::vector<glm::dvec3> stored(positions.size() / 3);
   for (std::size_t v = 0; v < stored.size(); ++v) stored[v] = at(positions, v);
-  start_ = pull_back_.start(stored, {options_.outside, options_.two_sided, options_.crossings}, progress);
+  start_ = pull_back_.start(
+      stored, {options_.outside, options_.two_sided, options_.crossings, options_.max_normal_angle}, progress);
   last_.assign(positions.begin(), positions.end());
 }
 

@@ -22,6 +22,7 @@ class Guard {
     Outside outside = Outside::error;                            ///< See ConstrainOptions.
     bool two_sided = true;                                       ///< See ConstrainOptions.
     PullBack::Crossings crossings = PullBack::Crossings::allow;  ///< Relative to the last start.
+    double max_normal_angle = 90;                                ///< See ConstrainOptions.
     unsigned threads = 0;                                        ///< 0 is one for each core.
     Progress* progress = nullptr;                                ///< The progress of the construction alone.
   };
@@ -34,7 +35,8 @@ class Guard {
 
   /// `positions`: three float32 coordinates a vertex, local, as Blender stores them. `faces`: `corners` indices a face,
   /// as in Pieces. Keeps a reference to `volume`. Throws InvalidInput like constrain(); Cancelled. About 1 us a vertex;
-  /// holds about 150 bytes a vertex and 60 a triangle, and where crossings are kept out 72 and 130 more.
+  /// holds about 150 bytes a vertex and 60 a triangle, 100 a triangle more where an angle is kept, and where crossings
+  /// are kept out 72 and 130 more.
   Guard(std::span<const float> positions, std::vector<std::uint32_t> faces, int corners, const glm::dmat4& to_world,
         const ToleranceVolume& volume, const Options& options);
   Guard(const Guard&) = delete;

@@ -17,6 +17,7 @@
 #include "check/tolerance_check.h"
 #include "check/tolerance_volume.h"
 #include "geometry/frame.h"
+#include "motion/moving_facing.h"
 
 namespace tolvol {
 
@@ -32,7 +33,7 @@ class MovingMesh {
 
   struct Start {
     std::vector<std::uint32_t> outside;  ///< Faces that are not proved inside, ascending. Their vertices never move.
-    std::optional<std::string> warning;  ///< By storage_warning().
+    std::vector<std::string> warnings;   ///< By storage_warning() and facing_rule().
   };
 
   /// `faces` has `corners` (1 to 4) indices for each face, as in Pieces. Keeps references to `volume` and `faces`.
@@ -40,9 +41,14 @@ class MovingMesh {
   MovingMesh(const ToleranceVolume& volume, const StoredSpace& space, std::span<const std::uint32_t> faces, int corners,
              std::size_t vertex_count, unsigned threads);
 
-  /// Takes the stored positions as state and trial. Throws InvalidInput for a position that is not finite, and where
-  /// the stored type cannot hold the tolerance. About 1 us a vertex; nothing for faces of the reference itself.
-  Start start(std::span<const glm::dvec3> stored, Progress* progress);
+  /// Takes the stored positions as state and trial. `max_normal_angle`, in degrees, is kept from then on (see
+  /// MovingFacing); 180 keeps no angle. A face that exceeds it keeps the least angle that can be proved of it, to
+  /// within a degree. A connected part of the mesh more of which keeps the angle by its other side is compared by that.
+  /// `place` has the first vertex at the place of each, or is empty if vertices at one place are not connected. Throws
+  /// InvalidInput for a position that is not finite, and where the stored type cannot hold the tolerance. About 1 us a
+  /// vertex; for faces of the reference itself 0.5 us a face, and nothing where no angle is kept.
+  Start start(std::span<const glm::dvec3> stored, double max_normal_angle, std::span<const std::uint32_t> place,
+              Progress* progress);
 
   /// Tries all these vertices at stored positions; those that may not move stay. Throws InvalidInput, changing nothing,
   /// for the first position that is not finite in the world or in the frame.
@@ -59,6 +65,8 @@ class MovingMesh {
   /// ring of the face that is asked first, set to that of the face that refused.
   bool try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint32_t& blame);
   void measure(std::span<const std::uint32_t> faces, Progress* progress);
+  /// Which of these faces, all of which are inside on trial, exceed their angle there.
+  std::vector<std::uint32_t> turned(std::span<const std::uint32_t> faces, Progress* progress);
   /// Makes the trial of these vertices the state. `faces` are all faces around them.
   void accept(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces);
 
@@ -83,6 +91,14 @@ class MovingMesh {
   bool any_frozen() const { return any_frozen_; }
   /// The vertex never moves from now on.
   void freeze(std::uint32_t vertex) { frozen_[vertex] = any_frozen_ = true; }
+  /// How the faces of the state face the reference; none where no angle is kept. About 50 ns a face.
+  std::optional<Normals> normals() const;
+  /// The faces that exceeded the angle at the start, ascending.
+  const std::vector<std::uint32_t>& exceeding() const { return exceeding_; }
+  /// Freezes what holds T-junctions together in these stored positions (topology/t_junctions.h), because faces that
+  /// meet there share no vertex by which they could be kept together while they move. `place` is as for start(), and
+  /// not empty. Returns a warning if that holds any vertex that could move. About 0.3 us a face.
+  std::optional<std::string> hold_t_junctions(std::span<const glm::dvec3> stored, std::span<const std::uint32_t> place);
   double provable() const { return provable_; }
   double limit() const { return limit_; }  ///< The provable distance less a headroom.
   const ToleranceVolume& volume() const { return *volume_; }
@@ -122,10 +138,26 @@ class MovingMesh {
 
   void make_rings(std::size_t vertex_count);
   void set_trial(std::uint32_t vertex, const VertexState& state);
-  double reach_by_motion(std::uint32_t face) const;
-  template <class Bound>
-  double over_triangulations(std::uint32_t face, Bound&& bound) const;
-  double reach_by_certificate(std::uint32_t face) const;
+  /// What is known of all points of a face.
+  struct Reach {
+    double distance = kUnproved;
+    MovingFacing::Known facing;
+  };
+  using TriangleCorners = glm::dvec3[3];
+  Reach reach_by_motion(std::uint32_t face) const;
+  Reach reach_by_certificate(std::uint32_t face) const;
+  double distance_by(const TriangleCertificate& certificate, std::uint32_t face, MovingFacing::Known& facing) const;
+  bool is_inside(std::uint32_t face) const;
+  void set_trial_reach(std::uint32_t face, const Reach& reach);
+  void accept(std::uint32_t face);
+  bool is_plainly_oriented(std::span<const std::uint32_t> place) const;
+  void start_facing(FacingRule rule, std::span<const std::uint32_t> place);
+  std::vector<std::uint32_t> uncertified(std::span<const std::uint32_t> faces, Progress* progress);
+  std::vector<double> balance(std::span<const std::uint32_t> failing) const;
+  std::vector<std::uint32_t> compare_sides(std::vector<std::uint32_t> failing, Progress* progress);
+  bool limit_angle(std::uint32_t face);
+  template <class Visit>
+  void for_triangles(std::uint32_t face, Visit&& visit) const;
 
   const ToleranceVolume* volume_;
   StoredSpace space_;
@@ -142,8 +174,12 @@ class MovingMesh {
   std::vector<std::array<Refusal, 2>>
       refusals_;  // The last ones for each vertex and Trial; empty unless they are remembered.
   std::vector<double> reach_, trial_reach_;  // For each face: no point of it is farther from the reference.
-  std::vector<std::uint64_t> seen_;          // For each face: in which call faces_around() met it last.
-  std::uint64_t now_ = 0;                    // The number of these calls.
+  std::optional<MovingFacing> facing_;       // None if no angle is kept.
+  double max_normal_angle_ = 180;            // In degrees.
+  std::vector<std::uint32_t> part_;          // For each face: its connected part; empty where nobody has to ask.
+  std::vector<std::uint32_t> exceeding_;
+  std::vector<std::uint64_t> seen_;  // For each face: in which call faces_around() met it last.
+  std::uint64_t now_ = 0;            // The number of these calls.
 };
 
 }  // namespace tolvol

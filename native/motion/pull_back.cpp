@@ -26,8 +26,6 @@
 #include "geometry/triangle_mesh.h"
 #include "motion/moving_coverage.h"
 #include "motion/moving_crossings.h"
-#include "topology/sides.h"
-#include "topology/t_junctions.h"
 
 namespace tolvol {
 namespace {
@@ -71,17 +69,14 @@ PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, const StartO
   held_index_.assign(stored.size(), kNone);
   next_twin_.clear();
   coverage_.reset(), crossings_.reset();
-  MovingMesh::Start start = mesh_.start(stored, progress);
+  std::vector<std::uint32_t> place;
+  if (options.together) place = weld_equal_positions(stored);
+  MovingMesh::Start start = mesh_.start(stored, options.max_normal_angle, place, progress);
   if (!start.outside.empty() && options.outside == Outside::error) refuse_outside(FaceCount::of(start.outside));
-  Start result{std::move(start.outside), {}, {}};
-  if (start.warning) result.warnings.push_back(*start.warning);
+  Start result{std::move(start.outside), {}, FaceCount::of(mesh_.exceeding()), std::move(start.warnings)};
   if (options.together) {
-    const std::vector<std::uint32_t> place = weld_equal_positions(stored);
     link_twins(place);
-    if (const std::size_t fixed = hold_t_junctions(stored, place)) {
-      result.warnings.push_back(std::to_string(fixed) + (fixed == 1 ? " vertex holds" : " vertices hold") +
-                                " T-junctions together and cannot move");
-    }
+    if (const auto warning = mesh_.hold_t_junctions(stored, place)) result.warnings.push_back(*warning);
   }
   if (options.crossings == Crossings::keep_out && mesh_.corners() >= 3) {
     crossings_ = std::make_unique<MovingCrossings>(mesh_.faces(), mesh_.corners(), stored, mesh_.threads());
@@ -449,34 +444,6 @@ void PullBack::link_twins(std::span<const std::uint32_t> place) {
     }
     next_twin_[v] = std::exchange(next_twin_[place[v]], v);
   }
-}
-
-/// Faces that meet in a T-junction share no vertex by which they could be kept together while they move. Returns the
-/// number of vertices that are held.
-std::size_t PullBack::hold_t_junctions(std::span<const glm::dvec3> stored, std::span<const std::uint32_t> place) {
-  if (mesh_.corners() < 3) return 0;
-  TriangleMesh mesh{{stored.begin(), stored.end()}, {}};
-  for (std::uint32_t f = 0; f < mesh_.face_count(); ++f) {
-    const std::span<const std::uint32_t> c = mesh_.corners_of(f);
-    for (std::size_t k = 1; k + 1 < c.size(); ++k) {
-      const glm::uvec3 t(place[c[0]], place[c[k]], place[c[k + 1]]);
-      if (t.x != t.y && t.y != t.z && t.z != t.x) mesh.triangles.push_back(t);
-    }
-  }
-  Team team(mesh_.threads());
-  std::vector<Side> sides(3 * mesh.triangles.size());
-  std::iota(sides.begin(), sides.end(), 0u);
-  const auto end_of = [&](Side corner) { return mesh.triangles[corner / 3][corner % 3]; };
-  std::vector<glm::uvec2> open;
-  by_ends(sides, stored.size(), team, end_of, [&](const std::vector<Side>& alike) {
-    if (alike.size() == 1) open.emplace_back(end_of(alike[0]), end_of(next_corner(alike[0])));
-  });
-  std::size_t count = 0;
-  for (const std::uint32_t v : t_junctions(std::move(mesh), open, mesh_.space().unit_roundoff(), team)) {
-    count += !mesh_.frozen(v);
-    mesh_.freeze(v);
-  }
-  return count;
 }
 
 /// Sends vertices back to where their twins are, the vertices that were at their place at the start and have the same

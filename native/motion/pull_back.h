@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// Keeps a moving mesh inside a tolerance volume, and its reference within the tolerance of it, and keeps its faces
-/// from crossing: vertices of faces that would leave the volume, leave a part of the reference without a witness or
-/// cross another face anew are pulled back along their motion. constrain(), Guard and smooth() share it. It keeps the
-/// state from one motion to the next.
+/// from turning over and from crossing: vertices of faces that would leave the volume, turn too far away from it, leave
+/// a part of the reference without a witness or cross another face anew are pulled back along their motion.
+/// constrain(), Guard and smooth() share it. It keeps the state from one motion to the next.
 #pragma once
 
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -55,7 +56,8 @@ class PullBack {
     Outside outside = Outside::error;
     bool two_sided = true;  ///< Keeps the backward direction, too: see MovingCoverage.
     Crossings crossings = Crossings::keep_out;
-    bool short_ways = false;  ///< Says that all vertices will move by little, again and again.
+    double max_normal_angle = 90;  ///< In degrees; 180 keeps no angle. See MovingMesh::start().
+    bool short_ways = false;       ///< Says that all vertices will move by little, again and again.
     /// Keeps vertices at one place together, and what holds T-junctions together (topology/t_junctions.h) where it is.
     bool together = true;
   };
@@ -63,6 +65,7 @@ class PullBack {
   struct Start {
     std::vector<std::uint32_t> outside;  ///< Faces that are not proved inside, ascending. Their vertices never move.
     FaceCount uncovered;  ///< Faces of the reference that are not covered. What is nearest to them never moves.
+    FaceCount exceeding;  ///< Faces with no proof of the angle. They keep the least angle that is proved of them.
     std::vector<std::string> warnings;
   };
   /// Takes the stored positions as the state. Throws what MovingMesh::start() throws, FacesOutside as the options say,
@@ -71,11 +74,13 @@ class PullBack {
   /// keeping places and T-junctions together as much.
   Start start(std::span<const glm::dvec3> stored, const StartOptions& options, Progress* progress);
   bool frozen(std::uint32_t vertex) const { return mesh_.frozen(vertex); }
+  std::optional<Normals> normals() const { return mesh_.normals(); }  ///< See MovingMesh.
 
   Moving moving(std::vector<std::uint32_t> vertices);
 
   /// Moves each vertex from `before`, its stored position now, towards `after`, and makes where it ends the new state.
-  /// All faces of the new state are inside, the reference is covered, and nothing crosses that did not at the start;
+  /// All faces of the new state are inside, the reference is covered, no face exceeds its angle, and nothing crosses
+  /// that did not at the start;
   /// see constrain.h for what else holds of the factors. Vertices that were at one place at the start and have the same
   /// `before` and `after` have the same factor. Throws InvalidInput, for a wish that is not finite, and
   /// Cancelled; both change nothing. A settled face costs about 10 ns, and a face near the tolerance about 1 us for
@@ -131,7 +136,6 @@ class PullBack {
   bool attempt(Held& held, double factor);
   void back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Progress* progress);
   void link_twins(std::span<const std::uint32_t> place);
-  std::size_t hold_t_junctions(std::span<const glm::dvec3> stored, std::span<const std::uint32_t> place);
   void hold_twins(const Wish& wish, std::span<const std::uint32_t> vertices, std::vector<Held>& held,
                   std::vector<std::uint32_t>& changed);
   void start_crossings(const std::vector<Held>& held, const Wish& wish);

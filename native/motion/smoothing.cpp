@@ -17,6 +17,7 @@
 #include "base/errors.h"
 #include "base/parallel.h"
 #include "check/certificate.h"
+#include "check/input_checks.h"
 #include "topology/t_junctions.h"
 
 namespace tolvol {
@@ -63,6 +64,7 @@ class Smoothing {
       if (options_.progress) options_.progress->update(static_cast<double>(i) / options_.iterations);
       iterate();
     }
+    if (pull_back_) result_.normals = pull_back_->normals();
     write();
     return std::move(result_);
   }
@@ -76,6 +78,7 @@ class Smoothing {
   };
 
   void require_options() const {
+    require_normal_angle(options_.max_normal_angle);
     if (!options_.locked.empty() && options_.locked.size() != input_.size()) {
       throw InvalidInput("locked must have one value for each vertex");
     }
@@ -169,7 +172,8 @@ class Smoothing {
     for (const glm::uvec3& t : triangles_) faces_.insert(faces_.end(), {t.x, t.y, t.z});
     pull_back_ = std::make_unique<PullBack>(*volume_, space_, faces_, 3, positions_.size(), options_.threads);
     PullBack::Start start = pull_back_->start(
-        positions_, {options_.outside, options_.two_sided, options_.crossings, true, false}, options_.progress);
+        positions_, {options_.outside, options_.two_sided, options_.crossings, options_.max_normal_angle, true, false},
+        options_.progress);
     result_.outside = FaceCount::of(start.outside);
     result_.uncovered = start.uncovered;
     result_.warnings = std::move(start.warnings);

@@ -32,7 +32,8 @@ struct SmoothingOptions {
   bool two_sided = true;             ///< Also keeps the whole reference within the tolerance of the mesh.
   Outside outside = Outside::error;  ///< What happens to a mesh that is not within the tolerance.
   PullBack::Crossings crossings = PullBack::Crossings::keep_out;  ///< It matters only with a volume.
-  unsigned threads = 0;  ///< 0 is one for each core. It never changes the result.
+  double max_normal_angle = 90;  ///< See ConstrainOptions; it matters only with a volume.
+  unsigned threads = 0;          ///< 0 is one for each core. It never changes the result.
   Progress* progress = nullptr;
 };
 
@@ -48,6 +49,7 @@ struct SmoothingResult {
   std::size_t fixed_t_junctions = 0;   ///< The number of others that stay because they hold a T-junction together.
   FaceCount outside;                   ///< Input faces that are not within the tolerance and are kept as they are.
   FaceCount uncovered;                 ///< Faces of the reference that are not within the tolerance of the input.
+  std::optional<Normals> normals;      ///< How the faces face the reference; none where no angle was kept.
   std::string method, renderer;        ///< The check that decided; empty without a volume.
   std::vector<std::string> warnings;
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "python/arrays.h"
 
+#include <pybind11/stl.h>
+
 #include <limits>
 #include <sstream>
 
@@ -145,6 +147,15 @@ PullBack::Crossings to_crossings(const std::string& crossings) {
   if (crossings == "keep_out") return PullBack::Crossings::keep_out;
   if (crossings == "allow") return PullBack::Crossings::allow;
   throw InvalidInput("crossings must be \"keep_out\" or \"allow\", not \"" + crossings + "\"");
+}
+
+py::object from_normals(const std::optional<Normals>& normals) {
+  if (!normals) return py::none();
+  py::dict result;
+  result["largest"] = normals->largest;
+  result["unsure"] = normals->unsure;
+  result["exceeded_before"] = normals->exceeded_before, result["exceeded_after"] = normals->exceeded_after;
+  return result;
 }
 
 py::dict from_outside(const FaceCount& outside, const FaceCount& uncovered) {

@@ -55,6 +55,8 @@ PullBack::Crossings to_crossings(const std::string& crossings);
 
 /// The entry "outside" of a report.
 py::dict from_outside(const FaceCount& outside, const FaceCount& uncovered);
+/// Returns a dict, or None where no angle was kept.
+py::object from_normals(const std::optional<Normals>& normals);
 
 /// Returns 0, which means one for each core, for None. Throws InvalidInput below 1.
 unsigned to_threads(std::optional<int> threads);

@@ -29,8 +29,8 @@ PullBack::Mode to_mode(const std::string& mode) {
 
 Constrained constrain_arrays(const py::object& before, const py::object& after, const py::object& faces,
                              const Volume& volume, const py::object& to_world, const std::string& mode, bool two_sided,
-                             const std::string& outside, const std::string& crossings, std::optional<int> threads,
-                             Progress* progress) {
+                             const std::string& outside, const std::string& crossings,
+                             std::optional<double> max_normal_angle, std::optional<int> threads, Progress* progress) {
   const Vertices from = to_vertices(before, "before"), to = to_vertices(after, "after");
   if (from.storage != to.storage) throw InvalidInput("before and after must have the same type");
   int corners = 3;
@@ -41,6 +41,7 @@ Constrained constrain_arrays(const py::object& before, const py::object& after, 
   options.two_sided = two_sided;
   options.outside = to_outside(outside);
   options.crossings = to_crossings(crossings);
+  options.max_normal_angle = max_normal_angle.value_or(options.max_normal_angle);
   options.threads = to_threads(threads);
   options.progress = progress;
   ConstrainResult r;
@@ -52,6 +53,7 @@ Constrained constrain_arrays(const py::object& before, const py::object& after, 
   result.report["held_back"] = r.held_back;
   result.report["kept_from_crossing"] = r.kept_from_crossing;
   result.report["outside"] = from_outside(r.outside, r.uncovered);
+  result.report["normals"] = from_normals(r.normals);
   result.report["method"] = r.method;
   result.report["renderer"] = r.renderer;
   result.report["warnings"] = r.warnings;
@@ -82,12 +84,17 @@ struct LockedGuard {
 
 std::unique_ptr<LockedGuard> make_guard(const py::object& positions, const py::object& faces, const Volume& volume,
                                         const py::object& to_world, bool two_sided, const std::string& outside,
-                                        const std::string& crossings, std::optional<int> threads, Progress* progress) {
+                                        const std::string& crossings, std::optional<double> max_normal_angle,
+                                        std::optional<int> threads, Progress* progress) {
   const Positions p = to_positions(positions);
   int corners = 3;
   std::vector<std::uint32_t> indices = to_faces(faces, "faces", corners);
   const glm::dmat4 matrix = to_matrix(to_world);
-  const Guard::Options options{to_outside(outside), two_sided, to_crossings(crossings), to_threads(threads), progress};
+  Guard::Options options;
+  options.outside = to_outside(outside), options.two_sided = two_sided;
+  options.crossings = to_crossings(crossings);
+  options.max_normal_angle = max_normal_angle.value_or(options.max_normal_angle);
+  options.threads = to_threads(threads), options.progress = progress;
   const Interruptible call(progress);
   return std::unique_ptr<LockedGuard>(
       new LockedGuard{{values(p), std::move(indices), corners, matrix, volume.native, options}, {}});
@@ -127,12 +134,14 @@ held_back : the number of vertices that did not go all the way
 kept_from_crossing : the number of these that went back so that no faces cross
 outside : a dict of `faces`, the number of faces that were outside before and were kept, `first`, the first of them, and
     `reference_faces`, the number of reference faces that were beyond the tolerance of the mesh before
+normals : how the faces of the result face the reference, as in the report of decimate
 method, renderer : which check was used, and what computed it
 warnings : a list of sentences)doc");
   module.def("constrain", &constrain_arrays, py::arg("before"), py::arg("after"), py::arg("faces"), py::arg("volume"),
              py::kw_only(), py::arg("to_world") = py::none(), py::arg("mode") = "pull_back",
              py::arg("two_sided") = true, py::arg("outside") = "error", py::arg("crossings") = "keep_out",
-             py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+             py::arg("max_normal_angle") = py::none(), py::arg("threads") = py::none(),
+             py::arg("progress") = py::none(),
              R"doc(Move the vertices of a mesh as far as the tolerance permits.
 
 Vertex v ends at before + f (after - before), rounded to the stored type, where f is its factor. All faces of the result
@@ -165,6 +174,10 @@ crossings : {"keep_out", "allow"}
     the corners and edges that they share, decided exactly for the stored coordinates; they may cross only if they cross
     in `before`. No face becomes degenerate, either. Of quads this holds in every triangulation. Vertices go back by at
     least 1/16 of their way then.
+max_normal_angle : float, optional
+    In degrees, more than 0 and at most 180: every point of a face keeps a witness, a triangle of the reference within
+    the tolerance whose normal is within this angle of the face's. None keeps 90: no face is turned over. 180 keeps no
+    angle. What is said of input faces, orientation and thin faces in decimate holds here, too.
 to_world, threads, progress
     See help(tolvol).
 
@@ -197,15 +210,15 @@ An edit costs a comparison of all positions with the last ones and what it touch
 vertices, and for each vertex that is held back as much as in constrain.)doc")
       .def(py::init(&make_guard), py::arg("positions"), py::arg("faces"), py::arg("volume"), py::kw_only(),
            py::arg("to_world") = py::none(), py::arg("two_sided") = true, py::arg("outside") = "error",
-           py::arg("crossings") = "allow", py::arg("threads") = py::none(), py::arg("progress") = py::none(),
-           py::keep_alive<1, 4>(),
+           py::arg("crossings") = "allow", py::arg("max_normal_angle") = py::none(), py::arg("threads") = py::none(),
+           py::arg("progress") = py::none(), py::keep_alive<1, 4>(),
            R"doc(Start from these positions.
 
 Parameters
 ----------
 positions : (n, 3) float32 array
     Local coordinates.
-faces, volume, two_sided, outside
+faces, volume, two_sided, outside, max_normal_angle
     As for constrain.
 crossings : {"allow", "keep_out"}
     As for constrain. Faces may cross only if they crossed at the start.
@@ -267,6 +280,11 @@ Cost: about 1 us a vertex and 2 us a face of the reference.)doc")
           "uncovered", [](const LockedGuard& guard) { return guard.native.start().uncovered.faces; },
           "The number of reference faces that were beyond the tolerance of the mesh at the start. The vertices nearest "
           "to them never move.")
+      .def_property_readonly(
+          "exceeding", [](const LockedGuard& guard) { return guard.native.start().exceeding.faces; },
+          "The number of faces that were not proved to keep max_normal_angle at the start. They keep the angle that "
+          "they "
+          "had, or a smaller one.")
       .def_property_readonly(
           "warnings", [](const LockedGuard& guard) { return guard.native.start().warnings; },
           "A list of sentences about the start.");

@@ -50,14 +50,7 @@ py::dict make_report(const DecimationResult& r, std::size_t triangles_in, double
   report["repairs"] = repairs;
   report["locked"] = locked;
   report["outside"] = from_outside(r.outside, r.uncovered);
-  py::object normals = py::none();
-  if (r.normals) {
-    normals = py::dict();
-    normals["largest"] = r.normals->largest;
-    normals["unsure"] = r.normals->unsure;
-    normals["exceeded_before"] = r.normals->exceeded_before, normals["exceeded_after"] = r.normals->exceeded_after;
-  }
-  report["normals"] = normals;
+  report["normals"] = from_normals(r.normals);
   report["warnings"] = r.warnings;
   return report;
 }

@@ -114,6 +114,7 @@ py::dict make_report(const DeformationResult& r, double seconds) {
   py::dict report;
   report["permitted_fraction"] = r.permitted_fraction;
   report["leaving"] = counted(r.leaving);
+  report["turning"] = counted(r.turning);
   report["crossing"] = counted(r.crossing);
   report["outside"] = from_outside(r.outside, r.uncovered);
   report["outside_lattice"] = r.outside_lattice;
@@ -121,6 +122,7 @@ py::dict make_report(const DeformationResult& r, double seconds) {
   report["held_back"] = r.held_back;
   report["kept_from_crossing"] = r.kept_from_crossing;
   report["largest_motion"] = r.largest_motion;
+  report["normals"] = from_normals(r.normals);
   report["method"] = r.method;
   report["renderer"] = r.renderer;
   report["seconds"] = seconds;
@@ -130,8 +132,8 @@ py::dict make_report(const DeformationResult& r, double seconds) {
 
 Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, const py::object& faces,
                      const Volume* volume, const py::object& to_world, const std::string& mode, bool two_sided,
-                     const std::string& outside, const std::string& crossings, std::optional<int> threads,
-                     Progress* progress) {
+                     const std::string& outside, const std::string& crossings, std::optional<double> max_normal_angle,
+                     std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   int corners = 3;
   std::vector<std::uint32_t> indices;
@@ -143,6 +145,7 @@ Result deform_arrays(const py::object& vertices, const PythonLattice& lattice, c
   options.two_sided = two_sided;
   options.outside = to_outside(outside);
   options.crossings = to_crossings(crossings);
+  options.max_normal_angle = max_normal_angle.value_or(options.max_normal_angle);
   options.threads = to_threads(threads);
   options.progress = progress;
   DeformationResult r;
@@ -221,17 +224,20 @@ InvalidInput)doc");
       .def_readonly("report", &Result::report, R"doc(A dict with these entries:
 
 permitted_fraction : from 0 to 1, the share of the way at which the whole mesh is certified to be inside, and no faces
-    cross that must not, found by bisection to a thousandth; 1 without a volume; None if vertices were pulled back
-    instead
+    are turned or cross that must not, found by bisection to a thousandth; 1 without a volume; None if vertices were
+    pulled back instead
 leaving : a dict of `faces`, the number of faces that the deformation as wished would not leave certified inside, and
     `first`, the first of them. If there are none, some that it would take from a part of the reference that has no
     other face within the tolerance
+turning : the same for faces that would exceed max_normal_angle, and did not before; it is only looked for if no faces are
+    leaving
 crossing : the same for faces that would cross others or become degenerate, and did not before; it is only looked for if
-    no faces are leaving
+    no faces are leaving or turning
 outside : a dict of `faces`, the number of faces that were outside before and were kept, `first`, the first of them, and
     `reference_faces`, the number of reference faces that were beyond the tolerance of the mesh before
 outside_lattice : the number of vertices that are not in the box
 moved : the number of vertices of the result that are not where they were
+normals : how the faces of the result face the reference, as in the report of decimate
 held_back : the number of vertices of the result that are not where they were to go
 kept_from_crossing : the number of these that went back so that no faces cross, if vertices were pulled back
 largest_motion : the longest way of a vertex, in world units
@@ -242,7 +248,8 @@ warnings : a list of sentences)doc");
   module.def("deform", &deform_arrays, py::arg("vertices"), py::arg("lattice"), py::arg("faces") = py::none(),
              py::arg("volume").none(true) = py::none(), py::kw_only(), py::arg("to_world") = py::none(),
              py::arg("mode") = "blocked", py::arg("two_sided") = true, py::arg("outside") = "error",
-             py::arg("crossings") = "keep_out", py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+             py::arg("crossings") = "keep_out", py::arg("max_normal_angle") = py::none(),
+             py::arg("threads") = py::none(), py::arg("progress") = py::none(),
              R"doc(Deform the space in the box of a lattice, and with it a mesh, within the tolerance of a volume.
 
 Vertices outside of the box stay where they are.
@@ -258,14 +265,17 @@ faces : (m, k) integer array, optional
 volume : ToleranceVolume, optional
     The result has to stay in it.
 mode : {"blocked", "farthest", "pull_back"}
-    What happens to a deformation that is not certified inside as a whole, or by which faces would cross. "blocked"
-    moves nothing, and the report says how far the deformation may go. "farthest" moves every vertex that permitted
-    share of its way. "pull_back" moves each vertex as far as it may go, as constrain does.
+    What happens to a deformation that is not certified inside as a whole, or by which faces would turn or cross.
+    "blocked" moves nothing, and the report says how far the deformation may go. "farthest" moves every vertex that
+    permitted share of its way. "pull_back" moves each vertex as far as it may go, as constrain does. What holds a
+    T-junction together stays in each of them, as in constrain.
 two_sided, outside
     As for constrain. A mesh that is beyond the tolerance before the deformation is no error if it is within it
-    afterwards and no faces cross that must not.
+    afterwards and no faces turn or cross that must not.
 crossings : {"keep_out", "allow"}
     As for constrain. Without a volume nothing is held back.
+max_normal_angle
+    As for constrain. Ignored without a volume.
 to_world, threads, progress
     See help(tolvol).
 
@@ -282,7 +292,7 @@ Cancelled
 
 Notes
 -----
-Cost: about 0.4 us a vertex, with a volume one check, and two-sided 1 us a vertex and 2 us a face of the reference. If
+Cost: about 0.4 us a vertex, with a volume one check and 1 us a vertex, and two-sided 2 us a face of the reference. If
 the check fails: some twelve checks, or constrain.
 
 After M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.)doc");

@@ -30,7 +30,8 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
                        const py::object& to_world, std::int64_t iterations, const std::string& kind,
                        const std::string& weights, const std::string& boundary, const py::object& locked,
                        const py::object& strength, const std::string& mode, bool two_sided, const std::string& outside,
-                       const std::string& crossings, std::optional<int> threads, Progress* progress) {
+                       const std::string& crossings, std::optional<double> max_normal_angle, std::optional<int> threads,
+                       Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const StoredSpace space(to_matrix(to_world), v.storage);
@@ -50,6 +51,7 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
   options.two_sided = two_sided;
   options.outside = to_outside(outside);
   options.crossings = to_crossings(crossings);
+  options.max_normal_angle = max_normal_angle.value_or(options.max_normal_angle);
   py::array_t<bool, py::array::c_style> locked_values;
   if (!locked.is_none()) {
     locked_values = to_values<bool>(locked, "locked must be a bool array, one value for each vertex");
@@ -82,6 +84,7 @@ Smoothed smooth_arrays(const py::object& vertices, const py::object& triangles, 
   result.report["welded"] = r.welded;
   result.report["fixed"] = fixed;
   result.report["outside"] = from_outside(r.outside, r.uncovered);
+  result.report["normals"] = from_normals(r.normals);
   result.report["method"] = r.method;
   result.report["renderer"] = r.renderer;
   result.report["warnings"] = r.warnings;
@@ -103,6 +106,7 @@ welded : the number of vertices that were treated as one with an earlier vertex 
 fixed : a dict of `boundary`, `non-manifold` and `T-junction`, the number of vertices that stay for that cause
 outside : a dict of `faces`, the number of input faces that were outside and were kept, `first`, the first of them, and
     `reference_faces`, the number of reference faces that were beyond the tolerance of the input
+normals : how the faces of the result face the reference, as in the report of decimate
 method, renderer : which check was used, and what computed it
 warnings : a list of sentences
 seconds : the time that the call took)doc");
@@ -111,7 +115,8 @@ seconds : the time that the call took)doc");
              py::arg("operator") = "bilaplacian", py::arg("weights") = "cotangent", py::arg("boundary") = "fixed",
              py::arg("locked") = py::none(), py::arg("strength") = py::none(), py::arg("mode") = "pull_back",
              py::arg("two_sided") = true, py::arg("outside") = "error", py::arg("crossings") = "keep_out",
-             py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+             py::arg("max_normal_angle") = py::none(), py::arg("threads") = py::none(),
+             py::arg("progress") = py::none(),
              R"doc(Smooth a mesh within the tolerance of a volume.
 
 Every iteration ends with all faces inside and the whole reference within the tolerance of them. Vertices at an edge
@@ -149,6 +154,10 @@ outside : {"error", "keep"}
 crossings : {"keep_out", "allow"}
     "keep_out" also holds vertices back where faces would come to cross that do not cross in the input, as constrain
     does. Without a volume nothing is held back.
+max_normal_angle : float, optional
+    In degrees, more than 0 and at most 180: every point of a face keeps a witness, a triangle of the reference within
+    the tolerance whose normal is within this angle of the face's. None keeps 90: no face is turned over. 180 keeps no
+    angle. What is said of input faces, orientation and thin faces in decimate holds here, too. Ignored without a volume.
 to_world, threads, progress
     See help(tolvol).
 

@@ -13,6 +13,7 @@
 #include "base/parallel.h"
 #include "check/certificate.h"
 #include "check/facing.h"
+#include "check/input_checks.h"
 #include "geometry/frame.h"
 #include "repair/least_triangulation.h"
 #include "topology/boundary_loops.h"
@@ -48,9 +49,7 @@ void check(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> tri
   if (options.largest_perimeter && !(*options.largest_perimeter > 0)) {
     throw InvalidInput("largest_perimeter must be more than 0, or None for no limit");
   }
-  if (!(options.max_normal_angle > 0 && options.max_normal_angle <= 180)) {
-    throw InvalidInput("max_normal_angle must be more than 0 and at most 180 degrees");
-  }
+  require_normal_angle(options.max_normal_angle);
   if (!options.shares.empty() && options.shares.size() != vertices.size()) {
     throw InvalidInput("shares must have one value for each vertex");
   }
@@ -152,16 +151,7 @@ class Closing {
     const double mapping_error = space_.mapping_error(used);
     certificate_.emplace(volume_.witnesses(), volume_.grid(), volume_.hierarchy(),
                          volume_.provable(mapping_error) * (1 - kHeadroom), volume_.refutable(mapping_error));
-    if (options_.max_normal_angle < 180) {
-      facing_.emplace(volume_.reference(), volume_.mapping_error(), mapping_error,
-                      glm::radians(options_.max_normal_angle));
-      if (2 * facing_->unsure > facing_->normals.size()) {
-        result_.warnings.push_back(
-            "no angle of normals is kept: rounding could turn most faces of the reference, which are too small or too "
-            "thin for its size");
-        facing_.reset();
-      }
-    }
+    facing_ = facing_rule(volume_, mapping_error, options_.max_normal_angle, result_.warnings);
     std::vector<Box> boxes(mesh_.triangles.size());
     for (std::uint32_t t = 0; t < boxes.size(); ++t) {
       poll_at(t);

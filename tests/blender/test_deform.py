@@ -150,22 +150,37 @@ def test_pulled_back_only_the_vertices_there_are_held():
 
 
 def test_quads_that_blender_cuts_along_their_other_diagonal_stay_within():
-    """A corner that is pushed in makes a quad concave, and Blender then triangulates the quad through that corner."""
-    ob = add_object("kite", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 1)], [(0, 1, 2, 3), (0, 1, 4)])
-    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.9
+    """Blender triangulates a quad along its other diagonal as soon as the fold along the first exceeds 90 degrees."""
+    ob = add_object("tent", [(-1, 0, 0.5), (0, -1, -0.4), (1, 0, 0.5), (0, 1, -0.4)], [(0, 1, 2, 3)])
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 1.2
     ob.tolvol.keep = "ONE"
-    ob.tolvol.crossings = "ALLOW"  # Cut along the other diagonal, the quad crosses the triangle beside it.
     before = world_triangles(ob)
-    lattice = cage(points=(2, 2, 2), size=(1, 1, 2), matrix=Matrix.Translation((0.5, 0.5, 0.5)))
+    lattice = cage(points=(2, 2, 2), size=(2, 2, 2))
     for point in lattice.data.points:
-        if point.co.x > 0 and point.co.y < 0:
-            point.co_deform.x, point.co_deform.y = -0.2, 0.2
+        point.co_deform.y *= 0.8
     bpy.ops.tolvol.deform(lattice="cage")
     stored = world_triangles(ob)
     assert not np.array_equal(stored[1], before[1])
     judged = native.module.directed_hausdorff(*stored, *before)
     measured = measurements.measurement_of(ob)
     assert judged.lower <= measured.forward <= judged.upper * 1.02
+
+
+def test_a_corner_stops_before_its_face_would_turn_over():
+    """A corner that is pushed in beyond the diagonal turns a triangle of the quad over."""
+    ob = add_object("kite", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 1)], [(0, 1, 2, 3), (0, 1, 4)])
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.9
+    ob.tolvol.keep = "ONE"
+    ob.tolvol.crossings = "ALLOW"  # Cut along the other diagonal, the quad crosses the triangle beside it.
+    lattice = cage(points=(2, 2, 2), size=(1, 1, 2), matrix=Matrix.Translation((0.5, 0.5, 0.5)))
+    for point in lattice.data.points:
+        if point.co.x > 0 and point.co.y < 0:
+            point.co_deform.x, point.co_deform.y = -0.2, 0.2
+    with pytest.raises(RuntimeError, match="1 faces of kite would turn away from the reference. 71.4 % of the way is"):
+        bpy.ops.tolvol.deform(lattice="cage")
+    bpy.ops.tolvol.deform(lattice="cage", mode="FARTHEST")
+    x, y, _ = coordinates(ob)[1]
+    assert 0.49 < y < x < 0.51
 
 
 def test_again_and_again_it_does_not_drift():

@@ -81,7 +81,7 @@ def test_boundary_stays_or_is_smoothed_along_itself():
 
 def test_vertex_group_is_the_strength():
     def half():
-        ob = torus(noise=0.02)
+        ob = torus(noise=0.01)
         ob.tolvol.crossings = "ALLOW"  # Single vertices would be held back.
         group = ob.vertex_groups.new(name="half")
         group.add(np.flatnonzero(coordinates(ob)[:, 0] > 0).tolist(), 0.5, "REPLACE")

@@ -30,6 +30,7 @@ def draw_smooth(rng, case):
     options["mode"] = some(rng, "pull_back", "reset")
     options["two_sided"] = bool(rng.random() < 0.7)
     options["crossings"] = some(rng, "keep_out", "keep_out", "allow")
+    draw_angle(rng, case)
     if rng.random() < 0.2:
         case.arrays["locked"] = rng.random(n) < rng.random()
     if rng.random() < 0.2:
@@ -41,10 +42,18 @@ def draw_smooth(rng, case):
         options["free"] = True
 
 
+def draw_angle(rng, case):
+    if rng.random() < 0.4:
+        case.options["max_normal_angle"] = float(some(rng, 5, 45, 90, 180, 180))
+
+
 def smooth(run):
     case, options, arrays = run.case, run.case.options, run.case.arrays
     vertices, triangles, volume = moved(run), case.triangles, volume_of(run)
-    names = ("iterations", "operator", "weights", "boundary", "mode", "two_sided", "outside", "crossings")
+    names = (
+        *("iterations", "operator", "weights", "boundary", "mode", "two_sided", "outside", "crossings"),
+        "max_normal_angle",
+    )
     given = {name: options[name] for name in names if name in options}
     given |= {name: arrays[name] for name in ("locked", "strength") if name in arrays}
 
@@ -82,8 +91,21 @@ def _judge_motion(run, result, vertices, faces, volume, stay):
         covers(run, case.world(result.vertices), faces, reference)
     if case.options["crossings"] == "keep_out":
         uncrossed_as_pieces(run, vertices, result.vertices, faces)
-    elif np.any(result.report["kept_from_crossing"]):
+    _judge_angles(run, result, faces, kept)
+    if case.options["crossings"] != "keep_out" and np.any(result.report["kept_from_crossing"]):
         raise Finding("report", "vertices are said to be kept from crossing, which is allowed")
+
+
+def _judge_angles(run, result, faces, kept):
+    """Judges triangles alone: quads keep the angle in each of their triangulations, and may be folded."""
+    angle, normals = run.case.options.get("max_normal_angle", 90), result.report["normals"]
+    if (normals is None) != (faces.shape[1] < 3 or angle == 180) and not result.report["warnings"]:
+        raise Finding("report", f"with an angle of {angle} degrees the normals are {normals}")
+    if faces.shape[1] == 3:
+        given = run.case.vertices, run.case.triangles
+        judges.angles_kept(run, (result.vertices, faces[~kept]), given, result.report, angle)
+    if normals is not None and normals["exceeded_after"] > normals["exceeded_before"]:
+        raise Finding("angle", f"more faces exceed the angle than before: {normals}")
 
 
 def draw_deform(rng, case):
@@ -91,6 +113,7 @@ def draw_deform(rng, case):
     options["mode"] = some(rng, "blocked", "farthest", "pull_back")
     options["two_sided"] = bool(rng.random() < 0.7)
     options["crossings"] = some(rng, "keep_out", "keep_out", "allow")
+    draw_angle(rng, case)
     options["points"] = [int(k) for k in rng.integers(2, 6, 3)]
     options["amplitude"] = float(10 ** rng.uniform(-2, 2))
     options["seed"] = int(rng.integers(1 << 30))
@@ -108,7 +131,8 @@ def deform(run):
     case, options = run.case, run.case.options
     vertices, triangles, volume = moved(run), case.triangles, volume_of(run)
     lattice = run.call("Lattice", lambda: lattice_of(run, vertices))
-    given = {name: options[name] for name in ("mode", "two_sided", "outside", "crossings") if name in options}
+    names = ("mode", "two_sided", "outside", "crossings", "max_normal_angle")
+    given = {name: options[name] for name in names if name in options}
 
     def call(threads, progress):
         return tolvol.deform(
@@ -119,7 +143,7 @@ def deform(run):
     fraction = result.report["permitted_fraction"]
     if fraction is not None and not 0 <= fraction <= 1:
         raise Finding("report", f"permitted_fraction is {fraction}")
-    stopped = result.report["leaving"]["faces"] + result.report["crossing"]["faces"] > 0
+    stopped = sum(result.report[why]["faces"] for why in ("leaving", "turning", "crossing")) > 0
     stay = np.full(len(vertices), options["mode"] == "blocked" and stopped)
     _judge_motion(run, result, vertices, triangles, volume, stay)
 
@@ -130,6 +154,7 @@ def draw_constrain(rng, case):
     case.options["two_sided"] = bool(case.options["corners"] > 2 and rng.random() < 0.7)
     case.options["outside"] = "keep" if case.options["corners"] == 4 else "error"
     case.options["crossings"] = some(rng, "keep_out", "keep_out", "allow")
+    draw_angle(rng, case)
     case.arrays["wish"] = motion_of(rng, case, 10 ** rng.uniform(-1, 2))
 
 
@@ -150,6 +175,7 @@ def constrain(run):
             two_sided=options["two_sided"],
             outside=options["outside"],
             crossings=options["crossings"],
+            max_normal_angle=options.get("max_normal_angle"),
             threads=threads,
             progress=progress,
         )
@@ -162,6 +188,8 @@ def constrain(run):
             "factors", f"factors from {f.min()} to {f.max()}, {result.report['held_back']} said to be held back"
         )
     if options["mode"] == "reset" or options["two_sided"] or options["crossings"] == "keep_out":
+        return
+    if options["corners"] > 2 and options.get("max_normal_angle") != 180:
         return
     reset = run.call("constrain", lambda: bounded("reset", 1, None)).factors
     if (f < reset).any():
@@ -187,6 +215,7 @@ def draw_guard(rng, case):
     case.options["edits"] = int(rng.integers(1, 6))
     case.options["two_sided"] = bool(rng.random() < 0.7)
     case.options["crossings"] = some(rng, "keep_out", "allow")
+    draw_angle(rng, case)
     case.options["amplitude"] = float(10 ** rng.uniform(-1, 2))
     if rng.random() < 0.3:
         case.options["moved"], case.options["outside"] = (
@@ -215,6 +244,7 @@ def guard(run):
                 two_sided=options["two_sided"],
                 outside=options.get("outside", "error"),
                 crossings=options["crossings"],
+                max_normal_angle=options.get("max_normal_angle"),
                 threads=threads,
                 progress=progress,
             )

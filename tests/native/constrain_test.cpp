@@ -191,7 +191,7 @@ std::vector<std::vector<std::uint32_t>> rings(const Scene& scene) {
 TEST(Constrain, OnlyVerticesOfFailingFacesAreHeldBack) {
   const Scene scene{shapes::torus(40)};
   const Points wish = scene.wish(noise(0.5));
-  const ConstrainResult r = run(scene, wish);
+  const ConstrainResult r = run(scene, wish, {.max_normal_angle = 180});
   const std::vector<Verdict> wished =
       verdicts(*scene.volume(1 - 2e-4), scene.space(), wish, flat(scene.mesh.triangles));
   const auto ring = rings(scene);
@@ -217,7 +217,8 @@ TEST(Constrain, NoFactorCanRiseAlone) {
   for (const double deviation : {0.5, 3.0}) {
     const Scene scene{shapes::torus(40)};
     const Points wish = scene.wish(noise(deviation));
-    const ConstrainResult r = run(scene, wish, {.two_sided = false, .crossings = PullBack::Crossings::allow});
+    const ConstrainResult r =
+        run(scene, wish, {.two_sided = false, .crossings = PullBack::Crossings::allow, .max_normal_angle = 180});
     const auto ring = rings(scene);
     // Nearer to its end than the headroom that is kept no vertex has to go.
     const auto volume = scene.volume(1 - 2e-4);

@@ -31,7 +31,7 @@ struct Scene {
     }
     volume = std::make_unique<ToleranceVolume>(mesh.vertices, mesh.triangles, space, kTolerance);
     moving = std::make_unique<MovingMesh>(*volume, space, indices, corners, mesh.vertices.size(), 1);
-    moving->start(mesh.vertices, nullptr);
+    moving->start(mesh.vertices, 180, {}, nullptr);
     coverage = std::make_unique<MovingCoverage>(*moving, nullptr);
   }
 

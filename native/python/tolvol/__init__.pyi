@@ -164,6 +164,7 @@ def constrain(
     two_sided: bool = True,
     outside: _Outside = "error",
     crossings: _Crossings = "keep_out",
+    max_normal_angle: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> ConstrainResult: ...
@@ -179,6 +180,7 @@ class Guard:
         two_sided: bool = True,
         outside: _Outside = "error",
         crossings: _Crossings = "allow",
+        max_normal_angle: float | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> None: ...
@@ -192,6 +194,8 @@ class Guard:
     def outside(self) -> NDArray[np.int32]: ...
     @property
     def uncovered(self) -> int: ...
+    @property
+    def exceeding(self) -> int: ...
     @property
     def warnings(self) -> list[str]: ...
 
@@ -217,6 +221,7 @@ def smooth(
     two_sided: bool = True,
     outside: _Outside = "error",
     crossings: _Crossings = "keep_out",
+    max_normal_angle: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> SmoothingResult: ...
@@ -322,6 +327,7 @@ def deform(
     two_sided: bool = True,
     outside: _Outside = "error",
     crossings: _Crossings = "keep_out",
+    max_normal_angle: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> DeformationResult: ...
