@@ -74,7 +74,7 @@ the share of the mesh that is beyond the tolerance"""
         surface, found = outcome
         self.remember(surface, found)
         level = "INFO" if found.kind == WITHIN else "WARNING"
-        self.report({level}, said(found))
+        self.say({level}, said(found))
 
 
 class TOLVOL_OT_measure_statistics(Comparison, bpy.types.Operator):
@@ -93,7 +93,7 @@ from the mesh to the reference and from the reference to the mesh"""
         surface, found, measured = outcome
         self.remember(surface, found)
         statistics.keep(self.ob, measured)
-        self.report({"INFO" if found.passed else "WARNING"}, said(found))
+        self.say({"INFO" if found.passed else "WARNING"}, said(found))
 
 
 def said(found):
@@ -129,8 +129,8 @@ reference, and bring them into view"""
         faces = np.zeros(len(mesh.polygons), bool)
         faces[surface.arrays.polygons[triangles]] = True
         if not faces.any():
-            self.report({"INFO" if found.passed else "WARNING"}, f"No face of the mesh is outside. {said(found)}")
+            self.say({"INFO" if found.passed else "WARNING"}, f"No face of the mesh is outside. {said(found)}")
             return
         mesh_io.select_faces(mesh, faces)
         show_selected(context, self.ob, (False, False, True))
-        self.report({"WARNING"}, f"{found.word}: {faces.sum():,} of {len(faces):,} faces are outside")
+        self.say({"WARNING"}, f"{found.word}: {faces.sum():,} of {len(faces):,} faces are outside")

@@ -54,9 +54,9 @@ corners and edges that they share"""
         faces = np.zeros(len(mesh.polygons), bool)
         faces[polygons] = True
         if not faces.any():
-            self.report({"INFO"}, "No faces cross")
+            self.say({"INFO"}, "No faces cross")
             return
         mesh_io.select_faces(mesh, faces)
         show_selected(context, self.ob, (False, False, True))
         at_least = "at least " if more else ""
-        self.report({"WARNING"}, f"{at_least}{faces.sum():,} of {len(faces):,} faces cross others")
+        self.say({"WARNING"}, f"{at_least}{faces.sum():,} of {len(faces):,} faces cross others")

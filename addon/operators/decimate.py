@@ -170,7 +170,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         passed = sum(verdict.word(ob) == verdict.PASS for ob in self.objects)
         seconds = sum(sum(run["seconds"].values()) for run in runs)
         counts = f"{before:,} -> {after:,} triangles, {passed} of {len(runs)} {verdict.PASS}"
-        self.report({"INFO"}, f"{len(runs)} objects: {counts}, {report.duration(seconds)}")
+        self.say({"INFO"}, f"{len(runs)} objects: {counts}, {report.duration(seconds)}")
 
     def _take_settings(self, settings):
         """Takes the settings of the active object for all objects, so that Adjust Last Operation shows the ones used."""

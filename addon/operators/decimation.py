@@ -66,8 +66,8 @@ def keep(operator, ob, run, said):
     last_run.keep(ob, run)
     kept_warnings.keep(ob, run["warnings"], run["locked"])
     for warning in run["warnings"]:
-        operator.report({"WARNING"}, f"{said}{warning}")
-    operator.report({"INFO"}, f"{said}{verdict.word(ob)}: {report.line(run)}")
+        operator.say({"WARNING"}, f"{said}{warning}")
+    operator.say({"INFO"}, f"{said}{verdict.word(ob)}: {report.line(run)}")
 
 
 class Task:

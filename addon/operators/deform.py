@@ -100,8 +100,8 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
         warnings = [*run["warnings"], *_twice(ob)]
         kept_warnings.keep(ob, warnings)
         for warning in warnings:
-            self.report({"WARNING"}, warning)
-        self.report({"INFO"}, motion.line(_remarks(result), certified))
+            self.say({"WARNING"}, warning)
+        self.say({"INFO"}, motion.line(_remarks(result), certified))
 
     def _chosen(self, context):
         selected = [ob for ob in context.selected_objects if ob.type == "LATTICE"]

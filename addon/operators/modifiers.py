@@ -149,8 +149,8 @@ moves as far as the tolerance permits. An object without a reference gets one fi
             motion.write(ob, vertices, certified, "apply_modifier")
         kept_warnings.keep(ob, motion.warnings)
         for warning in motion.warnings:
-            self.report({"WARNING"}, warning)
-        self.report({"INFO"}, f"{name}: {motion.line(motion.moved(vertices, wished), certified)}")
+            self.say({"WARNING"}, warning)
+        self.say({"INFO"}, f"{name}: {motion.line(motion.moved(vertices, wished), certified)}")
 
     @staticmethod
     def _add_key(ob, name, vertices):
@@ -206,7 +206,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             values = [self.value] if self.value else (yield from self._search(evaluation, parameter, trial))
             self.value, mesh, certified = yield from self._proved(evaluation, parameter, trial, values)
         try:
-            plain = None if self._progress.finishing else (yield from self._plain(context, trial))
+            plain = None if self.progress.finishing else (yield from self._plain(context, trial))
             settings = self.ob.tolvol.modifiers
         except BaseException:
             bpy.data.meshes.remove(mesh)
@@ -219,17 +219,17 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             )
         self._write(context, trial, mesh, certified, warnings)
         for warning in warnings:
-            self.report({"WARNING"}, warning)
-        self.report({"INFO"}, f"{name}: {parameter.label} {self.value:.4g}, {trial.line(certified)}")
+            self.say({"WARNING"}, warning)
+        self.say({"INFO"}, f"{name}: {parameter.label} {self.value:.4g}, {trial.line(certified)}")
 
     def improving(self):
-        return bool(self._found) and not self._progress.finishing
+        return bool(self._found) and not self.progress.finishing
 
     def _search(self, evaluation, parameter, trial):
         """Returns the values at which no sample was beyond the tolerance, the one with the fewest triangles first."""
         name, triangles = evaluation.modifier.name, len(trial.surface.arrays.triangles)
         search, deviation = fit.search(parameter.first, parameter.last, fit.most_values(triangles)), None
-        while not self._progress.finishing:
+        while not self.progress.finishing:
             try:
                 value = search.send(deviation)
             except StopIteration:

@@ -74,7 +74,7 @@ and bring the one with the largest distance into view"""
         self.remember(surface, found)
         places.show(self.ob, of_mesh, regions)
         _frame(context, self.ob)
-        self.report({"INFO" if found.passed else "WARNING"}, f"{found.word}: {'. '.join(described(context, self.ob))}")
+        self.say({"INFO" if found.passed else "WARNING"}, f"{found.word}: {'. '.join(described(context, self.ob))}")
 
 
 class TOLVOL_OT_next_place(bpy.types.Operator):

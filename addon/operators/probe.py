@@ -256,7 +256,7 @@ class TOLVOL_OT_add_label(_Measuring, bpy.types.Operator):
     def read(self, context, probes):
         reading = probes[self.on_reference].near(self.position)
         labels.add(self.ob, reading)
-        self.report({"INFO"}, ", ".join(described(context, self.ob, reading)))
+        self.say({"INFO"}, ", ".join(described(context, self.ob, reading)))
 
 
 class TOLVOL_OT_renew_labels(_Measuring, bpy.types.Operator):
@@ -286,7 +286,7 @@ to them"""
                 labels.write(ob, label, probes[label.on_reference].near(labels.reading(ob, label).position))
                 count += 1
         labels.notify()
-        self.report({"INFO"}, f"Measured again at {count} label{'s' * (count != 1)}")
+        self.say({"INFO"}, f"Measured again at {count} label{'s' * (count != 1)}")
 
 
 class TOLVOL_OT_remove_label(bpy.types.Operator):

@@ -86,7 +86,7 @@ another reference is set, a menu asks whether to replace it"""
     def finish(self, context, outcome):
         surface, built = outcome
         snapshots.set_reference(self.ob, surface)
-        self.report({"INFO"}, f"Reference set: {built.triangle_count:,} triangles")
+        self.say({"INFO"}, f"Reference set: {built.triangle_count:,} triangles")
 
 
 class TOLVOL_OT_clear_reference(bpy.types.Operator):

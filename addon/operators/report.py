@@ -82,7 +82,7 @@ read (.html), a table (.csv) or all numbers (.json)"""
         with safe_files.Staged() as staged:
             staged.write(self._target, deviation.content(outcome | self._about, self._target.name))
             staged.publish()
-        self.report({"INFO"}, f"{outcome['verdict']}: saved {self._target.name}")
+        self.say({"INFO"}, f"{outcome['verdict']}: saved {self._target.name}")
 
 
 def _counted(name, mesh):

@@ -101,11 +101,11 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
 
     def _say(self, motion, vertices, run, certified, prefix):
         for warning in run["warnings"]:
-            self.report({"WARNING"}, prefix + warning)
+            self.say({"WARNING"}, prefix + warning)
         held = max(run["held_back"], default=0)
         remarks = [f"{self.iterations:,} iterations", *motion.moved(vertices, vertices)]
         remarks += [f"up to {held:,} held back"] * bool(held)
-        self.report({"INFO"}, prefix + motion.line(remarks, certified))
+        self.say({"INFO"}, prefix + motion.line(remarks, certified))
 
 
 def _anything_to_smooth(ob):

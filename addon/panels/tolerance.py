@@ -58,10 +58,10 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
 
 def draw_job(context, layout):
     """Shows what the job under way does, if there is one."""
-    operator = job.under_way()
-    if operator is None:
+    run = job.under_way()
+    if run is None:
         return
-    lines, share = operator.shown()
+    lines, share = run.shown()
     column = layout.box().column(align=True)
     for i, line in enumerate(lines):
         text_lines(context, column, line, "BLANK1" if i else "SORTTIME")

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Changes of a job's objects while it runs, and jobs that run when Blender ends."""
 
+import inspect
 import threading
 
 import bpy
 import pytest
 
 from addon import job, native
-from addon.operators.decimate import TOLVOL_OT_decimate
+from addon.job import interruptions, progress_text, thread
+from addon.job.run import Run
 from addon.overlay import work
 from scenes import torus
 
@@ -28,7 +30,7 @@ class TOLVOL_OT_stand_in(job.JobOperator, bpy.types.Operator):
         cls.happens()
         yield lambda _progress: None
         cls.written = True
-        self.report({"WARNING"}, DONE)
+        self.say({"WARNING"}, DONE)
 
 
 @pytest.fixture
@@ -37,6 +39,19 @@ def stand_in():
     TOLVOL_OT_stand_in.written = False
     yield TOLVOL_OT_stand_in
     bpy.utils.unregister_class(TOLVOL_OT_stand_in)
+
+
+def operators(base=job.JobOperator):
+    for sub in base.__subclasses__():
+        yield from operators(sub)
+        yield sub
+
+
+def test_no_operator_reports_past_say():
+    """After Adjust Last Operation nobody sees what an operator itself reports."""
+    found = [cls for cls in operators() if cls.__module__.startswith("addon.")]
+    assert len(found) > 10
+    assert [cls.__name__ for cls in found if "self.report(" in inspect.getsource(cls)] == []
 
 
 def delete():
@@ -99,7 +114,7 @@ def test_jobs_end_before_a_file_is_loaded_or_a_step_undone(monkeypatch, happens,
     bpy.ops.ed.undo_push(message="two")
     interrupted = []
     operator = type("Operator", (), {"interrupt": lambda _self, because: interrupted.append(because)})()
-    monkeypatch.setattr(job, "_under_way", [operator])
+    monkeypatch.setattr(interruptions, "runs", [operator])
     happens()
     assert interrupted == [why]
 
@@ -114,7 +129,7 @@ def stubborn(progress):
 def test_jobs_are_waited_for_when_blender_ends():
     running = job.Job(stubborn, native.module.Progress())
     assert not running.done()
-    job.end_all()
+    thread.end_all()
     assert running.done()
 
 
@@ -210,20 +225,16 @@ class Context:
 
 
 class Modal(job.JobOperator):
-    """A job at work, without Blender's operator around it."""
+    """An operator without Blender's part of it."""
 
     bl_label = "Modal"
 
     def __init__(self, work):
-        self.objects, self._claims, self.ended = [], [], []
-        self._progress, self._mode, self._clock, self._timer = native.module.Progress(), "OBJECT", job._Clock(), None
-        self._steps = self.steps(None)
-        self._job = job.Job(work, self._progress)
-        next(self._steps)
-        job._under_way.append(self)
+        self.objects, self.ended, self._work = [], [], work
+        self._run = Run(self, Context())
 
     def steps(self, _context):
-        self.ended.append((yield))
+        self.ended.append((yield self._work))
 
     def report(self, kind, text):
         self.said = text
@@ -234,10 +245,12 @@ def waiting():
     """(a job that ends when `go` is set, go)"""
     go = threading.Event()
     operator = Modal(lambda _progress: go.wait(60))
+    operator._run.advance()
+    interruptions.runs.append(operator._run)
     yield operator, go
     go.set()
-    if operator in job._under_way:
-        job._under_way.remove(operator)
+    if operator._run in interruptions.runs:
+        interruptions.runs.remove(operator._run)
 
 
 def test_all_events_but_esc_are_passed_on(waiting):
@@ -245,10 +258,10 @@ def test_all_events_but_esc_are_passed_on(waiting):
     context = Context()
     for kind in ("MIDDLEMOUSE", "WHEELUPMOUSE", "LEFTMOUSE", "G", "TAB", "MOUSEMOVE", "TIMER"):
         assert operator.modal(context, event(kind)) == {"PASS_THROUGH"}
-    assert operator.modal(context, event("ESC", "RELEASE")) == {"RUNNING_MODAL"} and not operator._progress.cancelled
-    assert operator.modal(context, event("ESC")) == {"RUNNING_MODAL"} and operator._progress.cancelled
+    assert operator.modal(context, event("ESC", "RELEASE")) == {"RUNNING_MODAL"} and not operator.progress.cancelled
+    assert operator.modal(context, event("ESC")) == {"RUNNING_MODAL"} and operator.progress.cancelled
     go.set()
-    operator._job.outcome()
+    operator._run._job.outcome()
     assert operator.modal(context, event("TIMER")) == {"CANCELLED"} and not operator.ended
     assert operator.said == "Modal was cancelled. It has changed nothing"
 
@@ -256,7 +269,7 @@ def test_all_events_but_esc_are_passed_on(waiting):
 def test_an_outcome_waits_until_the_mode_is_that_of_the_start(waiting):
     operator, go = waiting
     go.set()
-    operator._job.outcome()
+    operator._run._job.outcome()
     context = Context()
     context.mode = "EDIT_MESH"
     assert operator.modal(context, event("TIMER")) == {"PASS_THROUGH"} and not operator.ended
@@ -266,7 +279,6 @@ def test_an_outcome_waits_until_the_mode_is_that_of_the_start(waiting):
 
 
 def test_a_second_job_waits_for_the_first(waiting):
-    operator, _ = waiting
     second = type("Second", (Modal,), {"__init__": lambda self: None})()
     assert second.invoke(None, None) == {"CANCELLED"}
     assert second.said == "Modal is at work: wait until it ends, or press Esc"
@@ -279,19 +291,24 @@ class Progress:
 def test_the_panel_is_told_stage_count_part_and_time_left(waiting, monkeypatch):
     operator, _ = waiting
     now = [100.0]
-    monkeypatch.setattr(job.time, "monotonic", lambda: now[0])
-    operator._progress = progress = Progress()
+    monkeypatch.setattr(progress_text.time, "monotonic", lambda: now[0])
+    operator._run.progress = progress = Progress()
     operator.improving = lambda: False
     operator.part = "torus, 2 of 3"
-    assert operator.shown() == (["Modal", "torus, 2 of 3", "Decimating", "Esc: Cancel"], None)
+    assert operator._run.shown() == (["Modal", "torus, 2 of 3", "Decimating", "Esc: Cancel"], None)
     now[0] += 10
     progress.fraction, progress.count = 0.25, 12_400
-    lines, share = operator.shown()
+    lines, share = operator._run.shown()
     assert lines[3:5] == ["12,400 triangles left", "About 30 s left of this stage"] and share == 0.25
     progress.stage, progress.fraction = "measuring", 0.5
-    assert operator.shown()[0] == ["Modal", "torus, 2 of 3", "Measuring", "Esc: Cancel"]  # A new stage has just begun.
+    assert operator._run.shown()[0] == [
+        "Modal",
+        "torus, 2 of 3",
+        "Measuring",
+        "Esc: Cancel",
+    ]  # A new stage has just begun.
     now[0] += 200
-    assert operator.shown()[0][3] == "About 3 min left of this stage"
+    assert operator._run.shown()[0][3] == "About 3 min left of this stage"
 
 
 def test_a_batch_names_each_object_and_reports_totals(monkeypatch, capfd):
@@ -299,8 +316,8 @@ def test_a_batch_names_each_object_and_reports_totals(monkeypatch, capfd):
     for ob in objects:
         ob.select_set(True)
     parts = []
-    work = TOLVOL_OT_decimate._next_work
-    monkeypatch.setattr(TOLVOL_OT_decimate, "_next_work", lambda self: (work(self), parts.append(self.part))[0])
+    work = Run._next_work
+    monkeypatch.setattr(Run, "_next_work", lambda self: (work(self), parts.append(self.operator.part))[0])
     bpy.ops.tolvol.decimate()
     assert parts == ["three, 1 of 3", "one, 2 of 3", "two, 3 of 3"]
     left = sum(len(ob.data.polygons) for ob in objects)

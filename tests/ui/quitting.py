@@ -15,7 +15,7 @@ bpy.context.preferences.view.show_splash = False
 bpy.context.preferences.view.use_save_prompt = False
 
 import addon  # noqa: E402
-from addon import job  # noqa: E402
+from addon.job import thread  # noqa: E402
 from addon.reference import snapshots  # noqa: E402
 from window import draw_finely, window_context  # noqa: E402
 
@@ -83,7 +83,7 @@ _ticks = iter(range(_MOST_TICKS))
 
 def leave():
     """Quits as soon as a thread is at work."""
-    if all(work.done() for work in job._at_work):
+    if not thread.at_work():
         return _TICK if next(_ticks, None) is not None else None
     print("at work", flush=True)
     with window_context():
@@ -91,8 +91,8 @@ def leave():
     return None
 
 
-run = job.Job._run
-job.Job._run = lambda self, work: run(self, repeated(work))
+run = thread.Job._run
+thread.Job._run = lambda self, work: run(self, repeated(work))
 addon.register()
 bpy.app.timers.register(start, first_interval=1.0)
 bpy.app.timers.register(leave, first_interval=1.0 + _TICK)

@@ -4,9 +4,8 @@
 import bpy
 
 import scenes
-from addon import job
 from test_panel import assert_proved, monkey, stored, suzanne
-from window import centre, finished, key, reset, screenshot, view, xdotool
+from window import centre, finished, key, reset, screenshot, status_texts, view, xdotool
 
 
 def fit(ob):
@@ -18,14 +17,13 @@ def fit(ob):
 
 def test_escape_while_a_modifier_is_fitted_changes_nothing():
     yield from reset(monkey)
-    before, said, status = stored(), [], job._status
-    job._status = lambda *shown: said.append(status(*shown)) or said[-1]
+    before = stored()
+    said = status_texts()
     fit(suzanne())
     yield from finished(lambda: said)
     screenshot("10 fitting")
     xdotool("key", "Escape", "Escape")  # The first one keeps the best so far if there is one.
     yield from finished(lambda: len(bpy.data.scenes) == 1)
-    job._status = status
     assert said[0].startswith("Fitting Decimate: Ratio")
     assert stored() == before and suzanne().tolvol.snapshot is None
     assert [modifier.name for modifier in suzanne().modifiers] == ["Decimate"]
@@ -34,13 +32,12 @@ def test_escape_while_a_modifier_is_fitted_changes_nothing():
 
 def test_escape_keeps_the_best_so_far():
     yield from reset(monkey)
-    reference, said, status = scenes.world_triangles(suzanne()), [], job._status
-    job._status = lambda *shown: said.append(status(*shown)) or said[-1]
+    reference = scenes.world_triangles(suzanne())
+    said = status_texts()
     fit(suzanne())
     yield from finished(lambda: said and "triangles so far    Esc: Keep Present Result" in said[-1], pause=0.02)
     key("Escape")
     yield from finished(lambda: not suzanne().modifiers)
-    job._status = status
     assert_proved(suzanne(), reference, 0.2)
 
 

@@ -7,8 +7,21 @@ from pathlib import Path
 import bpy
 
 from addon import job, status_bar
-from test_panel import monkey, stored, suzanne
-from window import centre, finished, open_tab, reset, screenshot, view, window_context, xdotool
+from addon.job import run as job_run
+from addon.job import thread
+from scenes import world_triangles
+from test_panel import assert_proved, monkey, stored, suzanne
+from window import (
+    centre,
+    finished,
+    open_tab,
+    reset,
+    screenshot,
+    status_texts,
+    view,
+    window_context,
+    xdotool,
+)
 
 _SMOOTHER = 1  # levels of subdivision on top of the monkey's, which make the job slow enough
 
@@ -24,7 +37,7 @@ def begin():
         bpy.ops.ed.undo_push(message="moved")
         said = len(reports())
         assert bpy.ops.tolvol.decimate("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
-    assert len(job._under_way) == 1
+    assert job.under_way()
     return said
 
 
@@ -43,7 +56,7 @@ def reports():
 
 
 def ends(said, text):
-    yield from finished(lambda: not job._under_way)
+    yield from finished(lambda: not job.under_way())
     yield 0.5
     assert any(text in line for line in reports()[said:]), reports()[said:]
 
@@ -71,10 +84,10 @@ def test_the_view_is_turned_while_a_job_runs():
     yield
     xdotool("key", "KP_4")
     yield from finished(lambda: rotation() != before, pause=0.05)
-    assert job._under_way
+    assert job.under_way()
     screenshot("job 1 turned")
     xdotool("key", "Escape")
-    yield from finished(lambda: not job._under_way)
+    yield from finished(lambda: not job.under_way())
     assert rotation() != before and suzanne().tolvol.snapshot is None
 
 
@@ -121,6 +134,79 @@ def test_opening_a_file_ends_a_job():
         finally:
             status_bar.say = say
     assert shown == ["Decimate in Tolerance was stopped, because another file was opened. It has changed nothing"]
-    assert not job._under_way and all(work.done() for work in job._at_work)
+    assert not job.under_way() and not thread.at_work()
     yield 1.0
     assert stored() == before and suzanne().tolvol.snapshot is None
+
+
+# Adjust Last Operation -----------------------------------------------------------------------------------------------
+
+
+def adjust(**settings):
+    """Does to the last operation as its panel does when settings are changed there."""
+    last = bpy.context.window_manager.operators[-1]
+    for name, value in settings.items():
+        setattr(last.properties, name, value)
+    patience, job_run.PATIENCE = job_run.PATIENCE, 0.0  # The job goes on in the background even on a quick machine.
+    try:
+        with window_context():
+            assert bpy.ops.ed.undo_redo("EXEC_DEFAULT", True) == {"FINISHED"}  # True: with an undo step, as there
+    finally:
+        job_run.PATIENCE = patience
+
+
+def decimated():
+    """Decimates. Returns the number of triangles that are left, and the triangles of the reference."""
+    with window_context():
+        suzanne().tolvol.tolerance_percent = 0.2
+        bpy.ops.ed.undo_push(message="ready")
+        reference = world_triangles(suzanne())
+        bpy.ops.tolvol.decimate("INVOKE_DEFAULT")
+    yield from finished(lambda: not job.under_way())
+    return len(suzanne().data.polygons), reference
+
+
+def test_adjust_last_operation_shows_progress_and_is_one_undo_step():
+    yield from reset(monkey)
+    left, reference = yield from decimated()
+    said = status_texts()
+    adjust(tolerance_percent=0.1)
+    assert job.under_way() and len(suzanne().data.polygons) > 3 * left
+    yield from finished(lambda: not job.under_way())
+    more = len(suzanne().data.polygons)
+    assert left < more < 3 * left and any("triangles left" in text and "Esc: Cancel" in text for text in said)
+    assert_proved(suzanne(), reference, 0.1)
+    adjust(tolerance_percent=0.4)  # It begins with the original again.
+    yield from finished(lambda: not job.under_way())
+    assert len(suzanne().data.polygons) < left
+    with window_context():
+        bpy.ops.ed.undo()
+    assert suzanne().tolvol.snapshot is None and len(suzanne().data.polygons) > 3 * left
+
+
+def test_escape_while_adjusting_leaves_the_mesh_as_before_the_operation():
+    yield from reset(monkey)
+    left, _ = yield from decimated()
+    said = len(reports())
+    adjust(tolerance_percent=0.1)
+    xdotool("mousemove", *centre(), "key", "Escape")
+    yield from ends(said, "Decimate in Tolerance was cancelled. The mesh is as it was before that operation")
+    assert suzanne().tolvol.snapshot is None and len(suzanne().data.polygons) > 3 * left
+    adjust(tolerance_percent=0.2)
+    yield from finished(lambda: not job.under_way())
+    assert len(suzanne().data.polygons) == left
+
+
+def test_adjusting_again_while_a_job_runs_begins_anew():
+    yield from reset(monkey)
+    left, _ = yield from decimated()
+    said = len(reports())
+    adjust(tolerance_percent=0.1)
+    adjust(tolerance_percent=0.4)
+    yield from finished(lambda: not job.under_way())
+    assert len(suzanne().data.polygons) < left
+    yield 0.5
+    assert not any("stopped" in line for line in reports()[said:])
+    with window_context():
+        bpy.ops.ed.undo()
+    assert suzanne().tolvol.snapshot is None and len(suzanne().data.polygons) > 3 * left

@@ -7,7 +7,20 @@ import scenes
 from addon import job, panels
 from panels_open import unfolded
 from test_panel import assert_proved, monkey, stored, suzanne
-from window import centre, finished, key, on_screen, open_tab, press, region, reset, screenshot, scroll_down, xdotool
+from window import (
+    centre,
+    finished,
+    key,
+    on_screen,
+    open_tab,
+    press,
+    region,
+    reset,
+    screenshot,
+    scroll_down,
+    status_texts,
+    xdotool,
+)
 
 
 def levels():
@@ -16,13 +29,12 @@ def levels():
 
 def test_levels_by_mouse_and_one_ctrl_z():
     yield from reset(monkey)
-    reference, before, said, status = scenes.world_triangles(suzanne()), stored(), [], job._status
-    job._status = lambda *shown: said.append(status(*shown)) or said[-1]
+    reference, before = scenes.world_triangles(suzanne()), stored()
+    said = status_texts()
     with unfolded(panels.TOLVOL_PT_lod):
         yield from open_tab()
         yield from press("tolvol.make_lods")
-        yield from finished(lambda: len(levels()) == 3 and not job._under_way)
-        job._status = status
+        yield from finished(lambda: len(levels()) == 3 and not job.under_way())
         yield from scroll_down()
         xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
         yield 1.0
@@ -42,8 +54,7 @@ def test_escape_in_a_chain_leaves_nothing():
     yield from reset(monkey)
     meshes = len(bpy.data.meshes)
     suzanne().tolvol.effort = "THOROUGH"
-    said, status = [], job._status
-    job._status = lambda *shown: said.append(status(*shown)) or said[-1]
+    said = status_texts()
     with unfolded(panels.TOLVOL_PT_lod):
         yield from open_tab()
         yield from press("tolvol.make_lods")
@@ -51,6 +62,5 @@ def test_escape_in_a_chain_leaves_nothing():
         screenshot("lod 2 under way")
         for _ in range(2):  # The first Esc may keep the present result of a level.
             key("Escape")
-        yield from finished(lambda: not job._under_way)
-        job._status = status
+        yield from finished(lambda: not job.under_way())
     assert not levels() and suzanne().tolvol.snapshot is None and len(bpy.data.meshes) == meshes

@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 
 import scenes
-from addon import job, native, reference
+from addon import native, reference
+from addon.job import run as job_run
 from addon.mesh import mesh_io
 from addon.overlay import legend
 from addon.panels import deviation
@@ -27,6 +28,7 @@ from window import (
     region,
     reset,
     screenshot,
+    status_texts,
     still,
     view,
     window_context,
@@ -152,14 +154,13 @@ def test_escape_leaves_everything_as_it_was():
         suzanne().modifiers.new("more", "SUBSURF").levels = 1  # The decimation becomes slow enough to be stopped.
         bpy.ops.object.modifier_apply(modifier="more")
     yield 0.5
-    before, said, status = stored(), [], job._status
-    job._status = lambda *shown: said.append(status(*shown)) or said[-1]
+    before = stored()
+    said = status_texts()
     yield from press("tolvol.decimate")
     yield from finished(lambda: any("triangles left" in text for text in said))
     screenshot("5 busy")
     key("Escape")
     yield 2.0
-    job._status = status
     assert any(text.startswith("Decimating") and text.endswith("Esc: Cancel") for text in said)
     count = len(said)
     yield 2.0
@@ -173,14 +174,13 @@ def test_escape_keeps_what_refining_has_reached():
     yield from open_tab()
     suzanne().tolvol.tolerance_percent, suzanne().tolvol.effort = 0.3, "THOROUGH"
     suzanne().tolvol.placement = "OPTIMAL"  # This placement has more to refine.
-    reference, said, status = scenes.world_triangles(suzanne()), [], job._status
-    job._status = lambda *shown: said.append(status(*shown)) or said[-1]
+    reference = scenes.world_triangles(suzanne())
+    said = status_texts()
     yield from press("tolvol.decimate")
     yield from finished(lambda: any(text.startswith("Refining") for text in said))
     screenshot("refining")
     key("Escape")
     yield from finished(lambda: suzanne().tolvol.last_run)
-    job._status = status
     assert any(text.startswith("Refining") and text.endswith("Esc: Keep Present Result") for text in said)
     run = json.loads(suzanne().tolvol.last_run)
     assert run["stopped_by"] == "request" and run["output"]["triangles"] == len(suzanne().data.polygons) < 1500
@@ -301,11 +301,11 @@ def test_the_answer_of_check_is_seen_without_moving_the_mouse():
     yield from open_tab()
     yield from press("tolvol.set_reference")
     xdotool("mousemove", *centre())
-    before, patience = (yield from still(sidebar_pixels)), job._PATIENCE
-    job._PATIENCE = 0.0  # The job then ends in a timer even on a quick machine.
+    before, patience = (yield from still(sidebar_pixels)), job_run.PATIENCE
+    job_run.PATIENCE = 0.0  # The job then ends in a timer even on a quick machine.
     with window_context():
         bpy.ops.tolvol.check("INVOKE_DEFAULT")
-    job._PATIENCE = patience
+    job_run.PATIENCE = patience
     yield from finished(lambda: verdict.of(suzanne()) is not None)
     yield from finished(lambda: (sidebar_pixels() != before).any())
     seen = yield from still(sidebar_pixels)

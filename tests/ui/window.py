@@ -8,6 +8,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from addon.job import progress_text
+
 PICTURES = Path(__file__).resolve().parents[2] / "build" / "ui"
 
 
@@ -21,6 +23,16 @@ def click(x, y):
 
 def key(name):
     xdotool("key", name)
+
+
+_status_line = progress_text.status_line
+
+
+def status_texts():
+    """Returns a list that gets each text that a job shows in the status bar from now on."""
+    said = []
+    progress_text.status_line = lambda *about: said.append(_status_line(*about)) or said[-1]
+    return said
 
 
 class TOLVOL_TEST_OT_mark(bpy.types.Operator):

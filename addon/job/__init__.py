@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs the long computations of operators in threads, with progress and Esc, while Blender can be used.
+
+An operator has three parts: prepare() reads Blender's data and returns the work; the work runs in the thread and touches
+no data of Blender; finish() writes the outcome in one go. An operator whose work needs Blender between its parts
+overrides steps(), a generator. For a script and in Blender without a window the same parts run one after the other, and
+the call returns when they are done.
+
+While a job runs, the operator takes Esc and passes all other events on. If the user changes what the job works on, the
+job ends, and it writes nothing.
+"""
+
+import atexit
+
+from .. import status_bar
+from . import adjusting, interruptions, thread
+from .interruptions import under_way
+from .operator import JobOperator
+from .thread import Job
+
+__all__ = ["Job", "JobOperator", "register", "under_way", "unregister"]
+
+
+def register():
+    """The classes of operators have to be known: those of JobOperator get what lets Adjust Last Operation show progress."""
+    interruptions.register()
+    adjusting.register(JobOperator)
+    atexit.register(thread.end_all)  # On exit Blender does not unregister an add-on that a script has registered.
+
+
+def unregister():
+    atexit.unregister(thread.end_all)
+    thread.end_all()
+    adjusting.unregister()
+    interruptions.unregister()
+    status_bar.clear()

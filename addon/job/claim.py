@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Remembers an object as it was when an operator began to work on it."""
+
+import hashlib
+
+import numpy as np
+
+from ..errors import Refused
+from ..mesh import mesh_io
+from ..reference import measurements
+
+
+class Claim:
+    def __init__(self, ob):
+        self._ob = ob
+        self._name = ob.name
+        self._mesh, self._content, self._place = self._state(), self._digest(), self._placed()
+
+    def check(self, thoroughly):
+        """Raises Refused unless the outcome can still be written to the object. thoroughly: compare every vertex, too."""
+        try:
+            name = self._ob.name
+        except ReferenceError:
+            raise Refused(f"{self._name} was deleted meanwhile: nothing was changed") from None
+        if name != self._name:
+            raise Refused(f"{self._name} was renamed to {name} meanwhile: nothing was changed")
+        if self._state() != self._mesh or thoroughly and self._digest() != self._content:
+            raise Refused(f"The mesh or the mode of {name} was changed meanwhile: nothing more was changed")
+        (matrix, reference), (matrix_before, reference_before) = self._placed(), self._place
+        if reference != reference_before:
+            raise Refused(f"The reference of {name} was changed meanwhile: nothing more was changed")
+        # With a reference of its own kind the object may be moved and turned: the reference goes along.
+        own = self._ob.tolvol.reference_kind == "SELF" and measurements.same_shape(matrix_before, matrix)
+        if not own and not np.array_equal(matrix, matrix_before):
+            raise Refused(f"{name} was moved or scaled meanwhile: nothing more was changed")
+
+    def _state(self):
+        mesh = self._ob.data
+        return mesh.as_pointer(), len(mesh.vertices), len(mesh.loops), len(mesh.polygons), self._ob.mode
+
+    def _digest(self):
+        """Returns a value that is equal for equal positions and faces."""
+        self._ob.update_from_editmode()
+        mesh = self._ob.data
+        digest = hashlib.blake2b(mesh_io.column(mesh.vertices, "co", 3).tobytes(), digest_size=16)
+        digest.update(mesh_io.column(mesh.loops, "vertex_index", 1, np.int32).tobytes())
+        return digest.digest()
+
+    def _placed(self):
+        settings = self._ob.tolvol
+        reference = settings.snapshot_fingerprint if settings.snapshot else "", settings.reference_kind
+        return mesh_io.matrix_array(self._ob.matrix_world), reference

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The runs of operators that are under way while Blender goes on, and what the user does meanwhile that ends them."""
+
+import bpy
+from bpy.app.handlers import persistent
+
+from .. import status_bar
+
+# Only the main thread uses these.
+runs = []  # each a Run (see run.py)
+to_say = []  # messages for the status bar, to be shown once the next file is open
+_edited = False  # whether Blender has reported a change of some mesh that no run has looked at yet
+
+
+def under_way():
+    """Returns the run that goes on now, or None."""
+    return runs[0] if runs else None
+
+
+def take_edited():
+    """Returns whether some mesh was changed since the last call."""
+    global _edited
+    edited, _edited = _edited, False
+    return edited
+
+
+def _interrupt(happens):
+    for run in runs:
+        run.interrupt(happens)
+
+
+@persistent
+def _before_load(*_):
+    _interrupt("another file was opened")
+
+
+@persistent
+def _before_undo(*_):
+    _interrupt("a step was undone")
+
+
+@persistent
+def _before_redo(*_):
+    _interrupt("a step was redone")
+
+
+@persistent
+def _after_load(*_):
+    for text in to_say:
+        status_bar.say(text)
+    to_say.clear()
+
+
+@persistent
+def _after_update(_scene, depsgraph):
+    """Notes a change of any mesh, so that the runs look whether it is one of theirs."""
+    global _edited
+    if runs and any(update.is_updated_geometry for update in depsgraph.updates):
+        _edited = True
+
+
+_HANDLERS = (
+    ("depsgraph_update_post", _after_update),
+    ("load_pre", _before_load),
+    ("undo_pre", _before_undo),
+    ("redo_pre", _before_redo),
+    ("load_post", _after_load),
+)
+
+
+def register():
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister():
+    for name, handler in reversed(_HANDLERS):
+        getattr(bpy.app.handlers, name).remove(handler)

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The base class of operators that work in threads."""
+
+import json
+
+import bpy
+from bpy.props import StringProperty
+
+from .. import native
+from ..errors import Refused
+from . import adjusting, run
+from .interruptions import under_way
+
+
+class JobOperator:
+    """A base class for an Operator with prepare(context), which returns work(progress), and finish(context, outcome)."""
+
+    # Adjust Last Operation works on the same objects again, although another object may be active by then.
+    worked_on: StringProperty(
+        description="The names of the objects that the operator worked on, as JSON", options={"HIDDEN", "SKIP_SAVE"}
+    )
+
+    doing = ""  # text for the status bar in place of the native stage
+    part = ""  # which part of the work is under way, such as "Level 2 of 3", if there are several
+
+    voice = None  # the operator that reports in place of this one
+    _run = None
+
+    def targets(self, context):
+        """Returns the objects that the operator works on. The settings are those of the first one."""
+        return [context.active_object]
+
+    @property
+    def ob(self):
+        return self.objects[0]
+
+    @property
+    def progress(self):
+        return self._run.progress
+
+    def improving(self):
+        """Whether Esc keeps the present result. A second Esc cancels."""
+        return self.progress.stage == "refining" and not self.progress.finishing
+
+    def steps(self, context):
+        """A generator in the main thread: yields work(progress) and is sent its outcome. It may change Blender's data only
+        after the last yield."""
+        outcome = yield self.prepare(context)
+        self.finish(context, outcome)
+
+    def each(self, tasks, names=None):
+        """A generator for steps(): yields the work of one task after another, and returns the outcomes of task.run(progress).
+
+        With several tasks the status says which one is at work, and an error begins with its name. names: pairs of the text
+        for the status and the name, by default of the tasks' own names.
+        """
+        if names is None:
+            names = [(f"{task.name}, {i + 1} of {len(tasks)}", task.name) for i, task in enumerate(tasks)]
+        outcomes = []
+        for task, (part, name) in zip(tasks, names):
+            if len(tasks) > 1:
+                self.part = part
+            try:
+                outcomes.append((yield task.run))
+            except native.module.Cancelled:
+                raise
+            except (Refused, native.module.TolvolError) as error:
+                if len(tasks) == 1:
+                    raise
+                raise Refused(f"{name}: {native.said(error)}") from None
+        return outcomes
+
+    def say(self, kind, text):
+        """Reports the text. kind: a set, as for report(), which the user would not see after Adjust Last Operation."""
+        (self.voice or self).report(kind, text)
+
+    def cancelled_message(self):
+        if self.voice is None:
+            return f"{self.bl_label} was cancelled. It has changed nothing"
+        # Adjust Last Operation has undone the result before it repeats the operator.
+        return f"{self.bl_label} was cancelled. The mesh is as it was before that operation"
+
+    def execute(self, context):
+        if self.options.is_repeat and (earlier := under_way()) and earlier.operator == self:
+            earlier.supersede()
+        self._begin(context)
+        ended = self._run.advance()
+        if self.options.is_repeat and not bpy.app.background:
+            return ended or self._run.go_on(run.PATIENCE) or adjusting.hand_over(self._run)
+        while not ended:
+            ended = self._run.advance()
+        return ended
+
+    def invoke(self, context, _event):
+        if other := under_way():
+            self.say({"WARNING"}, f"{other.operator.bl_label} is at work: wait until it ends, or press Esc")
+            return {"CANCELLED"}
+        self._begin(context)
+        return self._run.advance() or self._run.go_on(run.PATIENCE) or self._run.begin_modal(context, self)
+
+    def modal(self, context, event):
+        return self._run.on_event(context, event)
+
+    def cancel(self, context):
+        """Called when Blender closes the window or the file, or a dialog of the operator before its job has begun."""
+        if self._run is not None:
+            self._run.close(context)
+
+    def _begin(self, context):
+        again = self.options.is_repeat and not self.options.is_repeat_last
+        named = [bpy.data.objects.get(name) for name in json.loads(self.worked_on or "[]")] if again else []
+        self.objects = named if named and all(named) else self.targets(context)
+        self.worked_on = json.dumps([ob.name for ob in self.objects])
+        self.voice, self.doing, self.part = None, "", ""
+        self._run = run.Run(self, context)

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One run of an operator: its steps, the job of the present step, and the objects that it works on."""
+
+import time
+
+from .. import native
+from ..errors import Refused
+from ..redraw import redraw_sidebars
+from . import interruptions, progress_text
+from .claim import Claim
+from .thread import Job
+
+# Blender waits so many seconds for a job before the status bar shows it: a short job makes no line flash up.
+PATIENCE = 0.4
+_TICK = 0.1
+
+_MODES = {"OBJECT": "Object Mode", "EDIT_MESH": "Edit Mode"}
+
+
+class Run:
+    def __init__(self, operator, context):
+        self.operator = operator
+        self.progress = native.module.Progress()
+        self.interrupted = None  # the message why the run was stopped: its objects must not be touched any more
+        self._mode, self._clock = context.mode, progress_text.Clock()
+        self._claims = [Claim(ob) for ob in operator.objects]
+        self._steps = operator.steps(context)
+        self._job = None
+        self._timer = None
+
+    def shown(self):
+        """Returns what is known about the work, as lines of text for the panel, and its share that is done, or None."""
+        return progress_text.panel_lines(self.operator, self.progress, self._clock)
+
+    def advance(self):
+        """Starts the next work. Returns the operator's result if there is no more work, else None."""
+        try:
+            self._job = Job(self._next_work(), self.progress)
+        except StopIteration:
+            return {"FINISHED"}
+        except native.module.Cancelled:
+            self.operator.say({"INFO"}, self.operator.cancelled_message())
+            return {"CANCELLED"}
+        except (Refused, native.module.TolvolError) as error:
+            self.operator.say({"ERROR"}, native.said(error))
+            return {"CANCELLED"}
+        return None
+
+    def go_on(self, seconds):
+        """Does as many steps as the time permits. Returns the operator's result if it has ended, else None."""
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0 and self._job.done(left):
+            if ended := self.advance():
+                return ended
+        return None
+
+    def begin_modal(self, context, modal):
+        """Makes `modal`, an operator, receive Blender's events from now on. It passes them to on_event()."""
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(_TICK, window=context.window)
+        manager.modal_handler_add(modal)
+        interruptions.runs.append(self)
+        return {"RUNNING_MODAL"}
+
+    def on_event(self, context, event):
+        if self.interrupted is None:
+            self._look()
+        if self.interrupted is not None:
+            self._leave(context)
+            if self.interrupted:
+                self.operator.say({"WARNING"}, self.interrupted)
+            return {"CANCELLED"}
+        if event.type == "ESC":
+            if event.value != "PRESS":
+                return {"RUNNING_MODAL"}
+            if self.operator.improving():
+                self.progress.finish()
+            else:
+                self.progress.cancel()
+            return {"RUNNING_MODAL"}
+        if event.type == "TIMER" and (ended := self._on_timer(context)):
+            return ended
+        return {"PASS_THROUGH"}  # With RUNNING_MODAL beside it Blender would pass nothing on.
+
+    def _on_timer(self, context):
+        # An undo step of one mode does not hold a change that is made in another: the outcome waits until the mode is back.
+        waits = context.mode != self._mode
+        if not waits:
+            try:
+                ended = self.go_on(_TICK) if self._job.done() else None
+            except BaseException:
+                self._leave(context)
+                raise
+            if ended:
+                self._leave(context)
+                return ended
+        status = progress_text.status_line(self.operator, self.progress)
+        context.workspace.status_text_set(
+            status + (f"    Waits for {_MODES.get(self._mode, 'its mode')}" if waits else "")
+        )
+        redraw_sidebars()
+        return None
+
+    def close(self, context):
+        """Ends the run because Blender closes the window or the file."""
+        if self.interrupted:
+            interruptions.to_say.append(self.interrupted)
+        self._end()
+        self._leave(context)
+
+    def interrupt(self, happens):
+        """Ends the job while the data that it began with still exists. Blender then calls on_event() or close()."""
+        self.interrupted = f"{self.operator.bl_label} was stopped, because {happens}. It has changed nothing"
+        self._end()
+
+    def supersede(self):
+        """Ends the job without a word, because the operator begins anew."""
+        self.interrupted = ""
+        self._end()
+
+    def _look(self):
+        """Ends the job as soon as its outcome cannot be written any more."""
+        try:
+            self._check(thoroughly=interruptions.take_edited())
+        except Refused as error:
+            self.interrupted = str(error)
+            self._end()
+
+    def _check(self, thoroughly=True):
+        for claim in self._claims:
+            claim.check(thoroughly)
+
+    def _end(self):
+        self.progress.cancel()
+        self._job.done(None)
+        self._steps.close()
+
+    def _next_work(self):
+        if self._job is None:
+            return next(self._steps)
+        try:
+            outcome = self._job.outcome()
+            if self.progress.cancelled:  # The work may have ended before it noticed the cancel.
+                raise native.module.Cancelled("cancelled")
+            self._check()
+        except BaseException as error:
+            return self._steps.throw(error)
+        return self._steps.send(outcome)
+
+    def _leave(self, context):
+        interruptions.runs.remove(self)
+        context.window_manager.event_timer_remove(self._timer)
+        context.workspace.status_text_set(None)
