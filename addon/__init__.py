@@ -19,10 +19,22 @@ for _name in [name for name in sys.modules if name.startswith(__name__ + ".")]:
     del sys.modules[_name]
     globals().pop(_name.removeprefix(__name__ + "."), None)
 
-from . import guard, job, measuring, native, operators, overlay, panels, preferences, properties, reference  # noqa: E402
+from . import (  # noqa: E402
+    estimate,
+    guard,
+    job,
+    measuring,
+    native,
+    operators,
+    overlay,
+    panels,
+    preferences,
+    properties,
+    reference,
+)
 from .files.gltf_extras import glTF2ExportUserExtension  # noqa: E402, F401  Blender's exporter of glTF looks for it here.
 
-_PARTS = (preferences, properties, reference, job, operators, guard, overlay, measuring, panels)
+_PARTS = (preferences, properties, reference, job, operators, guard, overlay, measuring, estimate, panels)
 
 
 def register():

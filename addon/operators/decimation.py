@@ -126,11 +126,14 @@ class Task:
             raise NotProved(report.intervals(run))
         return arrays, self.reference, result, run
 
-    def count(self, progress):
-        """Returns the number of triangles that run() leaves if it closes no holes, without a proof."""
-        built = volumes.native_volume(self.reference, self.tolerance, self.options["threads"], progress)
+    def count(self, progress, volume=None):
+        """Returns the number of triangles that run() leaves, without a proof. volume: instead of that of the tolerance."""
+        built = volume or volumes.native_volume(self.reference, self.tolerance, self.options["threads"], progress)
         arrays = self.surface.arrays
-        return len(self._decimate(arrays, built, self._wedges(arrays), progress).triangles)
+        if self.close_holes is not None:
+            arrays, _ = self._close(arrays, built, progress)
+        computed = self._decimate(arrays, built, self._wedges(arrays), progress)
+        return len(transfer.Decimated.of(computed, arrays).triangles)
 
     def _wedges(self, arrays):
         """Returns the wedge at each corner of the triangles, or None without UV maps."""

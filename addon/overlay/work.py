@@ -11,21 +11,22 @@ from ..job import Job
 # The timer looks for work after so many seconds.
 _TICK = 0.05
 
-_waiting = {}  # key of a task -> (the time at which it may begin, prepare, finish)
-_running = None  # (about, finish, job)
+_waiting = {}  # key of a task -> (the time at which it may begin, prepare, finish, rank)
+_running = None  # (about, finish, job, rank)
 
 
-def later(about, seconds, prepare, finish):
+def later(about, seconds, prepare, finish, rank=0):
     """Calls prepare(), runs the work(progress) that it returns in a thread, then calls finish(outcome, error).
 
     about: a key that identifies the task. seconds: the earliest start from now. Either outcome or error is None. prepare
     and finish run in Blender's main thread, but not while it draws. Of several calls with the same key the first sets the
     time, and the last sets prepare and finish. While the task runs, further calls with its key do nothing.
+    rank: of the tasks that may begin the one with the lowest rank is first, and it cancels a running one with a higher rank.
     """
     if _running is not None and _running[0] == about:
         return
     begin = _waiting[about][0] if about in _waiting else time.monotonic() + seconds
-    _waiting[about] = begin, prepare, finish
+    _waiting[about] = begin, prepare, finish, rank
     if not bpy.app.timers.is_registered(_tick):
         bpy.app.timers.register(_tick, first_interval=0, persistent=True)  # The timer survives opening another file.
 
@@ -33,23 +34,27 @@ def later(about, seconds, prepare, finish):
 def _tick():
     global _running
     if _running is not None and _running[2].done():
-        (_, finish, job), _running = _running, None
+        (_, finish, job, _), _running = _running, None
         try:
             outcome, error = job.outcome(), None
         except (native.module.TolvolError, MemoryError) as failure:
             outcome, error = None, failure
         finish(outcome, error)
-    for about, (begin, prepare, finish) in list(_waiting.items()):
-        if _running is None and begin <= time.monotonic():
+    due = [(about, task) for about, task in _waiting.items() if task[0] <= time.monotonic()]
+    for about, (_, prepare, finish, rank) in sorted(due, key=lambda waiting: waiting[1][3]):
+        if _running is None:
             del _waiting[about]
             work = prepare()
             if work is not None:
-                _running = about, finish, Job(work, native.module.Progress())
+                _running = about, finish, Job(work, native.module.Progress()), rank
+        elif rank < _running[3]:
+            _running[2].progress.cancel()
     return _TICK if _waiting or _running is not None else None
 
 
 def cancel(about):
-    """Cancels the task with this key if it runs. Its finish() is called with the error Cancelled."""
+    """Forgets the task with this key if it waits, and cancels it if it runs: its finish() is called with the error Cancelled."""
+    _waiting.pop(about, None)
     if _running is not None and _running[0] == about:
         _running[2].progress.cancel()
 

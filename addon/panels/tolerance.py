@@ -3,11 +3,13 @@
 
 import bpy
 
-from .. import job, native
+from .. import estimate, job, native
 from ..operators import blocked
 from ..reference import measurements, snapshots, tolerances
-from ..units import length
-from .layout import AMBER, GREEN, GREY, RED, Panel, active, right, text_lines
+from ..units import NO_BREAK, length
+from .layout import AMBER, GREEN, GREY, RED, Panel, active, is_narrow, right, text_lines
+
+_DIGITS = 3  # of an estimated number of triangles
 
 
 class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
@@ -36,8 +38,12 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
         row = column.row(align=True)
         row.prop(settings, "tolerance_percent" if settings.tolerance_mode == "PERCENT" else "tolerance_length")
         row.menu("TOLVOL_MT_tolerances", text="", icon="PRESET")
-        column.prop(settings, "tolerance_mode", text=" ")
-        right(layout, self._other_form(context, ob))
+        other, narrow = self._other_form(context, ob), is_narrow(context)
+        # Beside the unit the other form takes no room from the verdict, which has to be on the first screen.
+        column.prop(settings, "tolerance_mode", text=" " if narrow else other or " ")
+        if narrow:
+            right(layout, other)
+        right(layout, _estimated(context))
         layout.prop(settings, "keep")
         row = layout.row(align=True)
         row.operator("tolvol.set_reference", text="Replace Reference..." if settings.snapshot else "Set Reference")
@@ -53,7 +59,22 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
         tolerance = tolerances.tolerance_length(ob.tolvol, size)
         if ob.tolvol.tolerance_mode == "PERCENT":
             return f"= {length(context, tolerance)}"
-        return f"= {100 * tolerance / size:.4g} % of size"
+        return f"= {100 * tolerance / size:.4g}{NO_BREAK}%"
+
+
+def _estimated(context):
+    """Returns how many triangles Decimate would leave, or has left, as text of one line."""
+    found = estimate.shown(context)
+    if isinstance(found, str):
+        return found
+    rounded = found.after
+    if not found.known:  # An estimate with all digits would look like a fact.
+        digits = max(len(str(found.after)) - _DIGITS, 0)
+        rounded = round(found.after, -digits)
+    share = 100 * (1 - found.after / found.before)
+    text = f"{'' if found.known else '~'}{rounded:,}"
+    fewer = f"\u2212{share:.0f}{NO_BREAK}%" if 1 <= share < 99 else f"\u2212{share:.1f}{NO_BREAK}%"
+    return f"{text}, {fewer}" if is_narrow(context) else f"{text} triangles, {fewer}"
 
 
 def draw_job(context, layout):

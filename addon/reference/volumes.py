@@ -16,19 +16,27 @@ def built_of(ob):
 
 def native_volume(surface, tolerance, threads=None, progress=None):
     """Returns the tolerance volume of a surface. A volume that was built for the same content is used again."""
-    key = (surface.arrays.fingerprint(), surface.matrix.tobytes(), tolerance)
+    return _volumes.get(_key(surface, tolerance), lambda: _build(surface, tolerance, threads, progress), progress)
 
-    def build():
-        return native.module.ToleranceVolume(
-            surface.arrays.vertices,
-            surface.arrays.triangles,
-            tolerance,
-            to_world=surface.matrix,
-            threads=threads,
-            progress=progress,
-        )
 
-    return _volumes.get(key, build, progress)
+def passing_volume(surface, tolerance, threads=None, progress=None):
+    """Returns the tolerance volume of a surface, and does not keep one that it builds: others in memory stay there."""
+    return _volumes.built(_key(surface, tolerance)) or _build(surface, tolerance, threads, progress)
+
+
+def _key(surface, tolerance):
+    return surface.arrays.fingerprint(), surface.matrix.tobytes(), tolerance
+
+
+def _build(surface, tolerance, threads, progress):
+    return native.module.ToleranceVolume(
+        surface.arrays.vertices,
+        surface.arrays.triangles,
+        tolerance,
+        to_world=surface.matrix,
+        threads=threads,
+        progress=progress,
+    )
 
 
 def forget():

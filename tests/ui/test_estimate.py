@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The estimated number of triangles: before the first click, and while the tolerance is dragged by the mouse."""
+
+import contextlib
+import time
+
+from addon import estimate
+from addon.proof import verdict
+from test_panel import monkey, suzanne
+from window import find_property, finished, on_screen, open_tab, press, region, reset, screenshot, xdotool
+
+
+@contextlib.contextmanager
+def drawn():
+    """Gives a list to which each answer is added that the panel draws: (tolerance, answer, seconds that it took)."""
+    answers, shown = [], estimate.shown
+
+    def watched(context):
+        began = time.perf_counter()
+        answer = shown(context)
+        answers.append((suzanne().tolvol.tolerance_percent, answer, time.perf_counter() - began))
+        return answer
+
+    estimate.shown = watched
+    try:
+        yield answers
+    finally:
+        estimate.shown = shown
+
+
+def is_known(answers):
+    return bool(answers) and isinstance(answers[-1][1], estimate.Estimate)
+
+
+def test_the_number_follows_the_tolerance_while_it_is_dragged():
+    yield from reset(monkey)
+    with drawn() as answers:
+        yield from open_tab()
+        yield from finished(lambda: is_known(answers))
+        screenshot("estimate 1 before the click")
+        before = answers[-1][1]
+        assert suzanne().tolvol.snapshot is None and before.before == 62976 and not before.known
+        # The curve is complete when nothing asks for more.
+        yield from finished(lambda: estimate._known and estimate._known["Suzanne"].curve.missing(0.2) is None)
+        x, y = yield from find_property("tolerance_percent", 0.6)
+        yield 0.6  # After so many seconds no tooltip is in the way.
+        xdotool("mousemove", x, y, "sleep", "0.1", "mousedown", 1)
+        yield 0.3
+        answers.clear()
+        for step in range(1, 13):
+            xdotool("mousemove", x + 2 * step, y)
+            yield 0.1
+        screenshot("estimate 2 dragged")
+        held = [(percent, answer.after) for percent, answer, _ in answers]
+        slowest = max(seconds for *_, seconds in answers)
+        xdotool("mouseup", 1)
+        yield 1.0
+        assert len({percent for percent, _ in held}) >= 4, answers
+        counts = [count for _, count in sorted(held)]
+        assert counts == sorted(counts, reverse=True) and counts[-1] < 0.7 * before.after, held
+        assert slowest < 0.05, "drawing must not compute"
+        estimated = answers[-1][1].after
+        xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
+        yield from press("tolvol.decimate")
+        yield from finished(lambda: verdict.word(suzanne()) == verdict.PASS)
+        yield from finished(lambda: is_known(answers) and answers[-1][1].known)
+        xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
+        yield 0.5
+        screenshot("estimate 3 decimated")
+        count = len(suzanne().data.polygons)
+        assert answers[-1][1] == estimate.Estimate(62976, count, True)
+        assert abs(estimated - count) <= 0.15 * count
