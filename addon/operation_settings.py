@@ -337,3 +337,24 @@ def lod_settings(options=frozenset()):
             options=set(options),
         ),
     }
+
+
+def bake_settings(options=frozenset()):
+    return {
+        "image_size": IntProperty(
+            name="Image Size",
+            description="Width and height of the normal map",
+            default=2048,
+            min=64,
+            max=16384,
+            subtype="PIXEL",
+            options=set(options),
+        ),
+        "shade": BoolProperty(
+            name="Shade First",
+            description="First shade the mesh smooth by the reference's normals. The normal map then holds only what that "
+            "shading lacks. Without this, the map belongs to the present shading",
+            default=True,
+            options=set(options),
+        ),
+    }

@@ -16,7 +16,7 @@ from bpy.props import (
 )
 
 from . import preferences
-from .operation_settings import decimate_settings, lod_settings, modifier_settings, smooth_settings
+from .operation_settings import bake_settings, decimate_settings, lod_settings, modifier_settings, smooth_settings
 from .redraw import redraw_views
 from .reference import measurements, snapshots, tolerances
 
@@ -201,6 +201,10 @@ class TOLVOL_PG_modifiers(bpy.types.PropertyGroup):
 
 class TOLVOL_PG_lod(bpy.types.PropertyGroup):
     __annotations__ = lod_settings()
+
+
+class TOLVOL_PG_bake(bpy.types.PropertyGroup):
+    __annotations__ = bake_settings()
 
 
 def _changed(_settings, _context):
@@ -431,6 +435,7 @@ class TOLVOL_PG_settings(bpy.types.PropertyGroup):
     smooth: PointerProperty(type=TOLVOL_PG_smooth)
     modifiers: PointerProperty(type=TOLVOL_PG_modifiers)
     lod: PointerProperty(type=TOLVOL_PG_lod)
+    bake: PointerProperty(type=TOLVOL_PG_bake)
     lods: PointerProperty(type=bpy.types.Collection, description="The collection of the levels that were made last")
     guard: PointerProperty(type=TOLVOL_PG_guard)
 
@@ -449,6 +454,7 @@ _CLASSES = (
     TOLVOL_PG_smooth,
     TOLVOL_PG_modifiers,
     TOLVOL_PG_lod,
+    TOLVOL_PG_bake,
     TOLVOL_PG_guard,
     TOLVOL_PG_settings,
 )

@@ -144,7 +144,7 @@ class Carry:
             return
         # Blender stores one normal for all corners between two sharp edges. To store different ones it would mark more
         # edges as sharp, so those corners get their mean.
-        normals = self._nearest_values(self._normals, layout, _fans(mesh)).astype(np.float64)
+        normals = self._nearest_values(self._normals, layout, fans(mesh)).astype(np.float64)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         with _AutoSmooth(mesh):
             mesh.normals_split_custom_set(normals)
@@ -160,7 +160,7 @@ class Carry:
         own = self._source.corners[self._result.triangle_source[layout.triangles][:, None], layout.corners].ravel()
         had = values[own]
         if shared is not None:
-            read, had = _mean(read, shared), _mean(had, shared)
+            read, had = mean(read, shared), mean(had, shared)
         vertices = self._result.triangles[layout.triangles[:, None], layout.corners].ravel()
         still = np.ones(len(self._result.vertices), bool)
         still[self._moved] = False
@@ -192,23 +192,29 @@ def _blend(values, weights):
     return np.einsum("rk,rk...->r...", weights, values.astype(np.float64)).astype(np.float32)
 
 
-def _mean(values, labels):
+def mean(values, labels):
     """Replaces each row of (r, width) by the mean of the rows with the same label."""
     sums = np.zeros((labels.max(initial=0) + 1, values.shape[1]))
     np.add.at(sums, labels, values)
     return (sums / np.maximum(np.bincount(labels, minlength=len(sums)), 1)[:, None])[labels].astype(np.float32)
 
 
-def _fans(mesh):
-    """Returns a label for each corner of a triangle mesh.
+def following_corners(mesh):
+    """Returns the next corner around the face for each corner of a mesh, (corners,)."""
+    begins, sizes = (column(mesh.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total"))
+    following = np.arange(1, len(mesh.loops) + 1)
+    following[begins + sizes - 1] = begins
+    return following
+
+
+def fans(mesh):
+    """Returns a label for each corner of a mesh.
 
     Two corners at a vertex have the same label if no sharp edge and no flat-shaded face lies between them.
     """
     edges, starts = (column(mesh.loops, name, 1, np.int32) for name in ("edge_index", "vertex_index"))
-    count = len(edges)
-    corner = np.arange(count)
-    following = corner // 3 * 3 + (corner + 1) % 3
-    smooth = np.repeat(column(mesh.polygons, "use_smooth", 1, bool), 3)
+    following = following_corners(mesh)
+    smooth = np.repeat(column(mesh.polygons, "use_smooth", 1, bool), column(mesh.polygons, "loop_total", 1, np.int32))
     order = np.argsort(edges, kind="stable")
     twice = np.bincount(edges, minlength=len(mesh.edges)) == 2
     pairs = order[twice[edges[order]]].reshape(-1, 2)
@@ -216,7 +222,7 @@ def _fans(mesh):
     pairs = pairs[joined & (starts[pairs[:, 0]] != starts[pairs[:, 1]])]
     one, two = pairs.T
     ends = np.concatenate([one, following[one]]), np.concatenate([following[two], two])
-    labels = corner.copy()
+    labels = np.arange(len(edges))
     while True:
         lowest = np.minimum(labels[ends[0]], labels[ends[1]])
         before = labels.copy()
@@ -293,10 +299,15 @@ def _custom_normals(mesh):
     """Returns the custom normals, (corners, 3), or None if the mesh has none."""
     if not mesh.has_custom_normals:
         return None
+    with _AutoSmooth(mesh):
+        return corner_normals(mesh)
+
+
+def corner_normals(mesh):
+    """Returns the normals with which Blender shades the corners of a mesh, (corners, 3)."""
     if bpy.app.version >= (4, 1):
         return column(mesh.corner_normals, "vector", 3)
-    with _AutoSmooth(mesh):
-        mesh.calc_normals_split()
-        normals = column(mesh.loops, "normal", 3)
-        mesh.free_normals_split()
+    mesh.calc_normals_split()
+    normals = column(mesh.loops, "normal", 3)
+    mesh.free_normals_split()
     return normals

@@ -2,11 +2,12 @@
 """Registers the operators in bpy.ops.tolvol: set_tolerance, set_reference, clear_reference, show_original,
 restore_original, new_original, check, measure_statistics, select_outside, worst_point, next_place, clear_places, probe,
 add_label, renew_labels, remove_label, select_crossing, select_staying, save_report, decimate, make_lods, smooth,
-apply_modifier, fit_modifier and deform."""
+apply_modifier, fit_modifier, deform, shade_by_reference and bake_normals."""
 
 import bpy
 
 from . import original
+from .appearance import TOLVOL_OT_bake_normals, TOLVOL_OT_shade_by_reference
 from .check import TOLVOL_OT_check, TOLVOL_OT_measure_statistics, TOLVOL_OT_select_outside
 from .crossings import TOLVOL_OT_select_crossing
 from .decimate import TOLVOL_OT_decimate
@@ -49,6 +50,8 @@ _CLASSES = (
     TOLVOL_OT_apply_modifier,
     TOLVOL_OT_fit_modifier,
     TOLVOL_OT_deform,
+    TOLVOL_OT_shade_by_reference,
+    TOLVOL_OT_bake_normals,
 )
 
 _register, _unregister = bpy.utils.register_classes_factory(_CLASSES)

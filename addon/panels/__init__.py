@@ -4,6 +4,7 @@
 import bpy
 
 from . import menus
+from .appearance import TOLVOL_PT_appearance
 from .decimate import TOLVOL_PT_advanced, TOLVOL_PT_decimate, TOLVOL_PT_protect
 from .deform import TOLVOL_PT_deform
 from .deviation import (
@@ -25,6 +26,7 @@ _CLASSES = (
     TOLVOL_PT_decimate,
     TOLVOL_PT_protect,
     TOLVOL_PT_advanced,
+    TOLVOL_PT_appearance,
     TOLVOL_PT_deviation,
     TOLVOL_PT_objects,
     TOLVOL_UL_labels,

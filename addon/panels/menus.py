@@ -17,6 +17,7 @@ _IN_OBJECT_MENU = (
     ),
     *("probe", "add_label", "renew_labels", "remove_label"),
     *("decimate", "make_lods", "smooth", "apply_modifier", "fit_modifier", "deform"),
+    *("shade_by_reference", "bake_normals"),
 )
 
 

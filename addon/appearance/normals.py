@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shades a mesh by the normals of its reference at the nearest points.
+
+Blender's Data Transfer reads the normals, from the original with its own shading. Each corner looks from a place slightly
+inside its face: exactly at a sharp edge the nearest face of the reference would be any of those that meet there. Where the
+normals of two faces at a common edge differ much, the edge is marked as sharp, and all other corners at a vertex get one
+normal.
+"""
+
+import contextlib
+import math
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..mesh.carry import corner_normals, fans, following_corners, mean
+from ..mesh.mesh_io import column, matrix_array
+from ..reference import originals, snapshots
+
+# A corner looks from a place that is this share of the way to the centre of its face.
+_INSIDE = 0.02
+# Edges are sharp where the normals of their faces differ by more.
+_SHARP = math.radians(20)
+# An original that is shaded flat everywhere counts as smooth, but for edges of more than this angle.
+_FLAT = math.radians(30)
+
+
+@dataclass(frozen=True)
+class Shading:
+    """Normals for the corners of a mesh, (corners, 3), and the edges that are sharp, (edges,) bool."""
+
+    normals: np.ndarray
+    sharp: np.ndarray
+
+    def write(self, mesh):
+        mesh.polygons.foreach_set("use_smooth", np.ones(len(mesh.polygons), bool))
+        mesh.edges.foreach_set("use_edge_sharp", self.sharp | column(mesh.edges, "use_edge_sharp", 1, bool))
+        if bpy.app.version < (4, 1):
+            mesh.use_auto_smooth, mesh.auto_smooth_angle = True, math.pi
+        mesh.update()
+        normals = mean(self.normals, fans(mesh)).astype(np.float64)
+        mesh.normals_split_custom_set(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12))
+
+
+def original_in_place(ob):
+    """Returns a new mesh: the original of `ob` in the space of `ob`, shaded as it shall be looked at."""
+    mesh = originals.kept(ob).copy()
+    apart = Matrix(np.linalg.solve(matrix_array(ob.matrix_world), snapshots.reference_matrix(ob)))
+    if apart != Matrix():
+        mesh.transform(apart)
+        if apart.determinant() < 0:
+            mesh.flip_normals()
+    if not mesh.has_custom_normals and not column(mesh.polygons, "use_smooth", 1, bool).any():
+        mesh.polygons.foreach_set("use_smooth", np.ones(len(mesh.polygons), bool))
+        if bpy.app.version < (4, 1):
+            mesh.use_auto_smooth, mesh.auto_smooth_angle = True, _FLAT
+        else:
+            mesh.set_sharp_from_angle(angle=_FLAT)
+    return mesh
+
+
+def shading(ob):
+    """Returns the Shading of the mesh of `ob` by its reference. It changes nothing."""
+    mesh = ob.data
+    normals = _transferred(mesh, ob)
+    edges, starts = (column(mesh.loops, name, 1, np.int32) for name in ("edge_index", "vertex_index"))
+    following = following_corners(mesh)
+    order = np.argsort(edges, kind="stable")
+    one, two = order[(np.bincount(edges, minlength=len(mesh.edges)) == 2)[edges[order]]].reshape(-1, 2).T
+    turned = starts[one] == starts[two]  # The two faces run along the edge in the same direction.
+    sharp = np.zeros(len(mesh.edges), bool)
+    for first, second in (
+        (one, np.where(turned, two, following[two])),
+        (following[one], np.where(turned, following[two], two)),
+    ):
+        apart = np.einsum("ij,ij->i", normals[first], normals[second]) < math.cos(_SHARP)
+        sharp[edges[one[apart]]] = True
+    return Shading(normals, sharp)
+
+
+def _transferred(mesh, ob):
+    """Returns the normals of the reference for each corner of `mesh`, (corners, 3)."""
+    with contextlib.ExitStack() as ends:
+        source, looking = original_in_place(ob), _separate_faces(mesh)
+        scene = bpy.data.scenes.new(".appearance")
+        made = [bpy.data.objects.new(".appearance", each) for each in (source, looking)]
+        for each in (source, looking):
+            ends.callback(bpy.data.meshes.remove, each)
+        for each in made:
+            ends.callback(bpy.data.objects.remove, each)
+            scene.collection.objects.link(each)
+        ends.callback(bpy.data.scenes.remove, scene)
+        modifier = made[1].modifiers.new("normals", "DATA_TRANSFER")
+        modifier.object = made[0]
+        modifier.use_loop_data, modifier.data_types_loops = True, {"CUSTOM_NORMAL"}
+        modifier.loop_mapping = "POLYINTERP_NEAREST"
+        layer = scene.view_layers[0]
+        layer.update()
+        return corner_normals(made[1].evaluated_get(layer.depsgraph).data)
+
+
+def _separate_faces(mesh):
+    """Returns a new mesh with the faces of `mesh`, each on vertices of its own that are slightly inside it."""
+    sizes, begins = (column(mesh.polygons, name, 1, np.int32) for name in ("loop_total", "loop_start"))
+    places = column(mesh.vertices, "co", 3)[column(mesh.loops, "vertex_index", 1, np.int32)]
+    centres = np.add.reduceat(places, begins) / sizes[:, None]
+    places += _INSIDE * (np.repeat(centres, sizes, axis=0) - places)
+    apart = bpy.data.meshes.new(".appearance")
+    apart.vertices.add(len(places))
+    apart.vertices.foreach_set("co", places.ravel())
+    apart.loops.add(len(places))
+    apart.loops.foreach_set("vertex_index", np.arange(len(places), dtype=np.int32))
+    apart.polygons.add(len(sizes))
+    apart.polygons.foreach_set("loop_start", begins)
+    if bpy.app.version < (4, 0):
+        apart.polygons.foreach_set("loop_total", sizes)
+    if bpy.app.version < (4, 1):
+        apart.use_auto_smooth = True
+    apart.update(calc_edges=True)
+    return apart

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Gives a mesh the look of its reference: normals, and a normal map."""
+
+import tempfile
+
+import bpy
+from bpy.props import IntProperty
+
+from .. import preferences
+from ..appearance import baking, materials, normals
+from ..errors import Refused
+from ..job import JobOperator
+from ..operation_settings import bake_settings
+from ..reference import snapshots, tolerances
+from . import settings as shared
+from .blocked import allowed, check_blocked, mesh_blocked
+
+
+def appearance_blocked(ob):
+    """Why the mesh of `ob` cannot get the look of its reference now, or None."""
+    if reason := mesh_blocked(ob) or check_blocked(ob):
+        return reason
+    if any(modifier.type == "MULTIRES" for modifier in ob.modifiers):
+        return "Apply the Multiresolution modifier first"
+    return None
+
+
+class TOLVOL_OT_shade_by_reference(bpy.types.Operator):
+    """Shade the mesh smooth with the normals of the reference at the nearest points, as custom normals. Edges where the \
+normals of the two sides differ by more than 20 degrees are marked as sharp. The shape stays as it is"""
+
+    bl_idname = "tolvol.shade_by_reference"
+    bl_label = "Shade Smooth by the Reference's Normals"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        return allowed(cls, appearance_blocked(context.active_object))
+
+    def execute(self, context):
+        ob = context.active_object
+        shading = normals.shading(ob)
+        shading.write(ob.data)
+        sharp = int(shading.sharp.sum())
+        self.report({"INFO"}, f"{ob.name} has the normals of its reference, {sharp:,} edges are sharp")
+        return {"FINISHED"}
+
+
+class TOLVOL_OT_bake_normals(JobOperator, bpy.types.Operator):
+    """Bake the normals of the reference into an image for this mesh, and show it in the materials. Cycles bakes within the \
+tolerance, in a second Blender without a window. Without a UV map, Smart UV Project makes one"""
+
+    bl_idname = "tolvol.bake_normals"
+    bl_label = "Bake Normal Map"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = bake_settings({"SKIP_SAVE"})
+    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+
+    doing = "Baking the normals"
+
+    @classmethod
+    def poll(cls, context):
+        return allowed(cls, appearance_blocked(context.active_object))
+
+    def draw(self, _context):
+        self.layout.use_property_split = True
+        self.layout.prop(self, "image_size")
+        self.layout.prop(self, "shade")
+
+    def steps(self, context):
+        context.view_layer.update()
+        ob = self.ob
+        shared.take(self, ob.tolvol.bake, bake_settings())
+        reference = snapshots.reference_of(ob)
+        if not reference.size() > 0:
+            raise Refused(f"The reference of {ob.name} has no size: replace it")
+        tolerance = tolerances.tolerance_length(ob.tolvol, reference.size())
+        threads = self.threads or preferences.threads(context) or 0
+        shading = normals.shading(ob) if self.shade else None
+        with tempfile.TemporaryDirectory(prefix="bake-", dir=bpy.app.tempdir, ignore_cleanup_errors=True) as folder:
+            task = baking.Task(ob, shading, tolerance, self.image_size, threads, folder)
+            baked = yield task.run
+            self._write(ob, shading, baked)
+
+    def _write(self, ob, shading, baked):
+        mesh = ob.data
+        name = f"{ob.name} normals"
+        before, image = bpy.data.images.get(name), bpy.data.images.load(str(baked.path))
+        image.colorspace_settings.name = "Non-Color"
+        image.pack()
+        image.filepath = ""
+        if shading is not None:
+            shading.write(mesh)
+        made = baked.uvs is not None
+        if made:
+            mesh.uv_layers.new().data.foreach_set("uv", baked.uvs)
+        uv_map = mesh.uv_layers.active.name
+        for warning in materials.show(ob, image, uv_map):
+            self.report({"WARNING"}, warning)
+        if before is not None and before.users == 0:  # It is that of an earlier bake.
+            bpy.data.images.remove(before)
+        image.name = name
+        shared.give(self, ob.tolvol.bake, bake_settings())
+        if baked.missed:
+            share = 100 * baked.missed / baked.covered
+            self.report(
+                {"WARNING"},
+                f"{share:.2g} % of the pixels have no point of the reference in front of them, as at open borders: there the "
+                "normal map changes nothing",
+            )
+        uvs = f"Smart UV Project made the UV map {uv_map}" if made else f"by the UV map {uv_map}"
+        size = image.size[0]
+        self.report({"INFO"}, f"{image.name}: {size} x {size} pixels, packed into the file; {uvs}")

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import bpy
+
+from .layout import SubPanel, active
+
+
+class TOLVOL_PT_appearance(SubPanel, bpy.types.Panel):
+    """What makes the few faces of a decimated mesh look like the original."""
+
+    bl_label = "Look"
+    bl_parent_id = "TOLVOL_PT_decimate"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        settings = active(context).tolvol.bake
+        layout.operator("tolvol.shade_by_reference", text="Shade by Reference")
+        column = layout.column(align=True)
+        column.prop(settings, "image_size")
+        column.prop(settings, "shade")
+        column.operator("tolvol.bake_normals")
