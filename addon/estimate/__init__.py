@@ -49,7 +49,7 @@ _THOROUGH, _MANY = 0.63, 0.25
 _BESIDE = {"effort", "use_target", "target_triangles", "max_seconds"}
 _SETTINGS = sorted(decimate_settings().keys() - _BESIDE)
 _MOST_CURVES = 16
-_AT_WORK = "Estimating the triangles"
+_AT_WORK = "Estimating"
 # A float32 tolerance in percent differs from that of the run by a smaller share.
 _SAME = 1e-6
 
@@ -94,7 +94,7 @@ def shown(context):
         return Estimate(sum(before for before, _ in done), sum(after for _, after in done), True)
     if _triangles(objects) > MOST_TRIANGLES:
         _cancel()
-        return f"No estimate above {MOST_TRIANGLES:,} triangles"
+        return "Too large to estimate"
     percents = {ob.name: _percent(ob, settings) for ob in objects}
     if not all(percents.values()):
         return ""
@@ -111,7 +111,7 @@ def _sum(objects, percents, settings):
         if known.curve is None:
             return ""
         if known.curve.refused(percents[ob.name]):
-            return "The mesh is beyond this tolerance"
+            return "Beyond this tolerance"
         count = known.curve.count(percents[ob.name])
         if not count:
             return _AT_WORK

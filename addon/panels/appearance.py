@@ -7,8 +7,7 @@ from .layout import SubPanel, active
 class TOLVOL_PT_appearance(SubPanel, bpy.types.Panel):
     """What makes the few faces of a decimated mesh look like the original."""
 
-    bl_label = "Look"
-    bl_parent_id = "TOLVOL_PT_decimate"
+    bl_label = "Appearance"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):

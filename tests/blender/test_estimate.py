@@ -113,7 +113,7 @@ def test_the_first_answer_comes_before_a_click_and_the_real_number_after_it():
     ob = torus()
     ob.tolvol.property_unset("percent_choice")
     assert ob.tolvol.tolerance_percent == pytest.approx(0.2)
-    assert estimate.shown(bpy.context) == "Estimating the triangles"
+    assert estimate.shown(bpy.context) == "Estimating"
     first = drawn(until=is_known)
     assert first.before == 2304
     assert bpy.ops.tolvol.decimate() == {"FINISHED"}
@@ -216,13 +216,13 @@ def test_what_is_refused_is_said(monkeypatch):
     bpy.ops.tolvol.set_reference()
     ob.data.vertices[0].co.z += 0.1
     ob.data.update()
-    assert drawn() == "The mesh is beyond this tolerance"
+    assert drawn() == "Beyond this tolerance"
     ob.tolvol.tolerance_percent = 20
     assert is_known(drawn(until=is_known))
     ob.tolvol.vertex_group = "nowhere"
     assert drawn() == ""
     monkeypatch.setattr(estimate, "MOST_TRIANGLES", 1000)
-    assert estimate.shown(bpy.context) == "No estimate above 1,000 triangles"
+    assert estimate.shown(bpy.context) == "Too large to estimate"
     bpy.ops.object.mode_set(mode="EDIT")
     assert estimate.shown(bpy.context) == "" and not work._waiting
 
