@@ -114,7 +114,7 @@ def _command(folder):
     script = str(Path(__file__).parent / "bake_process.py")
     if not bpy.app.binary_path:  # The module bpy of PyPI is no program.
         return [sys.executable, script, "--", str(folder)]
-    options = ["--background", "--factory-startup", "-noaudio", "--python", script]
+    options = ["--background", "--factory-startup", "--python", script]
     return [bpy.app.binary_path, *options, "--", str(folder)]
 
 

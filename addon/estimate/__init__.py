@@ -49,7 +49,7 @@ _THOROUGH, _MANY = 0.63, 0.25
 _BESIDE = {"effort", "use_target", "target_triangles", "max_seconds"}
 _SETTINGS = sorted(decimate_settings().keys() - _BESIDE)
 _MOST_CURVES = 16
-_AT_WORK = "Estimating"
+_AT_WORK, _TOO_LARGE = "Estimating", "Too large to estimate"
 # A float32 tolerance in percent differs from that of the run by a smaller share.
 _SAME = 1e-6
 
@@ -94,7 +94,7 @@ def shown(context):
         return Estimate(sum(before for before, _ in done), sum(after for _, after in done), True)
     if _triangles(objects) > MOST_TRIANGLES:
         _cancel()
-        return "Too large to estimate"
+        return _TOO_LARGE
     percents = {ob.name: _percent(ob, settings) for ob in objects}
     if not all(percents.values()):
         return ""
@@ -110,6 +110,8 @@ def _sum(objects, percents, settings):
             return _AT_WORK
         if known.curve is None:
             return ""
+        if known.curve.too_large:
+            return _TOO_LARGE
         if known.curve.refused(percents[ob.name]):
             return "Beyond this tolerance"
         count = known.curve.count(percents[ob.name])
@@ -183,22 +185,17 @@ def _token(ob, settings):
     for each in {ob, source or ob}:
         about += [each.name, each.data.as_pointer(), _edits[each.data.name]]
     about += [ob.tolvol.snapshot_fingerprint, ob.tolvol.snapshot_kind if ob.tolvol.snapshot else ""]
-    own = source == ob or ob.tolvol.snapshot and ob.tolvol.snapshot_kind == "SELF"
-    return (*about, _shape(ob.matrix_world) if own else (*_rows(ob.matrix_world), *_rows(_matrix(ob, source))))
+    return *about, _place(ob)
 
 
-def _matrix(ob, source):
-    return source.matrix_world if source else ob.tolvol.snapshot_matrix
-
-
-def _rows(matrix):
-    return tuple(np.array(matrix, np.float64).ravel())
-
-
-def _shape(matrix):
-    """Returns numbers that stay the same when the object is moved or turned, but for rare rounding."""
-    linear = mesh_io.matrix_array(matrix)[:3, :3]
-    metric = linear.T @ linear
+def _place(ob):
+    """Returns a value that changes with the places of the mesh and its reference, unless both move and turn together."""
+    matrix, source = mesh_io.matrix_array(ob.matrix_world), snapshots.source_object(ob)
+    if ob.tolvol.snapshot_kind != "SELF" if ob.tolvol.snapshot else source != ob:
+        of_reference = ob.tolvol.snapshot_matrix if ob.tolvol.snapshot else mesh_io.matrix_array(source.matrix_world)
+        return (*matrix.ravel(), *np.ravel(of_reference))
+    metric = matrix[:3, :3].T @ matrix[:3, :3]
+    # Rounding changes the last digits when the object is turned.
     return tuple(f"{value:.4e}" for value in (metric + np.abs(metric).max()).ravel())
 
 
@@ -217,7 +214,7 @@ def _read(ob, settings):
     _known[ob.name] = _Known(_token(ob, settings), None, None)
     # The tolerance is that of each run.
     task = decimation.task(ob, snapshots.reference_of(ob), math.nan, settings, asked)
-    digest = _digest(task)
+    digest = _digest(task, _place(ob))
     curve = _curves.pop(digest, None) or Curve(len(task.surface.arrays.triangles))
     _curves[digest] = curve
     while len(_curves) > _MOST_CURVES:
@@ -226,10 +223,9 @@ def _read(ob, settings):
     return _known[ob.name]
 
 
-def _digest(task):
-    digest = hashlib.blake2b(digest_size=16)
-    relative = np.linalg.solve(task.reference.matrix, task.surface.matrix)
-    digest.update(f"{task.options} {task.close_holes} {_shape(task.reference.matrix)} {relative.round(6)}".encode())
+def _digest(task, place):
+    """Returns a value that is equal for equal decimations but for the tolerance."""
+    digest = hashlib.blake2b(f"{task.options} {task.close_holes} {place}".encode(), digest_size=16)
     for surface in (task.surface, task.reference):
         digest.update(surface.arrays.fingerprint().encode())
     for array in (task.locked, task.shares, task.uvs, task.selected if task.close_holes else None):
@@ -252,7 +248,7 @@ def _ask(objects, percents):
     for name in _known.keys() - current:
         del _known[name]
         _cancel()
-    if any(known and known.curve is None for known, _ in found):
+    if any(known and (known.curve is None or known.curve.too_large) for known, _ in found):
         return
     if not all(known and known.curve.good(percent) for known, percent in found):
         _later(_HERE, _REST)
@@ -304,6 +300,8 @@ def _run(task, curve, percent, progress):
         raise
     except native.module.TolvolError:  # Decimate would refuse the mesh, too.
         count = None
+    except MemoryError:
+        curve.too_large, count = True, None
     return curve, percent, count, time.monotonic() - began
 
 
@@ -311,7 +309,7 @@ def _finish(outcome, error):
     if error is None:
         curve, *known = outcome
         curve.add(*known)
-        redraw_sidebars()  # Drawing them asks for the next decimation.
+    redraw_sidebars()  # Drawing them asks for the next decimation.
 
 
 def _cancel():

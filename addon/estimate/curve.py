@@ -33,6 +33,7 @@ class Curve:
     def __init__(self, triangles):
         """triangles: the number before the decimation."""
         self.triangles = triangles
+        self.too_large = False  # whether a decimation had not enough memory
         self._tolerances = []  # in percent of the size, in rising order
         self._counts = {}  # tolerance -> number of triangles, or None if the mesh cannot be decimated within it
         self._seconds = {}

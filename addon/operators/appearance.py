@@ -20,6 +20,8 @@ def appearance_blocked(ob):
     """Why the mesh of `ob` cannot get the look of its reference now, or None."""
     if reason := mesh_blocked(ob) or check_blocked(ob):
         return reason
+    if not ob.matrix_world.determinant():
+        return f"{ob.name} has no extent along an axis: Object > Clear > Scale"
     if any(modifier.type == "MULTIRES" for modifier in ob.modifiers):
         return "Apply the Multiresolution modifier first"
     return None

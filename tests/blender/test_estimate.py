@@ -75,9 +75,9 @@ def noise():
 MODELS = {
     "small ball": lambda: ball(2),
     "ball": lambda: ball(4),
-    "torus": lambda: torus(noise=0.0),
-    "rough torus": torus,
-    "sheet": sheet,
+    "torus": lambda: torus(around=32, across=16, noise=0.0),
+    "rough torus": lambda: torus(around=32, across=16),
+    "sheet": lambda: sheet(count=20),
     "flat": lambda: sheet(bumps=0.0),
     "CAD": cylinders,
     "noise": noise,
@@ -121,7 +121,7 @@ def test_the_first_answer_comes_before_a_click_and_the_real_number_after_it():
     assert estimate.shown(bpy.context) == estimate.Estimate(2304, count, True) and not work._waiting
     assert first.after == count
     ob.tolvol.tolerance_percent = 1  # What Decimate would leave now.
-    assert drawn().before == count
+    assert drawn(until=is_known).before == count
 
 
 def test_thorough_and_stop_at():
@@ -195,7 +195,7 @@ def test_closed_holes_are_counted():
 
 def test_moving_and_turning_the_object_keeps_the_estimate():
     ob = torus()
-    before = drawn()
+    before = drawn(until=is_known)
     ob.location, ob.rotation_euler = (3, 1, 0), (1, 0.4, 0)
     bpy.context.view_layer.update()
     assert estimate.shown(bpy.context) == before
@@ -288,3 +288,22 @@ def test_nothing_runs_while_an_animation_plays_or_the_panel_is_not_drawn(monkeyp
         work._tick()
         assert time.monotonic() < end
     assert work._running is None and not work._waiting
+
+
+def test_without_memory_nothing_more_is_tried(monkeypatch):
+    torus()
+
+    def none_left(*_):
+        raise MemoryError
+
+    monkeypatch.setattr(estimate.volumes, "passing_volume", none_left)
+    assert drawn() == "Too large to estimate" and not work._waiting
+
+
+def test_a_mesh_without_extent_along_an_axis():
+    ob = torus()
+    ob.scale.z = 0
+    bpy.context.view_layer.update()
+    assert isinstance(drawn(), str)
+    with pytest.raises(RuntimeError, match="an axis is scaled to zero"):
+        bpy.ops.tolvol.decimate()
