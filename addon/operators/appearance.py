@@ -20,8 +20,6 @@ def appearance_blocked(ob):
     """Why the mesh of `ob` cannot get the look of its reference now, or None."""
     if reason := mesh_blocked(ob) or check_blocked(ob):
         return reason
-    if not ob.matrix_world.determinant():
-        return f"{ob.name} has no extent along an axis: Object > Clear > Scale"
     if any(modifier.type == "MULTIRES" for modifier in ob.modifiers):
         return "Apply the Multiresolution modifier first"
     return None
@@ -59,8 +57,6 @@ tolerance, in a second Blender without a window. Without a UV map, Smart UV Proj
     __annotations__ = bake_settings({"SKIP_SAVE"})
     threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
 
-    doing = "Baking the normals"
-
     @classmethod
     def poll(cls, context):
         return allowed(cls, appearance_blocked(context.active_object))
@@ -72,7 +68,7 @@ tolerance, in a second Blender without a window. Without a UV map, Smart UV Proj
 
     def steps(self, context):
         context.view_layer.update()
-        ob = self.ob
+        ob, self.doing = self.ob, "Baking the normals"
         shared.take(self, ob.tolvol.bake, bake_settings())
         reference = snapshots.reference_of(ob)
         if not reference.size() > 0:
@@ -99,18 +95,18 @@ tolerance, in a second Blender without a window. Without a UV map, Smart UV Proj
             mesh.uv_layers.new().data.foreach_set("uv", baked.uvs)
         uv_map = mesh.uv_layers.active.name
         for warning in materials.show(ob, image, uv_map):
-            self.report({"WARNING"}, warning)
+            self.say({"WARNING"}, warning)
         if before is not None and before.users == 0:  # It is that of an earlier bake.
             bpy.data.images.remove(before)
         image.name = name
         shared.give(self, ob.tolvol.bake, bake_settings())
         if baked.missed:
             share = 100 * baked.missed / baked.covered
-            self.report(
+            self.say(
                 {"WARNING"},
                 f"{share:.2g} % of the pixels have no point of the reference in front of them, as at open borders: there the "
                 "normal map changes nothing",
             )
         uvs = f"Smart UV Project made the UV map {uv_map}" if made else f"by the UV map {uv_map}"
         size = image.size[0]
-        self.report({"INFO"}, f"{image.name}: {size} x {size} pixels, packed into the file; {uvs}")
+        self.say({"INFO"}, f"{image.name}: {size} x {size} pixels, packed into the file; {uvs}")

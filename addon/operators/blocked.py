@@ -15,6 +15,8 @@ def object_blocked(ob, modes=_OBJECT_MODE):
         return "Select a mesh object"
     if ob.library is not None or ob.override_library is not None:
         return f"{ob.name} is linked from another file: Object > Relations > Make Local > All"
+    if not ob.matrix_world.determinant():
+        return f"{ob.name} has no extent along an axis: Object > Clear > Scale"
     if ob.mode not in modes:
         return "Switch to Object Mode"
     return None

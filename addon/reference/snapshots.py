@@ -97,7 +97,7 @@ def reference_matrix(ob):
 def snapshot_size(ob):
     """Returns the same number as reference_of(ob).size(), bit for bit, but is quick enough to be called while drawing.
 
-    Returns nan if a damaged file holds no surface.
+    Returns nan if a damaged file holds no surface, or if an axis of the object is scaled to zero.
     """
     settings = ob.tolvol
     key = settings.snapshot_fingerprint
@@ -108,7 +108,10 @@ def snapshot_size(ob):
     if not np.isfinite(_boxes[key]).all():
         return math.nan
     # The size of a surface is the size of the bounding box of its used vertices.
-    return native.module.diagonal(_boxes[key], np.array([[0, 1, 1]]), to_world=reference_matrix(ob))
+    try:
+        return native.module.diagonal(_boxes[key], np.array([[0, 1, 1]]), to_world=reference_matrix(ob))
+    except native.module.TolvolError:
+        return math.nan
 
 
 def set_reference(ob, surface):

@@ -40,12 +40,12 @@ def test_normals_and_a_normal_map_by_mouse():
         yield from finished(lambda: not suzanne().data.has_custom_normals)
         engine, uvs = bpy.context.scene.render.engine, len(suzanne().data.uv_layers)
         yield from press("tolvol.bake_normals")
-        yield from finished(lambda: job._under_way)
+        yield from finished(job.under_way)
         yield from scroll(4)
         aside()
         yield 0.5
         screenshot("look 2 baking")
-        yield from finished(lambda: not job._under_way)
+        yield from finished(lambda: not job.under_way())
         yield 1.0
         screenshot("look 3 baked")
         image = bpy.data.images["Suzanne normals"]
@@ -59,11 +59,11 @@ def test_normals_and_a_normal_map_by_mouse():
         assert "Suzanne normals" not in bpy.data.images and not suzanne().data.materials
         suzanne().tolvol.bake.image_size = 8192
         yield from press("tolvol.bake_normals")
-        yield from finished(lambda: job._under_way)
+        yield from finished(job.under_way)
         yield 2.0
         xdotool("mousemove", *centre())
         key("Escape")
         began = time.monotonic()
-        yield from finished(lambda: not job._under_way, pause=0.05)
+        yield from finished(lambda: not job.under_way(), pause=0.05)
         assert time.monotonic() - began < 2
         assert not suzanne().data.has_custom_normals and "Suzanne normals" not in bpy.data.images
