@@ -74,3 +74,37 @@ def typed(value, units):
                 digits, length = count, wanted
                 break
     return length
+
+
+# The metres of each unit that a scene can be set to, and its short name.
+_UNITS = {
+    "KILOMETERS": (1000.0, "km"),
+    "METERS": (1.0, "m"),
+    "CENTIMETERS": (0.01, "cm"),
+    "MILLIMETERS": (0.001, "mm"),
+    "MICROMETERS": (1e-6, "µm"),
+    "MILES": (1609.344, "mi"),
+    "FEET": (0.3048, "ft"),
+    "INCHES": (0.0254, "in"),
+    "THOU": (0.0000254, "thou"),
+}
+# Of these a scene with an adaptive unit takes the largest that the length reaches.
+_ADAPTIVE = {
+    "METRIC": ("KILOMETERS", "METERS", "MILLIMETERS", "MICROMETERS"),
+    "IMPERIAL": ("MILES", "FEET", "INCHES", "THOU"),
+}
+
+
+def chosen_unit(context, length):
+    """Returns the name of the scene's unit, and the factor from world lengths to it.
+
+    length: in the world; an adaptive scene gets a unit that suits it. A scene without units has "units".
+    """
+    settings = context.scene.unit_settings
+    if settings.system == "NONE":
+        return "units", 1.0
+    scale = shortest(settings.scale_length)
+    named = [settings.length_unit] if settings.length_unit in _UNITS else _ADAPTIVE[settings.system]
+    fitting = [name for name in named if length * scale >= _UNITS[name][0]]
+    metres, name = _UNITS[fitting[0] if fitting else named[-1]]
+    return name, scale / metres

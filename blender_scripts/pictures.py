@@ -7,6 +7,7 @@ import numpy as np
 
 import command_line as cli
 from addon.native import module as tolvol
+from addon.proof import deviation_pictures
 
 DPI = 100  # A point of type is 100/72 pixels.
 INK, FAINT = "#1b1e25", "#6a6f7a"
@@ -14,10 +15,6 @@ WIDTH, HEIGHT, LEGEND = 800, 700, 230  # pixels: width and height of the image o
 MARGIN = 20
 EDGES_UP_TO = 5000  # triangles; the edges of a mesh with more triangles would hide the colours
 STRIPE = 12  # pixels from one stripe to the next in the images that tolvol renders
-
-# Axis that is up -> a view from the front, the right and above. A file does not say which axis is up: each format has a
-# convention.
-_VIEWS = {"Y": {"direction": (0.55, 0.4, 1), "up": (0, 1, 0)}, "Z": {"direction": (0.55, -1, 0.4), "up": (0, 0, 1)}}
 
 
 def require(option, path):
@@ -35,16 +32,17 @@ def unavailable():
         import matplotlib  # noqa: F401
     except ImportError as error:
         return f"{error}; install Debian's python3-matplotlib"
-    try:
-        tolvol.renderer()
-    except tolvol.GlUnavailable as error:
-        return str(error)
-    return None
+    return deviation_pictures.unavailable()
+
+
+def up_axis(path):
+    """Returns the axis that is up by the convention of a file's format. The file does not say it."""
+    return "Y" if Path(path).suffix.lower() in {".obj", ".gltf", ".glb"} else "Z"
 
 
 def camera(vertices, triangles, size, path="", margin=0.0):
     """Returns a camera that shows a mesh upright, by the convention of the format of `path`."""
-    view = _VIEWS["Y" if Path(path).suffix.lower() in {".obj", ".gltf", ".glb"} else "Z"]
+    view = deviation_pictures.VIEWS[up_axis(path)]
     return tolvol.Camera.framing(vertices, triangles, size=size, margin=margin, **view)
 
 

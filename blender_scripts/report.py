@@ -5,6 +5,7 @@ blender --background --python blender_scripts/report.py -- A B [--tolerance 1%] 
 """
 
 import argparse
+import datetime
 import io
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ try:
     import command_line as cli
     import pictures
     from addon.files import file_io, safe_files
-    from addon.proof import deviation, report, solidity
+    from addon.proof import deviation, deviation_pictures, report, solidity
     from addon.reference import snapshots
 except ImportError as error:  # After an uncaught exception Blender would end with exit code 0.
     print(f"report.py: Blender's Python lacks a package: {error}; install Debian's python3-numpy", file=sys.stderr)
@@ -122,16 +123,22 @@ def _report(options, staged):
     size = surfaces[1].size()
     tolerance = cli.in_units(options.tolerance, size) if options.tolerance else None
     lengths = [cli.in_units(bound, size) for bound in options.bounds]
-    result = deviation.deviation(*surfaces, size, tolerance, lengths, options.unit, options.threads)
-    result |= {"a": files[0], "b": files[1]}
+    given_in = "percent" if options.tolerance and options.tolerance[1] else "length"
+    result = deviation.deviation(*surfaces, size, tolerance, lengths, options.unit, options.threads, given_in=given_in)
+    date = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
+    result |= {"a": files[0], "b": files[1], "date": date}
     for label, name in (("A", "a"), ("B", "b")):
         print(f"{label}: {solidity.line(result['solidity'][name])}")
     print(f"A: {solidity.measures_line(*(result['solidity'][key] for key in ('a', 'b', 'change')))}")
     for way, label in (("forward", "A from B"), ("backward", "B from A")):
         print(_line(result[way], label, size))
-    drawn = _draw(surfaces, result, options)
     if picture:
-        staged.write(picture, drawn[0][1])
+        pair = [(surface.world(), surface.arrays.triangles) for surface in surfaces]
+        png = io.BytesIO()
+        reach = deviation_pictures.reach(result)
+        pictures.save_deviation(png, *pair, reach, size, options.a, options.threads)
+        staged.write(picture, png.getvalue())
+    drawn = _drawn(surfaces, result, options)
     for path, target in zip(options.report, reports):
         staged.write(target, deviation.content(result, path, drawn))
     staged.publish()
@@ -142,22 +149,17 @@ def _report(options, staged):
     return cli.NOT_PROVED if missed else 0
 
 
-def _draw(surfaces, result, options):
-    """Returns pairs (caption, PNG): of both directions if there is an .html report, else of the first for --picture."""
-    in_page = any(Path(path).suffix.lower() == ".html" for path in options.report)
-    if in_page and (reason := pictures.unavailable()):
+def _drawn(surfaces, result, options):
+    """Returns the pictures of both directions, if there is an .html report."""
+    if not any(Path(path).suffix.lower() == ".html" for path in options.report):
+        return []
+    if reason := deviation_pictures.unavailable():
         print(f"note: no pictures in the report: {reason}")
-        in_page = False
-    a, b = ((surface.world(), surface.arrays.triangles) for surface in surfaces)
-    largest = max(result[way]["largest"][1] for way in ("forward", "backward"))
-    scale = result["tolerance"]["absolute"] if result["tolerance"] else max(largest, 1e-6 * result["size"])
-    drawn = []
-    for pair, path, other in (((a, b), options.a, options.b), ((b, a), options.b, options.a)):
-        if in_page or (options.picture and not drawn):
-            png = io.BytesIO()
-            pictures.save_deviation(png, *pair, scale, result["size"], path, options.threads)
-            drawn.append((f"{Path(path).name}, coloured by its distance from {Path(other).name}", png.getvalue()))
-    return drawn
+        return []
+    names = [Path(path).name for path in (options.a, options.b)]
+    captions = [f"{own}, coloured by its distance from {other}" for own, other in (names, names[::-1])]
+    up = pictures.up_axis(options.a)
+    return deviation_pictures.drawn(*surfaces, result, captions, up=up, threads=options.threads)
 
 
 def _line(way, label, size):

@@ -1,24 +1,87 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Saves the deviation of an object and its reference as a file."""
+"""Saves the deviations of the selected objects from their references as a file."""
 
+import datetime
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
+from .. import native, preferences
 from ..errors import Refused
 from ..files import safe_files
-from ..proof import deviation, labels, last_run, report
+from ..job import JobOperator
+from ..proof import deviation, deviation_pictures, deviation_units, labels, last_run, report
 from ..reference import snapshots, tolerances
-from .check import Comparison
+from ..units import chosen_unit
+from .blocked import allowed, check_blocked
+from .decimate import targets
 
 # The report gives the share of the area in the bands between these shares of the tolerance.
 _BANDS = (0.25, 0.5, 0.75)
 
+_FORMATS = (
+    (
+        "HTML",
+        "Page",
+        "A page to read and to print (.html), with histograms, and pictures of the mesh and of the reference",
+    ),
+    (
+        "CSV",
+        "Table",
+        "A table for a spreadsheet (.csv): each row has one number, and the ends of its range if it has one",
+    ),
+    ("JSON", "All Numbers", "All numbers for a program to read (.json)"),
+)
 
-class TOLVOL_OT_save_report(Comparison, bpy.types.Operator):
-    """Measure the distances from the mesh to the reference and from the reference to the mesh, and save them as a page to \
-read (.html), a table (.csv) or all numbers (.json)"""
+
+@dataclass
+class _Task:
+    """The work on one object in the thread. It reads and returns no data of Blender."""
+
+    name: str
+    surface: snapshots.Surface
+    reference: snapshots.Surface
+    tolerance: float
+    two_sided: bool
+    given_in: str
+    about: dict  # entries of the report that are known before
+    unit: tuple  # the name of the unit, and the factor from world lengths to it
+    drawn: bool  # whether pictures are needed
+    threads: int
+
+    def run(self, progress):
+        bounds = [share * self.tolerance for share in _BANDS]
+        run = deviation.deviation(
+            self.surface,
+            self.reference,
+            self.reference.size(),
+            self.tolerance,
+            bounds,
+            threads=self.threads,
+            progress=progress,
+            two_sided=self.two_sided,
+            given_in=self.given_in,
+        )
+        name, factor = self.unit
+        pictures = self._pictures(run, factor, progress) if self.drawn else []
+        return deviation_units.in_unit(run | self.about, factor, name), pictures
+
+    def _pictures(self, run, factor, progress):
+        names = [self.about[key]["name"] for key in ("a", "b")]
+        captions = [f"{own}, coloured by its distance from {other}" for own, other in (names, names[::-1])]
+        try:
+            return deviation_pictures.drawn(
+                self.surface, self.reference, run, captions, factor, threads=self.threads, progress=progress
+            )
+        except native.module.GlUnavailable:
+            return []
+
+
+class TOLVOL_OT_save_report(JobOperator, bpy.types.Operator):
+    """Measure the distances from each selected mesh to its reference and back, and save them as a page to read (.html), \
+a table (.csv) or all numbers (.json)"""
 
     bl_idname = "tolvol.save_report"
     bl_label = "Save Report"
@@ -27,9 +90,27 @@ read (.html), a table (.csv) or all numbers (.json)"""
     filter_glob: StringProperty(
         default=";".join(f"*{extension}" for extension in deviation.EXTENSIONS), options={"HIDDEN", "SKIP_SAVE"}
     )
-    check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    check_existing: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
+    format: EnumProperty(
+        name="Format",
+        description="The kind of file. Another choice changes the ending of the file's name, and a typed ending the choice",
+        items=_FORMATS,
+        options={"SKIP_SAVE"},
+    )
+    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
 
     _browsing = False
+    _named_for = ""  # the format that the file's name has an ending for
+
+    @classmethod
+    def poll(cls, context):
+        return allowed(cls, check_blocked(context.active_object))
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(self, "format")
 
     def invoke(self, context, event):
         if self.filepath:
@@ -39,50 +120,103 @@ read (.html), a table (.csv) or all numbers (.json)"""
         folder = Path(bpy.data.filepath).parent
         if not bpy.data.filepath or not folder.is_dir():
             folder = Path.home()
-        self.filepath = str(folder / f"{bpy.path.clean_name(context.active_object.name)} deviation.html")
+        self.filepath = str(
+            folder / f"{bpy.path.clean_name(context.active_object.name)} deviation{_ending(self.format)}"
+        )
+        self._named_for = self.format
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
+    def check(self, _context):
+        """Called by the file browser after each change: makes the ending of the name and the format agree."""
+        path = Path(self.filepath)
+        before = self.filepath, self.format
+        ending = path.suffix.lower()
+        if not path.name:
+            return False
+        if self.format != self._named_for:  # The format was chosen.
+            known = ending in deviation.EXTENSIONS
+            self.filepath = f"{path.with_suffix('') if known else path}{_ending(self.format)}"
+        elif ending in deviation.EXTENSIONS:  # The name was typed.
+            self.format = ending[1:].upper()
+        else:
+            self.filepath += _ending(self.format)
+        self._named_for = self.format
+        return before != (self.filepath, self.format)
+
     def execute(self, context):
         if self._browsing:  # The user has chosen a file. A new invoke measures with progress and Esc.
+            self.check(context)
             return bpy.ops.tolvol.save_report("INVOKE_DEFAULT", filepath=self.filepath, threads=self.threads)
         return super().execute(context)
 
-    def prepare(self, context):
+    def targets(self, context):
+        return targets(context)
+
+    def steps(self, context):
+        context.view_layer.update()
+        self._prepare_file()
+        blocked = {ob.name: reason for ob in self.objects if (reason := check_blocked(ob))}
+        tasks = [self._task(context, ob) for ob in self.objects if ob.name not in blocked]
+        about = {
+            "date": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
+            "blend_file": Path(bpy.data.filepath).name or None,
+        }
+        outcomes = yield from self.each(tasks)
+        runs, pictures = [run for run, _ in outcomes], [drawn for _, drawn in outcomes]
+        if len(self.objects) == 1:
+            document, pictures = runs[0] | about, pictures[0]
+        else:
+            others = [{"name": name, "reason": reason} for name, reason in blocked.items()]
+            document = deviation.several(runs, others, about)
+        with safe_files.Staged() as staged:
+            staged.write(self._target, deviation.content(document, self._target.name, pictures))
+            staged.publish()
+        self.say({"INFO"}, f"{document['verdict']}: saved {self._target.name}")
+
+    def _prepare_file(self):
+        """Refuses before the work begins what could not be written at its end."""
         path = Path(bpy.path.abspath(self.filepath))
         if path.suffix.lower() not in deviation.EXTENSIONS:
             raise Refused(f"{path.name} does not end in {', '.join(deviation.EXTENSIONS)}")
         self._target = safe_files.Target(path)
         used = [path for path in (bpy.data.filepath, *bpy.utils.blend_paths(absolute=True)) if path]
         safe_files.require_apart([(str(path), path)], [(path, path) for path in used])
-        with safe_files.Staged() as staged:  # This refuses a folder that cannot be written to before the work begins.
+        with safe_files.Staged() as staged:  # This refuses a folder that cannot be written to.
             if not self._target.is_device:
                 staged.folder(self._target)
-        self._about = {
-            "a": _counted(self.ob.name, self.ob.data),
-            "b": _counted("its reference", self.ob.tolvol.snapshot),
-        }
-        holes = report.remembered_holes(self.ob.tolvol.last_run)
-        if holes and last_run.stays(self.ob):
-            self._about["a"]["holes"] = holes
-        if self.ob.tolvol.labels:
-            tolerance = tolerances.tolerance_length(self.ob.tolvol, snapshots.snapshot_size(self.ob))
-            self._about["labels"] = labels.listed(self.ob, tolerance)
-        units = context.scene.unit_settings
-        self._unit = "m" if units.system != "NONE" and units.scale_length == 1 else "units"
-        return super().prepare(context)
 
-    def compare(self, surface, reference, tolerance, threads, progress):
-        bounds = [share * tolerance for share in _BANDS]
-        return deviation.deviation(
-            surface, reference, reference.size(), tolerance, bounds, self._unit, threads, progress, self.two_sided
+    def _task(self, context, ob):
+        settings = ob.tolvol
+        surface, reference = snapshots.surface_of(ob), snapshots.reference_of(ob)
+        size = reference.size()
+        tolerance = tolerances.tolerance_length(settings, size)
+        if not snapshots.sound(tolerance):
+            raise Refused(f"The tolerance of {ob.name} in the file is damaged: enter it again")
+        of_object = settings.snapshot_kind == "OBJECT" and settings.snapshot_object is not None
+        reference_name = settings.snapshot_object.name if of_object else "its reference"
+        about = {"a": _counted(ob.name, ob.data), "b": _counted(reference_name, settings.snapshot)}
+        holes = report.remembered_holes(settings.last_run)
+        if holes and last_run.stays(ob):
+            about["a"]["holes"] = holes
+        if settings.labels:
+            about["labels"] = labels.listed(ob, tolerance)
+        return _Task(
+            ob.name,
+            surface,
+            reference,
+            tolerance,
+            settings.keep == "BOTH",
+            settings.tolerance_mode.lower(),
+            about,
+            chosen_unit(context, size),
+            self._target.path.suffix.lower() == ".html",
+            self.threads or preferences.threads(context),
         )
 
-    def finish(self, context, outcome):
-        with safe_files.Staged() as staged:
-            staged.write(self._target, deviation.content(outcome | self._about, self._target.name))
-            staged.publish()
-        self.say({"INFO"}, f"{outcome['verdict']}: saved {self._target.name}")
+
+def _ending(format_):
+    return f".{format_.lower()}"
 
 
 def _counted(name, mesh):

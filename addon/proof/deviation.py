@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measures the deviation of two surfaces in both directions and writes it as .json, .csv or .html.
 
-A deviation is a dictionary, as a .json report holds it. Lengths are in the units of the surfaces, and shares are shares
+A deviation is a dictionary, as a .json report holds it. Lengths are in the unit that it names, and shares are shares
 of the area (0 to 1). `largest` and every entry whose name ends in _range is an interval that certainly contains the true
 number:
 
     version, method, unit, size   `size` is the length that is 100 %
-    tolerance                     {absolute, percent}, or None
+    date, blend_file              only of Save Report: local time with its offset, ISO 8601; the name of the file, or None
+    tolerance                     {absolute, percent, given_in}, or None; given_in: "percent" or "length"
     two_sided                     whether both directions have to be within the tolerance for the verdict, or `forward` alone
     verdict                       PASS or FAIL (verdict.py), or None without a tolerance
     a, b                          {name or file, vertices, triangles}; a also has `holes`, as in report.py, if the last
@@ -25,31 +26,34 @@ number:
                       closed, else None; `mean` is signed, `inside` and `outside` are the largest distances on each side
         histogram     {edges, shares}                   of signed distances if there are sides
         samples, spacing
+
+A report of several objects is a dictionary, too: {version, date, blend_file, verdict, objects, not_measured}. `verdict` is
+that of all, `objects` are their deviations, and `not_measured` are selected objects as {name, reason}.
 """
 
-import csv
-import io
 import json
-import re
 from pathlib import Path
 
 import numpy as np
 
 from .. import native
-from . import deviation_page, measure, report, solidity
-from .verdict import Verdict
+from . import deviation_page, deviation_table, measure, solidity
+from .verdict import NOT_CHECKED, Verdict, together
 
 PERCENTILES = (50, 90, 95, 99, 99.9)
 EXTENSIONS = (".json", ".csv", ".html")
 
 _METHOD = "certified interval; one sample for each piece of the surface, ranges from bounds on the pieces"
-# A spreadsheet takes text that begins with one of these for a formula; the last four are the full-width forms.
-_FORMULA = "=+-@\uff1d\uff0b\uff0d\uff20"
 _BINS = 30  # the approximate number of bins on each side of the histogram
 
 
-def deviation(a, b, size, tolerance=None, bounds=(), unit="", threads=None, progress=None, two_sided=True):
-    """Returns the dictionary that is described above, without `a` and `b`, for two Surfaces."""
+def deviation(
+    a, b, size, tolerance=None, bounds=(), unit="", threads=None, progress=None, two_sided=True, given_in="percent"
+):
+    """Returns the dictionary that is described above, without `a` and `b`, for two Surfaces.
+
+    unit: the name of the unit of the surfaces; given_in: whether the tolerance was given as "percent" or "length".
+    """
     bounds = sorted({*bounds, *([] if tolerance is None else [tolerance])})
     ways = {}
     for way, surface, other in (("forward", a, b), ("backward", b, a)):
@@ -57,7 +61,11 @@ def deviation(a, b, size, tolerance=None, bounds=(), unit="", threads=None, prog
         spread = native.module.deviation(
             *pair[0], *pair[1], bounds=bounds, percentiles=PERCENTILES, threads=threads, progress=progress
         )
-        ways[way] = measure.largest_distance(*pair, tolerance, threads, progress), spread, surface.arrays.polygons
+        ways[way] = (
+            measure.largest_distance(*pair, tolerance, threads, progress),
+            spread,
+            surface.arrays.polygons,
+        )
     facts = {name: solidity.facts(surface, threads, progress) for name, surface in (("a", a), ("b", b))}
     largest = [measured for measured, _, _ in ways.values()]
     # Both histograms have the same scale, so that they can be compared.
@@ -67,11 +75,25 @@ def deviation(a, b, size, tolerance=None, bounds=(), unit="", threads=None, prog
         "method": _METHOD,
         "unit": unit,
         "size": size,
-        "tolerance": None if tolerance is None else {"absolute": tolerance, "percent": 100 * tolerance / size},
+        "tolerance": None
+        if tolerance is None
+        else {"absolute": tolerance, "percent": 100 * tolerance / size, "given_in": given_in},
         "two_sided": two_sided,
         "verdict": None if tolerance is None else Verdict(tolerance, *largest, two_sided=two_sided).word,
         "solidity": facts | {"change": solidity.change(facts["a"], facts["b"])},
         **{way: _way(*of_way, bounds, edges) for way, of_way in ways.items()},
+    }
+
+
+def several(runs, not_measured, about):
+    """Returns the report of several objects. not_measured: {name, reason}; about: date and blend_file."""
+    words = [run["verdict"] for run in runs] + [NOT_CHECKED] * bool(not_measured)
+    return {
+        "version": native.module.__version__,
+        **about,
+        "verdict": together(words),
+        "objects": runs,
+        "not_measured": not_measured,
     }
 
 
@@ -125,90 +147,16 @@ def _way(largest, spread, polygons, bounds, edges):
     }
 
 
-def content(run, path, pictures=()):
-    """Returns the bytes of a file for a deviation with its `a` and `b`, in the format of the path's extension.
+def content(document, path, pictures=()):
+    """Returns the bytes of a file, in the format of the path's extension.
 
-    pictures: pairs (caption, bytes of a PNG), which only the .html page shows.
+    document: a deviation with its `a` and `b`, or a report of several objects; pictures: a list of Pictures, which only the
+    .html page shows, or one such list for each of several objects.
     """
     writers = {
-        ".json": lambda: json.dumps(run, indent=1) + "\n",
-        ".csv": lambda: table(run),
-        ".html": lambda: deviation_page.page(run, pictures),
+        ".json": lambda: json.dumps(document, indent=1) + "\n",
+        ".csv": lambda: deviation_table.table(document),
+        ".html": lambda: deviation_page.page(document, pictures),
     }
     # The name of a file may have bytes that are not valid text.
     return writers[Path(path).suffix.lower()]().encode("utf-8", "backslashreplace")
-
-
-def table(run):
-    """Returns a deviation as CSV: each row has one number, its parameter, and the ends of its range if it has one.
-
-    Text that a spreadsheet would take for a formula gets a ' before it.
-    """
-    rows = [("direction", "quantity", "at", "value", "lower", "upper")]
-    rows += [("", "version", "", run["version"], "", ""), ("", "unit", "", run["unit"], "", "")]
-    rows += [("", "size", "", run["size"], "", "")]
-    if run["tolerance"]:
-        rows += [
-            ("", "tolerance", "", run["tolerance"]["absolute"], "", ""),
-            ("", "verdict", "", run["verdict"], "", ""),
-        ]
-    for name in ("a", "b"):
-        rows += [("", f"{name} {key}", "", value, "", "") for key, value in run[name].items() if key != "holes"]
-        holes = report.hole_rows(run[name]["holes"]) if "holes" in run[name] else ()
-        rows += [("", f"{name} {key}", at, value, "", "") for key, at, value in holes]
-        facts = run["solidity"][name].items()
-        rows += [("", f"{name} {key}", "", "" if value is None else value, "", "") for key, value in facts]
-    change = run["solidity"]["change"].items()
-    rows += [("", f"change of {key}", "", "" if value is None else value, "", "") for key, value in change]
-    for i, label in enumerate(run.get("labels", ())):
-        rows += [
-            ("", f"label {i + 1} {key}", "", "" if value is None else value, "", "") for key, value in _flat(label)
-        ]
-    for way in ("forward", "backward"):
-        rows += [(way, *row) for row in _rows(run[way])]
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([_harmless(cell) for cell in row] for row in rows)
-    return text.getvalue()
-
-
-def _flat(label):
-    """Yields the entries of a label, each coordinate of its position by itself."""
-    for key, value in label.items():
-        if key == "position":
-            yield from zip("xyz", value)
-        else:
-            yield key, value
-
-
-def _harmless(cell):
-    """Makes text safe for a spreadsheet: names come from other people's files, and as a formula a name could run a
-    program where the table is opened."""
-    if not isinstance(cell, str):
-        return cell
-    line = re.sub(r"[\t\r\n]", " ", cell)  # Some readers of CSV begin a new row at a lone \r.
-    return f"'{line}" if line.lstrip()[:1] in tuple(_FORMULA) else line
-
-
-def _rows(way):
-    yield "largest", "", way["largest"][0], *way["largest"]
-    for axis, value in zip("xyz", way["position"]):
-        yield "position", axis, value, "", ""
-    yield "triangle", "", way["triangle"], "", ""
-    yield "face", "", "" if way["face"] is None else way["face"], "", ""
-    yield "mean", "", way["mean"], *way["mean_range"]
-    yield "mean_error", "", way["mean_error"], "", ""
-    yield "rms", "", way["rms"], *way["rms_range"]
-    for entry in way["percentiles"]:
-        yield "percentile", entry["percent"], entry["distance"], *entry["range"]
-    for entry in way["beyond"]:
-        yield "share beyond", entry["bound"], entry["share"], *entry["range"]
-    if way["sides"]:
-        sides = way["sides"]
-        yield "signed mean", "", sides["mean"], *sides["mean_range"]
-        yield "share inside", "", sides["share_inside"], *sides["share_inside_range"]
-        yield "largest inside", "", sides["inside"][0], *sides["inside"]
-        yield "largest outside", "", sides["outside"][0], *sides["outside"]
-    for edge, share in zip(way["histogram"]["edges"], way["histogram"]["shares"]):
-        yield "histogram from", edge, share, "", ""
-    yield "samples", "", way["samples"], "", ""
-    yield "spacing", "", way["spacing"], "", ""

@@ -1,79 +1,159 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes a deviation as one HTML page that needs no other file: both directions side by side, with histograms as SVG.
+"""Writes deviations as one HTML page that needs no other file: both directions side by side, with histograms and pictures.
 
-The colours are from the palette of M. Okabe and K. Ito, which the colour-blind can tell apart. Bars beyond the tolerance
-are striped as well.
+Several objects have a table on top and a section each.
 """
 
 import base64
-import math
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from html import escape
 from pathlib import Path
 
 from ..units import NO_BREAK
 from . import report, solidity
-from .verdict import FAIL, PASS, Interval
-
-_WITHIN, _BEYOND, _LINE = "#0072B2", "#D55E00", "#1a1a1a"
-
-_STYLE = f"""
-:root {{ color-scheme: light; font: 15px/1.45 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; color: #1a1a1a; }}
-body {{ max-width: 80rem; margin: 0 auto; padding: 2rem 1.5rem 3rem; background: #fff; }}
-h1 {{ font-size: 1.6rem; margin: 0 0 .2rem; }}
-h2 {{ font-size: 1.15rem; margin: 0 0 .6rem; }}
-h3 {{ font-size: .95rem; margin: 1.4rem 0 .3rem; }}
-p {{ margin: .3rem 0; }}
-.muted, th, figcaption, footer {{ color: #555; font-weight: normal; }}
-.verdict {{ width: fit-content; margin: .8rem 0; padding: .35rem .8rem; border-radius: .3rem; font-weight: 600;
-  border: 2px solid #888; }}
-.verdict.within {{ border-color: {_WITHIN}; color: {_WITHIN}; }}
-.verdict.beyond {{ border-color: {_BEYOND}; color: #a34700; }}
-.ways {{ display: grid; grid-template-columns: repeat(auto-fit, minmax(31rem, 1fr)); gap: 1.5rem; margin-top: 1rem; }}
-article {{ border: 1px solid #d0d0d0; border-radius: .5rem; padding: 1.1rem 1.3rem; }}
-.largest {{ font-size: 1.9rem; font-weight: 600; line-height: 1.2; }}
-table {{ font-size: .93rem; border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }}
-th, td {{ text-align: right; white-space: nowrap; padding: .16rem .35rem; border-bottom: 1px solid #ececec; }}
-th:first-child, td:first-child {{ text-align: left; padding-left: 0; }}
-.measures table {{ width: auto; }}
-svg {{ display: block; width: 100%; height: auto; }}
-svg text {{ font-size: 12px; fill: #333; }}
-figure {{ margin: 1.5rem 0 0; }}
-figure img {{ max-width: 100%; }}
-footer {{ margin-top: 2rem; font-size: .87rem; border-top: 1px solid #d0d0d0; padding-top: .8rem; }}
-"""
-
-# Size and margins of the drawing of a histogram, in pixels.
-_WIDTH, _HEIGHT, _LEFT, _RIGHT, _TOP, _BOTTOM = 560, 240, 50, 12, 30, 44
-_LEAST_BAR = 1.5  # least height of a bar in pixels, so that a share of one in a million can be seen
+from .deviation_drawings import LEAST_BAR, histogram, legend
+from .deviation_style import STYLE
+from .deviation_units import tolerance_text
+from .verdict import FAIL, NOT_CHECKED, PASS, Interval
 
 
-def page(run, pictures=()):
-    """Returns the page of a deviation with its `a` and `b` (see deviation.py). pictures: pairs (caption, bytes of a PNG)."""
-    a, b = (escape(_name(run[key])) for key in ("a", "b"))
-    figures = "".join(
-        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,{base64.b64encode(png).decode()}">'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-        for caption, png in pictures
-    )
-    highest = max(max(run[way]["histogram"]["shares"]) for way in ("forward", "backward"))
-    articles = "".join(
-        _article(run, way, from_, to, highest) for way, from_, to in (("forward", a, b), ("backward", b, a))
-    )
+def page(document, pictures=()):
+    """Returns the page of a deviation with its `a` and `b`, or of a report of several objects (see deviation.py).
+
+    pictures: a list of Pictures, or one such list for each of several objects.
+    """
+    if "objects" in document:
+        return _page_of_several(document, pictures)
+    a, b = (escape(_name(document[key])) for key in ("a", "b"))
+    body = f"""<h1>Deviation of {a} and {b}</h1>
+{_facts(document)}
+{_of_one(document, pictures, "")}
+<footer>{_notes([document])}</footer>"""
+    return _page(f"Deviation of {a} and {b}", body)
+
+
+def _page(title, body):
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>Deviation of {a} and {b}</title><style>{_STYLE}</style></head><body>
-<h1>Deviation of {a} and {b}</h1>
-<p class="muted">{_counts(run, run["a"])}<br>{_counts(run, run["b"])}; size, which is 100&nbsp;%: {_length(run, run["size"])}</p>
-{_verdict(run)}
+<title>{title}</title><style>{STYLE}</style></head><body>
+{body}
+</body></html>
+"""
+
+
+def _page_of_several(document, pictures):
+    runs, others = document["objects"], document["not_measured"]
+    title = f"Deviation of {len(runs)} {'object' if len(runs) == 1 else 'objects'}"
+    sections = "".join(
+        f"""<section id="object-{i}"><h2>{escape(_name(run["a"]))}</h2>
+{_facts(run, {"Reference": _counts(run, run["b"])})}
+{_of_one(run, pictures[i] if pictures else (), f"-{i}")}
+</section>
+"""
+        for i, run in enumerate(runs)
+    )
+    word = document["verdict"]
+    failed = sum(run["verdict"] != PASS for run in runs)
+    counted = f"{len(runs) - failed} of {len(runs) + len(others)} objects are within the tolerance, proved"
+    body = f"""<h1>{title}</h1>
+{_list(_about(document))}
+<p class="verdict{_look(word)}">{_sign(word)}{word}. {counted}</p>
+{_overview(runs, others)}
+{sections}
+<footer>{_notes(runs)}</footer>"""
+    return _page(title, body)
+
+
+def _look(word):
+    """Returns the class of a verdict, with a space before it."""
+    return {PASS: " within", FAIL: " beyond"}.get(word, "")
+
+
+def _sign(word):
+    return {PASS: "✓ ", FAIL: "✗ "}.get(word, "")
+
+
+def _list(facts):
+    """Returns pairs (name, HTML) as a list. A pair without a text is left out."""
+    rows = "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in facts if text)
+    return f'<dl class="facts">{rows}</dl>'
+
+
+def _about(document):
+    return [
+        ("File", escape(document.get("blend_file") or "")),
+        ("Date", escape(document.get("date", "").replace("T", " "))),
+        ("Made by", f"Tolerance Volumes {escape(document['version'])}"),
+    ]
+
+
+def _facts(run, names=None):
+    """Returns what was measured and how. names: what names the surfaces, by default both of them."""
+    names = names or {"Mesh": _counts(run, run["a"]), "Reference": _counts(run, run["b"])}
+    ways = "both ways" if run["two_sided"] else "one way: from the mesh to the reference"
+    counts = [("Mesh", _counts(run, run["a"]))] if "Mesh" not in names else []
+    measured = [
+        ("Tolerance", f"{escape(tolerance_text(run))}, {ways}" if run["tolerance"] else ""),
+        ("Size", f"{_length(run, run['size'])}, the longest diagonal of the reference's box, is 100&nbsp;%"),
+        ("Unit", escape(run["unit"])),
+    ]
+    about = _about(run) if "date" in run or "blend_file" in run else []
+    return _list([*counts, *names.items(), *measured, *about])
+
+
+def _overview(runs, others):
+    """Returns the table of all objects."""
+    head = ("Object", "Verdict", "Mesh, at&nbsp;most", "Reference, at&nbsp;most", "Tolerance")
+    head += ("Mesh beyond", "Reference beyond", "Mesh triangles", "Reference triangles")
+    rows = []
+    for i, run in enumerate(runs):
+        word, unit = run["verdict"], _unit(run)
+        rows.append(
+            (
+                f'<a href="#object-{i}">{escape(_name(run["a"]))}</a>',
+                f'<span class="{_look(word).strip()}">{_sign(word)}{word}</span>',
+                *(f"{_rounded(run[way]['largest'][1], True)}{unit}" for way in ("forward", "backward")),
+                f"{run['tolerance']['absolute']:.4g}{unit}",
+                *(_share_beyond(run, way) for way in ("forward", "backward")),
+                *(f"{run[key]['triangles']:,}" for key in ("a", "b")),
+            )
+        )
+    dashes = ("–",) * (len(head) - 2)
+    rows += [(escape(other["name"]), NOT_CHECKED.replace(" ", NO_BREAK), *dashes) for other in others]
+    reasons = "".join(f"<p>{escape(other['name'])}: {escape(other['reason'])}</p>" for other in others)
+    return f'<div class="overview">{_table(head, rows)}</div>{reasons}'
+
+
+def _share_beyond(run, way):
+    """Returns the share of a surface that is farther away than the tolerance."""
+    if Interval(*run[way]["largest"]).within(run["tolerance"]["absolute"]):
+        return "0&nbsp;%"
+    share = next(entry for entry in run[way]["beyond"] if entry["bound"] == run["tolerance"]["absolute"])["share"]
+    return f"{100 * share:.3g}&nbsp;%"
+
+
+def _of_one(run, pictures, suffix):
+    """Returns what a section and the page of one object have in common. suffix: ends the names of its drawings."""
+    a, b = (escape(_name(run[key])) for key in ("a", "b"))
+    highest = max(max(run[way]["histogram"]["shares"]) for way in ("forward", "backward"))
+    articles = "".join(
+        _article(run, way, from_, to, highest, suffix) for way, from_, to in (("forward", a, b), ("backward", b, a))
+    )
+    figures = "".join(_figure(run, picture, f"{i}{suffix}") for i, picture in enumerate(pictures))
+    return f"""{_verdict(run)}
+{f'<div class="pictures">{figures}</div>' if figures else ""}
 <p>{a}: {escape(solidity.line(run["solidity"]["a"]))}<br>{b}: {escape(solidity.line(run["solidity"]["b"]))}</p>
 {_measures(run, a, b)}
 <div class="ways">{articles}</div>
-{_labels(run)}
-{figures}
-<footer>{_notes(run)}</footer>
-</body></html>
-"""
+{_labels(run)}"""
+
+
+def _figure(run, picture, name):
+    colours = legend(picture, run["unit"], f"picture-{name}") if picture.reach else ""
+    return (
+        f'<figure><img alt="{escape(picture.caption)}" src="data:image/png;base64,'
+        f'{base64.b64encode(picture.png).decode()}"><figcaption>{escape(picture.caption)}</figcaption>{colours}</figure>'
+    )
 
 
 def _name(mesh):
@@ -100,7 +180,7 @@ def _rounded(value, up, digits=4):
 
 
 def _between(ends, scale=1.0):
-    return f"{_rounded(scale * ends[0], False, 3)} to {_rounded(scale * ends[1], True, 3)}"
+    return f"{_rounded(scale * ends[0], False, 3)} to&nbsp;{_rounded(scale * ends[1], True, 3)}"
 
 
 def _unit(run):
@@ -144,7 +224,7 @@ def _verdict(run):
     if not run["tolerance"]:
         return ""
     tolerance = run["tolerance"]["absolute"]
-    said = f"Tolerance {_length(run, tolerance)} ({run['tolerance']['percent']:.4g}&nbsp;% of size): "
+    said = f"Tolerance {escape(tolerance_text(run))}: "
     names = [escape(_name(run[key])) for key in ("a", "b")]
     found = [Interval(*run[way]["largest"]) for way in ("forward", "backward")]
     about = "both" if run["two_sided"] else names[0]
@@ -161,30 +241,34 @@ def _verdict(run):
     return f'<p class="verdict beyond">✗ {FAIL}. {said}{why}</p>'
 
 
-def _article(run, way, from_, to, highest):
+def _article(run, way, from_, to, highest, suffix):
     found = run[way]
     lower, upper = found["largest"]
     place = ", ".join(f"{x:.6g}" for x in found["position"])
     face = f"triangle {found['triangle']:,}" if found["face"] is None else f"face {found['face']:,}"
     whole = run["tolerance"]["absolute"] if run["tolerance"] else None
     relative = f", {100 * upper / whole:.4g}&nbsp;% of the tolerance" if whole else ""
-    return f"""<article><h2>{from_} from {to}</h2>
+    return f"""<article><h3>{from_} from {to}</h3>
 <p class="muted">Largest distance, proved to be at most</p>
 <p class="largest">{_rounded(upper, True)}{_unit(run)}</p>
 <p>{100 * upper / run["size"]:.4g}&nbsp;% of size{relative}; at least {_rounded(lower, False)}{_unit(run)}
 at ({place}), {face}.</p>
-<h3>Share of the area by distance</h3>
-{_histogram(run, way, highest)}
-<h3>Statistics over the area</h3>
-{_statistics(run, found)}
+{_block("Share of the area by distance", histogram(run, way, highest, f"{way}{suffix}", f"distance{_in_unit(run)}"))}
+{_block("Statistics over the area", _statistics(run, found))}
 {_bands(run, found)}
 {_sides(run, found, to)}
 </article>"""
 
 
+def _block(heading, content):
+    """Returns a part of an article that is not divided between two sheets of paper."""
+    return f'<div class="block"><h4>{heading}</h4>{content}</div>'
+
+
 def _table(head, rows):
     cells = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
-    return f"<table><tr>{''.join(f'<th>{cell}</th>' for cell in head)}</tr>{cells}</table>"
+    heads = "".join(f"<th>{cell}</th>" for cell in head)
+    return f'<div class="table"><table><thead><tr>{heads}</tr></thead><tbody>{cells}</tbody></table></div>'
 
 
 def _statistics(run, found):
@@ -211,7 +295,8 @@ def _bands(run, found):
         rows.append((band, *_share(before["share"] - entry["share"], [max(0.0, range_[0]), min(1.0, range_[1])])))
         before = entry
     rows.append((f"beyond {before['bound']:.4g}", *_share(before["share"], before["range"])))
-    return "<h3>Share of the area in each band</h3>" + _table((f"distance{_in_unit(run)}", "share", "certainly"), rows)
+    table = _table((f"distance{_in_unit(run)}", "share", "certainly"), rows)
+    return _block("Share of the area in each band", table)
 
 
 def _sides(run, found, to):
@@ -223,66 +308,12 @@ def _sides(run, found, to):
         ("inside", *_share(inside, ends), _rounded(sides["inside"][1], True)),
         ("outside", *_share(1 - inside, [1 - ends[1], 1 - ends[0]]), _rounded(sides["outside"][1], True)),
     ]
-    return (
-        f"<h3>Sides of {to}</h3>"
-        + _table(("", "area", "certainly", f"farthest at most{_in_unit(run)}"), rows)
+    return _block(
+        f"Sides of {to}",
+        _table(("", "area", "certainly", f"farthest at most{_in_unit(run)}"), rows)
         + f"<p>The signed mean, with distances outside above 0, is {sides['mean']:+.3g}{_unit(run)}, certainly "
-        f"{_between(sides['mean_range'])}.</p>"
+        f"{_between(sides['mean_range'])}.</p>",
     )
-
-
-def _ticks(lower, upper, count=6):
-    """Round numbers from lower to upper, about `count` of them."""
-    rough = (upper - lower) / count
-    power = 10.0 ** math.floor(math.log10(rough))
-    step = next(factor * power for factor in (1, 2, 2.5, 5, 10) if factor * power >= rough * (1 - 1e-9))
-    return [i * step for i in range(math.ceil(lower / step - 1e-9), math.floor(upper / step + 1e-9) + 1)]
-
-
-def _histogram(run, way, highest):
-    edges, shares = run[way]["histogram"]["edges"], run[way]["histogram"]["shares"]
-    tolerance = run["tolerance"]["absolute"] if run["tolerance"] else math.inf
-    signed = bool(run[way]["sides"])
-    floor = _HEIGHT - _BOTTOM
-
-    def across(value):
-        return _LEFT + (value - edges[0]) / (edges[-1] - edges[0]) * (_WIDTH - _LEFT - _RIGHT)
-
-    def up(share):
-        return (floor - _TOP) * share / highest
-
-    parts = []
-    for share in _ticks(0, 100 * highest, 4):
-        y = floor - up(share / 100)
-        parts.append(f'<path d="M{_LEFT} {y:.1f}H{_WIDTH - _RIGHT}" stroke="#e4e4e4"/>')
-        parts.append(f'<text x="{_LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{share:g}&#160;%</text>')
-    for lower, upper, share in zip(edges, edges[1:], shares):
-        if share > 0:
-            height = max(up(share), _LEAST_BAR)
-            beyond = min(abs(lower), abs(upper)) >= tolerance * (1 - 1e-9)
-            fill = f"url(#stripes-{way})" if beyond else _WITHIN
-            parts.append(
-                f'<rect x="{across(lower) + 0.4:.2f}" y="{floor - height:.2f}" '
-                f'width="{across(upper) - across(lower) - 0.8:.2f}" height="{height:.2f}" fill="{fill}"/>'
-            )
-    parts.append(f'<path d="M{_LEFT} {floor}H{_WIDTH - _RIGHT}" stroke="{_LINE}"/>')
-    for value in _ticks(edges[0], edges[-1]):
-        parts.append(f'<path d="M{across(value):.1f} {floor}v5" stroke="{_LINE}"/>')
-        parts.append(f'<text x="{across(value):.1f}" y="{floor + 18}" text-anchor="middle">{value:.6g}</text>')
-    if math.isfinite(tolerance):
-        for line in (-tolerance, tolerance) if signed else (tolerance,):
-            x = across(line)
-            anchor = "end" if line > 0 else "start"
-            parts.append(
-                f'<path d="M{x:.1f} {_TOP - 4}V{floor}" stroke="{_BEYOND}" stroke-width="2" stroke-dasharray="6 4"/>'
-                f'<text x="{x:.1f}" y="{_TOP - 12}" text-anchor="{anchor}">{"−" if line < 0 else ""}tolerance</text>'
-            )
-    axis = f"inside ← distance{_in_unit(run)} → outside" if signed else f"distance{_in_unit(run)}"
-    parts.append(f'<text x="{(_LEFT + _WIDTH - _RIGHT) / 2}" y="{_HEIGHT - 6}" text-anchor="middle">{axis}</text>')
-    return f"""<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="Histogram of the distance"><defs>
-<pattern id="stripes-{way}" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)">
-<rect width="6" height="6" fill="{_BEYOND}"/><rect width="2" height="6" fill="#fff"/></pattern></defs>
-{"".join(parts)}</svg>"""
 
 
 def _labels(run):
@@ -300,20 +331,17 @@ def _labels(run):
         for i, label in enumerate(run.get("labels", ()))
     ]
     head = ("label", "on", f"point{_in_unit(run)}", f"distance{_in_unit(run)}", "side", "of tolerance", "")
-    return f"<h2>Labels</h2>{_table(head, rows)}" if rows else ""
+    return f'<div class="block"><h3>Labels</h3>{_table(head, rows)}</div>' if rows else ""
 
 
-def _notes(run):
-    samples = " and ".join(f"{run[way]['samples']:,}" for way in ("forward", "backward"))
-    spacing, errors = (
-        " and ".join(_length(run, run[way][key]) for way in ("forward", "backward"))
-        for key in ("spacing", "mean_error")
-    )
+def _notes(runs):
+    """Returns how to read the page."""
+    samples = sum(run[way]["samples"] for run in runs for way in ("forward", "backward"))
+    error = max(run[way]["mean_error"] / run["size"] for run in runs for way in ("forward", "backward"))
     return (
         f"<p>A distance is measured from a point of one surface to the nearest point of the other. The largest distance is a "
-        f"certified interval. The statistics are estimated from {samples} samples (mean spacing {spacing}); the standard "
-        f"error of the mean is at most {errors}. Beside each number is an interval that certainly contains the true number, "
+        f"certified interval. The statistics are estimated from {samples:,} samples; the standard error of a mean is at most "
+        f"{100 * error:.2g}&nbsp;% of the size. Beside each number is an interval that certainly contains the true number, "
         f"whatever lies between the samples. Bars beyond the tolerance are striped. Bars that would be too low to be seen "
-        f"are drawn {_LEAST_BAR} pixels high.</p>"
-        f"<p>Tolerance Volumes {escape(run['version'])}</p>"
+        f"are drawn {LEAST_BAR} pixels high. The pictures are drawn from an interpolated field and prove nothing.</p>"
     )

@@ -312,7 +312,7 @@ def test_labels_are_in_the_report(tmp_path):
     rows = {row[1]: row[3] for row in csv.reader(io.StringIO((tmp_path / "report.csv").read_text()))}
     assert float(rows["label 1 x"]) == pytest.approx(0.25) and rows["label 2 on"] == "reference"
     page = (tmp_path / "report.html").read_text()
-    assert "<h2>Labels</h2>" in page and "50&nbsp;%" in page and page.count("out of date") == 1
+    assert "<h3>Labels</h3>" in page and "50&nbsp;%" in page and page.count("out of date") == 1
     bpy.ops.tolvol.remove_label(everything=True)
     bpy.ops.tolvol.save_report(filepath=str(tmp_path / "report.html"))
     assert "Labels" not in (tmp_path / "report.html").read_text()

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from addon.mesh import mesh_io
-from addon.proof import deviation
+from addon.proof import deviation, deviation_table
+from addon.proof.deviation_pictures import Picture
 from addon.reference import snapshots
 from commands import command, save
 from scenes import activate, add_object, sheet, sheet_arrays, torus, torus_arrays
@@ -114,19 +115,23 @@ class Page(HTMLParser):
     """Checks that tags are closed in order and that the page loads no other file. Collects the text."""
 
     VOID = {"meta", "img", "br", "path", "rect"}
+    HIDDEN = {"style", "title"}
 
     def __init__(self, text):
         super().__init__()
-        self.open, self.tags, self.images, self.text = [], [], [], ""
+        self.open, self.tags, self.images, self.links, self.text = [], [], [], [], ""
         self.feed(text)
         assert not self.open
-        assert "http" not in text and "url(" not in text.replace("url(#stripes-", "") and "@import" not in text
+        assert "http" not in text and "url(" not in text.replace("url(#", "") and "@import" not in text
 
     def handle_starttag(self, tag, attributes):
         self.tags.append(tag)
         assert tag not in {"script", "link", "iframe", "object"}
         for name, value in attributes:
-            if name in {"src", "href"}:
+            if name == "href":
+                self.links.append(value)
+                assert value.startswith("#")
+            if name == "src":
                 assert value.startswith("data:image/png;base64,")
                 self.images.append(value)
         if tag not in self.VOID:
@@ -137,6 +142,8 @@ class Page(HTMLParser):
             assert self.open.pop() == tag
 
     def handle_data(self, data):
+        if self.open and self.open[-1] in self.HIDDEN:
+            return
         self.text += data.replace("\xa0", " ")
 
 
@@ -146,7 +153,10 @@ def test_page_stands_alone_and_says_what_was_measured():
     page = Page(deviation.deviation_page.page(run))
     assert page.tags.count("svg") == page.tags.count("article") == 2 and not page.images
     assert "A <1> from B & co" in page.text and "B & co from A <1>" in page.text
-    assert "Tolerance 0.05 mm" in page.text and "beyond the tolerance, proved: A <1> and B & co" in page.text
+    assert (
+        "Tolerance 1.768 % of size = 0.05 mm" in page.text
+        and "beyond the tolerance, proved: A <1> and B & co" in page.text
+    )
     largest = run["forward"]["largest"][1]
     assert 0.1 <= float(re.search(r"at most\s+([\d.]+) mm", page.text)[1]) <= largest * 1.001
     assert f"{largest / 0.05 * 100:.4g} % of the tolerance" in page.text
@@ -171,8 +181,12 @@ def test_page_bars_beyond_the_tolerance_are_striped():
 def test_page_holds_the_pictures():
     a, b = step()
     run = measured(a, b)
-    page = Page(deviation.deviation_page.page(run, [("of A <left>", PNG), ("of B", PNG)]))
+    page = Page(
+        deviation.deviation_page.page(run, [Picture("of A <left>", PNG, 0.05, True), Picture("of B", PNG, 0.05)])
+    )
     assert len(page.images) == 2 and "of A <left>" in page.text
+    # Each has a legend: with both signs, and without.
+    assert page.text.count("−0.05") == 1 and page.text.count("0.025") == 1 and page.text.count("farther away") == 2
 
 
 def test_proved_bounds_are_rounded_outwards():
@@ -189,7 +203,7 @@ def test_table_holds_the_same_numbers(tmp_path):
     run = measured(a, b, tolerance=0.05, bounds=(0.02,))
     for extension in deviation.EXTENSIONS:
         path = tmp_path / f"r{extension}"
-        path.write_bytes(deviation.content(run, path, [("picture", PNG)]))
+        path.write_bytes(deviation.content(run, path, [Picture("picture", PNG)]))
     assert json.loads((tmp_path / "r.json").read_text()) == run
     assert "data:image/png" in (tmp_path / "r.html").read_text()
     rows = list(csv.DictReader(io.StringIO((tmp_path / "r.csv").read_text())))
@@ -213,7 +227,7 @@ def test_no_name_is_a_formula_in_the_table(name):
     run["a"] |= {"name": name}
     run["b"] |= {"name": "plain-name\r= x"}
     run["forward"]["position"] = [-0.5, 0.0, 0.0]
-    rows = {tuple(row[:3]): row[3] for row in csv.reader(io.StringIO(deviation.table(run), newline=""))}
+    rows = {tuple(row[:3]): row[3] for row in csv.reader(io.StringIO(deviation_table.table(run), newline=""))}
     assert rows["", "a name", ""] == rows["", "unit", ""] == "'" + name.replace("\t", " ").replace("\r", " ")
     assert rows["", "b name", ""] == "plain-name = x" and rows["forward", "position", "x"] == "-0.5"
 
@@ -282,9 +296,6 @@ def test_save_report_measures_and_writes(tmp_path):
     assert ob.data.polygons[run["forward"]["face"]].center.x > 0.4
     assert [entry["bound"] for entry in run["forward"]["beyond"]] == pytest.approx([0.0125, 0.025, 0.0375, 0.05])
     assert f"{ob.name} from its reference" in Page((tmp_path / "r.html").read_text()).text
-    bpy.context.scene.unit_settings.scale_length = 0.001
-    bpy.ops.tolvol.save_report(filepath=str(tmp_path / "r.json"))
-    assert json.loads((tmp_path / "r.json").read_text())["unit"] == "units"
 
 
 def test_save_report_refuses(tmp_path):

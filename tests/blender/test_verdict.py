@@ -151,7 +151,7 @@ _OTHERS = {
     ("addon/proof/certify.py", "Verdict.INSIDE"),  # the native check of single triangles
     ("addon/overlay/field.py", "finest"),  # whether colours can show the tolerance
     ("addon/overlay/scale.py", "self.tolerance"),  # the shares in the legend of the colours, which prove nothing
-    ("addon/proof/deviation_page.py", "abs(lower)"),  # the bars of the histogram that are striped
+    ("addon/proof/deviation_drawings.py", "abs(lower)"),  # the bars of the histogram that are striped
     ("addon/operators/modifiers.py", "largest > self.tolerance"),  # where sampling ends; the proof decides afterwards
     ("blender_scripts/decimate.py", "tolerance > size"),  # an argument that makes no sense
     ("blender_scripts/decimate.py", "left <= target"),  # numbers of triangles

@@ -55,3 +55,52 @@ def test_escape_in_the_file_browser_of_save_report():
         yield from finished(lambda: ended)
     finally:
         TOLVOL_OT_save_report.cancel = cancel
+
+
+def browser():
+    """Returns the area of the file browser and its operator."""
+    area = next(area for area in bpy.context.window_manager.windows[0].screen.areas if area.type == "FILE_BROWSER")
+    return area, area.spaces[0].active_operator
+
+
+def choose_next_format():
+    """Goes to the next entry of the menu by Ctrl and the wheel, which do so without opening it."""
+    area, operator = browser()
+    side = next(region for region in area.regions if region.type == "TOOL_PROPS")
+    before, height = operator.format, bpy.context.window_manager.windows[0].height
+    for y in range(4, side.height, 12):
+        xdotool("mousemove", side.x + side.width * 3 // 4, height - side.y - side.height + y)
+        yield 0.5
+        xdotool("keydown", "ctrl", "click", 5, "keyup", "ctrl")
+        yield 0.5
+        if operator.format != before:
+            return
+    raise AssertionError("no choice of format")
+
+
+def test_format_is_chosen_in_the_file_browser():
+    bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
+    yield from reset(monkey)
+    yield from open_tab()
+    yield from press("tolvol.set_reference")
+    yield from finished(lambda: suzanne().tolvol.snapshot is not None)
+    home = os.environ["HOME"]
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["HOME"] = folder
+        try:
+            yield from press("tolvol.save_report", across=0.7)
+            yield 1.0
+            area, _ = browser()
+            assert area.spaces[0].params.filename == "Suzanne deviation.html"
+            yield from choose_next_format()
+            yield 1.0
+            screenshot("16 format chosen")
+            assert area.spaces[0].params.filename == "Suzanne deviation.csv"
+            xdotool("mousemove", 640, 400)
+            yield
+            key("Return")
+            saved = Path(folder) / "Suzanne deviation.csv"
+            yield from finished(saved.is_file)
+            assert saved.read_text().startswith("direction,quantity")
+        finally:
+            os.environ["HOME"] = home
