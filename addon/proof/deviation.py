@@ -62,11 +62,11 @@ def deviation(
             *pair[0], *pair[1], bounds=bounds, percentiles=PERCENTILES, threads=threads, progress=progress
         )
         ways[way] = (
-            measure.largest_distance(*pair, tolerance, threads, progress),
+            measure.largest_distance(*pair, tolerance, threads, progress, again=False),
             spread,
             surface.arrays.polygons,
         )
-    facts = {name: solidity.facts(surface, threads, progress) for name, surface in (("a", a), ("b", b))}
+    facts = {name: solidity.facts(surface, threads, progress, again=False) for name, surface in (("a", a), ("b", b))}
     largest = [measured for measured, _, _ in ways.values()]
     # Both histograms have the same scale, so that they can be compared.
     edges = _edges(max(found.upper for found in largest), tolerance)

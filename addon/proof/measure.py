@@ -6,16 +6,20 @@ from dataclasses import replace
 import numpy as np
 
 from .. import native
+from . import known
 from .verdict import Interval
 
 
-def largest_distance(from_surface, to_surface, tolerance=None, threads=None, progress=None):
+def largest_distance(from_surface, to_surface, tolerance=None, threads=None, progress=None, again=True):
     """Returns the Interval of the largest distance of a point of `from_surface` from `to_surface`.
 
     Each surface is a pair (vertices, triangles). The width of the interval is at most 0.1 % of `upper`, with the
     exceptions that native/measure/hausdorff.h names. If `tolerance` lies inside the interval, the interval is narrowed
-    until `tolerance` no longer does, as far as rounding permits.
+    until `tolerance` no longer does, as far as rounding permits. again: whether to measure what was measured before.
     """
+    key = known.key_of("largest", *from_surface, *to_surface, None if tolerance is None else float(tolerance))
+    if not again and (found := known.get(key)) is not None:
+        return found
 
     def measured(**options):
         found = native.module.directed_hausdorff(
@@ -28,6 +32,7 @@ def largest_distance(from_surface, to_surface, tolerance=None, threads=None, pro
         decided = measured(bound=tolerance)
         best = max(interval, decided, key=lambda found: found.lower)
         interval = replace(best, upper=min(interval.upper, decided.upper))
+    known.keep(key, interval)
     return interval
 
 

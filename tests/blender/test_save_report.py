@@ -235,6 +235,27 @@ def test_report_of_one_object_keeps_its_keys(tmp_path):
     assert {"version", "method", "unit", "size", "tolerance", "two_sided", "verdict", "solidity", "forward"} <= set(run)
 
 
+# What was measured before -------------------------------------------------------------------------------------------
+
+
+def test_report_takes_over_what_check_has_proved(tmp_path, monkeypatch):
+    ob = lifted_sheet()
+    bpy.ops.tolvol.check()
+    calls, measure = [], addon.native.module.directed_hausdorff
+    monkeypatch.setattr(
+        addon.native.module, "directed_hausdorff", lambda *given, **named: calls.append(1) or measure(*given, **named)
+    )
+    run = saved(tmp_path)
+    assert not calls
+    assert run["forward"]["largest"][1] == ob.tolvol.measurement.forward
+    # A change of one vertex, or of the tolerance to one that the interval has not decided, is measured.
+    ob.data.vertices[0].co.z += 1.0
+    ob.data.update()
+    moved = saved(tmp_path)
+    assert calls and moved["forward"]["largest"][0] > 0.9
+    assert moved["solidity"]["a"]["area"] > run["solidity"]["a"]["area"]
+
+
 # The format in the dialog -------------------------------------------------------------------------------------------
 
 
