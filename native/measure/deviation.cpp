@@ -5,7 +5,8 @@
 // distance too low between a scan and its decimation within 0.1 %. The choice of the pieces to refine must not depend
 // on their points, which would no longer be random; so the bounds are from the middle. Every statistic is one of a
 // distribution by area. The distances at the points give the estimate, and the lower and the upper bounds of the pieces
-// give the ends of its range.
+// give the ends of its range. In the mean the distance at a point is corrected by what is known about its piece: by the
+// mean of a linear function between the bounds, less the value of the function at the point.
 //
 // The bounds of a piece include their own rounding, and leave more room between them than the error of the sums of
 // weighted bounds. Weights are added in another order for each distribution, so that equal shares may differ in the
@@ -32,16 +33,21 @@ namespace {
 
 using glm::dvec3;
 
-// A surface is first cut into about so many pieces. Those of a scan are then about 0.4 % of its size apart.
-constexpr double kPieces = 65536;
+// A surface is first cut into about so many pieces. Those of a scan are then about 0.25 % of its size apart. Cutting
+// fewer pieces further would bound each part and each whole.
+constexpr double kPieces = 196608;
 // There are at most so many pieces, or so many for each triangle if that is more.
-constexpr std::size_t kBudget = 524288, kBudgetPerTriangle = 4;
+constexpr std::size_t kBudget = 229376, kBudgetPerTriangle = 2;
 // Pieces are cut until the range of the mean is no wider than this share of the largest distance.
 constexpr double kEnough = 0.001;
 // A range of the mean that is no wider than this, in the frame, is rounding.
 constexpr double kNoise = 256 * kUnitRoundoff;
+// A bound over a piece is a linear function. It enters the distributions by its values on so many equal shares.
+constexpr int kSlices = 4;
 // Rounding changes a share by at most so much.
 constexpr double kShareRounding = 32 * kUnitRoundoff;
+// Cutting ends when there is room for so small a part of the budget: each round looks at all pieces.
+constexpr std::size_t kLeastRoom = 64;
 // The progress is looked at after so many pieces.
 constexpr std::size_t kChunk = 4096;
 // A thread takes so many pieces at once.
@@ -100,13 +106,13 @@ double uniform(std::uint64_t n) {
   return double((n ^ (n >> 31)) >> 11) * 0x1p-53;
 }
 
-/// Returns the n-th point, evenly spread over the piece.
-dvec3 point_in(const Simplex& s, std::uint64_t n) {
-  if (s.corners == number) return s.corner[0];
+/// Returns the weights of the corners at the n-th point, which are evenly spread over the piece.
+dvec3 weights_in(const Simplex& s, std::uint64_t n) {
+  if (s.corners == number) return {1, 0, 0};
   const double u = uniform(2 * n), v = uniform(2 * n + 1);
-  if (s.corners == length) return glm::mix(s.corner[0], s.corner[1], u);
+  if (s.corners == length) return {1 - u, u, 0};
   const double root = std::sqrt(u);
-  return (1 - root) * s.corner[0] + root * (1 - v) * s.corner[1] + root * v * s.corner[2];
+  return {1 - root, root * (1 - v), root * v};
 }
 
 struct Piece {
@@ -114,11 +120,42 @@ struct Piece {
   double weight = 0;
   DistanceBounds bounds;
   double distance = 0;  // is that of its point
+  double average = 0;   // estimates the mean over the piece: the distance of its point, corrected where that is sharper
   bool inside = false;  // tells whether its point is inside, if b is closed
 
   double signed_distance() const { return inside ? -distance : distance; }
+  /// Returns the distance of the point with these weights less the value of a linear function there, plus its mean. The
+  /// function is the middle between the bounds, so that the difference is small, and as good as random.
+  double corrected(const dvec3& weights) const {
+    if (!(bounds.room(simplex.corners) < bounds.value.upper - bounds.value.lower)) return distance;
+    double middle = 0, mean = 0;
+    for (int i = 0; i < simplex.corners; ++i) {
+      const double at = 0.5 * (bounds.lower[i] + bounds.upper[i]);
+      middle += weights[i] * at;
+      mean += at / simplex.corners;
+    }
+    return distance - middle + mean;
+  }
+  double signed_average() const { return inside ? -average : average; }
+  /// Returns the width of an interval that holds `average` whatever the point is.
+  double width() const { return std::min(bounds.room(simplex.corners), bounds.value.upper - bounds.value.lower); }
   double gap() const { return weight * (bounds.mean.upper - bounds.mean.lower); }
 };
+
+/// Returns the number that the linear function with these values at the corners does not exceed on `share` of a piece.
+double quantile(std::array<double, 3> value, int corners, double share) {
+  std::sort(value.begin(), value.begin() + corners);
+  const auto [a, b, c] = value;
+  if (corners == number) return a;
+  if (corners == length) return a + share * (b - a);
+  if (share * (c - a) <= b - a) return a + std::sqrt(share * (b - a) * (c - a));
+  return c - std::sqrt((1 - share) * (c - a) * (c - b));
+}
+
+/// Values of a bound over equal shares of a piece.
+using Slices = std::array<double, kSlices>;
+
+double sum_of(const Slices& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
 /// A sum without the error that grows with the number of terms (Neumaier).
 class Sum {
@@ -134,45 +171,79 @@ class Sum {
   double sum_ = 0, lost_ = 0;
 };
 
-/// The distribution of one number over the weight of all pieces.
+/// The distribution of one number, 0 or more, over the weight of all pieces.
 class Distribution {
  public:
-  template <class Number>
-  Distribution(const std::vector<Piece>& pieces, Number&& number) {
+  /// visit(piece, add) calls add(number, share of the piece) for the parts of a piece.
+  template <class Visit>
+  Distribution(const std::vector<Piece>& pieces, Visit&& visit) {
     for (const Piece& piece : pieces) {
-      poll_at(steps_.size());
-      if (piece.weight > 0) steps_.push_back({number(piece), piece.weight});
+      poll_at(parts_.size());
+      if (!(piece.weight > 0)) continue;
+      visit(piece, [&](double number, double share) { parts_.push_back({number, share * piece.weight}); });
+    }
+    for (const Part& part : parts_) largest_ = std::max(largest_, part.value);
+    std::vector<Sum> bins(kBins);
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      poll_at(i);
+      bins[bin_of(parts_[i].value)].add(parts_[i].weight);
+    }
+    Sum sum;
+    for (const Sum& bin : bins) {
+      before_.push_back(sum.value());
+      sum.add(bin.value());
+    }
+    before_.push_back(sum.value());
+  }
+
+  double share_beyond(double bound) const {
+    Sum sum;
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      poll_at(i);
+      if (parts_[i].value > bound) sum.add(parts_[i].weight);
+    }
+    return std::min(1.0, sum.value() / before_.back());
+  }
+
+  double percentile(double percent, double share_error = 0) const {
+    const double wanted = (percent / 100 + share_error) * before_.back();
+    const auto after = std::lower_bound(before_.begin() + 1, before_.end() - 1, wanted);
+    std::size_t bin = std::size_t(after - before_.begin()) - 1;
+    while (bin + 1 < kBins && before_[bin + 1] == before_[bin]) ++bin;  // an empty bin
+    std::vector<Part> inside;
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      poll_at(i);
+      if (bin_of(parts_[i].value) == bin) inside.push_back(parts_[i]);
     }
     std::size_t compared = 0;
-    std::sort(steps_.begin(), steps_.end(), [&](const Step& x, const Step& y) {
+    std::sort(inside.begin(), inside.end(), [&](const Part& x, const Part& y) {
       poll_at(++compared);
       return x.value < y.value;
     });
     Sum sum;
-    for (Step& step : steps_) {
-      sum.add(step.weight);
-      step.weight = sum.value();
+    sum.add(before_[bin]);
+    for (const Part& part : inside) {
+      sum.add(part.weight);
+      if (sum.value() >= wanted) return part.value;
     }
-  }
-
-  double share_beyond(double bound) const {
-    const auto after = std::upper_bound(steps_.begin(), steps_.end(), bound,
-                                        [](double value, const Step& step) { return value < step.value; });
-    return after == steps_.begin() ? 1 : 1 - (after - 1)->weight / steps_.back().weight;
-  }
-
-  double percentile(double percent, double share_error = 0) const {
-    const double share = percent / 100 + share_error;
-    const auto at = std::lower_bound(steps_.begin(), steps_.end(), share * steps_.back().weight,
-                                     [](const Step& step, double weight) { return step.weight < weight; });
-    return std::min(at, steps_.end() - 1)->value;
+    return inside.empty() ? largest_ : inside.back().value;
   }
 
  private:
-  struct Step {
-    double value, weight;  ///< weight is that of this value and all before it
+  // The parts are sorted only within the one of so many bins where a percentile is.
+  static constexpr std::size_t kBins = 4096;
+
+  struct Part {
+    double value, weight;
   };
-  std::vector<Step> steps_;
+
+  std::size_t bin_of(double value) const {
+    return largest_ > 0 ? std::min(kBins - 1, std::size_t(std::max(0.0, value) / largest_ * double(kBins))) : 0;
+  }
+
+  std::vector<Part> parts_;
+  double largest_ = 0;
+  std::vector<double> before_;  // the weight before each bin, and at last that of all
 };
 
 /// Returns the world mesh about the centre of the frame, as small as it takes for its volume, a sum of products of
@@ -243,7 +314,8 @@ class Cover {
       pieces_.clear();
       for (const glm::uvec3& t : a.triangles) {
         poll_at(pieces_.size());
-        pieces_.push_back({simplex_of({a.vertices[t.x], a.vertices[t.y], a.vertices[t.z]}, measure), 0, {}, 0, false});
+        pieces_.push_back(
+            {simplex_of({a.vertices[t.x], a.vertices[t.y], a.vertices[t.z]}, measure), 0, {}, 0, 0, false});
         total_.add(measure_of(pieces_.back().simplex));
       }
       if (total_.value() > 0) break;
@@ -256,7 +328,7 @@ class Cover {
       const double share = measure_ == number ? 1 : 1.0 / (measure_ == area ? double(k) * k : k);
       cut(triangle.simplex, k, [&](const Simplex& part) {
         poll_at(pieces_.size());
-        pieces_.push_back({part, whole * share, {}, 0, false});
+        pieces_.push_back({part, whole * share, {}, 0, 0, false});
       });
     }
     budget_ = std::max({kBudget, kBudgetPerTriangle * a.triangles.size(), pieces_.size()});
@@ -296,13 +368,16 @@ class Cover {
             hint = piece.bounds.nearest;
             made += piece.bounds.steps;
           }
-          const dvec3 point = point_in(piece.simplex, first + i);
+          const dvec3 weights = weights_in(piece.simplex, first + i);
+          const auto& p = piece.simplex.corner;
+          const dvec3 point = weights.x * p[0] + weights.y * p[1] + weights.z * p[2];
           const Hierarchy::Nearest nearest = hierarchy_.nearest(point, std::numeric_limits<double>::infinity(), hint);
           if (loosely) {
             piece.bounds = bounds_around(point, nearest, piece.simplex, b_);
             hint = nearest.triangle;
           }
           piece.distance = nearest.distance;
+          piece.average = piece.corrected(weights);
           piece.inside = sides_.inside(point, nearest);
           made += nearest.nodes;
         }
@@ -328,7 +403,7 @@ class Cover {
     }
     const double enough = std::max(kEnough * largest, kNoise) * total_.value();
     const std::size_t room = (budget_ - pieces_.size()) / 2;  // a piece leaves two or three
-    if (gap.value() <= enough || room == 0 || steps_ >= most_steps_) return false;
+    if (gap.value() <= enough || room < budget_ / kLeastRoom || steps_ >= most_steps_) return false;
     // The pieces above the wanted average are cut, the worst of them first if there is no room for all.
     std::vector<std::size_t> worst;
     for (std::size_t i = 0; i < pieces_.size(); ++i) {
@@ -349,7 +424,7 @@ class Cover {
     std::vector<std::size_t> cut, end;  // holds the pieces that have parts, and the ends of their parts
     for (const std::size_t i : worst) {
       poll_at(parts.size());
-      halve(pieces_[i], [&](const Simplex& part) { parts.push_back({part, measure_of(part), {}, 0, false}); });
+      halve(pieces_[i], [&](const Simplex& part) { parts.push_back({part, measure_of(part), {}, 0, 0, false}); });
       if (parts.size() == (end.empty() ? 0 : end.back())) continue;
       cut.push_back(i);
       end.push_back(parts.size());
@@ -410,7 +485,8 @@ Sides sides_of(const std::vector<Piece>& pieces) {
     // A piece whose distance is nowhere 0 is on one side.
     const bool crosses = !(value.lower > 0);
     weight.add(piece.weight);
-    mean.add(piece.weight * piece.signed_distance());
+    // Where the distance is nowhere 0 it has one sign.
+    mean.add(piece.weight * (crosses ? piece.signed_distance() : piece.signed_average()));
     mean_lower.add(piece.weight * (crosses || piece.inside ? -average.upper : average.lower));
     mean_upper.add(piece.weight * (crosses || !piece.inside ? average.upper : -average.lower));
     inside.add(piece.inside ? piece.weight : 0);
@@ -456,10 +532,10 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
   Sum weight, mean, mean_lower, mean_upper, square, square_lower, square_upper, variance;
   for (const Piece& piece : pieces) {
     const DistanceBounds& of = piece.bounds;
-    const double d = piece.distance, width = of.value.upper - of.value.lower;
+    const double d = piece.distance, width = piece.width();
     weight.add(piece.weight);
     variance.add(piece.weight * piece.weight * width * width / 4);  // is the largest variance of numbers in an interval
-    mean.add(piece.weight * d);
+    mean.add(piece.weight * piece.average);
     mean_lower.add(piece.weight * of.mean.lower);
     mean_upper.add(piece.weight * of.mean.upper);
     square.add(piece.weight * d * d);
@@ -474,9 +550,25 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
 
   result.mean_error = std::sqrt(variance.value()) / whole / scale;
 
-  const Distribution seen(pieces, [](const Piece& piece) { return piece.distance; });
-  const Distribution least(pieces, [](const Piece& piece) { return piece.bounds.value.lower; });
-  const Distribution most(pieces, [](const Piece& piece) { return piece.bounds.value.upper; });
+  const Distribution seen(pieces, [](const Piece& piece, auto&& add) { add(piece.distance, 1); });
+  const Distribution least(pieces, [](const Piece& piece, auto&& add) {
+    Slices linear, quarters;
+    for (int i = 0; i < kSlices; ++i) {
+      linear[i] = quantile(piece.bounds.lower, piece.simplex.corners, double(i) / kSlices) - kNoise;
+      quarters[i] = piece.bounds.quarters[i].lower;
+    }
+    const Slices& better = sum_of(linear) > sum_of(quarters) ? linear : quarters;
+    for (const double at : better) add(std::max(piece.bounds.value.lower, at), 1.0 / kSlices);
+  });
+  const Distribution most(pieces, [](const Piece& piece, auto&& add) {
+    Slices linear, quarters;
+    for (int i = 0; i < kSlices; ++i) {
+      linear[i] = quantile(piece.bounds.upper, piece.simplex.corners, double(i + 1) / kSlices) + kNoise;
+      quarters[i] = piece.bounds.quarters[i].upper;
+    }
+    const Slices& better = sum_of(linear) < sum_of(quarters) ? linear : quarters;
+    for (const double at : better) add(std::min(piece.bounds.value.upper, at), 1.0 / kSlices);
+  });
   for (const double bound : options.bounds) {
     const double t = bound * scale;
     result.share_beyond.push_back(estimated_share(seen.share_beyond(t), least.share_beyond(t), most.share_beyond(t)));

@@ -46,10 +46,10 @@ struct Deviation {
   std::size_t steps;                   ///< counts the nodes of the hierarchy and triangles that were looked at
 };
 
-/// Covers a with pieces of about 1/65,536 of its area, at least one for each triangle, and cuts the worst pieces. It
+/// Covers a with pieces of about 1/196,608 of its area, at least one for each triangle, and cuts the worst pieces. It
 /// stops when the range of the mean is no wider than 0.1 % of the largest distance that was seen or than rounding,
-/// 3e-14 of the size of both meshes together; when there are half a million pieces, or four for each triangle if that
-/// is more; or when the searches for near triangles have taken `steps` for each of so many pieces, as they do among
+/// 3e-14 of the size of both meshes together; when there are about 229,000 pieces, or two for each triangle if that is
+/// more; or when the searches for near triangles have taken `steps` for each of so many pieces, as they do among
 /// needles or if the surfaces cross everywhere. The exact distance of one point of each piece enters the estimates, and
 /// bounds over the whole piece (measure/distance_bounds.h) enter the ranges. The points are fixed, so that equal input
 /// gives equal output, but as good as random: no estimate is biased, and the error of the mean is usually below twice
@@ -65,7 +65,7 @@ struct Deviation {
 /// unless b intersects itself.
 ///
 /// Throws InvalidInput if a mesh is not valid (geometry/triangle_mesh.h), a bound is not a length of 0 or more or a
-/// percentile is not between 0 and 100, and Cancelled. A piece costs 2 to 10 us and 200 bytes. Each of the first pieces
+/// percentile is not between 0 and 100, and Cancelled. A piece costs 2 to 15 us and 300 bytes. Each of the first pieces
 /// takes one search of the hierarchy of b even if all steps are used up; their ranges are then as wide as they are
 /// long.
 Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const DeviationOptions& options = {});

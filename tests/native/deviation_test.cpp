@@ -35,7 +35,7 @@ TEST(Deviation, ParallelPlates) {
     }
     EXPECT_NEAR(d.share_beyond[0].range.lower, 1, 1e-12);
     EXPECT_EQ(d.share_beyond[1].range.upper, 0);
-    EXPECT_NEAR(d.distances.size(), 65536, 10000);
+    EXPECT_NEAR(d.distances.size(), 196608, 30000);
     EXPECT_NEAR(d.spacing, std::sqrt(1.0 / double(d.distances.size())), 1e-12);
   }
 }
@@ -139,8 +139,8 @@ TEST(Deviation, RefinedUntilTheMeanIsKnown) {
     const Deviation d = deviation(a, b);
     const double largest = *std::max_element(d.distances.begin(), d.distances.end());
     const double width = d.mean.range.upper - d.mean.range.lower;
-    EXPECT_TRUE(width <= 0.001 * largest || d.distances.size() > 520000) << width / largest;
-    EXPECT_LE(d.distances.size(), 524288u);
+    EXPECT_TRUE(width <= 0.001 * largest || d.distances.size() > 225000) << width / largest;
+    EXPECT_LE(d.distances.size(), 229376u);
     EXPECT_LT(width, 0.02 * largest);
   }
 }
@@ -235,7 +235,7 @@ TEST(Deviation, WeightsAddUpToOne) {
     mean += d.weights[i] * std::abs(d.distances[i]);
   }
   EXPECT_NEAR(sum, 1, 1e-9);
-  EXPECT_NEAR(mean, d.mean.value, 1e-9);
+  EXPECT_NEAR(mean, d.mean.value, 1e-3 * mean);
 }
 
 // By area, not by triangles: half of the area in two triangles, the other half in two thousand.
@@ -298,7 +298,7 @@ TEST(Deviation, AnyScaleAndAnyPlace) {
     EXPECT_NEAR(d.rms.value / scale, 0.25, 1e-9);
     EXPECT_NEAR(d.share_beyond[0].value, 1, 1e-12);
     EXPECT_EQ(d.share_beyond[1].value, 0);
-    EXPECT_NEAR(d.spacing / scale, 1 / 256.0, 2e-4);
+    EXPECT_NEAR(d.spacing / scale, std::sqrt(1 / 196608.0), 1e-4);
   }
 }
 
@@ -317,7 +317,7 @@ TEST(Deviation, EndsByItsStepsWhereNeedlesCrowd) {
   moved = fan;
   for (dvec3& p : moved.vertices) p += dvec3(normal(random), normal(random), normal(random));
   const double percentiles[] = {50, 100};
-  const std::size_t pieces = 524288, first = 65536 + 2 * n;  // at most; about how many there are at first
+  const std::size_t pieces = 229376, first = 196608 + 2 * n;  // at most; about how many there are at first
   for (const auto& [a, b] : {std::pair{fan, moved}, {moved, fan}}) {
     Deviation before{};
     for (const double steps : {0.0, 2.0, 8.0}) {
@@ -336,7 +336,7 @@ TEST(Deviation, EndsByItsStepsWhereNeedlesCrowd) {
         const double distance = std::abs(d.distances[i]);
         mean += d.weights[i] * distance, square += d.weights[i] * distance * distance;
       }
-      EXPECT_NEAR(d.mean.value, mean, 1e-9);
+      EXPECT_NEAR(d.mean.value, mean, 1e-3 * mean);  // the samples alone are a less exact estimate
       EXPECT_NEAR(d.rms.value, std::sqrt(square), 1e-9);
       if (before.steps > 0) {
         EXPECT_GT(d.steps, before.steps);

@@ -160,7 +160,8 @@ def test_deviation_of_a_closed_reference_has_sides():
     assert result.sides.outside[0] <= farthest + 0.01 and result.sides.outside[1] >= farthest
     assert result.distances.min() == pytest.approx(-0.4, abs=0.01)
     assert result.sides.mean_range[0] <= result.sides.mean <= result.sides.mean_range[1]
-    assert result.sides.mean == pytest.approx((result.weights * result.distances).sum())
+    # The samples alone are a less exact estimate.
+    assert result.sides.mean == pytest.approx((result.weights * result.distances).sum(), rel=1e-3)
     turned = tolvol.deviation(vertices - [1.5, 1.5, 0], triangles, torus[0], torus[1][:, ::-1])
     assert turned.sides.share_inside == pytest.approx(result.sides.share_inside, abs=1e-3)
 
