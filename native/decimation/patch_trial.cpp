@@ -76,7 +76,7 @@ std::optional<PatchTrial::Price> PatchTrial::price(BoundedMesh::Edge edge) {
   return best;
 }
 
-bool PatchTrial::try_collapse(const Price& price, int rings) {
+bool PatchTrial::try_collapse(const Price& price, int rings, bool quick) {
   crossings_.crossings.begin();
   met_another_ = false;
   vanished_ = mesh_.from(price.halfedge);
@@ -86,7 +86,8 @@ bool PatchTrial::try_collapse(const Price& price, int rings) {
     if (certify()) return true;
     if (!learnt_) return false;
     relaxation_.renew();
-    relaxation_.lower_largest(kStepsAfterRefusal);
+    if (relaxation_.is_stuck()) return false;
+    quick ? relaxation_.try_lower_largest(kStepsAfterRefusal) : relaxation_.lower_largest(kStepsAfterRefusal);
     if (!relaxation_.enough()) return false;
   }
   return false;

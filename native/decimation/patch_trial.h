@@ -39,8 +39,9 @@ class PatchTrial {
   /// The least of the prices of an edge; none where it cannot collapse. About 0.1 ms.
   std::optional<Price> price(BoundedMesh::Edge edge);
 
-  /// Whether an edge can collapse if the vertices that are less than `rings` edges away from it move as well.
-  bool try_collapse(const Price& price, int rings);
+  /// Whether an edge can collapse if the vertices that are less than `rings` edges away from it move as well. A `quick`
+  /// try gives up earlier after a refusal, and misses about one success in thirty.
+  bool try_collapse(const Price& price, int rings, bool quick);
   /// Carries out what was found possible. Returns a box of stored positions around all that it changes, which is empty
   /// where crossings were not looked for.
   Box carry_out(BoundedMesh& mesh);

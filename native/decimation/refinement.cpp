@@ -15,9 +15,12 @@ namespace {
 
 /// Vertices less than so many edges away from a collapse move with it, in one round after another.
 constexpr int kRings[] = {2, 3, 4};
-/// A round ends after so many failures in a row, or this share of the edges if that is more.
-constexpr std::size_t kMostFailures = 40;
+/// A round ends after so many failures, or this share of the edges if that is more. A success makes up for some of
+/// them.
+constexpr std::size_t kMostFailures = 40, kMadeUpFor = 25;
 constexpr double kMostFailuresShare = 0.125;
+/// Of more edges than this in a round each is tried quickly only.
+constexpr std::size_t kMany = 320;
 /// An edge is not tried if the deviation with its vertex alone moved is beyond so many tolerances.
 constexpr double kMostLargest = 1.7;
 /// The number of steps that are tried at once, for each thread. More would often be in vain, because one before them
@@ -28,6 +31,18 @@ constexpr std::size_t kAhead = 2;
 constexpr double kMostReached = 1.2, kUntried = 1.1;
 
 }  // namespace
+
+Refinement::Patience::Patience(std::size_t steps)
+    : most_failures_(
+          std::max(kMostFailures, static_cast<std::size_t>(kMostFailuresShare * static_cast<double>(steps)))) {}
+
+void Refinement::Patience::note(bool success) {
+  if (success) {
+    failures_ -= std::min(failures_, kMadeUpFor);
+  } else {
+    ++failures_;
+  }
+}
 
 Refinement::Refinement(BoundedMesh& mesh, NewCrossings* crossings, Team& team)
     : mesh_(mesh),
@@ -106,20 +121,17 @@ std::vector<std::uint32_t> Refinement::order() const {
 bool Refinement::round(const std::function<bool()>& go_on) {
   find_prices();
   const std::vector<std::uint32_t> steps = order();
-  const auto most_failures =
-      std::max(kMostFailures, static_cast<std::size_t>(kMostFailuresShare * static_cast<double>(steps.size())));
   ahead_.drop_all();
-  std::size_t failures = 0;
-  for (std::size_t place = 0; place < steps.size() && failures < most_failures; ++place) {
+  Patience patience(steps.size());
+  quick_ = steps.size() > kMany;
+  for (std::size_t place = 0; place < steps.size() && !patience.is_over(); ++place) {
     if (!go_on()) return false;
     if (!wanted(steps[place])) continue;
     Attempt& a = tried(steps, place);
     tried_[steps[place]] = ahead_.now();
     reached_[steps[place]] = {ahead_.now(), a.reached};
-    ++failures;
-    if (!a.possible) continue;
-    carry_out(a);
-    failures = 0;
+    patience.note(a.possible);
+    if (a.possible) carry_out(a);
   }
   return true;
 }
@@ -151,7 +163,7 @@ void Refinement::attempt(std::uint32_t edge, Attempt& a) const {
   const std::optional<PatchTrial::Price> price =
       touched(edge) > priced_[edge] ? a.trial.price(BoundedMesh::edge(edge)) : prices_[edge];
   a.reached = std::numeric_limits<double>::infinity();
-  a.possible = price && price->largest <= kMostLargest && a.trial.try_collapse(*price, rings_);
+  a.possible = price && price->largest <= kMostLargest && a.trial.try_collapse(*price, rings_, quick_);
   if (price && price->largest <= kMostLargest) a.reached = a.trial.reached();
   for (const Patch::Vertex& v : a.trial.patch().vertices()) a.read.push_back(v.id);
 }

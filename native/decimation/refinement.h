@@ -24,6 +24,19 @@ namespace tolvol {
 
 class Refinement {
  public:
+  /// How many tries of a round may fail. A success makes up for some failures, so that a round ends where hardly one
+  /// try in fifty succeeds, too.
+  class Patience {
+   public:
+    /// `steps` is the number of edges that may be tried.
+    explicit Patience(std::size_t steps);
+    bool is_over() const { return failures_ >= most_failures_; }
+    void note(bool success);
+
+   private:
+    std::size_t most_failures_, failures_ = 0;
+  };
+
   /// Changes `mesh`, whose bounds are certified, and keeps references to all. `crossings` is null where crossings are
   /// allowed.
   Refinement(BoundedMesh& mesh, NewCrossings* crossings, Team& team);
@@ -65,6 +78,7 @@ class Refinement {
   TriesAhead ahead_;
   std::vector<Attempt> attempts_;  ///< For each slot of ahead_.
   int rings_ = 0;                  ///< How far from a collapse vertices move.
+  bool quick_ = false;             ///< Whether tries give up early, because there are many.
   // A step that failed is not tried again until a face around it has changed. The times are those of ahead_.
   std::vector<std::uint64_t> touched_;         ///< For each vertex: when a face around it changed last.
   std::vector<std::uint64_t> tried_, priced_;  ///< For each edge: when it was tried and when its price was found last.

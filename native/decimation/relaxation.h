@@ -64,9 +64,13 @@ class Relaxation {
   /// Minimises the sum of deviations to the power of 24 by at most so many steps, and then of a still higher power,
   /// which lowers the largest one.
   void lower_largest(int steps);
+  /// The same, but gives up like lower_sum(), for points that were added in a state that was enough without them.
+  void try_lower_largest(int steps);
   /// Whether the largest deviation that is seen is at most kEnough. A point of the reference that was beyond it before
   /// may stay where it was.
   bool enough() const { return now_.largest <= kEnough; }
+  /// Whether a point that was added deviates too far and lies between vertices that do not move.
+  bool is_stuck() const;
 
   /// The deviation of a point of the reference from the patch, over the tolerance, and the face that is nearest.
   /// `face` is where the search begins.
@@ -124,6 +128,7 @@ class Relaxation {
   }
 
   void minimise(int power, int steps, std::span<const double> give_up_above);
+  void lower_largest(int steps, std::span<const double> give_up_above, std::span<const double> give_up_at_last);
   bool step(int power, bool look_around);
   void assemble(int power);
   bool solve();

@@ -55,7 +55,7 @@ TEST(PatchTrial, WhatItFindsPossibleKeepsBothDirections) {
         if (!price) continue;
         ++tried;
         const std::size_t before = c.mesh->triangle_count();
-        if (!trial.try_collapse(*price, 2 + i % 3)) {
+        if (!trial.try_collapse(*price, 2 + i % 3, i % 2 == 0)) {
           EXPECT_EQ(c.mesh->triangle_count(), before);
           continue;
         }
@@ -87,7 +87,7 @@ TEST(PatchTrial, MovesNoVertexThatHasToStay) {
   for (std::uint32_t e = 0; e < c.mesh->connectivity().n_edges(); ++e) {
     if (c.mesh->connectivity().status(BoundedMesh::edge(e)).deleted()) continue;
     const std::optional<PatchTrial::Price> price = trial.price(BoundedMesh::edge(e));
-    if (!price || !trial.try_collapse(*price, 2)) continue;
+    if (!price || !trial.try_collapse(*price, 2, false)) continue;
     trial.carry_out(*c.mesh);
     ++possible;
   }

@@ -45,6 +45,21 @@ TEST(Refinement, KeepsBothDirectionsOnEveryMeshAndAddsNoTriangle) {
   EXPECT_LT(static_cast<double>(fewer), 0.95 * static_cast<double>(fast));
 }
 
+TEST(Refinement, ARoundEndsAfterFailuresInARowAndWhereHardlyATrySucceeds) {
+  /// The number of tries of a round if one in so many succeeds.
+  const auto tries = [](std::size_t steps, std::size_t one_in) {
+    Refinement::Patience patience(steps);
+    std::size_t count = 0;
+    while (count < steps && !patience.is_over()) patience.note(++count % one_in == 0);
+    return count;
+  };
+  const std::size_t never = 1000000;
+  EXPECT_EQ(tries(100, never), 40u);
+  EXPECT_EQ(tries(8000, never), 1000u);
+  EXPECT_EQ(tries(8000, 20), 8000u);
+  EXPECT_LT(tries(8000, 80), 1600u);
+}
+
 TEST(Refinement, KeepsTheOneDirectionThatIsAskedFor) {
   Options options = thorough();
   options.two_sided = false;

@@ -3,11 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "certified_mesh.h"
 #include "decimation/surface_samples.h"
+#include "polls.h"
 
 namespace {
 
@@ -84,6 +86,43 @@ TEST(Relaxation, HoldsPointsThatAreAdded) {
   EXPECT_TRUE(f.relaxation->enough());
   EXPECT_LE(f.relaxation->deviation(point, face), Relaxation::kEnough + 1e-9);
   EXPECT_GT(f.height(), 0.35) << "the surface has come towards the point";
+}
+
+TEST(Relaxation, GivesUpOnPointsThatContradictEachOther) {
+  Fixture f(0);
+  std::uint32_t face = 0;
+  const dvec3 middle = f.plate.mesh->position(kMiddle);
+  f.relaxation->deviation(middle, face);
+  for (const double side : {1.4, -1.4}) {
+    const SurfaceSample sample{middle + dvec3(0, 0, side * f.unit), 1, 0};
+    f.relaxation->add({&sample, 1}, face);
+  }
+  f.relaxation->renew();
+  EXPECT_EQ(polls_of([&] { f.relaxation->try_lower_largest(10); }), 1u) << "before the first step";
+  EXPECT_GT(polls_of([&] { f.relaxation->lower_largest(10); }), 5u);
+  EXPECT_FALSE(f.relaxation->enough());
+}
+
+TEST(Relaxation, IsStuckWhereAPointLiesBetweenVerticesThatDoNotMove) {
+  Fixture f(0);
+  const auto is_fixed = [&](std::uint32_t v) { return !f.patch.vertices()[v].free; };
+  const auto faces = f.patch.faces();
+  const auto rim = std::ranges::find_if(faces, [&](const Patch::Face& x) {
+    return is_fixed(x.corners[0]) && is_fixed(x.corners[1]) != is_fixed(x.corners[2]);
+  });
+  ASSERT_NE(rim, faces.end());
+  const auto face = static_cast<std::uint32_t>(rim - faces.begin());
+  const bool second = is_fixed(rim->corners[1]);
+  const dvec3 fixed = second ? dvec3(0.5, 0.5, 0) : dvec3(0.5, 0, 0.5);
+  const auto stuck = [&](const dvec3& weights, double offset) {
+    f.relaxation->drop_separations();
+    f.relaxation->add_separation(face, {weights, dvec3(0, 0, 1), offset * f.unit}, 0.05);
+    f.relaxation->renew();
+    return f.relaxation->is_stuck();
+  };
+  EXPECT_TRUE(stuck(fixed, 0.3));
+  EXPECT_FALSE(stuck(fixed, -0.3)) << "it need not move";
+  EXPECT_FALSE(stuck(dvec3(1.0 / 3), 0.3)) << "the third corner moves";
 }
 
 TEST(Relaxation, HoldsPointsInHalfSpaces) {
