@@ -64,10 +64,15 @@ class TJunctions {
     for (const auto& [vertex, triangle] : around_) {
       if (ends.empty() || ends.back() != vertex) ends.push_back(vertex);
     }
+    const std::vector<std::size_t> starts = sort_by_place(ends);
     const Hierarchy hierarchy(mesh_);
-    std::vector<std::vector<glm::dvec3>> found((ends.size() + kBlock - 1) / kBlock);
-    team.run(ends.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) add(ends[i], hierarchy, found[begin / kBlock]);
+    std::vector<std::vector<glm::dvec3>> found((starts.size() + kBlock - 1) / kBlock);
+    team.run(starts.size() - 1, kBlock, [&](std::size_t begin, std::size_t end) {
+      std::vector<std::uint32_t> near;
+      for (std::size_t i = begin; i < end; ++i) {
+        find_near(place(ends[starts[i]]), hierarchy, mesh_.triangles, near);
+        for (std::size_t k = starts[i]; k < starts[i + 1]; ++k) add(ends[k], near, found[begin / kBlock]);
+      }
     });
     std::vector<glm::dvec3> result;
     for (const std::vector<glm::dvec3>& f : found) result.insert(result.end(), f.begin(), f.end());
@@ -143,21 +148,46 @@ class TJunctions {
     return joined_[vertex] == joined_[edge.first] && joined_[vertex] == joined_[edge.second];
   }
 
-  /// Adds the places of the T-junctions of a vertex.
-  void add(std::uint32_t vertex, const Hierarchy& hierarchy, std::vector<glm::dvec3>& places) const {
+  /// Puts vertices at one place together. Returns where the vertices of each place begin, and the number of all.
+  std::vector<std::size_t> sort_by_place(std::vector<std::uint32_t>& vertices) const {
+    std::ranges::stable_sort(vertices, [&](std::uint32_t a, std::uint32_t b) { return before(place(a), place(b)); });
+    std::vector<std::size_t> starts;
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+      if (i == 0 || place(vertices[i]) != place(vertices[i - 1])) starts.push_back(i);
+    }
+    starts.push_back(vertices.size());
+    return starts;
+  }
+
+  /// Finds the triangles that a vertex at `p` may lie on. Those with a corner there are left out: where thousands of
+  /// vertices are at one place, each of them would look at the triangles of all others.
+  void find_near(const glm::dvec3& p, const Hierarchy& hierarchy, std::span<const glm::uvec3> triangles,
+                 std::vector<std::uint32_t>& near) const {
+    near.clear();
+    std::size_t turn = 0;
+    hierarchy.for_each_within(p, most_reach(p), [&](std::uint32_t index) {
+      poll_at(++turn);
+      const glm::uvec3& t = triangles[index];
+      if (place(t.x) != p && place(t.y) != p && place(t.z) != p) near.push_back(index);
+    });
+  }
+
+  /// Adds the places of the T-junctions of a vertex with the triangles near it.
+  void add(std::uint32_t vertex, std::span<const std::uint32_t> near, std::vector<glm::dvec3>& places) const {
     const glm::dvec3& p = place(vertex);
     std::vector<Contact> contacts;
-    hierarchy.for_each_within(p, most_reach(p), [&](std::uint32_t index) {
-      const glm::uvec3& t = mesh_.triangles[index];
-      for (int k = 0; k < 3; ++k) {
+    for (std::size_t i = 0; i < near.size(); ++i) {
+      poll_at(i);
+      const glm::uvec3& t = mesh_.triangles[near[i]];
+      bool touches = false;
+      for (int k = 0; k < 3 && !touches; ++k) {
         const std::uint32_t a = t[k], b = t[(k + 1) % 3];
-        if (!lies_on(p, a, b)) continue;
-        contacts.push_back({std::minmax(a, b), lies_in_plane(vertex, t, around_)});
-        return;
+        touches = lies_on(p, a, b);
+        if (touches) contacts.push_back({std::minmax(a, b), lies_in_plane(vertex, t, around_)});
       }
-      if (!lies_inside(p, t) || lies_in_plane(vertex, t, around_)) return;
+      if (touches || !lies_inside(p, t) || lies_in_plane(vertex, t, around_)) continue;
       places.insert(places.end(), {p, place(t.x), place(t.y), place(t.z)});
-    });
+    }
     // The sides on one edge stand together, and those in whose plane the faces lie are first.
     std::ranges::sort(contacts, std::greater<>(), [](const Contact& c) { return std::pair(c.edge, c.in_plane); });
     for (std::size_t i = 0; i < contacts.size(); ++i) {
@@ -186,18 +216,28 @@ class TJunctions {
     }
     if (rim.triangles.empty()) return;
     const Hierarchy hierarchy(rim);
-    std::vector<std::vector<OnOpenEdge>> found((mesh_.vertices.size() + kBlock - 1) / kBlock);
-    team.run(mesh_.vertices.size(), kBlock, [&](std::size_t begin, std::size_t end) {
-      for (auto v = static_cast<std::uint32_t>(begin); v < end; ++v) {
-        if (is_end_[v]) continue;
-        hierarchy.for_each_within(place(v), most_reach(place(v)), [&](std::uint32_t index) {
+    std::vector<std::uint32_t> inner;
+    const std::vector<bool> used = used_vertices(mesh_.vertices.size(), mesh_.triangles);
+    for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
+      if (used[v] && !is_end_[v]) inner.push_back(v);
+    }
+    const std::vector<std::size_t> starts = sort_by_place(inner);
+    std::vector<std::vector<OnOpenEdge>> found((starts.size() + kBlock - 1) / kBlock);
+    team.run(starts.size() - 1, kBlock, [&](std::size_t begin, std::size_t end) {
+      std::vector<std::uint32_t> near;
+      const auto add = [&](std::uint32_t v) {
+        for (const std::uint32_t index : near) {
           const glm::uvec3& t = rim.triangles[index];
           for (int k = 0; k < 3; ++k) {
             const std::uint32_t a = t[k], b = t[(k + 1) % 3];
             if (!is_open(a, b) || !lies_on(place(v), a, b) || is_joined(v, std::minmax(a, b))) continue;
             found[begin / kBlock].push_back({v, t, std::minmax(a, b)});
           }
-        });
+        }
+      };
+      for (std::size_t i = begin; i < end; ++i) {
+        find_near(place(inner[starts[i]]), hierarchy, rim.triangles, near);
+        for (std::size_t k = starts[i]; k < starts[i + 1]; ++k) add(inner[k]);
       }
     });
     std::vector<bool> is_found(mesh_.vertices.size());
@@ -213,7 +253,7 @@ class TJunctions {
     std::ranges::stable_sort(around, {}, &Around::first);
     for (const auto& block : found) {
       for (const OnOpenEdge& f : block) {
-        if (lies_in_plane(f.vertex, f.triangle, around)) continue;  // so does a vertex that no face uses
+        if (lies_in_plane(f.vertex, f.triangle, around)) continue;
         places.insert(places.end(), {place(f.vertex), place(f.edge.first), place(f.edge.second)});
       }
     }

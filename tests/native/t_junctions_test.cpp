@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "decimation_cases.h"
 #include "geometry/frame.h"
+#include "polls.h"
 #include "shapes.h"
 
 namespace {
@@ -180,6 +182,30 @@ TEST(TJunctions, DoNotOpenInADecimation) {
 TriangleMesh plate_with_wall(unsigned n) {
   const TriangleMesh wall = shapes::squares(n / 2, [](const dvec3& p) { return dvec3(0.21 + 0.57 * p.x, 0.43, p.y); });
   return shapes::stored(shapes::joined(shapes::grid(n), wall));
+}
+
+/// A soup of triangles around the origin, and all their edges.
+std::size_t polls_of_soup(std::uint32_t count, bool open_at_the_rim_alone) {
+  TriangleMesh mesh;
+  std::vector<glm::uvec2> open;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto on_rim = [&](std::uint32_t k) {
+      const double angle = 2 * std::numbers::pi * (k % count) / count;
+      return dvec3(std::cos(angle), std::sin(angle), 0);
+    };
+    mesh.vertices.insert(mesh.vertices.end(), {dvec3(0), on_rim(i), on_rim(i + 1)});
+    mesh.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+    open.emplace_back(3 * i + 1, 3 * i + 2);
+    if (!open_at_the_rim_alone) open.insert(open.end(), {{3 * i, 3 * i + 1}, {3 * i + 2, 3 * i}});
+  }
+  return polls_of([&] { EXPECT_EQ(found(mesh, open), Indices{}); });
+}
+
+TEST(TJunctions, LookOnceAtWhatIsAroundManyVerticesAtOnePlace) {
+  for (const bool at_the_rim_alone : {false, true}) {
+    const std::size_t few = polls_of_soup(500, at_the_rim_alone), many = polls_of_soup(4000, at_the_rim_alone);
+    EXPECT_LT(many, 12 * few + 100);
+  }
 }
 
 TEST(TJunctions, AWallStaysOnItsPlate) {
