@@ -27,17 +27,19 @@ class Decimation {
   DecimationResult run() {
     BoundedMesh mesh(input_.take_mesh(), input_.bounds(), team_);
     std::optional<NewCrossings> crossings;
-    if (mesh.certified() && options_.crossings == DecimationOptions::Crossings::keep_out) {
-      crossings.emplace(input_.stored_mesh(), mesh.stored_mesh(), input_.faces_aside());
-    }
-    NewCrossings* const kept_out = crossings ? &*crossings : nullptr;
     const std::size_t apart = input_.cut().aside.size();
     const std::size_t target = options_.target_triangles > apart ? options_.target_triangles - apart : 0;
-    collapse(mesh, kept_out, target);
+    // A try that is under way when one of the two ends early is not carried out: the mesh is proved at any time.
+    until([this] { return is_out_of_time(); },
+          [&] {
+            if (mesh.certified() && options_.crossings == DecimationOptions::Crossings::keep_out) {
+              crossings.emplace(input_.stored_mesh(), mesh.stored_mesh(), input_.faces_aside());
+            }
+            collapse_edges(mesh, crossings ? &*crossings : nullptr, target, team_, options_.progress);
+          });
     if (mesh.certified() && options_.effort == DecimationOptions::Effort::thorough && !result_.stopped_at_time) {
-      Refinement(mesh, kept_out, team_)
-          .run(
-              target, [&] { return ended_early(); }, options_.progress);
+      until([this] { return is_out_of_time() || is_asked_to_finish(); },
+            [&] { Refinement(mesh, crossings ? &*crossings : nullptr, team_).run(target, options_.progress); });
     }
     result_.stopped_at_target =
         options_.target_triangles > 0 && mesh.triangle_count() + apart <= options_.target_triangles;
@@ -46,26 +48,26 @@ class Decimation {
   }
 
  private:
-  bool out_of_time() const {
+  bool is_out_of_time() {
+    if (!(options_.max_seconds > 0)) return false;
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start_;
-    return options_.max_seconds > 0 && spent.count() > options_.max_seconds;
+    result_.stopped_at_time = spent.count() > options_.max_seconds;
+    return result_.stopped_at_time;
+  }
+  bool is_asked_to_finish() {
+    result_.stopped_on_request = options_.progress && options_.progress->finishing();
+    return result_.stopped_on_request;
   }
 
-  /// Collapses edges until none can be collapsed or the time is over. A try that is under way then is not carried out.
-  void collapse(BoundedMesh& mesh, NewCrossings* crossings, std::size_t target) {
-    const Call limited(nullptr, [this] { return out_of_time(); });
+  /// Works until there is no more to do or, at any poll, `ended` returns true.
+  template <class Ended, class Work>
+  void until(Ended&& ended, Work&& work) {
+    const Call limited(nullptr, ended);
     try {
-      collapse_edges(mesh, crossings, target, team_, options_.progress);
+      work();
     } catch (const Cancelled&) {
       if (!limited.stopped()) throw;
-      result_.stopped_at_time = true;
     }
-  }
-
-  bool ended_early() {
-    result_.stopped_at_time = out_of_time();
-    result_.stopped_on_request = options_.progress && options_.progress->finishing();
-    return result_.stopped_at_time || result_.stopped_on_request;
   }
 
   const DecimationOptions& options_;

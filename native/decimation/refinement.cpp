@@ -62,22 +62,14 @@ Refinement::Refinement(BoundedMesh& mesh, NewCrossings* crossings, Team& team)
   while (attempts_.size() < ahead_.slot_count()) attempts_.emplace_back(mesh, samples_, around_ ? &*around_ : nullptr);
 }
 
-void Refinement::run(std::size_t target, const std::function<bool()>& expired, Progress* progress) {
-  const auto go_on = [&] {
-    poll();
-    if (progress) {
-      progress->set_count(mesh_.triangle_count());
-      progress->update(0);
-    }
-    return mesh_.triangle_count() > target && !expired();
-  };
+void Refinement::run(std::size_t target, Progress* progress) {
   if (progress) progress->begin("refining");
   for (const int rings : kRings) {
     rings_ = rings;
     std::ranges::fill(tried_, 0);
     for (std::size_t before = 0; before != mesh_.triangle_count();) {
       before = mesh_.triangle_count();
-      if (!round(go_on)) return;
+      if (!round(target, progress)) return;
     }
   }
 }
@@ -117,15 +109,20 @@ std::vector<std::uint32_t> Refinement::order() const {
   return edges;
 }
 
-/// Tries the edges in the order of their prices, and returns whether it may go on.
-bool Refinement::round(const std::function<bool()>& go_on) {
+/// Tries the edges in the order of their prices, and returns whether more triangles than the target are left.
+bool Refinement::round(std::size_t target, Progress* progress) {
   find_prices();
   const std::vector<std::uint32_t> steps = order();
   ahead_.drop_all();
   Patience patience(steps.size());
   quick_ = steps.size() > kMany;
   for (std::size_t place = 0; place < steps.size() && !patience.is_over(); ++place) {
-    if (!go_on()) return false;
+    poll();
+    if (progress) {
+      progress->set_count(mesh_.triangle_count());
+      progress->update(0);
+    }
+    if (mesh_.triangle_count() <= target) return false;
     if (!wanted(steps[place])) continue;
     Attempt& a = tried(steps, place);
     tried_[steps[place]] = ahead_.now();
@@ -176,7 +173,10 @@ void Refinement::carry_out(Attempt& a) {
   };
   note(a.trial.vanished());
   for (const Patch::Vertex& v : a.trial.patch().vertices()) note(v.id);
-  ahead_.note_change(a.trial.carry_out(mesh_));
+  {
+    const Call::Within uninterrupted(nullptr);
+    ahead_.note_change(a.trial.carry_out(mesh_));
+  }
   for (const Patch::Face& f : a.trial.patch().faces()) samples_.renew(mesh_, f.id);
   for (const Coverage::Removed& r : a.trial.removed()) samples_.renew(mesh_, r.id);
 }

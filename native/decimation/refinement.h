@@ -8,7 +8,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -41,9 +40,9 @@ class Refinement {
   /// allowed.
   Refinement(BoundedMesh& mesh, NewCrossings* crossings, Team& team);
 
-  /// Runs until hardly a collapse succeeds any more, `target` triangles are left, or `expired`, which is asked before
-  /// every step, returns true. Throws Cancelled. A step takes 1 to 10 ms on one thread, and one in ten succeeds.
-  void run(std::size_t target, const std::function<bool()>& expired, Progress* progress);
+  /// Runs until hardly a collapse succeeds any more or `target` triangles are left. Throws Cancelled, and then leaves a
+  /// mesh that is proved. A step takes 1 to 10 ms on one thread, and one in ten succeeds.
+  void run(std::size_t target, Progress* progress);
 
  private:
   /// The outcome of trying to collapse an edge, and the scratch of the try.
@@ -62,7 +61,7 @@ class Refinement {
 
   void find_prices();
   std::vector<std::uint32_t> order() const;
-  bool round(const std::function<bool()>& go_on);
+  bool round(std::size_t target, Progress* progress);
   bool wanted(std::uint32_t edge) const;
   Attempt& tried(std::span<const std::uint32_t> steps, std::size_t place);
   void attempt(std::uint32_t edge, Attempt& a) const;

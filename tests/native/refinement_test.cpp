@@ -8,6 +8,7 @@
 #include "base/errors.h"
 #include "decimation_cases.h"
 #include "many.h"
+#include "polls.h"
 #include "topology/wedges.h"
 
 namespace {
@@ -259,6 +260,30 @@ TEST(Refinement, KeepsWhatThereIsOnRequest) {
   EXPECT_TRUE(kept.stopped_on_request);
   EXPECT_EQ(kept.triangles, fast.triangles);
   EXPECT_FALSE(fast.stopped_on_request);
+}
+
+TEST(Refinement, EndsAtOnceOnRequestWithWhatIsProved) {
+  const Case c{shapes::torus(across(40), 0.002), glm::dmat4(1), Storage::float32, kPercent};
+  Options options = thorough();
+  options.threads = 1;
+  const std::size_t fast_polls = polls_of([&] { run(c, {.threads = 1}); });
+  const std::size_t fast = run(c).triangles.size();
+  const std::size_t whole = polls_of([&] { run(c, options); });
+  for (const double share : {0.05, 0.3, 0.7}) {
+    const auto at = fast_polls + static_cast<std::size_t>(share * static_cast<double>(whole - fast_polls));
+    Progress progress;
+    options.progress = &progress;
+    std::size_t polls = 0;
+    const Call asked(nullptr, [&] {
+      if (++polls == at) progress.finish();
+      return false;
+    });
+    const DecimationResult r = run(c, options);
+    EXPECT_TRUE(r.stopped_on_request);
+    EXPECT_LE(r.triangles.size(), fast);
+    EXPECT_LE(polls, at + 100) << "a price of all edges, and a try to its end, take more";
+    cases::expect_within(c, r);
+  }
 }
 
 TEST(Refinement, StopsWhenCancelled) {
