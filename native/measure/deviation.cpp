@@ -37,7 +37,7 @@ using glm::dvec3;
 // fewer pieces further would bound each part and each whole.
 constexpr double kPieces = 196608;
 // There are at most so many pieces, or so many for each triangle if that is more.
-constexpr std::size_t kBudget = 229376, kBudgetPerTriangle = 2;
+constexpr std::size_t kBudget = 229376, kBudgetPerTriangle = 4;
 // Pieces are cut until the range of the mean is no wider than this share of the largest distance.
 constexpr double kEnough = 0.001;
 // A range of the mean that is no wider than this, in the frame, is rounding.

@@ -48,7 +48,7 @@ struct Deviation {
 
 /// Covers a with pieces of about 1/196,608 of its area, at least one for each triangle, and cuts the worst pieces. It
 /// stops when the range of the mean is no wider than 0.1 % of the largest distance that was seen or than rounding,
-/// 3e-14 of the size of both meshes together; when there are about 229,000 pieces, or two for each triangle if that is
+/// 3e-14 of the size of both meshes together; when there are about 229,000 pieces, or four for each triangle if that is
 /// more; or when the searches for near triangles have taken `steps` for each of so many pieces, as they do among
 /// needles or if the surfaces cross everywhere. The exact distance of one point of each piece enters the estimates, and
 /// bounds over the whole piece (measure/distance_bounds.h) enter the ranges. The points are fixed, so that equal input

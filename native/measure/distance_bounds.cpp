@@ -12,10 +12,9 @@
 //   for each triangle is concave, so that over the piece it is at least the least of its values at the corners, and on
 //   average at least their mean. Two planes are tried: the plane at the point nearest to c, and the plane parallel to
 //   T, without which the triangles beside T would seem to come nearer.
-// - Both ends again for each quarter of the piece, whose corners are those of the piece and the middles of its sides,
-// with
-//   the triangles that are known by now: the least function is concave between these points, and each quarter has a
-//   triangle of its own for the upper end.
+// - Both ends again for each quarter of the piece, with the triangles that are known by now. The corners of a quarter
+//   are corners of the piece and middles of its sides. The least function is concave between them, and each quarter has
+//   a triangle of its own for the upper end.
 // - The lower ends if this takes too many triangles, because the surfaces are far apart for their size: for x = sum w_i
 //   p_i and every y, |x - y|^2 = sum w_i |p_i - y|^2 - sum w_i |p_i - x|^2 (Lagrange), hence d(x)^2 >= sum w_i d(p_i)^2
 //   - sum w_i |p_i - x|^2. For k corners the last term is at most r^2, and sum |p_i - c|^2 / (k + 1) on average.

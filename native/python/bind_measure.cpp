@@ -227,7 +227,7 @@ Cancelled
 Notes
 -----
 Mesh a is cut into pieces, and each piece holds one sample. The cutting ends as soon as the range of the mean is no wider
-than 0.1 % of the largest distance or than rounding. It ends earlier at 229,376 samples (two for each triangle if that
+than 0.1 % of the largest distance or than rounding. It ends earlier at 229,376 samples (four for each triangle if that
 is more), and after 128 steps of search for each of so many samples, as between crowded needles: the ranges are then wider,
 and as certain.
 
