@@ -2,6 +2,7 @@
 """Saves the deviations of the selected objects from their references as a file."""
 
 import datetime
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -132,7 +133,7 @@ a table (.csv) or all numbers (.json)"""
         path = Path(self.filepath)
         before = self.filepath, self.format
         ending = path.suffix.lower()
-        if not path.name:
+        if not os.path.basename(self.filepath):  # A Path would take the folder for the name.
             return False
         if self.format != self._named_for:  # The format was chosen.
             known = ending in deviation.EXTENSIONS

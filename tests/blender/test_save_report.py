@@ -284,6 +284,8 @@ def test_format_and_ending_agree():
     assert dialog.check(format="HTML") and dialog.filepath == "/tmp/version 1.2.html"
     assert dialog.check(filepath="/tmp/note.txt") and dialog.filepath == "/tmp/note.txt.html"
     assert not dialog.check(filepath="/tmp/x.html")
+    # The name was cleared.
+    assert not dialog.check(filepath="/tmp/reports/") and dialog.filepath == "/tmp/reports/"
 
 
 # What the page looks like -------------------------------------------------------------------------------------------
