@@ -46,7 +46,7 @@ def _page_of_several(document, pictures):
     title = f"Deviation of {len(runs)} {'object' if len(runs) == 1 else 'objects'}"
     sections = "".join(
         f"""<section id="object-{i}"><h2>{escape(_name(run["a"]))}</h2>
-{_facts(run, {"Reference": _counts(run, run["b"])})}
+{_facts(run)}
 {_of_one(run, pictures[i] if pictures else (), f"-{i}")}
 </section>
 """
@@ -87,18 +87,18 @@ def _about(document):
     ]
 
 
-def _facts(run, names=None):
-    """Returns what was measured and how. names: what names the surfaces, by default both of them."""
-    names = names or {"Mesh": _counts(run, run["a"]), "Reference": _counts(run, run["b"])}
+def _facts(run):
+    """Returns what was measured and how, as a list."""
     ways = "both ways" if run["two_sided"] else "one way: from the mesh to the reference"
-    counts = [("Mesh", _counts(run, run["a"]))] if "Mesh" not in names else []
-    measured = [
+    facts = [
+        ("Mesh", _counts(run, run["a"])),
+        ("Reference", _counts(run, run["b"])),
         ("Tolerance", f"{escape(tolerance_text(run))}, {ways}" if run["tolerance"] else ""),
         ("Size", f"{_length(run, run['size'])}, the longest diagonal of the reference's box, is 100&nbsp;%"),
         ("Unit", escape(run["unit"])),
     ]
     about = _about(run) if "date" in run or "blend_file" in run else []
-    return _list([*counts, *names.items(), *measured, *about])
+    return _list([*facts, *about])
 
 
 def _overview(runs, others):
