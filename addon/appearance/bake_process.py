@@ -14,8 +14,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-# The ends of rays: a ray starts above the surface and goes on so far below it, in tolerances. Where a ray finds nothing, all
-# rays get any length.
+# A ray starts above the surface, on the cage, and ends so many tolerances below it. If any ray finds nothing, all rays are
+# tried without an end as well.
 _BELOW = 3.0
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes the normals of the reference into an image for the mesh, by Cycles in a Blender of its own (bake_process.py).
 
-Rays go from a cage around the mesh to the reference, which is within the tolerance of the mesh. The cage lies above the
-surface by two tolerances along the normals of the vertices: at an edge these are not those of the faces, over which the cage
-is lower.
+Rays go from a cage around the mesh to the reference, which is within the tolerance of the mesh. Each vertex of the cage is
+two tolerances away from its vertex of the mesh, along the normal there. Beside a sharp edge this normal is tilted against
+the faces, so that the cage is lower over them.
 """
 
 import json
@@ -22,10 +22,10 @@ from ..mesh.mesh_io import matrix_array
 from . import normals, skirt
 
 _LOOK = 0.05  # The thread looks every so many seconds whether it was cancelled.
-# Beyond its border each island of the UV map is continued by this share of the image, so that no seam is seen.
+# Each island of the UV map is continued beyond its border by 1 / _MARGIN of the image's width, so that no seam is seen.
 _MARGIN = 128
 _ABOVE = 2.0  # tolerances
-_SKIRT = 3.0  # tolerances: so far the reference is continued beyond its borders
+_SKIRT = 3.0  # tolerances by which the reference is continued beyond its borders
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Baked:
     path: Path  # of the image
     uvs: np.ndarray | None  # (2 * corners,) float32 if the mesh had no UV map
     covered: int  # number of pixels that the mesh covers
-    missed: int  # number of those whose rays have not found the reference
+    missed: int  # number of these pixels whose rays have not found the reference
 
 
 class Task:

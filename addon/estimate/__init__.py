@@ -3,7 +3,7 @@
 
 While the panel is drawn, decimations run in a thread, one at a time and without a proof: one at the present tolerance once
 it rests, and some at others, so that the number is known at once while the tolerance is dragged (curve.py). They end when
-the panel is not drawn any more, when an operator is at work, and when the mesh, its mode or a setting changes.
+an operator is at work, and when the mesh, its mode or a setting changes. None begins that the panel does not ask for.
 """
 
 import functools
@@ -147,8 +147,8 @@ def _percent(ob, settings):
 
 
 def _decimated(ob, settings):
-    """Returns the numbers of triangles before and after the last operation on `ob` if it was Decimate as the settings demand.
-    Otherwise it returns None."""
+    """Returns the numbers of triangles before and after the last operation on `ob`, or None unless it was Decimate with the
+    tolerance, the directions, the effort and the target of the settings."""
     run = _counted(last_run.shown(ob))
     percent = _percent(ob, settings)
     if run is None or not percent or not math.isclose(run[0], percent, rel_tol=_SAME) or run[1] != _choices(settings):
@@ -191,7 +191,8 @@ def _token(ob, settings):
 def _place(ob):
     """Returns a value that changes with the places of the mesh and its reference, unless both move and turn together."""
     matrix, source = mesh_io.matrix_array(ob.matrix_world), snapshots.source_object(ob)
-    if ob.tolvol.snapshot_kind != "SELF" if ob.tolvol.snapshot else source != ob:
+    is_own = ob.tolvol.snapshot_kind == "SELF" if ob.tolvol.snapshot else source == ob
+    if not is_own:
         of_reference = ob.tolvol.snapshot_matrix if ob.tolvol.snapshot else mesh_io.matrix_array(source.matrix_world)
         return (*matrix.ravel(), *np.ravel(of_reference))
     metric = matrix[:3, :3].T @ matrix[:3, :3]

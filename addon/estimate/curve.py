@@ -15,7 +15,7 @@ STEP = 2.0
 # Tolerances are in percent of the size here. The ladder goes through the default tolerance.
 _ON_LADDER = 0.2
 _FINEST, _COARSEST = _ON_LADDER / STEP**5, _ON_LADDER * STEP**6
-# Between two numbers with at most this ratio the curve needs no decimation: it is within 10 % of both.
+# Between two numbers with at most this ratio the curve needs no decimation.
 _CLOSE = 1.2
 # Tolerances that differ by a smaller factor count as the same.
 _SAME = 1 + 1e-6

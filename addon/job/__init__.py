@@ -22,7 +22,7 @@ __all__ = ["Job", "JobOperator", "register", "under_way", "unregister"]
 
 
 def register():
-    """The classes of operators have to be known: those of JobOperator get what lets Adjust Last Operation show progress."""
+    """Call this once all classes of operators exist: those that Adjust Last Operation offers get their helpers here."""
     interruptions.register()
     adjusting.register(JobOperator)
     atexit.register(thread.end_all)  # On exit Blender does not unregister an add-on that a script has registered.

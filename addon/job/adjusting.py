@@ -2,18 +2,19 @@
 """Lets Adjust Last Operation and Repeat Last show progress and take Esc.
 
 Blender repeats an operator by execute() alone, which receives no events, and then stores an undo step. If the work takes
-longer than that, execute() therefore leaves the mesh as it was and hands its run over to another operator, which does
-receive events. What this one writes replaces the undo step, so that there is one.
+longer than PATIENCE (run.py), execute() leaves the mesh as it was and hands its run over to a helper: an operator that
+does receive events, and writes the outcome. The undo step of the helper replaces the one that Blender has stored, so
+that there is one.
 """
 
 import bpy
 
-_handed_over = None  # the run that the next operator takes over
-_classes = []
+_handed_over = None  # the run that the next helper takes over
+_classes = []  # the helpers
 
 
 def hand_over(run):
-    """Lets the run go on in an operator of its own."""
+    """Lets the run go on in the helper of its operator."""
     global _handed_over
     _handed_over = run
     getattr(bpy.ops.tolvol, _name(type(run.operator)))("INVOKE_DEFAULT")
@@ -49,7 +50,7 @@ def _operators(base):
 
 
 def register(base):
-    """Registers an operator for each of those with this base class."""
+    """Registers a helper for each operator with this base class that Adjust Last Operation offers."""
     for cls in _operators(base):
         name, doc = _name(cls), f"Go on with {cls.bl_label} after Adjust Last Operation"
         about = {"bl_idname": f"tolvol.{name}", "bl_label": "Go On", "bl_undo_group": cls.bl_label, "__doc__": doc}

@@ -29,7 +29,7 @@ class Claim:
         (matrix, reference), (matrix_before, reference_before) = self._placed(), self._place
         if reference != reference_before:
             raise Refused(f"The reference of {name} was changed meanwhile: nothing more was changed")
-        # With a reference of its own kind the object may be moved and turned: the reference goes along.
+        # An object whose reference is its own mesh may be moved and turned: the reference goes along.
         own = self._ob.tolvol.reference_kind == "SELF" and measurements.same_shape(matrix_before, matrix)
         if not own and not np.array_equal(matrix, matrix_before):
             raise Refused(f"{name} was moved or scaled meanwhile: nothing more was changed")

@@ -9,7 +9,7 @@ from .. import status_bar
 # Only the main thread uses these.
 runs = []  # each a Run (see run.py)
 to_say = []  # messages for the status bar, to be shown once the next file is open
-_edited = False  # whether Blender has reported a change of some mesh that no run has looked at yet
+_edited = False  # whether Blender has reported a change of some mesh since the last call of take_edited()
 
 
 def under_way():

@@ -23,7 +23,7 @@ class JobOperator:
     doing = ""  # text for the status bar in place of the native stage
     part = ""  # which part of the work is under way, such as "Level 2 of 3", if there are several
 
-    voice = None  # the operator that reports in place of this one
+    voice = None  # the helper that reports in place of this operator (adjusting.py)
     _run = None
 
     def targets(self, context):
@@ -71,7 +71,10 @@ class JobOperator:
         return outcomes
 
     def say(self, kind, text):
-        """Reports the text. kind: a set, as for report(), which the user would not see after Adjust Last Operation."""
+        """Reports the text where the user sees it: after Adjust Last Operation, report() of this operator shows nothing.
+
+        kind: a set, as for report().
+        """
         (self.voice or self).report(kind, text)
 
     def cancelled_message(self):

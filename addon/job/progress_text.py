@@ -3,7 +3,7 @@
 
 import time
 
-# How long a stage takes is told from what it has done by then: so many seconds, and such a share of it.
+# The time that a stage still takes is told after so many seconds, and after such a share of the stage.
 _KNOWN_AFTER, _KNOWN_SHARE = 1.0, 0.05
 
 

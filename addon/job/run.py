@@ -10,7 +10,7 @@ from . import interruptions, progress_text
 from .claim import Claim
 from .thread import Job
 
-# Blender waits so many seconds for a job before the status bar shows it: a short job makes no line flash up.
+# Blender waits so many seconds for a job before the status bar shows it, so that no line flashes up for a short one.
 PATIENCE = 0.4
 _TICK = 0.1
 
@@ -21,7 +21,8 @@ class Run:
     def __init__(self, operator, context):
         self.operator = operator
         self.progress = native.module.Progress()
-        self.interrupted = None  # the message why the run was stopped: its objects must not be touched any more
+        # Why the run was stopped, as a message; "" if its operator begins anew. Its objects must not be touched then.
+        self.interrupted = None
         self._mode, self._clock = context.mode, progress_text.Clock()
         self._claims = [Claim(ob) for ob in operator.objects]
         self._steps = operator.steps(context)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A computation in a thread, and all of those that may be running."""
+"""A computation in a thread, and the list of all computations that may be running."""
 
 import threading
 

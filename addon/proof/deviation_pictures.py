@@ -60,7 +60,7 @@ def drawn(surface, reference, run, captions, factor=1.0, up="Z", threads=None, p
     ):
         # The tolerance of a volume is at most the size of its reference. Parts that are farther away are striped.
         wanted = min(reach(run), other.size())
-        # The volume of the reference serves the next operation, too, that of the mesh no other purpose.
+        # The volume of the reference is kept for the next operation. That of the mesh is needed here alone.
         volume = (
             volumes.native_volume(other, wanted, threads, progress)
             if other is reference

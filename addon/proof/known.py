@@ -16,9 +16,9 @@ _lock = threading.Lock()  # jobs measure in threads
 _kept = OrderedDict()
 
 
-def key_of(what, *content):
-    """Returns a key that is equal for equal content: arrays, numbers and None."""
-    digest = hashlib.blake2b(what.encode(), digest_size=16)
+def key_of(kind, *content):
+    """Returns a key that is equal for the same kind of measurement of equal content: arrays, numbers and None."""
+    digest = hashlib.blake2b(kind.encode(), digest_size=16)
     for part in content:
         if isinstance(part, np.ndarray):
             digest.update(f"{part.dtype}{part.shape}".encode())

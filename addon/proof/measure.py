@@ -15,7 +15,8 @@ def largest_distance(from_surface, to_surface, tolerance=None, threads=None, pro
 
     Each surface is a pair (vertices, triangles). The width of the interval is at most 0.1 % of `upper`, with the
     exceptions that native/measure/hausdorff.h names. If `tolerance` lies inside the interval, the interval is narrowed
-    until `tolerance` no longer does, as far as rounding permits. again: whether to measure what was measured before.
+    until `tolerance` no longer does, as far as rounding permits. again: whether to measure even if this was
+    measured before in this session (known.py).
     """
     key = known.key_of("largest", *from_surface, *to_surface, None if tolerance is None else float(tolerance))
     if not again and (found := known.get(key)) is not None:

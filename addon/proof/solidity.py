@@ -50,7 +50,10 @@ def pair_count(pairs):
 
 
 def facts(surface, threads=None, progress=None, again=True):
-    """Returns the facts about a Surface. About 2.5 us for each triangle. again: whether to find what was found before."""
+    """Returns the facts about a Surface. About 2.5 us for each triangle.
+
+    again: whether to look even if they were found before in this session (known.py).
+    """
     arrays = surface.arrays
     key = known.key_of("solidity", arrays.vertices, arrays.triangles, surface.matrix)
     if not again and (kept := known.get(key)) is not None:
