@@ -196,7 +196,7 @@ class Below {
 
 /// Returns the bounds with what follows from the values at the corners, widened by the rounding of their arithmetic.
 DistanceBounds rounded_outwards(DistanceBounds bounds, int k) {
-  const auto [least, most] = std::minmax_element(bounds.lower.begin(), bounds.lower.begin() + k);
+  const auto least = std::min_element(bounds.lower.begin(), bounds.lower.begin() + k);
   double mean = 0, spread = 0;
   for (int i = 0; i < k; ++i) mean += bounds.lower[i] / k;
   for (int i = 0; i < k; ++i) spread += (bounds.lower[i] - mean) * (bounds.lower[i] - mean);
