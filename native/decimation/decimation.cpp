@@ -29,7 +29,7 @@ class Decimation {
     std::optional<NewCrossings> crossings;
     const std::size_t apart = input_.cut().aside.size();
     const std::size_t target = options_.target_triangles > apart ? options_.target_triangles - apart : 0;
-    // A try that is under way when one of the two ends early is not carried out: the mesh is proved at any time.
+    // Where collapses or refinement end early, the try that is under way is not carried out, so the mesh is proved.
     until([this] { return is_out_of_time(); },
           [&] {
             if (mesh.certified() && options_.crossings == DecimationOptions::Crossings::keep_out) {

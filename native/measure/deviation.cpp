@@ -42,7 +42,8 @@ constexpr std::size_t kBudget = 229376, kBudgetPerTriangle = 4;
 constexpr double kEnough = 0.001;
 // A range of the mean that is no wider than this, in the frame, is rounding.
 constexpr double kNoise = 256 * kUnitRoundoff;
-// A bound over a piece is a linear function. It enters the distributions by its values on so many equal shares.
+// A bound over a piece is a linear function. It enters the distributions by its values on so many equal shares, as many
+// as DistanceBounds has quarters.
 constexpr int kSlices = 4;
 // Rounding changes a share by at most so much.
 constexpr double kShareRounding = 32 * kUnitRoundoff;

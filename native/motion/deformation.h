@@ -51,8 +51,8 @@ struct DeformationResult {
   FaceCount outside;    ///< Faces that are outside to begin with, which are kept as they are.
   FaceCount uncovered;  ///< Faces of the reference that are not within the tolerance of the mesh to begin with.
   std::optional<Normals> normals;  ///< How the faces face the reference; none where no angle was kept.
-  std::size_t outside_lattice =
-      0;                      ///< The number of vertices not in the box of the lattice, which stay where they are.
+  /// The number of vertices not in the box of the lattice, which stay where they are.
+  std::size_t outside_lattice = 0;
   std::size_t moved = 0;      ///< The number of vertices of the result that are not where they were.
   std::size_t held_back = 0;  ///< The number of vertices that did not go all their way.
   /// When vertices are pulled back: the number of these that went back so that no faces cross.
@@ -63,13 +63,14 @@ struct DeformationResult {
 };
 
 /// `faces` has `corners` (1 to 4) indices for each face; without a volume it may be empty. Without a volume there is no
-/// tolerance. With one, what holds T-junctions together stays, and a warning counts it. All faces of the result are
+/// tolerance. With one, vertices that hold T-junctions together stay, and a warning counts them; they move only with a
+/// mesh that is not within the tolerance to begin with and is brought there as a whole. All faces of the result are
 /// inside, and two-sided the reference is covered, except for what is kept. Unless they are allowed to, no faces exceed
 /// the angle to the reference or cross that do not do so to begin with. Throws InvalidInput for bad arrays, for a mesh
-/// that is not within the tolerance to begin with (unless Outside::keep, or the deformation brings it there without new
-/// crossings), and where the stored type cannot hold the tolerance; Cancelled. It takes about 0.4 us a vertex, and with
-/// a volume the time of one check and of PullBack::start(); where that check fails, of about twelve checks or of
-/// constrain().
+/// that is not within the tolerance to begin with (unless Outside::keep, or the deformation brings it there without
+/// faces that turn or cross anew), and where the stored type cannot hold the tolerance; Cancelled. It takes about 0.4
+/// us a vertex, and with a volume the time of one check and of PullBack::start(); where that check fails, of about
+/// twelve checks or of constrain().
 DeformationResult deform(std::span<const glm::dvec3> vertices, std::span<const std::uint32_t> faces, int corners,
                          const StoredSpace& space, const ToleranceVolume* volume, const LatticeDeformation& lattice,
                          const DeformationOptions& options);

@@ -204,8 +204,8 @@ void MovingMesh::for_triangles(std::uint32_t face, Visit&& visit) const {
   }
 }
 
-/// Whether no two triangles run along an edge in one direction, and no vertices are at one place. Then no edge has more
-/// than two triangles, and neighbours look to one side.
+/// Whether no two triangles run along an edge in one direction, and no two vertices are at one place. If so, no edge
+/// has more than two triangles, and neighbours look to one side.
 bool MovingMesh::is_plainly_oriented(std::span<const std::uint32_t> place) const {
   if (corners_ != 3) return false;
   std::atomic<bool> result{true};
@@ -329,7 +329,7 @@ std::vector<double> MovingMesh::balance(std::span<const std::uint32_t> failing) 
   return result;
 }
 
-/// Compares parts by their other side if more of them keeps the angle by that. Returns the faces that still fail.
+/// Compares a part by its other side if more of its area then keeps the angle. Returns the faces that still fail.
 std::vector<std::uint32_t> MovingMesh::compare_sides(std::vector<std::uint32_t> failing, Progress* progress) {
   if (failing.empty()) return failing;
   std::vector<double> kept = balance(failing);
@@ -345,7 +345,7 @@ std::vector<std::uint32_t> MovingMesh::compare_sides(std::vector<std::uint32_t> 
     if (faces.empty()) return;
     std::erase_if(failing, [&](std::uint32_t f) { return is_to_turn(part_[f]); });
     measure(faces, progress);
-    // What is free of the rule cannot fail but for its distance.
+    // A face that is free of the rule can fail by its distance alone.
     std::erase_if(faces, [&](std::uint32_t f) { return facing_->of(f, 0).limit >= std::numbers::pi && !is_inside(f); });
     const std::vector<std::uint32_t> still = uncertified(faces, progress);
     failing.insert(failing.end(), still.begin(), still.end());

@@ -43,7 +43,8 @@ class MovingMesh {
 
   /// Takes the stored positions as state and trial. `max_normal_angle`, in degrees, is kept from then on (see
   /// MovingFacing); 180 keeps no angle. A face that exceeds it keeps the least angle that can be proved of it, to
-  /// within a degree. A connected part of the mesh more of which keeps the angle by its other side is compared by that.
+  /// within a degree. If more of a connected part of the mesh keeps the angle by its other side, the part is compared
+  /// by that side.
   /// `place` has the first vertex at the place of each, or is empty if vertices at one place are not connected. Throws
   /// InvalidInput for a position that is not finite, and where the stored type cannot hold the tolerance. About 1 us a
   /// vertex; for faces of the reference itself 0.5 us a face, and nothing where no angle is kept.
@@ -171,8 +172,8 @@ class MovingMesh {
   std::vector<TriangleCertificate> certificates_;  // One for each of these two; none before start().
   std::vector<VertexState> state_, trial_;
   std::vector<double> step_;
-  std::vector<std::array<Refusal, 2>>
-      refusals_;  // The last ones for each vertex and Trial; empty unless they are remembered.
+  // For each vertex the last refusal of each Aim; empty unless refusals are remembered.
+  std::vector<std::array<Refusal, 2>> refusals_;
   std::vector<double> reach_, trial_reach_;  // For each face: no point of it is farther from the reference.
   std::optional<MovingFacing> facing_;       // None if no angle is kept.
   double max_normal_angle_ = 180;            // In degrees.

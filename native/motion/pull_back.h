@@ -79,12 +79,11 @@ class PullBack {
   Moving moving(std::vector<std::uint32_t> vertices);
 
   /// Moves each vertex from `before`, its stored position now, towards `after`, and makes where it ends the new state.
-  /// All faces of the new state are inside, the reference is covered, no face exceeds its angle, and nothing crosses
-  /// that did not at the start;
-  /// see constrain.h for what else holds of the factors. Vertices that were at one place at the start and have the same
-  /// `before` and `after` have the same factor. Throws InvalidInput, for a wish that is not finite, and
-  /// Cancelled; both change nothing. A settled face costs about 10 ns, and a face near the tolerance about 1 us for
-  /// each try. Keeping crossings out costs about 1 us a face.
+  /// All faces of the new state are inside, the reference is covered, no face exceeds its angle, and no faces cross
+  /// that did not at the start; constrain.h says what else holds of the factors. Vertices that were at one place at the
+  /// start and have the same `before` and `after` have the same factor. Throws InvalidInput, for a wish that is not
+  /// finite, and Cancelled; both change nothing. A settled face costs about 10 ns, and a face near the tolerance about
+  /// 1 us for each try. Keeping crossings out costs about 1 us a face.
   Result move(const Moving& moving, std::span<const glm::dvec3> before, std::span<const glm::dvec3> after, Mode mode,
               Progress* progress);
 

@@ -282,9 +282,8 @@ Cost: about 1 us a vertex and 2 us a face of the reference.)doc")
           "to them never move.")
       .def_property_readonly(
           "exceeding", [](const LockedGuard& guard) { return guard.native.start().exceeding.faces; },
-          "The number of faces that were not proved to keep max_normal_angle at the start. They keep the angle that "
-          "they "
-          "had, or a smaller one.")
+          "The number of faces that were not proved to keep max_normal_angle at the start. They keep the angle of "
+          "the start, or a smaller one.")
       .def_property_readonly(
           "warnings", [](const LockedGuard& guard) { return guard.native.start().warnings; },
           "A list of sentences about the start.");

@@ -267,8 +267,9 @@ volume : ToleranceVolume, optional
 mode : {"blocked", "farthest", "pull_back"}
     What happens to a deformation that is not certified inside as a whole, or by which faces would turn or cross.
     "blocked" moves nothing, and the report says how far the deformation may go. "farthest" moves every vertex that
-    permitted share of its way. "pull_back" moves each vertex as far as it may go, as constrain does. What holds a
-    T-junction together stays in each of them, as in constrain.
+    permitted share of its way. "pull_back" moves each vertex as far as it may go, as constrain does. Vertices that
+    hold T-junctions together stay, as in constrain; they move only with a mesh that is beyond the tolerance before the
+    deformation and is brought within it as a whole.
 two_sided, outside
     As for constrain. A mesh that is beyond the tolerance before the deformation is no error if it is within it
     afterwards and no faces turn or cross that must not.
