@@ -352,8 +352,8 @@ def bake_settings(options=frozenset()):
         ),
         "shade": BoolProperty(
             name="Shade First",
-            description="First shade the mesh smooth by the reference's normals. The normal map then holds only what that "
-            "shading lacks. Without this, the map belongs to the present shading",
+            description="First shade the mesh smooth by the reference's normals. The normal map then holds only the details "
+            "that this shading lacks. Without Shade First, the map belongs to the present shading",
             default=True,
             options=set(options),
         ),

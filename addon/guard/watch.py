@@ -184,9 +184,9 @@ class Watch(Preparing):
         # A larger polygon stands for triangles that are not all there, so that they cannot be witnesses.
         two_sided = both and faces.largest <= 4
         keeps_out = ob.tolvol.guard.crossings
-        # Its triangles cross each other as well.
+        # The triangles that it stands for cross each other as well.
         crossings = "keep_out" if keeps_out and faces.largest <= 4 else "allow"
-        # Some of them are turned over where the polygon is concave.
+        # Where the polygon is concave, some of these triangles are turned over.
         angle = None if faces.largest <= 4 else 180
 
         def work(progress):
