@@ -121,7 +121,7 @@ seconds : the time that the call took)doc");
 
 Every iteration ends with all faces inside and the whole reference within the tolerance of them. Vertices at an edge
 with more than two faces stay where they are, and so does what holds a T-junction together: a vertex of an open edge
-that lies on another edge or on the inside of a face, or a vertex inside of a sheet that lies on an open edge of
+that lies on another edge or on the inside of a face, or a vertex inside a sheet that lies on an open edge of
 another, and the corners there.
 
 Parameters
