@@ -229,8 +229,8 @@ permitted_fraction : from 0 to 1, the share of the way at which the whole mesh i
 leaving : a dict of `faces`, the number of faces that the deformation as wished would not leave certified inside, and
     `first`, the first of them. If there are none, some that it would take from a part of the reference that has no
     other face within the tolerance
-turning : the same for faces that would exceed max_normal_angle, and did not before; it is only looked for if no faces are
-    leaving
+turning : the same for faces that would exceed max_normal_angle, and did not before; it is only looked for if no faces
+    are leaving
 crossing : the same for faces that would cross others or become degenerate, and did not before; it is only looked for if
     no faces are leaving or turning
 outside : a dict of `faces`, the number of faces that were outside before and were kept, `first`, the first of them, and

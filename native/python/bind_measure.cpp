@@ -226,12 +226,12 @@ Cancelled
 
 Notes
 -----
-Mesh a is cut into pieces, and each piece holds one sample. The cutting ends as soon as the range of the mean is no wider
-than 0.1 % of the largest distance or than rounding. It ends earlier at 229,376 samples (four for each triangle if that
-is more), and after 128 steps of search for each of so many samples, as between crowded needles: the ranges are then wider,
-and as certain.
+Mesh a is cut into pieces, and each piece holds one sample. The cutting ends as soon as the range of the mean is no
+wider than 0.1 % of the largest distance or than rounding. It ends earlier at about 229,000 samples (four for each
+triangle if that is more), and after 128 steps of search for each of so many samples, as between crowded needles: the
+ranges are then wider, and as certain.
 
-The mean is more exact than that of the samples: bounds over whole pieces enter it, too.
+The mean is more exact than the mean of the samples: bounds over whole pieces enter it, too.
 
 Cost: 2 to 15 us a sample.)doc");
 }

@@ -157,7 +157,8 @@ crossings : {"keep_out", "allow"}
 max_normal_angle : float, optional
     In degrees, more than 0 and at most 180: every point of a face keeps a witness, a triangle of the reference within
     the tolerance whose normal is within this angle of the face's. None keeps 90: no face is turned over. 180 keeps no
-    angle. What is said of input faces, orientation and thin faces in decimate holds here, too. Ignored without a volume.
+    angle. What is said of input faces, orientation and thin faces in decimate holds here, too. Ignored without a
+    volume.
 to_world, threads, progress
     See help(tolvol).
 
