@@ -151,14 +151,20 @@ def _decimated(ob, settings):
     tolerance, the directions, the effort and the target of the settings."""
     run = _counted(last_run.shown(ob))
     percent = _percent(ob, settings)
-    if run is None or not percent or not math.isclose(run[0], percent, rel_tol=_SAME) or run[1] != _choices(settings):
+    if (
+        run is None
+        or not percent
+        or not math.isclose(run[0], percent, rel_tol=_SAME)
+        or run[1] != _choices(ob, settings)
+    ):
         return None
     return run[2:]
 
 
-def _choices(settings):
+def _choices(ob, settings):
     target = settings.target_triangles if settings.use_target else None
-    return settings.keep == "BOTH", settings.effort.lower(), target
+    placement = settings.placement if settings.placement_choice >= 0 else automatic_placement(ob.data)
+    return settings.keep == "BOTH", settings.effort.lower(), placement.lower(), target
 
 
 @functools.lru_cache(maxsize=16)
@@ -166,7 +172,7 @@ def _counted(run):
     """Returns (tolerance in percent, choices, triangles before, after) of a run as JSON, or None if it is no decimation."""
     try:
         told = json.loads(run)
-        choices = tuple(told[name] for name in ("two_sided", "effort", "target_triangles"))
+        choices = tuple(told[name] for name in ("two_sided", "effort", "placement", "target_triangles"))
         counts = int(told["input"]["triangles"]), int(told["output"]["triangles"])
         return float(told["tolerance"]["percent"]), choices, *counts
     except report.DAMAGED:

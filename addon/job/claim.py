@@ -16,6 +16,13 @@ class Claim:
         self._name = ob.name
         self._mesh, self._content, self._place = self._state(), self._digest(), self._placed()
 
+    def concerns(self, data):
+        """Whether this is the object, or its mesh."""
+        try:
+            return data in (self._ob, self._ob.data)
+        except ReferenceError:  # check() finds that the object was deleted.
+            return False
+
     def check(self, thoroughly):
         """Raises Refused unless the outcome can still be written to the object. thoroughly: compare every vertex, too."""
         try:

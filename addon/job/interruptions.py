@@ -7,9 +7,9 @@ from bpy.app.handlers import persistent
 from .. import status_bar
 
 # Only the main thread uses these.
-runs = []  # each a Run (see run.py)
+runs = []  # each a Run (see run.py); more than one only until the next event, after Adjust Last Operation
 to_say = []  # messages for the status bar, to be shown once the next file is open
-_edited = False  # whether Blender has reported a change of some mesh since the last call of take_edited()
+_edited = False  # whether Blender has reported a change of a run's mesh since the last call of take_edited()
 
 
 def under_way():
@@ -18,7 +18,7 @@ def under_way():
 
 
 def take_edited():
-    """Returns whether some mesh was changed since the last call."""
+    """Returns whether the mesh of a run was changed since the last call."""
     global _edited
     edited, _edited = _edited, False
     return edited
@@ -53,10 +53,11 @@ def _after_load(*_):
 
 @persistent
 def _after_update(_scene, depsgraph):
-    """Notes a change of any mesh, so that the runs look whether it is one of theirs."""
+    """Notes a change of a mesh that a run works on, so that the run looks whether the change concerns it."""
     global _edited
-    if runs and any(update.is_updated_geometry for update in depsgraph.updates):
-        _edited = True
+    for update in depsgraph.updates:
+        if update.is_updated_geometry and any(run.concerns(update.id.original) for run in runs):
+            _edited = True
 
 
 _HANDLERS = (

@@ -9,7 +9,7 @@ from bpy.props import StringProperty
 from .. import native
 from ..errors import Refused
 from . import adjusting, run
-from .interruptions import under_way
+from .interruptions import runs, under_way
 
 
 class JobOperator:
@@ -84,8 +84,9 @@ class JobOperator:
         return f"{self.bl_label} was cancelled. The mesh is as it was before that operation"
 
     def execute(self, context):
-        if self.options.is_repeat and (earlier := under_way()) and earlier.operator == self:
-            earlier.supersede()
+        for earlier in runs:
+            if earlier.operator == self:
+                earlier.supersede()
         self._begin(context)
         ended = self._run.advance()
         if self.options.is_repeat and not bpy.app.background:

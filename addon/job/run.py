@@ -111,13 +111,18 @@ class Run:
 
     def interrupt(self, happens):
         """Ends the job while the data that it began with still exists. Blender then calls on_event() or close()."""
-        self.interrupted = f"{self.operator.bl_label} was stopped, because {happens}. It has changed nothing"
-        self._end()
+        if self.interrupted is None:
+            self.interrupted = f"{self.operator.bl_label} was stopped, because {happens}. It has changed nothing"
+            self._end()
 
     def supersede(self):
         """Ends the job without a word, because the operator begins anew."""
         self.interrupted = ""
         self._end()
+
+    def concerns(self, data):
+        """Whether the run works on this object or mesh."""
+        return any(claim.concerns(data) for claim in self._claims)
 
     def _look(self):
         """Ends the job as soon as its outcome cannot be written any more."""

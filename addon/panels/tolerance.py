@@ -71,10 +71,11 @@ def _estimated(context):
     if not found.known:  # An estimate with all digits would look like a fact.
         digits = max(len(str(found.after)) - _DIGITS, 0)
         rounded = round(found.after, -digits)
-    share = 100 * (1 - found.after / found.before)
-    text = f"{'' if found.known else '~'}{rounded:,}"
-    fewer = f"\u2212{share:.0f}{NO_BREAK}%" if 1 <= share < 99 else f"\u2212{share:.1f}{NO_BREAK}%"
-    return f"{text}, {fewer}" if is_narrow(context) else f"{text} triangles, {fewer}"
+    text = f"{'' if found.known else '~'}{rounded:,}{'' if is_narrow(context) else ' triangles'}"
+    share = min(100 * (1 - found.after / found.before), 99.9)  # 100 % would leave no triangle.
+    if share < 0.05:
+        return text
+    return f"{text}, \u2212{share:.{0 if 1 <= share < 99 else 1}f}{NO_BREAK}%"
 
 
 def draw_job(context, layout):
