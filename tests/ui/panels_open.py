@@ -16,16 +16,28 @@ def _replace(classes, others):
         bpy.utils.register_class(cls)
 
 
-@contextlib.contextmanager
-def unfolded(panel):
-    """Registers a panel under another name while the context lasts: for each name Blender remembers whether the panel was
-    last open."""
+def _opened(panel):
+    """Returns the panel under another name: for each name Blender remembers whether the panel was last open."""
     name = panel.__name__.replace("TOLVOL_PT", "TOLVOL_TEST_PT")
     told = {"bl_idname": name, "bl_label": panel.bl_label, "bl_parent_id": panel.bl_parent_id, "draw": panel.draw}
+    return type(name, (SubPanel, bpy.types.Panel), told)
+
+
+@contextlib.contextmanager
+def _registered(shown):
     shipped = panels._CLASSES
-    shown = [type(name, (SubPanel, bpy.types.Panel), told) if cls is panel else cls for cls in shipped]
     _replace(shipped, shown)
     try:
         yield
     finally:
         _replace(shown, shipped)
+
+
+def unfolded(panel):
+    """Registers a panel open while the context lasts."""
+    return _registered([_opened(panel) if cls is panel else cls for cls in panels._CLASSES])
+
+
+def alone(panel):
+    """Registers a panel open, and none beside it, while the context lasts."""
+    return _registered([panels._CLASSES[0], _opened(panel)])

@@ -9,9 +9,10 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Euler
 
 import scenes
-from addon import guard, native, panels
+from addon import guard, native
 from addon.mesh import mesh_io
 from addon.panels.guard import TOLVOL_PT_guard
+from panels_open import alone
 from window import (
     centre,
     click,
@@ -82,21 +83,6 @@ def across(length=200, steps=12):
     return [(x - length // 2 + i * length // steps, y + 3 * (i % 2)) for i in range(steps + 1)]
 
 
-def only_guard_panel():
-    """Removes all sub-panels except Guard, and opens it."""
-    for cls in panels._CLASSES[1:]:
-        bpy.utils.unregister_class(cls)
-    TOLVOL_PT_guard.bl_options = set()
-    bpy.utils.register_class(TOLVOL_PT_guard)
-
-
-def all_panels():
-    bpy.utils.unregister_class(TOLVOL_PT_guard)
-    TOLVOL_PT_guard.bl_options = {"DEFAULT_CLOSED"}
-    for cls in panels._CLASSES[1:]:
-        bpy.utils.register_class(cls)
-
-
 def switch(setting):
     """Clicks a switch in the sidebar. To find it, Blender's Shift Ctrl C copies the data path of the property below the mouse."""
     sidebar = region("UI")
@@ -109,6 +95,7 @@ def switch(setting):
             click(*place)
             yield 0.3
             return
+    screenshot(f"guard without {setting}")
     raise AssertionError(f"no switch {setting}")
 
 
@@ -123,8 +110,7 @@ def test_guard_sculpting_by_mouse():
     yield from reset(sheet)
     look()
     reference, before = scenes.world_triangles(ob()), coordinates()
-    only_guard_panel()
-    try:
+    with alone(TOLVOL_PT_guard):
         yield from open_tab()
         yield from switch("sculpting")
         mode("SCULPT")
@@ -133,8 +119,6 @@ def test_guard_sculpting_by_mouse():
         bpy.context.tool_settings.sculpt.brush.strength = 1.0
         yield from stroke(*across())
         screenshot("guard 1 stroke")
-    finally:
-        all_panels()
     after = coordinates()
     assert 0.95 < forward(reference) <= 1
     touched = (after != before).any(1)

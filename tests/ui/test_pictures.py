@@ -11,9 +11,10 @@ import numpy as np
 from mathutils import Euler, Vector
 
 from addon import guard
+from addon.panels.guard import TOLVOL_PT_guard
 from addon.proof import verdict
 from addon.reference import measurements
-from test_guard import all_panels, only_guard_panel
+from panels_open import alone
 from test_show_deviation import counted, sides, solid_monkey, stroke, surface, the_object, to_mode
 from window import (
     draw_finely,
@@ -44,8 +45,7 @@ def test_pictures_for_the_documentation():
     space = view()[1].spaces[0]
     space.show_gizmo = space.show_region_toolbar = space.overlay.show_cursor = False
     from_the_front()
-    only_guard_panel()
-    try:
+    with alone(TOLVOL_PT_guard):
         yield from open_tab()
         begin("set_reference")
         the_object().tolvol.guard.sculpting = True
@@ -58,8 +58,6 @@ def test_pictures_for_the_documentation():
         yield from finished(lambda: verdict.word(the_object()) == verdict.PASS and counted() is not None, pause=0.05)
         yield 0.3
         picture("guard")
-    finally:
-        all_panels()
     assert magenta() == 0
     assert [text.startswith("Held back") for _, text, _ in guard.states(the_object())] == [True]
 
