@@ -11,9 +11,9 @@ from mathutils import Matrix
 
 import addon
 from addon import native
+from addon.job.run import Run
 from addon.mesh import mesh_io
 from addon.mesh.mesh_io import column
-from addon.operators.lod import TOLVOL_OT_make_lods
 from addon.proof import verdict
 from addon.reference import snapshots
 from scenes import activate, torus, world_triangles
@@ -200,8 +200,8 @@ def test_a_mesh_that_blender_cannot_hold_leaves_nothing(monkeypatch):
 def test_progress_names_the_level(monkeypatch):
     torus()
     parts = []
-    each = TOLVOL_OT_make_lods._next_work
-    monkeypatch.setattr(TOLVOL_OT_make_lods, "_next_work", lambda self: (each(self), parts.append(self.part))[0])
+    each = Run._next_work
+    monkeypatch.setattr(Run, "_next_work", lambda self: (each(self), parts.append(self.operator.part))[0])
     make(levels=3, percentages=padded(1, 2, 3))
     assert parts == ["Level 1 of 3", "Level 2 of 3", "Level 3 of 3"]
 

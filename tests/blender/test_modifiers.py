@@ -7,11 +7,11 @@ import pytest
 from mathutils import Matrix
 
 from addon import native
+from addon.job.run import Run
 from addon.mesh import mesh_io
 from addon.mesh.evaluation import Evaluation
 from addon.mesh.mesh_io import column
 from addon.operators import fit, modifiers
-from addon.operators.modifiers import TOLVOL_OT_fit_modifier
 from addon.proof import kept_warnings, verdict
 from addon.reference import snapshots
 from scenes import activate, add_object, link, plates_with_t_junctions, torus, world_triangles
@@ -295,18 +295,18 @@ def test_a_mesh_of_which_only_the_proof_shows_that_it_is_beyond_is_passed_over(m
 
 def test_a_search_that_is_ended_keeps_the_best_so_far(monkeypatch):
     ob = modified("DECIMATE")
-    asked, advance, measured = [], TOLVOL_OT_fit_modifier._advance, modifiers._Trial.measured
+    asked, advance, measured = [], Run.advance, modifiers._Trial.measured
 
-    def until_one_is_within(operator):
-        if operator._job is not None and operator.improving():
-            operator._progress.finish()
-        return advance(operator)
+    def until_one_is_within(run):
+        if run._job is not None and run.operator.improving():
+            run.progress.finish()
+        return advance(run)
 
     def noted(trial, arrays):
         asked.append(len(arrays.triangles))
         return measured(trial, arrays)
 
-    monkeypatch.setattr(TOLVOL_OT_fit_modifier, "_advance", until_one_is_within)
+    monkeypatch.setattr(Run, "advance", until_one_is_within)
     monkeypatch.setattr(modifiers._Trial, "measured", noted)
     bpy.ops.tolvol.fit_modifier()
     assert len(asked) < 8 and len(world_triangles(ob)[1]) in asked and verdict.of(ob).passed

@@ -153,6 +153,7 @@ _OTHERS = {
     ("addon/overlay/scale.py", "self.tolerance"),  # the shares in the legend of the colours, which prove nothing
     ("addon/proof/deviation_drawings.py", "abs(lower)"),  # the bars of the histogram that are striped
     ("addon/operators/modifiers.py", "largest > self.tolerance"),  # where sampling ends; the proof decides afterwards
+    ("addon/estimate/curve.py", ""),  # the order of tolerances on a curve
     ("blender_scripts/decimate.py", "tolerance > size"),  # an argument that makes no sense
     ("blender_scripts/decimate.py", "left <= target"),  # numbers of triangles
     ("blender_scripts/decimate.py", "tolerance <= found[i - 1]"),  # the order of the levels
