@@ -17,17 +17,14 @@ constexpr double kSafe = 1 - 0x1p-10;
 /// No room is asked for a larger turn: its sine is about 0.88.
 constexpr double kLargestTurn = 1.1;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-const MovingFacing::Anchor kNoAnchor{glm::dvec3(kNaN), kNaN};
-
 }  // namespace
 
 MovingFacing::MovingFacing(FacingRule rule, std::size_t faces, int corners)
     : rule_(std::move(rule)),
       count_(triangles_of(corners).size()),
       rules_(count_ * faces),
-      anchors_(count_ * faces, kNoAnchor),
-      trial_(count_ * faces, kNoAnchor),
+      anchors_(count_ * faces),
+      trial_(count_ * faces),
       room_(faces, 0),
       trial_room_(faces, 0),
       is_renewed_(faces, 0) {}
@@ -71,7 +68,7 @@ void MovingFacing::follow(std::uint32_t face, std::size_t triangle, const glm::d
 void MovingFacing::renew(std::uint32_t face, std::size_t triangle, const glm::dvec3 (&corners)[3],
                          const std::optional<Facing>& facing, Known& known) const {
   known.is_renewed = true;
-  known.anchors[triangle] = facing ? Anchor{facing->normal(), facing->angle()} : kNoAnchor;
+  known.anchors[triangle] = facing ? Anchor{facing->normal(), facing->angle()} : Anchor{};
   const double limit = of(face, triangle).limit;
   if (limit >= std::numbers::pi) return;
   known.room = std::min(known.room, facing ? room_to_turn(corners, limit - facing->angle()) : 0);

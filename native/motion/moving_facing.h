@@ -26,8 +26,8 @@ class MovingFacing {
   static constexpr std::size_t kMost = 4;
 
   struct Anchor {
-    glm::dvec3 normal;  ///< is NaN if no angle was found
-    double angle;
+    glm::dvec3 normal{std::numeric_limits<double>::quiet_NaN()};  ///< is NaN if no angle was found, as the angle is
+    double angle = std::numeric_limits<double>::quiet_NaN();
   };
   /// What is known of a face in one position.
   struct Known {
