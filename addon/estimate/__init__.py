@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from .. import job, native
+from .. import handlers, job, native
 from ..errors import Refused
 from ..mesh import mesh_io
 from ..operation_settings import decimate_settings
@@ -357,12 +357,10 @@ _HANDLERS = (
 
 
 def register():
-    for name, handler in _HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
+    handlers.add(_HANDLERS)
 
 
 def unregister():
-    for name, handler in reversed(_HANDLERS):
-        getattr(bpy.app.handlers, name).remove(handler)
+    handlers.remove(_HANDLERS)
     _cancel()
     _after_load()

@@ -10,7 +10,7 @@ import time
 import bpy
 from bpy.app.handlers import persistent
 
-from .. import status_bar
+from .. import handlers, status_bar
 from . import edit, lattice, sculpt, undo
 
 # Setting of Object.tolvol.guard -> the module that does it. Each has wanted(ob), blocked(ob),
@@ -144,13 +144,11 @@ _HANDLERS = (
 
 def register():
     undo.register()
-    for name, handler in _HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
+    handlers.add(_HANDLERS)
 
 
 def unregister():
-    for name, handler in reversed(_HANDLERS):
-        getattr(bpy.app.handlers, name).remove(handler)
+    handlers.remove(_HANDLERS)
     if bpy.app.timers.is_registered(_tick):
         bpy.app.timers.unregister(_tick)
     _forget()

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The runs of operators that are under way while Blender goes on, and what the user does meanwhile that ends them."""
 
-import bpy
 from bpy.app.handlers import persistent
 
-from .. import status_bar
+from .. import handlers, status_bar
 
 # Only the main thread uses these.
 runs = []  # each a Run (see run.py); more than one only until the next event, after Adjust Last Operation
@@ -70,10 +69,8 @@ _HANDLERS = (
 
 
 def register():
-    for name, handler in _HANDLERS:
-        getattr(bpy.app.handlers, name).append(handler)
+    handlers.add(_HANDLERS)
 
 
 def unregister():
-    for name, handler in reversed(_HANDLERS):
-        getattr(bpy.app.handlers, name).remove(handler)
+    handlers.remove(_HANDLERS)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keeps the reference of an object, its tolerance volumes, and the distances that were measured from it."""
 
-import bpy
 from bpy.app.handlers import persistent
 
+from .. import handlers
 from . import measurements, snapshots, volumes
 
 
@@ -27,16 +27,18 @@ def forget_all(*_):
     snapshots.notify()
 
 
+_HANDLERS = (
+    ("depsgraph_update_post", _forget_changed),
+    ("undo_post", _forget_shown),
+    ("redo_post", _forget_shown),
+    ("load_post", forget_all),
+)
+
+
 def register():
-    bpy.app.handlers.depsgraph_update_post.append(_forget_changed)
-    bpy.app.handlers.undo_post.append(_forget_shown)
-    bpy.app.handlers.redo_post.append(_forget_shown)
-    bpy.app.handlers.load_post.append(forget_all)
+    handlers.add(_HANDLERS)
 
 
 def unregister():
-    bpy.app.handlers.load_post.remove(forget_all)
-    bpy.app.handlers.redo_post.remove(_forget_shown)
-    bpy.app.handlers.undo_post.remove(_forget_shown)
-    bpy.app.handlers.depsgraph_update_post.remove(_forget_changed)
+    handlers.remove(_HANDLERS)
     forget_all()
