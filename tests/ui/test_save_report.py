@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Save Report with the file browser."""
 
+import contextlib
 import os
 import tempfile
 from pathlib import Path
@@ -12,6 +13,25 @@ from test_panel import monkey, suzanne
 from window import finished, key, open_tab, press, reset, screenshot, xdotool
 
 
+@contextlib.contextmanager
+def folder_to_save_in():
+    """Gives an empty folder, which is the one that Save Report offers while the context lasts."""
+    home = os.environ["HOME"]
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["HOME"] = folder
+        try:
+            yield Path(folder)
+        finally:
+            os.environ["HOME"] = home
+
+
+def monkey_with_reference():
+    yield from reset(monkey)
+    yield from open_tab()
+    yield from press("tolvol.set_reference")
+    yield from finished(lambda: suzanne().tolvol.snapshot is not None)
+
+
 def test_save_report_by_mouse():
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"  # The file browser opens in this window.
     yield from reset(monkey)
@@ -19,31 +39,23 @@ def test_save_report_by_mouse():
     yield from press("tolvol.decimate")
     yield from finished(lambda: len(suzanne().data.polygons) < 3000)
     yield 1.0
-    home = os.environ["HOME"]
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["HOME"] = folder
-        try:
-            yield from press("tolvol.save_report", across=0.7)
-            yield 1.0
-            screenshot("14 file browser")
-            xdotool("mousemove", 640, 400)
-            yield
-            key("Return")
-            saved = Path(folder) / "Suzanne deviation.html"
-            yield from finished(saved.is_file)
-            yield 1.0
-            screenshot("15 saved")
-            assert "Suzanne from its reference" in saved.read_text()
-        finally:
-            os.environ["HOME"] = home
+    with folder_to_save_in() as folder:
+        yield from press("tolvol.save_report", across=0.7)
+        yield 1.0
+        screenshot("14 file browser")
+        xdotool("mousemove", 640, 400)
+        yield
+        key("Return")
+        saved = folder / "Suzanne deviation.html"
+        yield from finished(saved.is_file)
+        yield 1.0
+        screenshot("15 saved")
+        assert "Suzanne from its reference" in saved.read_text()
 
 
 def test_escape_in_the_file_browser_of_save_report():
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
-    yield from reset(monkey)
-    yield from open_tab()
-    yield from press("tolvol.set_reference")
-    yield from finished(lambda: suzanne().tolvol.snapshot is not None)
+    yield from monkey_with_reference()
     ended, cancel = [], TOLVOL_OT_save_report.cancel
     TOLVOL_OT_save_report.cancel = lambda operator, context: ended.append(cancel(operator, context))
     try:
@@ -80,27 +92,19 @@ def choose_next_format():
 
 def test_format_is_chosen_in_the_file_browser():
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
-    yield from reset(monkey)
-    yield from open_tab()
-    yield from press("tolvol.set_reference")
-    yield from finished(lambda: suzanne().tolvol.snapshot is not None)
-    home = os.environ["HOME"]
-    with tempfile.TemporaryDirectory() as folder:
-        os.environ["HOME"] = folder
-        try:
-            yield from press("tolvol.save_report", across=0.7)
-            yield 1.0
-            area, _ = browser()
-            assert area.spaces[0].params.filename == "Suzanne deviation.html"
-            yield from choose_next_format()
-            yield 1.0
-            screenshot("16 format chosen")
-            assert area.spaces[0].params.filename == "Suzanne deviation.csv"
-            xdotool("mousemove", 640, 400)
-            yield
-            key("Return")
-            saved = Path(folder) / "Suzanne deviation.csv"
-            yield from finished(saved.is_file)
-            assert saved.read_text().startswith("direction,quantity")
-        finally:
-            os.environ["HOME"] = home
+    yield from monkey_with_reference()
+    with folder_to_save_in() as folder:
+        yield from press("tolvol.save_report", across=0.7)
+        yield 1.0
+        area, _ = browser()
+        assert area.spaces[0].params.filename == "Suzanne deviation.html"
+        yield from choose_next_format()
+        yield 1.0
+        screenshot("16 format chosen")
+        assert area.spaces[0].params.filename == "Suzanne deviation.csv"
+        xdotool("mousemove", 640, 400)
+        yield
+        key("Return")
+        saved = folder / "Suzanne deviation.csv"
+        yield from finished(saved.is_file)
+        assert saved.read_text().startswith("direction,quantity")
