@@ -61,7 +61,7 @@ bool is_covered(mat3 part, out bool known) {
 float longest_edge(mat3 t) { return max(max(distance(t[0], t[1]), distance(t[1], t[2])), distance(t[2], t[0])); }
 
 bool is_inside(mat3 candidate) {
-  const float halvings = ceil(log2(max(longest_edge(candidate) / shortest, 1)));
+  const float halvings = ceil(log2(max(longest_edge(candidate) / shortest, 1.0)));
   const int deepest = int(min(halvings, float(kDeepest)));
   Part part = Part(0, 0);
   for (int looked = 0; looked < budget; ++looked) {

@@ -6,7 +6,7 @@
 vec3 distance_colour(sampler1D transfer, float distance_in_tolerances, float lowest) {
   const float d = lowest < 0 ? distance_in_tolerances : abs(distance_in_tolerances);
   const float size = float(textureSize(transfer, 0));
-  return texture(transfer, (0.5 + clamp((d - lowest) / (1 - lowest), 0, 1) * (size - 1)) / size).rgb;
+  return texture(transfer, (0.5 + clamp((d - lowest) / (1 - lowest), 0.0, 1.0) * (size - 1)) / size).rgb;
 }
 
 // Returns the colour of diagonal stripes, which mark points beyond the tolerance. A stripe is half of `period` wide. `at`
@@ -16,4 +16,4 @@ vec3 outside_colour(vec2 at, float period, vec3 colour, vec3 stripe) {
 }
 
 // Returns the brightness by a light beside the eye and an even sky. It is 1 where the surface faces the eye.
-float head_light(vec3 normal, vec3 to_eye) { return mix(0.5, 1, abs(dot(normal, to_eye))); }
+float head_light(vec3 normal, vec3 to_eye) { return mix(0.5, 1.0, abs(dot(normal, to_eye))); }

@@ -37,9 +37,9 @@ void main() {
       abs(signed_distance(field, entry + e.xyy)) - abs(signed_distance(field, entry - e.xyy)),
       abs(signed_distance(field, entry + e.yxy)) - abs(signed_distance(field, entry - e.yxy)),
       abs(signed_distance(field, entry + e.yyx)) - abs(signed_distance(field, entry - e.yyx)));
-  const float facing = clamp(abs(dot(normalize(gradient + 1e-6), direction)), 0, 1);
-  const float rim = pow(1 - facing, 3);
+  const float facing = clamp(abs(dot(normalize(gradient + 1e-6), direction)), 0.0, 1.0);
+  const float rim = pow(1 - facing, 3.0);
   const float alpha = 1 - exp(-kAbsorption * passage.inside / tolerance) * (1 - 0.7 * rim);
-  const vec3 shell = kShell * mix(0.55, 1, facing) + 0.35 * pow(facing, 40);
+  const vec3 shell = kShell * mix(0.55, 1.0, facing) + 0.35 * pow(facing, 40.0);
   colour = vec4(shell * alpha, alpha) + (1 - alpha) * colour;
 }

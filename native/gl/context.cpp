@@ -174,7 +174,8 @@ class Worker {
     if (!context_) context_ = std::make_unique<Context>();
     return *context_;
   }
-  unsigned generation() const { return context_ ? context_->generation() : 0; }
+  /// Returns 0 without a context, and after the context was lost: nothing that was made in it may be deleted then.
+  unsigned generation() const { return context_ && !context_->lost() ? context_->generation() : 0; }
 
  private:
   void serve();
@@ -211,7 +212,7 @@ struct Process {
   std::shared_ptr<Worker> worker;
 };
 
-// This is never destroyed. A program that ends without shutdown() leaves the thread waiting, which does no harm.
+// This is never destroyed: a program may end without shutdown().
 Process& process() {
   static Process& instance = *new Process;
   return instance;

@@ -20,6 +20,13 @@ inline void require_gl() {
   }
 }
 
+/// Ends the GL thread after the last test. Otherwise it could still delete objects while the driver is unloaded.
+class EndGl : public testing::Environment {
+ public:
+  void TearDown() override { tolvol::gl::shutdown(); }
+};
+inline testing::Environment* const kEndGl = testing::AddGlobalTestEnvironment(new EndGl);
+
 class GlTest : public testing::Test {
  protected:
   void SetUp() override { require_gl(); }

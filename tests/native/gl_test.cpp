@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <future>
 #include <string>
 #include <thread>
 #include <vector>
@@ -87,6 +88,17 @@ TEST_F(Gl, ObjectsOfALostContextSaySo) {
   EXPECT_NE(message_of([&] { buffer.clear(); }).find("lost"), std::string::npos);
   gl::run([&] { buffer = gl::Buffer(16, nullptr); });
   EXPECT_EQ(message_of([&] { buffer.clear(); }), "");
+}
+
+TEST_F(Gl, NothingIsDeletedOnceTheContextIsLost) {
+  gl::renderer();
+  EXPECT_NE(message_of([] {
+              eglMakeCurrent(eglGetCurrentDisplay(), EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+            }),
+            "");
+  std::promise<unsigned> generation;
+  gl::post([&] { generation.set_value(gl::generation()); });
+  EXPECT_EQ(generation.get_future().get(), 0u);
 }
 
 TEST_F(Gl, ShutsDownAndStartsAgain) {
