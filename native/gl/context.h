@@ -26,8 +26,9 @@ void post(std::function<void()> work) noexcept;
 /// The renderer. Throws GlUnavailable like run().
 Renderer renderer();
 
-/// Ends the thread and its context. Using an object that was made in it then throws. A later run() starts anew. A program
-/// should call this before it ends: the thread may still delete objects, for which some drivers have no context any more.
+/// Ends the thread and its context. Using an object that was made in it then throws. A later run() starts anew. A
+/// program should call this before it ends: the thread may still delete objects, for which some drivers have no context
+/// any more.
 void shutdown() noexcept;
 
 /// Returns the number of the current context, counted from 1. Must be called on the GL thread. Objects remember it,

@@ -92,9 +92,7 @@ TEST_F(Gl, ObjectsOfALostContextSaySo) {
 
 TEST_F(Gl, NothingIsDeletedOnceTheContextIsLost) {
   gl::renderer();
-  EXPECT_NE(message_of([] {
-              eglMakeCurrent(eglGetCurrentDisplay(), EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
-            }),
+  EXPECT_NE(message_of([] { eglMakeCurrent(eglGetCurrentDisplay(), EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT); }),
             "");
   std::promise<unsigned> generation;
   gl::post([&] { generation.set_value(gl::generation()); });
