@@ -15,5 +15,10 @@ vec3 outside_colour(vec2 at, float period, vec3 colour, vec3 stripe) {
   return fract((at.x + at.y) / period) < 0.5 ? colour : stripe;
 }
 
-// Returns the brightness by a light beside the eye and an even sky. It is 1 where the surface faces the eye.
-float head_light(vec3 normal, vec3 to_eye) { return mix(0.5, 1.0, abs(dot(normal, to_eye))); }
+// Returns the brightness by a light beside the eye and an even sky. It is 1 where the surface faces the eye. `normal` may
+// have any length. It has none, or one that overflows, where the eye sees a triangle from its edge: there the light gives
+// nothing.
+float head_light(vec3 normal, vec3 to_eye) {
+  float facing = abs(dot(normal, to_eye)) / length(normal);
+  return mix(0.5, 1.0, facing >= 0.0 ? min(facing, 1.0) : 0.0);
+}

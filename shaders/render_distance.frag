@@ -18,6 +18,6 @@ void main() {
     colour = vec4(outside_colour(gl_FragCoord.xy + first, period, outside, stripe), 1);
     return;
   }
-  const vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
+  const vec3 normal = cross(dFdx(place), dFdy(place));
   colour = vec4(head_light(normal, normalize(eye - place)) * distance_colour(transfer, d, lowest), 1);
 }

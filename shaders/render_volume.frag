@@ -20,7 +20,7 @@ void main() {
   const float reach = length(ray);
   const vec3 direction = ray / reach;
   colour = vec4(0);
-  if (surface) colour = vec4(kClay * head_light(normalize(cross(dFdx(place), dFdy(place))), direction), 1);
+  if (surface) colour = vec4(kClay * head_light(cross(dFdx(place), dFdy(place)), direction), 1);
 
   const vec3 last = vec3(textureSize(field, 0) - 1);
   const vec2 range = clip_ray(eye, direction, vec2(0, reach), last, cut);

@@ -53,7 +53,7 @@ void main() {
   float far = told.range > 1.0 ? FAR * told.range : 1.0;
   float reach = 1.001 * far * told.tolerance + 2.0 * ROUNDING;
   float d = surface_distance(nodes, corners, int(told.leaves), place, reach, ROUNDING) / told.tolerance;
-  vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
+  vec3 normal = cross(dFdx(place), dFdy(place));
   vec3 to_eye = normalize(told.eye.xyz - told.eye.w * place);
   vec3 colour = head_light(normal, to_eye) *
                 distance_colour(transfer, banded(d / told.range, told.lowest, told.bands), told.lowest);

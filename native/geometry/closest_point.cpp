@@ -122,7 +122,7 @@ ClosestPoint nearest_in_range(const glm::dvec3& p, const glm::dvec3& a, const gl
     v = v1, w = w1;
     q = a + v * ab + w * ac;
   }
-  return at(p, q, {1 - v - w, v, w});
+  return at(p, q, {std::max(1 - v - w, 0.0), v, w});  // v + w may be 1 by rounding alone
 }
 
 }  // namespace

@@ -132,17 +132,23 @@ def angles_kept(run, result, reference, report, angle):
     Neither is judged where a triangle is too thin for its normal, or where neighbours are oriented against each other.
     """
     case = run.case
-    faces, others = (case.world(vertices)[triangles] for vertices, triangles in (result, reference))
-    if len(faces) * len(others) > ANGLE_PAIRS or report["normals"] is None:
+    # In units of the size, so that no square is too large or too small for a double.
+    faces, others = (case.world(vertices)[triangles] / case.size() for vertices, triangles in (result, reference))
+    if not len(faces) or len(faces) * len(others) > ANGLE_PAIRS or report["normals"] is None:
         return
-    for a, b, c in (corners.transpose(1, 0, 2) / case.size() for corners in (faces, others)):
+    for a, b, c in (corners.transpose(1, 0, 2) for corners in (faces, others)):
         longest = np.maximum.reduce([((p - q) ** 2).sum(1) for p, q in ((a, b), (b, c), (c, a))])
         if not (np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-6 * np.sqrt(longest)).all():
             return
     facts = run.call("solidity", lambda: tolvol.solidity(*reference))
     if not (facts["manifold"] and facts["oriented"]):
         return
-    found = judge.angles_of(others, faces, case.tolerance * (1 + 1e-9))
+    tolerance = case.tolerance / case.size() * (1 + 1e-9)
+    found = judge.angles_of(others, faces, tolerance)
+    if "motion" in case.arrays:
+        # A part of a mesh that was moved away from the reference may have been turned over, and is compared by its other
+        # side then.
+        found = np.minimum(found, judge.angles_of(others, faces[:, ::-1], tolerance))
     normals = report["normals"]
     beyond = (found > angle + ANGLE_ROUNDING).sum()
     if beyond > normals["exceeded_after"] + normals["unsure"]:

@@ -67,10 +67,14 @@ def covers(run, vertices, faces, reference):
 
 
 def uncrossed_as_pieces(run, before, after, faces):
-    """Requires that no faces of 3 or 4 corners cross anew, of quads in both triangulations. Others never cross."""
+    """Requires that no faces of 3 or 4 corners cross anew, of quads in both triangulations. Others never cross.
+
+    A piece that repeats a corner is an edge of the other piece of its quad, and is not judged beside it.
+    """
     if faces.shape[1] > 2:
         for way in _CUTS[faces.shape[1]]:
-            judges.uncrossed(run, before, after, np.concatenate([faces[:, cut] for cut in way]))
+            pieces = np.concatenate([faces[:, cut] for cut in way])
+            judges.uncrossed(run, before, after, pieces[(pieces != np.roll(pieces, 1, axis=1)).all(1)])
 
 
 def faces_of(case):

@@ -90,6 +90,18 @@ TEST(ClosestPoint, RandomTrianglesAtRoundingLevel) {
   EXPECT_LT(worst, 1e-14);
 }
 
+TEST(ClosestPoint, NoWeightIsNegativeAtAnEdge) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  auto point = [&] { return dvec3(normal(random), normal(random), normal(random)); };
+  for (int i = 0; i < 20000; ++i) {
+    const dvec3 a = point(), b = point(), c = point();
+    const glm::dvec3 weights = closest_point(glm::mix(b, c, uniform(random)), a, b, c).weights;
+    ASSERT_GE(std::min({weights.x, weights.y, weights.z}), 0) << i;
+  }
+}
+
 // Needles and slivers of every thinness, asked from their plane, from close by and from afar.
 TEST(ClosestPoint, NeedlesAtRoundingLevel) {
   std::mt19937 random(2);
