@@ -18,162 +18,20 @@ try:
     import numpy as np
 
     import command_line as cli
+    import decimate_options
+    import file_report
     import pictures
-    from addon import operation_settings, units
+    from addon import units
     from addon.errors import NOT_PROVED, NotWritten, Refused
     from addon.files import file_io, safe_files, side_files
     from addon.files.gltf_extras import GEOMETRIC_ERROR
-    from addon.mesh import filling, mesh_io
+    from addon.mesh import mesh_io
     from addon.proof import report, solidity
     from addon.proof.certify import certify
     from addon.reference import snapshots, tolerances
 except ImportError as error:  # After an uncaught exception Blender would end with exit code 0.
     print(f"decimate.py: Blender's Python lacks a package: {error}; install Debian's python3-numpy", file=sys.stderr)
     sys.exit(2)
-
-_DESCRIPTION = """\
-Reduces the triangles of the meshes of IN within the tolerance and writes the meshes to OUT. The written file is read back and
-certified before it is moved to OUT. Formats: .obj .ply .stl, and .gltf and .glb where Blender can read them."""
-
-_EPILOG = """\
-The last line of the output gives the result. Its percentages are of the size of the reference (the longest diagonal of the
-bounding box), and its time is the time of the whole command. Exit codes: 0 proved; 2 bad usage or input; 3 not proved; 1 a file
-that could not be written, or a bug. Only with exit code 0 are OUT, its side files, the report and the picture written, all of
-them or none. Symbolic links are followed. OUT may be IN. No other file that is read and no texture beside OUT is overwritten."""
-
-
-def arguments():
-    parser = cli.Parser("blender_scripts/decimate.py", description=_DESCRIPTION, epilog=_EPILOG)
-    parser.add_argument("input", type=cli.file_name, metavar="IN", help="the mesh to decimate")
-    parser.add_argument(
-        "output", type=cli.file_name, metavar="OUT", help="the file for the result; its extension chooses the format"
-    )
-    asked = parser.add_mutually_exclusive_group(required=True)
-    asked.add_argument("--tolerance", type=cli.length, metavar="T", help="N%% of size, or a length in the file's units")
-    levels = operation_settings.FEWEST_LEVELS, operation_settings.MOST_LEVELS
-    asked.add_argument(
-        "--lod",
-        type=cli.several(cli.length, *levels),
-        metavar="T,T,...",
-        help="make a chain of levels of detail, one for each of 2 to 6 growing tolerances: OUT_LOD0, OUT_LOD1, ... with OUT's "
-        "extension. Each is decimated from IN and proved both ways; in glTF, geometricError in the extras of a node is its "
-        "deviation",
-    )
-    asked.add_argument(
-        "--lod-pixels",
-        type=cli.several(cli.above_zero, *levels),
-        metavar="N,N,...",
-        help="do the same, with as many pixels as the deviation of each level may cover in a picture from --distance",
-    )
-    parser.add_argument(
-        "--distance",
-        type=cli.length,
-        metavar="D",
-        help="N%% of size, or a length in the file's units, for --lod-pixels",
-    )
-    parser.add_argument(
-        "--fov",
-        type=cli.angle,
-        metavar="A",
-        help="the vertical angle of view in degrees, for --lod-pixels (default: 50)",
-    )
-    parser.add_argument(
-        "--height",
-        type=cli.whole_number(1),
-        metavar="N",
-        help="the height of the picture in pixels, for --lod-pixels (default: 1080)",
-    )
-    parser.add_argument(
-        "--reference",
-        type=cli.file_name,
-        metavar="REF",
-        help="a file that the tolerance refers to (default: IN itself)",
-    )
-    parser.add_argument(
-        "--one-sided",
-        action="store_true",
-        help="keep only the result within the tolerance of the reference; parts of the reference may vanish",
-    )
-    parser.add_argument(
-        "--placement",
-        choices=("optimal", "subset"),
-        help="optimal: fewest triangles; subset: every vertex is a vertex of IN (default: subset with UVs, else optimal)",
-    )
-    parser.add_argument(
-        "--effort",
-        choices=("fast", "thorough"),
-        default="fast",
-        help="thorough: a third fewer triangles in 4 to 16 times the processor time, at a tolerance of 0.1%% in 10 to 30 "
-        "times (default: fast)",
-    )
-    parser.add_argument(
-        "--crossings",
-        choices=("keep_out", "allow"),
-        default="keep_out",
-        help="keep_out: no faces cross in the result that did not cross in IN; allow: they may, as the two sides of a thin "
-        "wall do (default: keep_out)",
-    )
-    parser.add_argument(
-        "--max-normal-angle",
-        type=cli.angle,
-        default=90,
-        metavar="A",
-        help="the largest angle, in degrees from 1 to 180, between a face of the result and the faces of the reference that "
-        "it stands for; 180 permits any angle (default: 90, which turns no face over)",
-    )
-    parser.add_argument(
-        "--max-seconds",
-        type=cli.whole_number(1),
-        metavar="S",
-        help="stop after S seconds for each object with the result that is proved by then (default: no limit)",
-    )
-    parser.add_argument(
-        "--target-triangles",
-        type=cli.whole_number(1),
-        metavar="N",
-        help="stop at N triangles if the tolerance permits so few; N is divided among objects by their triangles",
-    )
-    parser.add_argument(
-        "--close-holes",
-        action="store_true",
-        help="first fill the holes that can be filled within the tolerance, such as the pinholes of a scan, and the ends of "
-        "a tube thinner than the tolerance",
-    )
-    parser.add_argument(
-        "--largest-perimeter",
-        type=cli.length,
-        metavar="LENGTH",
-        help="leave holes open whose rim is longer; N%% of size, or a length in the file's units (default: no limit)",
-    )
-    parser.add_argument(
-        "--outside",
-        choices=("error", "keep"),
-        default="error",
-        help="how to treat faces of IN that are not within the tolerance of the reference: stop with an error, or keep "
-        "them as they are (default: error)",
-    )
-    parser.add_argument("--report", type=cli.file_name, metavar="FILE.json", help="write all numbers to this file")
-    parser.add_argument(
-        "--picture",
-        type=cli.file_name,
-        metavar="FILE.png",
-        help="draw the result to this file, coloured by its distance to the reference; needs OpenGL",
-    )
-    parser.add_argument("--threads", type=cli.whole_number(1), metavar="N", help="default: all cores")
-    options = parser.parse()
-    if options.largest_perimeter and not options.close_holes:
-        parser.error("--largest-perimeter needs --close-holes")
-    if options.lod_pixels and options.distance is None:
-        parser.error("--lod-pixels needs --distance")
-    for name in ("distance", "fov", "height"):
-        if getattr(options, name) is not None and not options.lod_pixels:
-            parser.error(f"--{name} needs --lod-pixels")
-    if options.fov == 180:
-        parser.error("--fov: an angle of view of 180 degrees has no picture")
-    for name in ("one_sided", "target_triangles"):
-        if getattr(options, name) and options.tolerance is None:
-            parser.error(f"--{name.replace('_', '-')} cannot be used with levels of detail")
-    return options
 
 
 class Output:
@@ -304,13 +162,13 @@ class Command:
         ]
         if not self.options.tolerance:
             for ob, run in zip(source.objects, runs):
-                ob[GEOMETRIC_ERROR] = _deviation(run) + rounding
+                ob[GEOMETRIC_ERROR] = file_report.deviation(run) + rounding
         repairs = source.repairs + (reference_file.repairs if reference_file else [])
         whole = self._write(output, source, names, inputs, references, runs, tolerance, size)
         whole["input"] = whole_input
         whole["repairs"] = repairs + whole["repairs"]
         if not self.options.tolerance:
-            whole[GEOMETRIC_ERROR] = _deviation(whole)
+            whole[GEOMETRIC_ERROR] = file_report.deviation(whole)
         self._end_stage("write")
         seconds = {stage: took - seconds_before.get(stage, 0.0) for stage, took in self.seconds.items()}
         whole["seconds"] = {**seconds, "total": sum(seconds.values())}
@@ -439,7 +297,7 @@ class Command:
         else:  # The format holds only one object, so all objects were joined.
             kept = sum(run["outside"]["faces"] for run in runs)
             judged = [self._certify(snapshots.joined(found.values()), snapshots.joined(references), tolerance, kept)]
-        whole = self._summary(names, runs, judged, tolerance, size)
+        whole = file_report.summary(names, runs, judged, tolerance, size, self.options.target_triangles)
         if len(runs) == 1:
             before = runs[0]["solidity"]["before"]
         else:
@@ -513,79 +371,6 @@ class Command:
         pictures.save_deviation(png, *surfaces, tolerance, size, like, self.options.threads)
         self.staged.write(output.picture, png.getvalue())
 
-    def _summary(self, names, runs, judged, tolerance, size):
-        """Returns the report of the whole file. Its distances are the largest of all objects, as certified in the file."""
-
-        def worst(pairs):
-            return [max(ends) for ends in zip(*pairs)]
-
-        forward, backward = (worst(part[way] for part in judged) for way in ("forward", "backward"))
-        outside = {"faces": sum(run["outside"]["faces"] for run in runs), "first": None}
-        if outside["faces"]:
-            outside["first"] = next(run["outside"]["first"] for run in runs if run["outside"]["faces"])
-            outside["rest"] = worst(part["outside"].get("rest", part["forward"]) for part in judged)
-            outside["backward_before"] = max(run["outside"].get("backward_before", 0.0) for run in runs)
-        locked = {}
-        for run in runs:
-            for cause, count in run["locked"].items():
-                locked[cause] = locked.get(cause, 0) + count
-        left = sum(run["output"]["triangles"] for run in runs)
-        target = self.options.target_triangles or 0
-        out_of_time = any(run["stopped_by"] == "time" for run in runs)
-        several = len(runs) > 1
-        return {
-            **{key: runs[0][key] for key in ("version", "two_sided", "placement", "effort", "method", "renderer")},
-            "tolerance": {"absolute": tolerance, "percent": 100 * tolerance / size},
-            "target_triangles": target,
-            "stopped_by": "target" if target and left <= target else "time" if out_of_time else "tolerance",
-            "precision": min(run["precision"] for run in runs),
-            "forward": forward,
-            "backward": backward,
-            "outside": outside,
-            "normals": _normals(runs),
-            "holes": _holes(runs),
-            "repairs": [
-                {**repair, "message": f"{name}: {repair['message']}" if several else repair["message"]}
-                for name, run in zip(names, runs)
-                for repair in run["repairs"]
-            ],
-            "locked": locked,
-            "warnings": [
-                f"{name}: {text}" if several else text for name, run in zip(names, runs) for text in run["warnings"]
-            ],
-            "objects": [{"name": name, **run} for name, run in zip(names, runs)],
-        }
-
-
-def _deviation(run):
-    """Returns the larger of both proved distances of a run."""
-    return max(run["forward"][1], run["backward"][1])
-
-
-def _normals(runs):
-    """Returns the normals of several runs as those of one, or None if a run has none.
-
-    They are of the meshes before the file rounds coordinates.
-    """
-    kept = [run["normals"] for run in runs]
-    if not all(kept):
-        return None
-    counts = {key: sum(one[key] for one in kept) for key in ("unsure", "exceeded_before", "exceeded_after")}
-    return {"largest": max((one["largest"] for one in kept if one["largest"] is not None), default=None), **counts}
-
-
-def _holes(runs):
-    """Returns what became of the holes of several runs as of one, or None if none were to be closed."""
-    if runs[0]["holes"] is None:
-        return None
-    refused = {}
-    for run in runs:
-        for reason, count in run["holes"]["refused"].items():
-            refused[reason] = refused.get(reason, 0) + count
-    counts = {key: sum(run["holes"][key] for run in runs) for key in ("closed", "triangles_added")}
-    places = filling.largest([place for run in runs for place in run["holes"]["places"]])
-    return {**counts, "refused": refused, "places": places, "largest_perimeter": runs[0]["holes"]["largest_perimeter"]}
-
 
 def _not_above(length):
     """Returns the largest number that Blender's float32 property can express and that is not above `length`."""
@@ -603,4 +388,4 @@ def main(options):
             raise cli.Stop(f"{error}; {options.output} was not written", cli.NOT_WRITTEN) from None
 
 
-cli.run(__file__, arguments, main)
+cli.run(__file__, decimate_options.arguments, main)

@@ -155,7 +155,7 @@ _OTHERS = {
     ("addon/operators/modifiers.py", "largest > self.tolerance"),  # where sampling ends; the proof decides afterwards
     ("addon/estimate/curve.py", ""),  # the order of tolerances on a curve
     ("blender_scripts/decimate.py", "tolerance > size"),  # an argument that makes no sense
-    ("blender_scripts/decimate.py", "left <= target"),  # numbers of triangles
+    ("blender_scripts/file_report.py", "left <= target"),  # numbers of triangles
     ("blender_scripts/decimate.py", "tolerance <= found[i - 1]"),  # the order of the levels
 }
 
