@@ -311,9 +311,9 @@ bool PatchTrial::keep_sheets_apart() {
     const glm::uvec3& t = mesh_.triangle(face);
     return Corners{mesh_.position(t.x), mesh_.position(t.y), mesh_.position(t.z)};
   };
-  std::vector<Corners> sheet;
-  for (const Coverage::Element& e : elements_) sheet.push_back(corners(e.id));
-  for (const Coverage::Removed& r : removed_) sheet.push_back(corners(r.id));
+  Sheet sheet;
+  for (const Coverage::Element& e : elements_) sheet.add(corners(e.id));
+  for (const Coverage::Removed& r : removed_) sheet.add(corners(r.id));
   const double reach = bounds_.forward().limit();
   std::vector<Separation> separations;
   relaxation_.drop_separations();

@@ -50,20 +50,56 @@ void clip(std::vector<glm::dvec2>& polygon, const glm::dvec2& a, const glm::dvec
   polygon = std::move(left);
 }
 
-/// The unit normal of `other` that points to the side where the sheet is, or 0 if there is none.
-glm::dvec3 side(const Corners& face, const Corners& other, std::span<const Corners> sheet) {
-  const glm::dvec3 middle = (face[0] + face[1] + face[2]) / 3.0;
-  const glm::dvec3 start = closest_point(middle, other[0], other[1], other[2]).point;
-  double least = std::numeric_limits<double>::infinity();
-  glm::dvec3 toward(0);
-  for (const Corners& t : sheet) {
-    const ClosestPoint found = closest_point(start, t[0], t[1], t[2]);
-    if (found.distance_squared < least) least = found.distance_squared, toward = found.point - start;
+/// The overlap of two triangles in a view along the normal of the second.
+struct Overlap {
+  Overlap(const Corners& face, const Corners& other, const glm::dvec3& normal)
+      : Overlap(face, other, normal, right_of(normal)) {}
+
+  bool empty() const { return polygon.empty(); }
+
+  View own, beyond;
+  std::vector<glm::dvec2> polygon;
+
+ private:
+  Overlap(const Corners& face, const Corners& other, const glm::dvec3& normal, const glm::dvec3& right)
+      : own(face, right, glm::cross(normal, right), normal), beyond(other, right, glm::cross(normal, right), normal) {
+    if (own.area == 0 || beyond.area == 0) return;
+    polygon.assign(own.corners, own.corners + 3);
+    for (int k = 0; k < 3; ++k) clip(polygon, beyond.corners[k], beyond.corners[(k + 1) % 3], beyond.area < 0);
   }
-  const glm::dvec3 normal = glm::cross(other[1] - other[0], other[2] - other[0]);
-  const double along = glm::dot(normal, toward), length = glm::length(normal);
-  if (!(std::abs(along) > kSideCosine * length * glm::length(toward))) return glm::dvec3(0);
-  return (along > 0 ? 1 : -1) / length * normal;
+
+  static glm::dvec3 right_of(const glm::dvec3& normal) {
+    const glm::dvec3 axis = std::abs(normal.x) < 0.5 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+    return glm::normalize(glm::cross(axis, normal));
+  }
+};
+
+double squared_distance(const glm::dvec3& p, const Box& box) {
+  const glm::dvec3 d = glm::max(glm::max(box.lower - p, p - box.upper), 0.0);
+  return glm::dot(d, d);
+}
+
+/// Returns the way from `start` to the nearest point of the sheet, and counts the faces that it measures. Only a face
+/// whose box is nearer than the nearest point so far is measured, the one with the nearest box first.
+glm::dvec3 way_to(const Sheet& sheet, const glm::dvec3& start, std::size_t& measured) {
+  std::size_t first = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < sheet.boxes.size(); ++i) {
+    const double away = squared_distance(start, sheet.boxes[i]);
+    if (away < least) least = away, first = i;
+  }
+  least = std::numeric_limits<double>::infinity();
+  glm::dvec3 way(0);
+  const auto measure = [&](const Corners& t) {
+    ++measured;
+    const ClosestPoint found = closest_point(start, t[0], t[1], t[2]);
+    if (found.distance_squared < least) least = found.distance_squared, way = found.point - start;
+  };
+  if (!sheet.faces.empty()) measure(sheet.faces[first]);
+  for (std::size_t i = 0; i < sheet.faces.size(); ++i) {
+    if (i != first && squared_distance(start, sheet.boxes[i]) < least) measure(sheet.faces[i]);
+  }
+  return way;
 }
 
 bool share_a_corner(const Corners& a, const Corners& b) {
@@ -72,22 +108,30 @@ bool share_a_corner(const Corners& a, const Corners& b) {
 
 }  // namespace
 
-void separate(const Corners& face, const Corners& other, std::span<const Corners> sheet, double reach,
-              std::vector<Separation>& found) {
-  if (share_a_corner(face, other)) return;
-  const glm::dvec3 normal = side(face, other, sheet);
-  if (normal == glm::dvec3(0)) return;
-  const glm::dvec3 axis = std::abs(normal.x) < 0.5 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
-  const glm::dvec3 right = glm::normalize(glm::cross(axis, normal)), up = glm::cross(normal, right);
-  const View own(face, right, up, normal), beyond(other, right, up, normal);
-  if (own.area == 0 || beyond.area == 0) return;
-  std::vector<glm::dvec2> overlap(own.corners, own.corners + 3);
-  for (int k = 0; k < 3; ++k) clip(overlap, beyond.corners[k], beyond.corners[(k + 1) % 3], beyond.area < 0);
-  for (const glm::dvec2& p : overlap) {
-    const glm::dvec3 weights = own.weights(p);
-    const double offset = glm::dot(beyond.weights(p), beyond.heights);
-    if (glm::dot(weights, own.heights) - offset < reach) found.push_back({weights, normal, offset});
+std::size_t separate(const Corners& face, const Corners& other, const Sheet& sheet, double reach,
+                     std::vector<Separation>& found) {
+  std::size_t measured = 0;
+  if (share_a_corner(face, other)) return measured;
+  const glm::dvec3 across = glm::cross(other[1] - other[0], other[2] - other[0]);
+  const double length = glm::length(across);
+  if (!(length > 0)) return measured;
+  glm::dvec3 normal = across / length;
+  // Few faces near each other overlap, and this is found in less time than the side.
+  Overlap overlap(face, other, normal);
+  if (overlap.empty()) return measured;
+
+  const glm::dvec3 middle = (face[0] + face[1] + face[2]) / 3.0;
+  const glm::dvec3 start = closest_point(middle, other[0], other[1], other[2]).point;
+  const glm::dvec3 way = way_to(sheet, start, measured);
+  const double along = glm::dot(normal, way);
+  if (!(std::abs(along) > kSideCosine * glm::length(way))) return measured;
+  if (along < 0) normal = -normal, overlap = Overlap(face, other, normal);
+  for (const glm::dvec2& p : overlap.polygon) {
+    const glm::dvec3 weights = overlap.own.weights(p);
+    const double offset = glm::dot(overlap.beyond.weights(p), overlap.beyond.heights);
+    if (glm::dot(weights, overlap.own.heights) - offset < reach) found.push_back({weights, normal, offset});
   }
+  return measured;
 }
 
 }  // namespace tolvol

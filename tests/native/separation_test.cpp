@@ -29,7 +29,9 @@ Corners plane(double z) { return {dvec3(-50, -50, z), {50, -50, z}, {0, 50, z}};
 std::vector<Separation> separations(const Corners& face, const Corners& other, const Corners& sheet,
                                     double reach = kAnyReach) {
   std::vector<Separation> found;
-  separate(face, other, {&sheet, 1}, reach, found);
+  Sheet one;
+  one.add(sheet);
+  separate(face, other, one, reach, found);
   return found;
 }
 
@@ -114,4 +116,23 @@ TEST(Separation, WhereAllHoldTheFacesDoNotCross) {
   }
   EXPECT_GT(crossed, 300);
   EXPECT_GT(met, crossed + 300);
+}
+
+TEST(Separation, FewFacesOfALargeSheetAreMeasured) {
+  Sheet sheet;
+  constexpr int kSide = 40;
+  for (int i = 0; i < kSide; ++i) {
+    for (int j = 0; j < kSide; ++j) {
+      const dvec3 a(i, j, 1), b(i + 1, j, 1), c(i, j + 1, 1), d(i + 1, j + 1, 1);
+      sheet.add({a, b, c});
+      sheet.add({b, d, c});
+    }
+  }
+  std::vector<Separation> found;
+  const Corners other = moved(kFlat, {20.3, 20.4, 0});
+  EXPECT_LE(separate(moved(other, {0.1, 0.1, 0.02}), other, sheet, kAnyReach, found), 10u);
+  EXPECT_GE(found.size(), 3u);
+  found.clear();
+  EXPECT_EQ(separate(moved(other, {3, 0, 0.02}), other, sheet, kAnyReach, found), 0u) << "they do not overlap";
+  EXPECT_TRUE(found.empty());
 }
