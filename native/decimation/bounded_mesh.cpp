@@ -90,6 +90,11 @@ int BoundedMesh::rank(std::uint32_t vertex) const {
   return joined(vertex) ? 4 : (seam_[vertex] ? 2 : 0) + (on_boundary(vertex) ? 1 : 0);
 }
 
+bool BoundedMesh::movable_with_copies(std::uint32_t vertex) const {
+  return !subset_ && !pinned_[vertex] &&
+         std::ranges::none_of(copies(vertex), [&](std::uint32_t v) { return seam_[v]; });
+}
+
 BoundedMesh::Merge BoundedMesh::merge(Edge e) const {
   const Halfedge h = mesh_.halfedge_handle(e, 0);
   const std::uint32_t v0 = from(h), v1 = to(h);
@@ -97,12 +102,15 @@ BoundedMesh::Merge BoundedMesh::merge(Edge e) const {
   if ((pinned_[v0] && pinned_[v1]) || slots_[v0] == slots_[v1]) return {Freedom::none, h};
   // A point in which sheets touch may slide along the boundary of one of them.
   if (joined(v0) != joined(v1) && !pinned_[v0] && !pinned_[v1] && wedges_.empty() && mesh_.is_boundary(e)) {
-    return {Freedom::either_way, h};
+    if (subset_) return {Freedom::either_way, h};
+    return {Freedom::anywhere, joined(v0) ? mesh_.opposite_halfedge_handle(h) : h};
   }
   // A boundary vertex never leaves the boundary, not even for a vertex that must stay.
   if (rank0 > rank1 && on_boundary(v1) && !on_boundary(v0)) return {Freedom::none, h};
   if (rank1 > rank0 && on_boundary(v0) && !on_boundary(v1)) return {Freedom::none, h};
-  if (rank0 == rank1) return {movable(v0) ? Freedom::anywhere : Freedom::either_way, h};
+  if (rank0 == rank1) {
+    return {movable_with_copies(v0) && movable_with_copies(v1) ? Freedom::anywhere : Freedom::either_way, h};
+  }
   return {Freedom::one_way, rank0 > rank1 ? mesh_.opposite_halfedge_handle(h) : h};
 }
 
@@ -190,7 +198,7 @@ void BoundedMesh::apply(const Change& change) {
       collapse(mesh_, h);
     }
   }
-  place(*change.vertex(), change.position());
+  for (const std::uint32_t copy : copies(*change.vertex())) place(copy, change.position());
 }
 
 BoundedMesh::Saved BoundedMesh::save(std::span<const std::uint32_t> vertices,

@@ -121,7 +121,9 @@ class BoundedMesh {
   /// How the ends of an edge may become one vertex, by what each of them must keep.
   Merge merge(Edge e) const;
   /// Whether a vertex may move by itself.
-  bool movable(std::uint32_t vertex) const { return !subset_ && !pinned_[vertex] && !seam_[vertex] && !joined(vertex); }
+  bool movable(std::uint32_t vertex) const { return !joined(vertex) && movable_with_copies(vertex); }
+  /// Whether a vertex may move along with its copies.
+  bool movable_with_copies(std::uint32_t vertex) const;
 
   /// From now on no change puts a vertex where another is. Only one thread may apply changes then. O(n).
   void keep_apart();

@@ -70,6 +70,7 @@ class CertifiedBounds::VertexTrial : public Trial {
   bool accepts(const Change& change) override { return vertex_is_inside(change) && seems_to_face(change); }
   void commit(const Change& change) override {
     for (const std::uint32_t v : change.carried()) bounds_.note(v, vertex_bound_);
+    for (const std::uint32_t v : change.moved_along()) bounds_.note(v, vertex_bound_);
     if (const auto v = change.vertex()) bounds_.note(*v, vertex_bound_);
   }
 

@@ -4,6 +4,7 @@
 #include "decimation/change.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 
 namespace tolvol {
@@ -40,22 +41,34 @@ bool Change::meets_another() const {
 
 void Change::clear(Kind kind, const VertexPosition& target) {
   kind_ = kind, position_ = target, share_ = 1;
-  elements_.clear(), faces_.clear(), removed_.clear(), new_wedges_.clear();
+  collapses_.clear(), carried_.clear(), moved_along_.clear();
+  elements_.clear(), faces_.clear(), removed_.clear(), vanishing_.clear(), new_wedges_.clear();
 }
 
 bool Change::prepare_collapse(Halfedge h, const VertexPosition& target) {
   clear(Kind::collapse, target);
   halfedge_ = h, vertex_ = mesh_->to(h);
   share_ = std::min(mesh_->share(vertex_), mesh_->share(mesh_->from(h)));
-  collapses_.assign(1, h), carried_.clear();
+  collapses_.assign(1, h);
   if (mesh_->joined(mesh_->from(h)) && !gather_copies(h)) return false;
+  for (const Halfedge each : collapses_) {
+    vanishing_.push_back(mesh_->connectivity().face_handle(each).idx());
+    vanishing_.push_back(mesh_->connectivity().opposite_face_handle(each).idx());
+  }
   for (const Halfedge each : collapses_) {
     if (!link_condition(each) || !gather(each, target.position)) return false;
     if (mesh_->has_wedges() && !wedges_fit(each)) return false;
   }
-  constexpr int kNoFace = -1;
-  for (const std::uint32_t v : carried_) {
-    gather_side(v, target.position, glm::length(mesh_->position(v) - target.position), kNoFace, kNoFace);
+  if (target.position != mesh_->position(vertex_)) {
+    std::ranges::copy_if(mesh_->copies(vertex_), std::back_inserter(moved_along_),
+                         [&](std::uint32_t copy) { return copy != vertex_; });
+  }
+  for (const std::uint32_t v : carried_) gather_side(v, target.position);
+  for (const std::uint32_t copy : moved_along_) {
+    // Those at which a collapse ends were gathered with it.
+    if (std::ranges::none_of(collapses_, [&](Halfedge each) { return mesh_->to(each) == copy; })) {
+      gather_side(copy, target.position);
+    }
   }
   if (mesh_->has_copies() && !slots_fit()) return false;
   for (const Halfedge each : collapses_) {
@@ -69,8 +82,7 @@ bool Change::prepare_collapse(Halfedge h, const VertexPosition& target) {
 bool Change::prepare_relocate(std::uint32_t vertex, const VertexPosition& target) {
   clear(Kind::relocate, target);
   vertex_ = vertex, share_ = mesh_->share(vertex);
-  constexpr int kNoFace = -1;
-  gather_side(vertex, target.position, glm::length(mesh_->position(vertex) - target.position), kNoFace, kNoFace);
+  gather_side(vertex, target.position);
   return true;
 }
 
@@ -133,14 +145,15 @@ bool Change::link_condition(Halfedge h) {
   return !(mesh.is_boundary(v0) && mesh.is_boundary(v1) && !mesh.is_boundary(h) && !mesh.is_boundary(o));
 }
 
-/// Adds the faces around a vertex as they would be with the vertex at `position`.
-void Change::gather_side(std::uint32_t vertex, const glm::dvec3& position, double moved, int skip0, int skip1) {
+/// Adds the faces around a vertex, without those that vanish, as they would be with the vertex at `position`.
+void Change::gather_side(std::uint32_t vertex, const glm::dvec3& position) {
+  const double moved = glm::length(mesh_->position(vertex) - position);
   const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
   const Halfedge start = mesh.halfedge_handle(BoundedMesh::handle(vertex));
   Halfedge at = start;
   do {
     const int f = mesh.face_handle(at).idx();
-    if (f >= 0 && f != skip0 && f != skip1) {
+    if (f >= 0 && std::find(vanishing_.begin(), vanishing_.end(), f) == vanishing_.end()) {
       const glm::uvec3& t = mesh_->triangle(static_cast<std::uint32_t>(f));
       const int corner = t.x == vertex ? 0 : t.y == vertex ? 1 : 2;
       Coverage::Element element{
@@ -158,11 +171,12 @@ bool Change::gather(Halfedge h, const glm::dvec3& position) {
   const std::uint32_t v0 = mesh_->from(h), v1 = mesh_->to(h);
   const double moved0 = glm::length(mesh_->position(v0) - position),
                moved1 = glm::length(mesh_->position(v1) - position);
-  const int skip0 = mesh.face_handle(h).idx(), skip1 = mesh.opposite_face_handle(h).idx();
-  gather_side(v0, position, moved0, skip0, skip1);
-  const std::size_t of_v0 = elements_.size();
-  // Faces around the kept vertex do not change when it stays where it is.
-  if (moved1 > 0) gather_side(v1, position, moved1, skip0, skip1);
+  const std::size_t before = elements_.size();
+  gather_side(v0, position);
+  const std::size_t of_v0 = elements_.size() - before;
+  // Faces around the kept vertex do not change when it stays where it is. Several collapses may end there.
+  const Halfedge first = *std::ranges::find_if(collapses_, [&](Halfedge each) { return mesh_->to(each) == v1; });
+  if (moved1 > 0 && first == h) gather_side(v1, position);
 
   const Halfedge o = mesh.opposite_halfedge_handle(h);
   std::uint32_t apex[2] = {Coverage::kNone, Coverage::kNone};
@@ -292,7 +306,7 @@ bool Change::slots_fit() {
     if (!face.moves) continue;
     const std::uint32_t a = mesh_->slot(face.vertices[(face.corner + 1) % 3]),
                         b = mesh_->slot(face.vertices[(face.corner + 2) % 3]);
-    if (face.vertices[face.corner] == vertex_) continue;
+    if (mesh_->slot(face.vertices[face.corner]) == mesh_->slot(vertex_)) continue;
     if (a == b || a == mesh_->slot(vertex_) || b == mesh_->slot(vertex_)) return false;
     if (is_apex(a) && is_apex(b) && has_face(a, b)) return false;
     for (const std::uint32_t slot : {a, b}) {

@@ -62,6 +62,8 @@ class Change {
   Halfedge halfedge() const { return halfedge_; }
   /// The copies of the vertex that vanishes in a collapse that move along with it and become copies of vertex().
   const std::vector<std::uint32_t>& carried() const { return carried_; }
+  /// The copies of vertex(), without those that are carried, that move along with it.
+  const std::vector<std::uint32_t>& moved_along() const { return moved_along_; }
   /// The edge of a flip.
   Edge edge() const { return edge_; }
   /// The vertex that a collapse leaves or that a relocation moves; none of a flip.
@@ -80,7 +82,7 @@ class Change {
 
  private:
   void clear(Kind kind, const VertexPosition& target);
-  void gather_side(std::uint32_t vertex, const glm::dvec3& position, double moved, int skip0, int skip1);
+  void gather_side(std::uint32_t vertex, const glm::dvec3& position);
   bool link_condition(Halfedge h);
   bool gather(Halfedge h, const glm::dvec3& position);
   bool wedges_fit(Halfedge h);
@@ -92,6 +94,7 @@ class Change {
   Halfedge halfedge_;
   std::vector<Halfedge> collapses_;     ///< With the same edge of other sheets.
   std::vector<std::uint32_t> carried_;  ///< Copies of the vertex that vanishes that have no such edge.
+  std::vector<std::uint32_t> moved_along_;
   Edge edge_;
   std::uint32_t vertex_ = 0;  ///< The vertex that moves.
   VertexPosition position_{};
@@ -99,6 +102,7 @@ class Change {
   std::vector<Coverage::Element> elements_;
   std::vector<Face> faces_;
   std::vector<Coverage::Removed> removed_;
+  std::vector<int> vanishing_;  ///< The faces that the collapses remove, and negative numbers.
   std::vector<NewWedge> new_wedges_;
   std::vector<int> neighbours_;
   std::vector<std::uint32_t> apexes_, around_;

@@ -65,7 +65,7 @@ void EdgeCollapse::sum_quadrics() {
 
 EdgeCollapse::Plan EdgeCollapse::free_plan(Halfedge h) const {
   const std::uint32_t v0 = mesh_.from(h), v1 = mesh_.to(h);
-  const Quadric q = quadrics_[v0] + quadrics_[v1];
+  const Quadric q = quadric_of_copies(v0) + quadric_of_copies(v1);
   const glm::dvec3 &p0 = mesh_.position(v0), &p1 = mesh_.position(v1), middle = (p0 + p1) * 0.5;
   const double cost0 = q(p0), cost1 = q(p1), cost_middle = q(middle);
   glm::dvec3 best = p0;
@@ -126,14 +126,15 @@ void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
 }
 
 /// Tries other positions for a collapse whose best position fails: an end that costs nothing either, as on a plane,
-/// then fitted positions, then the ends that cost something. Where there is nothing to fit to, it tries the ends and
-/// the middle. Where the best position costs nothing, a position off the planes would spoil them for the collapses to
-/// come, and the edge waits instead.
+/// then fitted positions, then the ends that cost something, and where sheets meet the middle, because what the fit
+/// sees of them pulls to several sides. Where there is nothing to fit to, it tries the ends and the middle. Where the
+/// best position costs nothing, a position off the planes would spoil them for the collapses to come, and the edge
+/// waits instead.
 EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) const {
   const Halfedge h = a.halfedge;
   const VertexPosition s0 = mesh_.vertex_position(mesh_.from(h)), s1 = mesh_.vertex_position(mesh_.to(h));
   if (mesh_.certified()) {
-    const Quadric q = quadrics_[mesh_.from(h)] + quadrics_[mesh_.to(h)];
+    const Quadric q = quadric_of_copies(mesh_.from(h)) + quadric_of_copies(mesh_.to(h));
     const double nothing = length_cost(s0.position, s1.position);
     const auto possible_at_end = [&](bool that_costs) {
       return std::ranges::any_of(std::array{s0, s1}, [&](const VertexPosition& end) {
@@ -145,7 +146,9 @@ EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) c
     if (q(best) <= nothing) return Outcome::refused;
     const Outcome fitted = a.fit.collapse(a.trial, h, best, kGiveUpAbove);
     if (fitted != Outcome::refused) return fitted;
-    return possible_at_end(true) ? Outcome::possible : Outcome::refused;
+    if (possible_at_end(true)) return Outcome::possible;
+    if (!mesh_.joined(mesh_.to(h))) return Outcome::refused;
+    return a.trial.try_collapse(h, mesh_.store((s0.position + s1.position) * 0.5));
   }
   for (const VertexPosition& other : {s0, s1, mesh_.store((s0.position + s1.position) * 0.5)}) {
     const Outcome outcome = a.trial.try_collapse(h, other);

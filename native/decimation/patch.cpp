@@ -43,8 +43,8 @@ bool Patch::gather_core(const Change& collapse, int rings) {
   for (const Change::Halfedge h : collapse.collapses()) {
     if (!add(mesh_->from(h)) || !add(mesh_->to(h))) return false;
   }
-  for (const std::uint32_t v : collapse.carried()) {
-    if (!add(v)) return false;
+  for (const auto* copies : {&collapse.carried(), &collapse.moved_along()}) {
+    if (!std::ranges::all_of(*copies, add)) return false;
   }
   std::size_t begin = 0;
   for (int ring = 1; ring < rings; ++ring) {
@@ -96,6 +96,7 @@ void Patch::free_vertices(const Change& collapse, bool boundary_free) {
   // Copies that are carried along do not move any further, so that the vertex to which they are carried must not.
   if (!collapse.carried().empty()) kept.free = false;
   for (const std::uint32_t v : collapse.carried()) place(v);
+  for (const std::uint32_t v : collapse.moved_along()) place(v);
   for (const Change::NewWedge& n : collapse.new_wedges()) {
     const std::uint32_t f = find_face(n.triangle);
     if (f != kNone) faces_[f].wedges[n.corner] = n.gained.wedge;

@@ -119,7 +119,7 @@ void PatchTrial::round_positions() {
     if (v.free) {
       position = mesh_.store(v.position);
     } else if (v.position != position.position) {
-      position = change_.position();  // It merges with the vertex that is kept, which is not free then.
+      position = change_.position();  // It is kept, a copy of that, or carried there; none of these is free then.
     }
     moved_.push_back(position.position != mesh_.position(v.id));
     v.position = position.position;
@@ -129,11 +129,13 @@ void PatchTrial::round_positions() {
 
 bool PatchTrial::meets_another() {
   for (std::uint32_t v = 0; v < positions_.size(); ++v) {
-    if (!patch_.vertices()[v].free) continue;
     const std::uint32_t id = patch_.vertices()[v].id;
-    if (mesh_.meets_another(positions_[v], id, id == *change_.vertex() ? vanished_ : id)) met_another_ = true;
+    const bool is_free = patch_.vertices()[v].free;
+    const bool is_kept = id == *change_.vertex();
+    if ((is_free || is_kept) && mesh_.meets_another(positions_[v], id, is_kept ? vanished_ : id)) met_another_ = true;
     for (std::uint32_t w = 0; w < v; ++w) {
-      if (positions_[v].stored == positions_[w].stored) return true;
+      // Copies, none of which is free, are at one place.
+      if ((is_free || patch_.vertices()[w].free) && positions_[v].stored == positions_[w].stored) return true;
     }
   }
   return met_another_;
