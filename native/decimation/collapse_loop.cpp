@@ -32,7 +32,8 @@ CollapseLoop::Shared::Shared(EdgeCollapse& c)
     : collapse(c),
       before(c.mesh().triangle_count()),
       stamps(c.mesh().connectivity().n_edges(), 0),
-      refused(stamps.size()) {}
+      refused(stamps.size()),
+      spared(stamps.size(), 0) {}
 
 CollapseLoop::CollapseLoop(Shared& shared, const Regions& regions, std::uint32_t region, Surroundings* around,
                            DeferredProof* later)
@@ -112,7 +113,7 @@ void CollapseLoop::run(const Until& until, Progress* progress) {
       progress->update(static_cast<double>(shared_.before - left) / static_cast<double>(shared_.before));
     }
     const auto entry = queue_.pop();
-    if (!entry && call_back_met()) continue;
+    if (!entry && (call_back_met() || call_back_spared())) continue;
     if (!entry || entry->cost >= until.cost) break;
     if (deleted(entry->edge)) continue;
     if (rationed(entry->edge)) {
@@ -165,8 +166,10 @@ void CollapseLoop::give_back(std::unique_ptr<Attempt> attempt) {
 void CollapseLoop::try_now(std::uint32_t edge, Tried& tried) {
   give_back(std::move(tried.attempt));  // The attempt of an edge whose turn did not come.
   std::unique_ptr<Attempt> attempt = take_attempt();
+  attempt->at_any_cost = at_any_cost_;
   collapse_.attempt(edge, *attempt);
-  tried = {attempt->outcome, attempt->trial.looked_at(), attempt->trial.met_another(), attempt->trial.read()};
+  tried = {attempt->outcome, attempt->trial.looked_at(), attempt->spared, attempt->trial.met_another(),
+           attempt->trial.read()};
   if (tried.outcome == EdgeCollapse::Outcome::possible) {
     tried.attempt = std::move(attempt);
   } else {
@@ -263,7 +266,10 @@ void CollapseLoop::carry_out(std::uint32_t edge, Tried& tried) {
     give_back(std::move(tried.attempt));
   } else if (tried.outcome == EdgeCollapse::Outcome::refused) {
     note_refusal(edge, tried);
-    if (!later_) shared_.refused[edge].store(true, std::memory_order_relaxed);
+    if (!later_) {
+      shared_.refused[edge].store(true, std::memory_order_relaxed);
+      shared_.spared[edge] = tried.spared;
+    }
     // Crossings are looked for last, so that all else would have held.
     if (!regions_ && !tried.read.empty()) met_.push_back({edge, tried.read, changes_.size()});
   }
@@ -296,6 +302,21 @@ bool CollapseLoop::call_back_met() {
   met_ = std::move(waiting);
   changes_.clear();
   called_back_ = true;
+  return any;
+}
+
+/// Puts back, once, the edges of the whole mesh that were spared, and returns whether there are any. Nothing else can
+/// collapse by now, so that hardly anything is left for which to spare them.
+bool CollapseLoop::call_back_spared() {
+  if (regions_ || std::exchange(at_any_cost_, true)) return false;
+  bool any = false;
+  for (std::uint32_t edge = 0; edge < shared_.spared.size(); ++edge) {
+    poll_at(edge);
+    if (!shared_.spared[edge] || !shared_.refused[edge] || deleted(edge)) continue;
+    shared_.refused[edge].store(false, std::memory_order_relaxed);
+    renew(edge);
+    any = true;
+  }
   return any;
 }
 

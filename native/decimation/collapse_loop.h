@@ -32,6 +32,7 @@ class CollapseLoop {
     std::size_t before;                      ///< The number of triangles at the start.
     std::vector<std::uint32_t> stamps;       ///< For each edge, the stamp of the queues.
     std::vector<std::atomic<bool>> refused;  ///< Whether the edge waits for its neighbourhood to change.
+    std::vector<std::uint8_t> spared;        ///< Whether the edge was spared then. Threads would share bits.
   };
   /// A loop over one region. If `later` is not null, collapses are noted there instead of being proved. `around` is
   /// null where crossings are allowed.
@@ -57,6 +58,7 @@ class CollapseLoop {
   struct Tried {
     EdgeCollapse::Outcome outcome = EdgeCollapse::Outcome::impossible;
     std::size_t looked_at = 0;           ///< The number of parts of the reference's pieces that were looked at.
+    bool spared = false;                 ///< Whether positions that cost something were not asked for.
     bool met_another = false;            ///< Whether a vertex was in the way that may have gone since.
     Box read{};                          ///< What was found of crossings depends on the faces in this box.
     std::unique_ptr<Attempt> attempt{};  ///< Null unless the collapse is possible.
@@ -96,6 +98,7 @@ class CollapseLoop {
   void renew_ring(std::uint32_t vertex);
   void call_back(std::uint32_t vertex);
   bool call_back_met();
+  bool call_back_spared();
 
   Shared& shared_;
   EdgeCollapse& collapse_;
@@ -115,6 +118,7 @@ class CollapseLoop {
   std::vector<std::uint32_t> ring_;        ///< The neighbours of the vertex that vanished last.
   /// The crowds by vertex: those with many faces around them where a try was refused.
   std::unordered_map<std::uint32_t, Crowd> crowds_;
+  bool at_any_cost_ = false;  ///< Whether the spared edges were called back.
   std::vector<Met> met_;      ///< The edges that were refused so, if there are no regions.
   bool called_back_ = false;  ///< Whether these were called back once.
   std::vector<Box> changes_;  ///< The boxes in which faces have changed since they were called back last.

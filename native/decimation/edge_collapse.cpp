@@ -106,7 +106,7 @@ double EdgeCollapse::cost(std::uint32_t edge) const {
 }
 
 void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
-  a.outcome = Outcome::impossible;
+  a.outcome = Outcome::impossible, a.spared = false;
   a.trial.begin();
   const std::optional<Plan> p = plan(BoundedMesh::edge(edge));
   if (!p) return;
@@ -128,8 +128,8 @@ void EdgeCollapse::attempt(std::uint32_t edge, Attempt& a) const {
 /// Tries other positions for a collapse whose best position fails: an end that costs nothing either, as on a plane,
 /// then fitted positions, then the ends that cost something, and where sheets meet the middle, because what the fit
 /// sees of them pulls to several sides. Where there is nothing to fit to, it tries the ends and the middle. Where the
-/// best position costs nothing, a position off the planes would spoil them for the collapses to come, and the edge
-/// waits instead.
+/// best position costs nothing, a position off the planes would spoil them for the collapses to come: the edge is
+/// spared, and waits until it is to be tried at any cost.
 EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) const {
   const Halfedge h = a.halfedge;
   const VertexPosition s0 = mesh_.vertex_position(mesh_.from(h)), s1 = mesh_.vertex_position(mesh_.to(h));
@@ -143,7 +143,8 @@ EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) c
       });
     };
     if (possible_at_end(false)) return Outcome::possible;
-    if (q(best) <= nothing) return Outcome::refused;
+    a.spared = q(best) <= nothing && !a.at_any_cost;
+    if (a.spared) return Outcome::refused;
     const Outcome fitted = a.fit.collapse(a.trial, h, best, kGiveUpAbove);
     if (fitted != Outcome::refused) return fitted;
     if (possible_at_end(true)) return Outcome::possible;

@@ -36,8 +36,11 @@ class EdgeCollapse {
   struct Attempt {
     Attempt(const BoundedMesh& mesh, Surroundings* around, ChangeTrial::Proof proof = ChangeTrial::Proof::now)
         : trial(mesh, around, proof), fit(mesh) {}
+    /// Asks for positions that cost something, too, where the best one costs nothing.
+    bool at_any_cost = false;
     Outcome outcome = Outcome::impossible;
-    Halfedge halfedge;  ///< Its start would merge into its end.
+    bool spared = false;  ///< Whether it was refused without asking for these positions.
+    Halfedge halfedge;    ///< Its start would merge into its end.
     ChangeTrial trial;
     PositionFit fit;
   };

@@ -92,6 +92,15 @@ TEST(Slivers, AStarIsFilled) {
   EXPECT_LE(r.triangles.size(), 40u);
 }
 
+// The quadric's best position between two tips costs next to nothing, and is refused.
+TEST(Slivers, AStarIsFilledFromTheTipsOfItsRays) {
+  Case c = star(2500);
+  c.percent = 0.16;
+  const DecimationResult r = run(c, alone());
+  cases::expect_within(c, r);
+  EXPECT_LE(r.triangles.size(), 50u);
+}
+
 TEST(Slivers, TheWorkAtAFanGrowsHardlyFasterThanItsFaces) {
   std::size_t before = 0;
   for (const unsigned rim : {500u, 1000u, 2000u}) {
