@@ -20,6 +20,7 @@ import tolvol  # noqa: E402
 
 import meshes as shapes  # noqa: E402
 import tables  # noqa: E402
+from least_open import least_open  # noqa: E402
 from scan import scan  # noqa: E402
 
 HEADS = (
@@ -27,6 +28,7 @@ HEADS = (
     "Triangles",
     "Holes closed",
     "Left open",
+    "Least without closing",
     "Left without closing",
     "Left with closing",
     "Result → reference",
@@ -57,15 +59,16 @@ def icosphere(levels):
 
 
 def bumpy_sphere(missing, seed=1):
-    """Returns a bumpy sphere of which a share of the faces is missing at random."""
+    """Returns a bumpy sphere of which a share of the faces is missing at random, and the bound of least_open()."""
     vertices, triangles = icosphere(SUBDIVIDED)
     x, y, z = vertices.T
     vertices = vertices * (1 + 0.05 * np.sin(5 * x) * np.cos(4 * y + z))[:, None]
     kept = np.random.default_rng(seed).permutation(len(triangles))[: round((1 - missing) * len(triangles))]
-    return vertices.astype(np.float32), triangles[np.sort(kept)].astype(np.int32)
+    is_there = np.isin(np.arange(len(triangles)), kept)
+    return vertices.astype(np.float32), triangles[is_there].astype(np.int32), least_open(triangles, is_there)
 
 
-def measured(name, vertices, triangles):
+def measured(name, vertices, triangles, least=None):
     """Returns a row of the table, on one thread."""
     volume = tolvol.ToleranceVolume(vertices, triangles, 0.01 * tolvol.diagonal(vertices, triangles))
     clock = [time.process_time()]
@@ -75,6 +78,8 @@ def measured(name, vertices, triangles):
     result = tolvol.decimate(vertices, closed.triangles, volume, threads=1)
     clock.append(time.process_time())
     ways = tolvol.hausdorff(result.vertices, result.triangles, vertices, triangles, bound=volume.tolerance)
+    if least and len(without.triangles) < least:
+        sys.exit(f"{name}: {len(without.triangles)} triangles are left, fewer than {least}")
     if ways.upper > volume.tolerance or len(tolvol.crossing_pairs(result.vertices, result.triangles)):
         sys.exit(f"{name}: the result is not as promised")
     return [
@@ -82,6 +87,7 @@ def measured(name, vertices, triangles):
         f"{len(triangles):,}",
         f"{closed.report['closed']:,}",
         f"{sum(closed.report['refused'].values()):,}",
+        f"{least:,}" if least else "",
         f"{len(without.triangles):,}",
         f"**{len(result.triangles):,}**",
         f"{ways.forward.upper / volume.tolerance:.3f}",

@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How few triangles a decimation leaves: a change of the code that leaves more of them fails here."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 import tolvol
 
+import judge
 import meshes
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmark"))
+from least_open import least_open  # noqa: E402
 
 ALLOWANCE = 1.03
 MODELS = {
@@ -63,3 +70,22 @@ def test_fast_asks_again_where_the_sheets_of_a_wall_met():
         volume = tolvol.ToleranceVolume(vertices, triangles, percent / 100 * tolvol.diagonal(vertices, triangles))
         left += len(tolvol.decimate(vertices, triangles, volume).triangles)
     assert left <= 870
+
+
+@pytest.mark.parametrize("missing, over_least", [(0, None), (0.2, 1.035), (0.5, 1.82)])
+def test_missing_faces_cost_hardly_more_than_their_rims(missing, over_least):
+    """It left 1.05 and 1.98 of the least while vertices in which sheets meet did not move."""
+    vertices, triangles = meshes.sphere(4)
+    bumps = 1 + 0.05 * np.sin(5 * vertices[:, :1]) * np.cos(4 * vertices[:, 1:2] + vertices[:, 2:])
+    vertices = (vertices * bumps).astype(np.float32)
+    is_there = np.random.default_rng(1).random(len(triangles)) >= missing
+    faces = triangles[is_there]
+    volume = tolvol.ToleranceVolume(vertices, faces, 0.01 * tolvol.diagonal(vertices, faces))
+    result = tolvol.decimate(vertices, faces, volume)
+    judge.assert_promise(vertices, faces, result, volume.tolerance)
+    least = least_open(triangles, is_there)
+    assert least <= len(result.triangles)
+    if missing:
+        assert len(result.triangles) <= over_least * least
+    else:
+        assert least == -4  # Without a hole the bound is minus twice the Euler characteristic of a sphere.
