@@ -122,6 +122,48 @@ def crossing_count(run, vertices, triangles, most=10**6):
     return count
 
 
+def no_more_crossings(run, before, after, triangle_source):
+    """Requires that no more pairs of triangles cross than before, but for sheets that lie exactly on each other.
+
+    Such sheets are exempt from each other. triangle_source: for each triangle after, one before that it stands for.
+    """
+    sheet = double_sheets(*before)
+
+    def count(mesh, of):
+        pairs = np.asarray(run.call("crossing_pairs", lambda: tolvol.crossing_pairs(*mesh))).reshape(-1, 2)
+        a, b = of[pairs].T
+        return int(((a != b) | (a < 0)).sum())
+
+    now, had = count(after, sheet[triangle_source]), count(before, sheet)
+    if now > had:
+        raise Finding("crossings", f"{now} pairs of faces cross, {had} did before")
+
+
+def double_sheets(vertices, triangles):
+    """Returns a label for each triangle: equal for those of sheets that lie on each other, and -1 for all others.
+
+    A triangle is part of such a sheet if another one has its three positions. Sheets are connected by edges.
+    """
+    _, place = np.unique(vertices + 0.0, axis=0, return_inverse=True)
+    corners = np.sort(place.reshape(-1)[triangles], axis=1)
+    _, label, count = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
+    label = label.reshape(-1)
+    double = (count[label] > 1) & (np.diff(corners, axis=1) > 0).all(1)
+    _, edge = np.unique(corners[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=0, return_inverse=True)
+    edges = edge.reshape(-1, 3)
+    sheet = np.where(double, label, -1)
+    while True:  # Each edge gives its triangles the least of their labels, and so does each place.
+        least = np.full(edges.max(initial=-1) + 1, len(triangles))
+        np.minimum.at(least, edges[double].ravel(), np.repeat(sheet[double], 3))
+        of_place = np.full(len(count), len(triangles))
+        np.minimum.at(of_place, label[double], least[edges[double]].min(1))
+        lower = sheet.copy()
+        lower[double] = of_place[label[double]]
+        if (lower == sheet).all():
+            return sheet
+        sheet = lower
+
+
 ANGLE_PAIRS = 200_000  # of a face and a triangle of the reference; a second
 ANGLE_ROUNDING = 1e-3  # degrees
 

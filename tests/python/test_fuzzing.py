@@ -194,3 +194,14 @@ def test_the_second_judge_agrees():
     assert judges.crossings_by_cgal(*a, seconds=None) == 0
     several = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])
     assert judges.crossings_by_cgal(np.eye(5)[:, :3] * 3, several) is None, "no manifold"
+
+
+def test_double_sheets_are_told_from_others():
+    plate, torus = meshes.plate(4), meshes.torus(12, 8)
+    vertices, triangles = meshes.join(plate, torus, (plate[0], plate[1][:, ::-1]), (plate[0] + [0, 0, 1], plate[1]))
+    sheet = judges.double_sheets(vertices, triangles)
+    count = len(plate[1])
+    lies_on_another = np.zeros(len(triangles), bool)
+    lies_on_another[:count] = lies_on_another[count + len(torus[1]) :][:count] = True
+    assert np.array_equal(sheet >= 0, lies_on_another)
+    assert len(np.unique(sheet[lies_on_another])) == 1
