@@ -20,7 +20,9 @@ class JobOperator:
         description="The names of the objects that the operator worked on, as JSON", options={"HIDDEN", "SKIP_SAVE"}
     )
 
-    doing = ""  # text for the status bar in place of the native stage
+    # Texts for the status bar and the panel: doing and count are in place of the native stage and its count.
+    doing = ""
+    count = ""
     part = ""  # which part of the work is under way, such as "Level 2 of 3", if there are several
 
     voice = None  # the helper that reports in place of this operator (adjusting.py)
@@ -115,5 +117,5 @@ class JobOperator:
         named = [bpy.data.objects.get(name) for name in json.loads(self.worked_on or "[]")] if again else []
         self.objects = named if named and all(named) else self.targets(context)
         self.worked_on = json.dumps([ob.name for ob in self.objects])
-        self.voice, self.doing, self.part = None, "", ""
+        self.voice, self.doing, self.count, self.part = None, "", "", ""
         self._run = run.Run(self, context)

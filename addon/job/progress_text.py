@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Says how far the work of an operator is, in a line for the status bar and in lines for the panel."""
+"""Says how far the work of an operator is, for the status bar and the panel."""
 
 import time
+from dataclasses import dataclass
 
 # The time that a stage still takes is told after so many seconds, and after such a share of the stage.
 _KNOWN_AFTER, _KNOWN_SHARE = 1.0, 0.05
@@ -22,46 +23,48 @@ class Clock:
         return took * (1 - share) / share if took >= _KNOWN_AFTER and share >= _KNOWN_SHARE else None
 
 
-def status_line(operator, progress):
-    """Returns the text for the status bar."""
-    if progress.cancelled:
-        return "Stopping"
-    stage, count, share = _stage(progress)
-    native_stage = stage + (f" {share:.0%}" if share else "") + (f", {count}" if count else "")
-    prefix = f"{operator.part}: " if operator.part else ""
-    return f"{prefix}{operator.doing or native_stage}    Esc: {_escape(operator)}"
+@dataclass(frozen=True)
+class Told:
+    """What is known about the work, as texts, which are empty where nothing is known."""
+
+    title: str  # the part of the work that is under way, or the name of the operator
+    stage: str
+    share: float | None  # of the stage that is done
+    left: str  # how long the stage goes on
+    count: str
+    escape: str  # what Esc does
 
 
-def panel_lines(operator, progress, clock):
-    """Returns the lines of text for the panel, and the share of the stage that is done, or None if it is not known."""
-    if progress.cancelled:
-        return [operator.bl_label, "Stopping"], None
-    lines = [operator.bl_label, *([operator.part] if operator.part else [])]
-    stage, count, share = _stage(progress)
+def tell(operator, progress, clock):
+    """Returns the Told of an operator."""
     left = clock.seconds_left(progress)
+    if progress.cancelled:
+        return Told(operator.bl_label, "Stopping", None, "", "", "")
+    title = operator.part or operator.bl_label
+    escape = "Keep Present Result" if operator.improving() else "Cancel"
     if operator.doing:
-        lines.append(operator.doing)
-    else:
-        lines += [stage, *([count] if count else [])]
-        lines += [f"About {_duration(left)} left of this stage"] if left is not None else []
-    lines.append(f"Esc: {_escape(operator)}")
-    return lines, None if operator.doing else share
+        return Told(title, operator.doing, None, "", operator.count, escape)
+    # In these two stages the count is the number of triangles left.
+    counts = progress.count and progress.stage in {"decimating", "refining"}
+    return Told(
+        title,
+        progress.stage.capitalize(),
+        progress.fraction or None,
+        f"{_duration(left)} left" if left is not None else "",
+        f"{progress.count:,} triangles left" if counts else "",
+        escape,
+    )
+
+
+def status_line(operator, told):
+    """Returns the text for the status bar."""
+    if not told.escape:
+        return told.stage
+    part = f"{operator.part}: " if operator.part else ""
+    share = f" {told.share:.0%}" if told.share else ""
+    count = f", {told.count}" if told.count else ""
+    return f"{part}{told.stage}{share}{count}    Esc: {told.escape}"
 
 
 def _duration(seconds):
     return f"{seconds:.0f} s" if seconds < 60 else f"{seconds / 60:.0f} min"
-
-
-def _stage(progress):
-    """Returns the native stage, what it counts, and its share that is done, or None."""
-    # In these two stages the count is the number of triangles left.
-    counts = progress.count and progress.stage in {"decimating", "refining"}
-    return (
-        progress.stage.capitalize(),
-        f"{progress.count:,} triangles left" if counts else "",
-        progress.fraction or None,
-    )
-
-
-def _escape(operator):
-    return "Keep Present Result" if operator.improving() else "Cancel"

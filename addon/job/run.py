@@ -29,9 +29,9 @@ class Run:
         self._job = None
         self._timer = None
 
-    def shown(self):
-        """Returns what is known about the work, as lines of text for the panel, and its share that is done, or None."""
-        return progress_text.panel_lines(self.operator, self.progress, self._clock)
+    def told(self):
+        """Returns what is known about the work, for the panel."""
+        return progress_text.tell(self.operator, self.progress, self._clock)
 
     def advance(self):
         """Starts the next work. Returns the operator's result if there is no more work, else None."""
@@ -95,7 +95,7 @@ class Run:
             if ended:
                 self._leave(context)
                 return ended
-        status = progress_text.status_line(self.operator, self.progress)
+        status = progress_text.status_line(self.operator, self.told())
         context.workspace.status_text_set(
             status + (f"    Waits for {_MODES.get(self._mode, 'its mode')}" if waits else "")
         )

@@ -234,8 +234,8 @@ ways, and apply the modifier to the base mesh. An object without a reference get
                 value = search.send(deviation)
             except StopIteration:
                 break
-            best = f", {min(self._found)[0]:,} triangles so far" if self._found else ""
-            self.doing = f"Fitting {name}: {parameter.label} {value:.4g}{best}"
+            self.part, self.doing = f"Fitting {name}", f"{parameter.label} {value:.4g}"
+            self.count = f"{min(self._found)[0]:,} triangles so far" if self._found else ""
             setattr(evaluation.modifier, parameter.name, value)
             arrays = mesh_io.read_mesh(evaluation.mesh())
             deviation = yield trial.measured(arrays)
@@ -245,8 +245,9 @@ ways, and apply the modifier to the base mesh. An object without a reference get
 
     def _proved(self, evaluation, parameter, trial, values):
         """Returns (value, mesh, the result of certified()) for the first of the values whose mesh is proved to be within."""
+        name = evaluation.modifier.name
         for i, value in enumerate(values):
-            self.doing = f"Proving {evaluation.modifier.name}: {parameter.label} {value:.4g}"
+            self.part, self.doing, self.count = f"Proving {name}", f"{parameter.label} {value:.4g}", ""
             setattr(evaluation.modifier, parameter.name, value)
             mesh = evaluation.new_mesh()
             try:
@@ -255,12 +256,11 @@ ways, and apply the modifier to the base mesh. An object without a reference get
                 bpy.data.meshes.remove(mesh)
                 if not isinstance(error, NotProved) or i + 1 == len(values):
                     raise
-        name = evaluation.modifier.name
         raise Refused(f"No {parameter.label} of {name} keeps {self.ob.name} within the tolerance both ways")
 
     def _plain(self, context, trial):
         """Returns how many triangles Decimate would leave with its default settings."""
-        self.doing = "Comparing with Decimate"
+        self.part, self.doing, self.count = "", "Comparing with Decimate", ""
         settings = self.ob.tolvol
         options = decimation.options(settings, automatic_placement(self.ob.data), trial.threads)
         options |= {"two_sided": True, "effort": "fast", "target_triangles": None, "max_seconds": None}

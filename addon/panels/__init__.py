@@ -18,6 +18,7 @@ from .deviation import (
 from .guard import TOLVOL_PT_guard
 from .lod import TOLVOL_PT_lod
 from .modifiers import TOLVOL_PT_modifiers
+from .notes import TOLVOL_PT_notes
 from .smooth import TOLVOL_PT_smooth
 from .tolerance import TOLVOL_PT_tolerance
 
@@ -38,6 +39,7 @@ _CLASSES = (
     TOLVOL_PT_modifiers,
     TOLVOL_PT_deform,
     TOLVOL_PT_guard,
+    TOLVOL_PT_notes,
 )
 
 _register, _unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -3,13 +3,16 @@
 
 import bpy
 
-from .. import measuring, overlay
+from .. import job, measuring, overlay
 from ..operators.probe import TOLVOL_OT_probe, tolerance_of
 from ..overlay import reasons
-from ..proof import kept_warnings, labels, last_run, probing, report, statistics, verdict
-from ..reference import measurements
+from ..proof import labels, probing, report, statistics, verdict
 from ..units import length
-from .layout import AMBER, GHOST, GREEN, GREY, RED, SubPanel, active, is_narrow, right, text_lines
+from .layout import GHOST, GREEN, GREY, RED, SubPanel, active, is_narrow, right, text_lines, wrapped
+from .progress import draw_progress
+
+# The digits of a margin that is a smaller share of the tolerance have no room.
+_LITTLE = 1e-4
 
 
 class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
@@ -18,8 +21,11 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         ob = active(context)
-        found = verdict.of(ob)
-        self._draw_verdict(context, found)
+        run, box = job.under_way(), layout.box()
+        if run is not None and run.concerns(ob):
+            draw_progress(context, box, run.told())
+        else:
+            _draw_verdict(context, box, ob, verdict.of(ob))
         row = layout.row(align=True)
         row.operator("tolvol.check")
         row.operator("tolvol.select_outside")
@@ -36,38 +42,28 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         row.prop(context.window_manager, "tolvol_show_original", toggle=True)
         row.operator("tolvol.restore_original", text="", icon="LOOP_BACK")
         row.operator("tolvol.new_original", text="", icon="DUPLICATE")
-        # What may need several lines is below the buttons, so that they do not move.
-        if found is None:
-            text_lines(context, layout, _why_not_checked(ob), GREY)
-        elif found.kind != verdict.WITHIN:
-            text_lines(context, layout, found.line(), AMBER if found.passed else RED)
-        if on_top := measurements.on_top(ob):
-            text_lines(context, layout, f"The proof is for the base mesh, without its {' and '.join(on_top)}", "INFO")
-        if ob.tolvol.show_deviation and (reason := reasons.off()):
-            text_lines(context, layout, f"The deviation is not shown: {reason}", "INFO")
-        _draw_last_run(context, layout, ob)
 
-    def _draw_verdict(self, context, found):
-        """Draws the same rows with and without a measurement."""
-        box = self.layout.box()
-        narrow = is_narrow(context)
-        row = box.row()
-        row.scale_y, row.alert = 1.5, found is not None and not found.passed
-        if found is None:
-            row.label(text=verdict.NOT_CHECKED, icon=GREY)
-        else:
-            row.label(text=found.word if narrow else f"{found.word}  {found.ways}", icon=GREEN if found.passed else RED)
-        column = box.column(align=True)
-        for text, side in (("Mesh", "forward"), ("Reference", "backward")):
-            value = getattr(found, side).upper if found else None
-            _row(column, text, _distance(context, value, found.tolerance, narrow) if found else None, narrow)
-        if found:
-            left = found.margin_percent()
-            left = left if narrow else f"{length(context, abs(found.margin))}  {left}"
-            name = "Margin" if found.passed else "Beyond by" if found.surely_beyond else "Unproved by"
-            _row(column, name, left, narrow)
-        else:
-            _row(column, "Margin", None, narrow)
+
+def _draw_verdict(context, box, ob, found):
+    """Draws the same number of rows with and without a measurement."""
+    narrow = is_narrow(context)
+    row = box.row()
+    row.scale_y, row.alert = 1.5, found is not None and not found.passed
+    column = box.column(align=True)
+    if found is None:
+        row.label(text=verdict.NOT_CHECKED, icon=GREY)
+        for line in (*wrapped(context, _why_not_checked(ob)), "", "")[:3]:
+            column.label(text=line)
+        return
+    row.label(text=found.word if narrow else f"{found.word}  {found.ways}", icon=GREEN if found.passed else RED)
+    for text, way in (("Mesh", found.forward), ("Reference", found.backward)):
+        _row(column, text, _distance(context, way.upper, found.tolerance, narrow), narrow)
+    left = found.margin_percent()
+    if abs(found.margin) < _LITTLE * found.tolerance:
+        left = "almost 0"
+    elif not narrow:
+        left = f"{length(context, abs(found.margin))}  {left}"
+    _row(column, "Margin" if found.passed else "Beyond by" if found.surely_beyond else "Unproved by", left, narrow)
 
 
 def _distance(context, value, tolerance, narrow):
@@ -81,26 +77,6 @@ def _share(value, tolerance):
     return "almost 0" if verdict.negligible(value, tolerance) else report.percent(value, tolerance)
 
 
-def _draw_last_run(context, layout, ob):
-    """Draws what is known about the last operation: until the mesh changes, but its warnings until the next operation."""
-    if run := last_run.shown(ob):
-        lines = report.remembered(run, context)
-        for line, icon in zip(lines or (), ("CHECKMARK", "MESH_DATA")):
-            if line:
-                text_lines(context, layout, line, icon)
-        if lines is None:
-            damaged = "The report of the last operation is damaged: the next operation makes a new one"
-            text_lines(context, layout, damaged, "ERROR")
-    warnings, staying = kept_warnings.of(ob)
-    for warning in warnings:
-        text_lines(context, layout, warning, "ERROR")
-    known = {kept_warnings.ISLANDS, kept_warnings.ASKED_FOR}
-    if others := [f"{count:,} by {cause}" for cause, count in staying.items() if cause not in known]:
-        text_lines(context, layout, f"Vertices that had to stay: {', '.join(others)}", "INFO")
-    if count := staying.get(kept_warnings.ISLANDS):
-        layout.operator("tolvol.select_staying", text=f"Select {count:,} Staying Vertices")
-
-
 def _row(column, name, text, narrow):
     row = column.split(factor=0.38 if not narrow else 0.55)
     row.label(text=name)
@@ -111,12 +87,12 @@ def _why_not_checked(ob):
     if measuring.wanted(ob):
         return "Being measured"
     if ob.mode != "OBJECT":
-        return "Switch to Object Mode to measure or decimate"
+        return "Switch to Object Mode"
     return "Press Check to measure it" if ob.tolvol.snapshot else "Set the reference first"
 
 
 class TOLVOL_PT_objects(SubPanel, bpy.types.Panel):
-    """The verdicts of the selected objects that have a reference."""
+    """The verdicts of the selected meshes. It is there before they have a reference, so that no panel below moves then."""
 
     bl_label = "Selected Objects"
     bl_parent_id = "TOLVOL_PT_deviation"
@@ -143,7 +119,7 @@ _ICONS_OF = {verdict.FAIL: RED, verdict.NOT_CHECKED: GREY, verdict.PASS: GREEN}
 
 
 def _listed(context):
-    return [ob for ob in context.selected_objects if ob.type == "MESH" and ob.tolvol.snapshot is not None]
+    return [ob for ob in context.selected_objects if ob.type == "MESH"]
 
 
 def verdicts(objects):

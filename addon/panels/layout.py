@@ -48,19 +48,35 @@ def is_narrow(context):
     return context.region.width < _NARROW * context.preferences.system.ui_scale
 
 
-def text_lines(context, layout, text, icon):
-    """Draws a label, broken into lines that fit the sidebar."""
+def _room(context):
+    """Sets the font of the panels. Returns how many pixels a text may be wide."""
     scale = context.preferences.system.ui_scale
     blf.size(_FONT, context.preferences.ui_styles[0].widget.points * scale)
-    room = max(context.region.width, 100) - _BESIDE_TEXT * scale
-    lines, column = [""], layout.column(align=True)
+    return max(context.region.width, 100) - _BESIDE_TEXT * scale
+
+
+def fitting(context, *texts):
+    """Returns the first of the texts that fits the sidebar, or the last."""
+    room = _room(context)
+    return next((text for text in texts if blf.dimensions(_FONT, text)[0] <= room), texts[-1])
+
+
+def wrapped(context, text):
+    """Returns the text as lines that fit the sidebar."""
+    room, lines = _room(context), [""]
     for word in text.split(" "):
         longer = f"{lines[-1]} {word}".strip()
         if lines[-1] and blf.dimensions(_FONT, longer)[0] > room:
             lines.append(word)
         else:
             lines[-1] = longer
-    for i, line in enumerate(lines):
+    return lines
+
+
+def text_lines(context, layout, text, icon):
+    """Draws a label, broken into lines that fit the sidebar."""
+    column = layout.column(align=True)
+    for i, line in enumerate(wrapped(context, text)):
         column.label(text=line, icon="BLANK1" if i else icon)
 
 

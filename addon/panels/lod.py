@@ -23,9 +23,15 @@ class TOLVOL_PT_lod(SubPanel, bpy.types.Panel):
         layout.operator("tolvol.make_lods")
         if (reason := surface_blocked(ob)) and not object_blocked(ob):
             text_lines(context, layout, reason, "ERROR")
-        column = layout.column(align=True)
-        for level in ob.tolvol.lods.objects if ob.tolvol.lods else ():
+        # Each level has its row before it is made, so that no panel below moves.
+        column, made = layout.column(align=True), ob.tolvol.lods.objects[:] if ob.tolvol.lods else []
+        for i in range(max(ob.tolvol.lod.levels, len(made))):
             row = column.row()
+            if i >= len(made):
+                row.label(text=f"LOD{i + 1}")
+                right(row, "\u2013")
+                continue
+            level = made[i]
             row.label(text=level.name.removeprefix(f"{ob.name}_"))
             right(row, f"{len(level.data.polygons):,}" if level.type == "MESH" else "")
             error = level.get(GEOMETRIC_ERROR)

@@ -8,6 +8,7 @@ from ..operators import blocked
 from ..reference import measurements, snapshots, tolerances
 from ..units import NO_BREAK, length
 from .layout import AMBER, GREEN, GREY, RED, Panel, active, is_narrow, right, text_lines
+from .progress import in_a_row
 
 _DIGITS = 3  # of an estimated number of triangles
 
@@ -16,10 +17,6 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
     bl_label = "Tolerance"
 
     def draw(self, context):
-        self._draw_settings(context)
-        draw_job(context, self.layout)
-
-    def _draw_settings(self, context):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -63,8 +60,10 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
 
 
 def _estimated(context):
-    """Returns how many triangles Decimate would leave, or has left, as text of one line."""
-    found = estimate.shown(context)
+    """Returns how many triangles Decimate would leave, or has left, as text of one line. While a job runs, the text says so."""
+    found = estimate.shown(context)  # It ends the estimates when a job begins.
+    if run := job.under_way():
+        return in_a_row(context, run.told())
     if isinstance(found, str):
         return found
     rounded = found.after
@@ -76,21 +75,6 @@ def _estimated(context):
     if share < 0.05:
         return text
     return f"{text}, \u2212{share:.{0 if 1 <= share < 99 else 1}f}{NO_BREAK}%"
-
-
-def draw_job(context, layout):
-    """Shows what the job under way does, if there is one."""
-    run = job.under_way()
-    if run is None:
-        return
-    lines, share = run.shown()
-    column = layout.box().column(align=True)
-    for i, line in enumerate(lines):
-        text_lines(context, column, line, "BLANK1" if i else "SORTTIME")
-    if share is not None and hasattr(bpy.types.UILayout, "progress"):  # from Blender 4.0 on
-        column.progress(factor=share, text=f"{share:.0%}")
-    elif share is not None:
-        right(column, f"{share:.0%}")
 
 
 def _status(context, layout, ob):

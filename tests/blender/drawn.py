@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Draws panels without a window into lists of what they show."""
+"""Draws a panel without a window into a list of what it shows."""
 
 import bpy
-
-from addon.panels import deviation
 
 
 class _Layout:
@@ -29,14 +27,9 @@ class _Panel:
     def __init__(self):
         self.layout = _Layout({})
 
-    def _draw_verdict(self, context, found):
-        pass
 
-
-def deviation_panel(monkeypatch):
-    """Returns ({operator: label}, [texts]) of the panel Deviation for the active object."""
-    texts = []
-    monkeypatch.setattr(deviation, "text_lines", lambda _context, _layout, text, _icon: texts.append(text))
-    panel = _Panel()
-    deviation.TOLVOL_PT_deviation.draw(panel, bpy.context)
-    return panel.layout.buttons, texts
+def buttons(panel):
+    """Returns {operator: label} of a panel for the active object."""
+    drawn = _Panel()
+    panel.draw(drawn, bpy.context)
+    return drawn.layout.buttons

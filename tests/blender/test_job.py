@@ -295,20 +295,19 @@ def test_the_panel_is_told_stage_count_part_and_time_left(waiting, monkeypatch):
     operator._run.progress = progress = Progress()
     operator.improving = lambda: False
     operator.part = "torus, 2 of 3"
-    assert operator._run.shown() == (["Modal", "torus, 2 of 3", "Decimating", "Esc: Cancel"], None)
+    assert operator._run.told() == progress_text.Told("torus, 2 of 3", "Decimating", None, "", "", "Cancel")
     now[0] += 10
     progress.fraction, progress.count = 0.25, 12_400
-    lines, share = operator._run.shown()
-    assert lines[3:5] == ["12,400 triangles left", "About 30 s left of this stage"] and share == 0.25
+    told = operator._run.told()
+    assert (told.share, told.left, told.count) == (0.25, "30 s left", "12,400 triangles left")
+    assert progress_text.status_line(operator, told) == (
+        "torus, 2 of 3: Decimating 25%, 12,400 triangles left    Esc: Cancel"
+    )
     progress.stage, progress.fraction = "measuring", 0.5
-    assert operator._run.shown()[0] == [
-        "Modal",
-        "torus, 2 of 3",
-        "Measuring",
-        "Esc: Cancel",
-    ]  # A new stage has just begun.
+    told = operator._run.told()
+    assert (told.stage, told.left, told.count) == ("Measuring", "", "")  # A new stage has just begun.
     now[0] += 200
-    assert operator._run.shown()[0][3] == "About 3 min left of this stage"
+    assert operator._run.told().left == "3 min left"
 
 
 def test_a_batch_names_each_object_and_reports_totals(monkeypatch, capfd):

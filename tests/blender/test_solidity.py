@@ -11,10 +11,11 @@ import pytest
 from mathutils import Matrix
 
 from addon.mesh import mesh_io
+from addon.panels import deviation, notes
 from addon.proof import last_run, report, solidity
 from addon.reference import snapshots
 from commands import command, save
-from drawn import deviation_panel
+from drawn import buttons
 from scenes import activate, add_object, link, sheet, torus, torus_arrays
 
 CUBE = (
@@ -194,8 +195,8 @@ def test_select_crossing_faces():
 
 def test_the_button_has_the_name_of_the_manual(monkeypatch):
     activate(torus())
-    buttons, _ = deviation_panel(monkeypatch)
-    assert buttons["tolvol.select_crossing"] == "Select Crossing Faces"
+    monkeypatch.setattr(deviation, "_draw_verdict", lambda *_: None)  # It asks for the width of the sidebar.
+    assert buttons(deviation.TOLVOL_PT_deviation)["tolvol.select_crossing"] == "Select Crossing Faces"
     manual = Path(__file__).resolve().parents[2] / "docs" / "manual.md"
     assert "*Select Crossing Faces*" in manual.read_text()
 
@@ -256,13 +257,13 @@ OPERATIONS = (smooth, smooth_in_edit_mode, deform, apply_modifier, apply_to_a_ne
 
 
 @pytest.mark.parametrize("operation", OPERATIONS, ids=lambda operation: operation.__name__)
-def test_the_panel_states_what_became_of_the_solid_in_each_operation(operation, monkeypatch):
+def test_the_panel_states_what_became_of_the_solid_in_each_operation(operation):
     # One quad is missing, so that a fact differs from what a decimation has said.
     vertices, faces = torus_arrays(around=32, across=16, noise=0.01)
     ob = add_object("torus", vertices, faces, np.diag([2.0, 1, 1, 1]))
     ob.tolvol.tolerance_percent = 3
     bpy.ops.tolvol.decimate(target_triangles=10**6)
-    assert "Closed, manifold, no crossings" in last_run_texts(monkeypatch)[-1]
+    assert "Closed, manifold, no crossings" in noted()[-1]
     holed = add_object("holed", vertices, faces[1:], np.diag([2.0, 1, 1, 1]))
     holed.tolvol.last_run, holed.tolvol.last_run_of = ob.tolvol.last_run, ob.tolvol.last_run_of
     holed.tolvol.tolerance_percent = 3
@@ -273,7 +274,7 @@ def test_the_panel_states_what_became_of_the_solid_in_each_operation(operation, 
     run = json.loads(last_run.shown(result))
     assert run["solidity"]["before"] == pytest.approx(before) and run["solidity"]["after"] == pytest.approx(after)
     assert run["solidity"]["change"]["area"] == pytest.approx(after["area"] / before["area"] - 1) and after != before
-    assert solidity.summary(run["solidity"], bpy.context) in last_run_texts(monkeypatch)
+    assert solidity.summary(run["solidity"], bpy.context) in noted()
     # The facts are of this mesh, at this size.
     bpy.ops.object.mode_set(mode="OBJECT")
     result.matrix_world = Matrix.Translation((1, 2, 3)) @ result.matrix_world
@@ -291,9 +292,9 @@ def test_the_panel_states_what_became_of_the_solid_in_each_operation(operation, 
     assert last_run.shown(result) == ""
 
 
-def last_run_texts(monkeypatch):
-    """Returns the texts of the panel."""
-    return deviation_panel(monkeypatch)[1]
+def noted():
+    """Returns the texts of the panel Notes."""
+    return [text for text, _ in notes.notes(bpy.context, bpy.context.active_object)[0]]
 
 
 def test_an_operation_that_makes_a_shape_key_leaves_the_facts_of_the_base_mesh():

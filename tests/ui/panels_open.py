@@ -38,6 +38,6 @@ def unfolded(panel):
     return _registered([_opened(panel) if cls is panel else cls for cls in panels._CLASSES])
 
 
-def alone(panel):
-    """Registers a panel open, and none beside it, while the context lasts."""
-    return _registered([panels._CLASSES[0], _opened(panel)])
+def alone(*chosen):
+    """Registers panels open, and none beside them, while the context lasts."""
+    return _registered([panels._CLASSES[0], *map(_opened, chosen)])

@@ -9,7 +9,7 @@ from mathutils import Vector
 import scenes
 from addon.mesh import mesh_io
 from addon.overlay import markers
-from addon.panels import deviation
+from addon.panels import notes
 from addon.proof import kept_warnings, places
 from test_warnings import islands
 from window import (
@@ -95,10 +95,8 @@ def test_worst_point_next_and_previous_by_mouse():
 def test_warnings_stay_in_the_panel_and_select_their_vertices():
     yield from reset(lambda: islands(scenes.sheet(), 900))
     yield from open_tab()
-    said, text_lines = [], deviation.text_lines
-    deviation.text_lines = lambda context, where, text, icon: (
-        said.append(text) or text_lines(context, where, text, icon)
-    )
+    said, text_lines = [], notes.text_lines
+    notes.text_lines = lambda context, where, text, icon: said.append(text) or text_lines(context, where, text, icon)
     ob = bpy.data.objects["sheet"]
     yield from press("tolvol.decimate")
     yield from finished(lambda: ob.tolvol.warnings)
@@ -108,7 +106,7 @@ def test_warnings_stay_in_the_panel_and_select_their_vertices():
     said.clear()
     view()[1].tag_redraw()
     yield from finished(lambda: warning in said)
-    deviation.text_lines = text_lines
+    notes.text_lines = text_lines
     yield from press("tolvol.select_staying")
     yield from finished(lambda: ob.mode == "EDIT")
     yield 0.5

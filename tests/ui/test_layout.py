@@ -6,19 +6,35 @@ from pathlib import Path
 import bpy
 
 import scenes
+from addon import job, panels
 from addon.overlay import legend
 from addon.proof import verdict
-from window import find, finished, on_screen, open_tab, press, region, reset, screenshot, view, window_context, xdotool
+from panels_open import alone
+from test_panel import monkey, suzanne
+from window import (
+    find,
+    finished,
+    on_screen,
+    open_tab,
+    press,
+    region,
+    reset,
+    screenshot,
+    scroll_down,
+    view,
+    window_context,
+    xdotool,
+)
 
 
 def torus():
     return bpy.data.objects["torus"]
 
 
-def rows():
+def rows(*operators):
     """Returns the heights at which the buttons are."""
     places = []
-    for operator in ("tolvol.decimate", "tolvol.check"):
+    for operator in operators or ("tolvol.decimate", "tolvol.check"):
         place = yield from find(operator, across=0.25)
         assert place is not None, f"{operator} is not on the first screen"
         places.append(place[1])
@@ -59,6 +75,38 @@ def test_the_first_screen_has_everything_and_buttons_stay_where_they_are():
         screenshot(f"layout 3 {mode.lower()}")
     with window_context():
         bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_no_button_moves_while_a_job_runs():
+    yield from reset(monkey)
+    with window_context():
+        suzanne().modifiers.new("more", "SUBSURF").levels = 1
+        bpy.ops.object.modifier_apply(modifier="more")
+    yield from open_tab()
+    yield from _no_button_moves("decimate", "tolvol.set_reference", "tolvol.decimate", "tolvol.check")
+    # The panel Notes is left out, because it is below all buttons.
+    yield from reset(monkey)
+    suzanne().tolvol.smooth.iterations = 100
+    with alone(panels.TOLVOL_PT_deviation, panels.TOLVOL_PT_smooth):
+        yield from scroll_down()
+        yield from _no_button_moves("smooth", "tolvol.check", "tolvol.save_report", "tolvol.smooth")
+
+
+def _no_button_moves(operator, *buttons):
+    before = yield from rows(*buttons)
+    aside = on_screen(region("WINDOW"), 300, 300)
+    screenshot(f"layout 9 before {operator}")
+    yield from press(f"tolvol.{operator}")
+    yield from finished(lambda: job.under_way() and job.under_way().told().share, pause=0.01)
+    xdotool("mousemove", *aside)
+    yield 0.3
+    screenshot(f"layout 9 during {operator}")
+    assert (yield from rows(*buttons)) == before and job.under_way()
+    yield from finished(lambda: not job.under_way())
+    assert (yield from rows(*buttons)) == before
+    xdotool("mousemove", *aside)
+    yield 0.5
+    screenshot(f"layout 9 after {operator}")
 
 
 def light():

@@ -11,7 +11,7 @@ from addon import native, reference
 from addon.job import run as job_run
 from addon.mesh import mesh_io
 from addon.overlay import legend
-from addon.panels import deviation
+from addon.panels import notes
 from addon.proof import verdict
 from addon.reference import measurements, tolerances
 from window import (
@@ -272,8 +272,8 @@ def test_a_damaged_file_breaks_no_panel():
     yield from press("tolvol.decimate")
     yield from finished(lambda: suzanne().tolvol.last_run)
     yield 1.0
-    said, text_lines = [], deviation.text_lines
-    deviation.text_lines = lambda context, layout, text, icon: (
+    said, text_lines = [], notes.text_lines
+    notes.text_lines = lambda context, layout, text, icon: (
         said.append(text) or text_lines(context, layout, text, icon)
     )
     try:
@@ -287,7 +287,7 @@ def test_a_damaged_file_breaks_no_panel():
         yield 1.0
         screenshot("damaged")
     finally:
-        deviation.text_lines = text_lines
+        notes.text_lines = text_lines
 
 
 def sidebar_pixels():

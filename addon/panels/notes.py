@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The panel with the sentences about the last operation and the mesh.
+
+It is the last panel, because sentences come and go when an operation ends: no button below them moves.
+"""
+
+import bpy
+
+from ..overlay import reasons
+from ..proof import kept_warnings, last_run, report, verdict
+from ..reference import measurements
+from .layout import AMBER, RED, SubPanel, active, text_lines
+
+
+class TOLVOL_PT_notes(SubPanel, bpy.types.Panel):
+    bl_label = "Notes"
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and any(notes(context, active(context)))
+
+    def draw(self, context):
+        layout = self.layout
+        lines, staying = notes(context, active(context))
+        for text, icon in lines:
+            text_lines(context, layout, text, icon)
+        if staying:
+            layout.operator("tolvol.select_staying", text=f"Select {staying:,} Staying Vertices")
+
+
+def notes(context, ob):
+    """Returns [(sentence, icon)], and the number of vertices that had to stay because UV islands meet there."""
+    lines = []
+    found = verdict.of(ob)
+    if found is not None and found.kind != verdict.WITHIN:
+        lines.append((found.line(), AMBER if found.passed else RED))
+    if on_top := measurements.on_top(ob):
+        lines.append((f"The proof is for the base mesh, without its {' and '.join(on_top)}", "INFO"))
+    if ob.tolvol.show_deviation and (reason := reasons.off()):
+        lines.append((f"The deviation is not shown: {reason}", "INFO"))
+    lines += _of_last_run(context, ob)
+    warnings, staying = kept_warnings.of(ob)
+    lines += [(warning, "ERROR") for warning in warnings]
+    known = {kept_warnings.ISLANDS, kept_warnings.ASKED_FOR}
+    if others := [f"{count:,} by {cause}" for cause, count in staying.items() if cause not in known]:
+        lines.append((f"Vertices that had to stay: {', '.join(others)}", "INFO"))
+    return lines, staying.get(kept_warnings.ISLANDS, 0)
+
+
+def _of_last_run(context, ob):
+    """Returns what is known about the last operation, until the mesh changes."""
+    run = last_run.shown(ob)
+    if not run:
+        return []
+    lines = report.remembered(run, context)
+    if lines is None:
+        return [("The report of the last operation is damaged: the next operation makes a new one", "ERROR")]
+    return [(line, icon) for line, icon in zip(lines, ("CHECKMARK", "MESH_DATA")) if line]

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shows the job under way where nothing moves when it begins or ends: in rows that are there without it, too."""
+
+import bpy
+
+from .layout import fitting
+
+
+def draw_progress(context, box, told):
+    """Draws the job in place of a verdict, in as many rows."""
+    row = box.row()
+    row.scale_y = 1.5
+    row.label(text=told.title, icon="SORTTIME")
+    column = box.column(align=True)
+    if told.share is None:
+        column.label(text=told.stage)
+    else:
+        done = f"{told.stage} {told.share:.0%}"
+        text = fitting(context, *([f"{done}, {told.left}"] if told.left else []), done)
+        if hasattr(bpy.types.UILayout, "progress"):  # from Blender 4.0 on
+            column.progress(factor=told.share, text=text)
+        else:
+            column.label(text=text)
+    column.label(text=told.count)
+    column.label(text=f"Esc: {told.escape}" if told.escape else "")
+
+
+def in_a_row(context, told):
+    """Returns in few words what is at work."""
+    share = [f"{told.title}, {told.share:.0%}"] if told.share is not None else []
+    return fitting(context, *share, told.title)
