@@ -20,6 +20,7 @@ for _name in [name for name in sys.modules if name.startswith(__name__ + ".")]:
     globals().pop(_name.removeprefix(__name__ + "."), None)
 
 from . import (  # noqa: E402
+    background,
     estimate,
     guard,
     job,
@@ -34,7 +35,7 @@ from . import (  # noqa: E402
 )
 from .files.gltf_extras import glTF2ExportUserExtension  # noqa: E402, F401  Blender's exporter of glTF looks for it here.
 
-_PARTS = (preferences, properties, reference, job, operators, guard, overlay, measuring, estimate, panels)
+_PARTS = (background, preferences, properties, reference, job, operators, guard, overlay, measuring, estimate, panels)
 
 
 def register():

@@ -12,8 +12,8 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import native, preferences
+from .background import queue
 from .errors import Refused
-from .overlay import work
 from .proof import measure
 from .redraw import redraw_views
 from .reference import measurements, snapshots, tolerances
@@ -42,12 +42,12 @@ def note(ob):
     name = ob.name
     measurements.outdate(name)
     _changes[name] = _changes.get(name, (0, 0))[0] + 1, time.monotonic()
-    work.cancel(("measuring", name))
+    queue.cancel(("measuring", name))
     _request(name)
 
 
 def _request(name):
-    work.later(
+    queue.later(
         ("measuring", name), _REST, functools.partial(_prepare, name), functools.partial(_finish, name, _changes[name])
     )
 

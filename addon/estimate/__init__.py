@@ -19,12 +19,12 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from .. import handlers, job, native
+from ..background import queue
 from ..errors import Refused
 from ..mesh import mesh_io
 from ..operation_settings import decimate_settings
 from ..operators import blocked, decimation
 from ..operators.decimate import targets
-from ..overlay import work
 from ..proof import last_run, report
 from ..properties import automatic_placement
 from ..redraw import redraw_sidebars
@@ -37,7 +37,7 @@ MOST_TRIANGLES = 500_000
 
 # The tasks: a decimation at the present tolerance, and one at another. The first is more urgent, and everything else that
 # runs in a thread is more urgent than both.
-_HERE, _ELSEWHERE = "estimate here", "estimate elsewhere"
+_HERE, _ELSEWHERE = ("estimate", "here"), ("estimate", "elsewhere")
 _RANKS = {_HERE: 1, _ELSEWHERE: 2}
 # The tolerance rests if it has not changed for so many seconds. So long after a change a mesh is read, too.
 _REST = 0.3
@@ -249,7 +249,7 @@ def _ask(objects, percents):
     settings = objects[0].tolvol
     if _present != percents:
         _present = percents
-        work.cancel(_HERE)  # If it only waits, it waits anew.
+        queue.cancel(_HERE)  # If it only waits, it waits anew.
     found = [(_current(ob, settings), percents[ob.name]) for ob in objects]
     current = {ob.name for ob, (known, _) in zip(objects, found) if known}
     for name in _known.keys() - current:
@@ -264,7 +264,7 @@ def _ask(objects, percents):
 
 
 def _later(about, seconds):
-    work.later(about, seconds, functools.partial(_prepare, about), _finish, _RANKS[about])
+    queue.later(about, seconds, functools.partial(_prepare, about), _finish, _RANKS[about])
 
 
 def _prepare(about):
@@ -320,8 +320,8 @@ def _finish(outcome, error):
 
 
 def _cancel():
-    work.cancel(_HERE)
-    work.cancel(_ELSEWHERE)
+    queue.cancel(_HERE)
+    queue.cancel(_ELSEWHERE)
 
 
 @persistent

@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 
 from .. import native, preferences
+from ..background import Job
 from ..errors import Refused
-from ..job import Job
 from ..mesh import mesh_io
 from ..reference import snapshots, tolerances, volumes
 

@@ -10,27 +10,21 @@ While a job runs, the operator takes Esc and passes all other events on. If the 
 job ends, and it writes nothing.
 """
 
-import atexit
-
 from .. import status_bar
-from . import adjusting, interruptions, thread
+from . import adjusting, interruptions
 from .interruptions import under_way
 from .operator import JobOperator
-from .thread import Job
 
-__all__ = ["Job", "JobOperator", "register", "under_way", "unregister"]
+__all__ = ["JobOperator", "register", "under_way", "unregister"]
 
 
 def register():
     """Call this once all classes of operators exist: those that Adjust Last Operation offers get their helpers here."""
     interruptions.register()
     adjusting.register(JobOperator)
-    atexit.register(thread.end_all)  # On exit Blender does not unregister an add-on that a script has registered.
 
 
 def unregister():
-    atexit.unregister(thread.end_all)
-    thread.end_all()
     adjusting.unregister()
     interruptions.unregister()
     status_bar.clear()

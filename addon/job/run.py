@@ -4,11 +4,11 @@
 import time
 
 from .. import native
+from ..background import Job
 from ..errors import Refused
 from ..redraw import redraw_sidebars
 from . import interruptions, progress_text
 from .claim import Claim
-from .thread import Job
 
 # Blender waits so many seconds for a job before the status bar shows it, so that no line flashes up for a short one.
 PATIENCE = 0.4

@@ -8,8 +8,9 @@ from bpy.props import BoolProperty, FloatVectorProperty, IntProperty
 from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
 from .. import native, preferences
+from ..background import Job
 from ..errors import Refused
-from ..job import Job, JobOperator
+from ..job import JobOperator
 from ..proof import labels, probing, report
 from ..reference import measurements, snapshots, tolerances
 from ..units import length

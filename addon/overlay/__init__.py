@@ -12,11 +12,12 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .. import native, preferences
+from ..background import queue
 from ..proof import labels as kept_labels
 from ..proof import places, probing
 from ..redraw import redraw_views
 from ..reference import snapshots
-from . import coloured, draw, field, labels, legend, markers, moving, reasons, shaders, shares, work
+from . import coloured, draw, field, labels, legend, markers, moving, reasons, shaders, shares
 from .surface import Surface
 
 _surfaces = {}  # name of an object that shows its deviation -> Surface
@@ -78,7 +79,7 @@ def _end():
         _drawing.clear()
         bpy.app.handlers.depsgraph_update_post.remove(_note_changes)
         bpy.app.handlers.frame_change_post.remove(_note_frame)
-        work.stop()
+        queue.stop(*field.TASKS, *shares.TASKS)
         redraw_views()
     _surfaces.clear()
     shares.forget()
@@ -154,5 +155,4 @@ def unregister():
     snapshots.listeners.remove(refresh)
     _end()
     moving.unregister()
-    work.stop()
     reasons.broken.clear()

@@ -13,10 +13,11 @@ import gpu
 import numpy as np
 
 from .. import native, preferences
+from ..background import queue
 from ..errors import Refused
 from ..mesh import mesh_io
 from ..reference import measurements, snapshots, volumes
-from . import shaders, work
+from . import shaders
 
 # A tolerance below so many times the rounding error of the shader cannot be shown.
 _FINEST = 4
@@ -24,6 +25,8 @@ _FINEST = 4
 # A tree of a mesh needs little of the volume from which it is made: a grid of so many nodes per tolerance.
 _COARSE = 1 / 64
 _EVERY = 0.1  # seconds between two trees of a mesh that goes on changing
+
+_REFERENCE, _MESH = TASKS = "tree of a reference", "tree of a mesh"  # kinds of tasks in the queue
 
 _fields = {}  # key -> Field
 _failed = {}  # key -> the reason why the Field could not be made
@@ -79,8 +82,8 @@ def field_of(ob, tolerance, changed):
     own = ob.tolvol.snapshot_kind == "SELF"
     # A tree of a reference that was scaled since it was made has wrong distances.
     if field is None or own and not measurements.same_shape(field.matrix, snapshots.reference_matrix(ob)):
-        work.later(
-            ("field", key),
+        queue.later(
+            (_REFERENCE, key),
             0,
             functools.partial(_prepare, ob.name, tolerance),
             functools.partial(_finish, key, changed),
@@ -102,8 +105,8 @@ def field_of_mesh(ob, surface, tolerance, changed):
     if failed is not None and failed[0] == surface.changes:
         return None, failed[1]
     if field is None or not is_of(field, ob, surface):
-        work.later(
-            ("mesh", name),
+        queue.later(
+            (_MESH, name),
             _EVERY if field else 0,
             functools.partial(_prepare_mesh, name, surface, tolerance),
             functools.partial(_finish_mesh, name, surface.changes, changed),

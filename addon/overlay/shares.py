@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..background import queue
 from ..redraw import redraw_views
-from . import work
 from .scale import rounded_up
 
 _EVERY = 0.25  # seconds between two counts while a mesh goes on changing
+
+_SHARES, _LARGEST = TASKS = "shares", "largest distance"  # kinds of tasks in the queue
 
 _largest = {}  # name of an object -> (state that was measured, the largest distance as a round number or None)
 _counted = {}  # name of an object -> ((state that was counted, Scale), Shares or None)
@@ -49,7 +51,7 @@ def known(name, coloured, scale):
     if last is not None and last[0] == about:
         return last[1]
     if coloured.present:
-        _later("shares", name, last, coloured, functools.partial(_count, scale), _counted, about)
+        _later(_SHARES, name, last, coloured, functools.partial(_count, scale), _counted, about)
     return None
 
 
@@ -61,7 +63,7 @@ def automatic_reach(name, coloured):
     """
     last = _largest.get(name)
     if coloured.present and (last is None or last[0] != coloured.state):
-        _later("largest", name, last, coloured, _measure, _largest, coloured.state)
+        _later(_LARGEST, name, last, coloured, _measure, _largest, coloured.state)
     return last[1] if last is not None else None
 
 
@@ -70,7 +72,7 @@ def _later(kind, name, last, coloured, work_of, kept, about):
     if triangles.triangles is None or not len(triangles.triangles):
         return
     tree, to_world, vertices, corners = coloured.tree, coloured.to_world, triangles.vertices, triangles.triangles
-    work.later(
+    queue.later(
         (kind, name),
         _EVERY if last else 0,
         lambda: functools.partial(work_of, tree, vertices, corners, to_world),

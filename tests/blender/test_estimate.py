@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from addon import estimate, job
-from addon.overlay import work
+from addon.background import queue
 from scenes import activate, add_object, sheet, sheet_arrays, torus
 
 
@@ -17,7 +17,7 @@ from scenes import activate, add_object, sheet, sheet_arrays, torus
 def _nothing_left(monkeypatch):
     monkeypatch.setattr(estimate, "_REST", 0.0)
     yield
-    work.stop()
+    queue.stop()
     estimate._after_load()
 
 
@@ -29,9 +29,9 @@ def drawn(until=None):
     end = time.monotonic() + 300
     while True:
         answer = estimate.shown(bpy.context)
-        if until and until(answer) or not work._waiting and work._running is None:
+        if until and until(answer) or not queue._waiting and queue._running is None:
             return answer
-        work._tick()
+        queue._tick()
         assert time.monotonic() < end
         time.sleep(0.001)
 
@@ -94,7 +94,7 @@ def test_within_15_percent_of_the_run_at_rest_and_while_the_tolerance_is_dragged
     for percent in np.geomspace(0.0567, 4.1, 7).tolist():
         ob.tolvol.tolerance_percent = percent
         dragged[percent] = estimate.shown(bpy.context)
-        work.stop()  # There is no time for the work that is asked for now.
+        queue.stop()  # There is no time for the work that is asked for now.
     triangles = sum(len(face.vertices) - 2 for face in ob.data.polygons)
     missed = []
     for percent, answer in (rested | dragged).items():
@@ -118,7 +118,7 @@ def test_the_first_answer_comes_before_a_click_and_the_real_number_after_it():
     assert first.before == 2304
     assert bpy.ops.tolvol.decimate() == {"FINISHED"}
     count = len(ob.data.polygons)
-    assert estimate.shown(bpy.context) == estimate.Estimate(2304, count, True) and not work._waiting
+    assert estimate.shown(bpy.context) == estimate.Estimate(2304, count, True) and not queue._waiting
     assert first.after == count
     ob.tolvol.tolerance_percent = 1  # What Decimate would leave now.
     assert drawn(until=is_known).before == count
@@ -224,16 +224,16 @@ def test_what_is_refused_is_said(monkeypatch):
     monkeypatch.setattr(estimate, "MOST_TRIANGLES", 1000)
     assert estimate.shown(bpy.context) == "Too large to estimate"
     bpy.ops.object.mode_set(mode="EDIT")
-    assert estimate.shown(bpy.context) == "" and not work._waiting
+    assert estimate.shown(bpy.context) == "" and not queue._waiting
 
 
 def under_way():
     """Returns the progress of a decimation that runs for the estimate of a large mesh."""
     ball(7)
     estimate.shown(bpy.context)
-    while work._running is None:
-        work._tick()
-    return work._running[2].progress
+    while queue._running is None:
+        queue._tick()
+    return queue._running[2].progress
 
 
 def dragged(_):
@@ -253,8 +253,8 @@ def another_setting(_):
 
 
 def other_work(_):
-    work.later("urgent", 0, lambda: None, None)
-    work._tick()
+    queue.later(("urgent",), 0, lambda: None, None)
+    queue._tick()
 
 
 ENDS = {
@@ -278,7 +278,7 @@ def test_the_work_ends_when(happens, monkeypatch):
     ENDS[happens](monkeypatch)
     assert progress.cancelled
     began = time.monotonic()
-    assert work._running is None or work._running[2].done(10)
+    assert queue._running is None or queue._running[2].done(10)
     assert time.monotonic() - began < 2
 
 
@@ -286,10 +286,10 @@ def test_nothing_runs_while_an_animation_plays_or_the_panel_is_not_drawn(monkeyp
     torus()
     drawn(until=is_known)
     end = time.monotonic() + 60
-    while work._waiting or work._running is not None:
-        work._tick()
+    while queue._waiting or queue._running is not None:
+        queue._tick()
         assert time.monotonic() < end
-    assert work._running is None and not work._waiting
+    assert queue._running is None and not queue._waiting
 
 
 def test_without_memory_nothing_more_is_tried(monkeypatch):
@@ -299,7 +299,7 @@ def test_without_memory_nothing_more_is_tried(monkeypatch):
         raise MemoryError
 
     monkeypatch.setattr(estimate.volumes, "passing_volume", none_left)
-    assert drawn() == "Too large to estimate" and not work._waiting
+    assert drawn() == "Too large to estimate" and not queue._waiting
 
 
 def test_a_mesh_without_extent_along_an_axis():
@@ -307,7 +307,7 @@ def test_a_mesh_without_extent_along_an_axis():
     for _ in range(2):
         ob.scale.z = 0
         bpy.context.view_layer.update()
-        assert estimate.shown(bpy.context) == "" and not work._waiting
+        assert estimate.shown(bpy.context) == "" and not queue._waiting
         with pytest.raises(RuntimeError, match="torus has no extent along an axis: Object > Clear > Scale"):
             bpy.ops.tolvol.decimate()
         ob.scale.z = 1

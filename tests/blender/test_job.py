@@ -8,9 +8,9 @@ import bpy
 import pytest
 
 from addon import job, native
-from addon.job import interruptions, progress_text, thread
+from addon.background import queue, thread
+from addon.job import interruptions, progress_text
 from addon.job.run import Run
-from addon.overlay import work
 from scenes import torus
 
 DONE = "torus: done"
@@ -127,7 +127,7 @@ def stubborn(progress):
 
 
 def test_jobs_are_waited_for_when_blender_ends():
-    running = job.Job(stubborn, native.module.Progress())
+    running = thread.Job(stubborn, native.module.Progress())
     assert not running.done()
     thread.end_all()
     assert running.done()
@@ -135,14 +135,14 @@ def test_jobs_are_waited_for_when_blender_ends():
 
 def test_what_the_overlay_had_begun_ends_though_another_file_was_opened(monkeypatch):
     began, ended = threading.Event(), []
-    work.later("it", 0, lambda: lambda _progress: began.set(), lambda *outcome: ended.append(outcome))
-    work._tick()
+    queue.later(("it",), 0, lambda: lambda _progress: began.set(), lambda *outcome: ended.append(outcome))
+    queue._tick()
     assert began.wait(60)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert bpy.app.timers.is_registered(work._tick)
+    assert bpy.app.timers.is_registered(queue._tick)
     while not ended:
-        work._tick()
-    work.stop()
+        queue._tick()
+    queue.stop()
 
 
 # While a job runs, Blender can be used -------------------------------------------------------------------------------

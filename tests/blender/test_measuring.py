@@ -8,7 +8,7 @@ import bpy
 import pytest
 
 from addon import measuring
-from addon.overlay import work
+from addon.background import queue
 from addon.panels import deviation
 from addon.proof import statistics, verdict
 from addon.proof.verdict import FAIL, NOT_CHECKED, PASS
@@ -19,7 +19,7 @@ from scenes import sheet
 @pytest.fixture(autouse=True)
 def _nothing_left():
     yield
-    work.stop()
+    queue.stop()
     measurements.forget_passing()
 
 
@@ -37,9 +37,9 @@ def in_mode(mode, **settings):
 def measured():
     """Does what the timer does until nothing waits."""
     end = time.monotonic() + 60
-    while work._waiting or work._running is not None:
+    while queue._waiting or queue._running is not None:
         assert time.monotonic() < end
-        work._tick()
+        queue._tick()
         time.sleep(0.01)
 
 
@@ -91,11 +91,11 @@ def test_a_change_of_the_mesh_tolerance_or_reference_counts():
 
 def test_a_mesh_that_changes_meanwhile_is_measured_again():
     ob = in_mode("EDIT")
-    work._tick()
-    while work._running is None:
-        work._tick()
+    queue._tick()
+    while queue._running is None:
+        queue._tick()
     cut_a_hole(ob)
-    assert work._running is None or work._running[2].progress.cancelled
+    assert queue._running is None or queue._running[2].progress.cancelled
     measured()
     assert verdict.word(ob) == FAIL
 

@@ -11,8 +11,9 @@ import pytest
 
 import addon
 from addon import native, overlay, preferences
+from addon.background import queue
 from addon.mesh import mesh_io
-from addon.overlay import coloured, draw, field, legend, reasons, shaders, shares, surface, work
+from addon.overlay import coloured, draw, field, legend, reasons, shaders, shares, surface
 from addon.overlay.scale import Scale, rounded_up
 from addon.reference import snapshots, tolerances
 from scenes import add_object, sheet, sheet_arrays, torus, world_triangles
@@ -180,7 +181,7 @@ def test_an_automatic_range_ends_at_a_round_number(distance, up):
 
 
 def test_the_range_is_the_tolerance_a_fixed_length_or_the_largest_distance(monkeypatch):
-    monkeypatch.setattr(work, "later", lambda _about, _seconds, prepare, finish: finish(prepare()(None), None))
+    monkeypatch.setattr(queue, "later", lambda _about, _seconds, prepare, finish: finish(prepare()(None), None))
     ob = with_reference(torus())
     reference = world_triangles(ob)
     ob.data.vertices[0].co.z += 0.3
@@ -223,7 +224,7 @@ def test_the_range_is_the_tolerance_a_fixed_length_or_the_largest_distance(monke
 
 
 def test_selected_objects_have_one_scale_as_the_active_one_demands(monkeypatch):
-    monkeypatch.setattr(work, "later", lambda _about, _seconds, prepare, finish: finish(prepare()(None), None))
+    monkeypatch.setattr(queue, "later", lambda _about, _seconds, prepare, finish: finish(prepare()(None), None))
     objects, found = [sheet(bumps=0.0), torus()], {}
     for ob, percent, height in zip(objects, (1, 2), (0.38, 0.0)):
         bpy.ops.object.select_all(action="DESELECT")
@@ -282,7 +283,7 @@ def reference_shown(ob):
 
 @pytest.mark.parametrize("own", (True, False))
 def test_the_reference_is_coloured_by_its_distance_from_the_present_mesh(monkeypatch, own):
-    monkeypatch.setattr(work, "later", lambda _about, _seconds, prepare, finish: finish(prepare()(None), None))
+    monkeypatch.setattr(queue, "later", lambda _about, _seconds, prepare, finish: finish(prepare()(None), None))
     ob = sheet(count=20, bumps=0.0)
     if not own:
         ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", sheet("other", count=20, bumps=0.0)
@@ -316,7 +317,7 @@ def test_the_reference_is_coloured_by_its_distance_from_the_present_mesh(monkeyp
 
 
 def test_a_tree_of_the_mesh_before_its_last_change_is_known_as_such(monkeypatch):
-    monkeypatch.setattr(work, "later", lambda _about, _seconds, prepare, finish: finish(prepare()(None), None))
+    monkeypatch.setattr(queue, "later", lambda _about, _seconds, prepare, finish: finish(prepare()(None), None))
     ob = with_reference(sheet(count=10, bumps=0.0))
     ob.tolvol.deviation_surface = "REFERENCE"
     shown = surface.Surface()
@@ -356,7 +357,7 @@ def test_shares_of_another_tolerance_or_mesh_are_left_blank(monkeypatch):
     found = surface.Surface()
     found.update(ob, bpy.context.evaluated_depsgraph_get())
     waiting = []
-    monkeypatch.setattr(work, "later", lambda _about, _seconds, prepare, finish: waiting.append((prepare, finish)))
+    monkeypatch.setattr(queue, "later", lambda _about, _seconds, prepare, finish: waiting.append((prepare, finish)))
     field._fields[field.key_of(ob)] = field._prepare(ob.name, 0.05)(None)
 
     def known(tolerance):
@@ -407,11 +408,23 @@ def test_the_count_of_shares_is_cancelled_in_its_middle():
     slow.tree = LongTree()
     what = coloured.Coloured(found, np.eye(4), np.eye(4), slow, True, True)
     assert shares.known(ob.name, what, scale(0.05)) is None
-    work._tick()
+    queue._tick()
     assert began.wait(60) and not outcomes
-    work.stop()  # waits for the thread
+    queue.stop()  # waits for the thread
     assert len(outcomes) == 1 and isinstance(outcomes[0], native.module.Cancelled)
     shares.forget()
+
+
+def test_the_end_of_the_overlay_leaves_the_other_tasks_in_the_queue():
+    ended = []
+    for kind in (*field.TASKS, *shares.TASKS, "measuring"):
+        queue.later((kind, "it"), 0, lambda kind=kind: lambda _progress: kind, lambda kind, _error: ended.append(kind))
+    queue.stop(*field.TASKS, *shares.TASKS)
+    while queue._waiting or queue._running is not None:
+        queue._tick()
+    assert ended == ["measuring"] and bpy.app.timers.is_registered(queue._tick)
+    queue.stop()
+    assert not bpy.app.timers.is_registered(queue._tick)
 
 
 def test_an_object_of_edges_alone_has_no_surface():

@@ -15,7 +15,7 @@ bpy.context.preferences.view.show_splash = False
 bpy.context.preferences.view.use_save_prompt = False
 
 import addon  # noqa: E402
-from addon.job import thread  # noqa: E402
+from addon.background import thread  # noqa: E402
 from addon.reference import snapshots  # noqa: E402
 from window import draw_finely, window_context  # noqa: E402
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import bpy
 
 from addon import job, status_bar
+from addon.background import thread
 from addon.job import run as job_run
-from addon.job import thread
 from scenes import world_triangles
 from test_panel import assert_proved, monkey, stored, suzanne
 from window import (

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs tasks that take too long for a draw handler: one task at a time in a thread, started by a timer of Blender."""
+"""Runs tasks that nobody waits for, such as those that a draw handler asks for: one at a time in a thread, by a timer.
+
+The key of a task is a tuple, which begins with the kind of the task.
+"""
 
 import time
 
 import bpy
 
 from .. import native
-from ..job import Job
+from .thread import Job
 
 # The timer looks for work after so many seconds.
 _TICK = 0.05
@@ -59,14 +62,14 @@ def cancel(about):
         _running[2].progress.cancel()
 
 
-def stop():
-    """Cancels the running task and forgets the waiting ones."""
+def stop(*kinds):
+    """Cancels the running task and forgets the waiting ones, of all kinds if none is given. finish() is not called."""
     global _running
-    _waiting.clear()
-    if bpy.app.timers.is_registered(_tick):
-        bpy.app.timers.unregister(_tick)
-    if _running is not None:
-        job = _running[2]
+    for about in [about for about in _waiting if not kinds or about[0] in kinds]:
+        del _waiting[about]
+    if _running is not None and (not kinds or _running[0][0] in kinds):
+        job, _running = _running[2], None
         job.progress.cancel()
         job.done(None)
-        _running = None
+    if not _waiting and _running is None and bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)
