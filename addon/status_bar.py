@@ -1,31 +1,48 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shows a line in Blender's status bar for some seconds: timers and handlers cannot report messages."""
+"""Shows a line in Blender's status bar.
+
+Blender keeps a text for each workspace. While a job runs, the user may go to another workspace: the text is removed from
+all that got one.
+"""
 
 import bpy
 
 _SECONDS = 4.0
 
+_given = set()  # names of the workspaces that have a text
+
+
+def show(text):
+    """Shows the text in all windows until clear()."""
+    _stay()
+    for window in bpy.context.window_manager.windows:
+        with bpy.context.temp_override(window=window):
+            window.workspace.status_text_set(text)
+        _given.add(window.workspace.name)
+
 
 def say(text):
-    """Shows the text for _SECONDS."""
-    clear()
-    _set(text)
-    bpy.app.timers.register(_give_back, first_interval=_SECONDS, persistent=True)
+    """Shows the text for _SECONDS: timers and handlers cannot report messages."""
+    show(text)
+    bpy.app.timers.register(_remove, first_interval=_SECONDS, persistent=True)
 
 
 def clear():
-    """Removes the text before its time is over."""
-    if bpy.app.timers.is_registered(_give_back):
-        bpy.app.timers.unregister(_give_back)
-        _give_back()
+    """Removes the text from all workspaces that have one."""
+    _stay()
+    _remove()
 
 
-def _give_back():
-    _set(None)
+def _remove():
+    for workspace in bpy.data.workspaces:
+        if workspace.name in _given:
+            # Blender takes the workspace from the context.
+            with bpy.context.temp_override(workspace=workspace):
+                workspace.status_text_set(None)
+    _given.clear()
 
 
-def _set(text):
-    windows = bpy.context.window_manager.windows
-    if len(windows):
-        with bpy.context.temp_override(window=windows[0]):
-            bpy.context.workspace.status_text_set(text)
+def _stay():
+    """Ends the time of the text that is shown now."""
+    if bpy.app.timers.is_registered(_remove):
+        bpy.app.timers.unregister(_remove)

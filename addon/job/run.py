@@ -3,7 +3,7 @@
 
 import time
 
-from .. import native
+from .. import native, status_bar
 from ..background import Job
 from ..errors import Refused
 from ..redraw import redraw_sidebars
@@ -96,9 +96,7 @@ class Run:
                 self._leave(context)
                 return ended
         status = progress_text.status_line(self.operator, self.told())
-        context.workspace.status_text_set(
-            status + (f"    Waits for {_MODES.get(self._mode, 'its mode')}" if waits else "")
-        )
+        status_bar.show(status + (f"    Waits for {_MODES.get(self._mode, 'its mode')}" if waits else ""))
         redraw_sidebars()
         return None
 
@@ -156,4 +154,4 @@ class Run:
     def _leave(self, context):
         interruptions.runs.remove(self)
         context.window_manager.event_timer_remove(self._timer)
-        context.workspace.status_text_set(None)
+        status_bar.clear()

@@ -11,6 +11,7 @@ from bpy.app.handlers import persistent
 from bpy.props import BoolProperty
 from mathutils import Matrix
 
+from .. import status_bar
 from ..proof import last_run
 from ..reference import originals, snapshots
 from .blocked import allowed, mesh_blocked, object_blocked
@@ -154,7 +155,7 @@ changed. The view can be turned meanwhile"""
         self._held = event.type
         ob = context.active_object
         _shown.append(_Shown(context, ob))
-        context.workspace.status_text_set(f"The original of {ob.name}")
+        status_bar.show(f"The original of {ob.name}")
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -169,9 +170,9 @@ changed. The view can be turned meanwhile"""
             return {"FINISHED", "PASS_THROUGH"}
         return {"RUNNING_MODAL"}
 
-    def cancel(self, context):
+    def cancel(self, _context):
         _end()
-        context.workspace.status_text_set(None)
+        status_bar.clear()
 
 
 class TOLVOL_OT_restore_original(bpy.types.Operator):

@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty, FloatVectorProperty, IntProperty
 from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
-from .. import native, preferences
+from .. import native, preferences, status_bar
 from ..background import Job
 from ..errors import Refused
 from ..job import JobOperator
@@ -138,7 +138,7 @@ label there. Esc, or another click on this button, ends it"""
             status = f"{_what(ob)}: {', '.join(lines) or 'no point under the mouse'}    {_KEYS}"
         else:
             lines, status = ["Preparing"], "Preparing    Esc: End"
-        self._show(context, area, region, lines, reading, status)
+        self._show(area, region, lines, reading, status)
         return reading
 
     def _ready(self, context, ob):
@@ -157,7 +157,7 @@ label there. Esc, or another click on this button, ends it"""
         self._job = Job(functools.partial(self._source.look_up, preferences.threads(context)), native.module.Progress())
         return False
 
-    def _show(self, context, area, region, lines, reading, status):
+    def _show(self, area, region, lines, reading, status):
         place = (0, (0, 0)) if region is None else (region.as_pointer(), _within(region, self._mouse))
         found = probing.Hover(*place, lines if region is not None else [], reading.position if reading else None)
         before = probing.hover()
@@ -169,14 +169,14 @@ label there. Esc, or another click on this button, ends it"""
         self._area = area
         if status != self._said:
             self._said = status
-            context.workspace.status_text_set(status)
+            status_bar.show(status)
 
     def _end(self, context):
         TOLVOL_OT_probe._running = None
         if self._job is not None:
             self._job.progress.cancel()
         context.window_manager.event_timer_remove(self._timer)
-        context.workspace.status_text_set(None)
+        status_bar.clear()
         probing.show_hover(None)
         return {"FINISHED"}
 

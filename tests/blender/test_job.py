@@ -7,7 +7,7 @@ import threading
 import bpy
 import pytest
 
-from addon import job, native
+from addon import job, native, status_bar
 from addon.background import queue, thread
 from addon.job import interruptions, progress_text
 from addon.job.run import Run
@@ -219,8 +219,7 @@ class Context:
     mode = "OBJECT"
 
     def __init__(self):
-        self.texts, self.removed = [], []
-        self.workspace = type("Workspace", (), {"status_text_set": self.texts.append})()
+        self.removed = []
         self.window_manager = type("Manager", (), {"event_timer_remove": self.removed.append})()
 
 
@@ -266,14 +265,16 @@ def test_all_events_but_esc_are_passed_on(waiting):
     assert operator.said == "Modal was cancelled. It has changed nothing"
 
 
-def test_an_outcome_waits_until_the_mode_is_that_of_the_start(waiting):
+def test_an_outcome_waits_until_the_mode_is_that_of_the_start(waiting, monkeypatch):
+    texts = []
+    monkeypatch.setattr(status_bar, "show", texts.append)
     operator, go = waiting
     go.set()
     operator._run._job.outcome()
     context = Context()
     context.mode = "EDIT_MESH"
     assert operator.modal(context, event("TIMER")) == {"PASS_THROUGH"} and not operator.ended
-    assert context.texts[-1].endswith("Waits for Object Mode")
+    assert texts[-1].endswith("Waits for Object Mode")
     context.mode = "OBJECT"
     assert operator.modal(context, event("TIMER")) == {"FINISHED"} and operator.ended == [True]
 

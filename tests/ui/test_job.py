@@ -15,6 +15,7 @@ from window import (
     centre,
     finished,
     open_tab,
+    pixels,
     reset,
     screenshot,
     status_texts,
@@ -89,6 +90,33 @@ def test_the_view_is_turned_while_a_job_runs():
     xdotool("key", "Escape")
     yield from finished(lambda: not job.under_way())
     assert rotation() != before and suzanne().tolvol.snapshot is None
+
+
+def status_bar_pixels():
+    return pixels()[-18:, :600]
+
+
+def test_no_workspace_keeps_the_text_of_a_job():
+    yield from reset(monkey)
+    window, plain = view()[0], {}
+    xdotool("mousemove", 5, 5)
+    workspaces = [bpy.data.workspaces["Scripting"], window.workspace]
+    for workspace in workspaces:
+        window.workspace = workspace
+        yield 1.0
+        plain[workspace] = status_bar_pixels()
+    begin()
+    for workspace in workspaces[::-1]:
+        window.workspace = workspace
+        yield from finished(lambda before=plain[workspace]: (status_bar_pixels() != before).any())
+    xdotool("key", "Escape")
+    yield from finished(lambda: not job.under_way())
+    yield 12.0  # Until then the status bar shows what the job has reported.
+    for workspace in workspaces:
+        window.workspace = workspace
+        yield 1.0
+        screenshot(f"job 2 {workspace.name}")
+        assert (status_bar_pixels() == plain[workspace]).all()
 
 
 def test_the_keyboard_ends_a_job_by_an_edit_of_its_mesh():
