@@ -27,7 +27,7 @@ class _GoOn:
     def invoke(self, context, _event):
         global _handed_over
         self._run, _handed_over = _handed_over, None
-        self._run.operator.voice = self
+        self._run.voice = self
         return self._run.begin_modal(context, self)
 
     def modal(self, context, event):

@@ -25,7 +25,6 @@ class JobOperator:
     count = ""
     part = ""  # which part of the work is under way, such as "Level 2 of 3", if there are several
 
-    voice = None  # the helper that reports in place of this operator (adjusting.py)
     _run = None
 
     def targets(self, context):
@@ -77,13 +76,7 @@ class JobOperator:
 
         kind: a set, as for report().
         """
-        (self.voice or self).report(kind, text)
-
-    def cancelled_message(self):
-        if self.voice is None:
-            return f"{self.bl_label} was cancelled. It has changed nothing"
-        # Adjust Last Operation has undone the result before it repeats the operator.
-        return f"{self.bl_label} was cancelled. The mesh is as it was before that operation"
+        self._run.voice.report(kind, text)
 
     def execute(self, context):
         for earlier in runs:
@@ -99,7 +92,7 @@ class JobOperator:
 
     def invoke(self, context, _event):
         if other := under_way():
-            self.say({"WARNING"}, f"{other.operator.bl_label} is at work: wait until it ends, or press Esc")
+            self.report({"WARNING"}, f"{other.label} is at work: wait until it ends, or press Esc")
             return {"CANCELLED"}
         self._begin(context)
         return self._run.advance() or self._run.go_on(run.PATIENCE) or self._run.begin_modal(context, self)
@@ -117,5 +110,5 @@ class JobOperator:
         named = [bpy.data.objects.get(name) for name in json.loads(self.worked_on or "[]")] if again else []
         self.objects = named if named and all(named) else self.targets(context)
         self.worked_on = json.dumps([ob.name for ob in self.objects])
-        self.voice, self.doing, self.count, self.part = None, "", "", ""
+        self.doing, self.count, self.part = "", "", ""
         self._run = run.Run(self, context)

@@ -27,7 +27,8 @@ class Clock:
 class Told:
     """What is known about the work, as texts, which are empty where nothing is known."""
 
-    title: str  # the part of the work that is under way, or the name of the operator
+    title: str  # the name of the operator
+    part: str  # the part of the work that is under way
     stage: str
     share: float | None  # of the stage that is done
     left: str  # how long the stage goes on
@@ -39,15 +40,16 @@ def tell(operator, progress, clock):
     """Returns the Told of an operator."""
     left = clock.seconds_left(progress)
     if progress.cancelled:
-        return Told(operator.bl_label, "Stopping", None, "", "", "")
-    title = operator.part or operator.bl_label
+        return stopping(operator.bl_label)
+    title, part = operator.bl_label, operator.part
     escape = "Keep Present Result" if operator.improving() else "Cancel"
     if operator.doing:
-        return Told(title, operator.doing, None, "", operator.count, escape)
+        return Told(title, part, operator.doing, None, "", operator.count, escape)
     # In these two stages the count is the number of triangles left.
     counts = progress.count and progress.stage in {"decimating", "refining"}
     return Told(
         title,
+        part,
         progress.stage.capitalize(),
         progress.fraction or None,
         f"{_duration(left)} left" if left is not None else "",
@@ -56,11 +58,16 @@ def tell(operator, progress, clock):
     )
 
 
-def status_line(operator, told):
+def stopping(title):
+    """Returns the Told of an operator that is about to end."""
+    return Told(title, "", "Stopping", None, "", "", "")
+
+
+def status_line(told):
     """Returns the text for the status bar."""
     if not told.escape:
         return told.stage
-    part = f"{operator.part}: " if operator.part else ""
+    part = f"{told.part}: " if told.part else ""
     share = f" {told.share:.0%}" if told.share else ""
     count = f", {told.count}" if told.count else ""
     return f"{part}{told.stage}{share}{count}    Esc: {told.escape}"

@@ -14,12 +14,17 @@ from .claim import Claim
 PATIENCE = 0.4
 _TICK = 0.1
 
+# Adjust Last Operation has undone the result before it repeats the operator.
+_AS_BEFORE = "The mesh is as it was before that operation"
+
 _MODES = {"OBJECT": "Object Mode", "EDIT_MESH": "Edit Mode"}
 
 
 class Run:
     def __init__(self, operator, context):
         self.operator = operator
+        self.label = operator.bl_label
+        self.voice = operator  # reports in place of the operator: report() shows nothing after Adjust Last Operation
         self.progress = native.module.Progress()
         # Why the run was stopped, as a message; "" if its operator begins anew. Its objects must not be touched then.
         self.interrupted = None
@@ -31,7 +36,18 @@ class Run:
 
     def told(self):
         """Returns what is known about the work, for the panel."""
-        return progress_text.tell(self.operator, self.progress, self._clock)
+        return (
+            progress_text.stopping(self.label)
+            if self._gone()
+            else progress_text.tell(self.operator, self.progress, self._clock)
+        )
+
+    def _gone(self):
+        """Whether Blender has freed the operator: it keeps the last 32, one of which Adjust Last Operation has repeated."""
+        try:
+            return not self.operator.bl_label
+        except ReferenceError:
+            return True
 
     def advance(self):
         """Starts the next work. Returns the operator's result if there is no more work, else None."""
@@ -40,10 +56,11 @@ class Run:
         except StopIteration:
             return {"FINISHED"}
         except native.module.Cancelled:
-            self.operator.say({"INFO"}, self.operator.cancelled_message())
+            left = "It has changed nothing" if self.voice is self.operator else _AS_BEFORE
+            self.voice.report({"INFO"}, f"{self.label} was cancelled. {left}")
             return {"CANCELLED"}
         except (Refused, native.module.TolvolError) as error:
-            self.operator.say({"ERROR"}, native.said(error))
+            self.voice.report({"ERROR"}, native.said(error))
             return {"CANCELLED"}
         return None
 
@@ -69,7 +86,7 @@ class Run:
         if self.interrupted is not None:
             self._leave(context)
             if self.interrupted:
-                self.operator.say({"WARNING"}, self.interrupted)
+                self.voice.report({"WARNING"}, self.interrupted)
             return {"CANCELLED"}
         if event.type == "ESC":
             if event.value != "PRESS":
@@ -95,7 +112,7 @@ class Run:
             if ended:
                 self._leave(context)
                 return ended
-        status = progress_text.status_line(self.operator, self.told())
+        status = progress_text.status_line(self.told())
         status_bar.show(status + (f"    Waits for {_MODES.get(self._mode, 'its mode')}" if waits else ""))
         redraw_sidebars()
         return None
@@ -107,10 +124,10 @@ class Run:
         self._end()
         self._leave(context)
 
-    def interrupt(self, happens):
+    def interrupt(self, happens, left="It has changed nothing"):
         """Ends the job while the data that it began with still exists. Blender then calls on_event() or close()."""
         if self.interrupted is None:
-            self.interrupted = f"{self.operator.bl_label} was stopped, because {happens}. It has changed nothing"
+            self.interrupted = f"{self.label} was stopped, because {happens}. {left}"
             self._end()
 
     def supersede(self):
@@ -124,6 +141,9 @@ class Run:
 
     def _look(self):
         """Ends the job as soon as its outcome cannot be written any more."""
+        if self._gone():
+            self.interrupt("Blender keeps only 32 operations, and as many have followed", _AS_BEFORE)
+            return
         try:
             self._check(thoroughly=interruptions.take_edited())
         except Refused as error:

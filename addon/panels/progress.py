@@ -10,7 +10,7 @@ def draw_progress(context, box, told):
     """Draws the job in place of a verdict, in as many rows."""
     row = box.row()
     row.scale_y = 1.5
-    row.label(text=told.title, icon="SORTTIME")
+    row.label(text=told.part or told.title, icon="SORTTIME")
     column = box.column(align=True)
     if told.share is None:
         column.label(text=told.stage)
@@ -27,5 +27,6 @@ def draw_progress(context, box, told):
 
 def in_a_row(context, told):
     """Returns in few words what is at work."""
-    share = [f"{told.title}, {told.share:.0%}"] if told.share is not None else []
-    return fitting(context, *share, told.title)
+    name = told.part or told.title
+    share = [f"{name}, {told.share:.0%}"] if told.share is not None else []
+    return fitting(context, *share, name)

@@ -296,14 +296,12 @@ def test_the_panel_is_told_stage_count_part_and_time_left(waiting, monkeypatch):
     operator._run.progress = progress = Progress()
     operator.improving = lambda: False
     operator.part = "torus, 2 of 3"
-    assert operator._run.told() == progress_text.Told("torus, 2 of 3", "Decimating", None, "", "", "Cancel")
+    assert operator._run.told() == progress_text.Told("Modal", "torus, 2 of 3", "Decimating", None, "", "", "Cancel")
     now[0] += 10
     progress.fraction, progress.count = 0.25, 12_400
     told = operator._run.told()
     assert (told.share, told.left, told.count) == (0.25, "30 s left", "12,400 triangles left")
-    assert progress_text.status_line(operator, told) == (
-        "torus, 2 of 3: Decimating 25%, 12,400 triangles left    Esc: Cancel"
-    )
+    assert progress_text.status_line(told) == ("torus, 2 of 3: Decimating 25%, 12,400 triangles left    Esc: Cancel")
     progress.stage, progress.fraction = "measuring", 0.5
     told = operator._run.told()
     assert (told.stage, told.left, told.count) == ("Measuring", "", "")  # A new stage has just begun.

@@ -225,6 +225,19 @@ def test_escape_while_adjusting_leaves_the_mesh_as_before_the_operation():
     assert len(suzanne().data.polygons) == left
 
 
+def test_adjusting_ends_once_blender_has_forgotten_the_operator():
+    yield from reset(monkey)
+    left, _ = yield from decimated()
+    said = len(reports())
+    adjust(tolerance_percent=0.02)
+    with window_context():
+        for _ in range(33):
+            bpy.ops.object.select_all("EXEC_DEFAULT", True, action="TOGGLE")
+            assert job.under_way()
+    yield from ends(said, "because Blender keeps only 32 operations, and as many have followed. The mesh is as it was")
+    assert suzanne().tolvol.snapshot is None and len(suzanne().data.polygons) > 3 * left
+
+
 def test_adjusting_again_while_a_job_runs_begins_anew():
     yield from reset(monkey)
     left, _ = yield from decimated()
