@@ -15,6 +15,9 @@ from ..reference import snapshots, tolerances
 from . import settings as shared
 from .blocked import allowed, check_blocked, mesh_blocked
 
+# A custom property of an image that was baked for an object: the name of the object.
+_NORMALS_OF = "tolvol_normals_of"
+
 
 def appearance_blocked(ob):
     """Why the mesh of `ob` cannot get the look of its reference now, or None."""
@@ -83,8 +86,9 @@ tolerance, in a second Blender without a window. Without a UV map, Smart UV Proj
 
     def _write(self, ob, shading, baked):
         mesh = ob.data
-        name = f"{ob.name} normals"
-        before, image = bpy.data.images.get(name), bpy.data.images.load(str(baked.path))
+        before = [image for image in bpy.data.images if image.get(_NORMALS_OF) == ob.name and image.library is None]
+        image = bpy.data.images.load(str(baked.path))
+        image[_NORMALS_OF] = ob.name
         image.colorspace_settings.name = "Non-Color"
         image.pack()
         image.filepath = ""
@@ -96,9 +100,10 @@ tolerance, in a second Blender without a window. Without a UV map, Smart UV Proj
         uv_map = mesh.uv_layers.active.name
         for warning in materials.show(ob, image, uv_map):
             self.say({"WARNING"}, warning)
-        if before is not None and before.users == 0:  # It is that of an earlier bake.
-            bpy.data.images.remove(before)
-        image.name = name
+        for earlier in before:
+            if earlier.users == 0:
+                bpy.data.images.remove(earlier)
+        image.name = f"{ob.name} normals"  # If another image has the name, Blender adds a number.
         shared.give(self, ob.tolvol.bake, bake_settings())
         if baked.missed:
             share = 100 * baked.missed / baked.covered

@@ -205,6 +205,15 @@ def test_uv_maps_are_kept_and_a_second_bake_replaces_the_first():
     assert (ob.tolvol.bake.image_size, ob.tolvol.bake.shade) == (128, False)
 
 
+def test_an_image_of_the_user_with_the_same_name_stays():
+    decimate(ball())
+    mine = bpy.data.images.new("Sphere normals", 8, 8)  # Nothing uses it.
+    bake()
+    bake()
+    assert bpy.data.images["Sphere normals"] == mine and tuple(mine.size) == (8, 8)
+    assert [tuple(image.size) for image in bpy.data.images if image != mine] == [(256, 256)]
+
+
 def rendered(ob):
     """Returns a small picture of `ob` alone, by Cycles."""
     scene = bpy.context.scene
