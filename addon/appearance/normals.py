@@ -15,8 +15,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..mesh.carry import corner_normals, fans, following_corners, mean
-from ..mesh.mesh_io import column, matrix_array
+from ..mesh.carry import corner_normals, fans, mean
+from ..mesh.mesh_io import column, faces_of_corners, following_corners, matrix_array
 from ..reference import originals, snapshots
 
 # A corner looks from a place that is this share of the way to the centre of its face.
@@ -105,8 +105,9 @@ def _separate_faces(mesh):
     """Returns a new mesh with the faces of `mesh`, each on vertices of its own that are slightly inside it."""
     sizes, begins = (column(mesh.polygons, name, 1, np.int32) for name in ("loop_total", "loop_start"))
     places = column(mesh.vertices, "co", 3)[column(mesh.loops, "vertex_index", 1, np.int32)]
-    centres = np.add.reduceat(places, begins) / sizes[:, None]
-    places += _INSIDE * (np.repeat(centres, sizes, axis=0) - places)
+    faces = faces_of_corners(mesh)
+    centres = np.stack([np.bincount(faces, axis, len(sizes)) for axis in places.T], 1) / sizes[:, None]
+    places += _INSIDE * (centres[faces] - places)
     apart = bpy.data.meshes.new(".appearance")
     apart.vertices.add(len(places))
     apart.vertices.foreach_set("co", places.ravel())

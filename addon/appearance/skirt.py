@@ -4,8 +4,8 @@
 import bpy
 import numpy as np
 
-from ..mesh.carry import corner_normals, following_corners
-from ..mesh.mesh_io import column, new_mesh
+from ..mesh.carry import corner_normals
+from ..mesh.mesh_io import column, faces_of_corners, following_corners, new_mesh
 
 
 def around(mesh, width):
@@ -18,7 +18,7 @@ def around(mesh, width):
         return None
     second = following_corners(mesh)[first]
     places, normals = column(mesh.vertices, "co", 3), corner_normals(mesh)
-    faces = np.repeat(np.arange(len(mesh.polygons)), column(mesh.polygons, "loop_total", 1, np.int32))[first]
+    faces = faces_of_corners(mesh)[first]
     along = places[starts[second]] - places[starts[first]]
     outward = _unit(np.cross(along, column(mesh.polygons, "normal", 3)[faces]))
     outwards = np.zeros_like(places)

@@ -12,7 +12,7 @@ move keeps its values bit for bit.
 import bpy
 import numpy as np
 
-from .mesh_io import column
+from .mesh_io import column, faces_of_corners, following_corners
 
 # Data type of a Blender attribute -> (property of its elements, width, array type). An attribute of another type, such as
 # text, stays with its element.
@@ -199,14 +199,6 @@ def mean(values, labels):
     return (sums / np.maximum(np.bincount(labels, minlength=len(sums)), 1)[:, None])[labels].astype(np.float32)
 
 
-def following_corners(mesh):
-    """Returns the next corner around the face for each corner of a mesh, (corners,)."""
-    begins, sizes = (column(mesh.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total"))
-    following = np.arange(1, len(mesh.loops) + 1)
-    following[begins + sizes - 1] = begins
-    return following
-
-
 def fans(mesh):
     """Returns a label for each corner of a mesh.
 
@@ -214,7 +206,7 @@ def fans(mesh):
     """
     edges, starts = (column(mesh.loops, name, 1, np.int32) for name in ("edge_index", "vertex_index"))
     following = following_corners(mesh)
-    smooth = np.repeat(column(mesh.polygons, "use_smooth", 1, bool), column(mesh.polygons, "loop_total", 1, np.int32))
+    smooth = column(mesh.polygons, "use_smooth", 1, bool)[faces_of_corners(mesh)]
     order = np.argsort(edges, kind="stable")
     twice = np.bincount(edges, minlength=len(mesh.edges)) == 2
     pairs = order[twice[edges[order]]].reshape(-1, 2)

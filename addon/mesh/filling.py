@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import Refused
-from .mesh_io import MeshArrays, column
+from .mesh_io import MeshArrays, column, faces_of_corners
 
 # The report has the places of so many closed holes, the largest ones.
 MOST_PLACES = 100
@@ -111,7 +111,7 @@ def add_faces(built, mesh, source):
     faces = built.faces[:]
     starts = column(mesh.polygons, "loop_start", 1, np.int32)
     new = slice(len(source.triangles) - len(source.like), None)
-    of_corner = np.searchsorted(starts, source.corners[new], "right") - 1
+    of_corner = faces_of_corners(mesh)[source.corners[new]]
     offsets = source.corners[new] - starts[of_corner]
     for vertices, like, polygons, places in zip(
         source.triangles[new].tolist(), source.like.tolist(), of_corner.tolist(), offsets.tolist()

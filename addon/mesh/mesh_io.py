@@ -60,6 +60,26 @@ def whole_quads(mesh, arrays):
     return np.concatenate([quads, others[:, [0, 1, 2, 2]]])
 
 
+def following_corners(mesh):
+    """Returns the next corner around the face for each corner of a mesh, (corners,)."""
+    begins, sizes = (column(mesh.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total"))
+    following = np.arange(1, len(mesh.loops) + 1)
+    following[begins + sizes - 1] = begins
+    return following
+
+
+def faces_of_corners(mesh):
+    """Returns (corners,) int32: the face of each corner of a mesh.
+
+    Before Blender 4.0 a face may have its corners anywhere among those of the mesh: scripts and importers choose loop_start.
+    """
+    begins, sizes = (column(mesh.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total"))
+    corners = np.arange(sizes.sum()) + np.repeat(begins - (np.cumsum(sizes) - sizes), sizes)
+    faces = np.zeros(len(mesh.loops), np.int32)
+    faces[corners] = np.repeat(np.arange(len(sizes)), sizes)
+    return faces
+
+
 def triangles_at(mesh, vertices):
     """Returns (m, 3) int32: the triangles that Blender would show if the mesh had these vertex positions."""
     scratch = mesh.copy()

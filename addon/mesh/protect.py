@@ -21,7 +21,7 @@ def unselected(ob):
     if not selected.any():
         raise Refused(f"No face of {ob.name} is selected: select some in Edit Mode")
     vertices = np.zeros(len(mesh.vertices), bool)
-    corners = np.repeat(selected, column(mesh.polygons, "loop_total", 1, np.int32))
+    corners = selected[mesh_io.faces_of_corners(mesh)]
     vertices[column(mesh.loops, "vertex_index", 1, np.int32)[~corners]] = True
     return vertices
 
@@ -90,8 +90,8 @@ def _creases(mesh):
 
 
 def _material_borders(mesh):
-    sizes = column(mesh.polygons, "loop_total", 1, np.int32)
-    return _differ(mesh, np.repeat(column(mesh.polygons, "material_index", 1, np.int32), sizes)[:, None])
+    materials = column(mesh.polygons, "material_index", 1, np.int32)
+    return _differ(mesh, materials[mesh_io.faces_of_corners(mesh)][:, None])
 
 
 def _island_borders(mesh):
@@ -100,9 +100,7 @@ def _island_borders(mesh):
         return np.zeros(len(mesh.edges), bool)
     # A corner stands for the edge to the next corner of its face. Its row holds the UVs at the edge's vertex with the
     # smaller index, then those at the other vertex, so that both faces of the edge list them in the same order.
-    starts, sizes = (column(mesh.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total"))
-    following = np.arange(1, len(mesh.loops) + 1)
-    following[starts + sizes - 1] = starts
+    following = mesh_io.following_corners(mesh)
     vertices = column(mesh.loops, "vertex_index", 1, np.int32)
     swapped = (vertices > vertices[following])[:, None]
     ends = np.where(swapped, uvs[following], uvs), np.where(swapped, uvs, uvs[following])
