@@ -269,11 +269,13 @@ class TOLVOL_PG_guard(bpy.types.PropertyGroup):
 
     sculpting: BoolProperty(
         name="Sculpting",
-        description="Stop vertices at the tolerance while a stroke goes on in Sculpt Mode",
+        description="Stop vertices at the tolerance while a stroke goes on in Sculpt Mode. If a face has more than four corners, "
+        "the tolerance is kept one way, and faces may turn over",
     )
     editing: BoolProperty(
         name="Editing",
-        description="Stop vertices at the tolerance in Edit Mode, and undo edits of the faces that leave the tolerance",
+        description="Stop vertices at the tolerance in Edit Mode, and undo edits of the faces that leave the tolerance. If a face "
+        "has more than four corners, the tolerance is kept one way, and faces may turn over",
     )
     crossings: BoolProperty(
         name="Keep Crossings Out",

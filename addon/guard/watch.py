@@ -68,7 +68,7 @@ def points_of(ob):
 class Faces:
     """The faces that have to stay inside in every triangulation, and the triangles that Blender shows for them."""
 
-    largest: int  # the number of corners of the largest polygon
+    larger: int  # the number of polygons with more than four corners
     faces: np.ndarray  # (m, 3) or (m, 4) int32
     polygons: np.ndarray  # (m,) the polygon of each face
     shown: np.ndarray  # (k, 3) int32 triangles
@@ -96,7 +96,7 @@ class Faces:
         faces = np.concatenate(faces)
         if sizes.max() == 3:
             faces = np.ascontiguousarray(faces[:, :3])
-        return cls(sizes.max(), faces, np.concatenate(polygons), arrays.triangles, arrays.polygons)
+        return cls(int(np.count_nonzero(sizes > 4)), faces, np.concatenate(polygons), arrays.triangles, arrays.polygons)
 
     def outside(self, built, positions, options):
         """Returns how many polygons are outside in the triangulation that Blender shows. options: of a check."""
@@ -182,12 +182,12 @@ class Watch(Preparing):
 
         both = ob.tolvol.keep == "BOTH"
         # A larger polygon stands for triangles that are not all there, so that they cannot be witnesses.
-        two_sided = both and faces.largest <= 4
+        two_sided = both and not faces.larger
         keeps_out = ob.tolvol.guard.crossings
         # The triangles that it stands for cross each other as well.
-        crossings = "keep_out" if keeps_out and faces.largest <= 4 else "allow"
+        crossings = "keep_out" if keeps_out and not faces.larger else "allow"
         # Where the polygon is concave, some of these triangles are turned over.
-        angle = None if faces.largest <= 4 else 180
+        angle = 180 if faces.larger else None
 
         def work(progress):
             built = volumes.native_volume(reference, tolerance, threads, progress)
@@ -201,13 +201,10 @@ class Watch(Preparing):
                 remark = f"{kept:,} concave faces stay where they are"
             elif guard.uncovered:
                 remark = f"{guard.uncovered:,} faces of the reference are beyond the tolerance: what is nearest stays"
-            elif (both or keeps_out) and faces.largest > 4:
-                lost = "One way only" if both else ""
-                if keeps_out:
-                    lost = f"{lost}, and crossings allowed" if both else "Crossings allowed"
-                remark = f"{lost}: a face has {faces.largest} corners. Triangulate Faces helps"
             else:
                 remark = next(iter(guard.warnings), None)
+            if faces.larger:
+                remark = ". ".join(filter(None, (_not_kept(faces.larger, both, keeps_out), remark)))
             uncovered = None
             if edits_faces and both:
                 uncovered = np.zeros(len(reference.arrays.triangles), bool)
@@ -262,6 +259,13 @@ class Watch(Preparing):
         if self._held.any():
             return f"Held back {self.held_back:,} vertices"
         return self.remark
+
+
+def _not_kept(count, both, keeps_out):
+    """Returns what a guard does not keep because of so many faces with more than four corners."""
+    lost = [*(["one way only"] if both else []), *(["crossings allowed"] if keeps_out else []), "faces may turn over"]
+    faces = "1 face has" if count == 1 else f"{count:,} faces have"
+    return f"{', '.join(lost).capitalize()}: {faces} more than four corners. Triangulate Faces helps"
 
 
 def uncovered_faces(reference, positions, triangles, tolerance, options):

@@ -154,7 +154,18 @@ def test_faces_of_many_corners_stay_however_blender_cuts_them():
     vertices = [(np.cos(a), np.sin(a), 0) for a in around]
     ob = add_object("disc", vertices, [range(12)])
     reference = guarded(ob, "sculpting")
-    assert state(ob)["sculpting"] == ("One way only: a face has 12 corners. Triangulate Faces helps", True)
+    said = "faces may turn over: 1 face has more than four corners. Triangulate Faces helps"
+    assert state(ob)["sculpting"] == (f"One way only, {said}", True)
+    # What is not kept is said with every choice of what shall be kept.
+    for keep, crossings, lost in (
+        ("BOTH", True, "One way only, crossings allowed, "),
+        ("ONE", True, "Crossings allowed, "),
+        ("ONE", False, ""),
+    ):
+        ob.tolvol.keep, ob.tolvol.guard.crossings = keep, crossings
+        dab(ob, coordinates(ob))
+        text = lost + said
+        assert state(ob)["sculpting"] == (text[0].upper() + text[1:], True)
     rng = np.random.default_rng(5)
     for _ in range(10):
         dab(ob, coordinates(ob) + rng.normal(0, 0.03, (12, 3)))
