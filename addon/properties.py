@@ -274,8 +274,8 @@ class TOLVOL_PG_guard(bpy.types.PropertyGroup):
     )
     editing: BoolProperty(
         name="Editing",
-        description="Stop vertices at the tolerance in Edit Mode, and undo edits of the faces that leave the tolerance. If a face "
-        "has more than four corners, the tolerance is kept one way, and faces may turn over",
+        description="Stop vertices at the tolerance in Edit Mode, and undo edits of the faces that leave the tolerance. If a "
+        "face has more than four corners, the tolerance is kept one way, and faces may turn over",
     )
     crossings: BoolProperty(
         name="Keep Crossings Out",

@@ -150,7 +150,7 @@ class Preparing:
 def needed(ob):
     """Returns (reference, tolerance, to_world, threads) for a guard of `ob`. Raises Refused and TolvolError."""
     reference = snapshots.reference_of(ob)
-    tolerance = tolerances.tolerance_length(ob.tolvol, reference.size())
+    tolerance = tolerances.required(ob, reference.size())
     return reference, tolerance, mesh_io.matrix_array(ob.matrix_world), preferences.threads(bpy.context)
 
 

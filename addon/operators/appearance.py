@@ -76,7 +76,7 @@ tolerance, in a second Blender without a window. Without a UV map, Smart UV Proj
         reference = snapshots.reference_of(ob)
         if not reference.size() > 0:
             raise Refused(f"The reference of {ob.name} has no size: replace it")
-        tolerance = tolerances.tolerance_length(ob.tolvol, reference.size())
+        tolerance = tolerances.required(ob, reference.size())
         threads = self.threads or preferences.threads(context) or 0
         shading = normals.shading(ob) if self.shade else None
         with tempfile.TemporaryDirectory(prefix="bake-", dir=bpy.app.tempdir, ignore_cleanup_errors=True) as folder:

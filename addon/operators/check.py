@@ -9,7 +9,6 @@ import numpy as np
 from bpy.props import IntProperty
 
 from .. import native, preferences
-from ..errors import Refused
 from ..job import JobOperator
 from ..mesh import mesh_io
 from ..proof import measure, report, statistics
@@ -33,9 +32,7 @@ class Comparison(JobOperator):
         context.view_layer.update()
         ob = self.ob
         surface, reference = snapshots.surface_of(ob), snapshots.reference_of(ob)
-        tolerance = tolerances.tolerance_length(ob.tolvol, reference.size())
-        if not snapshots.sound(tolerance):
-            raise Refused("The tolerance in the file is damaged: enter it again")
+        tolerance = tolerances.required(ob, reference.size())
         threads = self.threads or preferences.threads(context)
         self.two_sided = ob.tolvol.keep == "BOTH"
         return functools.partial(self.compare, surface, reference, tolerance, threads)

@@ -317,7 +317,7 @@ class _Trial:
         self.surface = snapshots.surface_of(ob)
         self.reference = snapshots.reference_of(ob)
         self.size = self.reference.size()
-        self.tolerance = tolerances.tolerance_length(ob.tolvol, self.size)
+        self.tolerance = tolerances.required(ob, self.size)
         self.threads = threads
         self._pair = self.reference.world(), self.reference.arrays.triangles
         self.left = 0

@@ -25,7 +25,7 @@ class Motion:
         self.surface = snapshots.surface_of(ob)
         self.reference = snapshots.reference_of(ob)
         self.size = self.reference.size()
-        self.tolerance = tolerances.tolerance_length(ob.tolvol, self.size)
+        self.tolerance = tolerances.required(ob, self.size)
         self.two_sided = ob.tolvol.keep == "BOTH"
         self.crossings = ob.tolvol.crossings.lower()
         self.faces = mesh_io.whole_quads(ob.data, self.surface.arrays)

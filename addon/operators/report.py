@@ -191,9 +191,7 @@ a table (.csv) or all numbers (.json)"""
         settings = ob.tolvol
         surface, reference = snapshots.surface_of(ob), snapshots.reference_of(ob)
         size = reference.size()
-        tolerance = tolerances.tolerance_length(settings, size)
-        if not snapshots.sound(tolerance):
-            raise Refused(f"The tolerance of {ob.name} in the file is damaged: enter it again")
+        tolerance = tolerances.required(ob, size)
         of_object = settings.snapshot_kind == "OBJECT" and settings.snapshot_object is not None
         reference_name = settings.snapshot_object.name if of_object else "its reference"
         about = {"a": _counted(ob.name, ob.data), "b": _counted(reference_name, settings.snapshot)}

@@ -6,7 +6,9 @@ import math
 import bpy
 import numpy as np
 
+from ..errors import Refused
 from ..units import shortest, typed
+from . import snapshots
 
 # A converted number with at most so many digits but for this relative rounding error is meant to be the number of these
 # digits.
@@ -18,6 +20,14 @@ def tolerance_length(settings, size):
     if settings.tolerance_mode == "LENGTH":
         return _chosen(settings, "tolerance_length")
     return _chosen(settings, "tolerance_percent") / 100 * size
+
+
+def required(ob, size):
+    """Returns the tolerance of an object in world units. Raises Refused if a damaged file holds none."""
+    tolerance = tolerance_length(ob.tolvol, size)
+    if not snapshots.sound(tolerance):
+        raise Refused(f"The tolerance of {ob.name} in the file is damaged: enter it again")
+    return tolerance
 
 
 def set_length(settings, length):

@@ -71,13 +71,23 @@ def test_a_damaged_percentage_is_the_default(decimated, value):
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -1.0, 0.0])
-def test_a_damaged_length_has_no_verdict_and_no_check(decimated, value):
+def test_a_damaged_length_has_no_verdict_and_no_check(decimated, value, tmp_path):
     decimated.tolvol.tolerance_mode = "LENGTH"
     assert verdict.of(decimated).passed
     decimated.tolvol["tolerance_length"] = value
     assert measurements.measurement_of(decimated) is not None and verdict.of(decimated) is None
-    with pytest.raises(RuntimeError, match="tolerance in the file is damaged: enter it again"):
-        bpy.ops.tolvol.check()
+    decimated.modifiers.new("smooth", "SMOOTH")
+    decimated.modifiers.new("fit", "DECIMATE")
+    for refuses, options in (
+        (bpy.ops.tolvol.check, {}),
+        (bpy.ops.tolvol.save_report, {"filepath": str(tmp_path / "report.json")}),
+        (bpy.ops.tolvol.smooth, {}),
+        (bpy.ops.tolvol.bake_normals, {}),
+        (bpy.ops.tolvol.apply_modifier, {"modifier": "smooth"}),
+        (bpy.ops.tolvol.fit_modifier, {"modifier": "fit"}),
+    ):
+        with pytest.raises(RuntimeError, match=f"tolerance of {decimated.name} in the file is damaged: enter it again"):
+            refuses(**options)
     decimated.tolvol.tolerance_length = 0.1
     assert bpy.ops.tolvol.check() == {"FINISHED"} and verdict.of(decimated).passed
 
