@@ -10,15 +10,16 @@ import pytest
 
 from addon import estimate, job
 from addon.background import queue
+from addon.estimate import known, runs
 from scenes import activate, add_object, sheet, sheet_arrays, torus
 
 
 @pytest.fixture(autouse=True)
 def _nothing_left(monkeypatch):
-    monkeypatch.setattr(estimate, "_REST", 0.0)
+    monkeypatch.setattr(runs, "_REST", 0.0)
     yield
     queue.stop()
-    estimate._after_load()
+    known.forget()
 
 
 def drawn(until=None):
@@ -221,7 +222,7 @@ def test_what_is_refused_is_said(monkeypatch):
     assert is_known(drawn(until=is_known))
     ob.tolvol.vertex_group = "nowhere"
     assert drawn() == ""
-    monkeypatch.setattr(estimate, "MOST_TRIANGLES", 1000)
+    monkeypatch.setattr(runs, "MOST_TRIANGLES", 1000)
     assert estimate.shown(bpy.context) == "Too large to estimate"
     bpy.ops.object.mode_set(mode="EDIT")
     assert estimate.shown(bpy.context) == "" and not queue._waiting
@@ -298,7 +299,7 @@ def test_without_memory_nothing_more_is_tried(monkeypatch):
     def none_left(*_):
         raise MemoryError
 
-    monkeypatch.setattr(estimate.volumes, "passing_volume", none_left)
+    monkeypatch.setattr(runs.volumes, "passing_volume", none_left)
     assert drawn() == "Too large to estimate" and not queue._waiting
 
 

@@ -5,6 +5,7 @@ import contextlib
 import time
 
 from addon import estimate
+from addon.estimate import known
 from addon.proof import verdict
 from test_panel import monkey, suzanne
 from window import find_property, finished, on_screen, open_tab, press, region, reset, screenshot, xdotool
@@ -41,7 +42,7 @@ def test_the_number_follows_the_tolerance_while_it_is_dragged():
         before = answers[-1][1]
         assert suzanne().tolvol.snapshot is None and before.before == 62976 and not before.known
         # The curve reaches as far as the tolerance is dragged below.
-        yield from finished(lambda: "Suzanne" in estimate._known and estimate._known["Suzanne"].curve.count(6))
+        yield from finished(lambda: "Suzanne" in known._known and known._known["Suzanne"].curve.count(6))
         x, y = yield from find_property("tolerance_percent", 0.6)
         yield 0.6  # After so many seconds no tooltip is in the way.
         xdotool("mousemove", x, y, "sleep", "0.1", "mousedown", 1)
