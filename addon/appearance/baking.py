@@ -7,21 +7,16 @@ the faces, so that the cage is lower over them.
 """
 
 import json
-import subprocess
-import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from .. import native
 from ..errors import Refused
 from ..mesh.mesh_io import matrix_array
-from . import normals, skirt
+from . import normals, other_blender, skirt
 
-_LOOK = 0.05  # The thread looks every so many seconds whether it was cancelled.
 # Each island of the UV map is continued beyond its border by 1 / _MARGIN of the image's width, so that no seam is seen.
 _MARGIN = 128
 _ABOVE = 2.0  # tolerances
@@ -52,11 +47,11 @@ class Task:
             "threads": threads,
         }
         (self._folder / "task.json").write_text(json.dumps(task))
-        self._command = _command(self._folder)
+        self._command = other_blender.command("bake_process.py", self._folder)
 
     def _write(self, ob, shading, tolerance):
         """Writes the mesh, the reference and its skirt to a file, and returns the names of their objects there."""
-        meshes, objects = [ob.data.copy(), normals.original_in_place(ob)], []
+        meshes = [ob.data.copy(), normals.original_in_place(ob)]
         try:
             if meshes[0].shape_keys:
                 _clear_shape_keys(meshes[0])
@@ -64,37 +59,13 @@ class Task:
                 shading.write(meshes[0])
             if border := skirt.around(meshes[1], _SKIRT * tolerance):
                 meshes.append(border)
-            for mesh in meshes:
-                mesh.materials.clear()
-                objects.append(bpy.data.objects.new(".bake", mesh))
-            bpy.data.libraries.write(str(self._folder / "meshes.blend"), set(objects))
-            return [each.name for each in objects]
+            return other_blender.write(self._folder, meshes)
         finally:
-            for each in objects:
-                bpy.data.objects.remove(each)
             for mesh in meshes:
                 bpy.data.meshes.remove(mesh)
 
     def run(self, progress):
-        log = self._folder / "log.txt"
-        with open(log, "wb") as output:
-            process = subprocess.Popen(
-                self._command, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT, **_without_window()
-            )
-        try:
-            while process.poll() is None:
-                if progress.cancelled:
-                    raise native.module.Cancelled("cancelled")
-                time.sleep(_LOOK)
-        finally:
-            if process.poll() is None:
-                process.kill()
-                process.wait()
-        try:
-            result = json.loads((self._folder / "result.json").read_text())
-        except (OSError, ValueError):
-            said = log.read_text(errors="replace").strip().splitlines()[-1:] or ["it said nothing"]
-            raise Refused(f"Baking {self._name} failed: the other Blender ended without a result, {said[0]}") from None
+        result = other_blender.run(self._command, self._folder, f"Baking {self._name}", progress)
         if "error" in result:
             raise Refused(self._why(result["error"]))
         uvs = self._folder / "uvs.npy"
@@ -108,18 +79,6 @@ class Task:
         if error == "no area":
             return f"The UV map of {self._name} has no area: unwrap it, or remove it, and one is made"
         return f"Baking {self._name} failed: {error}"
-
-
-def _command(folder):
-    script = str(Path(__file__).parent / "bake_process.py")
-    if not bpy.app.binary_path:  # The module bpy of PyPI is no program.
-        return [sys.executable, script, "--", str(folder)]
-    options = ["--background", "--factory-startup", "--python", script]
-    return [bpy.app.binary_path, *options, "--", str(folder)]
-
-
-def _without_window():
-    return {"creationflags": subprocess.CREATE_NO_WINDOW} if sys.platform == "win32" else {}
 
 
 def _clear_shape_keys(mesh):

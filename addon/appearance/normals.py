@@ -7,17 +7,21 @@ normals of two faces at a common edge differ much, the edge is marked as sharp, 
 normal.
 """
 
-import contextlib
+import json
 import math
+import tempfile
 from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..mesh.carry import corner_normals, fans, mean
+from ..errors import Refused
+from ..mesh.carry import fans, mean
 from ..mesh.mesh_io import column, faces_of_corners, following_corners, matrix_array
 from ..reference import originals, snapshots
+from . import other_blender, transfer_process
 
 # A corner looks from a place that is this share of the way to the centre of its face.
 _INSIDE = 0.02
@@ -25,6 +29,11 @@ _INSIDE = 0.02
 _SHARP = math.radians(20)
 # An original that is shaded flat everywhere counts as smooth, but for edges of more than this angle.
 _FLAT = math.radians(30)
+
+
+# Meshes with more corners together are looked at by another Blender, which takes about a second more: with so many, this
+# one would stand still for half a second.
+_AT_ONCE = 300_000
 
 
 @dataclass(frozen=True)
@@ -62,9 +71,41 @@ def original_in_place(ob):
 
 
 def shading(ob):
-    """Returns the Shading of the mesh of `ob` by its reference. It changes nothing."""
-    mesh = ob.data
-    normals = _transferred(mesh, ob)
+    """A generator for the steps of an operator, which changes nothing: returns the Shading of the mesh of `ob` by its
+    reference. For large meshes it yields work for a thread."""
+    with tempfile.TemporaryDirectory(prefix="shade-", dir=bpy.app.tempdir, ignore_cleanup_errors=True) as folder:
+        task = _Task(ob, Path(folder))
+        normals = (yield task.run) if task.normals is None else task.normals
+    return Shading(normals, _sharp(ob.data, normals))
+
+
+class _Task:
+    """Has the normals of the reference for each corner of a mesh, (corners, 3), if that is quickly done. Otherwise run()
+    returns them: Blender does not let a thread evaluate a modifier, so that another Blender does it."""
+
+    def __init__(self, ob, folder):
+        self._name, self._folder, self.normals = ob.name, folder, None
+        meshes = original_in_place(ob), _separate_faces(ob.data)
+        try:
+            if sum(len(mesh.loops) for mesh in meshes) <= _AT_ONCE:
+                self.normals = transfer_process.transferred(*meshes)
+                return
+            (folder / "task.json").write_text(json.dumps(other_blender.write(folder, meshes)))
+            self._command = other_blender.command("transfer_process.py", folder)
+        finally:
+            for mesh in meshes:
+                bpy.data.meshes.remove(mesh)
+
+    def run(self, progress):
+        doing = f"Reading the normals for {self._name}"
+        result = other_blender.run(self._command, self._folder, doing, progress)
+        if "error" in result:
+            raise Refused(f"{doing} failed: {result['error']}")
+        return np.load(self._folder / "normals.npy")
+
+
+def _sharp(mesh, normals):
+    """Returns (edges,) bool: the edges whose two faces have normals that differ much there."""
     edges, starts = (column(mesh.loops, name, 1, np.int32) for name in ("edge_index", "vertex_index"))
     following = following_corners(mesh)
     order = np.argsort(edges, kind="stable")
@@ -77,28 +118,7 @@ def shading(ob):
     ):
         apart = np.einsum("ij,ij->i", normals[first], normals[second]) < math.cos(_SHARP)
         sharp[edges[one[apart]]] = True
-    return Shading(normals, sharp)
-
-
-def _transferred(mesh, ob):
-    """Returns the normals of the reference for each corner of `mesh`, (corners, 3)."""
-    with contextlib.ExitStack() as ends:
-        source, looking = original_in_place(ob), _separate_faces(mesh)
-        scene = bpy.data.scenes.new(".appearance")
-        made = [bpy.data.objects.new(".appearance", each) for each in (source, looking)]
-        for each in (source, looking):
-            ends.callback(bpy.data.meshes.remove, each)
-        for each in made:
-            ends.callback(bpy.data.objects.remove, each)
-            scene.collection.objects.link(each)
-        ends.callback(bpy.data.scenes.remove, scene)
-        modifier = made[1].modifiers.new("normals", "DATA_TRANSFER")
-        modifier.object = made[0]
-        modifier.use_loop_data, modifier.data_types_loops = True, {"CUSTOM_NORMAL"}
-        modifier.loop_mapping = "POLYINTERP_NEAREST"
-        layer = scene.view_layers[0]
-        layer.update()
-        return corner_normals(made[1].evaluated_get(layer.depsgraph).data)
+    return sharp
 
 
 def _separate_faces(mesh):

@@ -15,6 +15,8 @@ from ..reference import snapshots, tolerances
 from . import settings as shared
 from .blocked import allowed, check_blocked, mesh_blocked
 
+_READING = "Reading the normals"
+
 # A custom property of an image that was baked for an object: the name of the object.
 _NORMALS_OF = "tolvol_normals_of"
 
@@ -28,7 +30,7 @@ def appearance_blocked(ob):
     return None
 
 
-class TOLVOL_OT_shade_by_reference(bpy.types.Operator):
+class TOLVOL_OT_shade_by_reference(JobOperator, bpy.types.Operator):
     """Shade the mesh smooth with the normals of the reference at the nearest points, as custom normals. Edges where the \
 normals of the two sides differ by more than 20 degrees are marked as sharp. The shape stays as it is"""
 
@@ -40,13 +42,13 @@ normals of the two sides differ by more than 20 degrees are marked as sharp. The
     def poll(cls, context):
         return allowed(cls, appearance_blocked(context.active_object))
 
-    def execute(self, context):
-        ob = context.active_object
-        shading = normals.shading(ob)
+    def steps(self, context):
+        context.view_layer.update()
+        ob, self.doing = self.ob, _READING
+        shading = yield from normals.shading(ob)
         shading.write(ob.data)
         sharp = int(shading.sharp.sum())
-        self.report({"INFO"}, f"{ob.name} has the normals of its reference, {sharp:,} edges are sharp")
-        return {"FINISHED"}
+        self.say({"INFO"}, f"{ob.name} has the normals of its reference, {sharp:,} edges are sharp")
 
 
 class TOLVOL_OT_bake_normals(JobOperator, bpy.types.Operator):
@@ -71,14 +73,16 @@ tolerance, in a second Blender without a window. Without a UV map, Smart UV Proj
 
     def steps(self, context):
         context.view_layer.update()
-        ob, self.doing = self.ob, "Baking the normals"
+        ob = self.ob
         shared.take(self, ob.tolvol.bake, bake_settings())
         reference = snapshots.reference_of(ob)
         if not reference.size() > 0:
             raise Refused(f"The reference of {ob.name} has no size: replace it")
         tolerance = tolerances.required(ob, reference.size())
         threads = self.threads or preferences.threads(context) or 0
-        shading = normals.shading(ob) if self.shade else None
+        self.doing = _READING
+        shading = (yield from normals.shading(ob)) if self.shade else None
+        self.doing = "Baking the normals"
         with tempfile.TemporaryDirectory(prefix="bake-", dir=bpy.app.tempdir, ignore_cleanup_errors=True) as folder:
             task = baking.Task(ob, shading, tolerance, self.image_size, threads, folder)
             baked = yield task.run

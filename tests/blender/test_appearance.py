@@ -11,7 +11,7 @@ import pytest
 from mathutils import Matrix
 
 from addon import native
-from addon.appearance import bake_process, baking
+from addon.appearance import bake_process, baking, normals, other_blender
 from addon.mesh.carry import corner_normals
 from addon.mesh.mesh_io import column
 from scenes import activate, add_object, sheet, torus
@@ -76,6 +76,19 @@ def test_the_normals_are_those_of_the_reference(smooth):
     assert [len(getattr(bpy.data, kind)) for kind in ("meshes", "objects", "scenes")] == counts
     bpy.ops.ed.undo()
     assert not bpy.context.object.data.has_custom_normals
+
+
+def test_another_blender_reads_the_same_normals(monkeypatch):
+    ob = decimate(ball())
+    assert bpy.ops.tolvol.shade_by_reference() == {"FINISHED"}
+    before = corner_normals(ob.data)
+    ran, run = [], other_blender.run
+    monkeypatch.setattr(other_blender, "run", lambda *told: ran.append(told) or run(*told))
+    monkeypatch.setattr(normals, "_AT_ONCE", 1000)
+    meshes, scenes = len(bpy.data.meshes), len(bpy.data.scenes)
+    assert bpy.ops.tolvol.shade_by_reference() == {"FINISHED"} and len(ran) == 1
+    assert np.abs(corner_normals(ob.data) - before).max() < 1e-5
+    assert (len(bpy.data.meshes), len(bpy.data.scenes)) == (meshes, scenes)
 
 
 def test_sharp_edges_stay_sharp():
@@ -285,7 +298,9 @@ def test_what_the_other_blender_cannot_do_is_said(monkeypatch):
     decimate(torus())
     answer = "import json, sys; open(sys.argv[-1] + '/result.json', 'w').write(json.dumps({'error': 'no Cycles'}))"
     for code, message in ((answer, "has no Cycles, which bakes: install"), ("exit(3)", "ended without a result")):
-        monkeypatch.setattr(baking, "_command", lambda folder, code=code: [sys.executable, "-c", code, str(folder)])
+        monkeypatch.setattr(
+            other_blender, "command", lambda _, folder, code=code: [sys.executable, "-c", code, str(folder)]
+        )
         with pytest.raises(RuntimeError, match=message):
             bake()
     assert not bpy.data.images
@@ -309,9 +324,11 @@ class _Without:
 def test_a_cancel_ends_the_other_blender(tmp_path, monkeypatch):
     ob = decimate(torus())
     sleeper = [sys.executable, "-c", "import time; time.sleep(600)"]
-    monkeypatch.setattr(baking, "_command", lambda _: sleeper)
-    started, popen = [], baking.subprocess.Popen
-    monkeypatch.setattr(baking.subprocess, "Popen", lambda *a, **k: started.append(popen(*a, **k)) or started[-1])
+    monkeypatch.setattr(other_blender, "command", lambda *_: sleeper)
+    started, popen = [], other_blender.subprocess.Popen
+    monkeypatch.setattr(
+        other_blender.subprocess, "Popen", lambda *a, **k: started.append(popen(*a, **k)) or started[-1]
+    )
     task, progress = baking.Task(ob, None, 0.01, 64, 0, tmp_path), native.module.Progress()
     failed = []
 

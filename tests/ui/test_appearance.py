@@ -6,6 +6,7 @@ import time
 import bpy
 
 from addon import job, panels
+from addon.appearance import normals
 from addon.proof import verdict
 from panels_open import unfolded
 from test_panel import monkey, suzanne
@@ -38,6 +39,26 @@ def test_normals_and_a_normal_map_by_mouse():
         yield
         key("ctrl+z")
         yield from finished(lambda: not suzanne().data.has_custom_normals)
+        # As with a large reference, another Blender reads the normals, and Esc ends it.
+        at_once, normals._AT_ONCE = normals._AT_ONCE, 0
+        try:
+            yield from press("tolvol.shade_by_reference")
+            yield from finished(job.under_way, pause=0.05)
+            yield 0.3
+            screenshot("look 2 reading")
+            xdotool("mousemove", *centre())
+            key("Escape")
+            yield from finished(lambda: not job.under_way(), pause=0.05)
+            assert not suzanne().data.has_custom_normals
+            yield from press("tolvol.shade_by_reference")
+            yield from finished(lambda: suzanne().data.has_custom_normals)
+            assert verdict.word(suzanne()) == verdict.PASS
+            xdotool("mousemove", *centre())
+            yield
+            key("ctrl+z")
+            yield from finished(lambda: not suzanne().data.has_custom_normals)
+        finally:
+            normals._AT_ONCE = at_once
         engine, uvs = bpy.context.scene.render.engine, len(suzanne().data.uv_layers)
         yield from press("tolvol.bake_normals")
         yield from finished(job.under_way)

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs a script of this folder in a Blender of its own, without a window.
+
+It can be ended at any time, and the user can work on meanwhile. The script gets a folder as its only argument, reads
+meshes.blend there, and writes result.json.
+"""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bpy
+
+from .. import native
+from ..errors import Refused
+
+_LOOK = 0.05  # The thread looks every so many seconds whether it was cancelled.
+
+
+def write(folder, meshes):
+    """Writes meshes, without their materials, into the folder. Returns the names of their objects there."""
+    objects = []
+    try:
+        for mesh in meshes:
+            mesh.materials.clear()
+            objects.append(bpy.data.objects.new(".appearance", mesh))
+        bpy.data.libraries.write(str(folder / "meshes.blend"), set(objects))
+        return [ob.name for ob in objects]
+    finally:
+        for ob in objects:
+            bpy.data.objects.remove(ob)
+
+
+def command(script, folder):
+    """Returns the command that runs a script. Only the main thread may call it."""
+    path = str(Path(__file__).parent / script)
+    if not bpy.app.binary_path:  # The module bpy of PyPI is no program.
+        return [sys.executable, path, "--", str(folder)]
+    return [bpy.app.binary_path, "--background", "--factory-startup", "--python", path, "--", str(folder)]
+
+
+def run(command_line, folder, doing, progress):
+    """Runs a command until it ends or the progress is cancelled. Returns what it has written into result.json.
+
+    doing: what fails, for the error.
+    """
+    log = folder / "log.txt"
+    with open(log, "wb") as output:
+        process = subprocess.Popen(
+            command_line, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT, **_without_window()
+        )
+    try:
+        while process.poll() is None:
+            if progress.cancelled:
+                raise native.module.Cancelled("cancelled")
+            time.sleep(_LOOK)
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
+    try:
+        return json.loads((folder / "result.json").read_text())
+    except (OSError, ValueError):
+        said = log.read_text(errors="replace").strip().splitlines()[-1:] or ["it said nothing"]
+        raise Refused(f"{doing} failed: the other Blender ended without a result, {said[0]}") from None
+
+
+def _without_window():
+    return {"creationflags": subprocess.CREATE_NO_WINDOW} if sys.platform == "win32" else {}
