@@ -44,7 +44,8 @@ normals of the two sides differ by more than 20 degrees are marked as sharp. The
 
     def steps(self, context):
         context.view_layer.update()
-        ob, self.doing = self.ob, _READING
+        # The label has no room in the panel.
+        ob, self.part, self.doing = self.ob, "Shade by Reference", _READING
         shading = yield from normals.shading(ob)
         shading.write(ob.data)
         sharp = int(shading.sharp.sum())

@@ -10,7 +10,7 @@ def draw_progress(context, box, told):
     """Draws the job in place of a verdict, in as many rows."""
     row = box.row()
     row.scale_y = 1.5
-    row.label(text=told.part or told.title, icon="SORTTIME")
+    row.label(text=_name(told), icon="SORTTIME")
     column = box.column(align=True)
     if told.share is None:
         column.label(text=told.stage)
@@ -27,6 +27,11 @@ def draw_progress(context, box, told):
 
 def in_a_row(context, told):
     """Returns in few words what is at work."""
-    name = told.part or told.title
+    name = _name(told)
     share = [f"{name}, {told.share:.0%}"] if told.share is not None else []
     return fitting(context, *share, name)
+
+
+def _name(told):
+    """Returns the name of what is at work, without the words for which the panel has no room."""
+    return told.part or told.title.removesuffix(" in Tolerance").removesuffix(" to Tolerance")
