@@ -234,6 +234,20 @@ def scroll_down():
     yield from scroll(_DOWN)
 
 
+def end_operators():
+    """Ends what a failed test has left at work, and leaves its mode.
+
+    The next test removes all objects: Blender crashes if an operator goes on that moves one of them.
+    """
+    for _ in range(2):
+        xdotool("mouseup", 1, "mousemove", *centre(), "key", "Escape")
+        yield 1.0
+    if bpy.context.mode != "OBJECT":
+        with window_context():
+            bpy.ops.object.mode_set(mode="OBJECT")
+        yield
+
+
 _first_view = {}
 
 
