@@ -74,7 +74,9 @@ def uncrossed_as_pieces(run, before, after, faces):
     if faces.shape[1] > 2:
         for way in _CUTS[faces.shape[1]]:
             pieces = np.concatenate([faces[:, cut] for cut in way])
-            judges.uncrossed(run, before, after, pieces[(pieces != np.roll(pieces, 1, axis=1)).all(1)])
+            proper = pieces[(pieces != np.roll(pieces, 1, axis=1)).all(1)]
+            if len(proper):
+                judges.uncrossed(run, before, after, proper)
 
 
 def faces_of(case):
