@@ -136,8 +136,7 @@ std::optional<glm::dvec3> TriangleCertificate::nearby_point(const glm::dvec3& p)
 
 std::optional<glm::dvec3> TriangleCertificate::nearest_point(const glm::dvec3& p, double radius,
                                                              const Facing* facing) const {
-  const Hierarchy::Nearest nearest = hierarchy_->nearest_if(
-      p, [&](std::uint32_t triangle) { return !facing || facing->admits(triangle); }, radius);
+  const Hierarchy::Nearest nearest = facing ? facing->nearest(*hierarchy_, p, radius) : hierarchy_->nearest(p, radius);
   if (nearest.triangle == Hierarchy::kNone) return std::nullopt;
   const WitnessTriangle& t = (*reference_)[nearest.triangle];
   return closest_point(p, t.a, t.a + t.ab, t.a + t.ac).point;
@@ -178,7 +177,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
   thread_local NearTriangles around;
   queue.assign(1, {{corners[0], corners[1], corners[2]}});
   const double radius = kProve ? beyond_ : limit_;
-  around.begin(*reference_, *hierarchy_, radius);
+  around.begin(*reference_, *hierarchy_, radius, facing);
   Verdict result = Verdict::inside;
   double farthest2 = 0;  // the largest squared distance of the parts proved so far
   std::uint32_t hint = hints.x;
@@ -214,15 +213,6 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       }
       return false;
     };
-    // The nearest triangle that is admitted.
-    const auto find_nearest = [&](double within, std::uint32_t start) {
-      const std::uint32_t nearest = around.nearest(part, centre, within, start);
-      if (!facing || nearest == Hierarchy::kNone || facing->admits(nearest)) return nearest;
-      return hierarchy_
-          ->nearest_if(
-              centre, [&](std::uint32_t triangle) { return facing->admits(triangle); }, within)
-          .triangle;
-    };
     const std::uint32_t guess = grid_->triangle_near(centre);
     if (covered_by(hints.x) || covered_by(hints.y) || covered_by(hints.z) || covered_by(guess)) continue;
 
@@ -241,7 +231,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
     }
     if (!(centre2 <= limit2_) || longest2 < kExact * kExact * limit2_) {
       if (hint == Hierarchy::kNone) hint = guess;
-      const std::uint32_t nearest = find_nearest(radius, hint);
+      const std::uint32_t nearest = around.nearest(part, centre, radius, hint);
       if (nearest == Hierarchy::kNone) return Verdict::outside;
       hint = exact = nearest;
       if (covered_by(exact)) continue;
@@ -266,7 +256,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       if (cut_along(below)) continue;
       // Among slivers it happens that no node of the grid names the triangle below the centre.
       if (exact == Hierarchy::kNone) {
-        exact = find_nearest(limit_, below);
+        exact = around.nearest(part, centre, limit_, below);
         // By rounding there may be none, if the centre is as far away as it may be.
         const bool is_another = exact != below && exact != Hierarchy::kNone;
         if (is_another && (covered_by(exact) || cut_along(exact))) continue;

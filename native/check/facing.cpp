@@ -26,6 +26,12 @@ constexpr double kNearEnough = std::numbers::pi / 180;
 /// A face that keeps no smaller angle than this one is free.
 constexpr double kNearlyTurned = 0.99 * std::numbers::pi;
 
+/// No dot product of a normal in a box is larger than this by more than kRounding.
+double largest_dot(const Box& box, const glm::dvec3& normal) {
+  const glm::dvec3 dots = glm::max(box.lower * normal, box.upper * normal);
+  return dots.x + dots.y + dots.z;
+}
+
 /// The least cosine of two sure normals between which the angle is at most `limit`. It is rounded up to few digits, so
 /// that every platform gets one result although their cosines differ in the last ones.
 double least_cosine(double limit) {
@@ -65,6 +71,34 @@ FacingRule::FacingRule(const TriangleMesh& reference, double reference_error, do
     unsure += !normal && glm::cross(b - a, c - a) != glm::dvec3(0);
     normals.push_back(normal.value_or(glm::dvec3(std::numeric_limits<double>::quiet_NaN())));
   }
+}
+
+void FacingRule::bound_normals(const Hierarchy& hierarchy) {
+  below_.assign(hierarchy.node_count(), {});
+  hierarchy.for_each_below(
+      [&](std::uint32_t node, std::uint32_t triangle) {
+        if (!std::isnan(normals[triangle].x)) below_[node].add(normals[triangle]);
+      },
+      [&](std::uint32_t node, std::uint32_t child) {
+        if (below_[child].empty()) return;
+        below_[node].add(below_[child].lower);
+        below_[node].add(below_[child].upper);
+      });
+}
+
+Hierarchy::Nearest FacingRule::nearest(const Hierarchy& hierarchy, const glm::dvec3& p, const glm::dvec3& normal,
+                                       double least, double radius, std::uint32_t hint) const {
+  const auto accept = [&](std::uint32_t triangle) { return glm::dot(normals[triangle], normal) >= least; };
+  const double scale = std::max(1.0, glm::length(normal)), scaled_least = least / scale;
+  const glm::dvec3 scaled = normal / scale;
+  const auto may_accept = [&](std::uint32_t node) { return may_face(node, scaled, scaled_least); };
+  return hierarchy.nearest_if(p, accept, radius, hint, may_accept);
+}
+
+bool FacingRule::may_face(std::uint32_t node, const glm::dvec3& normal, double least) const {
+  if (below_.empty()) return true;
+  const Box& normals_below = below_[node];
+  return !normals_below.empty() && largest_dot(normals_below, normal) >= least - kRounding;
 }
 
 Facing::Facing(const FacingRule& rule, const glm::dvec3& normal, double limit)

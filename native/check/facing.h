@@ -11,10 +11,12 @@
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <vector>
 
+#include "geometry/hierarchy.h"
 #include "geometry/triangle_mesh.h"
 
 namespace tolvol {
@@ -36,12 +38,31 @@ struct FacingRule {
   /// corners of the reference's triangles by `reference_error`, and those of faces by `mesh_error`. O(m).
   FacingRule(const TriangleMesh& reference, double reference_error, double mesh_error, double angle);
 
+  /// Bounds the normals below each node of the reference's hierarchy, so that nearest() leaves out nodes in which no
+  /// triangle faces as it should. It has to be called again once `normals` has changed. O(m).
+  void bound_normals(const Hierarchy& hierarchy);
+
+  /// Returns the nearest triangle within `radius` of p whose normal has at least `least` as its dot product with
+  /// `normal`. `hierarchy` is the reference's, and `hint` a triangle that is tried first, or kNone.
+  Hierarchy::Nearest nearest(const Hierarchy& hierarchy, const glm::dvec3& p, const glm::dvec3& normal, double least,
+                             double radius, std::uint32_t hint = Hierarchy::kNone) const;
+
+  /// Tells whether a triangle below a node of the hierarchy may have at least `least` as the dot product of its normal
+  /// with `normal`, which is at most as long as a unit vector.
+  bool may_face(std::uint32_t node, const glm::dvec3& normal, double least) const;
+
   std::vector<glm::dvec3> normals;  ///< are those of the reference's triangles; NaN, which admits none, if not sure
   std::size_t unsure = 0;           ///< counts the triangles with an area but without a sure normal
   double mesh_error;
   double angle;
   double least_cosine;  ///< is that of two sure normals between which the angle is at most `angle`
+
+ private:
+  std::vector<Box> below_;  ///< holds the sure normals below each node; empty before bound_normals()
 };
+
+/// As the least dot product with a normal: any that is more than 0.
+inline constexpr double kSameSide = std::numeric_limits<double>::denorm_min();
 
 /// How one face keeps the rule, for as long as there is the face.
 struct FaceRule {
@@ -76,6 +97,13 @@ class Facing {
   void begin() { least_ = 1; }
   /// Tells whether a triangle of the reference may be a witness.
   bool admits(std::uint32_t triangle) const { return cosine(triangle) >= least_cosine_; }
+  /// Tells whether a triangle below a node of the reference's hierarchy may be admitted.
+  bool may_admit(std::uint32_t node) const { return rule_->may_face(node, normal_, least_cosine_); }
+  /// Returns the nearest triangle within `radius` of p that is admitted. `hierarchy` is the reference's.
+  Hierarchy::Nearest nearest(const Hierarchy& hierarchy, const glm::dvec3& p, double radius,
+                             std::uint32_t hint = kNone) const {
+    return rule_->nearest(hierarchy, p, normal_, least_cosine_, radius, hint);
+  }
   /// Notes that an admitted triangle is a witness.
   void take(std::uint32_t triangle) { least_ = std::min(least_, cosine(triangle)); }
   /// Returns an upper bound on the angle between the face and any witness noted since begin().

@@ -52,7 +52,10 @@ std::optional<FacingRule> facing_rule(const ToleranceVolume& volume, double mesh
                                       std::vector<std::string>& warnings) {
   if (degrees >= 180) return std::nullopt;
   FacingRule rule(volume.reference(), volume.mapping_error(), mesh_error, glm::radians(degrees));
-  if (2 * rule.unsure <= rule.normals.size()) return rule;
+  if (2 * rule.unsure <= rule.normals.size()) {
+    rule.bound_normals(volume.hierarchy());
+    return rule;
+  }
   warnings.push_back(
       "no angle of normals is kept: rounding could turn most faces of the reference, which are too small or too thin "
       "for its size; take the small parts as a mesh of their own");

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "check/facing.h"
 #include "geometry/closest_point.h"
 
 namespace tolvol {
@@ -24,8 +25,9 @@ constexpr double kNothing = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-void NearTriangles::begin(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, double radius) {
-  triangles_ = &triangles, hierarchy_ = &hierarchy, radius_ = radius;
+void NearTriangles::begin(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, double radius,
+                          const Facing* facing) {
+  triangles_ = &triangles, hierarchy_ = &hierarchy, facing_ = facing, radius_ = radius;
   searches_ = 0, too_far_ = kNothing;
   pool_.clear();
   lists_.assign(1, {0, 0});
@@ -47,7 +49,8 @@ std::uint32_t NearTriangles::nearest(Part& part, const glm::dvec3& centre, doubl
 
 std::uint32_t NearTriangles::search(const glm::dvec3& centre, double radius, std::uint32_t hint) {
   ++searches_;
-  return hierarchy_->nearest(centre, radius, hint).triangle;
+  return (facing_ ? facing_->nearest(*hierarchy_, centre, radius, hint) : hierarchy_->nearest(centre, radius, hint))
+      .triangle;
 }
 
 /// Returns a distance: a triangle within the radius of some point of the part is within this distance of its centre.
@@ -79,10 +82,13 @@ bool NearTriangles::gather(Part& part, const glm::dvec3& centre) {
   const std::size_t begin = pool_.size();
   if (!(2 * reach <= too_far_) || begin >= kMostKept) return false;
   best2_ = second2_ = kNothing, best_ = Hierarchy::kNone;
-  hierarchy_->for_each_within(centre, reach, [&](std::uint32_t triangle) {
+  const auto visit = [&](std::uint32_t triangle) {
+    if (facing_ && !facing_->admits(triangle)) return true;
     look_at(triangle, centre, reach2);
     return pool_.size() - begin <= kLongest;
-  });
+  };
+  hierarchy_->for_each_within(centre, reach, visit,
+                              [&](std::uint32_t node) { return !facing_ || facing_->may_admit(node); });
   if (pool_.size() - begin > kLongest) {
     pool_.resize(begin);
     too_far_ = reach;

@@ -15,15 +15,19 @@
 
 namespace tolvol {
 
+class Facing;
+
 /// Each thread has one of its own, and uses it for one piece after another, so that its memory is reused.
 class NearTriangles {
  public:
   /// Begins with a new piece, whose whole has of = 0. Keeps references. `hierarchy` holds the triangles, which must be
-  /// as large as in a frame. `radius` is the largest radius that nearest() will be asked for.
-  void begin(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, double radius);
+  /// as large as in a frame. `radius` is the largest radius that nearest() will be asked for. If `facing` is not null,
+  /// there are only the triangles that it admits.
+  void begin(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, double radius,
+             const Facing* facing = nullptr);
 
-  /// Returns exactly hierarchy.nearest(centre, radius, hint).triangle for the centre of a part. Writes part.of, which
-  /// names the list of triangles near the part, and which its parts inherit.
+  /// Returns exactly hierarchy.nearest(centre, radius, hint).triangle, or that of facing->nearest(), for the centre of
+  /// a part. Writes part.of, which names the list of triangles near the part, and which its parts inherit.
   std::uint32_t nearest(Part& part, const glm::dvec3& centre, double radius, std::uint32_t hint);
 
   /// The number of searches of the hierarchy since begin().
@@ -42,6 +46,7 @@ class NearTriangles {
 
   const std::vector<WitnessTriangle>* triangles_ = nullptr;
   const Hierarchy* hierarchy_ = nullptr;
+  const Facing* facing_ = nullptr;
   double radius_ = 0;
   std::size_t searches_ = 0;
   double too_far_ = 0;               // is the least reach() for which a list became too long

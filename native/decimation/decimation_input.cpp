@@ -175,7 +175,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   }
   facing_ = facing_rule(*volume_, mapping_error, options_.max_normal_angle, report_.warnings);
   if (facing_) {
-    if (own_count_ > 0) face_as_cut(cut_, *facing_);
+    if (own_count_ > 0) face_as_cut(cut_, volume_->hierarchy(), *facing_);
     directions.facing = &*facing_;
   }
   std::vector<std::uint32_t> on_reference;

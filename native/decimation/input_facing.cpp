@@ -31,7 +31,7 @@ std::vector<std::uint32_t> connected_parts(const CutMesh& cut) {
 
 }  // namespace
 
-void face_as_cut(const CutMesh& cut, FacingRule& rule) {
+void face_as_cut(const CutMesh& cut, const Hierarchy& hierarchy, FacingRule& rule) {
   std::vector<glm::dvec3> normals(rule.normals.size(), glm::dvec3(std::numeric_limits<double>::quiet_NaN()));
   for (std::uint32_t t = 0; t < cut.triangles.size(); ++t) {
     const std::uint32_t input = cut.triangle_input[t];
@@ -39,6 +39,7 @@ void face_as_cut(const CutMesh& cut, FacingRule& rule) {
     normals[input] = cut.reversed[t] ? -rule.normals[input] : rule.normals[input];
   }
   rule.normals = std::move(normals);
+  rule.bound_normals(hierarchy);
 }
 
 std::vector<std::uint32_t> face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> positions,
@@ -55,10 +56,7 @@ std::vector<std::uint32_t> face_as_reference(const CutMesh& cut, std::span<const
       const glm::dvec3 &a = positions[t.x], &b = positions[t.y], &c = positions[t.z];
       const glm::dvec3 centre = (a + b + c) * (1.0 / 3), normal = glm::cross(b - a, c - a);
       const auto nearest = [&](double sign) {
-        const auto faces_so = [&](std::uint32_t triangle) {
-          return sign * glm::dot(rule.normals[triangle], normal) > 0;
-        };
-        return hierarchy.nearest_if(centre, faces_so, certificate.limit()).triangle;
+        return rule.nearest(hierarchy, centre, sign * normal, kSameSide, certificate.limit()).triangle;
       };
       const std::uint32_t along = nearest(1), against = nearest(-1);
       places[i].below = along != kNone ? along : against;

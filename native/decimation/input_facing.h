@@ -17,8 +17,9 @@
 namespace tolvol {
 
 /// Turns the normals of a rule to where the triangles of the manifold face that its reference was cut to. Triangles
-/// that the cut dropped or set aside are no witnesses; what covers their points is. O(m).
-void face_as_cut(const CutMesh& cut, FacingRule& rule);
+/// that the cut dropped or set aside are no witnesses; what covers their points is. `hierarchy` is the reference's.
+/// O(m).
+void face_as_cut(const CutMesh& cut, const Hierarchy& hierarchy, FacingRule& rule);
 
 /// Looks at the faces of a mesh that is not its reference, and sets their rules. A connected part is compared by its
 /// other side if, over more of its area, all triangles of the reference near a face look against it than all look as it

@@ -33,6 +33,10 @@ class Hierarchy {
     std::uint32_t nodes = 0;  ///< counts the nodes that were visited, the same on every machine
   };
 
+  struct Always {
+    bool operator()(std::uint32_t) const { return true; }
+  };
+
   struct Common {
     std::uint32_t triangle = kNone;  ///< kNone: nothing within the radius
     double distance = std::numeric_limits<double>::infinity();
@@ -53,10 +57,18 @@ class Hierarchy {
         p, [](std::uint32_t) { return true; }, radius, hint);
   }
 
-  /// The same among the triangles for which accept(index) holds.
-  template <class Accept>
+  /// The same among the triangles for which accept(index) holds. `may_accept(node)` is false only where accept() holds
+  /// for no triangle below the node; without it, a search whose radius holds many triangles, of which none is accepted,
+  /// looks at all of them.
+  template <class Accept, class MayAccept = Always>
   Nearest nearest_if(const glm::dvec3& p, Accept&& accept, double radius = std::numeric_limits<double>::infinity(),
-                     std::uint32_t hint = kNone) const;
+                     std::uint32_t hint = kNone, MayAccept&& may_accept = {}) const;
+
+  /// Tells what is below each node, all of a node before the node above it: calls triangle(node, index) for triangles,
+  /// in nodes of more than one if the triangle is cut into slices, and child(node, node below) for nodes.
+  template <class OfTriangle, class OfNode>
+  void for_each_below(OfTriangle&& triangle, OfNode&& child) const;
+  std::size_t node_count() const { return nodes_.size(); }
 
   /// Returns the triangle whose distance from the farthest of `points` (1 to 4 of them) is least, if this distance is
   /// within `radius`. Ties go to the lower index. By convexity the distance holds for the whole convex hull of the
@@ -67,9 +79,10 @@ class Hierarchy {
                 double enough = -1, std::uint32_t hint = kNone) const;
 
   /// Calls visit(index) once for every triangle that is within `radius` (inclusive) of p, and for some others whose box
-  /// is. A visit that returns false is the last one; it may also return nothing. Returns the number of visited nodes.
-  template <class Visit>
-  std::size_t for_each_within(const glm::dvec3& p, double radius, Visit&& visit) const;
+  /// is. A visit that returns false is the last one; it may also return nothing. Triangles that are only below nodes
+  /// for which may_visit(node) does not hold may be left out. Returns the number of visited nodes.
+  template <class Visit, class MayVisit = Always>
+  std::size_t for_each_within(const glm::dvec3& p, double radius, Visit&& visit, MayVisit&& may_visit = {}) const;
 
   std::size_t size() const { return place_.size(); }
 
@@ -109,11 +122,14 @@ class Hierarchy {
 
   /// Calls attempt(place) for the triangles whose box is within the bound, which `attempt` lowers when it finds a
   /// better triangle. `bound` is the square of a scaled distance, and points are local. A triangle that is cut into
-  /// slices has a place for each. Returns the number of visited nodes.
-  template <int Count, class Attempt>
-  std::size_t walk(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const;
-  template <class Real, int Count, class Attempt>
-  std::size_t walk_in(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const;
+  /// slices has a place for each. Nodes for which enter(node) does not hold are left out. Returns the number of visited
+  /// nodes.
+  template <int Count, class Attempt, class Enter = Always>
+  std::size_t walk(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt,
+                   Enter&& enter = {}) const;
+  template <class Real, int Count, class Attempt, class Enter>
+  std::size_t walk_in(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt,
+                      Enter&& enter) const;
   const OrientedBoxes* oriented_boxes(std::uint32_t node) const {
     return turned_.empty() || turned_[node] == kNone ? nullptr : &oriented_[turned_[node]];
   }
@@ -136,9 +152,9 @@ class Hierarchy {
   double scale_ = 1;                     // is a power of two that makes half the size of the mesh 1/2 to 1
 };
 
-template <class Accept>
-Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, double radius,
-                                         std::uint32_t hint) const {
+template <class Accept, class MayAccept>
+Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, double radius, std::uint32_t hint,
+                                         MayAccept&& may_accept) const {
   bool beyond_reach = false;
   const glm::dvec3 at = local(p, beyond_reach), q = beyond_reach ? at + centre_ : scaled(p);
   std::uint32_t best = kNone;
@@ -151,18 +167,19 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
   auto attempt = [&](std::uint32_t place) {
     const Corners& t = corners_[place];
     if (++tried > kFew && is_beyond(q, t[0], t[1], t[2], closest.distance_squared)) return;
-    const ClosestPoint candidate = closest_point(q, t[0], t[1], t[2]);
-    if (candidate.distance_squared > closest.distance_squared) return;
     std::uint32_t triangle = triangle_[place];
     while (triangle != kNone && !accept(triangle)) triangle = twin(triangle);
+    if (triangle == kNone) return;
+    const ClosestPoint candidate = closest_point(q, t[0], t[1], t[2]);
+    if (candidate.distance_squared > closest.distance_squared) return;
     // A tie goes to the lower index; kNone is above all indices.
-    if (triangle == kNone || (candidate.distance_squared == closest.distance_squared && triangle > best)) return;
+    if (candidate.distance_squared == closest.distance_squared && triangle > best) return;
     best = triangle;
     closest = candidate;
     bound = std::min(bound, closest.distance_squared);
   };
   if (hint < place_.size()) attempt(place_[hint]);
-  const auto nodes = nodes_.empty() ? 0 : std::uint32_t(walk<1>({at}, bound, attempt));
+  const auto nodes = nodes_.empty() ? 0 : std::uint32_t(walk<1>({at}, bound, attempt, may_accept));
   Nearest found;
   if (best != kNone) found = beyond_reach ? seen_from(p, best) : unscaled(best, closest, scale_);
   if (!(found.distance <= radius)) found = Nearest{};
@@ -170,8 +187,8 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
   return found;
 }
 
-template <class Visit>
-std::size_t Hierarchy::for_each_within(const glm::dvec3& p, double radius, Visit&& visit) const {
+template <class Visit, class MayVisit>
+std::size_t Hierarchy::for_each_within(const glm::dvec3& p, double radius, Visit&& visit, MayVisit&& may_visit) const {
   const auto goes_on = [&](std::uint32_t triangle) {
     if constexpr (std::is_same_v<decltype(visit(triangle)), bool>) {
       return visit(triangle);
@@ -190,31 +207,50 @@ std::size_t Hierarchy::for_each_within(const glm::dvec3& p, double radius, Visit
     double bound = radius * scale_ * (radius * scale_) * (1 + 1e-12);
     bool more = true;
     const glm::dvec3 q = scaled(p);
-    return walk<1>({at}, bound, [&](std::uint32_t place) {
+    const auto attempt = [&](std::uint32_t place) {
       if (!slices_.empty() && !is_nearest_slice(q, place)) return;
       for (std::uint32_t triangle = triangle_[place]; more && triangle != kNone; triangle = twin(triangle)) {
         more = goes_on(triangle);
       }
       if (!more) bound = -1;  // this ends the search
-    });
+    };
+    return walk<1>({at}, bound, attempt, may_visit);
   }
   return 0;
 }
 
-template <int Count, class Attempt>
-std::size_t Hierarchy::walk(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const {
+template <class OfTriangle, class OfNode>
+void Hierarchy::for_each_below(OfTriangle&& triangle, OfNode&& child) const {
+  for (auto node = static_cast<std::uint32_t>(nodes_.size()); node-- > 0;) {
+    poll_at(node);
+    for (int c = 0; c < kWidth; ++c) {
+      if (nodes_[node].lower[0][c] > nodes_[node].upper[0][c]) continue;  // there is no such child
+      const std::uint32_t below = nodes_[node].child[c];
+      if (!(below & kTriangle)) {
+        child(node, below);
+        continue;
+      }
+      for (std::uint32_t i = triangle_[below & ~kTriangle]; i != kNone; i = twin(i)) triangle(node, i);
+    }
+  }
+}
+
+template <int Count, class Attempt, class Enter>
+std::size_t Hierarchy::walk(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt,
+                            Enter&& enter) const {
   double farthest = 0;
   for (const glm::dvec3& p : points) {
     for (int k = 0; k < 3; ++k) farthest = std::max(farthest, std::abs(p[k]));
   }
   if (farthest <= kFloatReach) {
-    return walk_in<float, Count>(points, bound, attempt);
+    return walk_in<float, Count>(points, bound, attempt, enter);
   }
-  return walk_in<double, Count>(points, bound, attempt);
+  return walk_in<double, Count>(points, bound, attempt, enter);
 }
 
-template <class Real, int Count, class Attempt>
-std::size_t Hierarchy::walk_in(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt) const {
+template <class Real, int Count, class Attempt, class Enter>
+std::size_t Hierarchy::walk_in(const std::array<glm::dvec3, Count>& points, double& bound, Attempt&& attempt,
+                               Enter&& enter) const {
   // hierarchy.cpp derives the margins.
   constexpr bool kSingle = sizeof(Real) == sizeof(float);
   constexpr double kMargin = kSingle ? 1 + 1e-6 : 1 + 1e-13;
@@ -245,7 +281,7 @@ std::size_t Hierarchy::walk_in(const std::array<glm::dvec3, Count>& points, doub
     if (++visited % kBetweenPolls == 0) poll();
     const Entry top = stack[--height];
     Real limit = threshold();
-    if (top.squared > limit) continue;
+    if (top.squared > limit || !enter(top.child)) continue;
     const Node& node = nodes_[top.child];
     const OrientedBoxes* oriented = oriented_boxes(top.child);
     Real squared[kWidth];

@@ -29,10 +29,12 @@ MovingFacing::MovingFacing(FacingRule rule, std::size_t faces, int corners)
       trial_room_(faces, 0),
       is_renewed_(faces, 0) {}
 
-void MovingFacing::reverse_reference(const std::vector<bool>& reversed) {
+void MovingFacing::reverse_reference(const std::vector<bool>& reversed, const Hierarchy& hierarchy) {
+  bool any = false;
   for (std::size_t t = 0; t < reversed.size(); ++t) {
-    if (reversed[t]) rule_.normals[t] = -rule_.normals[t];
+    if (reversed[t]) rule_.normals[t] = -rule_.normals[t], any = true;
   }
+  if (any) rule_.bound_normals(hierarchy);
 }
 
 /// How far all corners may go before the triangle turns by `angle`.

@@ -254,12 +254,12 @@ void MovingMesh::start_facing(FacingRule rule, std::span<const std::uint32_t> pl
   }
   facing_.emplace(std::move(rule), face_count(), corners());
   if (is_reference) {
-    facing_->reverse_reference(sides.reversed);
+    facing_->reverse_reference(sides.reversed, volume_->hierarchy());
   } else {
     const std::vector<std::uint32_t> same = weld_equal_positions(reference.vertices);
     std::vector<glm::uvec3> places;
     for (const glm::uvec3& t : reference.triangles) places.emplace_back(same[t.x], same[t.y], same[t.z]);
-    facing_->reverse_reference(orientation(places, same.size(), team).reversed);
+    facing_->reverse_reference(orientation(places, same.size(), team).reversed, volume_->hierarchy());
   }
   part_.assign(is_plain ? 0 : face_count(), 0);
   parallel_for(face_count(), kBlock, threads_, [&](std::size_t begin, std::size_t end) {

@@ -412,10 +412,8 @@ bool Closing::looks_against(const Filled& loop) const {
     const glm::dvec3 &a = positions_[t.x], &b = positions_[t.y], &c = positions_[t.z];
     const glm::dvec3 normal = glm::cross(b - a, c - a);
     const auto is_there = [&](double sign) {
-      const auto looks_so = [&](std::uint32_t triangle) {
-        return sign * glm::dot(facing_->normals[triangle], normal) > 0;
-      };
-      return volume_.hierarchy().nearest_if((a + b + c) * (1.0 / 3), looks_so, certificate_->limit()).triangle !=
+      const glm::dvec3 centre = (a + b + c) * (1.0 / 3);
+      return facing_->nearest(volume_.hierarchy(), centre, sign * normal, kSameSide, certificate_->limit()).triangle !=
              Hierarchy::kNone;
     };
     const bool along = is_there(1), against = is_there(-1);

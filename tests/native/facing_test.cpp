@@ -132,6 +132,44 @@ TEST(CertifiedFacing, TheOtherSideOfAWallIsNoWitness) {
   EXPECT_GE(bound, 0.999 * 0.05 * thin.volume->frame().scale()) << "the distance to the witness, not to the nearest";
 }
 
+TEST(Facing, FindsTheNearestThatIsAdmitted) {
+  shapes::Random random(5);
+  const TriangleMesh mesh = shapes::torus(24, 0.1);
+  const Hierarchy hierarchy(mesh);
+  FacingRule rule(mesh, kError, kError, kRight);
+  for (std::size_t t = 0; t < rule.normals.size(); t += 7) rule.normals[t] = -rule.normals[t];
+  rule.normals[3] = dvec3(std::numeric_limits<double>::quiet_NaN());
+  rule.bound_normals(hierarchy);
+  int found = 0;
+  for (int i = 0; i < 2'000; ++i) {
+    const dvec3 p = random.point(), normal = glm::normalize(random.point());
+    const double radius = random.share(), limit = 0.1 + 3 * random.share();
+    const Facing facing(rule, normal, limit);
+    const auto admits = [&](std::uint32_t t) { return facing.admits(t); };
+    const std::uint32_t expected = hierarchy.nearest_if(p, admits, radius).triangle;
+    ASSERT_EQ(facing.nearest(hierarchy, p, radius).triangle, expected);
+    ASSERT_EQ(facing.nearest(hierarchy, p, radius, random.below(100)).triangle, expected) << "with a hint";
+    found += expected != Hierarchy::kNone;
+  }
+  EXPECT_GT(found, 200);
+  EXPECT_LT(found, 1'800);
+}
+
+TEST(Facing, AMeshThatLooksAwayCostsASearchNothing) {
+  const TriangleMesh plate = shapes::grid(100);
+  const Hierarchy hierarchy(plate);
+  FacingRule rule(plate, kError, kError, kRight);
+  const Facing turned(rule, {0, 0, -1}, kRight), tilted(rule, glm::normalize(dvec3(1, 0, -0.1)), kRight);
+  const dvec3 p(0.5, 0.5, 0.1);
+  EXPECT_GT(turned.nearest(hierarchy, p, 10).nodes, 1'000u) << "what a search costs without the normals' bounds";
+  rule.bound_normals(hierarchy);
+  for (const Facing& facing : {turned, tilted}) {
+    const Hierarchy::Nearest nearest = facing.nearest(hierarchy, p, 10);
+    EXPECT_EQ(nearest.triangle, Hierarchy::kNone);
+    EXPECT_EQ(nearest.nodes, 1u);
+  }
+}
+
 TEST(CertifiedFacing, CornersProveNothingByTrianglesThatAreNotAdmitted) {
   const Wall thick(0.3);
   const StoredSpace space = StoredSpace(glm::dmat4(1), Storage::float64).in(thick.volume->frame());
