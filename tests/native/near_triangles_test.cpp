@@ -5,8 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
+#include <optional>
 #include <random>
 
+#include "check/facing.h"
 #include "shapes.h"
 
 namespace {
@@ -33,22 +36,29 @@ struct Work {
   std::size_t parts = 0, searches = 0;
 };
 
-/// Quarters a face of the reference, moved a little, towards one of its corners, and compares every answer.
-Work follow(const TriangleMesh& mesh, std::uint32_t face, int levels) {
+/// Quarters a face of the reference, moved a little, towards one of its corners, and compares every answer, among the
+/// triangles that face to the side of `normal` if there is one.
+Work follow(const TriangleMesh& mesh, std::uint32_t face, int levels, std::optional<dvec3> normal = {}) {
   const Hierarchy hierarchy(mesh);
+  FacingRule rule(mesh, 1e-15, 1e-15, std::numbers::pi / 2);
+  rule.bound_normals(hierarchy);
+  std::optional<Facing> facing;
+  if (normal) facing.emplace(rule, *normal, rule.angle);
   const std::vector<WitnessTriangle> witnesses = prepare_witnesses(mesh);
   const glm::uvec3 t = mesh.triangles[face];
   const dvec3 step(0.3 * kRadius, -0.2 * kRadius, 0.4 * kRadius);
   const dvec3 end = mesh.vertices[t.x] + step;
   std::vector<Part> queue{{{end, mesh.vertices[t.y] + step, mesh.vertices[t.z] - step}}};
   NearTriangles around;
-  around.begin(witnesses, hierarchy, kRadius);
+  around.begin(witnesses, hierarchy, kRadius, facing ? &*facing : nullptr);
   Work work;
   for (std::size_t next = 0; next < queue.size(); ++next) {
     Part part = queue[next];
     const dvec3 centre = (part.corners[0] + part.corners[1] + part.corners[2]) * (1.0 / 3);
     for (const double radius : {kRadius, kRadius / 2}) {
-      EXPECT_EQ(around.nearest(part, centre, radius, Hierarchy::kNone), hierarchy.nearest(centre, radius).triangle);
+      const auto is_due = [&](std::uint32_t triangle) { return !facing || facing->admits(triangle); };
+      EXPECT_EQ(around.nearest(part, centre, radius, Hierarchy::kNone),
+                hierarchy.nearest_if(centre, is_due, radius).triangle);
     }
     ++work.parts;
     if (part.cuts == static_cast<std::uint32_t>(levels)) continue;
@@ -72,7 +82,10 @@ TEST(NearTriangles, AnswersAreThoseOfTheHierarchy) {
   for (dvec3& p : twins.vertices) p *= 0.7;
   const TriangleMesh flat = shapes::grid(8);  // many parts are as near to one triangle as to the next
   for (const TriangleMesh& mesh : {tangle(300), twins, flat}) {
-    for (const std::uint32_t face : {0u, 7u, 99u}) EXPECT_GT(follow(mesh, face, 9).parts, 100u);
+    for (const std::uint32_t face : {0u, 7u, 99u}) {
+      EXPECT_GT(follow(mesh, face, 9).parts, 100u);
+      for (const dvec3& normal : {dvec3(0, 0, 1), dvec3(0, 0, -1), dvec3(1, 0, 0)}) follow(mesh, face, 9, normal);
+    }
   }
 }
 
