@@ -16,8 +16,8 @@ vec3 outside_colour(vec2 at, float period, vec3 colour, vec3 stripe) {
 }
 
 // Returns the brightness by a light beside the eye and an even sky. It is 1 where the surface faces the eye. `normal` may
-// have any length. It has none, or one that overflows, where the eye sees a triangle from its edge: there the light gives
-// nothing.
+// have any length. Where the eye sees a triangle from its edge, the length is 0 or overflows: there only the sky gives
+// light.
 float head_light(vec3 normal, vec3 to_eye) {
   float facing = abs(dot(normal, to_eye)) / length(normal);
   return mix(0.5, 1.0, facing >= 0.0 ? min(facing, 1.0) : 0.0);

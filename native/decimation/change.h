@@ -102,7 +102,7 @@ class Change {
   std::vector<Coverage::Element> elements_;
   std::vector<Face> faces_;
   std::vector<Coverage::Removed> removed_;
-  std::vector<int> vanishing_;  ///< The faces that the collapses remove, and negative numbers.
+  std::vector<int> vanishing_;  ///< The faces that the collapses remove; negative numbers at a boundary.
   std::vector<NewWedge> new_wedges_;
   std::vector<int> neighbours_;
   std::vector<std::uint32_t> apexes_, around_;

@@ -27,8 +27,8 @@ void post(std::function<void()> work) noexcept;
 Renderer renderer();
 
 /// Ends the thread and its context. Using an object that was made in it then throws. A later run() starts anew. A
-/// program should call this before it ends: the thread may still delete objects, for which some drivers have no context
-/// any more.
+/// program should call this before it ends. Otherwise the thread may delete objects while the program ends, when some
+/// drivers have already destroyed the context.
 void shutdown() noexcept;
 
 /// Returns the number of the current context, counted from 1. Must be called on the GL thread. Objects remember it,

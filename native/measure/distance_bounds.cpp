@@ -25,7 +25,7 @@
 // to the other side of a plane that is turned by it. The offset is the least over the corners of T, which errs by 16 u
 // whatever the direction is, and by 8 u more at a corner of the piece. Placing both meshes errs by 5 u, where a vertex
 // of b is cut off (measure/near_part.h), and the centroid and the mean of the corners by 4 u each. A b that is smaller
-// than 4 u is one triangle of it (measure/deviation.cpp) instead of them. kRounding is above the sum.
+// than 4 u is one triangle of it (measure/sampled_surface.cpp) instead of them. kRounding is above the sum.
 #include "measure/distance_bounds.h"
 
 #include <algorithm>

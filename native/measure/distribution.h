@@ -29,7 +29,8 @@ class Distribution {
     double value, weight;
   };
 
-  /// Takes the parts, in any order. Throws Cancelled, as the functions below. About 10 ns a part.
+  /// Takes the parts, in any order. The sum of their weights must be above 0. Throws Cancelled, as the functions below.
+  /// About 10 ns a part.
   explicit Distribution(std::vector<Part> parts);
 
   /// Returns the share of the weight that belongs to numbers above the bound.

@@ -49,7 +49,7 @@ struct SampledPiece {
   DistanceBounds bounds;
   double distance = 0;  // is that of its point
   double average = 0;   // estimates the mean over the piece: the distance of its point, corrected where that is sharper
-  bool inside = false;  // tells whether its point is inside, if b is closed
+  bool inside = false;  // tells whether its point is inside the other surface, if that is closed
 
   double signed_distance() const { return inside ? -distance : distance; }
   /// Returns the distance of the point with these weights less the value of a linear function there, plus its mean. The
