@@ -73,7 +73,7 @@ def current(ob, settings):
 
 
 def read(ob, settings):
-    """Reads the mesh and the reference of `ob` and returns what is known about them."""
+    """Reads the mesh and the reference of `ob` and returns what is known about them. Raises Refused and TolvolError."""
     chosen = settings.placement_choice >= 0
     placement = settings.placement if chosen else automatic_placement(ob.data)
     asked = decimation.options(settings, placement, threads=1)
@@ -101,7 +101,7 @@ def _digest(task, place):
 
 
 def keep_only(names):
-    """Forgets what is known about all objects except those with these names. Returns whether there was any."""
+    """Forgets what is known about all objects except those with these names. Returns whether anything was forgotten."""
     gone = _known.keys() - names
     for name in gone:
         del _known[name]

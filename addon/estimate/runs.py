@@ -19,8 +19,8 @@ from . import known
 # processor and 0.6 GB of memory.
 MOST_TRIANGLES = 500_000
 
-# The tasks: a decimation at the present tolerance, and one at another. The first is more urgent, and everything else that
-# runs in a thread is more urgent than both.
+# The tasks: a decimation at the present tolerance, and one at another. The first is more urgent, and everything else in
+# the queue is more urgent than both.
 _HERE, _ELSEWHERE = ("estimate", "here"), ("estimate", "elsewhere")
 _RANKS = {_HERE: 1, _ELSEWHERE: 2}
 # The tolerance rests if it has not changed for so many seconds. So long after a change a mesh is read, too.
@@ -40,20 +40,20 @@ def triangles(objects):
 
 
 def ask(objects, percents):
-    """Has the decimations run that are missing."""
+    """Asks for the decimations that are missing. percents: {name of an object: its tolerance in percent of the size}."""
     global _present
     settings = objects[0].tolvol
     if _present != percents:
         _present = percents
         queue.cancel(_HERE)  # If it only waits, it waits anew.
     found = [(known.current(ob, settings), percents[ob.name]) for ob in objects]
-    if known.keep_only({ob.name for ob, (about, _) in zip(objects, found) if about}):
+    if known.keep_only({ob.name for ob, (state, _) in zip(objects, found) if state}):
         cancel()
-    if any(about and (about.curve is None or about.curve.too_large) for about, _ in found):
+    if any(state and (state.curve is None or state.curve.too_large) for state, _ in found):
         return
-    if not all(about and about.curve.good(percent) for about, percent in found):
+    if not all(state and state.curve.good(percent) for state, percent in found):
         _later(_HERE, _REST)
-    if all(about for about, _ in found) and any(about.curve.missing(percent) for about, percent in found):
+    if all(state for state, _ in found) and any(state.curve.missing(percent) for state, percent in found):
         _later(_ELSEWHERE, 0.0)
 
 
@@ -76,22 +76,22 @@ def _prepare(about):
         if not percent:
             return None
         try:
-            about_it = known.current(ob, settings) or known.read(ob, settings)
+            state = known.current(ob, settings) or known.read(ob, settings)
         except (Refused, native.module.TolvolError):
             return None
-        if (curve := about_it.curve) is None:
+        if (curve := state.curve) is None:
             return None
         wanted = None if curve.good(percent) else percent
         if about == _ELSEWHERE:
             wanted = curve.missing(percent)
         if wanted:
-            return functools.partial(_run, about_it.task, curve, wanted)
+            return functools.partial(_run, state.task, curve, wanted)
     redraw_sidebars()  # The curve was known from before.
     return None
 
 
 def _run(task, curve, percent, progress):
-    """Runs a decimation in the thread. Returns what finish() adds to the curve."""
+    """Runs a decimation in the thread. Returns what _finish() adds to the curve."""
     began = time.monotonic()
     tolerance = percent / 100 * task.reference.size()
     try:
