@@ -16,6 +16,7 @@ them or none. Symbolic links are followed. OUT may be IN. No other file that is 
 
 
 def arguments():
+    """Returns the options of the command line. Ends the command with exit code 2 if they make no sense."""
     parser = cli.Parser("blender_scripts/decimate.py", description=_DESCRIPTION, epilog=_EPILOG)
     parser.add_argument("input", type=cli.file_name, metavar="IN", help="the mesh to decimate")
     parser.add_argument(

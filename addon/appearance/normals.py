@@ -30,7 +30,6 @@ _SHARP = math.radians(20)
 # An original that is shaded flat everywhere counts as smooth, but for edges of more than this angle.
 _FLAT = math.radians(30)
 
-
 # Meshes with more corners together are looked at by another Blender, which takes about a second more: with so many, this
 # one would stand still for half a second.
 _AT_ONCE = 300_000

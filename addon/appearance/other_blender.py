@@ -20,7 +20,7 @@ _LOOK = 0.05  # The thread looks every so many seconds whether it was cancelled.
 
 
 def write(folder, meshes):
-    """Writes meshes, without their materials, into the folder. Returns the names of their objects there."""
+    """Takes the materials from the meshes and writes them into the folder. Returns the names of their objects there."""
     objects = []
     try:
         for mesh in meshes:
@@ -44,7 +44,7 @@ def command(script, folder):
 def run(command_line, folder, doing, progress):
     """Runs a command until it ends or the progress is cancelled. Returns what it has written into result.json.
 
-    doing: what fails, for the error.
+    doing: the work, for the message of the error. Raises Cancelled, and Refused if there is no result.
     """
     log = folder / "log.txt"
     with open(log, "wb") as output:

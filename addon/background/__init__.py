@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Computations in threads: a Job each (thread.py), and a queue of those that nobody waits for (queue.py).
 
-Operators, guards and the probe start a Job and look after it themselves. What only draws or measures by itself asks the
-queue, which runs one computation at a time.
+Operators, guards and the probe start a Job and look after it themselves. The overlay, the measurement of a mesh that
+rests and the estimate ask the queue, which runs one computation at a time.
 """
 
 import atexit

@@ -20,7 +20,7 @@ class JobOperator:
         description="The names of the objects that the operator worked on, as JSON", options={"HIDDEN", "SKIP_SAVE"}
     )
 
-    # Texts for the status bar and the panel: doing and count are in place of the native stage and its count.
+    # Texts for the status bar and the panel. If `doing` is set, it and `count` replace the native stage and its count.
     doing = ""
     count = ""
     part = ""  # which part of the work is under way, such as "Level 2 of 3", if there are several

@@ -35,7 +35,7 @@ class Run:
         self._timer = None
 
     def told(self):
-        """Returns what is known about the work, for the panel."""
+        """Returns what is known about the work, for the panel and the status bar."""
         return (
             progress_text.stopping(self.label)
             if self._gone()
@@ -43,7 +43,7 @@ class Run:
         )
 
     def _gone(self):
-        """Whether Blender has freed the operator: it keeps the last 32, one of which Adjust Last Operation has repeated."""
+        """Whether Blender has freed the operator. It keeps the last 32, and may free one that Adjust Last Operation repeats."""
         try:
             return not self.operator.bl_label
         except ReferenceError:

@@ -39,7 +39,7 @@ _CLASSES = (
     TOLVOL_PT_modifiers,
     TOLVOL_PT_deform,
     TOLVOL_PT_guard,
-    TOLVOL_PT_notes,
+    TOLVOL_PT_notes,  # the last one (see notes.py)
 )
 
 _register, _unregister = bpy.utils.register_classes_factory(_CLASSES)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel with the sentences about the last operation and the mesh.
 
-It is the last panel, because sentences come and go when an operation ends: no button below them moves.
+It is the last panel, so that its sentences, which come and go when an operation ends, move no button of another panel.
 """
 
 import bpy

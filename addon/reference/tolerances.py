@@ -16,14 +16,17 @@ _DIGITS, _ROUNDING = 12, 1e-15
 
 
 def tolerance_length(settings, size):
-    """Returns the tolerance in world units. `settings` has the properties of properties.tolerance_settings()."""
+    """Returns the tolerance in world units. `settings` has the properties of properties.tolerance_settings().
+
+    size: of the reference, in world units. A damaged file may hold any number: see required().
+    """
     if settings.tolerance_mode == "LENGTH":
         return _chosen(settings, "tolerance_length")
     return _chosen(settings, "tolerance_percent") / 100 * size
 
 
 def required(ob, size):
-    """Returns the tolerance of an object in world units. Raises Refused if a damaged file holds none."""
+    """Returns the tolerance of an object in world units. Raises Refused if a damaged file holds no length."""
     tolerance = tolerance_length(ob.tolvol, size)
     if not snapshots.sound(tolerance):
         raise Refused(f"The tolerance of {ob.name} in the file is damaged: enter it again")
