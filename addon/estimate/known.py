@@ -37,9 +37,10 @@ _generation = 0  # grows when a step is undone or a file opened: pointers and na
 
 
 def percent(ob, settings):
-    """Returns the tolerance in percent of the size, or None if the size is not known."""
+    """Returns the tolerance in percent of the size, or None if the size is not known or a damaged file holds no tolerance."""
     size = measurements.shown_size(ob)
-    return 100 * tolerances.tolerance_length(settings, size) / size if size else None
+    tolerance = tolerances.tolerance_length(settings, size) if size else 0.0
+    return 100 * tolerance / size if snapshots.sound(tolerance) else None
 
 
 def _token(ob, settings):

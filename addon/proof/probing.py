@@ -39,7 +39,7 @@ class Reading:
 
 
 class Source:
-    """What a Probe needs of Blender's data. It is made in the main thread."""
+    """What a Probe needs of Blender's data. It is made in the main thread. Raises Refused."""
 
     def __init__(self, ob, on_reference):
         self.state = state_of(ob)
@@ -47,7 +47,7 @@ class Source:
         reference = snapshots.reference_of(ob)
         mesh = snapshots.surface_of(ob)
         self.own, self.other = (reference, mesh) if on_reference else (mesh, reference)
-        self.tolerance = tolerances.tolerance_length(ob.tolvol, reference.size())
+        self.tolerance = tolerances.required(ob, reference.size())
         self.shares = None if on_reference else _shares(ob)
 
     def fits(self, ob):

@@ -7,7 +7,8 @@ import math
 import bpy
 import pytest
 
-from addon import reference
+from addon import estimate, reference
+from addon.background import queue
 from addon.proof import kept_warnings, report, verdict
 from addon.reference import measurements, snapshots
 from scenes import torus
@@ -85,11 +86,21 @@ def test_a_damaged_length_has_no_verdict_and_no_check(decimated, value, tmp_path
         (bpy.ops.tolvol.bake_normals, {}),
         (bpy.ops.tolvol.apply_modifier, {"modifier": "smooth"}),
         (bpy.ops.tolvol.fit_modifier, {"modifier": "fit"}),
+        (bpy.ops.tolvol.worst_point, {}),
+        (bpy.ops.tolvol.add_label, {"position": (0, 0, 0)}),
     ):
         with pytest.raises(RuntimeError, match=f"tolerance of {decimated.name} in the file is damaged: enter it again"):
             refuses(**options)
     decimated.tolvol.tolerance_length = 0.1
     assert bpy.ops.tolvol.check() == {"FINISHED"} and verdict.of(decimated).passed
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -1.0, 0.0])
+def test_a_damaged_length_has_no_estimate(value):
+    ob = torus()
+    ob.tolvol.tolerance_mode = "LENGTH"
+    ob.tolvol["tolerance_length"] = value
+    assert estimate.shown(bpy.context) == "" and not queue._waiting
 
 
 @pytest.mark.parametrize("name", ["forward", "backward"])
