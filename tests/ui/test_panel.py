@@ -273,9 +273,7 @@ def test_a_damaged_file_breaks_no_panel():
     yield from finished(lambda: suzanne().tolvol.last_run)
     yield 1.0
     said, text_lines = [], notes.text_lines
-    notes.text_lines = lambda context, layout, text, icon: (
-        said.append(text) or text_lines(context, layout, text, icon)
-    )
+    notes.text_lines = lambda context, layout, text, icon: said.append(text) or text_lines(context, layout, text, icon)
     try:
         suzanne().tolvol.last_run = suzanne().tolvol.last_run[:100]
         suzanne().tolvol.measurement.forward = float("nan")
