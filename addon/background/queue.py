@@ -5,6 +5,7 @@ The key of a task is a tuple, which begins with the kind of the task.
 """
 
 import time
+import traceback
 
 import bpy
 
@@ -38,21 +39,34 @@ def _tick():
     global _running
     if _running is not None and _running[2].done():
         (_, finish, job, _), _running = _running, None
-        try:
-            outcome, error = job.outcome(), None
-        except (native.module.TolvolError, MemoryError) as failure:
-            outcome, error = None, failure
-        finish(outcome, error)
+        _call(_end, finish, job)
     due = [(about, task) for about, task in _waiting.items() if task[0] <= time.monotonic()]
     for about, (_, prepare, finish, rank) in sorted(due, key=lambda waiting: waiting[1][3]):
         if _running is None:
             del _waiting[about]
-            work = prepare()
+            work = _call(prepare)
             if work is not None:
                 _running = about, finish, Job(work, native.module.Progress()), rank
         elif rank < _running[3]:
             _running[2].progress.cancel()
     return _TICK if _waiting or _running is not None else None
+
+
+def _end(finish, job):
+    try:
+        outcome, error = job.outcome(), None
+    except (native.module.TolvolError, MemoryError) as failure:
+        outcome, error = None, failure
+    finish(outcome, error)
+
+
+def _call(function, *arguments):
+    """Calls a function of a task. An exception ends this task alone. Blender would end the timer, and with it all tasks."""
+    try:
+        return function(*arguments)
+    except Exception:
+        traceback.print_exc()
+        return None
 
 
 def cancel(about):
