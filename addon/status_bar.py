@@ -27,6 +27,11 @@ def say(text):
     bpy.app.timers.register(_remove, first_interval=_SECONDS, persistent=True)
 
 
+def showing():
+    """Whether there is a text now."""
+    return bool(_given)
+
+
 def clear():
     """Removes the text from all workspaces that have one."""
     _stay()

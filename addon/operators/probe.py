@@ -167,7 +167,7 @@ label there. Esc, or another click on this button, ends it"""
             probing.redraw(self._area)
             probing.redraw(area)
         self._area = area
-        if status != self._said:
+        if status != self._said or not status_bar.showing():  # A job that ends removes its text and this one.
             self._said = status
             status_bar.show(status)
 

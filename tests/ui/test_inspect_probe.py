@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 
 import scenes
-from addon import overlay
+from addon import overlay, status_bar
 from addon.operators.probe import TOLVOL_OT_probe
 from addon.proof import labels, probing
 from test_layout import dark, drag_sidebar, light
@@ -67,6 +67,8 @@ def test_the_probe_reads_under_the_mouse_and_leaves_labels():
         == f"ball: {', '.join(probing.hover().lines)}    Click: Leave a Label    Esc: End"
     )
     assert len(the_ball().tolvol.labels) == 0
+    status_bar.clear()  # as a job does that ends
+    yield from finished(status_bar.showing)
     # The view can be turned meanwhile: what is under the mouse is then read without a move.
     xdotool("click", 4)
     yield 0.5
