@@ -26,7 +26,8 @@ _RIGID = 1e-5
 def remember(ob, surface, certified, tolerance, share_outside=0.0):
     """Stores the certified distances of `surface`, the object's mesh as it is now, and redraws the panels."""
     measurement = ob.tolvol.measurement
-    measurement.fingerprint = surface.arrays.fingerprint()
+    # An operator that has just written the mesh reports before Blender tells of the change: what is shown counts from now.
+    measurement.fingerprint = _shown[_fingerprint_key(ob)] = surface.arrays.fingerprint()
     measurement.matrix = surface.matrix.ravel()
     measurement.tolerance, measurement.size = tolerance, snapshots.snapshot_size(ob)
     measurement.forward_lower, measurement.forward = certified["forward"]
@@ -139,10 +140,14 @@ def shown_size(ob):
 
 def shown_fingerprint(ob):
     """Returns the fingerprint of the object's mesh, for drawing: it is computed only after a change."""
-    key = (ob.as_pointer(), "fingerprint")
+    key = _fingerprint_key(ob)
     if key not in _shown:
         _shown[key] = mesh_io.read_mesh(ob.data).fingerprint()
     return _shown[key]
+
+
+def _fingerprint_key(ob):
+    return ob.as_pointer(), "fingerprint"
 
 
 def forget():

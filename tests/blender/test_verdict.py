@@ -124,6 +124,16 @@ def test_operations_begin_their_message_with_the_word(capfd):
     assert "PASS: " in capfd.readouterr().out and verdict.word(ob) == PASS
 
 
+def test_an_operation_gives_its_own_verdict_where_a_panel_has_shown_the_former_one(capfd):
+    ob = torus()
+    assert bpy.ops.tolvol.decimate(tolerance_percent=0.5) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert verdict.word(ob) == PASS  # as a panel that is drawn
+    capfd.readouterr()
+    assert bpy.ops.tolvol.decimate(tolerance_percent=2) == {"FINISHED"}
+    assert f"{PASS}: " in capfd.readouterr().out
+
+
 def test_the_list_of_the_selected_objects_has_their_verdicts_and_what_fails_first():
     objects = [shifted(), torus("whole"), torus("another"), sheet("unknown")]
     objects[0].tolvol.tolerance_length = 0.05
