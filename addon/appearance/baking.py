@@ -6,7 +6,6 @@ two tolerances away from its vertex of the mesh, along the normal there. Beside 
 the faces, so that the cage is lower over them.
 """
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,7 +45,7 @@ class Task:
             "above": _ABOVE * longest,
             "threads": threads,
         }
-        (self._folder / "task.json").write_text(json.dumps(task))
+        other_blender.write_task(self._folder, task)
         self._command = other_blender.command("bake_process.py", self._folder)
 
     def _write(self, ob, shading, tolerance):

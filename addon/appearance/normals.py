@@ -7,9 +7,7 @@ normals of two faces at a common edge differ much, the edge is marked as sharp, 
 normal.
 """
 
-import json
 import math
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,7 +70,7 @@ def original_in_place(ob):
 def shading(ob):
     """A generator for the steps of an operator, which changes nothing: returns the Shading of the mesh of `ob` by its
     reference. For large meshes it yields work for a thread."""
-    with tempfile.TemporaryDirectory(prefix="shade-", dir=bpy.app.tempdir, ignore_cleanup_errors=True) as folder:
+    with other_blender.temporary_folder("shade-") as folder:
         task = _Task(ob, Path(folder))
         normals = (yield task.run) if task.normals is None else task.normals
     return Shading(normals, _sharp(ob.data, normals))
@@ -89,7 +87,7 @@ class _Task:
             if sum(len(mesh.loops) for mesh in meshes) <= _AT_ONCE:
                 self.normals = transfer_process.transferred(*meshes)
                 return
-            (folder / "task.json").write_text(json.dumps(other_blender.write(folder, meshes)))
+            other_blender.write_task(folder, other_blender.write(folder, meshes))
             self._command = other_blender.command("transfer_process.py", folder)
         finally:
             for mesh in meshes:

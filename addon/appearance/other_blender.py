@@ -5,9 +5,11 @@ It can be ended at any time, and the user can work on meanwhile. The script gets
 meshes.blend there, and writes result.json.
 """
 
+import contextlib
 import json
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -19,6 +21,31 @@ from ..errors import Refused
 _LOOK = 0.05  # The thread looks every so many seconds whether it was cancelled.
 
 
+def temporary_folder(prefix):
+    """Returns a folder for the files of the other Blender, as a context that removes it."""
+    with _writing():
+        return tempfile.TemporaryDirectory(prefix=prefix, dir=bpy.app.tempdir, ignore_cleanup_errors=True)
+
+
+@contextlib.contextmanager
+def _writing():
+    """Says what can be done if the folder is on a full disk, was removed, or cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        reason = f" ({error.strerror})" if error.strerror else ""  # Blender's own error has no reason.
+        raise Refused(
+            f"Files cannot be written into Blender's temporary folder {bpy.app.tempdir}{reason}: make room there, or choose "
+            "another folder in Preferences > File Paths > Data > Temporary Files"
+        ) from None
+
+
+def write_task(folder, task):
+    """Writes what the script is to do, as JSON."""
+    with _writing():
+        (folder / "task.json").write_text(json.dumps(task))
+
+
 def write(folder, meshes):
     """Takes the materials from the meshes and writes them into the folder. Returns the names of their objects there."""
     objects = []
@@ -26,7 +53,8 @@ def write(folder, meshes):
         for mesh in meshes:
             mesh.materials.clear()
             objects.append(bpy.data.objects.new(".appearance", mesh))
-        bpy.data.libraries.write(str(folder / "meshes.blend"), set(objects))
+        with _writing():
+            bpy.data.libraries.write(str(folder / "meshes.blend"), set(objects))
         return [ob.name for ob in objects]
     finally:
         for ob in objects:

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Gives a mesh the look of its reference: normals, and a normal map."""
 
-import tempfile
-
 import bpy
 from bpy.props import IntProperty
 
 from .. import preferences
-from ..appearance import baking, materials, normals
+from ..appearance import baking, materials, normals, other_blender
 from ..errors import Refused
 from ..job import JobOperator
 from ..operation_settings import bake_settings
@@ -84,7 +82,7 @@ tolerance, in a second Blender without a window. Without a UV map, Smart UV Proj
         self.doing = _READING
         shading = (yield from normals.shading(ob)) if self.shade else None
         self.doing = "Baking the normals"
-        with tempfile.TemporaryDirectory(prefix="bake-", dir=bpy.app.tempdir, ignore_cleanup_errors=True) as folder:
+        with other_blender.temporary_folder("bake-") as folder:
             task = baking.Task(ob, shading, tolerance, self.image_size, threads, folder)
             baked = yield task.run
             self._write(ob, shading, baked)

@@ -4,6 +4,7 @@
 import sys
 import threading
 import time
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -12,6 +13,7 @@ from mathutils import Matrix
 
 from addon import native
 from addon.appearance import bake_process, baking, normals, other_blender
+from addon.errors import Refused
 from addon.mesh.carry import corner_normals
 from addon.mesh.mesh_io import column
 from scenes import activate, add_object, sheet, torus
@@ -139,6 +141,25 @@ def test_why_it_is_not_possible():
     for operator in (bpy.ops.tolvol.shade_by_reference, bpy.ops.tolvol.bake_normals):
         with pytest.raises(RuntimeError, match="no extent along an axis: Object > Clear > Scale"):
             operator()
+
+
+def test_a_temporary_folder_that_cannot_be_written_is_named_with_a_remedy():
+    decimate(ball())
+    folder = Path(bpy.app.tempdir)
+    away = folder.rename(f"{folder}.away")
+    try:
+        for operator in (bpy.ops.tolvol.shade_by_reference, bpy.ops.tolvol.bake_normals):
+            with pytest.raises(
+                RuntimeError, match=f"temporary folder {folder}/ .*: make room there, or choose another"
+            ):
+                operator()
+    finally:
+        away.rename(folder)
+    # A full disk is noticed only when the meshes are written.
+    objects = len(bpy.data.objects)
+    with pytest.raises(Refused, match="make room there"):
+        other_blender.write(folder / "missing", [bpy.context.object.data.copy()])
+    assert len(bpy.data.objects) == objects
 
 
 @pytest.fixture
