@@ -17,7 +17,7 @@ DEVIATION_SURFACES = (
 
 
 DEVIATION_PALETTES = (
-    ("SAFE", "Safe for All Eyes", "Colours that can be told apart by the colour-blind, too"),
+    ("SAFE", "For All Eyes", "Colours that can be told apart by the colour-blind, too"),
     ("NOMINAL", "Green to Red", "Green where nothing deviates, red at the end; what is inside the reference is blue"),
 )
 
