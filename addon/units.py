@@ -16,6 +16,9 @@ def length(context, value):
         text = bpy.utils.units.to_string(units.system, "LENGTH", value * units.scale_length, precision=3)
         if value == 0 or any(digit in "123456789" for digit in text):
             return text.replace(" ", NO_BREAK)
+        # Blender rounds what is less than a micrometre or a millionth of a foot to 0.
+        unit = _ADAPTIVE[units.system][-1]
+        return f"{value * units.scale_length / _UNITS[unit][0]:.3g}{NO_BREAK}{_UNITS[unit][1]}"
     return f"{value:.3g}"
 
 

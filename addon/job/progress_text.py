@@ -40,7 +40,7 @@ def tell(operator, progress, clock):
     """Returns the Told of an operator."""
     left = clock.seconds_left(progress)
     if progress.cancelled:
-        return stopping(operator.bl_label)
+        return stopping(operator.bl_label, operator.part)
     title, part = operator.bl_label, operator.part
     escape = "Keep Present Result" if operator.improving() else "Cancel"
     if operator.doing:
@@ -58,9 +58,9 @@ def tell(operator, progress, clock):
     )
 
 
-def stopping(title):
+def stopping(title, part=""):
     """Returns the Told of an operator that is about to end."""
-    return Told(title, "", "Stopping", None, "", "", "")
+    return Told(title, part, "Stopping", None, "", "", "")
 
 
 def status_line(told):

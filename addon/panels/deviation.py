@@ -8,11 +8,8 @@ from ..operators.probe import TOLVOL_OT_probe, tolerance_of
 from ..overlay import reasons
 from ..proof import labels, probing, report, statistics, verdict
 from ..units import length
-from .layout import GHOST, GREEN, GREY, RED, SubPanel, active, is_narrow, right, text_lines, wrapped
+from .layout import GHOST, GREEN, GREY, RED, SubPanel, active, fitting, is_narrow, right, text_lines, wrapped
 from .progress import draw_progress
-
-# The digits of a margin that is a smaller share of the tolerance have no room.
-_LITTLE = 1e-4
 
 
 class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
@@ -57,19 +54,21 @@ def _draw_verdict(context, box, ob, found):
         return
     row.label(text=found.word if narrow else f"{found.word}  {found.ways}", icon=GREEN if found.passed else RED)
     for text, way in (("Mesh", found.forward), ("Reference", found.backward)):
-        _row(column, text, _distance(context, way.upper, found.tolerance, narrow), narrow)
-    left = found.margin_percent()
-    if abs(found.margin) < _LITTLE * found.tolerance:
-        left = "almost 0"
-    elif not narrow:
-        left = f"{length(context, abs(found.margin))}  {left}"
-    _row(column, "Margin" if found.passed else "Beyond by" if found.surely_beyond else "Unproved by", left, narrow)
+        _row(context, column, text, *_distance(context, way.upper, found.tolerance))
+    size, share = abs(found.margin), found.margin_percent()
+    left = ["almost 0"] if found.margin_is_little else _both(length(context, size), share)
+    _row(context, column, "Margin" if found.passed else "Beyond by" if found.surely_beyond else "Unproved by", *left)
 
 
-def _distance(context, value, tolerance, narrow):
-    """Returns a proved distance as text: as a length and as a share of the tolerance, or as the share alone."""
+def _distance(context, value, tolerance):
+    """Returns a proved distance as texts for a row: as a length and as a share of the tolerance, or as the share alone."""
     share = _share(value, tolerance)
-    return share if narrow or verdict.negligible(value, tolerance) else f"{length(context, value)}  {share}"
+    return [share] if verdict.negligible(value, tolerance) else _both(length(context, value), share)
+
+
+def _both(size, share):
+    """Returns two numbers as texts for a row. The last one has only the second number."""
+    return [f"{size}  {share}", f"{size} {share}", share]
 
 
 def _share(value, tolerance):
@@ -77,10 +76,13 @@ def _share(value, tolerance):
     return "almost 0" if verdict.negligible(value, tolerance) else report.percent(value, tolerance)
 
 
-def _row(column, name, text, narrow):
-    row = column.split(factor=0.38 if not narrow else 0.55)
+def _row(context, column, name, *texts):
+    """Draws a name, and beside it the first of the texts that has room. A narrow sidebar has room for the last one."""
+    narrow = is_narrow(context)
+    factor = 0.55 if narrow else 0.38
+    row = column.split(factor=factor)
     row.label(text=name)
-    right(row, text or "\u2013")
+    right(row, texts[-1] if narrow else fitting(context, *texts, share=1 - factor))
 
 
 def _why_not_checked(ob):
@@ -219,13 +221,14 @@ class TOLVOL_PT_statistics(SubPanel, bpy.types.Panel):
 
     def draw(self, context):
         self.layout.operator("tolvol.measure_statistics", text="Measure")
-        ob, narrow = active(context), is_narrow(context)
+        ob = active(context)
         found = statistics.of(ob)
         for title, way in (("Of the Mesh", "forward"), ("Of the Reference", "backward")):
             column = self.layout.box().column(align=True)
             column.label(text=title)
             for name, key in statistics.ROWS:
-                text = length(context, found[way][key]) if found else None
-                if found and not narrow:
-                    text += f"  {report.percent(found[way][key], tolerance_of(ob))}"
-                _row(column, name, text, narrow)
+                texts = ["\u2013"]
+                if found:
+                    size = length(context, found[way][key])
+                    texts = [*_both(size, report.percent(found[way][key], tolerance_of(ob)))[:2], size]
+                _row(context, column, name, *texts)

@@ -11,6 +11,8 @@ from ..operators.original import active
 _FONT = 0  # Blender's own
 # Pixels of the sidebar's width that tabs, margins and the icon take from the text of a label.
 _BESIDE_TEXT = 85
+# Pixels that tabs and margins take from the width of a box, and that a label takes from its text.
+_BESIDE_BOX, _BESIDE_LABEL = 64, 4
 # Pixels of the sidebar's width, tabs included, below which a row has room for one number.
 _NARROW = 215
 
@@ -55,9 +57,15 @@ def _room(context):
     return max(context.region.width, 100) - _BESIDE_TEXT * scale
 
 
-def fitting(context, *texts):
-    """Returns the first of the texts that fits the sidebar, or the last."""
+def fitting(context, *texts, share=None):
+    """Returns the first of the texts that fits the sidebar, or the last.
+
+    share: the part of a box's width that is for the text, if a name stands beside it.
+    """
     room = _room(context)
+    if share is not None:
+        scale = context.preferences.system.ui_scale
+        room = share * (max(context.region.width, 100) - _BESIDE_BOX * scale) - _BESIDE_LABEL * scale
     return next((text for text in texts if blf.dimensions(_FONT, text)[0] <= room), texts[-1])
 
 

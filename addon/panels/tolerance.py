@@ -7,10 +7,11 @@ from .. import estimate, job, native
 from ..operators import blocked
 from ..reference import measurements, snapshots, tolerances
 from ..units import NO_BREAK, length
-from .layout import AMBER, GREEN, GREY, RED, Panel, active, is_narrow, right, text_lines
+from .layout import AMBER, GREEN, GREY, RED, Panel, active, fitting, is_narrow, right, text_lines
 from .progress import in_a_row
 
 _DIGITS = 3  # of an estimated number of triangles
+_BESIDE_UNIT = 0.4  # share of the width that Blender gives to the name of a property
 
 
 class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
@@ -37,7 +38,8 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
         row.menu("TOLVOL_MT_tolerances", text="", icon="PRESET")
         other, narrow = self._other_form(context, ob), is_narrow(context)
         # Beside the unit the other form takes no room from the verdict, which has to be on the first screen.
-        column.prop(settings, "tolerance_mode", text=" " if narrow else other or " ")
+        beside = fitting(context, other, other.removeprefix("= "), share=_BESIDE_UNIT)
+        column.prop(settings, "tolerance_mode", text=" " if narrow else beside or " ")
         if narrow:
             right(layout, other)
         right(layout, _estimated(context))

@@ -14,6 +14,8 @@ from ..units import NO_BREAK, three_digits
 # The words for the outcome that are shown everywhere.
 PASS, FAIL, NOT_CHECKED = "PASS", "FAIL", "NOT CHECKED"
 
+_LITTLE = 1e-4  # share of the tolerance
+
 # The outcomes for the two directions together.
 WITHIN, ONE_WAY, UNDECIDED, BEYOND = range(4)
 
@@ -81,6 +83,11 @@ class Verdict:
         """Whether a direction that has to be within the tolerance is proved to be beyond it."""
         ways = (self.forward, self.backward) if self.two_sided else (self.forward,)
         return any(way.beyond(self.tolerance) for way in ways)
+
+    @property
+    def margin_is_little(self):
+        """Whether the margin is so small a share of the tolerance that its digits say little and have no room."""
+        return abs(self.margin) < _LITTLE * self.tolerance
 
     def margin_percent(self):
         """Returns the margin without its sign as text in percent of the tolerance.

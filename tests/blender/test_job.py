@@ -3,6 +3,7 @@
 
 import inspect
 import threading
+from types import SimpleNamespace
 
 import bpy
 import pytest
@@ -320,3 +321,10 @@ def test_a_batch_names_each_object_and_reports_totals(monkeypatch, capfd):
     assert parts == ["three, 1 of 3", "one, 2 of 3", "two, 3 of 3"]
     left = sum(len(ob.data.polygons) for ob in objects)
     assert f"Info: 3 objects: 6,912 -> {left:,} triangles, 3 of 3 PASS, " in capfd.readouterr().out
+
+
+def test_a_job_that_stops_keeps_the_name_that_the_panel_has_shown():
+    operator = SimpleNamespace(bl_label="A name without room in the panel", part="Short")
+    progress = SimpleNamespace(cancelled=True, stage="reading", fraction=0.0, count=0)
+    told = progress_text.tell(operator, progress, progress_text.Clock())
+    assert (told.part, told.stage) == ("Short", "Stopping")

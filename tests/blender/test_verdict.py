@@ -6,13 +6,15 @@ import csv
 import io
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
 
+from addon import units
 from addon.mesh import mesh_io
-from addon.panels import deviation
+from addon.panels import deviation, layout
 from addon.proof import verdict
 from addon.proof.verdict import FAIL, NOT_CHECKED, PASS, Interval, Verdict
 from scenes import sheet, torus
@@ -132,6 +134,29 @@ def test_an_operation_gives_its_own_verdict_where_a_panel_has_shown_the_former_o
     capfd.readouterr()
     assert bpy.ops.tolvol.decimate(tolerance_percent=2) == {"FINISHED"}
     assert f"{PASS}: " in capfd.readouterr().out
+
+
+def test_a_row_of_numbers_has_a_text_that_fits_the_sidebar():
+    # In Blender without a window the scale is 0.
+    styles = bpy.context.preferences.ui_styles
+    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1), ui_styles=styles)
+
+    def shown(width):
+        context = SimpleNamespace(region=SimpleNamespace(width=width), preferences=preferences)
+        return layout.fitting(context, *texts, share=0.62)
+
+    texts = deviation._both("0.102 mm", "1.31 %")
+    assert texts == ["0.102 mm  1.31 %", "0.102 mm 1.31 %", "1.31 %"]
+    # The sidebar is 220 pixels wide at first, where Blender would cut off the longest text.
+    assert shown(400) == texts[0] and shown(220) != texts[0] and shown(150) == texts[2]
+
+
+@pytest.mark.parametrize(
+    ("system", "text"), (("METRIC", "0.00339 µm"), ("IMPERIAL", "0.000133 thou"), ("NONE", "3.39e-09"))
+)
+def test_a_length_that_blender_rounds_to_0_keeps_its_digits_and_its_unit(system, text):
+    bpy.context.scene.unit_settings.system = system
+    assert units.length(bpy.context, 3.39e-9).replace(units.NO_BREAK, " ") == text
 
 
 def test_the_list_of_the_selected_objects_has_their_verdicts_and_what_fails_first():
