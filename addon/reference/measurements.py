@@ -100,7 +100,7 @@ def _stored_of(ob):
 def measurement_of(ob):
     """Returns the last measurement, or None if the mesh, its place or the reference has changed since then."""
     measurement = _stored_of(ob) or _passing_of(ob)
-    if measurement is None:
+    if measurement is None or snapshots.is_damaged(ob):
         return None
     lengths = measurement.tolerance, measurement.size, 1 + measurement.forward, 1 + measurement.backward
     if not all(map(snapshots.sound, lengths)):

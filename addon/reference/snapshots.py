@@ -157,13 +157,18 @@ def stale_reason(ob):
     settings = ob.tolvol
     if settings.snapshot is None:
         return None
-    if not sound(settings.snapshot_size):
+    if is_damaged(ob):
         return "the snapshot in the file is damaged"
     if settings.snapshot_kind != settings.reference_kind:
         return "another kind of reference was chosen"
     if settings.snapshot_kind == "OBJECT" and settings.snapshot_object != settings.reference_object:
         return "another object was chosen"
     return None
+
+
+def is_damaged(ob):
+    """Whether the stored reference is no surface: nothing that was measured against it holds then."""
+    return ob.tolvol.snapshot is not None and not sound(ob.tolvol.snapshot_size)
 
 
 def reference_missing(ob):

@@ -57,6 +57,15 @@ def test_a_damaged_measurement_is_none(decimated, name, digits):
     assert measurements.measurement_of(decimated) is None
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf, 0.0])
+def test_against_a_damaged_reference_nothing_is_known(decimated, value):
+    assert verdict.of(decimated).passed
+    vertices = decimated.tolvol.snapshot.vertices
+    vertices.foreach_set("co", [value] * 3 * len(vertices))
+    snapshots._boxes.clear()  # as when the file is opened
+    assert verdict.of(decimated) is None and verdict.word(decimated) == verdict.NOT_CHECKED
+
+
 def test_a_measurement_of_nothing_is_none(decimated):
     for name in ("tolerance", "size"):
         setattr(decimated.tolvol.measurement, f"{name}_digits", "0")
