@@ -102,8 +102,8 @@ def test_a_mesh_that_changes_meanwhile_is_measured_again():
 
 @pytest.mark.parametrize("share", (0.9e-6, 1.1e-6))
 def test_what_is_no_more_than_rounding_is_said_to_be_almost_nothing(share):
-    text = deviation._distance(bpy.context, share * 0.02, 0.02, False)
-    assert (text == "almost 0") == (share < 1e-6)
+    texts = deviation._distance(bpy.context, share * 0.02, 0.02)
+    assert (texts == ["almost 0"]) == (share < 1e-6)
 
 
 def test_only_what_is_shown_or_guarded_is_measured():
