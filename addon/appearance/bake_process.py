@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bakes the normal map of one mesh in a Blender of its own, without a window: FOLDER is its only argument.
+"""Bakes the normal map of one mesh in a Blender of its own, without a window (process.py).
 
 It reads task.json and meshes.blend from the folder, with the mesh, the reference and its skirt (skirt.py), and writes
-normals.png, uvs.npy if it has unwrapped the mesh, and result.json. A Blender of its own can be ended at any time, and the
-scene of the user, its render engine, its selection and its materials stay as they are.
+normals.png, and uvs.npy if it has unwrapped the mesh. A Blender of its own can be ended at any time, and the scene of the
+user, its render engine, its selection and its materials stay as they are.
 """
 
 import json
-import sys
-import traceback
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -117,13 +114,3 @@ class _Bake:
             target="IMAGE_TEXTURES",
             save_mode="INTERNAL",
         )
-
-
-if __name__ == "__main__":
-    where = Path(sys.argv[-1])
-    try:
-        result = main(where)
-    except Exception:
-        traceback.print_exc()
-        result = {"error": traceback.format_exc().strip().splitlines()[-1]}
-    (where / "result.json").write_text(json.dumps(result))

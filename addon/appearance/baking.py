@@ -46,7 +46,7 @@ class Task:
             "threads": threads,
         }
         other_blender.write_task(self._folder, task)
-        self._command = other_blender.command("bake_process.py", self._folder)
+        self._command = other_blender.command("bake_process", self._folder)
 
     def _write(self, ob, shading, tolerance):
         """Writes the mesh, the reference and its skirt to a file, and returns the names of their objects there."""

@@ -7,6 +7,7 @@ normals of two faces at a common edge differ much, the edge is marked as sharp, 
 normal.
 """
 
+import contextlib
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,28 +71,40 @@ def original_in_place(ob):
 def shading(ob):
     """A generator for the steps of an operator, which changes nothing: returns the Shading of the mesh of `ob` by its
     reference. For large meshes it yields work for a thread."""
-    with other_blender.temporary_folder("shade-") as folder:
-        task = _Task(ob, Path(folder))
-        normals = (yield task.run) if task.normals is None else task.normals
+    if len(originals.kept(ob).loops) + len(ob.data.loops) <= _AT_ONCE:
+        normals = _read(ob)
+    else:
+        with other_blender.temporary_folder("shade-") as folder:
+            normals = yield _Task(ob, Path(folder)).run
     return Shading(normals, _sharp(ob.data, normals))
 
 
+@contextlib.contextmanager
+def _compared(ob):
+    """Gives the mesh that is looked at and the one that looks, as long as the context lasts."""
+    meshes = original_in_place(ob), _separate_faces(ob.data)
+    try:
+        yield meshes
+    finally:
+        for mesh in meshes:
+            bpy.data.meshes.remove(mesh)
+
+
+def _read(ob):
+    """Returns the normals of the reference for each corner of the mesh of `ob`, (corners, 3)."""
+    with _compared(ob) as meshes:
+        return transfer_process.transferred(*meshes)
+
+
 class _Task:
-    """Has the normals of the reference for each corner of a mesh, (corners, 3), if that is quickly done. Otherwise run()
-    returns them: Blender does not let a thread evaluate a modifier, so that another Blender does it."""
+    """Writes into `folder` what another Blender needs to read the same normals, and run() returns them: Blender does not let
+    a thread evaluate a modifier."""
 
     def __init__(self, ob, folder):
-        self._name, self._folder, self.normals = ob.name, folder, None
-        meshes = original_in_place(ob), _separate_faces(ob.data)
-        try:
-            if sum(len(mesh.loops) for mesh in meshes) <= _AT_ONCE:
-                self.normals = transfer_process.transferred(*meshes)
-                return
+        self._name, self._folder = ob.name, folder
+        with _compared(ob) as meshes:
             other_blender.write_task(folder, other_blender.write(folder, meshes))
-            self._command = other_blender.command("transfer_process.py", folder)
-        finally:
-            for mesh in meshes:
-                bpy.data.meshes.remove(mesh)
+        self._command = other_blender.command("transfer_process", folder)
 
     def run(self, progress):
         doing = f"Reading the normals for {self._name}"

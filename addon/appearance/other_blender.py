@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs a script of this folder in a Blender of its own, without a window.
+"""Runs a module of this folder in a Blender of its own, without a window.
 
-It can be ended at any time, and the user can work on meanwhile. The script gets a folder as its only argument, reads
-meshes.blend there, and writes result.json.
+It can be ended at any time, and the user can work on meanwhile. The module's main(folder) reads task.json and meshes.blend
+there, and what it returns is written into result.json (process.py).
 """
 
 import contextlib
@@ -41,7 +41,7 @@ def _writing():
 
 
 def write_task(folder, task):
-    """Writes what the script is to do, as JSON."""
+    """Writes what the module is to do, as JSON."""
     with _writing():
         (folder / "task.json").write_text(json.dumps(task))
 
@@ -61,12 +61,12 @@ def write(folder, meshes):
             bpy.data.objects.remove(ob)
 
 
-def command(script, folder):
-    """Returns the command that runs a script. Only the main thread may call it."""
-    path = str(Path(__file__).parent / script)
+def command(module, folder):
+    """Returns the command that runs a module. Only the main thread may call it."""
+    script, told = str(Path(__file__).with_name("process.py")), ["--", module, str(folder)]
     if not bpy.app.binary_path:  # The module bpy of PyPI is no program.
-        return [sys.executable, path, "--", str(folder)]
-    return [bpy.app.binary_path, "--background", "--factory-startup", "--python", path, "--", str(folder)]
+        return [sys.executable, script, *told]
+    return [bpy.app.binary_path, "--background", "--factory-startup", "--python", script, *told]
 
 
 def run(command_line, folder, doing, progress):
