@@ -6,6 +6,9 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from .. import preferences
 
+# How a length above 0 is entered.
+LENGTH = {"min": 1e-12, "soft_max": 1.0, "step": 1, "precision": 5, "subtype": "DISTANCE"}
+
 TOLERANCE_UNITS = (
     ("PERCENT", "% of Size", "Percent of the longest diagonal of the reference's bounding box"),
     ("LENGTH", "Length", "A length in the world, which does not depend on the size of the reference"),
@@ -37,11 +40,7 @@ def tolerance_settings(options=frozenset(), unit=None, percent=None, length=None
             name="Tolerance",
             description="How far the mesh may lie from the reference",
             default=0.01,
-            min=1e-12,
-            soft_max=1.0,
-            step=1,
-            precision=5,
-            subtype="DISTANCE",
+            **LENGTH,
             options=set(options),
             **(length or {}),
         ),

@@ -4,6 +4,7 @@
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..reference import snapshots
+from .choices import LENGTH
 
 DEVIATION_SURFACES = (
     ("MESH", "Mesh", "Colour the mesh by its distance to the reference"),
@@ -87,11 +88,7 @@ class ShowDeviation:
         name="Limit",
         description="The distance at which the colours end. Larger distances have the last colour",
         default=0.01,
-        min=1e-12,
-        soft_max=1.0,
-        step=1,
-        precision=5,
-        subtype="DISTANCE",
+        **LENGTH,
         update=changed,
     )
     use_bands: BoolProperty(
