@@ -41,16 +41,6 @@ dvec3 direction(const dvec3& v) {
   return length > 0 && length < kInfinity ? v / length : dvec3(0);
 }
 
-Box box_of(const TriangleMesh& mesh) {
-  Box box;
-  std::size_t turn = 0;
-  for (const glm::uvec3& t : mesh.triangles) {
-    poll_at(++turn);
-    for (int k = 0; k < 3; ++k) box.add(mesh.vertices[t[k]]);
-  }
-  return box;
-}
-
 /// Returns the largest distance of a point of the box from the origin of the frame.
 double extent(const Box& box, const Frame& frame) {
   return norm(glm::max(glm::abs(frame.from_world(box.lower)), glm::abs(frame.from_world(box.upper))));
@@ -151,6 +141,16 @@ class Cutter {
 };
 
 }  // namespace
+
+Box box_of(const TriangleMesh& mesh) {
+  Box box;
+  std::size_t turn = 0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    poll_at(++turn);
+    for (int k = 0; k < 3; ++k) box.add(mesh.vertices[t[k]]);
+  }
+  return box;
+}
 
 NearPart near_part(const TriangleMesh& a, const TriangleMesh& b) {
   const Box box_a = box_of(a), box_b = box_of(b);

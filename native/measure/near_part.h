@@ -12,6 +12,9 @@
 
 namespace tolvol {
 
+/// Returns the box of the corners of the triangles. Throws Cancelled. O(m).
+Box box_of(const TriangleMesh& mesh);
+
 struct NearPart {
   /// A vertex on an edge of the mesh, at `share` of the way from the vertex `from` to the vertex `to`.
   struct Cut {

@@ -36,12 +36,7 @@ TriangleMesh for_volume(TriangleMesh mesh, const Frame& frame) {
 }  // namespace
 
 bool is_a_point(const TriangleMesh& mesh) {
-  Box box;
-  std::size_t turn = 0;
-  for (const glm::uvec3& t : mesh.triangles) {
-    poll_at(++turn);
-    for (int k = 0; k < 3; ++k) box.add(mesh.vertices[t[k]]);
-  }
+  const Box box = box_of(mesh);
   return glm::distance(box.lower, box.upper) <= kPoint;
 }
 

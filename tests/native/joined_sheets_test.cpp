@@ -55,6 +55,22 @@ Case shelves(unsigned cells, unsigned n, std::uint32_t seed = 0) {
   return {shapes::stored(mesh)};
 }
 
+/// Decimates with each placement and judges both results, by `judge` too. Returns how many triangles *optimal* leaves,
+/// and then *subset*.
+template <class Judge>
+std::array<std::size_t, 2> both_placements(const Case& c, Judge&& judge) {
+  std::array<std::size_t, 2> left{};
+  for (const auto placement : {Options::Placement::optimal, Options::Placement::subset}) {
+    Options options;
+    options.placement = placement;
+    const DecimationResult r = run(c, options);
+    cases::expect_within(c, r);
+    judge(r);
+    left[placement == Options::Placement::subset] = r.triangles.size();
+  }
+  return left;
+}
+
 /// A row of round discs, each touching the next in one vertex.
 Case beads(unsigned discs, unsigned rim) {
   TriangleMesh mesh;
@@ -170,14 +186,7 @@ TEST(JoinedSheets, BoardsWithGapsEndAsTwoTrianglesAWall) {
     for (const double percent : {1.0, 0.3}) {
       Case c = shelves(3, 6, seed);
       c.percent = percent;
-      std::size_t left[2];
-      for (const auto placement : {Options::Placement::optimal, Options::Placement::subset}) {
-        Options options;
-        options.placement = placement;
-        const DecimationResult r = run(c, options);
-        cases::expect_within(c, r);
-        left[placement == Options::Placement::subset] = r.triangles.size();
-      }
+      const auto left = both_placements(c, [](const DecimationResult&) {});
       const double walls = static_cast<double>(c.mesh.triangles.size()) / (2 * 6 * 6);
       EXPECT_LE(static_cast<double>(left[0]), 1.02 * static_cast<double>(left[1])) << seed << " " << percent;
       EXPECT_LE(static_cast<double>(left[0]), 2.1 * walls) << seed << " " << percent;
@@ -337,16 +346,10 @@ Case wings(unsigned n) {
 TEST(JoinedSheets, SharedEdgesMoveWithTheirSheets) {
   Case c = wings(24);
   c.percent = 0.2;
-  std::size_t left[2];
-  for (const auto placement : {Options::Placement::optimal, Options::Placement::subset}) {
-    Options options;
-    options.placement = placement;
-    const DecimationResult r = run(c, options);
-    cases::expect_within(c, r);
+  const auto left = both_placements(c, [](const DecimationResult& r) {
     EXPECT_EQ(edges_by_faces(r.triangles).size(), 3u) << "some edges are open, others have two faces or three";
     EXPECT_GE(edges_by_faces(r.triangles).at(3), 2u);
-    left[placement == Options::Placement::subset] = r.triangles.size();
-  }
+  });
   EXPECT_LE(4 * left[0], 3 * left[1]);
   cases::expect_same_bits(c, {});
 }
