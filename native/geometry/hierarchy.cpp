@@ -446,8 +446,8 @@ Hierarchy::Common Hierarchy::common_of(std::span<const glm::dvec3> points, doubl
     return common.distance <= radius ? common : Common{};
   }
   std::uint32_t best = kNone;
-  double best_squared = std::numeric_limits<double>::infinity();
   double bound = radius * scale_ * (radius * scale_) * (1 + 1e-12);
+  double best_squared = bound;
   const double enough_squared = enough < 0 ? -1 : enough * scale_ * (enough * scale_);
   auto attempt = [&](std::uint32_t place) {
     const Corners& t = corners_[place];

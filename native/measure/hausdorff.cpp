@@ -3,8 +3,8 @@
 // for General Polygonal Models, 2009, with a sharper bound, a way to split that ends, and rounding inside the interval.
 //
 // - The upper bound of a piece, a triangle: the distance to one triangle T of b is convex, so that over the piece it is
-//   largest at a corner. U = min over T of the largest distance of a corner to T is found by one search of the
-//   hierarchy.
+//   largest at a corner. One search of the hierarchy finds a T for which that is small enough, if there is one. If not,
+//   the triangle nearest to the centroid gives an upper bound, and the piece waits to be split.
 // - The lower bound is the distance to b at any point of a.
 // - Splitting: halving the longest edge brings a piece to the size of the triangles near it. Then the piece is cut
 //   along the edges of the nearest triangle T, by planes perpendicular to T. A part above T has its largest distance to
@@ -73,13 +73,16 @@ struct Piece {
   std::array<dvec3, 3> corner;
   double error = 0;
   double upper = 0;
-  std::uint32_t triangle = 0;                // is a triangle of a
-  std::uint32_t common = Hierarchy::kNone;   // is the triangle of b that gives `upper`
-  std::uint32_t nearest = Hierarchy::kNone;  // is the triangle of b nearest to the centroid
+  std::uint32_t triangle = 0;             // is a triangle of a
+  std::uint32_t near = Hierarchy::kNone;  // is the triangle of b that gives `upper`; before that it is a guess
 };
 
-struct Smaller {
-  bool operator()(const Piece& x, const Piece& y) const { return x.upper < y.upper; }
+/// Is a piece that waits to be split. Pieces are not moved while the queue is put in order.
+struct Waiting {
+  double upper;
+  std::uint32_t place;  // of the piece in the store
+
+  bool operator<(const Waiting& other) const { return upper < other.upper; }
 };
 
 struct Sample {
@@ -91,6 +94,25 @@ struct Sample {
   void improve(const Sample& other) {
     if (other.distance > distance) *this = other;
   }
+};
+
+/// The corners of a piece and of its parts at which the distance to b has been looked at. It is looked at once.
+class Sampled {
+ public:
+  Sampled() = default;
+  explicit Sampled(const std::array<dvec3, 3>& corners) : count_(3) { std::copy_n(corners.begin(), 3, point_.begin()); }
+
+  /// Returns false if p has been added before.
+  bool add(const dvec3& p) {
+    const auto end = point_.begin() + count_;
+    if (std::find(point_.begin(), end, p) != end) return false;
+    point_[count_++] = p;
+    return true;
+  }
+
+ private:
+  std::array<dvec3, 5> point_;  // a split makes at most two new points
+  int count_ = 0;
 };
 
 struct Children {
@@ -178,9 +200,10 @@ class Search {
         for (std::size_t i = begin; i < end; ++i) {
           pieces[i].triangle = std::uint32_t(chunk + i);
           pieces[i].corner = corners(a_, pieces[i].triangle);
-          pieces[i].common = hint;
-          samples[i] = evaluate(pieces[i]);
-          hint = pieces[i].common;
+          pieces[i].near = hint;
+          Sampled sampled;
+          samples[i] = evaluate(pieces[i], sampled);
+          hint = pieces[i].near;
         }
       });
       learn(samples);
@@ -193,20 +216,14 @@ class Search {
     poll();
     std::vector<Piece> batch;
     const double enough = cutoff();
-    while (batch.size() < kBatch && !queue_.empty() && queue_.front().upper > enough) {
-      std::pop_heap(queue_.begin(), queue_.end(), Smaller());
-      batch.push_back(queue_.back());
-      queue_.pop_back();
-    }
+    while (batch.size() < kBatch && !queue_.empty() && queue_.front().upper > enough) batch.push_back(take());
     std::vector<Children> children(batch.size());
     std::vector<Sample> samples(batch.size());
     parallel_for(batch.size(), kSmallBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         children[i] = split(batch[i]);
-        for (int k = 0; k < children[i].count; ++k) {
-          children[i].piece[k].common = batch[i].nearest;  // this guess ends the piece above that triangle
-          samples[i].improve(evaluate(children[i].piece[k]));
-        }
+        Sampled sampled(batch[i].corner);
+        for (int k = 0; k < children[i].count; ++k) samples[i].improve(evaluate(children[i].piece[k], sampled));
       }
     });
     learn(samples);
@@ -221,30 +238,49 @@ class Search {
   void keep(const Piece& piece) {
     if (piece.upper <= cutoff()) {
       settled_ = std::max(settled_, piece.upper);
-    } else {
-      queue_.push_back(piece);
-      std::push_heap(queue_.begin(), queue_.end(), Smaller());
+      return;
     }
+    if (free_.empty()) {
+      free_.push_back(std::uint32_t(store_.size()));
+      store_.emplace_back();
+    }
+    store_[free_.back()] = piece;
+    queue_.push_back({piece.upper, free_.back()});
+    free_.pop_back();
+    std::push_heap(queue_.begin(), queue_.end());
   }
 
-  /// Sets upper, common and nearest of a piece, whose `common` is a guess before. Returns the best lower bound it
-  /// finds, not certified, or none for a piece that is settled.
-  Sample evaluate(Piece& piece) const {
-    const double margin = kUpperMargin + piece.error, enough = cutoff();
-    const Hierarchy::Common common = hierarchy_.common(piece.corner, kInfinity, enough - margin, piece.common);
-    piece.common = common.triangle;
-    piece.upper = common.distance + margin;
-    Sample best;
-    if (piece.upper <= enough) return best;
+  Piece take() {
+    std::pop_heap(queue_.begin(), queue_.end());
+    const std::uint32_t place = queue_.back().place;
+    queue_.pop_back();
+    free_.push_back(place);
+    return store_[place];
+  }
+
+  /// Sets `upper` and `near` of a piece, whose `near` is a guess before. Returns the best lower bound it finds, not
+  /// certified, or none for a piece that is settled. Adds to `sampled` the corners at which it has looked.
+  Sample evaluate(Piece& piece, Sampled& sampled) const {
+    const double margin = kUpperMargin + piece.error, enough = cutoff() - margin;
+    if (enough >= 0) {
+      const Hierarchy::Common common = hierarchy_.common(piece.corner, enough, enough, piece.near);
+      if (common.triangle != Hierarchy::kNone) {
+        piece.near = common.triangle;
+        piece.upper = common.distance + margin;
+        return {};
+      }
+    }
     const dvec3 middle = (piece.corner[0] + piece.corner[1] + piece.corner[2]) / 3.0;
-    const Hierarchy::Nearest nearest = hierarchy_.nearest(middle, kInfinity, common.triangle);
-    piece.nearest = nearest.triangle;
-    best = {nearest.distance, middle, piece.error, piece.triangle};
-    const std::array<dvec3, 3> t = corners(b_, common.triangle);
+    const Hierarchy::Nearest nearest = hierarchy_.nearest(middle, kInfinity, piece.near);
+    piece.near = nearest.triangle;
+    piece.upper = 0;
+    Sample best{nearest.distance, middle, piece.error, piece.triangle};
+    const std::array<dvec3, 3> t = corners(b_, piece.near);
     for (const dvec3& corner : piece.corner) {
-      if (std::sqrt(closest_point(corner, t[0], t[1], t[2]).distance_squared) <= std::max(lower_, best.distance))
-        continue;
-      best.improve({far_from(corner, common.triangle).distance, corner, piece.error, piece.triangle});
+      const double distance = std::sqrt(closest_point(corner, t[0], t[1], t[2]).distance_squared);
+      piece.upper = std::max(piece.upper, distance + margin);
+      if (!sampled.add(corner) || distance <= std::max(lower_, best.distance)) continue;
+      best.improve({far_from(corner, piece.near).distance, corner, piece.error, piece.triangle});
     }
     return best;
   }
@@ -303,24 +339,24 @@ class Search {
     return piece;
   }
 
-  /// Returns the triangle nearest to the corner of a piece that is farthest from piece.nearest. This takes as long as a
+  /// Returns the triangle nearest to the corner of a piece that is farthest from piece.near. This takes as long as a
   /// split, and most pieces end without it, so that it is found only after some splits.
   std::uint32_t other_near(const Piece& piece) const {
-    if (piece.error < kSplitsWithOneTriangle * kSplitError) return piece.nearest;
-    const std::array<dvec3, 3> t = corners(b_, piece.nearest);
+    if (piece.error < kSplitsWithOneTriangle * kSplitError) return piece.near;
+    const std::array<dvec3, 3> t = corners(b_, piece.near);
     const dvec3* farthest = nullptr;
     double most = -1;
     for (const dvec3& corner : piece.corner) {
       const double squared = closest_point(corner, t[0], t[1], t[2]).distance_squared;
       if (squared > most) most = squared, farthest = &corner;
     }
-    return hierarchy_.nearest(*farthest, kInfinity, piece.nearest).triangle;
+    return hierarchy_.nearest(*farthest, kInfinity, piece.near).triangle;
   }
 
   /// Returns no part if the piece is too small.
   Children split(const Piece& whole) const {
     const Piece piece = flattened(whole);
-    const Parts parts = tolvol::split(piece.corner, corners(b_, piece.nearest), corners(b_, other_near(piece)));
+    const Parts parts = tolvol::split(piece.corner, corners(b_, piece.near), corners(b_, other_near(piece)));
     Children children{{piece, piece, piece}, parts.count};
     for (int i = 0; i < parts.count; ++i) {
       children.piece[i].corner = parts.corners[i];
@@ -333,8 +369,10 @@ class Search {
   Hierarchy hierarchy_;
   double bound_;
   const HausdorffOptions& options_;
-  std::vector<Piece> queue_;  // is a heap with the largest upper bound in front
-  double settled_ = 0;        // is the largest upper bound of all pieces that left the queue
+  std::vector<Waiting> queue_;  // is a heap with the largest upper bound in front
+  std::vector<Piece> store_;    // holds the pieces of the queue, at places that are not in `free_`
+  std::vector<std::uint32_t> free_;
+  double settled_ = 0;  // is the largest upper bound of all pieces that left the queue
   double lower_ = 0;
   Sample farthest_;
   std::size_t pieces_ = 0;
