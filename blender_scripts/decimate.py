@@ -142,7 +142,8 @@ class Command:
         names = [ob.name for ob in source.objects]
         reference_objects = self._pair(source.objects, reference_file)
         references = [snapshots.surface_of(ob) for ob in reference_objects]
-        inputs = [snapshots.surface_of(ob) for ob in source.objects]
+        own = reference_objects is source.objects
+        inputs = references if own else [snapshots.surface_of(ob) for ob in source.objects]
         size = snapshots.joined(references).size()
         tolerance = self._tolerances(size)[level]
         rounding = file_io.rounding(output.exported, source.objects)
@@ -239,7 +240,7 @@ class Command:
         target = self.options.target_triangles
         if target is None:
             return [None] * len(objects)
-        triangles = [len(mesh_io.read_mesh(ob.data).triangles) for ob in objects]
+        triangles = [mesh_io.triangle_count(ob.data) for ob in objects]
         return [max(1, target * count // sum(triangles)) for count in triangles]
 
     def _decimate(self, ob, reference, tolerance, target):
@@ -302,7 +303,7 @@ class Command:
             before = runs[0]["solidity"]["before"]
         else:
             before = solidity.facts(snapshots.joined(inputs), self.options.threads)
-        after = solidity.facts(snapshots.joined(found.values()), self.options.threads)
+        after = solidity.facts(snapshots.joined(found.values()), self.options.threads, again=False)
         whole["solidity"] = solidity.compared(before, after)
         pairs = {when: whole["solidity"][when]["crossing_pairs"] for when in ("before", "after")}
         whole["crossings"] = pairs
@@ -362,7 +363,8 @@ class Command:
         return [target for target in (*of_outputs, self.report) if target]
 
     def _certify(self, surface, reference, tolerance, kept):
-        return certify(surface, reference, tolerance, kept, self.options.threads)
+        # Where the file holds the result bit for bit, the measurements of the operator are measurements of the file.
+        return certify(surface, reference, tolerance, kept, self.options.threads, again=False)
 
     def _draw(self, output, result, reference, tolerance, size):
         surfaces = [(surface.world(), surface.arrays.triangles) for surface in (result, reference)]

@@ -81,7 +81,8 @@ def read(ob, settings):
     asked |= {"effort": "fast", "target_triangles": None, "max_seconds": None}
     _known[ob.name] = Known(_token(ob, settings), None, None)
     # The tolerance is that of each run.
-    task = decimation.task(ob, snapshots.reference_of(ob), math.nan, settings, asked)
+    surface = snapshots.surface_of(ob)
+    task = decimation.task(ob, surface, snapshots.reference_of(ob, surface), math.nan, settings, asked)
     digest = _digest(task, _place(ob))
     curve = _curves.pop(digest, None) or Curve(len(task.surface.arrays.triangles))
     _curves[digest] = curve

@@ -49,10 +49,10 @@ class MeshFile:
     @functools.cached_property
     def counts(self):
         """The numbers of vertices and triangles at the first access: a later change of the meshes does not change them."""
-        vertices = sum(len(ob.data.vertices) for ob in self.objects)
+        meshes = [ob.data for ob in self.objects]
         return {
-            "vertices": vertices,
-            "triangles": sum(len(mesh_io.read_mesh(ob.data).triangles) for ob in self.objects),
+            "vertices": sum(len(mesh.vertices) for mesh in meshes),
+            "triangles": sum(mesh_io.triangle_count(mesh) for mesh in meshes),
         }
 
 

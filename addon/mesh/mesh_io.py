@@ -44,6 +44,11 @@ def read_mesh(mesh):
     )
 
 
+def triangle_count(mesh):
+    """Returns how many triangles Blender cuts the polygons of `mesh` into."""
+    return len(mesh.loops) - 2 * len(mesh.polygons)
+
+
 def whole_quads(mesh, arrays):
     """Returns faces for a check of quads in both their triangulations: (m, 4), or (m, 3) if the mesh has no quads.
 

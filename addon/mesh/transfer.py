@@ -76,7 +76,7 @@ class Writing:
     FilledArrays: the mesh then gets their new faces first.
 
     Entering the context builds a scratch mesh, compares it with the result vertex by vertex and triangle by triangle, and
-    raises MeshMismatch if they differ. Only write() changes the mesh.
+    raises MeshMismatch if they differ. Its `layout` tells then where the result is in the mesh. Only write() changes the mesh.
     """
 
     def __init__(self, mesh, source, result):
@@ -98,7 +98,7 @@ class Writing:
             _turn(built, faces, result)
             self._carry.blend_groups(built)
             _weld(built, _weld_targets(result), loose)
-            self._layout = _compare(_scratch_arrays(built), source, result)
+            self.layout = _compare(_scratch_arrays(built), source, result)
         except BaseException:
             built.free()
             raise
@@ -109,8 +109,8 @@ class Writing:
 
     def write(self):
         self._built.to_mesh(self._mesh)
-        self._carry.write(self._mesh, self._layout)
-        stored = column(self._mesh.vertices, "co", 3)[self._layout.result_vertices]
+        self._carry.write(self._mesh, self.layout)
+        stored = column(self._mesh.vertices, "co", 3)[self.layout.result_vertices]
         if not np.array_equal(stored.view(np.uint32), self._result.vertices.view(np.uint32)):
             raise RuntimeError("the mesh that was written is not the one that was certified")
 

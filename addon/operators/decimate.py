@@ -137,11 +137,12 @@ object. An object without a reference gets one first, as by Set Reference"""
         self.finish((yield from self.each(tasks)))
 
     def _task(self, context, ob):
-        reference = snapshots.reference_of(ob)
+        surface = snapshots.surface_of(ob)
+        reference = snapshots.reference_of(ob, surface)
         tolerance = tolerances.tolerance_length(self, reference.size())
         placement = automatic_placement(ob.data) if self.own_placements else self.placement
         options = decimation.options(self, placement, self.threads or preferences.threads(context))
-        return decimation.task(ob, reference, tolerance, self, options | {"outside": self.outside.lower()})
+        return decimation.task(ob, surface, reference, tolerance, self, options | {"outside": self.outside.lower()})
 
     def finish(self, outcomes):
         # Entering all contexts checks that Blender can hold all results before the first mesh is changed.
@@ -159,9 +160,9 @@ object. An object without a reference gets one first, as by Set Reference"""
             for write in writes:
                 write.write()
             without.clear()
-        for ob, (_, _, _, run) in zip(self.objects, outcomes):
+        for ob, outcome, write in zip(self.objects, outcomes, writes):
             shared.give(self, ob.tolvol, _SHARED if self.own_placements else {*_SHARED, "placement"})
-            decimation.keep(self, ob, run, f"{ob.name}: " if len(self.objects) > 1 else "")
+            decimation.keep(self, ob, outcome, write.layout, f"{ob.name}: " if len(self.objects) > 1 else "")
         if len(outcomes) > 1:
             self._report_totals([run for _, _, _, run in outcomes])
 

@@ -33,12 +33,12 @@ def options(settings, placement, threads):
     }
 
 
-def task(ob, reference, tolerance, settings, asked):
-    """Returns the Task that decimates the mesh of `ob` within the tolerance of `reference`, a Surface.
+def task(ob, surface, reference, tolerance, settings, asked):
+    """Returns the Task that decimates `surface`, that of `ob`, within the tolerance of `reference`, another Surface.
 
     settings: what is protected, and whether holes are closed, as in decimate_settings(); asked: the result of options().
     """
-    made = Task(ob.name, snapshots.surface_of(ob), reference, tolerance, asked)
+    made = Task(ob.name, surface, reference, tolerance, asked)
     made.uvs = mesh_io.corner_uvs(ob.data)
     made.locked[mesh_io.loose_edges(ob.data)] = True
     made.locked |= protect.on_edges(ob.data, settings.protect)
@@ -59,10 +59,17 @@ def task(ob, reference, tolerance, settings, asked):
     return made
 
 
-def keep(operator, ob, run, said):
-    """Remembers the run at its object, whose mesh has just been written, and reports it. said: the name of the object, for
-    the messages."""
-    measurements.remember(ob, snapshots.surface_of(ob), run, run["tolerance"]["absolute"])
+def keep(operator, ob, outcome, layout, said):
+    """Remembers the outcome of a Task at its object, whose mesh has just been written, and reports it.
+
+    layout: the Layout of the mesh that was written; said: the name of the object, for the messages.
+    """
+    _, reference, result, run = outcome
+    written = snapshots.surface_of(ob)
+    certified = mesh_io.to_world(result.vertices, written.matrix), result.triangles
+    other = reference.world(), reference.arrays.triangles
+    measure.take_over((written.world(), written.arrays.triangles), certified, other, layout.triangles)
+    measurements.remember(ob, written, run, run["tolerance"]["absolute"])
     last_run.keep(ob, run)
     kept_warnings.keep(ob, run["warnings"], run["locked"])
     for warning in run["warnings"]:

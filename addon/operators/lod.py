@@ -80,7 +80,8 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             placement = settings.placement if chosen else automatic_placement(original.data)
             asked = decimation.options(settings, placement, self.threads or preferences.threads(context))
             asked |= {"two_sided": True, "target_triangles": None}
-            tasks = [decimation.task(original, reference, limit, settings, dict(asked)) for limit in limits]
+            surface = snapshots.surface_of(original)
+            tasks = [decimation.task(original, surface, reference, limit, settings, dict(asked)) for limit in limits]
         if self.by == "COUNT":
             triangles = len(tasks[0].surface.arrays.triangles)
             for i, (task, count) in enumerate(zip(tasks, self.counts)):
@@ -118,13 +119,14 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
         """Makes the objects of all levels, or none of them."""
         ob = self.ob
         with contextlib.ExitStack() as undo:
-            meshes = []
+            meshes, layouts = [], []
             undo.callback(lambda: [bpy.data.meshes.remove(mesh) for mesh in meshes])
             source = _source(ob)
             for arrays, _, result, _ in outcomes:
                 meshes.append(source.copy())
                 with transfer.Writing(meshes[-1], arrays, result) as writing:
                     writing.write()
+                layouts.append(writing.layout)
             if ob.tolvol.snapshot is None:
                 undo.callback(snapshots.clear_reference, ob)
                 snapshots.set_reference(ob, outcomes[0][1])
@@ -132,7 +134,8 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
         shared.give(self, ob.tolvol.lod, lod_settings())
         collection = bpy.data.collections.new(f"{ob.name}_LODs")
         context.scene.collection.children.link(collection)
-        for i, (mesh, (_, _, _, run)) in enumerate(zip(meshes, outcomes)):
+        for i, (mesh, layout, outcome) in enumerate(zip(meshes, layouts, outcomes)):
+            run = outcome[3]
             level = ob.copy()
             level.name = mesh.name = f"{ob.name}_LOD{i + 1}"
             level.data = mesh
@@ -141,7 +144,7 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             self._set(level.tolvol, i, run["tolerance"]["absolute"])
             level[GEOMETRIC_ERROR] = max(run["forward"][1], run["backward"][1])
             context.view_layer.update()
-            decimation.keep(self, level, run, f"{level.name}: ")
+            decimation.keep(self, level, outcome, layout, f"{level.name}: ")
         ob.tolvol.lods = collection
 
     def _set(self, settings, level, tolerance):

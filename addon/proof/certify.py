@@ -28,13 +28,15 @@ def outside(surface, reference, found, tolerance, threads=None, progress=None):
     return unproved
 
 
-def certify(surface, reference, tolerance, kept_faces=0, threads=None, progress=None):
+def certify(surface, reference, tolerance, kept_faces=0, threads=None, progress=None, again=True):
     """Returns the entries "forward", "backward" and "outside" of a report for two Surfaces, with intervals as pairs.
 
     kept_faces: the number of faces that were outside from the start and were kept. If it is not 0, "outside" has the entry
-    "rest", the interval of all other faces, unless more faces than these are outside.
+    "rest", the interval of all other faces, unless more faces than these are outside. again: whether to measure even if
+    exactly these surfaces were measured before in this session, as those of a file are that holds bit for bit what was
+    certified in memory.
     """
-    judge = (tolerance, threads, progress)
+    judge = (tolerance, threads, progress, again)
     triangles = surface.arrays.triangles
     other = reference.world(), reference.arrays.triangles
     forward, backward = measure.both_ways((surface.world(), triangles), other, *judge)

@@ -14,12 +14,15 @@ def largest_distance(from_surface, to_surface, tolerance=None, threads=None, pro
     """Returns the Interval of the largest distance of a point of `from_surface` from `to_surface`.
 
     Each surface is a pair (vertices, triangles). The width of the interval is at most 0.1 % of `upper`, with the
-    exceptions that native/measure/hausdorff.h names. If `tolerance` lies inside the interval, the interval is narrowed
-    until `tolerance` no longer does, as far as rounding permits. again: whether to measure even if this was
-    measured before in this session (known.py).
+    exceptions that native/measure/hausdorff.h names, and `tolerance` does not lie inside the interval, as far as rounding
+    permits. again: whether to measure even if these surfaces were measured before in this session (known.py).
     """
-    key = known.key_of("largest", *from_surface, *to_surface, None if tolerance is None else float(tolerance))
-    if not again and (found := known.get(key)) is not None:
+    key = _key(from_surface, to_surface)
+    if (
+        not again
+        and (found := known.get(key)) is not None
+        and not (tolerance is not None and found.undecided(tolerance))
+    ):
         return found
 
     def measured(**options):
@@ -28,13 +31,33 @@ def largest_distance(from_surface, to_surface, tolerance=None, threads=None, pro
         )
         return Interval(found.lower, found.upper, found.position, found.triangle)
 
-    interval = measured()
-    if tolerance is not None and interval.undecided(tolerance):
-        decided = measured(bound=tolerance)
-        best = max(interval, decided, key=lambda found: found.lower)
-        interval = replace(best, upper=min(interval.upper, decided.upper))
+    interval = measured() if tolerance is None else measured(bound=tolerance)
+    if tolerance is not None and not interval.within(tolerance):
+        # The search ended as soon as the distance was known to be beyond, or after many pieces: the interval may be wide.
+        narrow = measured()
+        best = max(interval, narrow, key=lambda found: found.lower)
+        interval = replace(best, upper=min(interval.upper, narrow.upper))
     known.keep(key, interval)
     return interval
+
+
+def take_over(surface, same, other, rows):
+    """Remembers what was measured between `same` and `other` as the distances between `surface` and `other`, too.
+
+    Each is a pair (vertices, triangles). `surface` is `same` with its vertices and triangles in another order: its triangle i
+    is the triangle rows[i] of `same`.
+    """
+    if found := known.get(_key(same, other)):
+        triangle = int(np.flatnonzero(rows == found.triangle)[0])
+        known.keep(_key(surface, other), replace(found, triangle=triangle))
+    if found := known.get(_key(other, same)):
+        known.keep(_key(other, surface), found)
+
+
+def _key(from_surface, to_surface):
+    """Returns the key of the largest distance. It does not depend on the order of the vertices, nor on the tolerance."""
+    corners = (vertices[triangles] for vertices, triangles in (from_surface, to_surface))
+    return known.key_of("largest", *corners)
 
 
 def sampled_distance(points, to_surface, threads=None, progress=None):
@@ -43,7 +66,7 @@ def sampled_distance(points, to_surface, threads=None, progress=None):
     return native.module.directed_hausdorff(points, corners, *to_surface, threads=threads, progress=progress).lower
 
 
-def both_ways(surface, reference, tolerance=None, threads=None, progress=None):
+def both_ways(surface, reference, tolerance=None, threads=None, progress=None, again=True):
     """Returns two Intervals: of the surface from the reference, and of the reference from the surface."""
-    forward = largest_distance(surface, reference, tolerance, threads, progress)
-    return forward, largest_distance(reference, surface, tolerance, threads, progress)
+    forward = largest_distance(surface, reference, tolerance, threads, progress, again)
+    return forward, largest_distance(reference, surface, tolerance, threads, progress, again)

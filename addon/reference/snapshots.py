@@ -73,14 +73,17 @@ def source_object(ob):
     return ob if ob.tolvol.reference_kind == "SELF" else ob.tolvol.reference_object
 
 
-def reference_of(ob):
-    """Returns the reference at its present place. If none is set, it returns the mesh that Set Reference would take."""
+def reference_of(ob, own=None):
+    """Returns the reference at its present place. If none is set, it returns the mesh that Set Reference would take.
+
+    own: the Surface of `ob` as it is now, if it has been read: it is not read again where it is the reference.
+    """
     settings = ob.tolvol
     if settings.snapshot is None:
         source = source_object(ob)
         if source is None:
             raise Refused(f"{ob.name} has no reference: choose an object, or This Mesh")
-        return surface_of(source)
+        return own if source == ob and own is not None else surface_of(source)
     reason = stale_reason(ob)
     if reason:
         raise Refused(f"The reference of {ob.name} is out of date: {reason}. {REMEDY}")
@@ -102,9 +105,7 @@ def snapshot_size(ob):
     settings = ob.tolvol
     key = settings.snapshot_fingerprint
     if key not in _boxes:
-        arrays = mesh_io.read_mesh(settings.snapshot)
-        used = arrays.vertices[np.unique(arrays.triangles)]
-        _boxes[key] = np.array([used.min(0), used.max(0)]) if len(used) else np.full((2, 3), np.nan)
+        _boxes[key] = _box(mesh_io.read_mesh(settings.snapshot))
     if not np.isfinite(_boxes[key]).all():
         return math.nan
     # The size of a surface is the size of the bounding box of its used vertices.
@@ -112,6 +113,11 @@ def snapshot_size(ob):
         return native.module.diagonal(_boxes[key], np.array([[0, 1, 1]]), to_world=reference_matrix(ob))
     except native.module.TolvolError:
         return math.nan
+
+
+def _box(arrays):
+    used = arrays.vertices[np.unique(arrays.triangles)]
+    return np.array([used.min(0), used.max(0)]) if len(used) else np.full((2, 3), np.nan)
 
 
 def set_reference(ob, surface):
@@ -127,7 +133,7 @@ def set_reference(ob, surface):
     settings.snapshot_object = settings.reference_object if settings.reference_kind == "OBJECT" else None
     settings.snapshot_matrix = surface.matrix.ravel()
     settings.snapshot_fingerprint = surface.arrays.fingerprint()
-    _boxes.pop(settings.snapshot_fingerprint, None)  # A damaged snapshot may have had this fingerprint.
+    _boxes[settings.snapshot_fingerprint] = _box(surface.arrays)  # A damaged snapshot may have had this fingerprint.
     # Setting the percentage to itself makes it the object's own: a later change of the preferences does not change it.
     settings.tolerance_percent = settings.tolerance_percent
     notify()

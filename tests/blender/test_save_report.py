@@ -15,8 +15,11 @@ import numpy as np
 import pytest
 
 import addon
+from addon.files import file_io
 from addon.operators.report import TOLVOL_OT_save_report
-from addon.proof import deviation, deviation_drawings, deviation_pictures, deviation_units, verdict
+from addon.proof import deviation, deviation_drawings, deviation_pictures, deviation_units, measure, verdict
+from addon.proof.certify import certify
+from addon.reference import snapshots
 from addon.units import chosen_unit
 from scenes import activate, add_object, sheet_arrays, torus
 from test_report import Page, lifted_sheet, measured, step
@@ -238,13 +241,21 @@ def test_report_of_one_object_keeps_its_keys(tmp_path):
 # What was measured before -------------------------------------------------------------------------------------------
 
 
+def calls_of_hausdorff(monkeypatch):
+    """Returns a list that grows with each search for a largest distance."""
+    calls, search = [], addon.native.module.directed_hausdorff
+    monkeypatch.setattr(
+        addon.native.module,
+        "directed_hausdorff",
+        lambda *given, **named: calls.append(named) or search(*given, **named),
+    )
+    return calls
+
+
 def test_report_takes_over_what_check_has_proved(tmp_path, monkeypatch):
     ob = lifted_sheet()
     bpy.ops.tolvol.check()
-    calls, measure = [], addon.native.module.directed_hausdorff
-    monkeypatch.setattr(
-        addon.native.module, "directed_hausdorff", lambda *given, **named: calls.append(1) or measure(*given, **named)
-    )
+    calls = calls_of_hausdorff(monkeypatch)
     run = saved(tmp_path)
     assert not calls
     assert run["forward"]["largest"][1] == ob.tolvol.measurement.forward
@@ -254,6 +265,29 @@ def test_report_takes_over_what_check_has_proved(tmp_path, monkeypatch):
     moved = saved(tmp_path)
     assert calls and moved["forward"]["largest"][0] > 0.9
     assert moved["solidity"]["a"]["area"] > run["solidity"]["a"]["area"]
+
+
+@pytest.mark.parametrize("polygons", ["triangles", "quads"])
+def test_a_decimation_is_measured_once_each_way_for_its_report_and_its_file_too(tmp_path, monkeypatch, polygons):
+    ob = torus("ring")
+    if polygons == "triangles":
+        ob.modifiers.new("triangles", "TRIANGULATE")
+        bpy.ops.object.modifier_apply(modifier="triangles")
+    calls = calls_of_hausdorff(monkeypatch)
+    bpy.ops.tolvol.decimate(tolerance_mode="PERCENT", tolerance_percent=0.5)
+    assert [named["bound"] for named in calls] == [ob.tolvol.measurement.tolerance] * 2
+    run = saved(tmp_path)
+    assert run["forward"]["largest"][1] == ob.tolvol.measurement.forward
+    surface, reference = snapshots.surface_of(ob), snapshots.reference_of(ob)
+    on = surface.world()[surface.arrays.triangles[run["forward"]["triangle"]]]
+    point = np.array(run["forward"]["position"])
+    assert measure.sampled_distance(point[None], (on, np.array([[0, 1, 2]]))) < 1e-6
+    calls.clear()
+    file_io.write_file(tmp_path / "ring.ply", [ob], tmp_path)
+    [stored] = [snapshots.surface_of(one) for one in file_io.read_file(tmp_path / "ring.ply").objects]
+    certified = certify(stored, reference, ob.tolvol.measurement.tolerance, again=False)
+    assert not calls
+    assert certified["forward"][1] == ob.tolvol.measurement.forward
 
 
 # The format in the dialog -------------------------------------------------------------------------------------------
