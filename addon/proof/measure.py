@@ -17,7 +17,7 @@ def largest_distance(from_surface, to_surface, tolerance=None, threads=None, pro
     exceptions that native/measure/hausdorff.h names, and `tolerance` does not lie inside the interval, as far as rounding
     permits. again: whether to measure even if these surfaces were measured before in this session (known.py).
     """
-    key = _key(from_surface, to_surface)
+    key = _key(_content(from_surface), _content(to_surface))
     if (
         not again
         and (found := known.get(key)) is not None
@@ -47,6 +47,7 @@ def take_over(surface, same, other, rows):
     Each is a pair (vertices, triangles). `surface` is `same` with its vertices and triangles in another order: its triangle i
     is the triangle rows[i] of `same`.
     """
+    same, surface, other = map(_content, (same, surface, other))
     if found := known.get(_key(same, other)):
         triangle = int(np.flatnonzero(rows == found.triangle)[0])
         known.keep(_key(surface, other), replace(found, triangle=triangle))
@@ -54,10 +55,15 @@ def take_over(surface, same, other, rows):
         known.keep(_key(other, surface), found)
 
 
-def _key(from_surface, to_surface):
-    """Returns the key of the largest distance. It does not depend on the order of the vertices, nor on the tolerance."""
-    corners = (vertices[triangles] for vertices, triangles in (from_surface, to_surface))
-    return known.key_of("largest", *corners)
+def _content(surface):
+    """Returns a value that is equal for surfaces of equal triangles in equal order, however their vertices are numbered."""
+    vertices, triangles = surface
+    return known.key_of("corners", vertices[triangles])
+
+
+def _key(from_content, to_content):
+    """Returns the key of the largest distance, whatever tolerance it is compared with."""
+    return known.key_of("largest", from_content, to_content)
 
 
 def sampled_distance(points, to_surface, threads=None, progress=None):
