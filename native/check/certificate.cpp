@@ -218,17 +218,19 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
 
     const double longest2 = longest_squared(part);
     const bool seems_outside = !(centre2 <= limit2_);
-    if (guess != DistanceGrid::kNone && (seems_outside || longest2 < kSmall * kSmall * limit2_)) {
+    bool looked_around = guess == DistanceGrid::kNone;
+    const auto covered_by_node_around = [&] {
+      looked_around = true;
       const glm::dvec3 cell = glm::floor((centre - grid_->origin) * (1 / grid_->spacing));
-      bool found = false;
-      for (int i = 0; i < 8 && !found; ++i) {
+      for (int i = 0; i < 8; ++i) {
         const glm::ivec3 node = glm::ivec3(cell) + glm::ivec3(i & 1, (i >> 1) & 1, i >> 2);
         if (glm::any(glm::lessThan(node, glm::ivec3(0))) || glm::any(glm::greaterThanEqual(node, grid_->nodes)))
           continue;
-        found = covered_by(grid_->triangle[grid_->index(node.x, node.y, node.z)]);
+        if (covered_by(grid_->triangle[grid_->index(node.x, node.y, node.z)])) return true;
       }
-      if (found) continue;
-    }
+      return false;
+    };
+    if (!looked_around && (seems_outside || longest2 < kSmall * kSmall * limit2_) && covered_by_node_around()) continue;
     if (!(centre2 <= limit2_) || longest2 < kExact * kExact * limit2_) {
       if (hint == Hierarchy::kNone) hint = guess;
       const std::uint32_t nearest = around.nearest(part, centre, radius, hint);
@@ -254,6 +256,10 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
         longest2 > kLong * kLong * limit2_ && std::max(squared_length(t.ab), squared_length(t.ac)) <= limit2_;
     if (!long_over_small) {
       if (cut_along(below)) continue;
+      if (!looked_around) {
+        const std::uint32_t before = below;
+        if (covered_by_node_around() || (below != before && cut_along(below))) continue;
+      }
       // Among slivers it happens that no node of the grid names the triangle below the centre.
       if (exact == Hierarchy::kNone) {
         exact = around.nearest(part, centre, limit_, below);
