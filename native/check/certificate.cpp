@@ -48,6 +48,8 @@ constexpr double kExact = 0.7;
 constexpr double kRoomToLeave = 1.0 / 32;
 // The grid's guess of a distance is used without a search up to this distance.
 constexpr double kRoom = 0.7;
+// In the frame, more than ten times the rounding by which a proof may reach a point that is beyond the limit.
+constexpr double kBeyondRounding = 0x1p-40;
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
@@ -140,6 +142,10 @@ std::optional<glm::dvec3> TriangleCertificate::nearest_point(const glm::dvec3& p
   if (nearest.triangle == Hierarchy::kNone) return std::nullopt;
   const WitnessTriangle& t = (*reference_)[nearest.triangle];
   return closest_point(p, t.a, t.a + t.ab, t.a + t.ac).point;
+}
+
+bool TriangleCertificate::is_open(const glm::dvec3& p, const Facing* facing) const {
+  return !nearest_point(p, limit_ + kBeyondRounding, facing);
 }
 
 bool TriangleCertificate::shows_outside(const glm::dvec3 (&corners)[3]) const {

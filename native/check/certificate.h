@@ -96,6 +96,10 @@ class TriangleCertificate {
   /// or among all if it is null.
   std::optional<glm::dvec3> nearest_point(const glm::dvec3& p, double radius, const Facing* facing) const;
 
+  /// Tells whether p is farther than limit() from all triangles that `facing` admits, or from all if it is null, by
+  /// more than rounding. No triangle that contains p has a bound with such a `facing`. About 1 us.
+  bool is_open(const glm::dvec3& p, const Facing* facing) const;
+
   double limit() const { return limit_; }
   /// Returns a certificate with `share`, 0 to 1, of the provable distance.
   TriangleCertificate narrowed(double share) const {

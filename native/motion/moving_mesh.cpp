@@ -15,6 +15,7 @@
 #include "base/errors.h"
 #include "base/parallel.h"
 #include "check/input_checks.h"
+#include "geometry/closest_point.h"
 #include "topology/orientation.h"
 #include "topology/sides.h"
 #include "topology/t_junctions.h"
@@ -488,8 +489,8 @@ MovingMesh::Reach MovingMesh::reach_by_motion(std::uint32_t face) const {
 }
 
 /// The largest distance of any triangle that the face may consist of.
-double MovingMesh::distance_by(const TriangleCertificate& certificate, std::uint32_t face,
-                               MovingFacing::Known& known) const {
+double MovingMesh::distance_by(const TriangleCertificate& certificate, std::uint32_t face, MovingFacing::Known& known,
+                               Blame* blame) const {
   double largest = 0;
   known.room = std::numeric_limits<double>::infinity();
   for_triangles(face, [&](std::size_t k, const TriangleCorners& at, const PointBound* const(&of)[3]) {
@@ -501,7 +502,13 @@ double MovingMesh::distance_by(const TriangleCertificate& certificate, std::uint
       if (facing) facing->set_corners(near);
     }
     if (largest != kUnproved) {
-      largest = std::max(largest, certificate.bound_in_any_order(at, bounds, near, facing ? &*facing : nullptr));
+      Facing* const rule = facing ? &*facing : nullptr;
+      glm::dvec3 open(std::numeric_limits<double>::quiet_NaN());
+      largest = std::max(largest, certificate.bound_in_any_order(at, bounds, near, rule, blame ? &open : nullptr));
+      if (blame && largest == kUnproved) {
+        blame->triangle = static_cast<std::uint32_t>(k);
+        blame->weights = closest_point(open, at[0], at[1], at[2]).weights;
+      }
     }
     if (facing_ && largest != kUnproved) facing_->renew(face, k, at, facing, known);
     return largest != kUnproved;
@@ -509,17 +516,40 @@ double MovingMesh::distance_by(const TriangleCertificate& certificate, std::uint
   return largest;
 }
 
-MovingMesh::Reach MovingMesh::reach_by_certificate(std::uint32_t face) const {
+MovingMesh::Reach MovingMesh::reach_by_certificate(std::uint32_t face, Blame* blame) const {
   Reach reach;
   for (const std::uint32_t v : corners_of(face)) {
     if (trial_[v].bound.distance > limit_) return reach;
   }
   // The first question is the one that Certificate asks, so that it proves the face again; then comes the headroom.
   for (const TriangleCertificate& certificate : certificates_) {
-    reach.distance = distance_by(certificate, face, reach.facing);
+    reach.distance = distance_by(certificate, face, reach.facing, blame);
     if (reach.distance <= limit_ || reach.distance == kUnproved) break;
   }
   return reach;
+}
+
+/// Whether no proof of the face is possible on trial, because the point that was open last is open there, too.
+bool MovingMesh::refuses_again(std::uint32_t face, const Blame& blame) const {
+  if (std::isnan(blame.weights.x)) return false;
+  bool refuses = false;
+  for_triangles(face, [&](std::size_t k, const TriangleCorners& at, const auto&) {
+    if (k != blame.triangle) return true;
+    std::optional<Facing> facing;
+    if (facing_ && !facing_->start(face, k, at, facing)) return false;
+    const glm::dvec3 p = blame.weights.x * at[0] + blame.weights.y * at[1] + blame.weights.z * at[2];
+    refuses = certificates_.back().is_open(p, facing ? &*facing : nullptr);
+    return false;
+  });
+  return refuses;
+}
+
+/// What is known on trial of a face that is to blame for the last refusal.
+MovingMesh::Reach MovingMesh::reach_of_blamed(std::uint32_t face, Blame& blame) const {
+  const Reach reach = reach_by_motion(face);
+  if (reach.distance != kUnproved) return reach;
+  if (refuses_again(face, blame)) return {};
+  return reach_by_certificate(face, &blame);
 }
 
 void MovingMesh::set_trial_reach(std::uint32_t face, const Reach& reach) {
@@ -659,7 +689,7 @@ void MovingMesh::set_trial(std::uint32_t vertex, const VertexState& state) {
   step_[vertex] = glm::length(state.at - state_[vertex].at);
 }
 
-bool MovingMesh::try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint32_t& blame) {
+bool MovingMesh::try_alone(std::uint32_t vertex, const glm::dvec3& at, Blame& blame) {
   const VertexState from = trial_[vertex];
   if (at == from.at) return true;
   const PointBound there = bound_at(vertex, at, Aim::ahead);
@@ -669,12 +699,13 @@ bool MovingMesh::try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint
   const auto faces = ring(vertex);
   thread_local std::vector<Reach> reach;
   reach.resize(faces.size());
+  const std::size_t first = blame.place;
   for (std::size_t i = 0; i < faces.size(); ++i) {
-    const std::size_t place = (i + blame) % faces.size();
-    reach[place] = reach_by_motion(faces[place]);
-    if (reach[place].distance == kUnproved) reach[place] = reach_by_certificate(faces[place]);
+    const std::size_t place = (i + first) % faces.size();
+    Blame other{static_cast<std::uint32_t>(place)};
+    reach[place] = reach_of_blamed(faces[place], i == 0 ? blame : other);
     if (reach[place].distance != kUnproved) continue;
-    blame = static_cast<std::uint32_t>(place);
+    if (i > 0) blame = other;
     trial_[vertex] = from, step_[vertex] = step;
     return false;
   }

@@ -61,10 +61,18 @@ class MovingMesh {
   /// Which of these faces are not inside on trial. Every face must be asked about after the last change to a corner.
   /// A settled face costs about 10 ns, a face near the tolerance 0.1 us or much more.
   std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Progress* progress);
+  /// The face that refused a vertex last, and where. It is asked first when the vertex is tried again, because most
+  /// often it refuses there, too: then one point of one face was looked at.
+  struct Blame {
+    std::uint32_t place = 0;     ///< of the face in the vertex's ring
+    std::uint32_t triangle = 0;  ///< its number in the face
+    /// A point of the triangle around which no witness was found, by the weights of the corners; NaN if none is known.
+    glm::dvec3 weights{std::numeric_limits<double>::quiet_NaN()};
+  };
   /// Tries the vertex there if all faces around it are inside then; returns whether. Different threads may ask for
-  /// vertices that share no face. The distances of all corners must be known: measure(). `blame`: the place in the
-  /// ring of the face that is asked first, set to that of the face that refused.
-  bool try_alone(std::uint32_t vertex, const glm::dvec3& at, std::uint32_t& blame);
+  /// vertices that share no face. The distances of all corners must be known: measure(). If a face refuses, `blame`
+  /// names it.
+  bool try_alone(std::uint32_t vertex, const glm::dvec3& at, Blame& blame);
   void measure(std::span<const std::uint32_t> faces, Progress* progress);
   /// Which of these faces, all of which are inside on trial, exceed their angle there.
   std::vector<std::uint32_t> turned(std::span<const std::uint32_t> faces, Progress* progress);
@@ -146,8 +154,11 @@ class MovingMesh {
   };
   using TriangleCorners = glm::dvec3[3];
   Reach reach_by_motion(std::uint32_t face) const;
-  Reach reach_by_certificate(std::uint32_t face) const;
-  double distance_by(const TriangleCertificate& certificate, std::uint32_t face, MovingFacing::Known& facing) const;
+  Reach reach_by_certificate(std::uint32_t face, Blame* blame = nullptr) const;
+  double distance_by(const TriangleCertificate& certificate, std::uint32_t face, MovingFacing::Known& facing,
+                     Blame* blame) const;
+  bool refuses_again(std::uint32_t face, const Blame& blame) const;
+  Reach reach_of_blamed(std::uint32_t face, Blame& blame) const;
   bool is_inside(std::uint32_t face) const;
   void set_trial_reach(std::uint32_t face, const Reach& reach);
   void accept(std::uint32_t face);

@@ -209,6 +209,9 @@ TEST(Certificate, ProbesFindWhatHasNoProofAndNothingElse) {
     const Verdict verdict = certificate.verdict(corners, dvec3(TriangleCertificate::kUnproved));
     const bool shows = certificate.shows_outside(corners);
     EXPECT_FALSE(shows && verdict == Verdict::inside);
+    const dvec3 middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+    const double distance = volume.hierarchy().nearest(middle).distance;
+    EXPECT_EQ(certificate.is_open(middle, nullptr), distance > certificate.limit() + 0x1p-40) << distance;
     outside += verdict == Verdict::outside, shown += shows;
   }
   EXPECT_GT(outside, 300);
