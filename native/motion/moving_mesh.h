@@ -194,4 +194,17 @@ class MovingMesh {
   std::uint64_t now_ = 0;            // The number of these calls.
 };
 
+/// Calls visit(triangle's number in the face, its corners on trial, what is known of them) until it returns false.
+template <class Visit>
+void MovingMesh::for_triangles(std::uint32_t face, Visit&& visit) const {
+  const auto corner = corners_of(face);
+  std::size_t triangle = 0;
+  for (const auto& [a, b, c] : triangles_of(static_cast<int>(corners_))) {
+    const VertexState &p = trial_[corner[a]], &q = trial_[corner[b]], &r = trial_[corner[c]];
+    const glm::dvec3 corners[3] = {p.at, q.at, r.at};
+    const PointBound* const bounds[3] = {&p.bound, &q.bound, &r.bound};
+    if (!visit(triangle++, corners, bounds)) return;
+  }
+}
+
 }  // namespace tolvol

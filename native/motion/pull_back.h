@@ -142,6 +142,12 @@ class PullBack {
   void widen(std::vector<std::uint32_t>& vertices, std::size_t rings);
   void retreat(Held& held, Mode mode, double least);
 
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+  /// In the end no factor can rise by this.
+  static constexpr double kRise = 1.0 / 64;
+  /// A factor shrinks to this share in each round in which a face of the vertex fails.
+  static constexpr double kShrink = 0.5;
+
   MovingMesh mesh_;
   std::unique_ptr<MovingCoverage> coverage_;    // Null if only the forward direction is kept.
   std::unique_ptr<MovingCrossings> crossings_;  // Null if faces may cross.
