@@ -7,6 +7,8 @@
 #include <iterator>
 #include <limits>
 
+#include "decimation/is_turned.h"
+
 namespace tolvol {
 namespace {
 
@@ -26,9 +28,8 @@ bool have_common_neighbour(const OpenMesh::TriConnectivity& mesh, OpenMesh::Vert
 }
 
 bool turns_too_far(const glm::dvec3& before, const glm::dvec3& after) {
-  const double before2 = squared_length(before), after2 = squared_length(after), cosine = glm::dot(before, after);
-  if (!(before2 > 0)) return false;  // A degenerate face has no side to keep.
-  return !(cosine > 0 && cosine * cosine >= kFoldCosine * kFoldCosine * before2 * after2);
+  // A degenerate face has no side to keep.
+  return squared_length(before) > 0 && is_turned(before, after, kFoldCosine);
 }
 
 }  // namespace

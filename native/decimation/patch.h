@@ -56,6 +56,12 @@ class Patch {
   const glm::dvec3& position(std::uint32_t face, int corner) const {
     return vertices_[faces_[face].corners[corner]].position;
   }
+  /// The normal of a face, or of one with these corners, as long as twice its area.
+  glm::dvec3 normal(std::uint32_t face) const { return normal(faces_[face].corners); }
+  glm::dvec3 normal(const std::uint32_t (&corners)[3]) const {
+    const glm::dvec3& a = vertices_[corners[0]].position;
+    return glm::cross(vertices_[corners[1]].position - a, vertices_[corners[2]].position - a);
+  }
   /// The place in the patch of a face or of a vertex of the mesh, or kNone.
   std::uint32_t find_face(std::uint32_t id) const { return found(local_face_, id); }
   std::uint32_t find_vertex(std::uint32_t id) const { return found(local_vertex_, id); }

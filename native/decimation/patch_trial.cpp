@@ -31,7 +31,7 @@ constexpr int kFacePoints = 24;
 }  // namespace
 
 PatchTrial::PatchTrial(const BoundedMesh& mesh, const SurfaceSamples& samples, Surroundings* around)
-    : mesh_(mesh), bounds_(*mesh.certified()), samples_(samples), around_(around), change_(mesh), relaxation_(bounds_) {
+    : mesh_(mesh), bounds_(*mesh.certified()), samples_(samples), around_(around), change_(mesh), deviations_(bounds_) {
   backward_.look_for_failures(kLookedAt);
 }
 
@@ -42,10 +42,10 @@ bool PatchTrial::prepare(Halfedge h, const glm::dvec3& position, int rings) {
   const VertexPosition target = position == mesh_.position(end) ? mesh_.vertex_position(end) : mesh_.store(position);
   if (!target.is_finite() || !change_.prepare_collapse(h, target) || change_.folds_over()) return false;
   if (!patch_.gather(change_, rings, !bounds_.bounds_boundaries())) return false;
-  relaxation_.start(patch_);
-  for (std::uint32_t f = 0; f < patch_.faces().size(); ++f) relaxation_.add(samples_.of(patch_.faces()[f].id), f);
-  for (const Coverage::Removed& r : change_.removed()) relaxation_.add(samples_.of(r.id), r.successor);
-  relaxation_.renew();
+  deviations_.start(patch_);
+  for (std::uint32_t f = 0; f < patch_.faces().size(); ++f) deviations_.add(samples_.of(patch_.faces()[f].id), f);
+  for (const Coverage::Removed& r : change_.removed()) deviations_.add(samples_.of(r.id), r.successor);
+  deviations_.renew();
   return true;
 }
 
@@ -60,9 +60,9 @@ std::optional<PatchTrial::Price> PatchTrial::price(BoundedMesh::Edge edge) {
     const auto add = [&](std::uint32_t face) { before += samples_.energy(face); };
     for (const Patch::Face& f : patch_.faces()) add(f.id);
     for (const Coverage::Removed& r : change_.removed()) add(r.id);
-    relaxation_.lower_sum(kStepsOfPrice, false);
+    relaxation_.lower_sum(deviations_, kStepsOfPrice, false);
     const std::uint32_t kept = patch_.find_vertex(*change_.vertex());
-    const Relaxation::State now = relaxation_.state();
+    const PatchDeviations::State now = deviations_.state();
     if (best && now.energy - before >= best->rise) return;
     best = {now.energy - before, now.largest, halfedge, patch_.vertices()[kept].position};
   };
@@ -85,20 +85,21 @@ bool PatchTrial::try_collapse(const Price& price, int rings, bool quick) {
     learnt_ = false;
     if (certify()) return true;
     if (!learnt_) return false;
-    relaxation_.renew();
-    if (relaxation_.is_stuck()) return false;
-    quick ? relaxation_.try_lower_largest(kStepsAfterRefusal) : relaxation_.lower_largest(kStepsAfterRefusal);
-    if (!relaxation_.enough()) return false;
+    deviations_.renew();
+    if (deviations_.is_stuck()) return false;
+    quick ? relaxation_.try_lower_largest(deviations_, kStepsAfterRefusal)
+          : relaxation_.lower_largest(deviations_, kStepsAfterRefusal);
+    if (!deviations_.enough()) return false;
   }
   return false;
 }
 
 bool PatchTrial::relax() {
-  if (!relaxation_.lower_sum(kStepsOfSum, true)) return false;
-  if (!relaxation_.enough() && relaxation_.state().largest <= kWorthGoingOn) {
-    relaxation_.lower_largest(kStepsOfLargest);
+  if (!relaxation_.lower_sum(deviations_, kStepsOfSum, true)) return false;
+  if (!deviations_.enough() && deviations_.state().largest <= kWorthGoingOn) {
+    relaxation_.lower_largest(deviations_, kStepsOfLargest);
   }
-  return relaxation_.enough();
+  return deviations_.enough();
 }
 
 bool PatchTrial::certify() {
@@ -106,7 +107,7 @@ bool PatchTrial::certify() {
   if (meets_another()) return false;
   gather_elements();
   // A sheet that was in the way once likely still is, and the other questions take longer.
-  const bool asked = relaxation_.has_separations();
+  const bool asked = deviations_.has_separations();
   if (asked && !uncrossed()) return false;
   return pieces_hold() && faces_hold() && boundary_holds() && (asked || uncrossed());
 }
@@ -171,7 +172,7 @@ bool PatchTrial::pieces_hold() {
     Named worst{failure.element, -1, {}};
     for (const glm::dvec3& p : {(a + b + c) * (1.0 / 3), a, b, c}) {
       std::uint32_t face = failure.element;
-      const double deviation = relaxation_.deviation(p, face);
+      const double deviation = deviations_.deviation(p, face);
       if (deviation > worst.deviation) worst.deviation = deviation, worst.point = p;
     }
     named.push_back(worst);
@@ -182,7 +183,7 @@ bool PatchTrial::pieces_hold() {
   for (std::size_t i = 0; i < named.size(); ++i) {
     if (i >= kHeld && named[i - kHeld].element == named[i].element) continue;
     const SurfaceSample sample{named[i].point, kHeldWeight, 0};
-    relaxation_.add({&sample, 1}, named[i].element);
+    deviations_.add({&sample, 1}, named[i].element);
   }
   learnt_ = true;
   return false;
@@ -223,19 +224,19 @@ FaceBound PatchTrial::prove(std::uint32_t face, glm::dvec3& open) const {
 /// what is enough. Returns whether there are any.
 bool PatchTrial::add_face_points(std::uint32_t face) {
   glm::dvec3 worst[3];
-  double largest[3] = {Relaxation::kEnough, Relaxation::kEnough, Relaxation::kEnough};
+  double largest[3] = {PatchDeviations::kEnough, PatchDeviations::kEnough, PatchDeviations::kEnough};
   for (int i = 0; i <= kFacePoints; ++i) {
     for (int j = 0; i + j <= kFacePoints; ++j) {
       const glm::dvec3 weights = glm::dvec3(i, j, kFacePoints - i - j) / static_cast<double>(kFacePoints);
-      const double deviation = relaxation_.deviation_of(face, weights);
+      const double deviation = deviations_.deviation_of(face, weights);
       const int corner = weights.x >= weights.y ? (weights.x >= weights.z ? 0 : 2) : (weights.y >= weights.z ? 1 : 2);
       if (deviation > largest[corner]) largest[corner] = deviation, worst[corner] = weights;
     }
   }
   bool any = false;
   for (int k = 0; k < 3; ++k) {
-    if (!(largest[k] > Relaxation::kEnough)) continue;
-    relaxation_.add_face_point(face, worst[k], kHeldWeight);
+    if (!(largest[k] > PatchDeviations::kEnough)) continue;
+    deviations_.add_face_point(face, worst[k], kHeldWeight);
     any = learnt_ = true;
   }
   return any;
@@ -251,8 +252,8 @@ void PatchTrial::add_open_point(std::uint32_t face, const glm::dvec3& open) {
   const double of_b = glm::dot(glm::cross(open - a, c - a), normal) / square;
   const double of_c = glm::dot(glm::cross(b - a, open - a), normal) / square;
   const glm::dvec3 weights(1 - of_b - of_c, of_b, of_c);
-  if (!(relaxation_.admitted_deviation_of(face, weights) > Relaxation::kEnough)) return;
-  relaxation_.add_open_point(face, weights, kHeldWeight);
+  if (!(deviations_.admitted_deviation_of(face, weights) > PatchDeviations::kEnough)) return;
+  deviations_.add_open_point(face, weights, kHeldWeight);
   learnt_ = true;
 }
 
@@ -318,7 +319,7 @@ bool PatchTrial::keep_sheets_apart() {
   for (const Coverage::Removed& r : removed_) sheet.add(corners(r.id));
   const double reach = bounds_.forward().limit();
   std::vector<Separation> separations;
-  relaxation_.drop_separations();
+  deviations_.drop_separations();
   for (const std::uint32_t id : around_->near(crossings_)) {
     poll();
     if (id >= mesh_.connectivity().n_faces()) continue;  // It never changes, and the frame does not have it.
@@ -331,11 +332,11 @@ bool PatchTrial::keep_sheets_apart() {
       if (!changed(f) || !meet(box_of(face), near)) continue;
       separations.clear();
       separate(face, other, sheet, reach, separations);
-      for (const Separation& s : separations) relaxation_.add_separation(f, s, kHeldWeight);
+      for (const Separation& s : separations) deviations_.add_separation(f, s, kHeldWeight);
     }
   }
-  relaxation_.renew();
-  return !relaxation_.enough();
+  deviations_.renew();
+  return !deviations_.enough();
 }
 
 Box PatchTrial::carry_out(BoundedMesh& mesh) {

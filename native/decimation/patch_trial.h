@@ -15,6 +15,7 @@
 #include "decimation/certified_bounds.h"
 #include "decimation/change.h"
 #include "decimation/patch.h"
+#include "decimation/patch_deviations.h"
 #include "decimation/relaxation.h"
 #include "decimation/surface_samples.h"
 #include "decimation/surroundings.h"
@@ -31,7 +32,7 @@ class PatchTrial {
 
   /// What a collapse would cost if its vertex alone moved.
   struct Price {
-    double rise = 0;     ///< The rise of the energy of Relaxation.
+    double rise = 0;     ///< The rise of the energy of PatchDeviations.
     double largest = 0;  ///< The largest deviation, over the tolerance.
     Halfedge halfedge;   ///< The start merges into the end.
     glm::dvec3 position{0};
@@ -47,7 +48,7 @@ class PatchTrial {
   Box carry_out(BoundedMesh& mesh);
 
   /// The largest deviation that the last try came to, over the tolerance.
-  double reached() const { return relaxation_.state().largest; }
+  double reached() const { return deviations_.state().largest; }
   /// The patch of the last try.
   const Patch& patch() const { return patch_; }
   /// The vertex that the last try would remove, and the faces.
@@ -81,6 +82,7 @@ class PatchTrial {
   Surroundings* around_;
   Change change_;
   Patch patch_;
+  PatchDeviations deviations_;
   Relaxation relaxation_;
   std::uint32_t vanished_ = 0;
   std::vector<VertexPosition> positions_;  ///< For each vertex of the patch.

@@ -11,9 +11,15 @@
 #include "base/parallel.h"
 #include "check/coverage.h"
 #include "decimation/bounded_mesh.h"
-#include "decimation/relaxation.h"
 
 namespace tolvol {
+
+/// A point of the reference that a face of the mesh has to be near to.
+struct SurfaceSample {
+  glm::dvec3 point;
+  double weight;
+  double deviation;  ///< Its deviation from the face now, over the tolerance.
+};
 
 class SurfaceSamples {
  public:
