@@ -11,6 +11,7 @@
 
 #include "base/progress.h"
 #include "check/tolerance_volume.h"
+#include "repair/loop_outcome.h"
 
 namespace tolvol {
 
@@ -27,23 +28,6 @@ struct CloseHolesOptions {
   unsigned threads = 0;  ///< 0 is one for each core. It never changes the result.
   Progress* progress = nullptr;
 };
-
-/// What became of a boundary loop. If several of `outside`, `turned` and `crossing` keep it open, the outcome is the
-/// one that refused most of the faces and edges that were tried, and of equals the first. `non_manifold` and
-/// `degenerate` are outcomes only of loops that none of these three keeps open.
-enum class LoopOutcome : std::uint8_t {
-  closed,
-  not_a_loop,    ///< the open edges end at triangles of the other orientation or at an edge of more than two triangles
-  too_long,      ///< it has more than kMostLoopCorners corners
-  perimeter,     ///< it is longer than CloseHolesOptions::largest_perimeter
-  outside,       ///< it is not proved that the faces would be within the tolerance
-  turned,        ///< the faces would be turned away from the reference, or rounding could turn them
-  crossing,      ///< the faces would cross others
-  non_manifold,  ///< an edge would be one of more than two triangles
-  degenerate,    ///< the faces would be segments
-};
-/// The name of an outcome, as in "not_a_loop".
-const char* name_of(LoopOutcome outcome);
 
 /// The most corners of a loop that is filled: the work on a loop grows with the third power of its corners.
 inline constexpr std::size_t kMostLoopCorners = 1000;

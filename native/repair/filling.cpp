@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "repair/filling.h"
+
+#include <algorithm>
+#include <optional>
+#include <unordered_set>
+
+#include "base/call.h"
+#include "repair/least_triangulation.h"
+
+namespace tolvol {
+namespace {
+
+/// A loop is searched for a filling at most so many times, a long one less often. After each search but the last, faces
+/// that are in the way are gone around, and one of two triangles that cross, or that lie on one edge, is left out.
+constexpr int kMostTries = 32, kMostTriesOfLong = 8;
+/// A loop with more corners than this is long.
+constexpr std::size_t kLong = 200;
+/// A loop is given up after so many of its triangles were refused, in all searches together.
+constexpr std::size_t kMostRefused = 50000;
+/// Where the triangles of a loop cross more faces than so many, each further triangle is compared with all faces near
+/// it instead of with these.
+constexpr std::size_t kMostObstacles = 64;
+
+}  // namespace
+
+LoopOutcome Filling::run() {
+  TriangulationRules rules{[this](std::uint32_t i, std::uint32_t j) { return admits_edge(i, j); },
+                           [this](const glm::uvec3& face) { return admits(face); }};
+  const int most = hole_.at.size() > kLong ? kMostTriesOfLong : kMostTries;
+  for (int tries = 0; tries < most; ++tries) {
+    hole_.faces = least_triangulation(hole_.at, rules);
+    if (hole_.faces.empty() || gives_up()) break;
+    std::sort(hole_.faces.begin(), hole_.faces.end(), [](const glm::uvec3& a, const glm::uvec3& b) {
+      return std::array{a.x, a.y, a.z} < std::array{b.x, b.y, b.z};
+    });
+    if (is_clear() && is_sound()) return LoopOutcome::closed;
+  }
+  hole_.faces.clear();
+  return reason();
+}
+
+LoopOutcome Filling::reason() const {
+  // Across a corner of one triangle there is an edge already, and a rim that has points on a straight line makes
+  // triangles without an area, whatever else there is.
+  const auto first = refused_.begin(), others = first + static_cast<int>(LoopOutcome::non_manifold);
+  const auto most = std::max_element(first, others);
+  return static_cast<LoopOutcome>((*most > 0 ? most : std::max_element(others, refused_.end())) - first);
+}
+
+bool Filling::refuse(LoopOutcome reason) {
+  ++refused_[static_cast<std::size_t>(reason)];
+  return false;
+}
+
+bool Filling::gives_up() const { return refused_triangles_ >= kMostRefused; }
+
+bool Filling::admits_edge(std::uint32_t i, std::uint32_t j) {
+  if (gives_up()) return false;
+  if (left_out_edges_.contains({i, j}) || (earlier_ && earlier_->has_edge(rules_.edge_of(hole_, i, j)))) {
+    return refuse(LoopOutcome::non_manifold);
+  }
+  const std::optional<LoopOutcome> refusal = rules_.refusal_of_edge(hole_, i, j);
+  return !refusal || refuse(*refusal);
+}
+
+bool Filling::admits(const glm::uvec3& face) {
+  if (gives_up()) return false;
+  const bool is_admitted = keeps_rules(face);
+  refused_triangles_ += !is_admitted;
+  return is_admitted;
+}
+
+bool Filling::keeps_rules(const glm::uvec3& face) {
+  if (left_out_.contains({face.x, face.y, face.z})) return refuse(LoopOutcome::crossing);
+  if (const std::optional<LoopOutcome> refusal = rules_.refusal_of_face(hole_, face)) return refuse(*refusal);
+  return goes_around(rules_.corners_of(hole_, face)) || refuse(LoopOutcome::crossing);
+}
+
+/// Calls visit(corners) for the faces of the input, and of the fillings that the hole has to keep apart from, whose
+/// boxes meet that of a triangle. A visit that returns false is the last one.
+template <class Visit>
+void Filling::for_each_near(const Corners& stored, Visit&& visit) const {
+  const Box box = box_of(stored);
+  bool more = true;
+  rules_.for_each_near(box, [&](const Corners& other) { return more = visit(other); });
+  if (earlier_ && more) earlier_->for_each_near(hole_, box, visit);
+}
+
+/// Whether a triangle crosses nothing that an earlier try crossed.
+bool Filling::goes_around(const Corners& stored) const {
+  if (obstacles_.size() <= kMostObstacles) {
+    const Box box = box_of(stored);
+    return std::ranges::none_of(obstacles_, [&](const Obstacle& obstacle) {
+      return meet(box, obstacle.box) && faces_cross(stored, obstacle.corners);
+    });
+  }
+  bool clear = true;
+  for_each_near(stored, [&](const Corners& other) { return clear = !faces_cross(stored, other); });
+  return clear;
+}
+
+/// Whether the triangles cross no face of the input, and none of the fillings that the hole has to keep apart from.
+/// All triangles of the next try go around what they cross. Hardly a hole has anything in it, so that it would take
+/// most of the time to ask about all triangles whether they cross any face.
+bool Filling::is_clear() {
+  bool clear = true;
+  for (const glm::uvec3& face : hole_.faces) {
+    poll();
+    const Corners stored = rules_.corners_of(hole_, face);
+    for_each_near(stored, [&](const Corners& other) {
+      if (!faces_cross(stored, other)) return true;
+      clear = refuse(LoopOutcome::crossing);
+      obstacles_.push_back({other, box_of(other)});
+      return obstacles_.size() <= kMostObstacles;
+    });
+  }
+  return clear;
+}
+
+/// Whether the triangles fit together. If not, one of those that do not is left out of the next try.
+bool Filling::is_sound() {
+  bool sound = true;
+  std::unordered_set<std::uint64_t> edges;
+  hole_.for_each_inner_edge([&](std::uint32_t i, std::uint32_t j) {
+    if (!sound || edges.insert(rules_.edge_of(hole_, i, j)).second) return;
+    sound = false;
+    left_out_edges_.insert({i, j});
+  });
+  std::vector<Corners> corners;
+  std::vector<Box> boxes;
+  for (const glm::uvec3& face : hole_.faces) {
+    corners.push_back(rules_.corners_of(hole_, face));
+    boxes.push_back(box_of(corners.back()));
+  }
+  for (std::size_t a = 0; a < corners.size() && sound; ++a) {
+    poll();
+    for (std::size_t b = 0; b < a && sound; ++b) {
+      if (!meet(boxes[a], boxes[b]) || !faces_cross(corners[a], corners[b])) continue;
+      sound = false;
+      left_out_.insert({hole_.faces[a].x, hole_.faces[a].y, hole_.faces[a].z});
+    }
+  }
+  if (!sound) refuse(left_out_.empty() ? LoopOutcome::non_manifold : LoopOutcome::crossing);
+  return sound;
+}
+
+}  // namespace tolvol

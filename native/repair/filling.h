@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+/// Fills one hole with triangles between its corners.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <set>
+#include <vector>
+
+#include "repair/earlier_fillings.h"
+#include "repair/filling_rules.h"
+#include "repair/loop_outcome.h"
+#include "topology/faces_cross.h"
+
+namespace tolvol {
+
+/// Searches for the triangles of one hole, and counts what refused others.
+class Filling {
+ public:
+  /// Keeps references to all. The hole has been measured. If `earlier` is given, the hole has to keep apart from the
+  /// fillings of lower holes.
+  Filling(const FillingRules& rules, Hole& hole, const EarlierFillings* earlier = nullptr)
+      : rules_(rules), hole_(hole), earlier_(earlier) {}
+
+  /// Fills the hole, or leaves it without faces, and returns its outcome.
+  LoopOutcome run();
+
+ private:
+  struct Obstacle {
+    Corners corners;
+    Box box;
+  };
+
+  LoopOutcome reason() const;
+  bool refuse(LoopOutcome reason);
+  bool gives_up() const;
+  bool admits_edge(std::uint32_t i, std::uint32_t j);
+  bool admits(const glm::uvec3& face);
+  bool keeps_rules(const glm::uvec3& face);
+  template <class Visit>
+  void for_each_near(const Corners& stored, Visit&& visit) const;
+  bool goes_around(const Corners& stored) const;
+  bool is_clear();
+  bool is_sound();
+
+  const FillingRules& rules_;
+  Hole& hole_;
+  const EarlierFillings* earlier_;
+  std::size_t refused_triangles_ = 0;
+  std::vector<Obstacle> obstacles_;  ///< faces that an earlier try crossed
+  std::set<std::array<std::uint32_t, 3>> left_out_;
+  std::set<std::array<std::uint32_t, 2>> left_out_edges_;
+  std::array<std::size_t, kLoopOutcomeNames.size()> refused_{};  ///< for each outcome
+};
+
+}  // namespace tolvol
