@@ -13,10 +13,10 @@ from bpy.app.handlers import persistent
 
 from . import native, preferences
 from .background import queue
-from .errors import Refused
-from .proof import measure
 from .redraw import redraw_views
 from .reference import measurements, snapshots, tolerances
+from .shared.errors import Refused
+from .shared.proof import measure
 
 _MODES = {"EDIT", "SCULPT"}
 # A mesh rests if it has not changed for so many seconds.

@@ -22,6 +22,8 @@ from pathlib import Path
 
 import bpy
 
+from .shared import package
+
 _FOLDER = Path(__file__).resolve().parent
 
 
@@ -118,6 +120,7 @@ def _forbids_programs(folder):
 
 
 module, path, reason = _load()
+package.module = module
 
 
 # The add-on's own sentences for errors of the package by their code, where the package's sentences name its options.

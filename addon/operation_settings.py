@@ -16,7 +16,7 @@ from bpy.props import (
     StringProperty,
 )
 
-FEWEST_LEVELS, MOST_LEVELS = 2, 6  # of a chain of levels of detail
+from .shared.decimation import FEWEST_LEVELS, MOST_LEVELS
 
 PROTECTED = (
     ("BOUNDARY", "Boundary", "Edges that belong to only one face", 1),

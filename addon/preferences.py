@@ -8,7 +8,7 @@ import gpu
 from bpy.props import BoolProperty, FloatProperty, IntProperty
 
 from . import native
-from .reference import snapshots, volumes
+from .reference import built, snapshots
 
 # The tolerance of an object for which no other was chosen, in percent of the size.
 TOLERANCE = 0.2
@@ -76,10 +76,10 @@ def _volume(ob):
     """Returns the cost of the tolerance volume of `ob` as text, or None if it has none in memory."""
     if ob is None or ob.type != "MESH" or ob.tolvol.snapshot is None or not snapshots.sound(ob.tolvol.snapshot_size):
         return None
-    built = volumes.built_of(ob)
-    if built is None:
+    volume = built.volume_of(ob)
+    if volume is None:
         return None
-    return f"The tolerance volume of {ob.name} took {built.seconds:.2f} s and has {built.memory / 1e6:.3g} MB"
+    return f"The tolerance volume of {ob.name} took {volume.seconds:.2f} s and has {volume.memory / 1e6:.3g} MB"
 
 
 def _chosen(context, name, otherwise):

@@ -4,7 +4,8 @@
 import bpy
 import numpy as np
 
-NO_BREAK = "\u00a0"  # between a number and its unit
+from .shared.numbers import NO_BREAK, shortest
+
 # Blender writes all digits of an area or a volume, and cuts the text off after 63.
 _LARGEST = 1e15
 
@@ -39,16 +40,6 @@ def _of_power(context, value, category, power):
         if value == 0 or any(digit in "123456789" for digit in text):
             return text.replace(" ", NO_BREAK)
     return f"{value:.3g}"
-
-
-def three_digits(value):
-    """Returns a number with three digits, and one from 1000 on with all digits before the point."""
-    return f"{value:,.0f}" if value >= 999.5 else f"{value:#.3g}".rstrip(".")
-
-
-def shortest(value):
-    """Returns the shortest decimal number that rounds to the float32 `value`: the number that the user typed."""
-    return float(str(np.float32(value)))
 
 
 # The units, in metres, in which users type lengths: metre, foot and inch. Other metric units are decimal multiples of

@@ -22,7 +22,7 @@ import command_line as cli  # noqa: E402
 import models  # noqa: E402
 import tables  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
-from common import machine  # noqa: E402
+from machine import machine  # noqa: E402
 
 TRIANGLES = 4000
 SEEDS = (1, 2, 3)

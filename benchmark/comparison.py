@@ -24,8 +24,8 @@ import command_line as cli  # noqa: E402
 import models  # noqa: E402
 import tables  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
-from common import machine  # noqa: E402
 from decimation import Stopwatch  # noqa: E402
+from machine import machine  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "build" / "release" / "python"))
 

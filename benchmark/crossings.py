@@ -24,7 +24,7 @@ import models  # noqa: E402
 import tables  # noqa: E402
 import thin_walls  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
-from common import machine  # noqa: E402
+from machine import machine  # noqa: E402
 
 WALLS = (0.05, 0.02, 0.01)
 LEVELS = 5  # of the spheres, which have 16,384 triangles then

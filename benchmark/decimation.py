@@ -25,7 +25,7 @@ import models  # noqa: E402
 import table1  # noqa: E402
 import tables  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
-from common import machine  # noqa: E402
+from machine import machine  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "build" / "release" / "python"))
 

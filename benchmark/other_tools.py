@@ -29,18 +29,18 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "blender_scripts"))
-import tables  # noqa: E402
-import tool_calls  # noqa: E402
-from common import USAGE, Stop, in_units, length, machine, require_folder, whole_number  # noqa: E402
-from scan import scan  # noqa: E402
-from tool_calls import CGAL_PROGRAM, ROOT, TOOLS  # noqa: E402
-from tool_page import draw, row, text, title  # noqa: E402
-from tool_worker import Worker  # noqa: E402
+import tables
+import tool_calls
+from machine import machine
+from scan import scan
+from tool_calls import CGAL_PROGRAM, ROOT, TOOLS
+from tool_page import draw, row, text, title
+from tool_worker import Worker
 
 sys.path.insert(0, os.environ.get("TOLVOL_PYTHON_PATH", str(ROOT / "build" / "release" / "python")))
 try:
     import tolvol
+    from tolvol.shared.command.arguments import USAGE, Stop, in_units, length, require_folder, whole_number
 except ImportError as error:
     sys.exit(f"other_tools.py: the module tolvol does not load ({error}): run sh setup.sh --tests")
 

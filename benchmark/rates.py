@@ -22,7 +22,7 @@ import decimation  # noqa: E402
 import models  # noqa: E402
 import tables  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
-from common import machine  # noqa: E402
+from machine import machine  # noqa: E402
 
 REPEATS = 5
 MOVE = 0.1  # the largest move of a vertex along each axis, in tolerances

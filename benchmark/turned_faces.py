@@ -25,7 +25,7 @@ import meshes as shapes  # noqa: E402
 import models  # noqa: E402
 import scan  # noqa: E402
 import tables  # noqa: E402
-from common import machine  # noqa: E402
+from machine import machine  # noqa: E402
 
 ROUNDING = 1e-3  # degrees
 CHUNK = 8  # faces that are judged at once

@@ -20,7 +20,7 @@ import command_line as cli  # noqa: E402
 import models  # noqa: E402
 from addon.files import file_io  # noqa: E402
 from addon.mesh import mesh_io  # noqa: E402
-from addon.proof import report  # noqa: E402
+from addon.shared.proof import report  # noqa: E402
 
 WIDTH, HEIGHT = 1280, 640
 SAMPLES = 40  # Debian's Blender has no denoiser. One large light and an even sky make little noise without one.

@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import command_line as cli  # noqa: E402
 from addon.files import file_io  # noqa: E402
 from addon.mesh import mesh_io  # noqa: E402
+from addon.shared.surface import to_world
 
 LEVELS = {"suzanne": 3, "suzanne-4": 4}  # levels of subdivision, which make 62,976 and 251,904 triangles
 NOISE = 0.0005  # standard deviation of the noise along the normal, as a share of the bounding box's diagonal
@@ -43,7 +44,7 @@ def build(name):
 def arrays(ob):
     """Returns (vertices, triangles): (n, 3) float32 in the world and (m, 3) int32."""
     mesh, matrix = mesh_io.read_mesh(ob.data), mesh_io.matrix_array(ob.matrix_world)
-    return mesh_io.to_world(mesh.vertices, matrix).astype(np.float32), mesh.triangles
+    return to_world(mesh.vertices, matrix).astype(np.float32), mesh.triangles
 
 
 def read(path):

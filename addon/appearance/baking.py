@@ -12,8 +12,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..errors import Refused
 from ..mesh.mesh_io import matrix_array
+from ..shared.errors import Refused
 from . import normals, other_blender, skirt
 
 # Each island of the UV map is continued beyond its border by 1 / _MARGIN of the image's width, so that no seam is seen.

@@ -16,10 +16,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..errors import Refused
 from ..mesh.carry import fans, mean
 from ..mesh.mesh_io import column, faces_of_corners, following_corners, matrix_array
 from ..reference import originals, snapshots
+from ..shared.errors import Refused
 from . import other_blender, transfer_process
 
 # A corner looks from a place that is this share of the way to the centre of its face.

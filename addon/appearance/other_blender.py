@@ -16,7 +16,7 @@ from pathlib import Path
 import bpy
 
 from .. import native
-from ..errors import Refused
+from ..shared.errors import Refused
 
 _LOOK = 0.05  # The thread looks every so many seconds whether it was cancelled.
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from .. import job
 from ..operators import blocked
 from ..operators.decimate import targets
-from ..proof import last_run, report
+from ..proof import last_run
 from ..properties import automatic_placement
 from . import known, runs
 
@@ -110,5 +110,5 @@ def _counted(run):
         choices = tuple(told[name] for name in ("two_sided", "effort", "placement", "target_triangles"))
         counts = int(told["input"]["triangles"]), int(told["output"]["triangles"])
         return float(told["tolerance"]["percent"]), choices, *counts
-    except report.DAMAGED:
+    except last_run.DAMAGED:
         return None

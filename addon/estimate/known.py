@@ -13,6 +13,7 @@ from ..operation_settings import decimate_settings
 from ..operators import decimation
 from ..properties import automatic_placement
 from ..reference import measurements, snapshots, tolerances
+from ..shared.decimation import Task
 from .curve import Curve
 
 # The settings of Decimate that do not change the curve.
@@ -26,7 +27,7 @@ class Known:
     """What is known about an object: as it was when it had this token."""
 
     token: tuple
-    task: decimation.Task | None  # None if Decimate would refuse the settings
+    task: Task | None  # None if Decimate would refuse the settings
     curve: Curve | None
 
 

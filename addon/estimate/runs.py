@@ -8,11 +8,12 @@ import bpy
 
 from .. import job, native
 from ..background import queue
-from ..errors import Refused
 from ..operators import blocked
 from ..operators.decimate import targets
 from ..redraw import redraw_sidebars
-from ..reference import snapshots, volumes
+from ..reference import snapshots
+from ..shared import volumes
+from ..shared.errors import Refused
 from . import known
 
 # The most triangles of all meshes and references together that are estimated. Decimating so many at 0.2 % takes 8 s of the

@@ -17,9 +17,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..errors import Refused
 from ..mesh import mesh_io
-from . import file_check, gltf_check, plain_files
+from ..shared.errors import Refused
+from ..shared.files import file_check, gltf_check
+from . import plain_files
 
 _GLTF = (".gltf", ".glb")
 EXTENSIONS = (".obj", ".ply", ".stl", *_GLTF)

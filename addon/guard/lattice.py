@@ -12,9 +12,9 @@ import bpy
 import numpy as np
 
 from .. import native
-from ..errors import Refused
 from ..mesh import mesh_io
-from ..reference import volumes
+from ..shared import volumes
+from ..shared.errors import Refused
 from . import watch
 
 watches = watch.Watches()

@@ -12,9 +12,10 @@ import numpy as np
 
 from .. import native, preferences
 from ..background import Job
-from ..errors import Refused
 from ..mesh import mesh_io
-from ..reference import snapshots, tolerances, volumes
+from ..reference import snapshots, tolerances
+from ..shared import volumes
+from ..shared.errors import Refused
 
 # Blender waits so many seconds for a guard to be prepared. If preparing takes longer, it goes on in a thread.
 _PATIENCE = 0.4

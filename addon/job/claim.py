@@ -5,9 +5,9 @@ import hashlib
 
 import numpy as np
 
-from ..errors import Refused
 from ..mesh import mesh_io
 from ..reference import measurements
+from ..shared.errors import Refused
 
 
 class Claim:

@@ -7,7 +7,7 @@ import bpy
 from bpy.props import StringProperty
 
 from .. import native
-from ..errors import Refused
+from ..shared.errors import Refused
 from . import adjusting, run
 from .interruptions import runs, under_way
 

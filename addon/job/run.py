@@ -5,8 +5,8 @@ import time
 
 from .. import native, status_bar
 from ..background import Job
-from ..errors import Refused
 from ..redraw import redraw_sidebars
+from ..shared.errors import Refused
 from . import interruptions, progress_text
 from .claim import Claim
 

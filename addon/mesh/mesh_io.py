@@ -1,28 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads Blender's meshes as arrays (stored coordinates and the triangles that Blender shows) and writes arrays to them."""
 
-import hashlib
-from dataclasses import dataclass
-
 import bmesh
 import bpy
 import numpy as np
 
-
-@dataclass(frozen=True)
-class MeshArrays:
-    """The base mesh of a datablock, n vertices and m triangles."""
-
-    vertices: np.ndarray  # (n, 3) float32, local space, as stored
-    triangles: np.ndarray  # (m, 3) int32, Blender's own triangulation (loop_triangles)
-    corners: np.ndarray  # (m, 3) int32, the mesh corner (loop) at each triangle corner
-    polygons: np.ndarray  # (m,) int32, the polygon that each triangle is part of
-
-    def fingerprint(self):
-        """Returns a text that is equal for equal coordinates and triangles, whatever datablock they are from."""
-        digest = hashlib.blake2b(self.vertices.tobytes(), digest_size=16)
-        digest.update(self.triangles.tobytes())
-        return digest.hexdigest()
+from ..shared.surface import MeshArrays
 
 
 def column(collection, attribute, width=1, dtype=np.float32):
@@ -162,11 +145,6 @@ def new_mesh(name, vertices, faces):
 def matrix_array(matrix):
     """Returns a mathutils.Matrix as (4, 4) float64."""
     return np.array(matrix, dtype=np.float64)
-
-
-def to_world(vertices, matrix):
-    """Maps stored coordinates to the world: (n, 3) float64."""
-    return np.asarray(vertices, np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def loose_edges(mesh):

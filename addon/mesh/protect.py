@@ -5,7 +5,8 @@ import bpy
 import numpy as np
 
 from .. import native
-from ..errors import Refused
+from ..shared.decimation import meeting
+from ..shared.errors import Refused
 from . import mesh_io
 from .mesh_io import column
 
@@ -55,12 +56,6 @@ def where_islands_meet(arrays, uvs):
     """
     found = meeting(arrays.triangles, native.module.wedges(arrays.triangles, uvs[arrays.corners]))
     return np.pad(found, (0, len(arrays.vertices) - len(found)))
-
-
-def meeting(triangles, wedges):
-    """Does the same for wedges that are known: (m, 3), the wedge at each corner. Returns (k,) up to the last vertex in use."""
-    _, one_corner_each = np.unique(wedges, return_index=True)
-    return np.bincount(triangles.ravel()[one_corner_each]) > 2
 
 
 def group_weights(ob, name, invert):

@@ -6,10 +6,10 @@ from bpy.props import IntProperty
 
 from .. import preferences
 from ..appearance import baking, materials, normals, other_blender
-from ..errors import Refused
 from ..job import JobOperator
 from ..operation_settings import bake_settings
 from ..reference import snapshots, tolerances
+from ..shared.errors import Refused
 from . import settings as shared
 from .blocked import allowed, check_blocked, mesh_blocked
 

@@ -11,10 +11,11 @@ from bpy.props import IntProperty
 from .. import native, preferences
 from ..job import JobOperator
 from ..mesh import mesh_io
-from ..proof import measure, report, statistics
-from ..proof.certify import outside
-from ..proof.verdict import BEYOND, ONE_WAY, WITHIN, Verdict
+from ..proof import statistics
 from ..reference import measurements, snapshots, tolerances
+from ..shared.proof import measure, report
+from ..shared.proof.certify import outside
+from ..shared.proof.verdict import BEYOND, ONE_WAY, WITHIN, Verdict
 from .blocked import allowed, check_blocked
 from .staying import show_selected
 

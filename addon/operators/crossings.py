@@ -10,8 +10,8 @@ from bpy.props import IntProperty
 from .. import native, preferences
 from ..job import JobOperator
 from ..mesh import mesh_io
-from ..proof import solidity
 from ..reference import snapshots
+from ..shared.proof import solidity
 from .blocked import allowed, object_blocked
 from .staying import show_selected
 

@@ -7,13 +7,14 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty
 
 from .. import preferences
-from ..errors import Refused
 from ..job import JobOperator
 from ..mesh import transfer
 from ..operation_settings import PROTECTED, decimate_settings
-from ..proof import report, verdict
+from ..proof import verdict
 from ..properties import PLACEMENTS, automatic_placement, tolerance_settings
 from ..reference import snapshots, tolerances
+from ..shared.errors import Refused
+from ..shared.proof import report
 from . import decimation, original
 from . import settings as shared
 from .blocked import allowed, decimate_blocked

@@ -6,11 +6,11 @@ import numpy as np
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
 from .. import native, preferences
-from ..errors import Refused
 from ..job import JobOperator
 from ..mesh import mesh_io
 from ..proof import kept_warnings
 from ..properties import DEFORM_MODES
+from ..shared.errors import Refused
 from .blocked import allowed, decimate_blocked
 from .motion import Motion
 

@@ -9,14 +9,16 @@ import bpy
 from bpy.props import IntProperty
 
 from .. import preferences
-from ..errors import Refused
 from ..files.gltf_extras import GEOMETRIC_ERROR
 from ..job import JobOperator
 from ..mesh import transfer
 from ..operation_settings import lod_settings
 from ..properties import automatic_placement
 from ..reference import originals, snapshots, tolerances
-from ..units import length, shortest, three_digits, typed
+from ..shared.decimation import seen_as
+from ..shared.errors import Refused
+from ..shared.numbers import shortest, three_digits
+from ..units import length, typed
 from . import decimation
 from . import settings as shared
 from .blocked import allowed, surface_blocked
@@ -99,7 +101,7 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             pixels = [shortest(value) for value in self.pixels[: self.levels]]
             _require_order(pixels, lambda value: f"{value:g} pixels")
             distance, fov = typed(self.distance, context.scene.unit_settings), round(math.degrees(self.fov), 4)
-            limits = [tolerances.seen_as(value, distance, fov, self.height) for value in pixels]
+            limits = [seen_as(value, distance, fov, self.height) for value in pixels]
         elif self.in_length:
             limits = [typed(value, context.scene.unit_settings) for value in self.lengths[: self.levels]]
             _require_order(limits, lambda value: length(context, value))

@@ -10,17 +10,20 @@ import numpy as np
 from bpy.props import FloatProperty, IntProperty, StringProperty
 
 from .. import native, preferences
-from ..errors import NotProved, Refused
 from ..job import JobOperator
 from ..mesh import mesh_io
 from ..mesh.evaluation import Evaluation, same_faces
 from ..mesh.mesh_io import column
 from ..operation_settings import modifier_settings
-from ..proof import kept_warnings, last_run, measure, report, solidity
-from ..proof.certify import certify
-from ..proof.verdict import Verdict
+from ..proof import kept_warnings, last_run
 from ..properties import automatic_placement
 from ..reference import measurements, snapshots, tolerances
+from ..shared.decimation import Task
+from ..shared.errors import NotProved, Refused
+from ..shared.proof import measure, report, solidity
+from ..shared.proof.certify import certify
+from ..shared.proof.verdict import Verdict
+from ..shared.surface import Surface
 from . import decimation, fit
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
@@ -264,7 +267,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         settings = self.ob.tolvol
         options = decimation.options(settings, automatic_placement(self.ob.data), trial.threads)
         options |= {"two_sided": True, "effort": "fast", "target_triangles": None, "max_seconds": None}
-        task = decimation.Task(self.ob.name, trial.surface, trial.reference, trial.tolerance, options)
+        task = Task(self.ob.name, trial.surface, trial.reference, trial.tolerance, options)
         task.uvs = mesh_io.corner_uvs(self.ob.data)
         try:
             return (yield task.count)
@@ -336,7 +339,7 @@ class _Trial:
         def work(progress):
             if not len(arrays.triangles):
                 return np.inf
-            pair = snapshots.Surface(arrays, self.surface.matrix).world(), arrays.triangles
+            pair = Surface(arrays, self.surface.matrix).world(), arrays.triangles
             vertices, triangles = self._pair
             all_vertices, largest = vertices[np.unique(triangles)], 0.0
             few = all_vertices[:: max(len(all_vertices) // _FEW, 1)]
@@ -356,7 +359,7 @@ class _Trial:
         """
 
         def work(progress):
-            surface = snapshots.Surface(arrays, self.surface.matrix)
+            surface = Surface(arrays, self.surface.matrix)
             found = certify(surface, self.reference, self.tolerance, 0, self.threads, progress)
             if not Verdict.certified(found, self.tolerance).passed:
                 ways = (report.percent(found[way][1], self.size) for way in ("forward", "backward"))

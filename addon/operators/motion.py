@@ -7,12 +7,15 @@ import bmesh
 import numpy as np
 
 from .. import native
-from ..errors import NotProved
 from ..mesh import mesh_io
-from ..proof import last_run, report, solidity
-from ..proof.certify import certify
-from ..proof.verdict import Interval, Verdict
-from ..reference import measurements, snapshots, tolerances, volumes
+from ..proof import last_run
+from ..reference import measurements, snapshots, tolerances
+from ..shared import volumes
+from ..shared.errors import NotProved
+from ..shared.proof import report, solidity
+from ..shared.proof.certify import certify
+from ..shared.proof.verdict import Interval, Verdict
+from ..shared.surface import Surface
 
 _FOUND = {"forward": "the result is {} from the reference", "backward": "the reference is {} from the result"}
 
@@ -79,7 +82,7 @@ class Motion:
         arrays = replace(self.surface.arrays, vertices=vertices)
         if triangles is not None:
             arrays = replace(arrays, triangles=triangles)
-        moved = snapshots.Surface(arrays, self.surface.matrix)
+        moved = Surface(arrays, self.surface.matrix)
         certified = certify(moved, self.reference, self.tolerance, 0, self.threads, progress)
         for way, said in _FOUND.items() if self.two_sided else [("forward", _FOUND["forward"])]:
             found = Interval(*certified[way])

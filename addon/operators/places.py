@@ -5,8 +5,9 @@ import bpy
 from bpy.props import BoolProperty
 from mathutils import Vector
 
-from ..proof import places, report
+from ..proof import places
 from ..reference import snapshots, tolerances
+from ..shared.proof import report
 from ..units import area, length
 from .blocked import allowed
 from .check import Comparison

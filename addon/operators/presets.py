@@ -8,7 +8,8 @@ from bpy.props import EnumProperty, FloatProperty
 
 from ..properties import TOLERANCE_UNITS
 from ..reference import measurements, tolerances
-from ..units import length, shortest
+from ..shared.numbers import shortest
+from ..units import length
 from .blocked import allowed, object_blocked
 
 # A preset counts as the present tolerance if it differs by less than this share, which is more than float32 rounds away.

@@ -9,10 +9,11 @@ from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_
 
 from .. import native, preferences, status_bar
 from ..background import Job
-from ..errors import Refused
 from ..job import JobOperator
-from ..proof import labels, probing, report
+from ..proof import labels, probing
 from ..reference import measurements, snapshots, tolerances
+from ..shared.errors import Refused
+from ..shared.proof import report
 from ..units import length
 from .blocked import allowed, check_blocked, object_blocked
 from .original import OF_THE_VIEW

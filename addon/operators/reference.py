@@ -7,7 +7,8 @@ from bpy.props import BoolProperty, IntProperty
 
 from .. import preferences
 from ..job import JobOperator
-from ..reference import snapshots, tolerances, volumes
+from ..reference import snapshots, tolerances
+from ..shared import volumes
 from .blocked import allowed, reference_blocked
 
 

@@ -10,11 +10,13 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from .. import native, preferences
-from ..errors import Refused
-from ..files import safe_files
 from ..job import JobOperator
-from ..proof import deviation, deviation_pictures, deviation_units, labels, last_run, report
+from ..proof import labels, last_run
 from ..reference import snapshots, tolerances
+from ..shared.errors import Refused
+from ..shared.files import safe_files
+from ..shared.proof import deviation, deviation_pictures, deviation_units
+from ..shared.surface import Surface
 from ..units import chosen_unit
 from .blocked import allowed, check_blocked
 from .decimate import targets
@@ -42,8 +44,8 @@ class _Task:
     """The work on one object in the thread. It reads and returns no data of Blender."""
 
     name: str
-    surface: snapshots.Surface
-    reference: snapshots.Surface
+    surface: Surface
+    reference: Surface
     tolerance: float
     two_sided: bool
     given_in: str
@@ -195,7 +197,7 @@ a table (.csv) or all numbers (.json)"""
         of_object = settings.snapshot_kind == "OBJECT" and settings.snapshot_object is not None
         reference_name = settings.snapshot_object.name if of_object else "its reference"
         about = {"a": _counted(ob.name, ob.data), "b": _counted(reference_name, settings.snapshot)}
-        holes = report.remembered_holes(settings.last_run)
+        holes = last_run.remembered_holes(settings.last_run)
         if holes and last_run.stays(ob):
             about["a"]["holes"] = holes
         if settings.labels:

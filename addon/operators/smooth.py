@@ -6,11 +6,11 @@ import numpy as np
 from bpy.props import IntProperty
 
 from .. import native, preferences
-from ..errors import Refused
 from ..job import JobOperator
 from ..mesh import mesh_io, protect
 from ..operation_settings import smooth_settings
 from ..proof import kept_warnings
+from ..shared.errors import Refused
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
 from .motion import Motion

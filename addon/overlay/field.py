@@ -14,9 +14,10 @@ import numpy as np
 
 from .. import native, preferences
 from ..background import queue
-from ..errors import Refused
 from ..mesh import mesh_io
-from ..reference import measurements, snapshots, volumes
+from ..reference import measurements, snapshots
+from ..shared import volumes
+from ..shared.errors import Refused
 from . import shaders
 
 # A tolerance below so many times the rounding error of the shader cannot be shown.

@@ -5,8 +5,9 @@ import bpy
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 
 from ..operators.probe import described, distance_text, tolerance_of
-from ..proof import labels, probing, report
+from ..proof import labels, probing
 from ..redraw import redraw_views
+from ..shared.proof import report
 from . import legend, markers, reasons, shaders
 from .view_drawing import ViewDrawing
 

@@ -4,8 +4,9 @@
 import blf
 import gpu
 
-from ..proof.verdict import FAIL, NOT_CHECKED, PASS
-from ..units import NO_BREAK, length
+from ..shared.numbers import NO_BREAK
+from ..shared.proof.verdict import FAIL, NOT_CHECKED, PASS
+from ..units import length
 from . import shaders
 
 # Blender's own font has this number.

@@ -5,6 +5,7 @@ import gpu
 import numpy as np
 
 from ..mesh import mesh_io
+from ..shared.surface import to_world
 
 
 class Triangles:
@@ -43,7 +44,7 @@ def framed(vertices, to_frame):
     They are computed in double precision. A shader has float32 alone, in which the product for vertices far from their origin
     would lose all digits that count.
     """
-    return mesh_io.to_world(vertices, to_frame).astype(np.float32)
+    return to_world(vertices, to_frame).astype(np.float32)
 
 
 class Surface(Triangles):

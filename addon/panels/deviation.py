@@ -6,7 +6,8 @@ import bpy
 from .. import job, measuring, overlay
 from ..operators.probe import TOLVOL_OT_probe, tolerance_of
 from ..overlay import reasons
-from ..proof import labels, probing, report, statistics, verdict
+from ..proof import labels, probing, statistics, verdict
+from ..shared.proof import report
 from ..units import length
 from .layout import GHOST, GREEN, GREY, RED, SubPanel, active, fitting, is_narrow, right, text_lines, wrapped
 from .progress import draw_progress

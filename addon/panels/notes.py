@@ -7,8 +7,9 @@ It is the last panel, so that its sentences, which come and go when an operation
 import bpy
 
 from ..overlay import reasons
-from ..proof import kept_warnings, last_run, report, verdict
+from ..proof import kept_warnings, last_run, verdict
 from ..reference import measurements
+from ..shared.decimation import ISLANDS
 from .layout import AMBER, RED, SubPanel, active, text_lines
 
 
@@ -41,10 +42,10 @@ def notes(context, ob):
     lines += _of_last_run(context, ob)
     warnings, staying = kept_warnings.of(ob)
     lines += [(warning, "ERROR") for warning in warnings]
-    known = {kept_warnings.ISLANDS, kept_warnings.ASKED_FOR}
+    known = {ISLANDS, kept_warnings.ASKED_FOR}
     if others := [f"{count:,} by {cause}" for cause, count in staying.items() if cause not in known]:
         lines.append((f"Vertices that had to stay: {', '.join(others)}", "INFO"))
-    return lines, staying.get(kept_warnings.ISLANDS, 0)
+    return lines, staying.get(ISLANDS, 0)
 
 
 def _of_last_run(context, ob):
@@ -52,7 +53,7 @@ def _of_last_run(context, ob):
     run = last_run.shown(ob)
     if not run:
         return []
-    lines = report.remembered(run, context)
+    lines = last_run.remembered(run, context)
     if lines is None:
         return [("The report of the last operation is damaged: the next operation makes a new one", "ERROR")]
     return [(line, icon) for line, icon in zip(lines, ("CHECKMARK", "MESH_DATA")) if line]

@@ -6,7 +6,8 @@ import bpy
 from .. import estimate, job, native
 from ..operators import blocked
 from ..reference import measurements, snapshots, tolerances
-from ..units import NO_BREAK, length
+from ..shared.numbers import NO_BREAK
+from ..units import length
 from .layout import AMBER, GREEN, GREY, RED, Panel, active, fitting, is_narrow, right, text_lines
 from .progress import in_a_row
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Certifies and measures the distances of a mesh from its reference, and reports them as text and files."""
+"""Keeps with an object what was proved and measured of it, and finds the places that leave the tolerance."""

@@ -3,10 +3,8 @@
 
 import json
 
-from .report import DAMAGED
+from .last_run import DAMAGED
 
-# The cause for which the vertices that have to stay can be found in the mesh.
-ISLANDS = "UV islands meet"
 # The cause of vertices that the user protected: it is no surprise.
 ASKED_FOR = "asked for"
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..mesh import mesh_io
 from ..reference import measurements, snapshots
+from ..shared.surface import to_world
 from .probing import Reading
 
 # Functions that are called when labels were added, changed or removed.
@@ -26,7 +27,7 @@ def add(ob, reading):
 def write(ob, label, reading):
     """Stores a Reading of the present state of `ob` in a label."""
     inverse = np.linalg.inv(mesh_io.matrix_array(ob.matrix_world))
-    label.place = mesh_io.to_world(reading.position[None], inverse)[0]
+    label.place = to_world(reading.position[None], inverse)[0]
     label.on_reference, label.side, label.share = reading.on_reference, reading.side, reading.share
     label.distance = reading.distance
     label.fingerprint = measurements.shown_fingerprint(ob)
@@ -59,7 +60,7 @@ def current(ob, label):
 
 def reading(ob, label):
     """Returns a label as a Reading, at its place on the object as it is now."""
-    position = mesh_io.to_world(np.array(label.place, np.float64)[None], mesh_io.matrix_array(ob.matrix_world))
+    position = to_world(np.array(label.place, np.float64)[None], mesh_io.matrix_array(ob.matrix_world))
     return Reading(position[0], label.on_reference, label.distance, label.side, label.share)
 
 

@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Keeps the run of the last operation on an object, and tells whether it is still about the object's mesh.
 
-A run of a decimation is described in report.py. A run of any other operation is {operation, solidity}: the name of the
-operation, and the result of solidity.compared().
+A run of a decimation is described in shared/proof/report.py. A run of any other operation is {operation, solidity}: the name of
+the operation, and the result of solidity.compared().
 """
 
+import functools
 import json
 
 import numpy as np
 
 from ..mesh import mesh_io
 from ..reference import measurements, snapshots
+from ..shared.proof import report, solidity
+from ..units import area, length, volume
+
+# What reading JSON can raise that a damaged file holds in place of what was written.
+DAMAGED = (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError)
 
 
 def keep(ob, run):
@@ -42,3 +48,34 @@ def stays(ob):
     place = np.float32(mesh_io.matrix_array(ob.matrix_world))
     same_place = np.array_equal(np.float32(ob.tolvol.last_run_matrix).reshape(4, 4), place)
     return same_place and ob.tolvol.last_run_of == mesh_io.read_mesh(ob.data).fingerprint()
+
+
+def remembered(text, context):
+    """Returns two lines about a run that a .blend file keeps as JSON, or None if the text is damaged.
+
+    The lines are the counts() of a decimation, or None of another operation; and the facts about the result, or None if
+    the run is of an earlier version.
+    """
+    try:
+        run = json.loads(text)
+        decimated = "operation" not in run
+        counted = report.counts(run, functools.partial(length, context)) if decimated else None
+        if decimated and "solidity" not in run:
+            return counted, None
+        return counted, facts(run["solidity"], context)
+    except DAMAGED:
+        return None
+
+
+def remembered_holes(text):
+    """Returns the entry "holes" of a run that a .blend file keeps as JSON, or None if there is none that can be read."""
+    try:
+        holes = json.loads(text)["holes"]
+        return holes if holes and report.holes_closed(holes) and [*report.hole_rows(holes)] else None
+    except DAMAGED:
+        return None
+
+
+def facts(compared, context):
+    """Returns the facts about a result as text for the panel, in the scene's units. compared: of solidity.compared()."""
+    return solidity.summary(compared, functools.partial(area, context), functools.partial(volume, context))

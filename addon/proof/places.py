@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..reference import measurements, snapshots, tolerances, volumes
-from . import certify, measure
-from .verdict import Interval
+from ..reference import measurements, snapshots, tolerances
+from ..shared import volumes
+from ..shared.proof import certify, measure
+from ..shared.proof.verdict import Interval
 
 # So many places are measured in each direction; further regions are counted.
 MOST = 50

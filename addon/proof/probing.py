@@ -13,10 +13,12 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
 from .. import native
-from ..errors import Refused
-from ..mesh import mesh_io, protect
-from ..reference import measurements, snapshots, tolerances, volumes
-from .verdict import Interval
+from ..mesh import protect
+from ..reference import measurements, snapshots, tolerances
+from ..shared import volumes
+from ..shared.errors import Refused
+from ..shared.proof.verdict import Interval
+from ..shared.surface import to_world
 
 INSIDE, OUTSIDE = "inside", "outside"
 # What double precision rounds away when a point is placed on its triangle and its distance is computed, as a share of the
@@ -86,7 +88,7 @@ class Probe:
 
     def along(self, origin, direction):
         """Returns the Reading where a ray through the world first meets the surface, or None. Both are (3,)."""
-        origin = mesh_io.to_world(np.asarray(origin, np.float64)[None], self._inverse)[0]
+        origin = to_world(np.asarray(origin, np.float64)[None], self._inverse)[0]
         direction = self._inverse[:3, :3] @ np.asarray(direction, np.float64)
         # Blender's tree counts in single precision, which needs an origin near the surface.
         _, _, face, _ = self._faces.ray_cast(Vector(origin), Vector(direction))
@@ -96,7 +98,7 @@ class Probe:
 
     def near(self, position):
         """Returns the Reading at the point of the surface that is nearest to a point in the world (3,)."""
-        at = mesh_io.to_world(np.asarray(position, np.float64)[None], self._inverse)[0]
+        at = to_world(np.asarray(position, np.float64)[None], self._inverse)[0]
         _, _, face, _ = self._faces.find_nearest(Vector(at))
         if face is None:
             return None
@@ -111,7 +113,7 @@ class Probe:
         best = min(range(len(found)), key=lambda i: found[i][1])
         corners, weights = candidates[best], found[best][0]
         local = weights @ arrays.vertices[corners].astype(np.float64)
-        position = mesh_io.to_world(local[None], self._source.own.matrix)
+        position = to_world(local[None], self._source.own.matrix)
         shares = self._source.shares
         distance = float(self._volume.distance(position)[0])
         if distance <= _ROUNDING * (1 / self._tree.scale + np.abs(position).max()):

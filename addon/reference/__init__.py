@@ -4,7 +4,8 @@
 from bpy.app.handlers import persistent
 
 from .. import handlers
-from . import measurements, snapshots, volumes
+from ..shared import volumes
+from . import measurements, snapshots
 
 
 @persistent

@@ -9,15 +9,15 @@ was set.
 """
 
 import math
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
 from .. import native
-from ..errors import Refused
 from ..mesh import mesh_io
 from ..redraw import redraw_views
+from ..shared.errors import Refused
+from ..shared.surface import Surface
 from . import originals
 
 # Fingerprint of a snapshot -> the bounding box of its used vertices, (2, 3) float32. The box never becomes outdated,
@@ -30,42 +30,9 @@ _boxes = {}
 listeners = []
 
 
-@dataclass(frozen=True)
-class Surface:
-    """A mesh and its place in the world."""
-
-    arrays: mesh_io.MeshArrays
-    matrix: np.ndarray  # (4, 4) float64
-
-    def world(self):
-        return mesh_io.to_world(self.arrays.vertices, self.matrix)
-
-    def size(self):
-        """The length that is 100 %."""
-        return native.module.diagonal(self.arrays.vertices, self.arrays.triangles, to_world=self.matrix)
-
-
 def surface_of(ob):
     """Returns the object's base mesh as it is now."""
     return Surface(mesh_io.read_mesh(ob.data), mesh_io.matrix_array(ob.matrix_world))
-
-
-def joined(surfaces):
-    """Joins several Surfaces to one with world coordinates in double precision. A single Surface is returned as it is.
-
-    Triangles of a mirrored surface run the other way round in the world, as Blender shows them.
-    """
-    surfaces = list(surfaces)
-    if len(surfaces) == 1:
-        return surfaces[0]
-    vertices, triangles, base = [], [], 0
-    for surface in surfaces:
-        vertices.append(surface.world())
-        mirrored = np.linalg.det(surface.matrix[:3, :3]) < 0
-        triangles.append(surface.arrays.triangles[:, :: -1 if mirrored else 1] + base)
-        base += len(surface.arrays.vertices)
-    arrays = mesh_io.MeshArrays(np.concatenate(vertices), np.concatenate(triangles).astype(np.int32), None, None)
-    return Surface(arrays, np.eye(4))
 
 
 def source_object(ob):

@@ -6,8 +6,9 @@ import math
 import bpy
 import numpy as np
 
-from ..errors import Refused
-from ..units import shortest, typed
+from ..shared.errors import Refused
+from ..shared.numbers import shortest
+from ..units import typed
 from . import snapshots
 
 # A converted number with at most so many digits but for this relative rounding error is meant to be the number of these
@@ -38,14 +39,6 @@ def set_length(settings, length):
     settings.tolerance_mode = "LENGTH"
     settings.tolerance_length = length
     settings.tolerance_length_converted = repr(length)
-
-
-def seen_as(pixels, distance, fov, height):
-    """Returns the length that covers so many pixels of a picture at this distance from the camera.
-
-    fov: the vertical angle of view in degrees; height: the height of the picture in pixels.
-    """
-    return pixels * 2 * distance * math.tan(math.radians(fov) / 2) / height
 
 
 def _chosen(settings, name):

@@ -18,7 +18,7 @@ import comparison_picture as comparison  # noqa: E402
 import models  # noqa: E402
 from addon import native  # noqa: E402
 from addon.files import file_io  # noqa: E402
-from addon.proof import measure, report  # noqa: E402
+from addon.shared.proof import measure, report  # noqa: E402
 
 POINTS = 4  # control points of the lattice along each axis
 ROOM = 0.06  # space between the model and the lattice, as a share of the model's box

@@ -20,9 +20,9 @@ sys.path[:0] = [str(FOLDER), str(FOLDER.parents[1] / "blender_scripts")]
 import command_line as cli  # noqa: E402
 import error_plot  # noqa: E402
 import models  # noqa: E402
-import pictures  # noqa: E402
 from addon.mesh import mesh_io  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
+from addon.shared.command import pictures  # noqa: E402
 
 PICTURES = Path(__file__).resolve().parents[2] / "docs" / "pictures"
 VOLUME_TOLERANCE = 0.04  # share of the size; it is large enough to be seen

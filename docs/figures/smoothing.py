@@ -13,8 +13,8 @@ FOLDER = Path(__file__).resolve().parent
 sys.path[:0] = [str(FOLDER), str(FOLDER.parents[1] / "blender_scripts")]
 import command_line as cli  # noqa: E402
 import models  # noqa: E402
-import pictures  # noqa: E402
 from addon.native import module as tolvol  # noqa: E402
+from addon.shared.command import pictures  # noqa: E402
 
 NOISE = 0.4  # tolerances; the standard deviation of the noise along the normals
 ITERATIONS = 100

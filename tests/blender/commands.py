@@ -11,6 +11,7 @@ import numpy as np
 
 from addon.files import file_io
 from addon.reference import snapshots
+from addon.shared.surface import joined
 from scenes import add_object
 
 FOLDER = Path(__file__).resolve().parent
@@ -106,7 +107,7 @@ def save(path, *meshes):
 def world(path):
     """Returns (vertices, triangles) of all objects of a file."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    surface = snapshots.joined([snapshots.surface_of(ob) for ob in file_io.read_file(path).objects])
+    surface = joined([snapshots.surface_of(ob) for ob in file_io.read_file(path).objects])
     return surface.world(), surface.arrays.triangles
 
 

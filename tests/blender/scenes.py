@@ -7,6 +7,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
 from addon.mesh import mesh_io
+from addon.shared.surface import to_world
 
 
 def add_object(name, vertices, faces, matrix=None):
@@ -90,7 +91,7 @@ def world_triangles(ob):
     """Returns (vertices float64 in the world, triangles) of the stored mesh."""
     bpy.context.view_layer.update()
     arrays = mesh_io.read_mesh(ob.data)
-    return mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world)), arrays.triangles
+    return to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world)), arrays.triangles
 
 
 def sampled_distance(surface, other, samples=20_000, seed=7):

@@ -13,9 +13,9 @@ from mathutils import Matrix
 
 from addon import native
 from addon.appearance import bake_process, baking, normals, other_blender
-from addon.errors import Refused
 from addon.mesh.carry import corner_normals
 from addon.mesh.mesh_io import column
+from addon.shared.errors import Refused
 from scenes import activate, add_object, sheet, torus
 
 

@@ -10,9 +10,12 @@ import pytest
 from mathutils import Matrix
 
 from addon import native
-from addon.mesh import filling, mesh_io
+from addon.mesh import mesh_io
 from addon.mesh.mesh_io import column
-from addon.proof import report
+from addon.proof import last_run
+from addon.shared import filling
+from addon.shared.proof import report
+from addon.shared.surface import to_world
 from commands import decimate, save, succeeded, world
 from scenes import add_object, assert_within, sheet_arrays, torus_arrays, world_triangles
 
@@ -51,7 +54,9 @@ def test_pinholes_close_and_far_fewer_triangles_are_left():
             assert loops_of(ob) == 1
             assert report.counts(run_of(ob)).startswith("1,788 -> ")
             assert "5 holes closed, the longest rim 0.401, 1 left open: 1 " in report.counts(run_of(ob))
-            assert "5 holes closed, the longest rim 40.1\xa0cm" in report.remembered(ob.tolvol.last_run, bpy.context)[0]
+            assert (
+                "5 holes closed, the longest rim 40.1\xa0cm" in last_run.remembered(ob.tolvol.last_run, bpy.context)[0]
+            )
             assert "close_holes" in run_of(ob)["seconds"] and ob.tolvol.close_holes
         else:
             assert holes is None and loops_of(ob) == 6
@@ -61,7 +66,7 @@ def test_pinholes_close_and_far_fewer_triangles_are_left():
 
 def rims(arrays, missing, matrix):
     """Returns {centre: perimeter} of holes of one square each, in the world."""
-    corners = mesh_io.to_world(arrays[0], np.array(matrix))[arrays[1][list(missing)]]
+    corners = to_world(arrays[0], np.array(matrix))[arrays[1][list(missing)]]
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).sum(1)
     return {tuple(np.round(centre, 5)): side for centre, side in zip(corners.mean(1), sides)}
 
@@ -115,12 +120,12 @@ def test_places_of_a_damaged_file_are_none():
     ob = holed()
     bpy.ops.tolvol.decimate(tolerance_percent=4, close_holes=True)
     run = run_of(ob)
-    assert report.remembered_holes(json.dumps(run)) == run["holes"]
+    assert last_run.remembered_holes(json.dumps(run)) == run["holes"]
     for places in (3, [3], [{}], [{"perimeter": 1}], [{"perimeter": "long", "centre": [0, 0, 0]}]):
         damaged = json.dumps(run | {"holes": run["holes"] | {"places": places}})
-        assert report.remembered_holes(damaged) is None, places
+        assert last_run.remembered_holes(damaged) is None, places
     del run["holes"]["places"]  # as in a run of an earlier version
-    assert report.remembered_holes(json.dumps(run)) == run["holes"]
+    assert last_run.remembered_holes(json.dumps(run)) == run["holes"]
 
 
 def test_the_largest_perimeter_leaves_longer_holes_open():

@@ -11,7 +11,8 @@ from mathutils import Matrix
 
 from addon import guard, native
 from addon.mesh import mesh_io
-from addon.proof import kept_warnings, report
+from addon.proof import kept_warnings, last_run
+from addon.shared.proof import report
 from commands import decimate, save, succeeded, world
 from scenes import activate, add_object, link, sheet_arrays, world_triangles
 
@@ -52,7 +53,7 @@ def test_a_run_of_an_earlier_version_is_still_shown():
     bpy.ops.tolvol.decimate(tolerance_percent=1)
     run = json.loads(ob.tolvol.last_run)
     del run["crossings"], run["solidity"]
-    assert report.remembered(json.dumps(run), bpy.context) == (report.counts(run), None)
+    assert last_run.remembered(json.dumps(run), bpy.context) == (report.counts(run), None)
 
 
 def test_the_command_keeps_crossings_out_of_the_written_file(tmp_path):

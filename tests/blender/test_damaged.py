@@ -9,7 +9,7 @@ import pytest
 
 from addon import estimate, reference
 from addon.background import queue
-from addon.proof import kept_warnings, report, verdict
+from addon.proof import kept_warnings, last_run, verdict
 from addon.reference import measurements, snapshots
 from scenes import torus
 
@@ -18,7 +18,7 @@ from scenes import torus
 def decimated():
     ob = torus()
     bpy.ops.tolvol.decimate()
-    assert report.remembered(ob.tolvol.last_run, bpy.context) and measurements.measurement_of(ob)
+    assert last_run.remembered(ob.tolvol.last_run, bpy.context) and measurements.measurement_of(ob)
     return ob
 
 
@@ -36,12 +36,12 @@ def damaged_runs(text):
 
 def test_a_damaged_run_is_no_run(decimated):
     for text in damaged_runs(decimated.tolvol.last_run):
-        assert report.remembered(text, bpy.context) is None, text[:200]
+        assert last_run.remembered(text, bpy.context) is None, text[:200]
 
 
 def test_damaged_holes_are_none(decimated):
     for holes in ({}, {"closed": 1}, {"closed": "x", "refused": 0}, {"closed": 1, "refused": {"outside": [10**400]}}):
-        assert report.remembered_holes(json.dumps({"holes": holes})) is None
+        assert last_run.remembered_holes(json.dumps({"holes": holes})) is None
 
 
 @pytest.mark.parametrize("count", ["Infinity", "-Infinity", "NaN", "1" * 5000, "[]", '"x"'])

@@ -12,7 +12,8 @@ from mathutils import Matrix
 from addon import native
 from addon.mesh import mesh_io
 from addon.proof import verdict
-from addon.reference import snapshots, tolerances, volumes
+from addon.reference import snapshots, tolerances
+from addon.shared import volumes
 from scenes import activate, assert_within, link, sampled_distance, sheet, torus, world_triangles
 
 PERCENT = 1.0

@@ -11,7 +11,7 @@ from mathutils import Matrix
 from addon import native
 from addon.mesh import mesh_io, transfer
 from addon.mesh.mesh_io import column
-from addon.proof import report
+from addon.shared.proof import report
 from scenes import activate, sheet, torus, world_triangles
 
 PERCENT = 1.0

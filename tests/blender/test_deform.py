@@ -11,6 +11,7 @@ from addon.mesh import mesh_io
 from addon.operators.deform import native_lattice
 from addon.proof import verdict
 from addon.reference import measurements
+from addon.shared.surface import to_world
 from scenes import activate, add_object, assert_within, link, sheet, torus, world_triangles
 
 PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, 2, 0.5, 1))
@@ -87,7 +88,7 @@ def test_all_points_moved_alike_move_the_mesh_alike_wherever_it_is():
         point.co_deform = turn @ point.co
     assert bpy.ops.tolvol.deform(lattice="cage") == {"FINISHED"}
     local = np.array(lattice.matrix_world @ turn @ lattice.matrix_world.inverted())
-    assert np.abs(world_triangles(ob)[0] - mesh_io.to_world(before, local)).max() < 5e-6
+    assert np.abs(world_triangles(ob)[0] - to_world(before, local)).max() < 5e-6
 
 
 def test_vertices_outside_of_the_lattice_or_far_from_its_moved_points_stay_bit_for_bit():

@@ -12,8 +12,9 @@ import time
 import bpy
 import pytest
 
-from addon.errors import NotWritten, Refused
-from addon.files import file_io, safe_files
+from addon.files import file_io
+from addon.shared.errors import NotWritten, Refused
+from addon.shared.files import safe_files
 from commands import READS_GLTF, SCRIPTS, command, decimate, running, save, succeeded, world
 from scenes import sheet, sheet_arrays
 

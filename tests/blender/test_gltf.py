@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from addon import native
-from addon.errors import Refused
-from addon.files import file_check, side_files
+from addon.shared.errors import Refused
+from addon.shared.files import file_check, side_files
 from commands import READS_GLTF, command, decimate, save, succeeded, world
 from scenes import assert_within, torus_arrays
 

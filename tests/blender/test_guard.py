@@ -9,6 +9,7 @@ from mathutils import Matrix
 
 from addon import guard, native
 from addon.mesh import mesh_io
+from addon.shared.surface import to_world
 from scenes import activate, add_object, plates_with_t_junctions, sheet, sheet_arrays, world_triangles
 
 TOLERANCE = 0.02
@@ -49,7 +50,7 @@ def judged(ob, reference, tolerance=TOLERANCE, measure=native.module.hausdorff):
     scratch.vertices.foreach_set("co", coordinates(ob).ravel())
     arrays = mesh_io.read_mesh(scratch)
     bpy.data.meshes.remove(scratch)
-    vertices = mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world))
+    vertices = to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world))
     found = measure(vertices, arrays.triangles, *reference, bound=tolerance)
     return found.lower / tolerance, found.upper / tolerance
 
@@ -471,7 +472,7 @@ def lift(lattice, height):
 def evaluated(ob, reference):
     surface = ob.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
     arrays = mesh_io.read_mesh(surface)
-    vertices = mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world))
+    vertices = to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world))
     found = native.module.directed_hausdorff(vertices, arrays.triangles, *reference, bound=TOLERANCE)
     return found.lower / TOLERANCE, found.upper / TOLERANCE
 

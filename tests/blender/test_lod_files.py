@@ -7,7 +7,7 @@ import math
 import pytest
 
 from addon import native
-from addon.files import gltf_check
+from addon.shared.files import gltf_check
 from commands import LINE, decimate, save, succeeded, world
 from scenes import torus_arrays
 from test_command_line import PATCH

@@ -14,6 +14,7 @@ from addon.mesh.mesh_io import column
 from addon.operators import fit, modifiers
 from addon.proof import kept_warnings, verdict
 from addon.reference import snapshots
+from addon.shared.surface import to_world
 from scenes import activate, add_object, link, plates_with_t_junctions, torus, world_triangles
 
 PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, 2, 0.5, 1))
@@ -74,9 +75,7 @@ def test_keeps_the_tolerance_and_goes_as_far(kind, matrix):
     ob = modified(kind, matrix, KEEPING[kind])
     reference, before, wished = world_triangles(ob), coordinates(ob), evaluated(ob)
     tolerance = 0.01 * snapshots.surface_of(ob).size()
-    beyond = native.module.directed_hausdorff(
-        mesh_io.to_world(wished, np.array(ob.matrix_world)), reference[1], *reference
-    )
+    beyond = native.module.directed_hausdorff(to_world(wished, np.array(ob.matrix_world)), reference[1], *reference)
     assert beyond.lower > 1.1 * tolerance
     assert bpy.ops.tolvol.apply_modifier(modifier=kind) == {"FINISHED"}
     stored = world_triangles(ob)

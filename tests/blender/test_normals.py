@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.proof import report
+from addon.proof import last_run
+from addon.shared.proof import report
 from commands import decimate, save, succeeded
 from scenes import activate, add_object, sheet_arrays
 
@@ -44,7 +45,7 @@ def test_faces_that_exceed_the_angle_are_named_in_the_counts():
     run["normals"] = {"largest": 4.0, "exceeded_before": 1200, "exceeded_after": 7}
     assert "7 faces beyond the angle of Normals, before 1,200" in report.counts(run)
     del run["normals"]
-    assert report.remembered(json.dumps(run), bpy.context)[0] == report.counts(run), (
+    assert last_run.remembered(json.dumps(run), bpy.context)[0] == report.counts(run), (
         "a file may keep a run of an earlier version"
     )
 

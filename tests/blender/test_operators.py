@@ -11,8 +11,10 @@ from addon import native, overlay, preferences, units
 from addon.mesh import mesh_io
 from addon.operators import blocked, presets, reference
 from addon.overlay import draw, reasons
-from addon.proof import report, verdict
-from addon.reference import measurements, snapshots, tolerances, volumes
+from addon.proof import verdict
+from addon.reference import measurements, snapshots, tolerances
+from addon.reference.built import volume_of
+from addon.shared.proof import report
 from scenes import activate, add_object, link, sheet, torus, world_triangles
 
 OPERATORS = (bpy.ops.tolvol.set_reference, bpy.ops.tolvol.check, bpy.ops.tolvol.select_outside, bpy.ops.tolvol.decimate)
@@ -382,13 +384,13 @@ def referenced(name="torus"):
 
 def test_volume_in_memory_is_that_of_the_tolerance():
     ob = referenced()
-    built = volumes.built_of(ob)
+    built = volume_of(ob)
     assert built.tolerance == pytest.approx(0.01 * ob.tolvol.snapshot_size, rel=1e-6) and built.memory > 0
     ob.tolvol.tolerance_percent = 2
-    assert volumes.built_of(ob) is None
+    assert volume_of(ob) is None
     bpy.ops.tolvol.check()
     bpy.ops.tolvol.decimate()
-    assert volumes.built_of(ob).tolerance == pytest.approx(2 * built.tolerance)
+    assert volume_of(ob).tolerance == pytest.approx(2 * built.tolerance)
 
 
 def test_renaming_changes_nothing():
@@ -446,7 +448,7 @@ def test_saved_loaded_and_appended(tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
     ob = bpy.data.objects["torus"]
-    assert volumes.built_of(ob) is None
+    assert volume_of(ob) is None
     assert_whole(ob)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     with bpy.data.libraries.load(path) as (_, there):

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from addon.mesh import mesh_io
-from addon.proof import deviation, deviation_table
-from addon.proof.deviation_pictures import Picture
 from addon.reference import snapshots
+from addon.shared.proof import deviation, deviation_table
+from addon.shared.proof.deviation_pictures import Picture
 from commands import command, save
 from scenes import activate, add_object, sheet, sheet_arrays, torus, torus_arrays
 

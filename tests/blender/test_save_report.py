@@ -17,9 +17,10 @@ import pytest
 import addon
 from addon.files import file_io
 from addon.operators.report import TOLVOL_OT_save_report
-from addon.proof import deviation, deviation_drawings, deviation_pictures, deviation_units, measure, verdict
-from addon.proof.certify import certify
+from addon.proof import verdict
 from addon.reference import snapshots
+from addon.shared.proof import deviation, deviation_drawings, deviation_pictures, deviation_units, measure
+from addon.shared.proof.certify import certify
 from addon.units import chosen_unit
 from scenes import activate, add_object, sheet_arrays, torus
 from test_report import Page, lifted_sheet, measured, step

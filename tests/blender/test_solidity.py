@@ -12,8 +12,10 @@ from mathutils import Matrix
 
 from addon.mesh import mesh_io
 from addon.panels import deviation, notes
-from addon.proof import last_run, report, solidity
+from addon.proof import last_run
 from addon.reference import snapshots
+from addon.shared.proof import solidity
+from addon.shared.surface import joined
 from commands import command, save
 from drawn import buttons
 from scenes import activate, add_object, link, sheet, torus, torus_arrays
@@ -75,7 +77,7 @@ def test_a_solid_that_is_turned_inside_out_is_not_printable(tmp_path):
     mirror = np.diag([2.0, 1, -3, 1])
     assert solidity.line(facts(CUBE, matrix=mirror)).endswith(": printable")
     objects = add_object("plain", *moved(CUBE, 5)), add_object("mirrored", *CUBE, mirror)
-    found = solidity.facts(snapshots.joined(snapshots.surface_of(ob) for ob in objects))
+    found = solidity.facts(joined(snapshots.surface_of(ob) for ob in objects))
     assert found["volume"] == pytest.approx(1 + 6)
     cavity = 0.5 * vertices + np.float32(0.25), inward
     assert solidity.line(facts(CUBE, cavity)).endswith(": printable")
@@ -115,7 +117,7 @@ def test_the_panel_states_what_became_of_a_decimated_solid():
     assert found["after"] == pytest.approx(solidity.facts(snapshots.surface_of(ob)))
     assert found["before"]["area"] * (1 + found["change"]["area"]) == pytest.approx(found["after"]["area"])
     assert -0.1 < found["change"]["volume"] < 0.1
-    _, line = report.remembered(ob.tolvol.last_run, bpy.context)
+    _, line = last_run.remembered(ob.tolvol.last_run, bpy.context)
     assert line.startswith("Closed, manifold, no crossings, 1 shell, area ")
     parts = re.fullmatch(
         r".*, area ([\d.]+)\xa0m² \(([+-][\d.]+)\xa0%\), volume ([\d.]+)\xa0m³ \(([+-][\d.]+)\xa0%\)", line
@@ -128,12 +130,12 @@ def test_the_panel_states_what_became_of_a_decimated_solid():
     holed = found["after"] | {"closed": False, "boundary_loops": 2, "shells": 3, "area": 0.25, "volume": None}
     compared = {"before": found["before"], "after": holed, "change": none}
     bpy.context.scene.unit_settings.system = "NONE"
-    assert solidity.summary(compared, bpy.context) == "2 boundary loops, 3 shells (+2), area 0.25"
+    assert last_run.facts(compared, bpy.context) == "2 boundary loops, 3 shells (+2), area 0.25"
     bpy.context.scene.unit_settings.system = "METRIC"
     bpy.context.scene.unit_settings.scale_length = 0.001
-    assert solidity.summary(compared, bpy.context) == "2 boundary loops, 3 shells (+2), area 0.25\xa0mm²"
-    assert ", volume 1e+300" in solidity.summary(compared | {"after": holed | {"volume": 1e300}}, bpy.context)
-    assert ", volume 0.5\xa0mm³" in solidity.summary(compared | {"after": holed | {"volume": 0.5}}, bpy.context)
+    assert last_run.facts(compared, bpy.context) == "2 boundary loops, 3 shells (+2), area 0.25\xa0mm²"
+    assert ", volume 1e+300" in last_run.facts(compared | {"after": holed | {"volume": 1e300}}, bpy.context)
+    assert ", volume 0.5\xa0mm³" in last_run.facts(compared | {"after": holed | {"volume": 0.5}}, bpy.context)
 
 
 def test_the_command_requires(tmp_path):
@@ -274,7 +276,7 @@ def test_the_panel_states_what_became_of_the_solid_in_each_operation(operation):
     run = json.loads(last_run.shown(result))
     assert run["solidity"]["before"] == pytest.approx(before) and run["solidity"]["after"] == pytest.approx(after)
     assert run["solidity"]["change"]["area"] == pytest.approx(after["area"] / before["area"] - 1) and after != before
-    assert solidity.summary(run["solidity"], bpy.context) in noted()
+    assert last_run.facts(run["solidity"], bpy.context) in noted()
     # The facts are of this mesh, at this size.
     bpy.ops.object.mode_set(mode="OBJECT")
     result.matrix_world = Matrix.Translation((1, 2, 3)) @ result.matrix_world

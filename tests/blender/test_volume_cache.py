@@ -7,7 +7,9 @@ import threading
 import pytest
 
 from addon import native, reference
-from addon.reference import snapshots, volumes
+from addon.reference import snapshots
+from addon.reference.built import volume_of
+from addon.shared import volumes
 from scenes import torus
 
 PATIENCE = 60  # seconds after which a thread counts as stuck
@@ -69,7 +71,7 @@ def test_a_panel_is_drawn_while_jobs_add_and_drop_volumes(monkeypatch):
     try:
         thread.start()
         while not going.is_set():
-            volumes.built_of(ob)
+            volume_of(ob)
     finally:
         sys.setswitchinterval(interval)
         thread.join(PATIENCE)

@@ -8,6 +8,7 @@ import pytest
 from addon.mesh import mesh_io
 from addon.operators import staying
 from addon.proof import kept_warnings
+from addon.shared.decimation import ISLANDS
 from scenes import activate, sheet, torus
 
 
@@ -37,7 +38,7 @@ def test_the_vertices_where_islands_meet_are_selected_exactly():
     assert 40 < meets.sum() < 100
     assert bpy.ops.tolvol.decimate(tolerance_percent=2) == {"FINISHED"}
     _, counts = kept_warnings.of(ob)
-    assert counts[kept_warnings.ISLANDS] == meets.sum() and len(ob.data.vertices) < len(before)
+    assert counts[ISLANDS] == meets.sum() and len(ob.data.vertices) < len(before)
     assert bpy.ops.tolvol.select_staying("EXEC_DEFAULT", True) == {"FINISHED"}
     assert ob.mode == "EDIT" and tuple(bpy.context.tool_settings.mesh_select_mode) == (True, False, False)
     bpy.ops.object.mode_set(mode="OBJECT")
@@ -49,7 +50,7 @@ def test_warnings_stay_through_edits_until_the_next_operation():
     ob = islands(torus(), 48 * 24)
     assert bpy.ops.tolvol.decimate() == {"FINISHED"}
     (warning,), counts = kept_warnings.of(ob)
-    assert warning.startswith("1,152 of 1,152 vertices have to stay") and counts[kept_warnings.ISLANDS] == 1152
+    assert warning.startswith("1,152 of 1,152 vertices have to stay") and counts[ISLANDS] == 1152
     ob.data.vertices[0].co.z += 1e-4
     ob.data.update()
     assert kept_warnings.of(ob)[0] == [warning]

@@ -12,6 +12,7 @@ import scenes
 from addon import guard, native
 from addon.mesh import mesh_io
 from addon.panels.guard import TOLVOL_PT_guard
+from addon.shared.surface import to_world
 from panels_open import alone
 from window import (
     centre,
@@ -275,7 +276,7 @@ def points():
 def deformed(reference):
     """Returns the same as forward(), for the mesh that the viewport shows."""
     arrays = mesh_io.read_mesh(ob().evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh())
-    vertices = mesh_io.to_world(arrays.vertices, mesh_io.matrix_array(ob().matrix_world))
+    vertices = to_world(arrays.vertices, mesh_io.matrix_array(ob().matrix_world))
     return native.module.directed_hausdorff(vertices, arrays.triangles, *reference, bound=TOLERANCE).upper / TOLERANCE
 
 

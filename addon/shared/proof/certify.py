@@ -3,8 +3,7 @@
 
 import numpy as np
 
-from .. import native
-from ..reference import volumes
+from .. import package, volumes
 from . import measure
 
 
@@ -23,7 +22,7 @@ def outside(surface, reference, found, tolerance, threads=None, progress=None):
     """
     if found.within(tolerance):
         return np.zeros(len(surface.arrays.triangles), bool)
-    unproved = verdicts(surface, reference, tolerance, threads, progress) < native.module.Verdict.INSIDE
+    unproved = verdicts(surface, reference, tolerance, threads, progress) < package.module.Verdict.INSIDE
     unproved[found.triangle] = True
     return unproved
 
@@ -42,7 +41,7 @@ def certify(surface, reference, tolerance, kept_faces=0, threads=None, progress=
     forward, backward = measure.both_ways((surface.world(), triangles), other, *judge)
     outside = {}
     if kept_faces:
-        inside = triangles[verdicts(surface, reference, tolerance, threads, progress) == native.module.Verdict.INSIDE]
+        inside = triangles[verdicts(surface, reference, tolerance, threads, progress) == package.module.Verdict.INSIDE]
         if len(triangles) - len(inside) <= kept_faces and len(inside):
             rest = measure.largest_distance((surface.world(), inside), other, *judge)
             outside["rest"] = [rest.lower, rest.upper]

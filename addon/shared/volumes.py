@@ -1,17 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Builds the native tolerance volumes of references and keeps the last used ones."""
+"""Builds the native tolerance volumes of surfaces and keeps the last used ones."""
 
-from .. import native
-from . import snapshots, tolerances
+from . import package
 from .volume_cache import VolumeCache
 
 _volumes = VolumeCache(most_bytes=600_000_000)
-
-
-def built_of(ob):
-    """Returns the tolerance volume of the stored reference if it is in memory. It is quick enough to be called in drawing."""
-    tolerance = tolerances.tolerance_length(ob.tolvol, snapshots.snapshot_size(ob))
-    return _volumes.built((ob.tolvol.snapshot_fingerprint, snapshots.reference_matrix(ob).tobytes(), tolerance))
 
 
 def native_volume(surface, tolerance, threads=None, progress=None):
@@ -24,12 +17,20 @@ def passing_volume(surface, tolerance, threads=None, progress=None):
     return _volumes.built(_key(surface, tolerance)) or _build(surface, tolerance, threads, progress)
 
 
+def kept(fingerprint, matrix, tolerance):
+    """Returns the volume of a surface if it is in memory, else None. It never waits: panels may call it.
+
+    fingerprint: of the arrays of the surface.
+    """
+    return _volumes.built((fingerprint, matrix.tobytes(), tolerance))
+
+
 def _key(surface, tolerance):
     return surface.arrays.fingerprint(), surface.matrix.tobytes(), tolerance
 
 
 def _build(surface, tolerance, threads, progress):
-    return native.module.ToleranceVolume(
+    return package.module.ToleranceVolume(
         surface.arrays.vertices,
         surface.arrays.triangles,
         tolerance,

@@ -9,7 +9,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from html import escape
 from pathlib import Path
 
-from ..units import NO_BREAK
+from ..numbers import NO_BREAK
 from . import report, solidity
 from .deviation_drawings import LEAST_BAR, histogram, legend
 from .deviation_style import STYLE

@@ -36,7 +36,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import native
+from .. import package
 from . import deviation_page, deviation_table, measure, solidity
 from .verdict import NOT_CHECKED, Verdict, together
 
@@ -58,7 +58,7 @@ def deviation(
     ways = {}
     for way, surface, other in (("forward", a, b), ("backward", b, a)):
         pair = (surface.world(), surface.arrays.triangles), (other.world(), other.arrays.triangles)
-        spread = native.module.deviation(
+        spread = package.module.deviation(
             *pair[0], *pair[1], bounds=bounds, percentiles=PERCENTILES, threads=threads, progress=progress
         )
         ways[way] = (
@@ -71,7 +71,7 @@ def deviation(
     # Both histograms have the same scale, so that they can be compared.
     edges = _edges(max(found.upper for found in largest), tolerance)
     return {
-        "version": native.module.__version__,
+        "version": package.module.__version__,
         "method": _METHOD,
         "unit": unit,
         "size": size,
@@ -89,7 +89,7 @@ def several(runs, not_measured, about):
     """Returns the report of several objects. not_measured: {name, reason}; about: date and blend_file."""
     words = [run["verdict"] for run in runs] + [NOT_CHECKED] * bool(not_measured)
     return {
-        "version": native.module.__version__,
+        "version": package.module.__version__,
         **about,
         "verdict": together(words),
         "objects": runs,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The report of decimate.py about a whole file, from the reports of the operator about its objects."""
 
-from addon.mesh import filling
+from .. import filling
 
 
 def summary(names, runs, judged, tolerance, size, target):

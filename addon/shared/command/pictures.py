@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-import command_line as cli
-from addon.native import module as tolvol
-from addon.proof import deviation_pictures
+from .. import package
+from ..proof import deviation_pictures
+from .arguments import Stop, require_folder
 
 DPI = 100  # A point of type is 100/72 pixels.
 INK, FAINT = "#1b1e25", "#6a6f7a"
@@ -19,11 +19,11 @@ STRIPE = 12  # pixels from one stripe to the next in the images that tolvol rend
 
 def require(option, path):
     """Raises Stop before the work begins if the picture cannot be made or written."""
-    cli.require_folder(path, option)
+    require_folder(path, option)
     if Path(path).suffix.lower() != ".png":
-        raise cli.Stop(f"{option} {path}: the extension must be .png")
+        raise Stop(f"{option} {path}: the extension must be .png")
     if reason := unavailable():
-        raise cli.Stop(f"{option}: {reason}")
+        raise Stop(f"{option}: {reason}")
 
 
 def unavailable():
@@ -31,7 +31,7 @@ def unavailable():
     try:
         import matplotlib  # noqa: F401
     except ImportError as error:
-        return f"{error}; install Debian's python3-matplotlib"
+        return f"{error}; install matplotlib (Debian: python3-matplotlib)"
     return deviation_pictures.unavailable()
 
 
@@ -43,7 +43,7 @@ def up_axis(path):
 def camera(vertices, triangles, size, path="", margin=0.0):
     """Returns a camera that shows a mesh upright, by the convention of the format of `path`."""
     view = deviation_pictures.VIEWS[up_axis(path)]
-    return tolvol.Camera.framing(vertices, triangles, size=size, margin=margin, **view)
+    return package.module.Camera.framing(vertices, triangles, size=size, margin=margin, **view)
 
 
 class Page:
@@ -73,7 +73,7 @@ class Page:
         printed below.
         """
         bar = height - 50 - 28 * outside - (116 if shares is not None else 0)
-        colours, whole = tolvol.transfer_colours(transfer), -1 if transfer == "signed" else 0
+        colours, whole = package.module.transfer_colours(transfer), -1 if transfer == "signed" else 0
         lowest = whole if lowest is None else lowest
         axes = self.figure.add_axes((x / self.width, 1 - (y + bar) / self.height, 18 / self.width, bar / self.height))
         axes.imshow(colours[:, None], aspect="auto", origin="lower", extent=(0, 1, whole, 1))
@@ -122,14 +122,14 @@ class Page:
 def stripes(width, height):
     """Returns an image of the stripes that tolvol draws beyond the tolerance."""
     y, x = np.mgrid[:height, :width]
-    colours = np.array(tolvol.OUTSIDE_COLOURS, np.uint8)
+    colours = np.array(package.module.OUTSIDE_COLOURS, np.uint8)
     return colours[((x - y) % STRIPE >= STRIPE / 2).astype(int)]
 
 
 def shares_within(surface, reference, tolerance, threads=None):
     """Returns the shares of a surface's area within a quarter, half and all of the tolerance of another surface."""
     bounds = [tolerance / 4, tolerance / 2, tolerance]
-    spread = tolvol.deviation(*surface, *reference, bounds=bounds, threads=threads)
+    spread = package.module.deviation(*surface, *reference, bounds=bounds, threads=threads)
     return [1 - float(share) for share in spread.share_beyond]
 
 
@@ -139,11 +139,13 @@ def save_deviation(path, surface, reference, tolerance, size, like="", threads=N
     path: a path or a binary file; size: the length that is 100 %; like: the file of the surface, for the up axis.
     """
     # The tolerance of a volume is at most the size of its reference. Parts that are farther away are striped.
-    tolerance = min(tolerance, tolvol.diagonal(*reference))
-    volume = tolvol.ToleranceVolume(*reference, tolerance, threads=threads)
+    tolerance = min(tolerance, package.module.diagonal(*reference))
+    volume = package.module.ToleranceVolume(*reference, tolerance, threads=threads)
     view = camera(*surface, (WIDTH, HEIGHT), like)
     edges = len(surface[1]) <= EDGES_UP_TO
-    pixels = tolvol.render_distance(*surface, volume, camera=view, size=(WIDTH, HEIGHT), edges=edges, threads=threads)
+    pixels = package.module.render_distance(
+        *surface, volume, camera=view, size=(WIDTH, HEIGHT), edges=edges, threads=threads
+    )
     page = Page(WIDTH + LEGEND, HEIGHT)
     page.image(0, 0, pixels)
     shares = shares_within(surface, reference, tolerance, threads)

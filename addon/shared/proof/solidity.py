@@ -20,8 +20,8 @@ bounds a cavity if it looks inwards, and its volume is taken off; whether shells
 All but the last two are exact. tolvol.solidity() finds all but the crossings.
 """
 
-from .. import native
-from ..units import NO_BREAK, area, volume
+from .. import package
+from ..numbers import NO_BREAK
 from . import known
 
 # Where a mesh has so many pairs or more, they are not counted further: 100,000 faces on one place have five thousand million.
@@ -38,7 +38,7 @@ def crossing_count(arrays, threads=None, progress=None):
     if not len(arrays.triangles):
         return 0
     return len(
-        native.module.crossing_pairs(
+        package.module.crossing_pairs(
             arrays.vertices, arrays.triangles, most=MOST_PAIRS, threads=threads or None, progress=progress
         )
     )
@@ -58,7 +58,7 @@ def facts(surface, threads=None, progress=None, again=True):
     key = known.key_of("solidity", arrays.vertices, arrays.triangles, surface.matrix)
     if not again and (kept := known.get(key)) is not None:
         return dict(kept)
-    found = native.module.solidity(
+    found = package.module.solidity(
         arrays.vertices, arrays.triangles, to_world=surface.matrix, threads=threads or None, progress=progress
     )
     pairs = crossing_count(arrays, threads, progress)
@@ -106,14 +106,14 @@ def line(found):
     return f"not printable: {', '.join(missing.values())}"
 
 
-def summary(compared, context):
-    """Returns the facts about a result as text for the panel: the result of compared() in the scene's units."""
+def summary(compared, as_area, as_volume):
+    """Returns the facts about a result as text: the result of compared(). as_area, as_volume: return a number as text."""
     found = compared["after"]
     connected = ", ".join(lacking(found).values()) or "closed, manifold, no crossings"
     changes = _changes(found, compared["before"], compared["change"])
-    said = [f"{found['shells']:,} shell{'s' * (found['shells'] != 1)}", f"area {area(context, found['area'])}"]
+    said = [f"{found['shells']:,} shell{'s' * (found['shells'] != 1)}", f"area {as_area(found['area'])}"]
     if found["volume"] is not None:
-        said.append(f"volume {volume(context, found['volume'])}")
+        said.append(f"volume {as_volume(found['volume'])}")
     said = [f"{text} ({change})" if change else text for text, change in zip(said, changes)]
     return ", ".join([connected[:1].upper() + connected[1:], *said])
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .. import native
+from .. import package
 from . import known
 from .verdict import Interval
 
@@ -26,7 +26,7 @@ def largest_distance(from_surface, to_surface, tolerance=None, threads=None, pro
         return found
 
     def measured(**options):
-        found = native.module.directed_hausdorff(
+        found = package.module.directed_hausdorff(
             *from_surface, *to_surface, threads=threads, progress=progress, **options
         )
         return Interval(found.lower, found.upper, found.position, found.triangle)
@@ -69,7 +69,7 @@ def _key(from_content, to_content):
 def sampled_distance(points, to_surface, threads=None, progress=None):
     """Returns the largest distance of the points, (n, 3), from a surface: a lower bound of that of a surface through them."""
     corners = np.repeat(np.arange(len(points), dtype=np.int32)[:, None], 3, 1)
-    return native.module.directed_hausdorff(points, corners, *to_surface, threads=threads, progress=progress).lower
+    return package.module.directed_hausdorff(points, corners, *to_surface, threads=threads, progress=progress).lower
 
 
 def both_ways(surface, reference, tolerance=None, threads=None, progress=None, again=True):

@@ -4,7 +4,7 @@
 import threading
 from collections import OrderedDict
 
-from .. import native
+from . import package
 
 _LOOK = 0.05  # A waiting thread checks every so many seconds whether it was cancelled.
 
@@ -26,7 +26,7 @@ class VolumeCache:
         with self._changed:
             while key in self._being_built:
                 if progress is not None and progress.cancelled:
-                    raise native.module.Cancelled("cancelled")
+                    raise package.module.Cancelled("cancelled")
                 self._changed.wait(_LOOK)
             if key in self._volumes:
                 self._volumes.move_to_end(key)

@@ -1,33 +1,44 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The options of decimate.py."""
+"""The options of a decimation."""
 
-import command_line as cli
-from addon import operation_settings
+from ..decimation import FEWEST_LEVELS, MOST_LEVELS
+from .arguments import above_zero, angle, file_name, length, several, whole_number
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Reduces the triangles of the meshes of IN within the tolerance and writes the meshes to OUT. The written file is read back and
-certified before it is moved to OUT. Formats: .obj .ply .stl, and .gltf and .glb where Blender can read them."""
+certified before it is moved to OUT."""
 
-_EPILOG = """\
+EPILOG = """\
 The last line of the output gives the result. Its percentages are of the size of the reference (the longest diagonal of the
 bounding box), and its time is the time of the whole command. Exit codes: 0 proved; 2 bad usage or input; 3 not proved; 1 a file
 that could not be written, or a bug. Only with exit code 0 are OUT, its side files, the report and the picture written, all of
 them or none. Symbolic links are followed. OUT may be IN. No other file that is read and no texture beside OUT is overwritten."""
 
 
-def arguments():
-    """Returns the options of the command line. Ends the command with exit code 2 if they make no sense."""
-    parser = cli.Parser("blender_scripts/decimate.py", description=_DESCRIPTION, epilog=_EPILOG)
-    parser.add_argument("input", type=cli.file_name, metavar="IN", help="the mesh to decimate")
+def add_files(parser):
+    """Adds IN and OUT and the files of one decimation to a parser."""
+    parser.add_argument("input", type=file_name, metavar="IN", help="the mesh to decimate")
     parser.add_argument(
-        "output", type=cli.file_name, metavar="OUT", help="the file for the result; its extension chooses the format"
+        "output", type=file_name, metavar="OUT", help="the file for the result; its extension chooses the format"
     )
+    add(parser)
+    parser.add_argument("--report", type=file_name, metavar="FILE.json", help="write all numbers to this file")
+    parser.add_argument(
+        "--picture",
+        type=file_name,
+        metavar="FILE.png",
+        help="draw the result to this file, coloured by its distance to the reference; needs OpenGL",
+    )
+
+
+def add(parser):
+    """Adds the options that a decimation of one file and of many have in common to a parser."""
     asked = parser.add_mutually_exclusive_group(required=True)
-    asked.add_argument("--tolerance", type=cli.length, metavar="T", help="N%% of size, or a length in the file's units")
-    levels = operation_settings.FEWEST_LEVELS, operation_settings.MOST_LEVELS
+    asked.add_argument("--tolerance", type=length, metavar="T", help="N%% of size, or a length in the file's units")
+    levels = FEWEST_LEVELS, MOST_LEVELS
     asked.add_argument(
         "--lod",
-        type=cli.several(cli.length, *levels),
+        type=several(length, *levels),
         metavar="T,T,...",
         help="make a chain of levels of detail, one for each of 2 to 6 growing tolerances: OUT_LOD0, OUT_LOD1, ... with OUT's "
         "extension. Each is decimated from IN and proved both ways; in glTF, geometricError in the extras of a node is its "
@@ -35,31 +46,31 @@ def arguments():
     )
     asked.add_argument(
         "--lod-pixels",
-        type=cli.several(cli.above_zero, *levels),
+        type=several(above_zero, *levels),
         metavar="N,N,...",
         help="do the same, with as many pixels as the deviation of each level may cover in a picture from --distance",
     )
     parser.add_argument(
         "--distance",
-        type=cli.length,
+        type=length,
         metavar="D",
         help="N%% of size, or a length in the file's units, for --lod-pixels",
     )
     parser.add_argument(
         "--fov",
-        type=cli.angle,
+        type=angle,
         metavar="A",
         help="the vertical angle of view in degrees, for --lod-pixels (default: 50)",
     )
     parser.add_argument(
         "--height",
-        type=cli.whole_number(1),
+        type=whole_number(1),
         metavar="N",
         help="the height of the picture in pixels, for --lod-pixels (default: 1080)",
     )
     parser.add_argument(
         "--reference",
-        type=cli.file_name,
+        type=file_name,
         metavar="REF",
         help="a file that the tolerance refers to (default: IN itself)",
     )
@@ -89,7 +100,7 @@ def arguments():
     )
     parser.add_argument(
         "--max-normal-angle",
-        type=cli.angle,
+        type=angle,
         default=90,
         metavar="A",
         help="the largest angle, in degrees from 1 to 180, between a face of the result and the faces of the reference that "
@@ -97,13 +108,13 @@ def arguments():
     )
     parser.add_argument(
         "--max-seconds",
-        type=cli.whole_number(1),
+        type=whole_number(1),
         metavar="S",
         help="stop after S seconds for each object with the result that is proved by then (default: no limit)",
     )
     parser.add_argument(
         "--target-triangles",
-        type=cli.whole_number(1),
+        type=whole_number(1),
         metavar="N",
         help="stop at N triangles if the tolerance permits so few; N is divided among objects by their triangles",
     )
@@ -115,7 +126,7 @@ def arguments():
     )
     parser.add_argument(
         "--largest-perimeter",
-        type=cli.length,
+        type=length,
         metavar="LENGTH",
         help="leave holes open whose rim is longer; N%% of size, or a length in the file's units (default: no limit)",
     )
@@ -126,15 +137,11 @@ def arguments():
         help="how to treat faces of IN that are not within the tolerance of the reference: stop with an error, or keep "
         "them as they are (default: error)",
     )
-    parser.add_argument("--report", type=cli.file_name, metavar="FILE.json", help="write all numbers to this file")
-    parser.add_argument(
-        "--picture",
-        type=cli.file_name,
-        metavar="FILE.png",
-        help="draw the result to this file, coloured by its distance to the reference; needs OpenGL",
-    )
-    parser.add_argument("--threads", type=cli.whole_number(1), metavar="N", help="default: all cores")
-    options = parser.parse()
+    parser.add_argument("--threads", type=whole_number(1), metavar="N", help="default: all cores")
+
+
+def checked(parser, options):
+    """Returns the options. Raises Stop if they make no sense together."""
     if options.largest_perimeter and not options.close_holes:
         parser.error("--largest-perimeter needs --close-holes")
     if options.lod_pixels and options.distance is None:

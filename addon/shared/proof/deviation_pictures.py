@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import native
-from ..reference import snapshots, volumes
+from .. import package, volumes
+from ..surface import joined
 
 SIZE = (720, 600)  # pixels
 _EDGES_UP_TO = 5000  # triangles; the edges of a mesh with more triangles would hide the colours
@@ -33,8 +33,8 @@ class Picture:
 def unavailable():
     """Why no picture can be made here, or None."""
     try:
-        native.module.renderer()
-    except native.module.GlUnavailable as error:
+        package.module.renderer()
+    except package.module.GlUnavailable as error:
         return str(error)
     return None
 
@@ -51,8 +51,8 @@ def drawn(surface, reference, run, captions, factor=1.0, up="Z", threads=None, p
     run: their deviation() in world units; captions: texts for both; factor: from world lengths to those of the pictures; up:
     the axis that points upwards.
     """
-    both = snapshots.joined((surface, reference))
-    view = native.module.Camera.framing(both.world(), both.arrays.triangles, size=SIZE, **VIEWS[up])
+    both = joined((surface, reference))
+    view = package.module.Camera.framing(both.world(), both.arrays.triangles, size=SIZE, **VIEWS[up])
     pictures = []
     for way, own, other, caption in (
         ("forward", surface, reference, captions[0]),
@@ -64,12 +64,12 @@ def drawn(surface, reference, run, captions, factor=1.0, up="Z", threads=None, p
         volume = (
             volumes.native_volume(other, wanted, threads, progress)
             if other is reference
-            else native.module.ToleranceVolume(
+            else package.module.ToleranceVolume(
                 other.world(), other.arrays.triangles, wanted, threads=threads, progress=progress
             )
         )
         signed = bool(run[way]["sides"])
-        pixels = native.module.render_distance(
+        pixels = package.module.render_distance(
             own.arrays.vertices,
             own.arrays.triangles,
             volume,

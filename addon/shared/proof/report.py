@@ -5,17 +5,12 @@ A run is a dictionary, as --report writes it (decimation_run()), or that of anot
 are in world units.
 """
 
-import functools
-import json
 import math
 
-from .. import native
-from ..units import length, three_digits
+from .. import package
+from ..numbers import three_digits
 from . import solidity
 from .verdict import Interval
-
-# What reading JSON can raise that a damaged file holds in place of what was written.
-DAMAGED = (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError)
 
 # The distance of the reference counts as no larger than before if its upper end grew by at most this share, the width of a
 # certified interval (native/measure/hausdorff.h): equal distances count as equal.
@@ -51,7 +46,7 @@ def decimation_run(source, result, native_report, volume, certified, options, se
         message = f"{result.coincident:,} faces that lie exactly on another face were left out"
         repairs.append({"kind": "coincident", "count": result.coincident, "message": message})
     return {
-        "version": native.module.__version__,
+        "version": package.module.__version__,
         "input": {"vertices": len(source.vertices), "triangles": len(source.triangles)},
         "output": {"vertices": len(result.vertices), "triangles": len(result.triangles)},
         "tolerance": {"absolute": volume.tolerance, "percent": 100 * volume.tolerance / volume.diagonal},
@@ -158,32 +153,6 @@ def hole_rows(holes):
         yield f"hole {i + 1} perimeter", "", place["perimeter"]
         for axis, value in zip("xyz", place["centre"]):
             yield f"hole {i + 1} centre", axis, value
-
-
-def remembered(text, context):
-    """Returns two lines about a run that a .blend file keeps as JSON, or None if the text is damaged.
-
-    The lines are the counts() of a decimation, or None of another operation; and the facts about the result, or None if
-    the run is of an earlier version.
-    """
-    try:
-        run = json.loads(text)
-        decimated = "operation" not in run
-        counted = counts(run, functools.partial(length, context)) if decimated else None
-        if decimated and "solidity" not in run:
-            return counted, None
-        return counted, solidity.summary(run["solidity"], context)
-    except DAMAGED:
-        return None
-
-
-def remembered_holes(text):
-    """Returns the entry "holes" of a run that a .blend file keeps as JSON, or None if there is none that can be read."""
-    try:
-        holes = json.loads(text)["holes"]
-        return holes if holes and holes_closed(holes) and [*hole_rows(holes)] else None
-    except DAMAGED:
-        return None
 
 
 def intervals(run):

@@ -7,7 +7,7 @@ Bars beyond the tolerance are striped as well, for those who do not tell the col
 import math
 from html import escape
 
-from .. import native
+from .. import package
 from .deviation_style import BEYOND, LINE, WITHIN
 
 LEAST_BAR = 1.5  # least height of a bar in pixels, so that a share of one in a million can be seen
@@ -109,7 +109,7 @@ def _stripes(name, first, second, width):
 def legend(picture, unit, name):
     """Returns the colours of a Picture with their distances. unit: as text; name: unlike that of all other drawings."""
     transfer = "signed" if picture.signed else "magnitude"
-    colours = native.module.transfer_colours(transfer)
+    colours = package.module.transfer_colours(transfer)
     stops = "".join(
         f'<stop offset="{i / (_STOPS - 1):.4f}" stop-color="#{bytes(colours[i * (len(colours) - 1) // (_STOPS - 1)]).hex()}"/>'
         for i in range(_STOPS)
@@ -123,7 +123,7 @@ def legend(picture, unit, name):
         parts.append(_text(x, _BAR_HEIGHT + 18, f"{_number(value)}{unit}" if value else "0", anchor))
     if picture.signed:
         parts.append(_text((_BAR_FROM + 2 * _BAR_TO) / 3, 57, "blue inside, red outside"))
-    dark, light = (f"rgb({','.join(map(str, colour))})" for colour in native.module.OUTSIDE_COLOURS)
+    dark, light = (f"rgb({','.join(map(str, colour))})" for colour in package.module.OUTSIDE_COLOURS)
     parts.append(
         f'<rect x="{_BAR_FROM}" y="46" width="14" height="14" fill="url(#stripes-{name})"/>'
         + _text(_BAR_FROM + 22, 57, "farther away", "start")

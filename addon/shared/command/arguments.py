@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parts of the commands that do not need Blender: parsing arguments, and the name of the machine."""
+"""Parses the arguments of all commands, and refuses those that make no sense."""
 
 import argparse
 import math
 import os
-import platform
 import re
 from pathlib import Path
 
@@ -19,6 +18,43 @@ class Stop(Exception):
     def __init__(self, message, code=USAGE):
         super().__init__(message)
         self.code = code
+
+
+class Parser(argparse.ArgumentParser):
+    """An ArgumentParser whose errors are one line that names the faulty argument."""
+
+    def __init__(self, **options):
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False, **options)
+
+    def error(self, message):
+        raise Stop(f"{message}; see --help")
+
+    def joined(self, words):
+        """Returns the words with each value joined to its option by "=".
+
+        argparse would take a value such as "-1%" for an option.
+        """
+        valued = self._valued()
+        found = []
+        for word in words:
+            if found and found[-1] in valued and not word.startswith("--"):
+                found[-1] += "=" + word
+            else:
+                found.append(word)
+        return found
+
+    def parse(self, words):
+        return self.parse_args(self.joined(words))
+
+    def _valued(self):
+        """Returns the names of all options, of subcommands too, that take one value."""
+        valued = set()
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                valued.update(*(parser._valued() for parser in action.choices.values()))
+            elif action.nargs is None:
+                valued.update(action.option_strings)
+        return valued
 
 
 def whole_number(least):
@@ -95,8 +131,3 @@ def require_folder(path, what):
         raise Stop(f"{what} {path}: the folder {folder} does not exist")
     if Path(path).is_dir():
         raise Stop(f"{what} {path}: this is a folder")
-
-
-def machine():
-    model = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
-    return f"{model[1] if model else platform.processor()}, {os.cpu_count()} cores"
