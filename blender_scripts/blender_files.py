@@ -14,10 +14,10 @@ from addon.files import file_io
 from addon.files.file_io import extension_of, rounding  # noqa: F401
 from addon.files.file_io import read_file as read  # noqa: F401
 from addon.files.file_io import write_file as write  # noqa: F401
-from addon.files.gltf_extras import GEOMETRIC_ERROR
 from addon.mesh import mesh_io
 from addon.reference.snapshots import surface_of  # noqa: F401
 from addon.shared.command.arguments import NOT_PROVED
+from addon.shared.command.decimate import GEOMETRIC_ERROR
 from addon.shared.errors import NOT_PROVED as BEGINNING
 
 FORMATS = "Formats: .obj .ply .stl, and .gltf and .glb where Blender can read them."

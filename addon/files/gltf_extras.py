@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Writes the deviation of a level of detail into glTF files: Blender's exporter calls the class that is defined here."""
 
-# The name of the custom property, and of the entry of a glTF node's extras. It is the word of 3D Tiles for how far a level
-# is from the full detail, as a length.
-GEOMETRIC_ERROR = "geometricError"
+from ..shared.command.decimate import GEOMETRIC_ERROR  # also the name of the custom property
 
 
 # The exporter looks for a class of this name in every add-on that is enabled.

@@ -5,9 +5,13 @@ Before Blender 3.6 its reader of PLY files is written in Python and takes six ti
 bit. That reader leaves out normals, too.
 """
 
+from pathlib import Path
+
 import bpy
 
 from ..mesh import mesh_io
+
+_NORMALS = {"nx", "ny", "nz"}
 
 
 def read(path, content):
@@ -16,10 +20,11 @@ def read(path, content):
     content: the Content that the check of the file has returned. Returns whether this was done: it is not where Blender's
     own reader is as fast, or where the file holds more.
     """
-    if content.polygons is None or "ply_import" in dir(bpy.ops.wm):
+    plain = content.uniform is not None and content.columns.keys() <= _NORMALS and not content.others
+    if not plain or Path(path).suffix.lower() != ".ply" or "ply_import" in dir(bpy.ops.wm):
         return False
     name = bpy.path.display_name_from_filepath(str(path))
-    mesh = mesh_io.new_mesh(name, *content.polygons)
+    mesh = mesh_io.new_mesh(name, content.vertices, content.uniform)
     mesh.validate()  # This leaves out faces that repeat a corner or another face.
     bpy.context.collection.objects.link(bpy.data.objects.new(name, mesh))
     return True

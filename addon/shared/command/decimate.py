@@ -32,6 +32,10 @@ from ..surface import joined
 from . import arguments, file_report, pictures
 from .arguments import Stop, in_units
 
+# The name of the entry of a glTF node's extras, and of the report. It is the word of 3D Tiles for how far a level is from the
+# full detail, as a length.
+GEOMETRIC_ERROR = "geometricError"
+
 
 def reads(option, path):
     """Returns pairs (name for messages, path) for a mesh file that is read and for all files that it needs."""
@@ -173,7 +177,7 @@ class Command:
         whole["input"] = whole_input
         whole["repairs"] = repairs + whole["repairs"]
         if not self.options.tolerance:
-            whole["geometricError"] = file_report.deviation(whole)
+            whole[GEOMETRIC_ERROR] = file_report.deviation(whole)
         self._end_stage("write")
         seconds = {stage: took - seconds_before.get(stage, 0.0) for stage, took in self.seconds.items()}
         whole["seconds"] = {**seconds, "total": sum(seconds.values())}
