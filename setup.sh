@@ -11,12 +11,14 @@ cd "$(dirname "$0")"
 packages="cmake ninja-build pkg-config g++ python3-dev pybind11-dev python3-numpy python3-matplotlib libopenmesh-dev libglm-dev libcgal-dev libepoxy-dev libgtest-dev
   libegl1 libgl1 libgl1-mesa-dri blender"
 targets=extension
+tests=""
 case "${1-}" in
 "") ;;
 --tests)
   packages="$packages python3-pytest python3-venv ccache clang-format
     clang-tidy xvfb xdotool imagemagick"
   targets="all extension"
+  tests=1
   ;;
 *)
   echo "setup: unknown option $1 (the only one is --tests)" >&2
@@ -66,3 +68,4 @@ fi
 
 stage "configured" cmake --preset release ${TOLVOL_PYTHONS:+"-DTOLVOL_PYTHONS=$TOLVOL_PYTHONS"}
 stage "built in build/release" cmake --build --preset release --target $targets
+[ -z "$tests" ] || stage "packages of the command tolvol in build/command" sh tests/command/setup.sh

@@ -10,6 +10,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PYTHON = "/usr/bin/python3"
+COMMAND_PYTHON = "build/command/bin/python"  # with the packages of the command tolvol: tests/command/setup.sh
 RUNNERS = ("native", "asan", "tsan", "python", "fuzz", "blender", "ui", "style")
 FULL_LENGTH = {"TOLVOL_ALL_TESTS": "1"}  # the environment in which tests are as long as they can be
 # The tests of what several threads do, and of the proofs that are made after them. Each has a task of its own, because a
@@ -97,9 +98,10 @@ def threaded():
 
 
 def python(suffix="", environment=None, preset=""):
-    command = (PYTHON, "-m", "pytest", "-q", "-p", "no:cacheprovider")
-    for path in sorted(ROOT.glob("tests/python/test_*.py")):
-        yield Task("python", path.stem + suffix, (*command, str(path)), count_pytest, environment or {}, preset)
+    for folder, program in (("python", PYTHON), ("command", COMMAND_PYTHON)):
+        command = (program, "-m", "pytest", "-q", "-p", "no:cacheprovider")
+        for path in sorted(ROOT.glob(f"tests/{folder}/test_*.py")):
+            yield Task("python", path.stem + suffix, (*command, str(path)), count_pytest, environment or {}, preset)
 
 
 def python_with_addresses_checked():

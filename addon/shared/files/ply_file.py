@@ -64,7 +64,9 @@ def read(data):
     if vertices is None:
         raise Refused("it has no vertices")
     if rest := len(bytes(body[offset:]).strip(_BLANK)):
-        raise Refused(f"{rest:,} bytes are left after all that its header declares: the numbers in its header are wrong")
+        raise Refused(
+            f"{rest:,} bytes are left after all that its header declares: the numbers in its header are wrong"
+        )
     return Content(faces, vertices, corners, sizes, columns, others=tuple(others))
 
 
@@ -84,6 +86,11 @@ def _corners(indices):
     """Returns the vertex at each corner, one polygon after another, and the numbers of corners: one if they are equal."""
     if indices is None or not isinstance(indices, tuple) and not indices.size:
         raise Refused("its faces name no vertices")
+    if isinstance(indices, tuple) and not indices[1].all():
+        # Where the header declares a vertex too many, the first face begins late and looks like this.
+        raise Refused(
+            f"face {np.argmin(indices[1] > 0) + 1} has no vertices: the file or the numbers in its header are damaged"
+        )
     corners, sizes = indices if isinstance(indices, tuple) else (indices.ravel(), indices.shape[1])
     if corners.dtype.kind == "f":  # from a text
         if (corners != np.rint(corners)).any():
@@ -97,11 +104,8 @@ def _require_vertices(corners, sizes, count):
     if not len(corners) or 0 <= corners.min() and corners.max() < count:
         return
     sizes = np.broadcast_to(sizes, len(corners) // sizes) if isinstance(sizes, int) else sizes
-    some = np.flatnonzero(sizes)
-    starts = (np.cumsum(sizes) - sizes)[some]
-    lowest, highest = np.zeros((2, len(sizes)), np.int64)
-    lowest[some], highest[some] = np.minimum.reduceat(corners, starts), np.maximum.reduceat(corners, starts)
-    require_indices(lowest, highest, count, 0)
+    starts = np.cumsum(sizes) - sizes
+    require_indices(np.minimum.reduceat(corners, starts), np.maximum.reduceat(corners, starts), count, 0)
 
 
 def _ply_header(data):

@@ -92,8 +92,10 @@ def _values(found):
         values["normals"] = np.asarray(found.vertex_normals, np.float64)
     if getattr(found.visual, "uv", None) is not None:
         values["UVs"] = np.asarray(found.visual.uv)
-    if found.visual.kind == "vertex":
-        values["colours"] = np.asarray(found.visual.vertex_colors)
+    # Beside a material trimesh keeps the colours as an attribute.
+    beside = getattr(found.visual, "vertex_attributes", {}).get("color")
+    if found.visual.kind == "vertex" or beside is not None:
+        values["colours"] = _bytes(np.asarray(found.visual.vertex_colors if beside is None else beside))
     return values
 
 

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Runs the command as a user does, and writes the files that it reads."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import tolvol
+from tolvol.command import mesh_files
+from tolvol.command.mesh import Mesh
+
+import meshes
+
+PATIENCE = 120  # seconds after which a command counts as stuck
+LINE = re.compile(
+    r"([\d,]+) -> ([\d,]+) triangles(?: \((.*)\))?, tolerance ([\d.e-]+) % = ([\d.e-]+), result within ([\d.e+-]+) %, "
+    r"reference within ([\d.e+-]+) %(?:, normals within [\d.]+\N{DEGREE SIGN})? \(certified\), [\d.]+ s"
+)
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(tolvol.__file__).parents[1])}
+
+
+def words(*arguments):
+    return [sys.executable, "-m", "tolvol", *map(str, arguments)]
+
+
+def command(*arguments, **environment):
+    """Returns (exit code, stdout, stderr)."""
+    done = subprocess.run(
+        words(*arguments), capture_output=True, text=True, timeout=PATIENCE, env=ENVIRONMENT | environment
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def succeeded(done):
+    """Returns the match of the result line."""
+    code, out, err = done
+    assert (code, err) == (0, ""), (out, err)
+    match = LINE.fullmatch(out.splitlines()[-1])
+    assert match, out
+    return match
+
+
+def refused(done, *parts, code=2):
+    """The command has ended with this exit code and one line that has these parts."""
+    assert done[0] == code and done[2].count("\n") == 1 and "Traceback" not in done[2], done
+    for part in parts:
+        assert str(part) in done[2], done[2]
+
+
+def write(path, vertices, triangles, **attributes):
+    mesh_files.write(path, [Mesh(path.stem, vertices, triangles.astype(np.int32), attributes)], path.parent)
+    return path
+
+
+def scan(path, dtype=np.float32):
+    """Writes a rough torus."""
+    vertices, triangles = meshes.torus(columns=48, rows=24, noise=0.004)
+    return write(path, vertices.astype(dtype), triangles)
+
+
+def read(path):
+    """Returns the Mesh of a file."""
+    return mesh_files.read(path).objects[0]
+
+
+def assert_within(path, reference, tolerance):
+    """Every point of each file is within the tolerance of the other."""
+    one, other = ((mesh.vertices.astype(np.float64), mesh.triangles) for mesh in (read(path), read(reference)))
+    both = tolvol.hausdorff(*one, *other, bound=tolerance)
+    assert both.forward.upper <= tolerance and both.backward.upper <= tolerance

@@ -1,0 +1,383 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files of every format, there and back, with what the formats hold, and files that are damaged."""
+
+import io
+import json
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+import tolvol
+import trimesh
+from tolvol.command import mesh_files, polygons
+from tolvol.command.mesh import Attribute, Mesh, joined, weld, welded
+from tolvol.shared.errors import Refused
+
+import meshes
+from commands import command, read, scan, succeeded, write
+
+ALL = [".3mf", ".glb", ".obj", ".off", ".ply", ".stl"]
+CUBE = (
+    "OFF\n8 6 12\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n"
+    "4 3 2 1 0\n4 4 5 6 7\n4 0 1 5 4\n4 1 2 6 5\n4 2 3 7 6\n4 3 0 4 7\n"
+)
+
+
+def corners(mesh):
+    """Returns the triangles by the positions of their corners: it does not depend on the order of vertices."""
+    return mesh.vertices.astype(np.float64)[mesh.triangles]
+
+
+@pytest.mark.parametrize("extension", ALL)
+def test_there_and_back_every_coordinate_is_the_same(tmp_path, extension):
+    vertices, triangles = meshes.torus(columns=12, rows=6, noise=0.01)
+    found = read(write(tmp_path / f"a{extension}", vertices.astype(np.float32), triangles))
+    assert np.array_equal(corners(found), vertices.astype(np.float32).astype(np.float64)[triangles])
+    assert len(found.vertices) == len(vertices) and found.triangles.dtype == np.int32
+    exact = extension in (".3mf", ".obj", ".off", ".ply")
+    double = read(write(tmp_path / f"b{extension}", vertices.astype(np.float64), triangles))
+    assert np.array_equal(corners(double), vertices.astype(np.float64)[triangles]) == exact
+    assert (double.vertices.dtype == np.float64) == exact
+
+
+@pytest.mark.parametrize("extension", ALL)
+def test_each_format_is_decimated_and_certified(tmp_path, extension):
+    source, target = scan(tmp_path / f"in{extension}"), tmp_path / f"out{extension}"
+    match = succeeded(command("decimate", source, target, "--tolerance", "0.02"))
+    one, other = (corners(read(path)).reshape(-1, 3) for path in (target, source))
+    count = len(one) // 3
+    assert match[2] == str(count) and count < 600
+    soups = [(points, np.arange(len(points), dtype=np.int32).reshape(-1, 3)) for points in (one, other)]
+    both = tolvol.hausdorff(*soups[0], *soups[1], bound=0.02)
+    assert max(both.forward.upper, both.backward.upper) <= 0.02
+
+
+def test_a_double_stays_a_double(tmp_path):
+    source, target = scan(tmp_path / "in.ply", np.float64), tmp_path / "out.ply"
+    before = read(source)
+    assert not np.array_equal(before.vertices.astype(np.float32), before.vertices)
+    succeeded(command("decimate", source, target, "--tolerance", "1%", "--placement", "subset"))
+    assert b"property double x" in target.read_bytes()
+    assert {row.tobytes() for row in read(target).vertices} < {row.tobytes() for row in before.vertices}
+    # A format of float32 rounds, within the tolerance.
+    succeeded(command("decimate", source, tmp_path / "out.stl", "--tolerance", "1%"))
+
+
+def test_a_rounding_beyond_the_tolerance_is_refused(tmp_path):
+    vertices, triangles = meshes.torus(columns=24, rows=12)
+    far = write(tmp_path / "far.ply", vertices.astype(np.float64) + 1e6, triangles)
+    code, _, err = command("decimate", far, tmp_path / "out.stl", "--tolerance", "1%")
+    assert code == 2 and "is less than the rounding when .stl is written; use .ply" in err
+    succeeded(command("decimate", far, tmp_path / "out.ply", "--tolerance", "1%"))
+
+
+def plain_ply(form):
+    vertices, faces = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.5)], [(0, 1, 2), (0, 2, 3)]
+    header = (
+        f"ply\nformat {form} 1.0\ncomment made by a test\nelement vertex 4\n"
+        "property float x\nproperty float y\nproperty float z\n"
+        "property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 2\nproperty list uchar int vertex_indices\n"
+        "end_header\n"
+    )
+    if form == "ascii":
+        rows = [f"{x} {y} {z} {10 * i} 2 3" for i, (x, y, z) in enumerate(vertices)] + [
+            f"3 {a} {b} {c}" for a, b, c in faces
+        ]
+        return (header + "\n".join(rows) + "\n").encode()
+    order = "<" if "little" in form else ">"
+    body = b"".join(struct.pack(order + "3f3B", *place, 10 * i, 2, 3) for i, place in enumerate(vertices))
+    return header.encode() + body + b"".join(struct.pack(order + "B3i", 3, *face) for face in faces)
+
+
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_all_forms_of_ply(tmp_path, form):
+    (tmp_path / "a.ply").write_bytes(plain_ply(form))
+    mesh = read(tmp_path / "a.ply")
+    assert mesh.vertices.dtype == np.float32 and mesh.vertices[3].tolist() == [0, 1, 0.5]
+    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
+    colours = mesh.attributes["colours"]
+    assert colours.values.dtype == np.uint8 and colours.values[:, 0].tolist() == [0, 10, 20, 30]
+
+
+def test_stl_as_text_is_welded_and_says_so(tmp_path):
+    vertices, triangles = meshes.box()
+    facets = "".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join(f"vertex {x} {y} {z}\n" for x, y, z in face)
+        + "endloop\nendfacet\n"
+        for face in vertices[triangles]
+    )
+    (tmp_path / "box.stl").write_text(f"solid box\n{facets.replace('vertex 0 ', 'vertex -0.0 ', 5)}endsolid box\n")
+    found = mesh_files.read(tmp_path / "box.stl")
+    assert found.counts == {"vertices": 8, "triangles": 12}
+    assert found.repairs[0]["message"] == "box.stl: 36 corners were welded to 8 vertices by position"
+    assert tolvol.solidity(found.objects[0].vertices, found.objects[0].triangles)["closed"]
+
+
+def test_welding_is_exact_and_keeps_the_order_of_the_file():
+    rng = np.random.default_rng(3)
+    for dtype in (np.float32, np.float64):
+        places = rng.integers(-3, 3, (500, 3)).astype(dtype) / 3
+        places[::7] = np.nextafter(places[::7], dtype(9))
+        places[::5] *= -1  # which leaves some -0.0
+        kept, number = welded(places)
+        assert np.array_equal(kept[number], places)
+        assert len(kept) == len({tuple(row) for row in (places + 0).tolist()})
+        assert (np.diff([number.tolist().index(i) for i in range(len(kept))]) > 0).all()
+
+
+# What formats hold ----------------------------------------------------------------------------------------------------
+
+
+def plate(split=False):
+    """A slightly curved plate whose attributes are linear in x and y, so that every interpolation of them is exact."""
+    vertices, triangles = meshes.plate(n=17, bump=0.01)
+    x, y = vertices[:, 0], vertices[:, 1]
+    colours = np.stack([40 + 100 * x, 200 - 100 * y, 50 + 0 * x], 1)
+    normals = np.tile(np.float32([0, 0, 1]), (len(vertices), 1))
+    values = {
+        "UVs": np.stack([x, y], 1).astype(np.float32),
+        "normals": normals,
+        "colours": np.rint(colours).astype(np.uint8),
+    }
+    index = triangles.astype(np.int32)
+    return (
+        vertices.astype(np.float32),
+        triangles,
+        {name: Attribute(rows, index, split) for name, rows in values.items()},
+    )
+
+
+@pytest.mark.parametrize("extension", [".glb", ".obj", ".ply"])
+@pytest.mark.parametrize("placement", ["optimal", "subset"])
+def test_uvs_normals_and_colours_follow_the_decimation(tmp_path, extension, placement):
+    vertices, triangles, attributes = plate()
+    source = write(tmp_path / f"in{extension}", vertices, triangles, **attributes)
+    target = tmp_path / f"out{extension}"
+    done = command("decimate", source, target, "--tolerance", "1%", "--placement", placement)
+    succeeded(done)
+    assert "without" not in done[1]
+    mesh = read(target)
+    assert len(mesh.triangles) < 100 and mesh.attributes.keys() == attributes.keys()
+    places = mesh.vertices[mesh.triangles]
+    at = {name: kept.values[kept.index] for name, kept in mesh.attributes.items()}
+    assert np.allclose(at["UVs"], places[..., :2], atol=1e-5)
+    assert np.allclose(at["normals"], [0, 0, 1], atol=1e-6)
+    scale = 255 if at["colours"].dtype == np.float32 else 1
+    wanted = np.stack([40 + 100 * places[..., 0], 200 - 100 * places[..., 1]], -1)
+    assert np.abs(scale * at["colours"][..., :2].astype(float) - wanted).max() < 1.6
+
+
+def test_seams_of_uvs_stay_seams(tmp_path):
+    vertices, triangles, attributes = plate(split=True)
+    uvs = attributes["UVs"]
+    left = (vertices[triangles][:, :, 0].mean(1) < vertices[:, 0].mean())[:, None]
+    moved = Attribute(
+        np.concatenate([uvs.values, uvs.values + 5]), np.where(left, uvs.index, uvs.index + len(vertices)), True
+    )
+    for extension in (".glb", ".obj", ".ply"):
+        source = write(tmp_path / f"in{extension}", vertices, triangles, UVs=moved)
+        before = read(source)
+        assert len(before.vertices) == len(vertices), "the vertices of the seam are one vertex again"
+        succeeded(command("decimate", source, tmp_path / f"out{extension}", "--tolerance", "1%"))
+        mesh = read(tmp_path / f"out{extension}")
+        at, places = mesh.attributes["UVs"], mesh.vertices[mesh.triangles]
+        shift = (at.values[at.index] - places[..., :2]).round(4)
+        assert (shift == shift[:, :1]).all() and {0.0, 5.0} == set(np.unique(shift)), extension
+        assert len(mesh.vertices) < len(at.values)
+
+
+def test_what_is_left_out_is_said_on_one_line(tmp_path):
+    vertices, triangles, attributes = plate()
+    source = write(tmp_path / "in.ply", vertices, triangles, **attributes)
+    code, out, _ = command("decimate", source, tmp_path / "out.stl", "--tolerance", "1%")
+    assert code == 0 and "note: out.stl is without normals, colours, UVs\n" in out
+    text = source.read_bytes().replace(
+        b"property float s\nproperty float t", b"property float quality\nproperty float age"
+    )
+    (tmp_path / "scalars.ply").write_bytes(text)
+    _, out, _ = command("decimate", tmp_path / "scalars.ply", tmp_path / "out.ply", "--tolerance", "1%")
+    assert "note: out.ply is without the numbers quality, age of its vertices\n" in out
+
+
+def test_texture_of_a_glb_file_stays(tmp_path):
+    vertices, triangles, attributes = plate()
+    source = write(tmp_path / "plain.glb", vertices, triangles, UVs=attributes["UVs"])
+    scene = trimesh.load_scene(source, process=False)
+    from PIL import Image
+
+    for mesh in scene.geometry.values():
+        image = Image.new("RGB", (2, 2), (1, 2, 250))
+        mesh.visual.material = trimesh.visual.material.PBRMaterial(baseColorTexture=image)
+    (tmp_path / "in.glb").write_bytes(scene.export(file_type="glb"))
+    succeeded(command("decimate", tmp_path / "in.glb", tmp_path / "out.glb", "--tolerance", "1%"))
+    (kept,) = trimesh.load_scene(tmp_path / "out.glb", process=False).geometry.values()
+    assert kept.visual.material.baseColorTexture.getpixel((0, 0)) == (1, 2, 250)
+    _, out, _ = command("decimate", tmp_path / "in.glb", tmp_path / "out.obj", "--tolerance", "1%")
+    assert "note: out.obj is without materials\n" in out
+
+
+def test_several_meshes_of_a_scene_are_one_at_their_places(tmp_path):
+    box = trimesh.Trimesh(*meshes.box(), process=False)
+    scene = trimesh.Scene()
+    scene.add_geometry(box)
+    mirror = np.diag([-2.0, 1, 1, 1])
+    mirror[:3, 3] = -5, 0, 0
+    scene.add_geometry(box, transform=mirror)
+    for extension in ("glb", "3mf"):
+        (tmp_path / f"two.{extension}").write_bytes(scene.export(file_type=extension))
+        mesh = read(tmp_path / f"two.{extension}")
+        facts = tolvol.solidity(mesh.vertices, mesh.triangles)
+        assert facts["shells"] == 2 and facts["volume"] == pytest.approx(3), "the mirrored box looks outwards, too"
+        assert mesh.vertices[:, 0].min() == pytest.approx(-7)
+        assert "the division into 2 meshes" in mesh.others
+
+
+def test_the_unit_of_a_3mf_file_stays(tmp_path):
+    source = scan(tmp_path / "in.3mf")
+    with zipfile.ZipFile(source) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(source, "w") as archive:
+        for name, content in files.items():
+            archive.writestr(name, content.replace(b'unit="millimeter"', b'unit="inch"'))
+    succeeded(command("decimate", source, tmp_path / "out.3mf", "--tolerance", "1%"))
+    with zipfile.ZipFile(tmp_path / "out.3mf") as archive:
+        assert b'unit="inch"' in archive.read("3D/3dmodel.model")
+
+
+def test_a_level_of_a_glb_file_has_its_deviation(tmp_path):
+    code, out, err = command("decimate", scan(tmp_path / "in.ply"), tmp_path / "out.glb", "--lod", "0.5%,2%")
+    assert (code, err) == (0, "")
+    for level, line in zip(range(2), out.splitlines()[-2:]):
+        data = (tmp_path / f"out_LOD{level}.glb").read_bytes()
+        size = struct.unpack_from("<I", data, 12)[0]
+        (node,) = [node for node in json.loads(data[20 : 20 + size])["nodes"] if "mesh" in node]
+        assert line.startswith(f"out_LOD{level}.glb: ") and node["extras"]["geometricError"] > 0
+
+
+def test_joining_leaves_out_what_not_all_have():
+    vertices, triangles, attributes = plate()
+    one = Mesh("one", vertices, triangles, dict(attributes))
+    other = Mesh("other", vertices + np.float32(3), triangles, {"UVs": attributes["UVs"]})
+    whole = joined("both", [one, other])
+    assert whole.attributes.keys() == {"UVs"} and "colours, which not all of its meshes have" in whole.others
+    assert np.array_equal(
+        whole.attributes["UVs"].values[whole.attributes["UVs"].index][len(triangles) :],
+        attributes["UVs"].values[triangles],
+    )
+    assert weld(whole) is whole
+
+
+# Polygons ---------------------------------------------------------------------------------------------------------------
+
+
+def area(points, found):
+    one, two, three = (points[found[:, k]] for k in range(3))
+    return np.cross(two - one, three - one)[:, 2] / 2
+
+
+@pytest.mark.parametrize(
+    "outline",
+    [
+        [(0, 0), (2, 0), (2, 2), (0, 2)],
+        [(0, 0), (4, -1), (1, 1), (-1, 4)],
+        [(0, 0), (4, 0), (0, 4), (1, 1)][::-1],
+        [(0, 0), (4, 0), (4, 3), (2, 1), (0, 3)],
+        [(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)],
+        [(0, 0), (1, 0), (2, 0), (2, 2), (0, 2)],
+    ],
+)
+def test_polygons_with_dents_are_covered_once(outline):
+    points = np.array([(*place, 0.0) for place in outline])
+    for turned in (points, points[::-1]):
+        found = polygons.triangulated(turned, np.arange(len(points)), np.array([len(points)]))
+        x, y, _ = turned.T
+        whole = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
+        areas = area(turned, found)
+        assert len(found) == len(points) - 2 and areas.sum() == pytest.approx(whole)
+        assert (areas * np.sign(whole) > -1e-12).all(), "no triangle is turned over"
+
+
+def test_polygons_are_said_to_be_cut(tmp_path):
+    (tmp_path / "cube.off").write_text(CUBE)
+    found = mesh_files.read(tmp_path / "cube.off")
+    assert found.counts["triangles"] == 12
+    assert found.repairs[0]["message"] == "cube.off: 6 faces with more than three corners were cut into triangles"
+    assert tolvol.solidity(found.objects[0].vertices, found.objects[0].triangles)["volume"] == pytest.approx(1)
+    mixed = CUBE.replace("8 6 12", "8 7 12").replace("4 3 2 1 0\n", "3 3 2 1\n3 3 1 0\n")
+    (tmp_path / "mixed.off").write_text(mixed)
+    assert mesh_files.read(tmp_path / "mixed.off").counts["triangles"] == 12
+    (tmp_path / "two.off").write_text(CUBE.replace("4 3 2 1 0", "2 3 2"))
+    messages = [repair["message"] for repair in mesh_files.read(tmp_path / "two.off").repairs]
+    assert "two.off: 1 faces with fewer than three corners were left out" in messages
+
+
+# Damage -----------------------------------------------------------------------------------------------------------------
+
+
+def damaged(tmp_path):
+    """Yields (name of a damaged file, a part of the message)."""
+    whole = {}
+    for extension in ALL:
+        whole[extension] = scan(tmp_path / f"whole{extension}").read_bytes()
+    early = {
+        ".3mf": "it is no zip archive",
+        ".glb": "the file is truncated",
+        ".off": "the file ends early: it has",
+        ".ply": "the file ends inside its list of face elements",
+        ".stl": "it is truncated",
+    }
+    for extension, words in early.items():
+        yield f"early{extension}", whole[extension][: len(whole[extension]) * 3 // 4], words
+    ply = whole[".ply"]
+    body = ply.index(b"end_header\n") + 11
+    yield "fewer.ply", ply.replace(b"element face 2304", b"element face 2303"), "the numbers in its header are wrong"
+    yield "more.ply", ply.replace(b"element face 2304", b"element face 9999"), "ends inside its list of face"
+    yield (
+        "many.ply",
+        ply.replace(b"element vertex 1152", b"element vertex 1153"),
+        "face 1 has no vertices",
+    )
+    nan = struct.pack("<f", float("nan"))
+    yield "nan.ply", ply[: body + 12 * 41 + 4] + nan + ply[body + 12 * 41 + 8 :], "vertex 42 is not finite"
+    stl = whole[".stl"]
+    yield "nan.stl", stl[: 84 + 50 * 2 + 12] + nan + stl[84 + 50 * 2 + 16 :], "vertex 7 is not finite"
+    off = whole[".off"].split(b"\n")
+    yield "nan.off", b"\n".join([*off[:9], b"0 inf 0", *off[10:]]), "vertex 8 is not finite"
+    yield "word.off", b"\n".join([*off[:9], b"0 x 0", *off[10:]]), "vertex 8 is not three numbers (0 x 0)"
+    yield "index.off", whole[".off"].replace(b"\n3 0 ", b"\n3 7777 ", 1), "names vertex 7777"
+    yield "nan.obj", whole[".obj"].replace(b"v ", b"v nan 0 0\nv ", 1), "vertex 1 is not finite"
+    yield (
+        "none.ply",
+        ply[:body].replace(b"element face 2304", b"element face 0") + ply[body : body + 12 * 1152],
+        "no faces",
+    )
+    yield "none.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "the file has no faces"
+    yield "empty.glb", b"", "the file is empty"
+    yield "other.ply", b"solid nothing", "this is not a PLY file"
+    yield "other.xyz", b"0 0 0", "unknown extension .xyz; the known ones are .3mf .glb .obj .off .ply .stl"
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as made:
+        made.writestr("3D/3dmodel.model", "<model><resources>")
+    yield "xml.3mf", archive.getvalue(), "trimesh cannot read it"
+    glb = whole[".glb"]
+    size = struct.unpack_from("<I", glb, 12)[0]
+    document = json.loads(glb[20 : 20 + size]) | {"extensionsRequired": ["KHR_draco_mesh_compression"]}
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    rest = glb[20 + size :]
+    draco = struct.pack("<4sIIII", b"glTF", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest
+    yield "draco.glb", draco, "save it again without compression"
+
+
+def test_damage_is_one_line_that_names_the_file(tmp_path):
+    for name, data, words in damaged(tmp_path):
+        (tmp_path / name).write_bytes(data)
+        try:
+            mesh_files.read(tmp_path / name)
+        except Refused as error:
+            said = str(error)
+        else:
+            pytest.fail(f"{name} was read")
+        assert said.startswith(f"{tmp_path / name}: ") and words in said and "\n" not in said, (name, said)
