@@ -291,7 +291,7 @@ def area(points, found):
 def test_polygons_with_dents_are_covered_once(outline):
     points = np.array([(*place, 0.0) for place in outline])
     for turned in (points, points[::-1]):
-        found = polygons.triangulated(turned, np.arange(len(points)), np.array([len(points)]))
+        found, _ = polygons.triangulated(turned, np.arange(len(points)), np.array([len(points)]))
         x, y, _ = turned.T
         whole = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
         areas = area(turned, found)

@@ -24,6 +24,9 @@ class Mesh:
     vertices: np.ndarray
     triangles: np.ndarray
     attributes: dict = field(default_factory=dict)  # by the names "UVs", "normals" and "colours"
+    polygons: np.ndarray | None = (
+        None  # (m,) int32, the face of the file that each triangle is part of; None: each is one
+    )
     material: object = None  # of trimesh, with the textures of a .glb file
     unit: str = ""  # of a .3mf file
     deviation: float | None = None  # of a level of detail, as a length
@@ -86,8 +89,7 @@ def joined(name, meshes):
         np.concatenate([mesh.vertices for mesh in meshes]),
         np.concatenate([mesh.triangles + first for mesh, first in zip(meshes, firsts)]).astype(np.int32),
         attributes,
-        None,
-        meshes[0].unit,
+        unit=meshes[0].unit,
         others=(*others, f"the division into {len(meshes):,} meshes"),
     )
 

@@ -72,7 +72,7 @@ def read(path):
 
 def surface_of(mesh):
     corners = np.arange(3 * len(mesh.triangles), dtype=np.int32).reshape(-1, 3)
-    polygons = np.arange(len(mesh.triangles), dtype=np.int32)
+    polygons = np.arange(len(mesh.triangles), dtype=np.int32) if mesh.polygons is None else mesh.polygons
     return Surface(MeshArrays(mesh.vertices, mesh.triangles, corners, polygons), np.eye(4))
 
 
@@ -109,7 +109,7 @@ def decimate(mesh, reference, tolerance, target, options, largest_perimeter):
         task.close_holes = hole_options(largest_perimeter, options.max_normal_angle)
     arrays, _, result, run = followed(mesh.name, task.run, package.module.Progress())
     mesh.attributes = carried(mesh, arrays.corners, result)
-    mesh.vertices, mesh.triangles = result.vertices, result.triangles
+    mesh.vertices, mesh.triangles, mesh.polygons = result.vertices, result.triangles, None
     holds = _HOLDS[extension_of(options.output)]
     lost = [*mesh.others, *(name for name in mesh.attributes if name not in holds)]
     if mesh.material is not None and extension_of(options.output) != ".glb":

@@ -21,7 +21,7 @@ def read(name, extension, data):
     """Returns (Mesh, [remarks about what was done to the faces]). Raises Refused, which does not name the file."""
     content = _read(extension, data)
     corners = content.corners.astype(np.int32)
-    places = triangulated(content.vertices, corners, content.sizes)
+    places, polygons = triangulated(content.vertices, corners, content.sizes)
     triangles, remarks = corners[places], []
     sizes = np.broadcast_to(content.sizes, content.faces) if isinstance(content.sizes, int) else content.sizes
     if few := int((sizes < 3).sum()):
@@ -29,7 +29,7 @@ def read(name, extension, data):
     if more := int((sizes > 3).sum()):
         remarks.append((more, f"{more:,} faces with more than three corners were cut into triangles"))
     attributes, others = _attributes(content, triangles, places)
-    mesh = Mesh(name, content.vertices, triangles, attributes, others=(*content.others, *others))
+    mesh = Mesh(name, content.vertices, triangles, attributes, polygons, others=(*content.others, *others))
     # A file with a vertex for each UV has its seams open, and a soup has nothing but seams.
     if extension == ".stl" or "UVs" in attributes:
         before = len(mesh.vertices)

@@ -5,7 +5,7 @@ import numpy as np
 
 
 def triangulated(vertices, corners, sizes):
-    """Returns (m, 3): the places in `corners` of the corners of triangles that cut up all polygons.
+    """Returns (m, 3), the places in `corners` of the corners of triangles that cut up all polygons, and (m,), their polygons.
 
     corners: the vertex at each corner of the polygons, one polygon after another; sizes: the number of corners of each, or
     one number for all. A polygon with fewer than three corners has no triangles. A quad is cut from its first corner to its
@@ -13,7 +13,8 @@ def triangulated(vertices, corners, sizes):
     """
     if isinstance(sizes, int):
         if sizes == 3:
-            return np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+            triangles = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+            return triangles, np.arange(len(triangles), dtype=np.int32)
         sizes = np.full(len(corners) // max(sizes, 1), sizes)
     starts = np.cumsum(sizes) - sizes
     parts, places = [], []
@@ -28,8 +29,9 @@ def triangulated(vertices, corners, sizes):
         parts.append(at[_polygon(vertices[corners[at]].astype(np.float64))])
         places.append(np.full(len(parts[-1]), polygon))
     # The triangles stand in the order of the polygons.
-    order = np.argsort(np.concatenate(places), kind="stable")
-    return np.concatenate(parts)[order].astype(np.int32)
+    of = np.concatenate(places).astype(np.int32)
+    order = np.argsort(of, kind="stable")
+    return np.concatenate(parts)[order].astype(np.int32), of[order]
 
 
 def _quads(vertices, corners, starts):

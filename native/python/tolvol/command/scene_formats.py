@@ -82,7 +82,7 @@ def _mesh(name, found, matrix, extension):
             kept[kind] = Attribute(values, triangles[:, order])
     if not identity:
         vertices = vertices.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-    return Mesh(name, vertices, triangles[:, order], kept, getattr(found.visual, "material", None))
+    return Mesh(name, vertices, triangles[:, order], kept, material=getattr(found.visual, "material", None))
 
 
 def _values(found):
