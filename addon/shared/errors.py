@@ -4,7 +4,7 @@
 Each message names the object and, where there is one, the remedy.
 """
 
-# Every message of NotProved begins with these words: blender_scripts/decimate.py recognises the message by them.
+# Every message of NotProved begins with these words: blender_scripts/blender_files.py recognises the message by them.
 NOT_PROVED = "Not proved"
 
 

@@ -58,6 +58,9 @@ openmesh base geometry field check
 python base geometry gl field check topology decimation motion repair measure picture
 EOF
   )
+  # What the add-on shares with the command knows neither Blender nor the rest of the add-on, and the package not the add-on.
+  crossing="$crossing$(grep -rnE '^ *(import|from) +(bpy|bmesh|mathutils|addon)|^ *from \.\.\.' addon/shared native/python/tolvol |
+    grep -vE 'from \.\.\.shared')"
   [ -z "$crossing" ] || { echo "these may not be included here:" && echo "$crossing" && return 1; }
 }
 
@@ -80,14 +83,21 @@ assert tolvol.__file__.startswith(sys.prefix), tolvol.__file__
 vertices, triangles = meshes.torus()
 result = tolvol.decimate(vertices, triangles, tolvol.ToleranceVolume(vertices, triangles, 0.03))
 assert len(result.triangles) < 1000
-'
+from pathlib import Path
+from tolvol.command import plain_formats
+from tolvol.command.mesh import Mesh
+plain_formats.write(Path("build/venv/torus.ply"), Mesh("torus", vertices, triangles))
+' &&
+    # A .ply file needs no other package than NumPy.
+    "$venv/bin/tolvol" decimate build/venv/torus.ply build/venv/small.ply --tolerance 1% >/dev/null &&
+    "$venv/bin/tolvol" check build/venv/small.ply build/venv/torus.ply --tolerance 1%
 }
 
 types() {
   # The installed package brings its types along, so that a missing file of it is found here too.
   rm -rf build/examples
   "$venv/bin/python" tests/style/examples.py build/examples &&
-    "$venv/bin/mypy" --strict --cache-dir build/mypy --package tolvol &&
+    "$venv/bin/mypy" --strict --cache-dir build/mypy --module tolvol &&
     "$venv/bin/mypy" --strict --cache-dir build/mypy build/examples/*.py
 }
 

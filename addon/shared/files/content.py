@@ -43,6 +43,8 @@ class Content:
 
 def require_finite(coordinates):
     """coordinates: (n, 3). A number beyond float32 counts as infinite, because Blender's readers store float32."""
+    if not len(coordinates) or -_LARGEST <= coordinates.min() and coordinates.max() <= _LARGEST:
+        return
     bad = np.flatnonzero(~(np.abs(coordinates) <= _LARGEST).all(1))
     if len(bad):
         shown = ", ".join(f"{value:g}" for value in coordinates[bad[0]])

@@ -16,8 +16,12 @@ def read(data, attributes=False):
         raise Refused("this is not an OBJ file: it holds binary data")
     text = re.sub(rb"#[^\r\n]*", b"", data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" "))
     lines = re.findall(rb"^[ \t]*v[ \t]+([^\r\n]*)", text, re.MULTILINE)
-    firsts = [tuple(line.split()[:3]) for line in lines]
-    flat = numbers(b" ".join(word for words in firsts for word in words), np.float64)
+    # Most files have three numbers on each line. What else stands there is looked at only if there are more or fewer.
+    flat = numbers(b" ".join(lines), np.float64)
+    firsts = []
+    if flat is None or len(flat) != 3 * len(lines):
+        firsts = [tuple(line.split()[:3]) for line in lines]
+        flat = numbers(b" ".join(word for words in firsts for word in words), np.float64)
     if flat is None or len(flat) != 3 * len(lines):
         for number, words in enumerate(firsts, 1):
             values = numbers(b" ".join(words), np.float64)
@@ -25,11 +29,11 @@ def read(data, attributes=False):
                 raise Refused(f"vertex {number} is not three numbers ({b' '.join(words).decode(errors='replace')})")
     require_finite(flat.reshape(-1, 3))
     faces = re.findall(rb"^[ \t]*f[ \t]+([^\r\n]*)", text, re.MULTILINE)
-    corners = [re.sub(rb"/\S*", b"", face) for face in faces]
-    sizes = np.array([len(face.split()) for face in corners], np.int64)
-    indices = numbers(b" ".join(corners), np.int64)
+    corners = re.sub(rb"/\S*", b"", b"\n".join(faces))
+    sizes = np.array([len(face.split()) for face in faces], np.int64)
+    indices = numbers(corners, np.int64)
     if indices is None or len(indices) != sizes.sum() or (sizes == 0).any():
-        for number, face in enumerate(corners, 1):
+        for number, face in enumerate(corners.split(b"\n"), 1):
             values = numbers(face, np.int64)
             if values is None or not len(values):
                 raise Refused(f"face {number} is not a list of vertices ({face.decode(errors='replace').strip()})")
@@ -50,7 +54,7 @@ def _same(sizes):
 
 def _attributes(text, lines, faces, sizes):
     found, others = {}, []
-    if all(len(line.split()) == 6 for line in lines):
+    if lines and len(lines[0].split()) == 6 and all(len(line.split()) == 6 for line in lines):
         words = [word for line in lines for word in line.split()[3:]]
         colours = numbers(b" ".join(words), np.float64)
         if colours is not None and len(colours) == 3 * len(lines):

@@ -16,7 +16,7 @@ def read(data):
     """Returns the Content of a file: a soup, in which each triangle has three vertices of its own."""
     count = struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else 0
     if len(data) == 84 + count * _STL_TRIANGLE.itemsize:
-        return _soup(np.frombuffer(data, _STL_TRIANGLE, count, 84)["corners"].reshape(-1, 3))
+        return _soup(np.ascontiguousarray(np.frombuffer(data, _STL_TRIANGLE, count, 84)["corners"]).reshape(-1, 3))
     corners = re.findall(rb"^[ \t]*vertex[ \t]+([^\r\n]*)", data, re.MULTILINE)
     faces = len(re.findall(rb"^[ \t]*endfacet", data, re.MULTILINE))
     if not data.lstrip().startswith(b"solid") or not faces or len(corners) != 3 * faces:

@@ -26,29 +26,47 @@ def read(data):
         raise Refused(f"the file ends early: it has {len(lines) - 1:,} of the {count + faces:,} lines that it declares")
     if len(lines) - 1 > count + faces:
         raise Refused(f"it has {len(lines) - 1:,} lines of vertices and faces, but declares only {count + faces:,}")
-    rows = [line.split()[:3] for line in lines[1 : count + 1]]
-    values = numbers(b" ".join(word for row in rows for word in row), np.float64)
-    if values is None or len(values) != 3 * count:
-        bad = next(
-            i for i, row in enumerate(rows) if (one := numbers(b" ".join(row), np.float64)) is None or len(one) != 3
-        )
-        raise Refused(f"vertex {bad + 1} is not three numbers ({b' '.join(rows[bad]).decode(errors='replace')})")
-    vertices = values.reshape(-1, 3)
+    vertices, more = _vertices(lines[1 : count + 1])
     require_finite(vertices)
-    sizes, corners, more = [], [], False
-    for number, line in enumerate(lines[count + 1 :], 1):
-        words = numbers(line, np.float64)
-        size = -1 if words is None or not len(words) else int(words[0])
-        if size < 0 or len(words) <= size:
-            raise Refused(f"face {number} is not a list of vertices ({line.decode(errors='replace').strip()})")
-        sizes.append(size)
-        corners.append(words[1 : size + 1].astype(np.int64))
-        more |= len(words) > size + 1
-    sizes, corners = np.array(sizes, np.int64), np.concatenate([np.zeros(0, np.int64), *corners])
+    corners, sizes, further = _faces(lines[count + 1 :])
     bad = np.flatnonzero((corners < 0) | (corners >= count))
     if len(bad):
         face = np.searchsorted(np.cumsum(sizes), bad[0], "right")
         raise Refused(f"face {face + 1} names vertex {corners[bad[0]]}, but there are only {count} vertices")
     same = int(sizes[0]) if len(sizes) and (sizes == sizes[0]).all() else sizes
-    more |= any(len(line.split()) > 3 for line in lines[1 : count + 1])
-    return Content(faces, vertices, corners, same, others=("what its lines hold besides positions and faces",) * more)
+    others = ("what its lines hold besides positions and faces",) * (more or further)
+    return Content(faces, vertices, corners, same, others=others)
+
+
+def _vertices(lines):
+    """Returns ((n, 3) float64, whether there is more on the lines)."""
+    values = numbers(b" ".join(lines), np.float64)
+    if values is not None and len(values) == 3 * len(lines):
+        return values.reshape(-1, 3), False
+    rows = [line.split()[:3] for line in lines]
+    values = numbers(b" ".join(word for row in rows for word in row), np.float64)
+    if values is None or len(values) != 3 * len(lines):
+        for number, row in enumerate(rows, 1):
+            if (one := numbers(b" ".join(row), np.float64)) is None or len(one) != 3:
+                raise Refused(f"vertex {number} is not three numbers ({b' '.join(row).decode(errors='replace')})")
+    return values.reshape(-1, 3), True
+
+
+def _faces(lines):
+    """Returns (the vertices of one face after another, the number of corners of each, whether there is more on the lines)."""
+    widths = np.array([len(line.split()) for line in lines], np.int64)
+    words = numbers(b" ".join(lines), np.float64)
+    begins = np.cumsum(widths) - widths
+    if words is None or len(words) != widths.sum():  # A line holds something that is no number.
+        words = np.full(widths.sum(), -1.0)
+        for line, begin, width in zip(lines, begins, widths):
+            if (one := numbers(line, np.float64)) is not None and len(one) == width:
+                words[begin : begin + width] = one
+    sizes = words[begins].astype(np.int64)
+    bad = np.flatnonzero((sizes < 0) | (widths <= sizes))
+    if len(bad):
+        line = lines[bad[0]].decode(errors="replace").strip()
+        raise Refused(f"face {bad[0] + 1} is not a list of vertices ({line})")
+    within = np.arange(len(words)) - np.repeat(begins, widths)
+    corners = words[(within > 0) & (within <= np.repeat(sizes, widths))].astype(np.int64)
+    return corners, sizes, bool((widths > sizes + 1).any())
