@@ -70,5 +70,9 @@ def decimate(ob, reference, tolerance, target, options, largest_perimeter):
     return json.loads(ob.tolvol.last_run)
 
 
+def followed(_title, work):
+    return work(None)
+
+
 def note_deviation(ob, length):
     ob[GEOMETRIC_ERROR] = length

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """tolvol decimate, report and check as a user runs them: files, exit codes, messages, signals and the terminal."""
 
+import contextlib
 import csv
 import json
 import os
@@ -8,6 +9,7 @@ import pty
 import re
 import signal
 import subprocess
+import sys
 import time
 
 import numpy as np
@@ -238,26 +240,45 @@ def test_a_signal_ends_it_within_half_a_second_with_nothing_written(tmp_path, nu
     assert [path.name for path in tmp_path.iterdir()] == ["in.ply"]
 
 
-def test_a_bar_on_a_terminal_and_none_in_a_pipe(tmp_path):
-    vertices, triangles = meshes.torus(columns=300, rows=150, noise=0.004)
-    source = write(tmp_path / "in.ply", vertices.astype(np.float32), triangles)
-    asked = "decimate", source, tmp_path / "out.ply", "--tolerance", "0.1%"
+def on_a_terminal(*arguments, until=None):
+    """Runs the command with stderr on a terminal. Returns (exit code, stdout, what the terminal was sent).
+
+    until: what the terminal is to show before SIGINT ends the command, or None.
+    """
     terminal, end = pty.openpty()
-    process = subprocess.Popen(words(*asked), stdout=subprocess.PIPE, stderr=end, env=ENVIRONMENT | {"TERM": "xterm"})
+    environment = ENVIRONMENT | {"TERM": "xterm"}
+    process = subprocess.Popen(words(*arguments), stdout=subprocess.PIPE, stderr=end, env=environment)
     os.close(end)
     shown = b""
-    while True:
-        try:
-            chunk = os.read(terminal, 4096)
-        except OSError:  # The other end is closed.
-            break
-        shown += chunk
-        if not chunk:
-            break
-    out = process.communicate(timeout=60)[0].decode()
-    assert process.returncode == 0 and LINE.fullmatch(out.splitlines()[-1])
+    with contextlib.suppress(OSError):  # The other end is closed.
+        while chunk := os.read(terminal, 4096):
+            shown += chunk
+            if until and until in shown:
+                process.send_signal(signal.SIGINT)
+                until = None
+    return process.wait(60), process.stdout.read().decode(), shown
+
+
+def test_a_bar_on_a_terminal_and_none_in_a_pipe(torus, tmp_path):
+    vertices, triangles = meshes.torus(columns=200, rows=100, noise=0.004)
+    source = write(tmp_path / "in.ply", vertices.astype(np.float32), triangles)
+    asked = "decimate", source, tmp_path / "out.ply", "--tolerance", "0.4%"
+    code, out, shown = on_a_terminal(*asked)
+    assert code == 0 and LINE.fullmatch(out.splitlines()[-1])
     assert b"decimating" in shown and b"triangles left" in shown and b"%" in shown
-    assert command(*asked)[2] == ""
+    code, out, shown = on_a_terminal(*asked, "--effort", "thorough", until=b"decimating")
+    assert code == 130 and b"ended by SIGINT" in shown
+    hidden, visible = (shown.rindex(word) for word in (b"\x1b[?25l", b"\x1b[?25h"))
+    assert hidden < visible, "the cursor is visible again"
+    assert command("decimate", torus, tmp_path / "out.ply", "--tolerance", "1%")[2] == ""
+
+
+def test_a_missing_package_is_named(tmp_path):
+    (tmp_path / "in.glb").write_bytes(b"glTF")
+    code = "import sys; sys.modules['trimesh'] = None; from tolvol.command import run; sys.exit(run(sys.argv[1:]))"
+    asked = [sys.executable, "-c", code, "check", tmp_path / "in.glb", tmp_path / "in.glb", "--tolerance", "1%"]
+    done = subprocess.run(asked, capture_output=True, text=True, env=ENVIRONMENT)
+    refused((done.returncode, done.stdout, done.stderr), "the package trimesh is missing: pip install trimesh")
 
 
 def test_help_has_three_examples_of_every_command():

@@ -14,6 +14,7 @@ they exchange have a `name`, which may be set.
     decimate(object, reference, tolerance, target, options, largest_perimeter)
                                decimates an object and returns the run (proof/report.py). reference: an object, or the same one;
                                target: a number of triangles, or None; largest_perimeter: 0 for no limit
+    followed(title, work)      work(progress), with what the Progress of the package says shown on a terminal, or progress None
     note_deviation(object, length)    leaves the deviation of a level of detail with the object, for formats that hold it
     write(path, objects, folder)      writes a file; folder: where it will be moved to. Raises OSError
 """
@@ -334,8 +335,11 @@ class Command:
         return [target for target in (*of_outputs, self.report) if target]
 
     def _certify(self, surface, reference, tolerance, kept):
+        threads = self.options.threads
         # Where the file holds the result bit for bit, the measurements of the decimation are measurements of the file.
-        return certify(surface, reference, tolerance, kept, self.options.threads, again=False)
+        return self.files.followed(
+            "certifying", lambda progress: certify(surface, reference, tolerance, kept, threads, progress, again=False)
+        )
 
     def _draw(self, output, result, reference, tolerance, size):
         surfaces = [(surface.world(), surface.arrays.triangles) for surface in (result, reference)]

@@ -120,7 +120,8 @@ def _measure(options, files, staged):
     tolerance = in_units(options.tolerance, size) if options.tolerance else None
     lengths = [in_units(bound, size) for bound in options.bounds]
     given_in = "percent" if options.tolerance and options.tolerance[1] else "length"
-    result = deviation.deviation(*surfaces, size, tolerance, lengths, options.unit, options.threads, given_in=given_in)
+    asked = (*surfaces, size, tolerance, lengths, options.unit, options.threads)
+    result = files.followed("measuring", lambda progress: deviation.deviation(*asked, progress, given_in=given_in))
     date = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
     result |= {"a": named[0], "b": named[1], "date": date}
     for label, name in (("A", "a"), ("B", "b")):

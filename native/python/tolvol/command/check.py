@@ -38,7 +38,10 @@ def check(options):
     if tolerance > size:
         raise Stop(f"--tolerance: {tolerance:.6g} is more than the size of the reference, {size:.6g}")
     pairs = [(each.world(), each.arrays.triangles) for each in (surface, reference)]
-    found = Verdict(tolerance, *measure.both_ways(*pairs, tolerance, options.threads), two_sided=not options.one_sided)
+    ways = mesh_files.followed(
+        "measuring", lambda progress: measure.both_ways(*pairs, tolerance, options.threads, progress)
+    )
+    found = Verdict(tolerance, *ways, two_sided=not options.one_sided)
     print(
         f"{found.word}: tolerance {100 * tolerance / size:.4g} % = {tolerance:.3g}, "
         f"A within {report.percent(found.forward.upper, size)} of B, B within {report.percent(found.backward.upper, size)} "

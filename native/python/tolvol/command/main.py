@@ -8,7 +8,7 @@ from ..shared.command import decimate_options, report
 from ..shared.command.arguments import Parser, Stop
 from ..shared.command.decimate import decimate
 from ..shared.command.process import end_on_signals, exit_code
-from . import batch, check, mesh_files
+from . import batch, check, mesh_files, progress_bar
 
 _DESCRIPTION = """\
 Decimates and measures mesh files within a tolerance that is proved, without Blender. tolvol COMMAND --help tells the options of
@@ -76,6 +76,12 @@ def _all_examples():
     return "Examples:\n" + "\n".join(examples.splitlines()[0] for examples in _EXAMPLES.values())
 
 
+def _end(number):
+    """Ends what a signal with this number leaves behind."""
+    batch.end(number)
+    progress_bar.end()
+
+
 def run(words):
     """Runs the command with these words and returns its exit code."""
     made = parser()
@@ -83,7 +89,7 @@ def run(words):
         import argcomplete
 
         argcomplete.autocomplete(made)
-    end_on_signals("tolvol", before=batch.end)
+    end_on_signals("tolvol", before=_end)
     name = next((f"tolvol {word}" for word in words[:1] if word in _EXAMPLES), "tolvol")
 
     def work():

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..shared import package
 from ..shared.decimation import Task, hole_options
 from ..shared.errors import Refused
 from ..shared.surface import MeshArrays, Surface
@@ -107,7 +106,7 @@ def decimate(mesh, reference, tolerance, target, options, largest_perimeter):
         task.uvs = uvs.values[uvs.index.ravel()]
     if options.close_holes:
         task.close_holes = hole_options(largest_perimeter, options.max_normal_angle)
-    arrays, _, result, run = followed(mesh.name, task.run, package.module.Progress())
+    arrays, _, result, run = followed(mesh.name, task.run)
     mesh.attributes = carried(mesh, arrays.corners, result)
     mesh.vertices, mesh.triangles, mesh.polygons = result.vertices, result.triangles, None
     holds = _HOLDS[extension_of(options.output)]

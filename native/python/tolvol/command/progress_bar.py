@@ -2,17 +2,21 @@
 """Shows how far a native call is, on a terminal."""
 
 import contextlib
+import os
 import sys
 import threading
+
+from ..shared import package
 
 _LOOK = 0.1  # seconds from one look at the progress to the next
 
 
-def followed(title, work, progress):
-    """Returns work(progress). While it runs, a bar on stderr shows its stage, if that is a terminal.
+def followed(title, work):
+    """Returns work(progress), with a Progress of the package.
 
-    progress: a Progress of the package; title: what is worked on.
+    While it runs, a bar on stderr shows the title and the stage, if stderr is a terminal.
     """
+    progress = package.module.Progress()
     if not sys.stderr.isatty():
         return work(progress)
     outcome = []
@@ -33,6 +37,12 @@ def followed(title, work, progress):
     if error is not None:
         raise error
     return result
+
+
+def end():
+    """Leaves the terminal as it was: a signal ends the process while a bar may be shown, which hides the cursor."""
+    if sys.stderr.isatty():
+        os.write(sys.stderr.fileno(), b"\r\x1b[K\x1b[?25h")
 
 
 @contextlib.contextmanager
