@@ -15,9 +15,9 @@ import addon
 from addon import native
 from addon.shared.command import arguments, process
 from addon.shared.command.arguments import (  # noqa: F401
+    NOT_PROVED,
     USAGE,
     Stop,
-    above_zero,
     in_units,
     length,
     require_folder,

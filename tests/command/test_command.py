@@ -196,6 +196,7 @@ def test_check_passes_and_fails_in_both_directions(torus, tmp_path):
     part = write(tmp_path / "part.stl", mesh.vertices, mesh.triangles[:1000])
     code, out, _ = command("check", part, torus, "--tolerance", "0.01")
     assert code == 3 and "(the reference)" in out
+    assert out.startswith("note: part.stl: 3,000 corners were welded to ")
     code, out, _ = command("check", part, torus, "--tolerance", "0.01", "--one-sided")
     assert code == 0 and "(one way, proved)" in out
 
@@ -204,7 +205,9 @@ def test_report_writes_every_format_and_requires(torus, tmp_path):
     box = write(tmp_path / "box.ply", *(part.astype(np.float32) for part in meshes.box()))
     files = [tmp_path / f"r.{extension}" for extension in ("html", "csv", "json")]
     asked = [word for file in files for word in ("--report", file)]
-    code, out, err = command("report", torus, box, "--tolerance", "1%", "--bounds", "2%,3%", *asked)
+    code, out, err = command(
+        "report", torus, box, "--tolerance", "1%", "--bounds", "2%,3%", "--require", "closed,oriented", *asked
+    )
     assert (code, err) == (0, "") and out.count("largest") == 2
     document = json.loads(files[2].read_text())
     pair = [(mesh.vertices.astype(np.float64), mesh.triangles) for mesh in map(read, (torus, box))]
@@ -215,10 +218,10 @@ def test_report_writes_every_format_and_requires(torus, tmp_path):
     assert document["verdict"] == "FAIL" and len(document["forward"]["beyond"]) == 3
     assert {row["quantity"] for row in csv.DictReader(files[1].open())} >= {"largest", "mean", "verdict"}
     assert "<svg" in files[0].read_text() and "scan.ply" in files[0].read_text()
-    code, _, err = command("report", torus, box, "--require", "closed,oriented")
-    assert (code, err) == (0, "")
-    sheet = write(tmp_path / "sheet.ply", read(torus).vertices, read(torus).triangles[:50])
-    refused(command("report", sheet, torus, "--require", "closed"), "A is not closed (1 boundary loop)", code=3)
+    sheet = write(tmp_path / "sheet.stl", read(box).vertices, read(box).triangles[:4])
+    done = command("report", sheet, box, "--require", "closed")
+    refused(done, "A is not closed (1 boundary loop)", code=3)
+    assert "note: sheet.stl: 12 corners were welded to " in done[1]
 
 
 # Signals and the terminal -----------------------------------------------------------------------------------------------

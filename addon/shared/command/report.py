@@ -116,6 +116,8 @@ def _measure(options, files, staged):
         found = files.read(path)
         surfaces.append(joined([files.surface_of(ob) for ob in found.objects]))
         named.append({"file": path, **found.counts})
+        for repair in found.repairs:
+            print(f"note: {repair['message']}")
     size = surfaces[1].size()
     tolerance = in_units(options.tolerance, size) if options.tolerance else None
     lengths = [in_units(bound, size) for bound in options.bounds]

@@ -32,7 +32,10 @@ def check(options):
     began = time.perf_counter()
     for path in (options.a, options.b):
         mesh_files.extension_of(path)
-    surface, reference = (mesh_files.surface_of(mesh_files.read(path).objects[0]) for path in (options.a, options.b))
+    files = [mesh_files.read(path) for path in (options.a, options.b)]
+    for repair in (repair for file in files for repair in file.repairs):
+        print(f"note: {repair['message']}")
+    surface, reference = (mesh_files.surface_of(file.objects[0]) for file in files)
     size = reference.size()
     tolerance = in_units(options.tolerance, size)
     if tolerance > size:
