@@ -72,7 +72,7 @@ def test_what_makes_no_sense_is_refused_before_the_work(folder):
     refused(command("batch", *both, *out), "would both be written to")
     refused(command("batch", folder / "*.none", *out), "no file has such a name")
     refused(command("batch", both[0], "--out", both[1], "--tolerance", "2%"), "--out")
-    refused(command("batch", both[0], *out[:2], "--lod", "1%,2%"), "give --tolerance")
+    refused(command("batch", both[0], *out[:2], "--lod", "1%,2%"), "--tolerance")
     refused(command("batch", both[0], *out, "--csv", both[0]), "is the same file as")
     refused(command("batch", both[0], *out, "--jobs", "0"), "--jobs")
     (folder / "in" / "notes.txt").write_text("")

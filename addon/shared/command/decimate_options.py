@@ -14,6 +14,8 @@ bounding box), and its time is the time of the whole command. Exit codes: 0 prov
 that could not be written, or a bug. Only with exit code 0 are OUT, its side files, the report and the picture written, all of
 them or none. Symbolic links are followed. OUT may be IN. No other file that is read and no texture beside OUT is overwritten."""
 
+_TOLERANCE = "N%% of size, or a length in the file's units"
+
 
 def add_files(parser):
     """Adds IN and OUT and the files of one decimation to a parser."""
@@ -21,6 +23,7 @@ def add_files(parser):
     parser.add_argument(
         "output", type=file_name, metavar="OUT", help="the file for the result; its extension chooses the format"
     )
+    add_tolerance_or_levels(parser)
     add(parser)
     parser.add_argument("--report", type=file_name, metavar="FILE.json", help="write all numbers to this file")
     parser.add_argument(
@@ -31,10 +34,16 @@ def add_files(parser):
     )
 
 
-def add(parser):
-    """Adds the options that a decimation of one file and of many have in common to a parser."""
+def add_tolerance(parser):
+    """Adds the option of a decimation to one tolerance, without levels of detail, to a parser."""
+    parser.add_argument("--tolerance", type=length, required=True, metavar="T", help=_TOLERANCE)
+    parser.set_defaults(lod=None, lod_pixels=None, distance=None, fov=None, height=None)
+
+
+def add_tolerance_or_levels(parser):
+    """Adds the options of a tolerance, or of levels of detail, to a parser."""
     asked = parser.add_mutually_exclusive_group(required=True)
-    asked.add_argument("--tolerance", type=length, metavar="T", help="N%% of size, or a length in the file's units")
+    asked.add_argument("--tolerance", type=length, metavar="T", help=_TOLERANCE)
     levels = FEWEST_LEVELS, MOST_LEVELS
     asked.add_argument(
         "--lod",
@@ -68,6 +77,10 @@ def add(parser):
         metavar="N",
         help="the height of the picture in pixels, for --lod-pixels (default: 1080)",
     )
+
+
+def add(parser):
+    """Adds the other options that a decimation of one file and of many have in common to a parser."""
     parser.add_argument(
         "--reference",
         type=file_name,

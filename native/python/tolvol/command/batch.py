@@ -22,7 +22,7 @@ from . import mesh_files
 
 TEXTS = (
     "Decimates each file by tolvol decimate and writes it to the folder DIR under its own name. A table at the end, which is\n"
-    f"also written as DIR/batch.csv, says what became of each file. {mesh_files.FORMATS}",
+    f"also written as DIR/batch.csv, says what became of each file.\n{mesh_files.FORMATS}",
     "Exit codes: 0 if all are proved; otherwise the highest of the exit codes of the files: 2 bad usage or input; 3 not\n"
     "proved; 1 a file that could not be written, or a bug. A file that fails does not keep the others from being decimated.",
 )
@@ -56,14 +56,13 @@ def add(parser):
     parser.add_argument(
         "--csv", type=file_name, metavar="FILE.csv", help="where the table goes (default: DIR/batch.csv)"
     )
+    decimate_options.add_tolerance(parser)
     decimate_options.add(parser)
 
 
 def run(options):
     """Runs the command and returns its exit code."""
     decimate_options.checked(options.parser, options)
-    if options.tolerance is None:
-        raise Stop("batch makes one result of each file: give --tolerance, and levels of detail to tolvol decimate")
     pairs = _pairs(options)
     own = ("--out=", "--jobs=", "--csv=", "--extension=")
     given = [word for word in options.words if word.startswith("--") and not word.startswith(own)]

@@ -9,8 +9,8 @@ from ..shared.proof.verdict import Verdict
 from . import mesh_files
 
 TEXTS = (
-    f"Says PASS if every point of A is within the tolerance of B and every point of B within that of A, proved, else FAIL. "
-    f"{mesh_files.FORMATS}",
+    f"Says PASS if every point of A is within the tolerance of B and every point of B within that of A, proved,\n"
+    f"else FAIL. {mesh_files.FORMATS}",
     "Percentages are of the size of B, which is the longest diagonal of its bounding box. Exit codes: 0 PASS; 2 bad usage or\n"
     "input; 3 FAIL; 1 a bug.",
 )

@@ -54,7 +54,7 @@ def parser():
     add(
         "decimate",
         "reduce the triangles of a file within a tolerance",
-        f"{decimate_options.DESCRIPTION} {mesh_files.FORMATS}",
+        f"{decimate_options.DESCRIPTION}\n{mesh_files.FORMATS}",
         decimate_options.EPILOG,
         decimate_options.add_files,
         lambda options: decimate(decimate_options.checked(options.parser, options), mesh_files),
@@ -62,7 +62,7 @@ def parser():
     add(
         "report",
         "measure the distance of two files",
-        f"{report.DESCRIPTION} {mesh_files.FORMATS}",
+        f"{report.DESCRIPTION}\n{mesh_files.FORMATS}",
         report.EPILOG,
         report.add,
         lambda options: report.measure(options, mesh_files),
