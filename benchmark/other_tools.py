@@ -8,9 +8,10 @@
 MESH is an .obj, .ply or .stl file, or `scan`, a mesh with the noise of a range camera that benchmark/scan.py makes. The calls
 of the tools are in benchmark/tool_calls.py, with quotations from their documentation. The tools are installed from PyPI into
 build/other_tools/venv, in the versions of benchmark/other_tools.txt; CGAL's is built where libcgal-dev is installed.
-Each tool runs in a process of its own. Seconds are those of the tool's call alone, the best of three if one takes less than
-5 s. Then the tool's parameter is searched for the fewest triangles that keep both directions, unless one call takes more than
-20 s. Results are kept in build/other_tools/results and used the next time; --again measures them anew.
+Each tool runs in a process of its own. Seconds are processor seconds of the tool's call alone, on all cores together, the least
+of three if one takes less than 5 s. Then the tool's parameter is searched for the fewest triangles that keep both directions,
+unless one call takes more than 5 s. Results are kept in build/other_tools/results and used the next time; --again measures them
+anew.
 """
 
 import argparse
@@ -18,23 +19,22 @@ import hashlib
 import json
 import math
 import os
-import re
-import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+import solid
 import tables
-import tool_calls
+import tool_server
 from machine import machine
 from scan import scan
-from tool_calls import CGAL_PROGRAM, ROOT, TOOLS
+from tool_calls import ROOT, TOOLS
 from tool_page import draw, row, text, title
+from tool_setup import BUILD, PYTHON, set_up, versions
 from tool_worker import Worker
 
 sys.path.insert(0, os.environ.get("TOLVOL_PYTHON_PATH", str(ROOT / "build" / "release" / "python")))
@@ -44,21 +44,16 @@ try:
 except ImportError as error:
     sys.exit(f"other_tools.py: the module tolvol does not load ({error}): run sh setup.sh --tests")
 
-HERE = Path(__file__).resolve().parent
-BUILD = ROOT / "build" / "other_tools"
-PYTHON = BUILD / "venv" / "bin" / "python"
-PINS = HERE / "other_tools.txt"
-CGAL_SOURCE = HERE / "other_tools_cgal.cpp"
-CGAL_HEADER = Path("/usr/include/CGAL/version.h")
-
-REPEATS, QUICK = 3, 5  # number of calls of a tool whose call takes less than so many seconds
+REPEATS, QUICK = 3, 5  # number of calls of a tool whose call takes less than so many processor seconds
 SEARCH_CALLS = 16  # number of calls of a tool while its parameter is searched
-SEARCH_QUICK = 20  # seconds; the parameter is not searched if one call takes longer
+SEARCH_QUICK = 5  # processor seconds; the parameter is not searched if one call takes longer
 SEARCH_LIMIT = 60  # seconds; a call in the search that takes longer counts as not kept
+FIRST_RATIO = 100  # of the triangles of the input over those of the result, if a search has nothing to start from
+FIRST_ANGLE = math.radians(5)  # which is the default of Blender's Decimate, planar
 NEAR = 1.01  # ratio of the ends of a bracket that is not bisected any more
 
 FORMATS = (".obj", ".ply", ".stl")
-SCAN = "scan"  # the argument that stands for the mesh of scan.py in place of a file
+GENERATED = {"scan": scan}  # the meshes that are made here, by the argument that stands for them in place of a file
 
 
 @dataclass
@@ -76,53 +71,12 @@ def digest(data):
     return hashlib.sha256(data).hexdigest()[:8]
 
 
-# ---- installing the tools
-
-
-def set_up(names):
-    """Makes the virtual environment, again if the pinned versions have changed, and builds CGAL's program."""
-    if not PYTHON.exists() or not same_text(PINS, BUILD / "venv" / PINS.name):
-        print("other_tools: making a virtual environment, which takes some minutes", flush=True)
-        shutil.rmtree(BUILD / "venv", ignore_errors=True)
-        quietly(sys.executable, "-m", "venv", BUILD / "venv")
-        quietly(PYTHON, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement", PINS)
-        shutil.copy(PINS, BUILD / "venv")
-    if "cgal" in names and CGAL_HEADER.exists() and newer(CGAL_SOURCE, CGAL_PROGRAM):
-        print("other_tools: building CGAL's program, which takes half a minute", flush=True)
-        # The options are those of CGAL's own release builds. CGAL's intervals rely on -frounding-math.
-        options = ["-std=c++17", "-O3", "-DNDEBUG", "-frounding-math"]
-        quietly("g++", *options, CGAL_SOURCE, "-o", CGAL_PROGRAM, "-lgmp", "-lmpfr")
-
-
-def same_text(a, b):
-    return b.exists() and a.read_text() == b.read_text()
-
-
-def newer(source, product):
-    return not product.exists() or source.stat().st_mtime > product.stat().st_mtime
-
-
-def quietly(*command):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
-    if done.returncode:
-        said = (done.stderr or done.stdout).strip().splitlines()
-        raise Stop(f"{Path(command[0]).name} failed: {said[-1] if said else f'exit code {done.returncode}'}")
-
-
-def versions():
-    """Returns {package: version}. The version of CGAL is None if CGAL is not installed."""
-    found = dict(re.findall(r"^([a-z0-9]+)==(\S+)$", PINS.read_text(), re.M))
-    header = CGAL_HEADER.read_text() if CGAL_HEADER.exists() else ""
-    number = re.search(r"#define CGAL_VERSION (\S+)", header)
-    return {**found, "cgal": number and number[1], "tolvol": tolvol.__version__}
-
-
 def read_mesh(path, folder):
-    if path == SCAN:
-        vertices, triangles = scan()
-        return Mesh(SCAN, vertices, triangles, tolvol.diagonal(vertices, triangles))
+    if path in GENERATED:
+        vertices, triangles = GENERATED[path]()
+        return Mesh(path, vertices, triangles, tolvol.diagonal(vertices, triangles))
     arrays = folder / "vertices.npy", folder / "triangles.npy"
-    done = subprocess.run([PYTHON, tool_calls.__file__, "read", path, *arrays], capture_output=True, text=True)
+    done = subprocess.run([PYTHON, tool_server.__file__, "read", path, *arrays], capture_output=True, text=True)
     if done.returncode:
         raise Stop(f"{path}: {done.stderr.strip().splitlines()[-1]}")
     vertices, triangles = (np.load(file) for file in arrays)
@@ -202,35 +156,45 @@ def measure(name, mesh, tolerance, threads, limit):
     with tempfile.TemporaryDirectory() as folder:
         worker = Worker(PYTHON, name, mesh, threads, folder)
         try:
-            answer = worker.ask("run", tolerance, limit)
-            if "failure" in answer:
-                return {"failure": answer["failure"]}
-            entry["seconds"] = answer["seconds"]
-            entry["triangles"] = len(answer["triangles"])
-            for _ in range(REPEATS - 1):
-                if entry["seconds"] < QUICK:
-                    again = worker.ask("run", tolerance, limit)
-                    entry["seconds"] = min(entry["seconds"], again.get("seconds", math.inf))
-            if entry["triangles"]:
-                try:
-                    entry |= judge(mesh, tolerance, answer)
-                except tolvol.TolvolError as error:
-                    return {**entry, "failure": f"no mesh: {error}"}
-            quick = tool.search is not tool.run or entry["seconds"] <= SEARCH_QUICK
-            if tool.search and quick:
+            if tool.run:
+                entry = result_for(worker, mesh, tolerance, limit)
+            if (
+                tool.search
+                and "failure" not in entry
+                and (tool.search is not tool.run or entry["seconds"] <= SEARCH_QUICK)
+            ):
                 entry["search"] = fewest(tool, worker, mesh, tolerance, entry, min(limit, SEARCH_LIMIT))
         finally:
             worker.end()
     return entry
 
 
+def result_for(worker, mesh, tolerance, limit):
+    """Returns the part of an entry that is about the result for the tolerance."""
+    answer = worker.ask("run", tolerance, limit)
+    if "failure" in answer:
+        return {"failure": answer["failure"]}
+    entry = {"seconds": answer["seconds"], "triangles": len(answer["triangles"])}
+    for _ in range(REPEATS - 1):
+        if entry["seconds"] < QUICK:
+            again = worker.ask("run", tolerance, limit)
+            entry["seconds"] = min(entry["seconds"], again.get("seconds", math.inf))
+    if entry["triangles"]:
+        try:
+            entry |= judge(mesh, tolerance, answer)
+        except tolvol.TolvolError as error:
+            return {**entry, "failure": f"no mesh: {error}"}
+        entry["solid"] = solid.judge(answer["vertices"], answer["triangles"])
+    return entry
+
+
 def fewest(tool, worker, mesh, tolerance, entry, limit):
     """Searches the fewest triangles that keep both directions.
 
-    Returns {"seconds": the time of the search}, and if a result was found also its "triangles" and "parameter", and as "call"
-    the seconds of its call.
+    Returns {} or, if a result was found, its "triangles" and "parameter", as "call" the seconds of its call, and as "solid"
+    the judgement of solid.judge().
     """
-    calls = {}
+    calls, least = {}, None
 
     def count(parameter):
         answer = worker.ask("search", parameter, limit)
@@ -238,17 +202,24 @@ def fewest(tool, worker, mesh, tolerance, entry, limit):
             return None
         calls[parameter] = answer["seconds"]
         try:
-            return len(answer["triangles"]) if keeps_both(mesh, tolerance, answer) else None
+            kept = keeps_both(mesh, tolerance, answer)
         except tolvol.TolvolError:
             return None
+        nonlocal least
+        if kept and (least is None or len(answer["triangles"]) < len(least["triangles"])):
+            least = answer
+        return len(answer["triangles"]) if kept else None
 
-    started = time.perf_counter()
-    start = len(mesh.triangles) / max(4, entry["triangles"]) if tool.by_ratio else tolerance
-    best = search(start, count)
-    found = {"seconds": time.perf_counter() - started}
-    if best:
-        found |= {"parameter": best[0], "triangles": best[1], "call": calls[best[0]]}
-    return found
+    starts = {
+        "error": tolerance,
+        "ratio": len(mesh.triangles) / max(4, entry.get("triangles", len(mesh.triangles) / FIRST_RATIO)),
+        "angle": FIRST_ANGLE,
+    }
+    best = search(starts[tool.parameter], count)
+    if best is None:
+        return {}
+    found = {"parameter": best[0], "triangles": best[1], "call": calls[best[0]]}
+    return {**found, "solid": solid.judge(least["vertices"], least["triangles"])}
 
 
 def remembered(path, again, work):
@@ -267,7 +238,7 @@ def compare(mesh, tolerance, options, numbers):
     for name in options.only:
         number = numbers[TOOLS[name].package]
         if number is None:
-            entries[name] = {"failure": "libcgal-dev is not installed"}
+            entries[name] = {"failure": f"{TOOLS[name].package} is not installed"}
         else:
             percent = 100 * tolerance / mesh.size
             if TOOLS[name].package == "tolvol":  # Its version number stays the same while its code changes.
@@ -301,7 +272,7 @@ def arguments(words):
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("mesh", nargs="+", metavar="MESH", help=", ".join([*FORMATS, SCAN]))
+    parser.add_argument("mesh", nargs="+", metavar="MESH", help=", ".join([*FORMATS, *GENERATED]))
     parser.add_argument(
         "--tolerance",
         action="append",
@@ -315,7 +286,7 @@ def arguments(words):
     parser.add_argument(
         "--table", default="other tools", metavar="NAME", help="the name of the table in FILE.md (default: %(default)s)"
     )
-    parser.add_argument("--picture", metavar="FILE.png", help="draw triangles against seconds to this file")
+    parser.add_argument("--picture", metavar="FILE.png", help="draw triangles against processor seconds to this file")
     parser.add_argument("--json", metavar="FILE", help="write the figures to this file")
     parser.add_argument(
         "--limit",
@@ -343,7 +314,7 @@ def refuse(message):
 
 def main(options):
     for path in options.mesh:
-        if path == SCAN:
+        if path in GENERATED:
             continue
         if not Path(path).is_file():
             raise Stop(f"{path}: no such file")
@@ -354,11 +325,12 @@ def main(options):
             require_folder(getattr(options, option), f"--{option}")
 
     set_up(options.only)
-    numbers = versions()
+    numbers = {**versions(), "tolvol": tolvol.__version__}
     figures = {"machine": machine(), "threads": options.threads, "versions": numbers, "cases": []}
     for path in options.mesh:
         with tempfile.TemporaryDirectory() as folder:
             mesh = read_mesh(path, Path(folder))
+        state = solid.judge(mesh.vertices, mesh.triangles)
         for wanted in options.tolerance:
             tolerance = in_units(wanted, mesh.size)
             if tolerance > mesh.size:
@@ -369,6 +341,7 @@ def main(options):
                 "size": mesh.size,
                 "tolerance": tolerance,
                 "percent": float(f"{100 * tolerance / mesh.size:.6g}"),
+                "solid": state,
             }
             print(title(case), flush=True)
             case["tools"] = compare(mesh, tolerance, options, numbers)

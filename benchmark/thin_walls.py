@@ -6,16 +6,14 @@ tori, plates, stacks of plates, and interlocked rings. Each result is also judge
 """
 
 import itertools
-import subprocess
-from pathlib import Path
 
 import numpy as np
 
 import meshes as shapes
 from addon.native import module as tolvol
+from solid import crossings_by_cgal
 
 COLLAPSES = 1_000_000
-JUDGE = Path(__file__).resolve().parents[1] / "build/release/tests/native/tolvol_cgal_judge"
 
 
 def models(seed=1):
@@ -71,13 +69,6 @@ def _rings(rng, relative_width):
     width = relative_width * 4.3
     turned = vertices[:, [0, 2, 1]] * [1, -1, 1] + [1.2 - width, 0, 0]
     return "interlocked rings", *shapes.join((vertices, triangles), (turned, triangles)), width
-
-
-def crossings_by_cgal(vertices, triangles):
-    """Returns the number of pairs of faces that cross. The mesh must be an oriented manifold."""
-    head = np.array([len(vertices), len(triangles)], np.float64)
-    data = b"".join(np.ascontiguousarray(array, np.float64).tobytes() for array in (head, vertices, triangles))
-    return int(subprocess.run([JUDGE, "crossings"], input=data, capture_output=True, check=True).stdout)
 
 
 def run(collapses=COLLAPSES):

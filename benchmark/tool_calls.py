@@ -1,19 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Holds one function for each tool that benchmark/other_tools.py compares, and the process that runs one of them.
+"""Holds one function for each tool that benchmark/other_tools.py compares.
 
 Each function takes vertices (n, 3) float32, triangles (m, 3) int32, its parameter and the number of threads. It returns
-vertices, triangles and the seconds of the tool's own call, without the conversion of arrays if the tool permits. Each
+vertices, triangles and the processor seconds of the tool's own call, without the conversion of arrays if the tool permits. Each
 docstring quotes the tool's documentation of the parameter.
-
-`tool_calls.py read IN VERTICES.npy TRIANGLES.npy` reads a mesh file and merges points at the same place.
-`tool_calls.py serve TOOL VERTICES.npy TRIANGLES.npy THREADS` reads a request per line on stdin and answers in JSON on stdout.
 """
 
-import json
 import os
+import resource
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,10 +21,16 @@ CGAL_PROGRAM = ROOT / "build" / "other_tools" / "cgal"
 HAUSDORFF_STEPS = 16  # the number of steps in which PyMeshLab's number of triangles is bisected
 
 
+def processor_seconds():
+    """Returns the processor time of this process and of its children that have ended, on all cores together."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(usage.ru_utime + usage.ru_stime for usage in used)
+
+
 def timed(call, *arguments, **named):
-    started = time.perf_counter()
+    started = processor_seconds()
     result = call(*arguments, **named)
-    return result, time.perf_counter() - started
+    return result, processor_seconds() - started
 
 
 def tolerance_volumes(**options):
@@ -46,10 +48,6 @@ def tolerance_volumes(**options):
         return result.vertices, result.triangles, seconds
 
     return run
-
-
-def on_one_thread(run):
-    return lambda vertices, triangles, parameter, threads: run(vertices, triangles, parameter, 1)
 
 
 def meshlib(**settings):
@@ -295,16 +293,71 @@ def cgal(vertices, triangles, distance, threads):
         )
 
 
+def libigl(vertices, triangles, ratio, threads):
+    """qslim(max_m, block_intersections): "desired number of output faces", and "whether to block intersections". There is no
+    parameter for an error: this asks for so many times fewer triangles."""
+    import igl
+
+    arrays = np.asfortranarray(vertices, np.float64), np.asfortranarray(triangles)
+    count = max(4, round(len(triangles) / ratio))
+    (points, faces, *_), seconds = timed(igl.qslim, *arrays, count, block_intersections=True)
+    return points, faces, seconds
+
+
+def trueform(vertices, triangles, error, threads):
+    """simplified(error_rel): "Error budget as a fraction of the mesh bounding-box diagonal. An edge is collapsed when its
+    quadric error is <= error_rel * diagonal"."""
+    import trueform
+
+    diagonal = np.linalg.norm(np.ptp(vertices[np.unique(triangles)].astype(np.float64), axis=0))
+    (faces, points), seconds = timed(trueform.simplified, (triangles, vertices), error_rel=error / diagonal)
+    return points, faces, seconds
+
+
+def opengl_decimate(vertices, triangles, error, threads):
+    """SimplifyOptions.target_error: "deviation to stop at, a length in model units"."""
+    import opengl_decimate
+
+    options = opengl_decimate.SimplifyOptions(target_error=error)
+    indices = triangles.astype(np.uint32).ravel()
+    result, seconds = timed(opengl_decimate.simplify, {"POSITION": vertices}, indices, options)
+    return result.attributes["POSITION"], result.indices.reshape(-1, 3), seconds
+
+
+def through_blender(mode, vertices, triangles, parameter):
+    """Runs tool_blender.py. The seconds are those of the modifier."""
+    np.save("vertices.npy", vertices)
+    np.save("triangles.npy", triangles)
+    script = Path(__file__).with_name("tool_blender.py")
+    command = ["blender", "--background", "--factory-startup", "--python-exit-code", "1", "--python", script]
+    done = subprocess.run([*command, "--", mode, repr(parameter)], capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError((done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1])
+    points, faces, seconds = (np.load(f"blender_{name}.npy") for name in ("vertices", "triangles", "seconds"))
+    return points, faces, float(seconds)
+
+
+def blender_collapse(vertices, triangles, ratio, threads):
+    """DecimateModifier.ratio: "Ratio of triangles to reduce to". There is no parameter for an error."""
+    return through_blender("COLLAPSE", vertices, triangles, max(4, len(triangles) / ratio))
+
+
+def blender_planar(vertices, triangles, angle, threads):
+    """DecimateModifier.angle_limit: "Only dissolve angles below this". The modifier merges faces that are nearly in one plane
+    and cuts the result into triangles. There is no parameter for an error."""
+    return through_blender("DISSOLVE", vertices, triangles, angle)
+
+
 @dataclass
 class Tool:
-    """A tool. `run` is called with the tolerance as a length. `search` is called with other parameters in the search, which
-    starts from the tolerance; it is None for a tool without a search."""
+    """A tool. `run` is called with the tolerance as a length; it is None for a tool that has no parameter for an error.
+    `search` is called with other parameters in the search; it is None for a tool without a search."""
 
     title: str
-    package: str  # the name of the package on PyPI, or tolvol, or cgal
-    run: Callable
+    package: str  # the name of the package on PyPI, or tolvol, cgal, or blender
+    run: Callable | None
     search: Callable | None = None
-    by_ratio: bool = False  # whether the parameter of `search` is a ratio: the input's triangles over the result's
+    parameter: str = "error"  # of `search`: an error, an angle, or the ratio of the input's triangles over the result's
 
 
 def searched(title, package, run):
@@ -320,67 +373,24 @@ WEIGHTED = {
 
 TOOLS = {
     "ours": Tool("**Tolerance Volumes**", "tolvol", FAST),
-    "ours-1": Tool("**Tolerance Volumes**, one thread", "tolvol", on_one_thread(FAST)),
     "thorough": Tool("**Tolerance Volumes**, thorough", "tolvol", THOROUGH),
-    "thorough-1": Tool("**Tolerance Volumes**, thorough, one thread", "tolvol", on_one_thread(THOROUGH)),
     "subset": Tool("**Tolerance Volumes**, vertices of the input alone", "tolvol", SUBSET),
+    "blender-collapse": Tool("Blender, Decimate, collapse", "blender", None, blender_collapse, "ratio"),
+    "blender-planar": Tool("Blender, Decimate, planar", "blender", None, blender_planar, "angle"),
     "cgal": searched("CGAL, polyhedral envelope", "cgal", cgal),
+    "libigl": Tool("libigl, qslim without crossings", "libigl", None, libigl, "ratio"),
     "manifold3d": searched("Manifold, simplify", "manifold3d", manifold3d),
     "meshlib": searched("MeshLib", "meshlib", meshlib()),
     "meshlib-weighted": searched("MeshLib, weighted by angles", "meshlib", meshlib(**WEIGHTED)),
     "meshoptimizer": searched("meshoptimizer", "meshoptimizer", meshoptimizer),
     "open3d": searched("Open3D", "open3d", open3d),
+    "opengl-decimate": searched("opengl_decimate", "opengl_decimate", opengl_decimate),
     "openmesh": searched("OpenMesh, ModHausdorff", "openmesh", openmesh),
     "pyfqmr": searched("pyfqmr, lossless", "pyfqmr", pyfqmr),
-    "pymeshlab": Tool("PyMeshLab, bisected", "pymeshlab", pymeshlab_by_distance, pymeshlab_by_count, by_ratio=True),
+    "pymeshlab": Tool("PyMeshLab, bisected", "pymeshlab", pymeshlab_by_distance, pymeshlab_by_count, "ratio"),
     "pytetwild": searched("pytetwild, coarsened", "pytetwild", pytetwild()),
     "pytetwild-long": searched("pytetwild, edges of any length", "pytetwild", pytetwild(edge_length_fac=1.0)),
+    "trueform": searched("trueform, simplified", "trueform", trueform),
     "vtk-pro": searched("VTK, vtkDecimatePro", "vtk", vtk_pro),
     "vtk-quadric": searched("VTK, vtkQuadricDecimation", "vtk", vtk_quadric),
 }
-
-
-def merged(vertices, triangles):
-    """Merges points at the same place, and leaves out triangles with a repeated corner and points without a triangle."""
-    points, first = np.unique(np.asarray(vertices, np.float32), axis=0, return_inverse=True)
-    corners = first.ravel()[triangles]
-    a, b, c = corners.T
-    corners = corners[(a != b) & (b != c) & (c != a)]
-    used, corners = np.unique(corners, return_inverse=True)
-    return points[used], corners.reshape(-1, 3).astype(np.int32)
-
-
-def read(source, vertices, triangles):
-    import trimesh
-
-    mesh = trimesh.load_mesh(source, process=False)
-    points, corners = merged(mesh.vertices, mesh.faces)
-    np.save(vertices, points)
-    np.save(triangles, corners)
-
-
-def serve(name, vertices, triangles, threads):
-    """Answers requests until stdin ends. A request is a line {"what": "run" or "search", "parameter": x}.
-
-    The answer to a request is a line on stdout; the resulting mesh is written to result_*.npy.
-    """
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # Messages of the tools go to stderr, so that stdout has only answers.
-    tool = TOOLS[name]
-    vertices, triangles = np.load(vertices), np.load(triangles)
-    for line in sys.stdin:
-        asked = json.loads(line)
-        try:
-            points, corners, seconds = getattr(tool, asked["what"])(
-                vertices, triangles, asked["parameter"], int(threads)
-            )
-            np.save("result_vertices.npy", np.asarray(points, np.float64))
-            np.save("result_triangles.npy", np.asarray(corners, np.int32))
-            answer = {"seconds": seconds}
-        except Exception as error:  # The row of the tool in the table shows the error.
-            answer = {"failure": " ".join(str(error).split()) or type(error).__name__}
-        print(json.dumps(answer), file=answers, flush=True)
-
-
-if __name__ == "__main__":
-    {"read": read, "serve": serve}[sys.argv[1]](*sys.argv[2:])

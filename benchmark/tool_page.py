@@ -4,8 +4,9 @@
 import tables
 from tool_calls import TOOLS
 
-HEADS = ["Tool", "Triangles", "Seconds", "Result → reference", "Reference → result", "Kept"]
-HEADS += ["Fewest kept", "Search, s"]
+SOLID = "Closed, no crossings"
+HEADS = ["Tool", "Triangles", "Processor s", "Result → reference", "Reference → result", "Kept", SOLID]
+HEADS += ["Fewest kept", SOLID]
 
 
 def kept(entry):
@@ -25,19 +26,33 @@ def distance(interval):
     return f"**{text}**" if interval[1] <= 1 else text
 
 
+def solidity(entry):
+    """Returns "yes" for a closed mesh without crossings, or the reasons why a mesh is none, or "" without a judgement."""
+    found = entry.get("solid")
+    if found is None:
+        return ""
+    if found["crossings"] is None:
+        return "no manifold"
+    reasons = [] if found["closed"] else ["open"]
+    if found["crossings"]:
+        reasons.append(f"{found['crossings']:,} crossings" if found["crossings"] > 1 else "1 crossing")
+    return ", ".join(reasons) or "yes"
+
+
 def row(name, entry):
     if "failure" in entry:
         return [TOOLS[name].title, entry["failure"].replace("|", "/"), *[""] * (len(HEADS) - 2)]
     found = entry.get("search")
     return [
         TOOLS[name].title,
-        f"{entry['triangles']:,}",
-        seconds(entry["seconds"]),
+        f"{entry['triangles']:,}" if "triangles" in entry else "",
+        seconds(entry["seconds"]) if "seconds" in entry else "",
         distance(entry.get("forward")),
         distance(entry.get("backward")),
-        kept(entry),
+        kept(entry) if "triangles" in entry else "",
+        solidity(entry),
         "" if found is None else f"{found['triangles']:,}" if "triangles" in found else "none",
-        "" if found is None else seconds(found["seconds"]),
+        solidity(found or {}),
     ]
 
 
@@ -49,36 +64,42 @@ def text(figures):
     rows = []
     for case in figures["cases"]:
         rows.append([f"***{title(case)}***"] + [""] * (len(HEADS) - 1))
+        rows[-1][HEADS.index(SOLID)] = f"*input: {solidity(case)}*"
         rows += [row(name, entry) for name, entry in case["tools"].items()]
     used = {TOOLS[name].package for case in figures["cases"] for name in case["tools"]}
     numbers = [f"{package} {number}" for package, number in sorted(figures["versions"].items()) if package in used]
     threads = "1 thread" if figures["threads"] == 1 else f"{figures['threads']} threads"
     where = f"{figures['machine']}, {threads}; {', '.join(numbers)}."
-    return f"{where}\n\n{tables.table(HEADS, rows, 'lrrrrlrr')}"
+    return f"{where}\n\n{tables.table(HEADS, rows, 'lrrrrllrl')}"
 
 
 BLUE, ORANGE, GREEN, PURPLE, SKY, GREY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#56B4E9", "#777777"
-LOOKS = {  # name: (colour, marker); the markers tell the tools apart without colours
+LOOKS = {  # name: (colour, marker); the markers tell the tools apart without colours. A tuple: corners, kind, turn
     "ours": ("#000000", "D"),
     "thorough": ("#000000", "*"),
+    "blender-collapse": (PURPLE, "H"),
+    "blender-planar": (PURPLE, (3, 1, 0)),
     "cgal": (ORANGE, "s"),
+    "libigl": (ORANGE, (4, 1, 0)),
     "manifold3d": (GREY, "v"),
     "meshlib": (BLUE, "o"),
     "meshlib-weighted": (BLUE, "p"),
     "meshoptimizer": (GREEN, "^"),
     "open3d": (PURPLE, "<"),
+    "opengl-decimate": (BLUE, (6, 1, 0)),
     "openmesh": (GREEN, "h"),
     "pyfqmr": (SKY, ">"),
     "pymeshlab": (PURPLE, "d"),
     "pytetwild": (ORANGE, "X"),
     "pytetwild-long": (ORANGE, "P"),
-    "vtk-pro": (SKY, "s"),
+    "trueform": (GREEN, (5, 0, 180)),
+    "vtk-pro": (SKY, (8, 1, 0)),
     "vtk-quadric": (GREY, "8"),
 }
 
 
 def draw(cases, picture):
-    """Draws triangles against seconds, with a row for each tolerance and a column for each mesh."""
+    """Draws triangles against processor seconds, with a row for each tolerance and a column for each mesh."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -106,7 +127,7 @@ def draw(cases, picture):
     for axis in axes[-1]:
         axis.set_xlabel("triangles")
     for axis in axes[:, 0]:
-        axis.set_ylabel("seconds")
+        axis.set_ylabel("processor seconds")
 
     def sample(colour, marker, filled, label):
         face = colour if filled else "white"
@@ -127,14 +148,16 @@ def draw(cases, picture):
 def mark(axis, colour, marker, entry):
     """Draws a large mark for the result for the tolerance, and a line to a small mark for the fewest found by the search.
 
-    For a tool whose result for the tolerance has no triangles, only the small mark is drawn.
+    For a tool without a result for the tolerance, or whose result has no triangles, only the small mark is drawn.
     """
-    x, y = entry["triangles"], entry["seconds"]
+    x, y = entry.get("triangles"), entry.get("seconds")
     found = entry.get("search", {})
     if "triangles" in found:
-        axis.plot(found["triangles"], found["call"], marker, color=colour, markersize=4)
+        axis.plot(found["triangles"], found["call"], marker=marker, color=colour, markersize=4)
         if x:
             axis.plot([x, found["triangles"]], [y, found["call"]], color=colour, linewidth=0.8, alpha=0.6)
     if x:
         face = colour if kept(entry) == "both" else "white"
-        axis.plot(x, y, marker, color=colour, markerfacecolor=face, markersize=12 if marker == "*" else 8, zorder=3)
+        axis.plot(
+            x, y, marker=marker, color=colour, markerfacecolor=face, markersize=12 if marker == "*" else 8, zorder=3
+        )

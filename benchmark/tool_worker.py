@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-import tool_calls
+import tool_server
 
 
 class Worker:
@@ -24,7 +24,7 @@ class Worker:
         self.folder = Path(folder)
         np.save(self.folder / "vertices.npy", mesh.vertices)
         np.save(self.folder / "triangles.npy", mesh.triangles)
-        self.command = [python, tool_calls.__file__, "serve", name, "vertices.npy", "triangles.npy", str(threads)]
+        self.command = [python, tool_server.__file__, "serve", name, "vertices.npy", "triangles.npy", str(threads)]
         self.threads = threads
         self.process = None
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The parts of benchmark/other_tools.py that need no package of PyPI: search, judge, rows, bad usage, failing processes."""
+"""The parts of benchmark/other_tools.py that need no package of PyPI: search, judge, rows, bad usage, failing
+processes."""
 
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -13,8 +15,10 @@ import meshes
 BENCHMARK = Path(__file__).resolve().parents[2] / "benchmark"
 sys.path[:0] = [str(BENCHMARK), str(BENCHMARK.parent / "blender_scripts")]
 import other_tools  # noqa: E402
+import solid  # noqa: E402
 import tool_calls  # noqa: E402
 import tool_page  # noqa: E402
+import tool_server  # noqa: E402
 import tool_worker  # noqa: E402
 
 
@@ -75,11 +79,110 @@ def test_row_says_what_was_kept(forward, backward, expected):
 
 
 def test_row_of_a_search_and_of_a_failure():
-    entry = {"triangles": 0, "seconds": 30.0, "search": {"seconds": 81.2, "triangles": 5006}}
-    assert tool_page.row("openmesh", entry)[-2:] == ["5,006", "81"]
-    assert tool_page.row("openmesh", {**entry, "search": {"seconds": 81.2}})[-2:] == ["none", "81"]
+    entry = {"triangles": 0, "seconds": 30.0, "search": {"triangles": 5006, "solid": {"closed": True, "crossings": 0}}}
+    assert tool_page.row("openmesh", entry)[-2:] == ["5,006", "yes"]
+    assert tool_page.row("openmesh", {**entry, "search": {}})[-2:] == ["none", ""]
     cells = tool_page.row("cgal", {"failure": "did not end in 300 s"})
     assert len(cells) == len(tool_page.HEADS) and cells[1] == "did not end in 300 s"
+
+
+def test_row_of_a_tool_without_a_parameter_for_an_error():
+    cells = tool_page.row("libigl", {"search": {"triangles": 710, "solid": {"closed": False, "crossings": 0}}})
+    assert cells[1:] == [""] * 6 + ["710", "open"]
+
+
+@pytest.mark.parametrize(
+    "closed, crossings, expected",
+    [
+        (True, 0, "yes"),
+        (False, 0, "open"),
+        (True, 1, "1 crossing"),
+        (False, 1216, "open, 1,216 crossings"),
+        (False, None, "no manifold"),
+    ],
+)
+def test_row_says_whether_the_result_is_closed_and_uncrossed(closed, crossings, expected):
+    entry = {"triangles": 12, "seconds": 1.0, "solid": {"closed": closed, "crossings": crossings}}
+    assert tool_page.row("meshlib", entry)[tool_page.HEADS.index(tool_page.SOLID)] == expected
+
+
+def test_solid_judges_closed_open_crossing_and_other_meshes():
+    vertices, triangles = meshes.torus(24, 12)
+    assert solid.judge(vertices, triangles) == {"closed": True, "crossings": 0}
+    assert solid.judge(vertices, triangles[1:]) == {"closed": False, "crossings": 0}
+    both = meshes.join((vertices, triangles), (vertices[:, [0, 2, 1]] + [0.3, 0, 0], triangles[:, ::-1]))
+    pairs = other_tools.tolvol.crossing_pairs(*both)
+    assert solid.judge(*both) == {"closed": True, "crossings": len(pairs)} and len(pairs) > 10
+    flipped = np.concatenate([triangles[:1, ::-1], triangles[1:]])
+    assert solid.judge(vertices, flipped) == {"closed": False, "crossings": None}
+    repeated = np.concatenate([triangles, triangles[:1, [0, 0, 1]]])
+    assert solid.judge(vertices, repeated) == {"closed": False, "crossings": None}
+
+
+class Halves:
+    """A worker whose answer to a parameter above 1 is a part of the mesh, and below 1 all of it, a triangle less for each."""
+
+    def __init__(self, mesh):
+        self.mesh, self.left = mesh, len(mesh.triangles)
+
+    def ask(self, what, parameter, limit):
+        self.left -= 1
+        count = self.left if parameter <= 1 else self.left // 4
+        return {"vertices": self.mesh.vertices, "triangles": self.mesh.triangles[:count], "seconds": parameter}
+
+
+def test_the_fewest_of_a_search_come_with_their_own_judgement(monkeypatch):
+    judged = []
+    monkeypatch.setattr(solid, "judge", lambda vertices, triangles: judged.append(len(triangles)) or {})
+    mesh = torus()
+    found = other_tools.fewest(tool_calls.TOOLS["meshlib"], Halves(mesh), mesh, 0.1, {"triangles": 9}, 60)
+    assert len(mesh.triangles) - other_tools.SEARCH_CALLS <= found["triangles"] < len(mesh.triangles)
+    assert judged == [found["triangles"]] and found["call"] == found["parameter"] <= 1
+
+
+@pytest.mark.parametrize(
+    "name, entry, start",
+    [
+        ("meshlib", {"triangles": 100}, 0.1),
+        ("pymeshlab", {"triangles": 100}, 9216 / 100),
+        ("libigl", {}, other_tools.FIRST_RATIO),
+        ("blender-planar", {}, math.radians(5)),
+    ],
+)
+def test_a_search_starts_from_what_is_known_of_the_parameter(name, entry, start):
+    asked, mesh = [], torus()
+
+    class Refusing:
+        def ask(self, what, parameter, limit):
+            asked.append(parameter)
+            return {"failure": "no"}
+
+    assert other_tools.fewest(tool_calls.TOOLS[name], Refusing(), mesh, 0.1, entry, 60) == {}
+    assert asked[0] == pytest.approx(start) and min(asked) < 0.01 * start
+
+
+def case(percent, mesh="torus", **tools):
+    entries = {name.replace("_", "-"): entry for name, entry in tools.items()}
+    return {"mesh": mesh, "triangles": 9216, "tolerance": percent / 50, "percent": percent, "tools": entries}
+
+
+def result(triangles, upper=0.9, fewest=None):
+    entry = {"triangles": triangles, "seconds": 1.0, "forward": [0, upper], "backward": [0, 0.9]}
+    return entry if fewest is None else {**entry, "search": {"triangles": fewest, "call": 1.0}}
+
+
+def test_each_tool_has_a_marker_of_its_own_in_the_picture():
+    assert len({str(marker) for _, marker in tool_page.LOOKS.values()}) == len(tool_page.LOOKS)
+    assert set(tool_page.LOOKS) == set(tool_calls.TOOLS) - {"subset"}
+
+
+def test_the_picture_is_drawn(tmp_path):
+    pytest.importorskip("matplotlib")
+    tools = {"ours": result(200), "thorough": result(150), "meshlib": result(900, fewest=700)}
+    tools |= {"libigl": {"search": {"triangles": 650, "call": 2.0}}, "cgal": {"failure": "crashed"}}
+    cases = [case(percent, mesh, **tools) for mesh in ("torus", "sphere") for percent in (1, 0.1)]
+    tool_page.draw(cases, tmp_path / "picture.png")
+    assert (tmp_path / "picture.png").read_bytes()[:4] == b"\x89PNG"
 
 
 def test_judge_sees_both_directions():
@@ -99,7 +202,7 @@ def test_merged_makes_a_surface_of_a_soup():
     vertices, triangles = meshes.torus()
     soup = vertices[triangles].reshape(-1, 3)
     corners = np.arange(len(soup)).reshape(-1, 3)
-    points, faces = tool_calls.merged(np.concatenate([soup, [[9, 9, 9]]]), np.concatenate([corners, [[0, 0, 1]]]))
+    points, faces = tool_server.merged(np.concatenate([soup, [[9, 9, 9]]]), np.concatenate([corners, [[0, 0, 1]]]))
     assert len(points) == len(vertices) and len(faces) == len(triangles)
     assert points.dtype == np.float32 and faces.dtype == np.int32
 
