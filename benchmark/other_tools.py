@@ -3,15 +3,15 @@
 """Compares decimation by other tools: same meshes, same tolerance, judged by the same certified distances.
 
 /usr/bin/python3 benchmark/other_tools.py MESH... [--tolerance 1% --tolerance 0.1%] [--only NAME...] [--again]
-    [--write FILE.md] [--table NAME] [--picture FILE.png] [--json FILE]
+    [--write FILE.md] [--table NAME] [--picture FILE.png] [--curves FILE.png] [--json FILE]
 
-MESH is an .obj, .ply or .stl file, or `scan`, a mesh with the noise of a range camera that benchmark/scan.py makes. The calls
-of the tools are in benchmark/tool_calls.py, with quotations from their documentation. The tools are installed from PyPI into
-build/other_tools/venv, in the versions of benchmark/other_tools.txt; CGAL's is built where libcgal-dev is installed.
-Each tool runs in a process of its own. Seconds are processor seconds of the tool's call alone, on all cores together, the least
-of three if one takes less than 5 s. Then the tool's parameter is searched for the fewest triangles that keep both directions,
-unless one call takes more than 5 s. Results are kept in build/other_tools/results and used the next time; --again measures them
-anew.
+MESH is an .obj, .ply or .stl file, or the name of a mesh that benchmark/generated.py makes: `scan`, with the noise of a range
+camera, or `sphere`. The calls of the tools are in benchmark/tool_calls.py, with quotations from their documentation. The tools
+are installed from PyPI into build/other_tools/venv, in the versions of benchmark/other_tools.txt; CGAL's is built where
+libcgal-dev is installed. Each tool runs in a process of its own. Seconds are processor seconds of the tool's call alone, on all
+cores together, the least of three if one takes less than 5 s. Then the tool's parameter is searched for the fewest triangles
+that keep both directions, unless one call takes more than 5 s. Results are kept in build/other_tools/results and used the next
+time; --again measures them anew.
 """
 
 import argparse
@@ -30,11 +30,11 @@ import numpy as np
 import solid
 import tables
 import tool_server
+from generated import GENERATED
 from machine import machine
-from scan import scan
 from tool_calls import ROOT, TOOLS
+from tool_curves import draw_curves
 from tool_page import draw, row, text, title
-from tool_setup import BUILD, PYTHON, set_up, versions
 from tool_worker import Worker
 
 sys.path.insert(0, os.environ.get("TOLVOL_PYTHON_PATH", str(ROOT / "build" / "release" / "python")))
@@ -43,6 +43,7 @@ try:
     from tolvol.shared.command.arguments import USAGE, Stop, in_units, length, require_folder, whole_number
 except ImportError as error:
     sys.exit(f"other_tools.py: the module tolvol does not load ({error}): run sh setup.sh --tests")
+from tool_setup import BUILD, PYTHON, set_up, versions  # noqa: E402 (it needs the package)
 
 REPEATS, QUICK = 3, 5  # number of calls of a tool whose call takes less than so many processor seconds
 SEARCH_CALLS = 16  # number of calls of a tool while its parameter is searched
@@ -53,7 +54,6 @@ FIRST_ANGLE = math.radians(5)  # which is the default of Blender's Decimate, pla
 NEAR = 1.01  # ratio of the ends of a bracket that is not bisected any more
 
 FORMATS = (".obj", ".ply", ".stl")
-GENERATED = {"scan": scan}  # the meshes that are made here, by the argument that stands for them in place of a file
 
 
 @dataclass
@@ -287,6 +287,7 @@ def arguments(words):
         "--table", default="other tools", metavar="NAME", help="the name of the table in FILE.md (default: %(default)s)"
     )
     parser.add_argument("--picture", metavar="FILE.png", help="draw triangles against processor seconds to this file")
+    parser.add_argument("--curves", metavar="FILE.png", help="draw triangles against the tolerance to this file")
     parser.add_argument("--json", metavar="FILE", help="write the figures to this file")
     parser.add_argument(
         "--limit",
@@ -320,7 +321,7 @@ def main(options):
             raise Stop(f"{path}: no such file")
         if Path(path).suffix.lower() not in FORMATS:
             raise Stop(f"{path}: not one of {', '.join(FORMATS)}")
-    for option in ("write", "picture", "json"):
+    for option in ("write", "picture", "curves", "json"):
         if getattr(options, option):
             require_folder(getattr(options, option), f"--{option}")
 
@@ -352,6 +353,8 @@ def main(options):
         tables.write(options.write, options.table, text(figures))
     if options.picture:
         draw(figures["cases"], options.picture)
+    if options.curves:
+        draw_curves(figures["cases"], options.curves)
     return 0
 
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import solid
-from common import Stop
+from tolvol.shared.command.arguments import Stop
 from tool_calls import CGAL_PROGRAM, ROOT
 
 BUILD = ROOT / "build" / "other_tools"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The parts of benchmark/other_tools.py that need no package of PyPI: search, judge, rows, bad usage, failing
+"""The parts of benchmark/other_tools.py that need no package of PyPI: search, judge, rows, curves, bad usage, failing
 processes."""
 
 import math
@@ -14,9 +14,11 @@ import meshes
 
 BENCHMARK = Path(__file__).resolve().parents[2] / "benchmark"
 sys.path[:0] = [str(BENCHMARK), str(BENCHMARK.parent / "blender_scripts")]
+import generated  # noqa: E402
 import other_tools  # noqa: E402
 import solid  # noqa: E402
 import tool_calls  # noqa: E402
+import tool_curves  # noqa: E402
 import tool_page  # noqa: E402
 import tool_server  # noqa: E402
 import tool_worker  # noqa: E402
@@ -171,18 +173,66 @@ def result(triangles, upper=0.9, fewest=None):
     return entry if fewest is None else {**entry, "search": {"triangles": fewest, "call": 1.0}}
 
 
+@pytest.mark.parametrize(
+    "tools, best",
+    [
+        ({"meshlib": result(900, fewest=700), "cgal": result(500), "ours": result(100)}, (500, "cgal")),
+        ({"meshlib": result(900, fewest=400), "cgal": result(500), "subset": result(10)}, (400, "meshlib")),
+        ({"meshlib": result(300, upper=1.01, fewest=700), "pyfqmr": {"failure": "crashed"}}, (700, "meshlib")),
+        ({"blender_collapse": {"search": {"triangles": 650}}, "vtk_quadric": result(0, 9)}, (650, "blender-collapse")),
+        ({"ours": result(100), "meshlib": {**result(300, upper=1.01), "search": {}}}, None),
+    ],
+)
+def test_the_best_other_tool_is_the_one_with_the_fewest_that_keep_both_directions(tools, best):
+    assert tool_curves.best_of_others(case(1, **tools)) == best
+
+
+def test_curves_go_from_wide_to_narrow_tolerances():
+    tools = {"ours": result(200), "thorough": result(150), "meshlib": result(900, fewest=700)}
+    cases = [case(0.1, "sphere", **tools), case(1, **tools), case(2, "sphere", **tools, cgal=result(600))]
+    lines = tool_curves.curves([*cases, case(0.5, "sphere", ours=result(200, upper=1.2))])
+    assert list(lines) == ["sphere", "torus"]
+    assert lines["sphere"]["ours"] == [(2, 200, "ours"), (0.1, 200, "ours")], "what is not kept is no part of a curve"
+    assert lines["sphere"]["others"] == [(2, 600, "cgal"), (0.1, 700, "meshlib")]
+    assert lines["torus"]["theory"] == [] and lines["torus"]["thorough"] == [(1, 150, "thorough")]
+    percents, counts, _ = zip(*lines["sphere"]["theory"])
+    assert percents == (2, 0.5, 0.1)
+    assert counts[2] == pytest.approx(20 * counts[0]), "the slope is one over the tolerance"
+
+
+def test_the_smooth_optimum_is_a_sphere_of_triangles_that_are_as_far_outside_as_inside():
+    tolerance = 1e-6
+    # A triangle with its corners a tolerance outside the unit sphere, and its centre a tolerance inside.
+    corner, centre = 1 + tolerance, 1 - tolerance
+    radius = math.sqrt(corner**2 - centre**2)
+    area = 3 * math.sqrt(3) / 4 * radius**2
+    assert tool_curves.smooth_optimum(tolerance, tool_curves.CONVEX["sphere"]) == pytest.approx(
+        4 * math.pi / area, rel=1e-5
+    )
+
+
+def test_decimation_of_the_sphere_is_above_the_theory_and_not_far():
+    vertices, triangles = generated.sphere(4)
+    assert len(triangles) == 5120 and solid.judge(vertices, triangles) == {"closed": True, "crossings": 0}
+    assert np.linalg.norm(vertices.astype(float), axis=1) == pytest.approx(1, abs=1e-6)
+    volume = other_tools.tolvol.ToleranceVolume(vertices, triangles, 0.05)
+    left = len(other_tools.tolvol.decimate(vertices, triangles, volume).triangles)
+    assert 1 < left / tool_curves.smooth_optimum(0.05, tool_curves.CONVEX["sphere"]) < 2.2
+
+
 def test_each_tool_has_a_marker_of_its_own_in_the_picture():
     assert len({str(marker) for _, marker in tool_page.LOOKS.values()}) == len(tool_page.LOOKS)
     assert set(tool_page.LOOKS) == set(tool_calls.TOOLS) - {"subset"}
 
 
-def test_the_picture_is_drawn(tmp_path):
+def test_the_pictures_are_drawn(tmp_path):
     pytest.importorskip("matplotlib")
     tools = {"ours": result(200), "thorough": result(150), "meshlib": result(900, fewest=700)}
     tools |= {"libigl": {"search": {"triangles": 650, "call": 2.0}}, "cgal": {"failure": "crashed"}}
     cases = [case(percent, mesh, **tools) for mesh in ("torus", "sphere") for percent in (1, 0.1)]
-    tool_page.draw(cases, tmp_path / "picture.png")
-    assert (tmp_path / "picture.png").read_bytes()[:4] == b"\x89PNG"
+    for number, draw in enumerate((tool_page.draw, tool_curves.draw_curves)):
+        draw(cases, tmp_path / f"{number}.png")
+        assert (tmp_path / f"{number}.png").read_bytes()[:4] == b"\x89PNG"
 
 
 def test_judge_sees_both_directions():
@@ -264,6 +314,7 @@ def test_results_are_remembered_until_they_are_wanted_anew(tmp_path):
         (["mesh.ply", "--only", "nobody"], "nobody"),
         (["mesh.ply", "--limit", "0"], "0 is less than 1"),
         (["mesh.ply", "--write", "nowhere/page.md"], "nowhere does not exist"),
+        (["mesh.ply", "--curves", "nowhere/curves.png"], "nowhere does not exist"),
     ],
 )
 def test_bad_usage_is_one_line(words, message, tmp_path):
