@@ -62,23 +62,28 @@ LOOKS = {  # of a line: (colour, marker, style, text)
     "ours": (BLUE, "o", "-", "fast"),
     "thorough": ("#000000", "D", "-", "thorough"),
     "theory": (GREY, "", "--", "theory"),
+    "slope": (GREY, "", ":", "slope of theory"),
 }
+NARROWEST_GAP = 0.17  # between the texts of two lines, in powers of ten
 
 
 def draw_curves(cases, picture):
-    """Draws a panel for each mesh, with the narrow tolerances on the right."""
+    """Draws a panel for each mesh, with the narrow tolerances on the right.
+
+    Beside the name of the best other tool stands how many times the triangles of thorough it leaves.
+    """
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
     found = curves(cases)
-    figure, axes = pyplot.subplots(1, len(found), figsize=(5.5 * len(found), 5), sharey=True, squeeze=False)
+    figure, axes = pyplot.subplots(1, len(found), figsize=(6 * len(found), 5.2), sharey=True, squeeze=False)
     for axis, (mesh, lines) in zip(axes[0], found.items()):
         triangles = next(case["triangles"] for case in cases if case["mesh"] == mesh)
-        axis.set_title(f"{NAMES.get(mesh, mesh.capitalize())}, {triangles:,} triangles", fontsize=13)
+        axis.set_title(f"{NAMES.get(mesh, mesh.capitalize())}, {triangles:,} triangles", fontsize=14)
         panel(axis, lines)
-    axes[0, 0].set_ylabel("triangles left", fontsize=12)
+    axes[0, 0].set_ylabel("triangles left", fontsize=13)
     figure.tight_layout()
     figure.savefig(picture, dpi=110)
     pyplot.close(figure)
@@ -87,33 +92,46 @@ def draw_curves(cases, picture):
 def panel(axis, lines):
     percents = sorted({point[0] for points in lines.values() for point in points}, reverse=True)
     if not lines["theory"]:  # Its slope is shown where its height is not known.
-        lines = {**lines, "theory": slope(lines["thorough"] or lines["ours"], percents)}
-    for key, points in lines.items():
-        colour, marker, style, text = LOOKS[key]
-        x, y = [point[0] for point in points], [point[1] for point in points]
-        axis.plot(x, y, style, marker=marker, color=colour, markersize=6, linewidth=1.6)
-        if points:
-            axis.annotate(
-                text, (x[-1], y[-1]), (8, 0), textcoords="offset points", va="center", color=colour, fontsize=12
-            )
-    for percent, triangles, name in lines["others"]:
-        tool = TOOLS[name].title.split(",")[0]
-        axis.annotate(
-            tool, (percent, triangles), (0, 9), textcoords="offset points", ha="center", color=ORANGE, fontsize=10
-        )
+        lines = {**lines, "slope": slope(lines["thorough"] or lines["ours"], percents)}
     axis.set_xscale("log")
     axis.set_yscale("log")
-    axis.set_xticks(percents, [f"{percent:g} %" for percent in percents], fontsize=11)
+    drawn = {key: points for key, points in lines.items() if points}
+    for key, points in drawn.items():
+        colour, marker, style, _ = LOOKS[key]
+        x, y = [point[0] for point in points], [point[1] for point in points]
+        axis.plot(x, y, style, marker=marker, color=colour, markersize=7, linewidth=1.8)
+    heights = spread({key: math.log10(points[-1][1]) for key, points in drawn.items()})
+    for key, height in heights.items():
+        beside = {"textcoords": "offset points", "va": "center", "color": LOOKS[key][0], "fontsize": 13}
+        axis.annotate(LOOKS[key][3], (drawn[key][-1][0], 10**height), (10, 0), **beside)
+    own = {percent: triangles for percent, triangles, _ in lines["thorough"]}
+    for percent, triangles, name in lines["others"]:
+        text = TOOLS[name].title.split(",")[0]
+        if percent in own:
+            text += f", {triangles / own[percent]:.1f} ×"
+        above = {"textcoords": "offset points", "ha": "right", "color": ORANGE, "fontsize": 12}
+        axis.annotate(text, (percent, triangles), (-4, 6), **above)
+    axis.set_xticks(percents, [f"{percent:g}" for percent in percents], fontsize=12)
     axis.set_xticks([], minor=True)
-    axis.tick_params(axis="y", labelsize=11)
-    axis.set_xlim(1.3 * percents[0], percents[-1] / 4.5)
-    axis.set_xlabel("tolerance, % of size", fontsize=12)
+    axis.tick_params(axis="y", labelsize=12)
+    axis.set_xlim(16 * percents[0], percents[-1] / 36)
+    axis.margins(y=0.08)
+    axis.set_xlabel("tolerance, % of size", fontsize=13)
     axis.grid(True, color="#E4E4E4", linewidth=0.6)
     axis.set_axisbelow(True)
+    axis.spines[["top", "right"]].set_visible(False)
 
 
-def slope(points, percents, below=0.6):
-    """Returns points of a line with the slope of the theory, somewhat below the given ones."""
+def spread(heights, gap=NARROWEST_GAP):
+    """Returns the heights {name: height} moved apart, so that none is nearer than the gap to the next one above it."""
+    moved, last = {}, math.inf
+    for name in sorted(heights, key=heights.get, reverse=True):
+        last = moved[name] = min(heights[name], last - gap)
+    return moved
+
+
+def slope(points, percents, below=0.5):
+    """Returns points of a line with the slope of the theory, below all the given ones."""
     if not points:
         return []
     height = below * min(percent * triangles for percent, triangles, _ in points)

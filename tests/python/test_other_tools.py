@@ -200,6 +200,18 @@ def test_curves_go_from_wide_to_narrow_tolerances():
     assert counts[2] == pytest.approx(20 * counts[0]), "the slope is one over the tolerance"
 
 
+def test_texts_at_the_ends_of_the_curves_do_not_overlap():
+    heights = {"others": 4.0, "ours": 3.7, "thorough": 3.62, "theory": 3.55}
+    moved = tool_curves.spread(heights, gap=0.15)
+    assert moved == pytest.approx({"others": 4.0, "ours": 3.7, "thorough": 3.55, "theory": 3.4})
+
+
+def test_the_slope_of_the_theory_is_drawn_below_a_curve_whose_height_it_does_not_know():
+    points = tool_curves.slope([(2, 76, "thorough"), (1, 164, "thorough"), (0.1, 2590, "thorough")], [2, 1, 0.1])
+    assert [count * percent for percent, count, _ in points] == pytest.approx([76] * 3)
+    assert tool_curves.slope([], [2, 1]) == []
+
+
 def test_the_smooth_optimum_is_a_sphere_of_triangles_that_are_as_far_outside_as_inside():
     tolerance = 1e-6
     # A triangle with its corners a tolerance outside the unit sphere, and its centre a tolerance inside.
