@@ -7,8 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import solid
 from tolvol.shared.command.arguments import Stop
+
+import solid
 from tool_calls import CGAL_PROGRAM, ROOT
 
 BUILD = ROOT / "build" / "other_tools"
