@@ -198,10 +198,14 @@ def constrain(run):
     kept = np.zeros(len(vertices), bool)
     kept[faces[~proved_inside(run, vertices, faces, volume)]] = True
     for v in np.flatnonzero((f < 1) & ~kept)[:3]:
+        # Vertices at one place that are to go to one place move together.
+        together = (vertices == vertices[v]).all(1) & (wish == wish[v]).all(1)
         higher = result.vertices.copy()
         to = before[v] + min(1, f[v] + 1 / 64) * (wish[v].astype(np.float64) - before[v])
-        higher[v] = wish[v] if f[v] + 1 / 64 >= 1 else to
-        around = faces[(faces == v).any(1)]
+        higher[together] = wish[v] if f[v] + 1 / 64 >= 1 else to
+        around = faces[together[faces].any(1)]
+        if (kept & together).any():
+            continue
         if proved_inside(run, higher, around, volume).all():
             raise Finding("factors", f"vertex {v} could go on: its factor is {f[v]}, and 1/64 more is inside")
 
