@@ -42,6 +42,16 @@ def test_all_files_of_a_pattern_a_table_and_a_csv(folder):
     assert {path.name for path in (folder / "out").iterdir()} == {"one.ply", "two.stl", "batch.csv"}
 
 
+def test_names_that_are_options_or_formulas_elsewhere(folder, monkeypatch):
+    for name in ("-x.ply", "=one.ply"):
+        scan(folder / name)
+    monkeypatch.chdir(folder)
+    code, _, err = command("batch", "*.ply", "--out", "out", "--tolerance", "2%")
+    assert (code, err) == (0, "")
+    # A spreadsheet would take the names for formulas without the '.
+    assert rows(folder / "out" / "batch.csv").keys() == {"'-x.ply", "'=one.ply"}
+
+
 def test_options_and_extension_reach_every_file(folder):
     given = "--placement", "subset", "--target-triangles", "1500", "--extension", ".obj", "--csv", folder / "t.csv"
     code, _, err = command("batch", folder / "in" / "*.ply", "--out", folder / "out", "--tolerance", "2%", *given)

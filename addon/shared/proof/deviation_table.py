@@ -3,13 +3,11 @@
 
 import csv
 import io
-import re
 
 from . import report
 from .deviation_units import tolerance_text
+from .spreadsheet import harmless
 
-# A spreadsheet takes text that begins with one of these for a formula; the last four are the full-width forms.
-_FORMULA = "=+-@\uff1d\uff0b\uff0d\uff20"
 _COLUMNS = ("direction", "quantity", "at", "value", "lower", "upper")
 
 
@@ -29,7 +27,7 @@ def table(document):
     else:
         rows = [_COLUMNS, *_about(document), *_of_one(document)]
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([_harmless(cell) for cell in row] for row in rows)
+    csv.writer(text, lineterminator="\n").writerows([harmless(cell) for cell in row] for row in rows)
     return text.getvalue()
 
 
@@ -73,15 +71,6 @@ def _flat(label):
             yield from zip("xyz", value)
         else:
             yield key, value
-
-
-def _harmless(cell):
-    """Makes text safe for a spreadsheet: names come from other people's files, and as a formula a name could run a
-    program where the table is opened."""
-    if not isinstance(cell, str):
-        return cell
-    line = re.sub(r"[\t\r\n]", " ", cell)  # Some readers of CSV begin a new row at a lone \r.
-    return f"'{line}" if line.lstrip()[:1] in tuple(_FORMULA) else line
 
 
 def _rows(way):

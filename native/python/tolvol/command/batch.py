@@ -18,6 +18,7 @@ from ..shared.command import decimate_options
 from ..shared.command.arguments import Stop, file_name, whole_number
 from ..shared.files import safe_files
 from ..shared.proof import report
+from ..shared.proof.spreadsheet import harmless
 from . import mesh_files
 
 TEXTS = (
@@ -110,10 +111,12 @@ def _pairs(options):
 
 def _decimate(source, target, given, made, number):
     """Decimates one file in a process of its own. Returns the row of the table."""
-    command = [sys.executable, "-m", __package__.partition(".")[0], "decimate", str(source), str(target), *given]
+    # The names stand last, because one that begins with - would be taken for an option.
+    files = f"--report={made}", "--", str(source), str(target)
+    command = [sys.executable, "-m", __package__.partition(".")[0], "decimate", *given, *files]
     with _lock:
         process = subprocess.Popen(
-            [*command, f"--report={made}"],
+            command,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             stdin=subprocess.DEVNULL,
@@ -151,7 +154,7 @@ def _csv(rows):
     text = io.StringIO()
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     writer.writeheader()
-    writer.writerows(rows)
+    writer.writerows({name: harmless(cell) for name, cell in row.items()} for row in rows)
     return text.getvalue()
 
 
