@@ -10,15 +10,14 @@ GOLDEN = (1 + np.sqrt(5)) / 2
 
 
 def icosahedron():
-    """Returns corners (12, 3) on the unit sphere and triangles (20, 3) that look outwards."""
+    """Returns corners (12, 3) and triangles (20, 3), some of which look inwards. Its edges are 2 long."""
     corners = np.array([(0, a, b * GOLDEN) for a in (-1, 1) for b in (-1, 1)])
     corners = np.concatenate([np.roll(corners, turn, axis=1) for turn in range(3)])
-    near = np.linalg.norm(corners[:, None] - corners, axis=2) < 2.1  # Its edges are 2 long.
+    near = np.linalg.norm(corners[:, None] - corners, axis=2) < 2.1
     faces = [
         (a, b, c) for a in range(12) for b in range(a) for c in range(b) if near[a, b] and near[b, c] and near[c, a]
     ]
-    outward = [face if np.linalg.det(corners[list(face)]) > 0 else face[::-1] for face in faces]
-    return corners / np.linalg.norm(corners[0]), np.array(outward)
+    return corners, np.array(faces)
 
 
 def sphere(cuts=CUTS):
@@ -26,7 +25,9 @@ def sphere(cuts=CUTS):
 
     (n, 3) float32, (20 * 4 ** cuts, 3) int32
     """
-    points, triangles = icosahedron()
+    corners, faces = icosahedron()
+    points = corners / np.linalg.norm(corners[0])
+    triangles = np.where(np.linalg.det(corners[faces])[:, None] > 0, faces, faces[:, ::-1])
     for _ in range(cuts):
         edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         unique, label = np.unique(edges, axis=0, return_inverse=True)

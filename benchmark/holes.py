@@ -20,6 +20,7 @@ import tolvol  # noqa: E402
 
 import meshes as shapes  # noqa: E402
 import tables  # noqa: E402
+from generated import icosahedron  # noqa: E402
 from least_open import least_open  # noqa: E402
 from scan import scan  # noqa: E402
 
@@ -41,14 +42,7 @@ SUBDIVIDED = 4  # times; an icosahedron then has 5,120 faces
 
 def icosphere(levels):
     """Returns a sphere of 20 * 4**levels triangles: (n, 3) float64, (m, 3)."""
-    golden = (1 + 5**0.5) / 2
-    ones = [(0, a, b * golden) for a in (-1, 1) for b in (-1, 1)]
-    corners = np.array([np.roll(p, k) for k in range(3) for p in ones])
-    near = np.linalg.norm(corners[:, None] - corners, axis=2) < 2.1
-    faces = [
-        (a, b, c) for a in range(12) for b in range(a) for c in range(b) if near[a, b] and near[b, c] and near[c, a]
-    ]
-    vertices, triangles = corners, np.array(faces)
+    vertices, triangles = icosahedron()
     for _ in range(levels):
         vertices, triangles = shapes.subdivide(vertices, triangles)
     vertices = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)

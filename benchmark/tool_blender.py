@@ -11,27 +11,18 @@ the processor seconds that the modifier takes to blender_seconds.npy.
 import math
 import sys
 import time
+from pathlib import Path
 
 import bpy
 import numpy as np
 
-
-def blender_mesh(vertices, triangles):
-    mesh = bpy.data.meshes.new("mesh")
-    mesh.vertices.add(len(vertices))
-    mesh.vertices.foreach_set("co", vertices.ravel())
-    mesh.loops.add(triangles.size)
-    mesh.loops.foreach_set("vertex_index", triangles.ravel())
-    mesh.polygons.add(len(triangles))
-    mesh.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
-    mesh.polygons.foreach_set("loop_total", np.full(len(triangles), 3, np.int32))
-    mesh.update(calc_edges=True)
-    return mesh
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from addon.mesh import mesh_io  # noqa: E402
 
 
 def decimated(mode, parameter):
     vertices, triangles = np.load("vertices.npy"), np.load("triangles.npy")
-    ob = bpy.data.objects.new("ob", blender_mesh(vertices, triangles))
+    ob = bpy.data.objects.new("ob", mesh_io.new_mesh("mesh", vertices, triangles))
     bpy.context.scene.collection.objects.link(ob)
     modifier = ob.modifiers.new("Decimate", "DECIMATE")
     modifier.decimate_type = mode
@@ -42,11 +33,8 @@ def decimated(mode, parameter):
     started = time.process_time()
     mesh = ob.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
     seconds = time.process_time() - started
-    mesh.calc_loop_triangles()
-    points, corners = np.empty(3 * len(mesh.vertices)), np.empty(3 * len(mesh.loop_triangles), np.int32)
-    mesh.vertices.foreach_get("co", points)
-    mesh.loop_triangles.foreach_get("vertices", corners)
-    return points.reshape(-1, 3), corners.reshape(-1, 3), seconds
+    arrays = mesh_io.read_mesh(mesh)
+    return arrays.vertices, arrays.triangles, seconds
 
 
 if __name__ == "__main__":

@@ -59,9 +59,7 @@ class MeshFile:
 
 def extension_of(path):
     """Returns the extension of a path. Raises Refused for one that is not in EXTENSIONS, and lists those."""
-    extension = Path(path).suffix.lower()
-    if extension not in EXTENSIONS:
-        raise Refused(f"{path}: unknown extension {extension or '(none)'}; the known ones are {' '.join(EXTENSIONS)}")
+    extension = file_check.known_extension(path, EXTENSIONS)
     if extension in _GLTF and bpy.app.version < (4, 0) and "bool" not in vars(np):
         raise Refused(
             f"{path}: Blender {bpy.app.version_string} cannot read glTF with NumPy {np.__version__}; "
@@ -73,10 +71,7 @@ def extension_of(path):
 def read_file(path):
     """Adds the meshes of a file to the scene. Raises Refused, which names the file, if the file is damaged."""
     extension = extension_of(path)
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise Refused(f"{path}: {error.strerror}") from None
+    data = file_check.data_of(path)
     try:
         content = file_check.check(extension, data, Path(path).parent)
     except Refused as error:

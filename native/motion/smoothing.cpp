@@ -18,6 +18,7 @@
 #include "base/parallel.h"
 #include "check/certificate.h"
 #include "check/input_checks.h"
+#include "motion/finite.h"
 #include "topology/t_junctions.h"
 
 namespace tolvol {
@@ -274,7 +275,7 @@ class Smoothing {
     for (std::size_t v = 0; v < input_.size(); ++v) {
       const glm::dvec3& end = positions_[same_as_[v]];
       if (end == input_[v]) continue;
-      if (!std::isfinite(end.x) || !std::isfinite(end.y) || !std::isfinite(end.z)) {
+      if (!finite(end)) {
         throw InvalidInput("the coordinates around vertex " + std::to_string(v) + " are too large for double precision",
                            "too_far");
       }

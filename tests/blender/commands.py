@@ -2,7 +2,6 @@
 """Runs decimate.py and report.py as a user does, on files that the tests write."""
 
 import multiprocessing
-import re
 import subprocess
 from pathlib import Path
 
@@ -12,16 +11,13 @@ import numpy as np
 from addon.files import file_io
 from addon.reference import snapshots
 from addon.shared.surface import joined
+from result_line import LINE, succeeded  # noqa: F401
 from scenes import add_object
 
 FOLDER = Path(__file__).resolve().parent
 SCRIPTS = FOLDER.parents[1] / "blender_scripts"
 BENCHMARK, FIGURES = FOLDER.parents[1] / "benchmark", FOLDER.parents[1] / "docs" / "figures"
 PATIENCE = 120  # seconds after which a command counts as stuck
-LINE = re.compile(
-    r"([\d,]+) -> ([\d,]+) triangles(?: \((.*)\))?, tolerance ([\d.e-]+) % = ([\d.e-]+), result within ([\d.e+-]+) %, "
-    r"reference within ([\d.e+-]+) %(?:, normals within [\d.]+\N{DEGREE SIGN})? \(certified\), [\d.]+ s"
-)
 READS_GLTF = bpy.app.version >= (4, 0) or "bool" in vars(np)
 
 
@@ -109,11 +105,3 @@ def world(path):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     surface = joined([snapshots.surface_of(ob) for ob in file_io.read_file(path).objects])
     return surface.world(), surface.arrays.triangles
-
-
-def succeeded(done):
-    code, out, err = done
-    assert (code, err) == (0, ""), (out, err)
-    match = LINE.fullmatch(out.splitlines()[-1])
-    assert match, out
-    return match

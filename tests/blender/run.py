@@ -8,7 +8,7 @@ from pathlib import Path
 
 FOLDER = Path(__file__).resolve().parent
 sys.dont_write_bytecode = True
-sys.path[:0] = [str(FOLDER.parents[1]), str(FOLDER)]
+sys.path[:0] = [str(FOLDER.parents[1]), str(FOLDER), str(FOLDER.parent / "python")]
 
 code = 1
 try:

@@ -2,7 +2,6 @@
 """Runs the command as a user does, and writes the files that it reads."""
 
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,12 +12,9 @@ from tolvol.command import mesh_files
 from tolvol.command.mesh import Mesh
 
 import meshes
+from result_line import LINE, succeeded  # noqa: F401
 
 PATIENCE = 120  # seconds after which a command counts as stuck
-LINE = re.compile(
-    r"([\d,]+) -> ([\d,]+) triangles(?: \((.*)\))?, tolerance ([\d.e-]+) % = ([\d.e-]+), result within ([\d.e+-]+) %, "
-    r"reference within ([\d.e+-]+) %(?:, normals within [\d.]+\N{DEGREE SIGN})? \(certified\), [\d.]+ s"
-)
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(tolvol.__file__).parents[1])}
 
 
@@ -32,15 +28,6 @@ def command(*arguments, **environment):
         words(*arguments), capture_output=True, text=True, timeout=PATIENCE, env=ENVIRONMENT | environment
     )
     return done.returncode, done.stdout, done.stderr
-
-
-def succeeded(done):
-    """Returns the match of the result line."""
-    code, out, err = done
-    assert (code, err) == (0, ""), (out, err)
-    match = LINE.fullmatch(out.splitlines()[-1])
-    assert match, out
-    return match
 
 
 def refused(done, *parts, code=2):

@@ -10,6 +10,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [os.environ.get("TOLVOL_PYTHON_PATH", str(ROOT / "build/release/python")), str(ROOT / "tests/python")]
 
+from fixtures import gl  # noqa: E402, F401
+
 
 def pytest_sessionstart(session):
     try:

@@ -111,13 +111,7 @@ def test_levels_of_detail_come_each_from_in(torus, tmp_path):
     assert seen[0] == 0 and (tmp_path / "p_LOD1.ply").exists()
 
 
-def test_a_picture(torus, tmp_path):
-    try:
-        tolvol.renderer()
-    except tolvol.GlUnavailable as error:
-        if os.environ.get("TOLVOL_REQUIRE_GL"):
-            raise
-        pytest.skip(str(error))
+def test_a_picture(gl, torus, tmp_path):
     picture = tmp_path / "p.png"
     succeeded(command("decimate", torus, tmp_path / "out.ply", "--tolerance", "2%", "--picture", picture))
     assert picture.read_bytes().startswith(b"\x89PNG")

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from fixtures import gl  # noqa: F401
+
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, os.environ.get("TOLVOL_PYTHON_PATH", str(ROOT / "build/release/python")))
 
@@ -16,16 +18,3 @@ def pytest_sessionstart(session):
         import tolvol  # noqa: F401
     except ImportError as error:
         pytest.exit(f"the module tolvol does not load ({error}): run sh setup.sh", returncode=3)
-
-
-@pytest.fixture(scope="session")
-def gl():
-    """Skips tests that draw if nothing can be drawn here, or fails them if TOLVOL_REQUIRE_GL is set."""
-    import tolvol
-
-    try:
-        tolvol.renderer()
-    except tolvol.GlUnavailable as error:
-        if os.environ.get("TOLVOL_REQUIRE_GL"):
-            raise
-        pytest.skip(str(error))

@@ -167,7 +167,7 @@ class Command:
         runs = [
             self._decimate(ob, reference, min(working, surface.size()), target)
             for ob, reference, surface, target in zip(
-                source.objects, reference_objects, references, self._targets(source.objects)
+                source.objects, reference_objects, references, self._targets(inputs)
             )
         ]
         if not self.options.tolerance:
@@ -242,11 +242,12 @@ class Command:
                 )
         return found
 
-    def _targets(self, objects):
+    def _targets(self, inputs):
+        """Returns the number of triangles that is asked for of each object, or None; inputs: their Surfaces."""
         target = self.options.target_triangles
         if target is None:
-            return [None] * len(objects)
-        triangles = [len(self.files.surface_of(ob).arrays.triangles) for ob in objects]
+            return [None] * len(inputs)
+        triangles = [len(surface.arrays.triangles) for surface in inputs]
         return [max(1, target * count // sum(triangles)) for count in triangles]
 
     def _decimate(self, ob, reference, tolerance, target):

@@ -60,6 +60,27 @@ def require_indices(lowest, highest, count, first):
         raise Refused(f"face {face + 1} names vertex {index}, but there are only {count} vertices")
 
 
+def positions(lines):
+    """Returns ((n, 3) float64, whether there is more on the lines), for lines that begin with three numbers, as bytes."""
+    # Most files have three numbers on each line. What else stands there is looked at only if there are more or fewer.
+    found = numbers(b" ".join(lines), np.float64)
+    if found is not None and len(found) == 3 * len(lines):
+        return found.reshape(-1, 3), False
+    rows = [line.split()[:3] for line in lines]
+    found = numbers(b" ".join(word for row in rows for word in row), np.float64)
+    if found is None or len(found) != 3 * len(lines):
+        for number, row in enumerate(rows, 1):
+            one = numbers(b" ".join(row), np.float64)
+            if one is None or len(one) != 3:
+                raise Refused(f"vertex {number} is not three numbers ({b' '.join(row).decode(errors='replace')})")
+    return found.reshape(-1, 3), True
+
+
+def common_size(sizes):
+    """Returns the number of corners of all polygons if they have equally many, else the numbers, as Content has them."""
+    return int(sizes[0]) if len(sizes) and (sizes == sizes[0]).all() else sizes
+
+
 def numbers(text, dtype):
     """Returns the numbers in a text, or None when the text holds anything else."""
     with warnings.catch_warnings():

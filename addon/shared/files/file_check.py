@@ -6,9 +6,27 @@ truncated STL file as an empty one. check() finds such damage in the file itself
 so that the faces that a reader drops (repeated faces and faces with a repeated corner) can be reported.
 """
 
+from pathlib import Path
+
 from ..errors import Refused
 from . import gltf_check, obj_file, ply_file, stl_file
 from .content import Content
+
+
+def known_extension(path, known):
+    """Returns the extension of a path. Raises Refused for one that is not in `known`, and lists those."""
+    extension = Path(path).suffix.lower()
+    if extension not in known:
+        raise Refused(f"{path}: unknown extension {extension or '(none)'}; the known ones are {' '.join(known)}")
+    return extension
+
+
+def data_of(path):
+    """Returns the bytes of a file. Raises Refused, which names the file."""
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise Refused(f"{path}: {error.strerror}") from None
 
 
 def check(extension, data, folder):

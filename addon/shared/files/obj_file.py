@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import Refused
-from .content import Content, numbers, require_finite, require_indices
+from .content import Content, common_size, numbers, positions, require_finite, require_indices
 
 
 def read(data, attributes=False):
@@ -16,18 +16,8 @@ def read(data, attributes=False):
         raise Refused("this is not an OBJ file: it holds binary data")
     text = re.sub(rb"#[^\r\n]*", b"", data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" "))
     lines = re.findall(rb"^[ \t]*v[ \t]+([^\r\n]*)", text, re.MULTILINE)
-    # Most files have three numbers on each line. What else stands there is looked at only if there are more or fewer.
-    flat = numbers(b" ".join(lines), np.float64)
-    firsts = []
-    if flat is None or len(flat) != 3 * len(lines):
-        firsts = [tuple(line.split()[:3]) for line in lines]
-        flat = numbers(b" ".join(word for words in firsts for word in words), np.float64)
-    if flat is None or len(flat) != 3 * len(lines):
-        for number, words in enumerate(firsts, 1):
-            values = numbers(b" ".join(words), np.float64)
-            if values is None or len(values) != 3:
-                raise Refused(f"vertex {number} is not three numbers ({b' '.join(words).decode(errors='replace')})")
-    require_finite(flat.reshape(-1, 3))
+    vertices, _ = positions(lines)
+    require_finite(vertices)
     faces = re.findall(rb"^[ \t]*f[ \t]+([^\r\n]*)", text, re.MULTILINE)
     corners = re.sub(rb"/\S*", b"", b"\n".join(faces))
     sizes = np.array([len(face.split()) for face in faces], np.int64)
@@ -43,13 +33,8 @@ def read(data, attributes=False):
         starts = np.cumsum(sizes) - sizes
         lowest, highest = np.minimum.reduceat(indices, starts), np.maximum.reduceat(indices, starts)
         require_indices(lowest, highest, len(lines), 1)
-    content = Content(len(faces), flat.reshape(-1, 3), indices - 1, _same(sizes))
+    content = Content(len(faces), vertices, indices - 1, common_size(sizes))
     return replace(content, **_attributes(text, lines, faces, sizes)) if attributes else content
-
-
-def _same(sizes):
-    """Returns the number if all are equal, else the numbers."""
-    return int(sizes[0]) if len(sizes) and (sizes == sizes[0]).all() else sizes
 
 
 def _attributes(text, lines, faces, sizes):

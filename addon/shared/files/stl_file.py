@@ -9,14 +9,14 @@ import numpy as np
 from ..errors import Refused
 from .content import Content, numbers, require_finite
 
-_STL_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def read(data):
     """Returns the Content of a file: a soup, in which each triangle has three vertices of its own."""
     count = struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else 0
-    if len(data) == 84 + count * _STL_TRIANGLE.itemsize:
-        return _soup(np.ascontiguousarray(np.frombuffer(data, _STL_TRIANGLE, count, 84)["corners"]).reshape(-1, 3))
+    if len(data) == 84 + count * TRIANGLE.itemsize:
+        return _soup(np.ascontiguousarray(np.frombuffer(data, TRIANGLE, count, 84)["corners"]).reshape(-1, 3))
     corners = re.findall(rb"^[ \t]*vertex[ \t]+([^\r\n]*)", data, re.MULTILINE)
     faces = len(re.findall(rb"^[ \t]*endfacet", data, re.MULTILINE))
     if not data.lstrip().startswith(b"solid") or not faces or len(corners) != 3 * faces:

@@ -9,6 +9,8 @@ from .. import package
 from . import known
 from .verdict import Interval
 
+_HASHED_AT_ONCE = 1 << 16  # triangles
+
 
 def largest_distance(from_surface, to_surface, tolerance=None, threads=None, progress=None, again=True):
     """Returns the Interval of the largest distance of a point of `from_surface` from `to_surface`.
@@ -18,11 +20,12 @@ def largest_distance(from_surface, to_surface, tolerance=None, threads=None, pro
     permits. again: whether to measure even if these surfaces were measured before in this session (known.py).
     """
     key = _key(_content(from_surface), _content(to_surface))
-    if (
-        not again
-        and (found := known.get(key)) is not None
-        and not (tolerance is not None and found.undecided(tolerance))
-    ):
+    return _largest(key, from_surface, to_surface, tolerance, threads, progress, again)
+
+
+def _largest(key, from_surface, to_surface, tolerance, threads, progress, again):
+    found = None if again else known.get(key)
+    if found and (tolerance is None or not found.undecided(tolerance)):
         return found
 
     def measured(**options):
@@ -58,7 +61,9 @@ def take_over(surface, same, other, rows):
 def _content(surface):
     """Returns a value that is equal for surfaces of equal triangles in equal order, however their vertices are numbered."""
     vertices, triangles = surface
-    return known.key_of("corners", vertices[triangles])
+    # A part at a time, because the corners of all triangles would need several times the memory of the surface.
+    parts = range(0, len(triangles), _HASHED_AT_ONCE)
+    return known.key_of("corners", *(vertices[triangles[first : first + _HASHED_AT_ONCE]] for first in parts))
 
 
 def _key(from_content, to_content):
@@ -74,5 +79,7 @@ def sampled_distance(points, to_surface, threads=None, progress=None):
 
 def both_ways(surface, reference, tolerance=None, threads=None, progress=None, again=True):
     """Returns two Intervals: of the surface from the reference, and of the reference from the surface."""
-    forward = largest_distance(surface, reference, tolerance, threads, progress, again)
-    return forward, largest_distance(reference, surface, tolerance, threads, progress, again)
+    own, other = _content(surface), _content(reference)
+    judge = (tolerance, threads, progress, again)
+    forward = _largest(_key(own, other), surface, reference, *judge)
+    return forward, _largest(_key(other, own), reference, surface, *judge)

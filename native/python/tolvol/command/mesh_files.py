@@ -11,6 +11,7 @@ import numpy as np
 
 from ..shared.decimation import Task, hole_options
 from ..shared.errors import Refused
+from ..shared.files import file_check
 from ..shared.surface import MeshArrays, Surface
 from . import plain_formats, scene_formats
 from .mesh import Mesh, carried
@@ -36,10 +37,7 @@ class MeshFile:
 
 def extension_of(path):
     """Returns the extension of a path. Raises Refused for one that is not in EXTENSIONS, and lists those."""
-    extension = Path(path).suffix.lower()
-    if extension not in EXTENSIONS:
-        raise Refused(f"{path}: unknown extension {extension or '(none)'}; the known ones are {' '.join(EXTENSIONS)}")
-    return extension
+    return file_check.known_extension(path, EXTENSIONS)
 
 
 def clear():
@@ -49,10 +47,7 @@ def clear():
 def read(path):
     """Returns the MeshFile of a file. Raises Refused, which names the file and what is wrong with it."""
     extension, name, extras = extension_of(path), Path(path).stem, {}
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise Refused(f"{path}: {error.strerror}") from None
+    data = file_check.data_of(path)
     try:
         if not data:
             raise Refused("the file is empty")

@@ -6,7 +6,7 @@ import re
 import numpy as np
 
 from ..shared.errors import Refused
-from ..shared.files.content import Content, numbers, require_finite
+from ..shared.files.content import Content, common_size, numbers, positions, require_finite
 
 
 def read(data):
@@ -26,30 +26,15 @@ def read(data):
         raise Refused(f"the file ends early: it has {len(lines) - 1:,} of the {count + faces:,} lines that it declares")
     if len(lines) - 1 > count + faces:
         raise Refused(f"it has {len(lines) - 1:,} lines of vertices and faces, but declares only {count + faces:,}")
-    vertices, more = _vertices(lines[1 : count + 1])
+    vertices, more = positions(lines[1 : count + 1])
     require_finite(vertices)
     corners, sizes, further = _faces(lines[count + 1 :])
     bad = np.flatnonzero((corners < 0) | (corners >= count))
     if len(bad):
         face = np.searchsorted(np.cumsum(sizes), bad[0], "right")
         raise Refused(f"face {face + 1} names vertex {corners[bad[0]]}, but there are only {count} vertices")
-    same = int(sizes[0]) if len(sizes) and (sizes == sizes[0]).all() else sizes
     others = ("what its lines hold besides positions and faces",) * (more or further)
-    return Content(faces, vertices, corners, same, others=others)
-
-
-def _vertices(lines):
-    """Returns ((n, 3) float64, whether there is more on the lines)."""
-    values = numbers(b" ".join(lines), np.float64)
-    if values is not None and len(values) == 3 * len(lines):
-        return values.reshape(-1, 3), False
-    rows = [line.split()[:3] for line in lines]
-    values = numbers(b" ".join(word for row in rows for word in row), np.float64)
-    if values is None or len(values) != 3 * len(lines):
-        for number, row in enumerate(rows, 1):
-            if (one := numbers(b" ".join(row), np.float64)) is None or len(one) != 3:
-                raise Refused(f"vertex {number} is not three numbers ({b' '.join(row).decode(errors='replace')})")
-    return values.reshape(-1, 3), True
+    return Content(faces, vertices, corners, common_size(sizes), others=others)
 
 
 def _faces(lines):

@@ -14,7 +14,6 @@ HOLDS = {".obj": ("UVs", "normals", "colours"), ".off": (), ".ply": ("normals", 
 
 _UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _NORMALS, _COLOURS = ("nx", "ny", "nz"), ("red", "green", "blue", "alpha")
-_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 def read(name, extension, data):
@@ -23,7 +22,7 @@ def read(name, extension, data):
     corners = content.corners.astype(np.int32)
     places, polygons = triangulated(content.vertices, corners, content.sizes)
     triangles, remarks = corners[places], []
-    sizes = np.broadcast_to(content.sizes, content.faces) if isinstance(content.sizes, int) else content.sizes
+    sizes = np.broadcast_to(content.sizes, content.faces)
     if few := int((sizes < 3).sum()):
         remarks.append((few, f"{few:,} faces with fewer than three corners were left out"))
     if more := int((sizes > 3).sum()):
@@ -101,7 +100,7 @@ def _ply(path, mesh):
 
 def _stl(path, mesh):
     corners = mesh.vertices[mesh.triangles].astype(np.float32)
-    rows = np.zeros(len(corners), _TRIANGLE)
+    rows = np.zeros(len(corners), stl_file.TRIANGLE)
     wide = corners.astype(np.float64)
     normals = np.cross(wide[:, 1] - wide[:, 0], wide[:, 2] - wide[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
