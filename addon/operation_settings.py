@@ -80,8 +80,8 @@ def decimate_settings(options=frozenset()):
                     "THOROUGH",
                     "Thorough",
                     "After the pass of Fast, move the vertices around each further collapse together. This leaves a "
-                    "third fewer triangles in 4 to 16 times the processor time, at a tolerance of 0.1 % in 10 to 30 "
-                    "times",
+                    "third fewer triangles in 4 to 16 times the processor time, for a small mesh or tolerance in up to "
+                    "50 times",
                 ),
             ),
             options=set(options),

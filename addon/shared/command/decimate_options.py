@@ -102,7 +102,7 @@ def add(parser):
         choices=("fast", "thorough"),
         default="fast",
         help="thorough: a third fewer triangles in 4 to 16 times the processor time, at a tolerance of 0.1%% in 10 to 30 "
-        "times (default: fast)",
+        "times, for a small mesh in up to 50 times (default: fast)",
     )
     parser.add_argument(
         "--crossings",
