@@ -13,6 +13,7 @@
 #include "base/simd.h"
 #include "many.h"
 #include "measure/hausdorff.h"
+#include "polls.h"
 #include "shapes.h"
 
 namespace {
@@ -185,6 +186,35 @@ TEST(Certificate, ProvesLargeFacesOverTrianglesOfAnySize) {
     const std::vector<Verdict> verdicts = check(volume, faces);
     EXPECT_EQ(std::count(verdicts.begin(), verdicts.end(), Verdict::inside), 3'000) << "at " << tolerance;
   }
+}
+
+TEST(Certificate, AsksTheNodesAroundAPartBeforeTheHierarchy) {
+  // A search of the hierarchy takes ten times as long as a look at a node. The searches are counted by a hierarchy that
+  // is made of triangles across all space, so that each search looks at most of its nodes, and polls.
+  const double tolerance = 0.003;
+  TriangleMesh rough = shapes::grid(100);  // of side 1; the triangles are about three tolerances long
+  std::mt19937 engine(4);
+  std::uniform_real_distribution<double> u(0, 1);
+  for (dvec3& p : rough.vertices) p += tolerance * dvec3(u(engine), u(engine), u(engine) - 0.5);
+  const ToleranceVolume volume(rough.vertices, rough.triangles, kIdentity, tolerance);
+  const StoredSpace placed = kIdentity.in(volume.frame());
+  TriangleMesh across;
+  for (std::uint32_t i = 0; i < volume.reference().triangles.size(); ++i) {
+    for (int k = 0; k < 3; ++k) across.vertices.emplace_back(4 * u(engine) - 2, 4 * u(engine) - 2, 4 * u(engine) - 2);
+    across.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+  }
+  const Hierarchy slow(across);
+  const TriangleCertificate certificate(volume.witnesses(), volume.grid(), slow, volume.provable(0),
+                                        volume.refutable(0));
+  const auto prove = [&] {
+    for (int i = 0; i < 20; ++i) {
+      const dvec3 at(0.1 + 0.6 * u(engine), 0.1 + 0.6 * u(engine), 0);
+      dvec3 corners[3];
+      for (dvec3& p : corners) p = placed.frame(at + 0.2 * dvec3(u(engine), u(engine), 0));
+      EXPECT_NE(certificate.bound(corners, dvec3(TriangleCertificate::kUnproved)), TriangleCertificate::kUnproved);
+    }
+  };
+  EXPECT_LE(polls_of(prove), 60) << "a search for each part that the nearest node does not settle takes 337";
 }
 
 TEST(Certificate, ProbesFindWhatHasNoProofAndNothingElse) {
