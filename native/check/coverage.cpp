@@ -71,26 +71,22 @@ void Coverage::set_witness(std::uint32_t element, std::uint32_t triangle) {
   lists_[element].pieces.push_back(whole(triangle));
 }
 
-FaceCount Coverage::find_witnesses(std::span<const std::uint32_t> triangles, const TriangleMesh& mesh,
-                                   std::span<const std::uint32_t> ids, double provable,
-                                   std::vector<std::uint32_t>& nearest, Progress* progress) {
-  if (mesh.triangles.empty()) return FaceCount::of(triangles);
+Coverage::Uncovered Coverage::find_witnesses(std::span<const std::uint32_t> triangles, const TriangleMesh& mesh,
+                                             std::span<const std::uint32_t> ids, double provable, Progress* progress) {
+  if (mesh.triangles.empty()) return {{triangles.begin(), triangles.end()}, {}, {}};
   const Hierarchy hierarchy(mesh);
-  FaceCount uncovered;
+  Uncovered uncovered;
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     poll_at(i);
     if (progress) progress->update(static_cast<double>(i) / static_cast<double>(triangles.size()));
-    if (find_witnesses_of(triangles[i], mesh, hierarchy, ids, provable, nearest)) continue;
-    if (uncovered.faces++ == 0) uncovered.first = triangles[i];
+    find_witnesses_of(triangles[i], mesh, hierarchy, ids, provable, uncovered);
   }
   return uncovered;
 }
 
-/// Does so for one triangle. Returns whether every piece has a witness.
-bool Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
-                                 std::span<const std::uint32_t> ids, double provable,
-                                 std::vector<std::uint32_t>& nearest) {
-  bool all = true;
+/// Does so for one triangle.
+void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
+                                 std::span<const std::uint32_t> ids, double provable, Uncovered& uncovered) {
   std::vector<Part> stack{whole(triangle)};
   std::size_t looked = 0;
   bool found_beyond = false;
@@ -120,9 +116,11 @@ bool Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
     const double floor = (found_beyond ? kFloor : kHeadroom) * limit_;
     const bool finest = longest_squared(piece) <= floor * floor || piece.cuts == kMostCuts ||
                         (++looked > kBudget && (found_beyond || budget_of_first_ == 0 || --budget_of_first_ == 0));
-    if (closest.distance > provable + radius || finest) {
-      nearest.push_back(closest.triangle);
-      all = false;
+    const bool is_beyond = closest.distance > provable + radius;
+    if (is_beyond || finest) {
+      if (!is_beyond) uncovered.in_part.push_back(piece);
+      uncovered.nearest.push_back(closest.triangle);
+      if (!(split_into_[triangle] & kNeverWhole)) uncovered.triangles.push_back(triangle);
       split_into_[triangle] |= kNeverWhole;
     } else {
       const glm::uvec3& t = mesh.triangles[closest.triangle];
@@ -130,7 +128,6 @@ bool Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
       if (!cut(piece, below, kWorthCutting * limit_, stack)) split(piece, stack);
     }
   }
-  return all;
 }
 
 void Coverage::sample(std::uint32_t element, std::size_t stride, std::vector<Sample>& out) const {

@@ -18,7 +18,6 @@
 #include <vector>
 
 #include "base/progress.h"
-#include "check/outside.h"
 #include "check/part.h"
 #include "check/witness.h"
 #include "geometry/hierarchy.h"
@@ -50,13 +49,17 @@ class Coverage {
   /// Makes the element the witness of a triangle of the reference that coincides with it.
   void set_witness(std::uint32_t element, std::uint32_t triangle);
 
+  /// What find_witnesses() leaves without a witness.
+  struct Uncovered {
+    std::vector<std::uint32_t> triangles;  ///< Triangles of the reference of which a piece has no witness.
+    std::vector<std::uint32_t> nearest;    ///< The triangle of the mesh nearest to each such piece.
+    std::vector<Part> in_part;             ///< Those of the pieces of which the mesh may cover a part.
+  };
   /// Finds witnesses for triangles of the reference, whose numbers ascend, among the triangles of a mesh. `ids[i]` is
   /// the element that triangle i of the mesh is, or kNone if it never changes. A piece farther than `provable` from all
-  /// triangles gets no witness, and the triangle nearest to it is added to `nearest`. Returns the triangles of which a
-  /// piece has no witness. About 2 us a triangle.
-  FaceCount find_witnesses(std::span<const std::uint32_t> triangles, const TriangleMesh& mesh,
-                           std::span<const std::uint32_t> ids, double provable, std::vector<std::uint32_t>& nearest,
-                           Progress* progress);
+  /// triangles gets no witness. About 2 us a triangle.
+  Uncovered find_witnesses(std::span<const std::uint32_t> triangles, const TriangleMesh& mesh,
+                           std::span<const std::uint32_t> ids, double provable, Progress* progress);
 
   /// A point that stands for a piece. sample() adds one for every `stride`-th piece of the element.
   struct Sample {
@@ -97,8 +100,8 @@ class Coverage {
   };
 
   Part whole(std::uint32_t triangle) const;
-  bool find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
-                         std::span<const std::uint32_t> ids, double provable, std::vector<std::uint32_t>& nearest);
+  void find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
+                         std::span<const std::uint32_t> ids, double provable, Uncovered& uncovered);
   bool place_all(Trial& trial, std::vector<std::uint32_t>& gathered) const;
   bool place(const Part& whole, std::uint32_t first, Trial& trial) const;
 

@@ -66,7 +66,7 @@ ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span
   constexpr double kAboutOne = 1.1;
   const glm::dvec3 reach = glm::max(-box.lower, box.upper);
   if (!(std::max({reach.x, reach.y, reach.z}) <= kAboutOne)) refuse_tolerance();
-  grid_ = layout_grid(box, frame_tolerance(), options.precision);
+  grid_ = layout_grid(box, frame_tolerance(), options.precision, options.grid_memory);
   // The two parts run at the same time, because neither needs the other.
   parallel_for(2, 1, options.threads, [&](std::size_t part, std::size_t) {
     if (part == 0 && field_ == Field::scatter) {

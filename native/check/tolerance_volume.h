@@ -28,10 +28,11 @@ enum class Field { scatter, fast_marching };
 class ToleranceVolume {
  public:
   struct Options {
-    std::optional<double> precision;  ///< is in grid nodes per tolerance; if empty, the finest that fits kGridBudget
+    std::optional<double> precision;  ///< is in grid nodes per tolerance; if empty, the finest that fits `grid_memory`
     unsigned threads = 0;             ///< 0 means one for each core
     Progress* progress = nullptr;
-    Field field = Field::scatter;  ///< never makes a verdict wrong
+    Field field = Field::scatter;           ///< never makes a verdict wrong
+    std::size_t grid_memory = kGridBudget;  ///< is in bytes; less makes proofs slower and no verdict wrong
   };
 
   /// `tolerance` is in world units. Throws InvalidInput for a bad mesh, and for a tolerance that is not finite and

@@ -49,10 +49,10 @@ BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mes
       uncertified_.push_back(b);
     }
   }
-  std::vector<std::uint32_t> all(reference_.triangles.size()), nearest;
+  std::vector<std::uint32_t> all(reference_.triangles.size());
   std::iota(all.begin(), all.end(), 0u);
-  backward_->find_witnesses(all, elements, ids, provable, nearest, nullptr);
-  for (const std::uint32_t t : nearest) {
+  const Coverage::Uncovered uncovered = backward_->find_witnesses(all, elements, ids, provable, nullptr);
+  for (const std::uint32_t t : uncovered.nearest) {
     uncertified_.push_back(elements.triangles[t].x);
     uncertified_.push_back(elements.triangles[t].y);
   }

@@ -15,6 +15,7 @@ BoundedMesh::BoundedMesh(BoundedMeshInput input, Bounds* bounds, Team& team)
     : bounds_(bounds),
       subset_(input.subset),
       store_(std::move(input.store)),
+      cell_(input.cell),
       triangles_(std::move(input.triangles)),
       pinned_(std::move(input.pinned)),
       shares_(std::move(input.shares)),

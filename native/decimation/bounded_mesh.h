@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
+#include <limits>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -43,6 +44,8 @@ struct BoundedMeshInput {
   std::vector<bool> joined;          ///< For each vertex: an edge of it lies on edges of other sheets. May be empty.
   std::vector<glm::uvec3> wedges;    ///< For each corner: equal at a vertex where attributes are equal. May be empty.
   bool subset = false;               ///< Every surviving vertex keeps its position.
+  /// Vertices move strictly inside this box of stored positions alone.
+  Box cell{glm::dvec3(-std::numeric_limits<double>::infinity()), glm::dvec3(std::numeric_limits<double>::infinity())};
   /// Rounds a position in the frame to what can be stored.
   std::function<VertexPosition(const glm::dvec3&)> store;
 };
@@ -71,6 +74,8 @@ class BoundedMesh {
   const glm::dvec3& stored(std::uint32_t vertex) const { return stored_[vertex]; }
   VertexPosition vertex_position(std::uint32_t vertex) const { return {stored_[vertex], positions_[vertex]}; }
   VertexPosition store(const glm::dvec3& position) const { return store_(position); }
+  /// Whether a vertex may be put there: the stored type can hold the position, and it is strictly inside the cell.
+  bool may_hold(const VertexPosition& p) const { return p.is_finite() && strictly_inside(p.stored, cell_); }
   /// Whether the vertex left its original position.
   bool left_original(std::uint32_t vertex) const { return left_original_[vertex] != 0; }
   /// The share of the forward bound that new faces around the vertex may use.
@@ -182,6 +187,7 @@ class BoundedMesh {
   Bounds* bounds_;
   bool subset_;
   std::function<VertexPosition(const glm::dvec3&)> store_;
+  Box cell_;
   std::vector<glm::uvec3> triangles_;
   std::vector<glm::dvec3> positions_, stored_;
   std::vector<bool> pinned_, seam_;

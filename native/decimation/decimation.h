@@ -40,6 +40,12 @@ struct DecimationOptions {
   std::span<const double> shares = {};
   Outside outside = Outside::error;            ///< What happens to input faces that are not within the tolerance.
   std::span<const std::uint32_t> wedges = {};  ///< For each input corner, or empty: see wedge_labels().
+  /// Only faces whose corners are strictly inside this box of stored positions change, and their corners stay strictly
+  /// inside. All others stand still and are not certified. Faces of the reference that the input does not cover are no
+  /// error: what may cover a part of what is left of them stands still. So boxes without a common inner point, each
+  /// with all faces that meet it and all of the reference within the tolerance of it, may be decimated at once
+  /// (docs/architecture.md). Needs two_sided.
+  std::optional<Box> cell = {};
   RingCheck* baseline =
       nullptr;           ///< For comparisons: it decides in place of the certificates, and nothing is promised.
   unsigned threads = 0;  ///< 0 is one for each core. It never changes the result.

@@ -34,6 +34,9 @@ void check(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> tri
     }
   }
   require_normal_angle(options.max_normal_angle);
+  if (options.cell && (!volume || !options.two_sided || options.baseline)) {
+    throw InvalidInput("a cell needs a volume and both directions");
+  }
   if (!options.wedges.empty() && options.wedges.size() != 3 * triangles.size()) {
     throw InvalidInput("wedges must have one label for each corner of each triangle");
   }
@@ -51,6 +54,7 @@ DecimationInput::DecimationInput(std::span<const glm::dvec3> vertices, std::span
   positions_.resize(cut_.vertex_input.size());
   for (std::size_t v = 0; v < positions_.size(); ++v) positions_[v] = space_.frame(vertices_[cut_.vertex_input[v]]);
   pin();
+  hold_outside_cell();
   pin_t_junctions(team);
   if (std::none_of(cut_.triangles.begin(), cut_.triangles.end(), [&](const glm::uvec3& t) {
         return glm::cross(positions_[t.y] - positions_[t.x], positions_[t.z] - positions_[t.x]) != glm::dvec3(0);
@@ -77,6 +81,19 @@ void DecimationInput::pin() {
   for_holders([&](std::uint32_t of_input, std::uint32_t vertex) {
     if (options_.locked[of_input]) pin(vertex, "asked for");
   });
+}
+
+/// Vertices of faces that are not strictly inside the cell stay.
+void DecimationInput::hold_outside_cell() {
+  exempt_.assign(triangles_.size(), false);
+  if (!options_.cell) return;
+  for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
+    const glm::uvec3& t = triangles_[i];
+    const auto inside = [&](int k) { return strictly_inside(vertices_[t[k]], *options_.cell); };
+    if (inside(0) && inside(1) && inside(2)) continue;
+    exempt_[i] = true;
+    pin_corners(i, "outside the cell");
+  }
 }
 
 /// Faces that meet in a T-junction share no edge along which they could be kept together while it moves.
@@ -111,6 +128,14 @@ void DecimationInput::for_holders(Visit&& visit) const {
 void DecimationInput::pin(std::uint32_t vertex, const std::string& cause) {
   if (!pinned_[vertex]) ++report_.locked[cause];
   pinned_[vertex] = true;
+}
+
+/// Pins the vertices of an input triangle. Those of one that was dropped may be none of the manifold.
+void DecimationInput::pin_corners(std::uint32_t triangle, const std::string& cause) {
+  for (int k = 0; k < 3; ++k) {
+    const std::uint32_t v = cut_.input_vertex[triangles_[triangle][k]];
+    if (v != kNone) pin(v, cause);
+  }
 }
 
 bool DecimationInput::input_begins_as_reference() const {
@@ -202,24 +227,27 @@ void DecimationInput::face(double provable, double mapping_error, Team& team) {
     exceeding_ = keep_angles(cut_, positions_, start, *facing_, added, team, *certified_);
   }
   // A face that is outside has no witness, and so no angle. It is counted as outside.
-  std::erase_if(exceeding_, [&](std::uint32_t t) { return is_outside_[cut_.triangle_input[t]]; });
+  std::erase_if(exceeding_, [&](std::uint32_t t) { return exempt_[cut_.triangle_input[t]]; });
 }
 
 /// Proves the triangles that are none of the reference.
 void DecimationInput::certify_input(const Certificate& certificate) {
-  is_outside_.assign(triangles_.size(), false);
-  if (own_count_ == triangles_.size()) return;
-  std::vector<std::uint32_t> indices;
-  indices.reserve(3 * (triangles_.size() - own_count_));
-  for (const glm::uvec3& t : triangles_.subspan(own_count_)) indices.insert(indices.end(), {t.x, t.y, t.z});
+  std::vector<std::uint32_t> asked, indices;
+  for (auto i = static_cast<std::uint32_t>(own_count_); i < triangles_.size(); ++i) {
+    if (exempt_[i]) continue;
+    const glm::uvec3& t = triangles_[i];
+    asked.push_back(i);
+    indices.insert(indices.end(), {t.x, t.y, t.z});
+  }
+  if (asked.empty()) return;
   const std::vector<Verdict> verdicts =
       certificate.check({vertices_, space_, indices}, {options_.threads, options_.progress});
-  for (std::uint32_t k = 0; k < verdicts.size(); ++k) {
+  for (std::size_t k = 0; k < asked.size(); ++k) {
     if (verdicts[k] == Verdict::inside) continue;
-    const auto i = static_cast<std::uint32_t>(own_count_ + k);
-    is_outside_[i] = true;
+    const std::uint32_t i = asked[k];
+    exempt_[i] = true;
     if (report_.outside.faces++ == 0) report_.outside.first = i;
-    for (int k = 0; k < 3; ++k) pin(cut_.input_vertex[triangles_[i][k]], "outside the tolerance");
+    pin_corners(i, "outside the tolerance");
   }
   if (report_.outside.faces && options_.outside == Outside::error) refuse_outside(report_.outside);
 }
@@ -241,13 +269,30 @@ void DecimationInput::cover(double provable) {
                                     cut_.input_vertex[triangles_[i].z]);
     ids.push_back(kNone);
   }
-  std::vector<std::uint32_t> all(volume_->reference().triangles.size()), nearest;
+  std::vector<std::uint32_t> all(volume_->reference().triangles.size());
   std::iota(all.begin(), all.end(), 0u);
   if (options_.progress) options_.progress->begin("comparing");
-  report_.uncovered = backward_->find_witnesses(all, elements, ids, provable, nearest, options_.progress);
+  const Coverage::Uncovered found = backward_->find_witnesses(all, elements, ids, provable, options_.progress);
+  if (options_.cell) return hold_near(found.in_part, elements, provable);
+  report_.uncovered = FaceCount::of(found.triangles);
   if (report_.uncovered.faces) report_.warnings.push_back(take_uncovered(report_.uncovered, options_.outside));
-  for (const std::uint32_t t : nearest) {
+  for (const std::uint32_t t : found.nearest) {
     for (int k = 0; k < 3; ++k) pin(elements.triangles[t][k], "outside the tolerance");
+  }
+}
+
+/// Pins all faces that may cover a part of one of some pieces of the reference: those within the tolerance of them.
+void DecimationInput::hold_near(std::span<const Part> pieces, const TriangleMesh& elements, double provable) {
+  if (pieces.empty()) return;
+  const Hierarchy hierarchy(elements);
+  for (const Part& piece : pieces) {
+    poll();
+    const auto& [a, b, c] = piece.corners;
+    const glm::dvec3 centre = (a + b + c) * (1.0 / 3);
+    const double radius = std::max({glm::distance(a, centre), glm::distance(b, centre), glm::distance(c, centre)});
+    hierarchy.for_each_within(centre, (provable + radius) * (1 + kHeadroom), [&](std::uint32_t near) {
+      for (int k = 0; k < 3; ++k) pin(elements.triangles[near][k], "beside an uncovered part of the reference");
+    });
   }
 }
 
@@ -299,6 +344,7 @@ BoundedMeshInput DecimationInput::take_mesh() {
     }
     islands_ = island_labels(cut_.triangles, input.wedges);
   }
+  if (options_.cell) input.cell = *options_.cell;
   input.subset = options_.placement == DecimationOptions::Placement::subset;
   input.store = [this](const glm::dvec3& p) {
     const glm::dvec3 stored = space_.store(p);

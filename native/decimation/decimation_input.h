@@ -79,10 +79,13 @@ class DecimationInput {
  private:
   Frame own_frame() const;
   void pin();
+  void hold_outside_cell();
+  void hold_near(std::span<const Part> pieces, const TriangleMesh& elements, double provable);
   void pin_t_junctions(Team& team);
   template <class Visit>
   void for_holders(Visit&& visit) const;
   void pin(std::uint32_t vertex, const std::string& cause);
+  void pin_corners(std::uint32_t triangle, const std::string& cause);
   bool input_begins_as_reference() const;
   bool added_triangles_are_open() const;
   Bounds* set_bounds(Team& team);
@@ -112,7 +115,7 @@ class DecimationInput {
   std::optional<FacingRule> facing_;
   std::optional<CertifiedBounds> certified_;
   std::vector<std::uint32_t> exceeding_;
-  std::vector<bool> is_outside_;  ///< for each input triangle
+  std::vector<bool> exempt_;  ///< For each input triangle: it is outside, or stands still outside of the cell.
   Bounds* bounds_ = nullptr;
 };
 

@@ -40,7 +40,7 @@ bool PatchTrial::prepare(Halfedge h, const glm::dvec3& position, int rings) {
   // A vertex that stays where it is keeps its bits, which mapping from the frame need not give.
   const std::uint32_t end = mesh_.to(h);
   const VertexPosition target = position == mesh_.position(end) ? mesh_.vertex_position(end) : mesh_.store(position);
-  if (!target.is_finite() || !change_.prepare_collapse(h, target) || change_.folds_over()) return false;
+  if (!mesh_.may_hold(target) || !change_.prepare_collapse(h, target) || change_.folds_over()) return false;
   if (!patch_.gather(change_, rings, !bounds_.bounds_boundaries())) return false;
   deviations_.start(patch_);
   for (std::uint32_t f = 0; f < patch_.faces().size(); ++f) deviations_.add(samples_.of(patch_.faces()[f].id), f);
@@ -104,7 +104,7 @@ bool PatchTrial::relax() {
 
 bool PatchTrial::certify() {
   round_positions();
-  if (meets_another()) return false;
+  if (leaves_cell() || meets_another()) return false;
   gather_elements();
   // A sheet that was in the way once likely still is, and the other questions take longer.
   const bool asked = deviations_.has_separations();
@@ -126,6 +126,13 @@ void PatchTrial::round_positions() {
     v.position = position.position;
     positions_.push_back(position);
   }
+}
+
+bool PatchTrial::leaves_cell() const {
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) {
+    if (moved_[v] && !mesh_.may_hold(positions_[v])) return true;
+  }
+  return false;
 }
 
 bool PatchTrial::meets_another() {

@@ -64,6 +64,7 @@ class PatchTrial {
   bool relax();
   bool certify();
   void round_positions();
+  bool leaves_cell() const;
   bool meets_another();
   bool changed(std::uint32_t face) const;
   bool pieces_hold();

@@ -3,6 +3,7 @@
 // follow h = epsilon / rho.
 #include "field/distance_grid.h"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -14,6 +15,8 @@ namespace {
 // Where no precision is given, a grid has at most so many nodes per tolerance: a finer one costs time and saves the
 // certificate none.
 constexpr double kFinestPrecision = 1;
+// The grid around a box smaller than a cell, which has 5 nodes along each axis, fits so many bytes.
+constexpr std::size_t kLeastBudget = 4096;
 
 // Returns node counts as doubles, because a precision far too fine must not overflow an integer before it is refused.
 struct Layout {
@@ -32,18 +35,19 @@ Layout layout(const Box& box, double tolerance, double precision) {
 
 }  // namespace
 
-double precision_that_fits(const Box& box, double tolerance, double finest) {
+double precision_that_fits(const Box& box, double tolerance, double finest, std::size_t most) {
   double precision = finest;
   // This ends because a coarser grid has fewer nodes, down to the few of a band around a box smaller than a cell.
-  while (layout(box, tolerance, precision).bytes() > kGridBudget) precision /= 2;
+  while (layout(box, tolerance, precision).bytes() > static_cast<double>(std::max(most, kLeastBudget))) precision /= 2;
   return precision;
 }
 
-DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double> precision) {
+DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double> precision, std::size_t most) {
   if (precision && !(*precision > 0 && std::isfinite(*precision))) {
     throw InvalidInput("the precision must be a positive number (grid nodes per tolerance)");
   }
-  const Layout l = layout(box, tolerance, precision.value_or(precision_that_fits(box, tolerance, kFinestPrecision)));
+  const Layout l =
+      layout(box, tolerance, precision.value_or(precision_that_fits(box, tolerance, kFinestPrecision, most)));
   if (l.bytes() > kGridBudget) {
     std::ostringstream text;
     text << "a precision of " << *precision << " needs a grid of " << l.bytes() / (1 << 20) << " MB, the limit is "

@@ -46,12 +46,14 @@ struct DistanceGrid {
   }
 };
 
-/// Returns the finest of `finest`, `finest` / 2, `finest` / 4, ... whose grid fits kGridBudget.
-double precision_that_fits(const Box& box, double tolerance, double finest);
+/// Returns the finest of `finest`, `finest` / 2, `finest` / 4, ... whose grid takes at most `most` bytes, or
+/// 4,096 if that is more.
+double precision_that_fits(const Box& box, double tolerance, double finest, std::size_t most = kGridBudget);
 
 /// Lays out the grid of a reference: its box enlarged by the band, with the spacing tolerance / precision. If
-/// `precision` is empty it is the finest of 1, 1/2, 1/4, ... that fits kGridBudget. Allocates nothing. Throws
-/// ResourceLimit, naming a precision that fits, for a precision that does not.
-DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double> precision);
+/// `precision` is empty it is the finest of 1, 1/2, 1/4, ... that fits `most` bytes. Allocates nothing. Throws
+/// ResourceLimit, naming a precision that fits, for a precision whose grid takes more than kGridBudget.
+DistanceGrid layout_grid(const Box& box, double tolerance, std::optional<double> precision,
+                         std::size_t most = kGridBudget);
 
 }  // namespace tolvol

@@ -70,12 +70,12 @@ void MovingCoverage::find_witnesses(Found& found, Progress* progress) const {
       elements.triangles.emplace_back(corners[a], corners[b], corners[c]);
     }
   }
-  std::vector<std::uint32_t> nearest;
-  const FaceCount uncovered = layer.coverage.find_witnesses(open, elements, ids, mesh_->provable(), nearest, progress);
+  const Coverage::Uncovered missing = layer.coverage.find_witnesses(open, elements, ids, mesh_->provable(), progress);
+  const FaceCount uncovered = FaceCount::of(missing.triangles);
   found.uncovered.faces = std::max(found.uncovered.faces, uncovered.faces);
   if (uncovered.first)
     found.uncovered.first = std::min(*uncovered.first, found.uncovered.first.value_or(*uncovered.first));
-  for (const std::uint32_t element : nearest) {
+  for (const std::uint32_t element : missing.nearest) {
     for (int k = 0; k < 3; ++k) found.nearest.push_back(elements.triangles[element][k]);
   }
 }

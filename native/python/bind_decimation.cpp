@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/stl.h>
 
+#include <array>
 #include <chrono>
 
 #include "base/errors.h"
@@ -55,11 +56,20 @@ py::dict make_report(const DecimationResult& r, std::size_t triangles_in, double
   return report;
 }
 
+Box to_box(const std::array<std::array<double, 3>, 2>& ends) {
+  const auto& [l, u] = ends;
+  if (!(l[0] < u[0] && l[1] < u[1] && l[2] < u[2])) {
+    throw InvalidInput("cell must be a lower and an upper corner, each coordinate of the first below that of the second");
+  }
+  return {{l[0], l[1], l[2]}, {u[0], u[1], u[2]}};
+}
+
 Result decimate_arrays(const py::object& vertices, const py::object& triangles, const Volume* volume,
                        const py::object& to_world, const std::string& placement, bool two_sided,
                        std::optional<std::int64_t> target_triangles, const py::object& locked, const py::object& shares,
                        const std::string& outside, const py::object& wedges, const std::string& effort,
                        const std::string& crossings, std::optional<double> max_normal_angle,
+                       const std::optional<std::array<std::array<double, 3>, 2>>& cell,
                        std::optional<double> max_seconds, std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
@@ -76,6 +86,7 @@ Result decimate_arrays(const py::object& vertices, const py::object& triangles, 
   if (max_seconds && !(*max_seconds > 0)) throw InvalidInput("max_seconds must be positive, or None for no limit");
   options.max_seconds = max_seconds.value_or(0);
   options.two_sided = two_sided;
+  if (cell) options.cell = to_box(*cell);
   if (target_triangles && *target_triangles < 1) {
     throw InvalidInput("target_triangles must be at least 1, or None for as few as the tolerance permits");
   }
@@ -181,7 +192,7 @@ warnings : a list of sentences)doc");
              py::arg("two_sided") = true, py::arg("target_triangles") = py::none(), py::arg("locked") = py::none(),
              py::arg("shares") = py::none(), py::arg("outside") = "error", py::arg("wedges") = py::none(),
              py::arg("effort") = "fast", py::arg("crossings") = "keep_out", py::arg("max_normal_angle") = py::none(),
-             py::arg("max_seconds") = py::none(), py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+             py::arg("cell") = py::none(), py::arg("max_seconds") = py::none(), py::arg("threads") = py::none(), py::arg("progress") = py::none(),
              R"doc(Reduce a mesh to few triangles within the tolerance of a volume.
 
 Every point of the result is within the tolerance of the reference and, with two_sided, every point of the reference is
@@ -229,6 +240,14 @@ max_normal_angle : float, optional
     faces against all of the reference near it. A face so thin that rounding could turn its normal is no witness and
     has no angle; only a face that was so in the input may be so in the result. If most faces of the reference are so,
     no angle is kept, and a warning says so.
+cell : ((float, float, float), (float, float, float)), optional
+    The lower and upper corner of a box in local coordinates, which may be infinite. Only faces whose corners are
+    strictly inside change, and their corners stay strictly inside. All others stand still and are not certified. Faces
+    of the reference that the mesh does not cover are no error: faces within the tolerance of them stand still. So the
+    cells of a large mesh, which have no inner point in common, may be decimated at once, each with all faces whose
+    bounding box meets the cell, and with all faces of the reference whose bounding box is within the tolerance of it:
+    the results together are within the tolerance of the whole reference, and it is of them, if it was before; and no
+    new faces cross. Needs two_sided.
 max_seconds : float, optional
     Stop after this time with what is proved by then, which depends on the speed of the machine. The time does not cut
     short the preparation, in which the mesh is set up and the input is certified: about 0.7 us a triangle, and 2 us if

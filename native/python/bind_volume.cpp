@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -23,16 +24,18 @@ Field to_field(const std::string& name) {
 
 std::unique_ptr<Volume> make_volume(const py::object& vertices, const py::object& triangles, double tolerance,
                                     const py::object& to_world, std::optional<double> precision,
-                                    const std::string& field, std::optional<int> threads, Progress* progress) {
+                                    std::optional<std::int64_t> grid_memory, const std::string& field, std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const StoredSpace space(to_matrix(to_world), v.storage);
+  if (grid_memory && *grid_memory < 0) throw InvalidInput("grid_memory must not be negative");
+  ToleranceVolume::Options options{.precision = precision, .threads = to_threads(threads), .progress = progress};
+  options.field = to_field(field);
+  if (grid_memory) options.grid_memory = std::min(kGridBudget, static_cast<std::size_t>(*grid_memory));
   const Interruptible call(progress);
   const auto start = std::chrono::steady_clock::now();
   auto volume = std::unique_ptr<Volume>(
-      new Volume{{v.values, t, space, tolerance, {precision, to_threads(threads), progress, to_field(field)}},
-                 v.values.size(),
-                 t.size()});
+      new Volume{{v.values, t, space, tolerance, options}, v.values.size(), t.size()});
   volume->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return volume;
 }
@@ -137,7 +140,8 @@ void bind_volume(py::module_& module) {
   py::class_<Volume>(module, "ToleranceVolume", py::module_local(),
                      "All points within a tolerance of a reference mesh, with what makes questions about them fast.")
       .def(py::init(&make_volume), py::arg("vertices"), py::arg("triangles"), py::arg("tolerance"), py::kw_only(),
-           py::arg("to_world") = py::none(), py::arg("precision") = py::none(), py::arg("field") = "scatter",
+           py::arg("to_world") = py::none(), py::arg("precision") = py::none(), py::arg("grid_memory") = py::none(),
+           py::arg("field") = "scatter",
            py::arg("threads") = py::none(), py::arg("progress") = py::none(),
            R"doc(Build the volume of a reference mesh.
 
@@ -148,6 +152,9 @@ vertices : (n, 3) float32 or float64 array
 triangles : (m, 3) integer array
 tolerance : float
     A positive length in world units, at most the diagonal of the reference.
+grid_memory : int, optional
+    The most bytes that the grid of distances takes if no precision is given: its precision is the finest of 1, 1/2, 1/4,
+    ... that fits. None, and any number above, is 256 MiB. Less makes proofs slower, and no verdict wrong.
 precision : float, optional
     Grid nodes per tolerance. None takes the finest of 1, 1/2, 1/4, ... that fits 256 MB.
 field : {"scatter", "fast_marching"}

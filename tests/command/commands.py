@@ -42,9 +42,9 @@ def write(path, vertices, triangles, **attributes):
     return path
 
 
-def scan(path, dtype=np.float32):
-    """Writes a rough torus."""
-    vertices, triangles = meshes.torus(columns=48, rows=24, noise=0.004)
+def scan(path, dtype=np.float32, columns=48, rows=24):
+    """Writes a rough torus of 2 * columns * rows triangles."""
+    vertices, triangles = meshes.torus(columns, rows, noise=0.004)
     return write(path, vertices.astype(dtype), triangles)
 
 

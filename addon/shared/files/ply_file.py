@@ -26,9 +26,10 @@ _BLANK = b" \t\r\n\0"  # Some programs end a file with an empty line, or fill it
 
 def read(data):
     """Returns the Content of a file."""
-    form, body, elements = _ply_header(data)
+    form, elements, start = header(data)
+    body = data[start:]
     wide = any(name == "vertex" and ("x", None, "f8") in properties for name, _, properties in elements)
-    order = ">" if form == "binary_big_endian" else "<"
+    order = byte_order(form)
     if form == "ascii":  # The text is turned into a binary body of doubles, so that one reader serves both forms.
         found = numbers(body, np.float64)
         if found is None:
@@ -108,8 +109,8 @@ def _require_vertices(corners, sizes, count):
     require_indices(np.minimum.reduceat(corners, starts), np.maximum.reduceat(corners, starts), count, 0)
 
 
-def _ply_header(data):
-    """Returns (format, the bytes after the header, elements).
+def header(data):
+    """Returns (format, elements, the offset of what follows the header), for a file that begins with `data`.
 
     elements: [(name, count, properties)]; properties: [(name, type of a list's length or None, type)].
     """
@@ -131,7 +132,22 @@ def _ply_header(data):
                 elements[-1][2].append((words[2], None, _PLY_TYPES[words[1]]))
         except (IndexError, KeyError, ValueError):
             raise Refused(f"its PLY header has a line that cannot be read: {' '.join(words)}") from None
-    return form, data[end.end() :], elements
+    return form, elements, end.end()
+
+
+def byte_order(form):
+    return ">" if form == "binary_big_endian" else "<"
+
+
+def row_type(properties, lengths, order):
+    """Returns the type of the rows of an element whose lists have these lengths: {property: length}."""
+    row = []
+    for field, counted, kind in properties:
+        if counted:
+            row += [(field + " length", order + counted), (field, order + kind, (lengths[field],))]
+        else:
+            row.append((field, order + kind))
+    return np.dtype(row)
 
 
 def _ply_element(body, offset, count, properties, order):
@@ -142,16 +158,13 @@ def _ply_element(body, offset, count, properties, order):
     """
     if not 0 <= count <= len(body):
         raise ValueError
-    row, start = [], offset
+    lengths, start = {}, offset
     for field, counted, kind in properties:
-        length = 1
         if counted:
-            row.append((field + " length", order + counted))
-            length = int(np.frombuffer(body, order + counted, 1, start)[0]) if count else 0
+            lengths[field] = int(np.frombuffer(body, order + counted, 1, start)[0]) if count else 0
             start += np.dtype(counted).itemsize
-        row.append((field, order + kind, (length,)) if counted else (field, order + kind))
-        start += length * np.dtype(kind).itemsize
-    dtype = np.dtype(row)
+        start += lengths.get(field, 1) * np.dtype(kind).itemsize
+    dtype = row_type(properties, lengths, order)
     fits = dtype.itemsize * count <= len(body) - offset
     rows = np.frombuffer(body, dtype, count if fits else 0, offset)
     lists = [(field, counted) for field, counted, _ in properties if counted]

@@ -121,9 +121,8 @@ def counts(run, as_text="{:.3g}".format):
         remarks.append(f"{run['outside']['faces']:,} faces outside kept")
     pairs = run.get("crossings", {"after": 0})  # a file may keep a run of an earlier version
     if pairs["after"]:
-        remarks.append(
-            f"{solidity.pair_count(pairs['after'])} pairs of faces cross, before {solidity.pair_count(pairs['before'])}"
-        )
+        before = "" if pairs["before"] is None else f", before {solidity.pair_count(pairs['before'])}"
+        remarks.append(f"{solidity.pair_count(pairs['after'])} pairs of faces cross{before}")
     turned = (run.get("normals") or {"exceeded_after": 0})["exceeded_after"]
     if turned:
         remarks.append(f"{turned:,} faces beyond the angle of Normals, before {run['normals']['exceeded_before']:,}")

@@ -8,7 +8,7 @@ from ..shared.command import decimate_options, report
 from ..shared.command.arguments import Parser, Stop
 from ..shared.command.decimate import decimate
 from ..shared.command.process import end_on_signals, exit_code
-from . import batch, check, mesh_files, progress_bar
+from . import batch, check, large, mesh_files, progress_bar
 
 _DESCRIPTION = """\
 Decimates and measures mesh files within a tolerance that is proved, without Blender. tolvol COMMAND --help tells the options of
@@ -56,8 +56,8 @@ def parser():
         "reduce the triangles of a file within a tolerance",
         f"{decimate_options.DESCRIPTION}\n{mesh_files.FORMATS}",
         decimate_options.EPILOG,
-        decimate_options.add_files,
-        lambda options: decimate(decimate_options.checked(options.parser, options), mesh_files),
+        lambda one: (decimate_options.add_files(one), large.add(one)),
+        _decimate,
     )
     add(
         "report",
@@ -70,6 +70,11 @@ def parser():
     add("check", "say whether a file is within the tolerance of another", *check.TEXTS, check.add, check.check)
     add("batch", "decimate many files", *batch.TEXTS, batch.add, batch.run)
     return top
+
+
+def _decimate(options):
+    large.checked(options.parser, decimate_options.checked(options.parser, options))
+    return decimate(options, mesh_files) if options.memory is None else large.decimate(options)
 
 
 def _all_examples():

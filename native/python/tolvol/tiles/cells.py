@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cuts space into cells: boxes without a common inner point that together are all of space."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+_SHARES = (0.5, 0.3, 0.7, 0.4, 0.6)  # of the cells below a cut, turn by turn
+
+
+@dataclass(frozen=True)
+class Box:
+    """An axis-aligned box: two corners of three numbers each, which may be infinite."""
+
+    lower: tuple
+    upper: tuple
+
+    def grown(self, length):
+        return Box(tuple(x - length for x in self.lower), tuple(x + length for x in self.upper))
+
+    def joined(self, other):
+        """Returns the smallest box around two boxes."""
+        return Box(tuple(map(min, self.lower, other.lower)), tuple(map(max, self.upper, other.upper)))
+
+    def meets(self, other):
+        return all(a <= d and c <= b for a, b, c, d in zip(self.lower, self.upper, other.lower, other.upper))
+
+    def holds(self, points):
+        """Tells which points, (k, 3), are in the box or on one of its lower sides: each point is so in one cell alone."""
+        return ((points >= np.array(self.lower)) & (points < np.array(self.upper))).all(1)
+
+    def meets_triangles(self, corners):
+        """Tells which triangles, (k, 3, 3), have a bounding box that meets this one."""
+        return ((corners.max(1) >= np.array(self.lower)) & (corners.min(1) <= np.array(self.upper))).all(1)
+
+    def strictly_holds_triangles(self, corners):
+        """Tells which triangles, (k, 3, 3), lie inside the box and meet none of its sides."""
+        return ((corners.min(1) > np.array(self.lower)) & (corners.max(1) < np.array(self.upper))).all(1)
+
+
+EVERYWHERE = Box((-math.inf,) * 3, (math.inf,) * 3)
+
+
+class Cells:
+    """`count` cells that hold about as many of some points, (k, 3), each; fewer where many points lie on each other.
+
+    Each cut is across the longest axis of the points. `turn` chooses how many of the cells are below each cut, so that the sides
+    of the cells of several turns lie apart. O(k log count).
+    """
+
+    def __init__(self, points, count, turn=0):
+        self.boxes = []
+        self._root = self._cut(points.astype(np.float64), count, turn, EVERYWHERE)
+
+    def _cut(self, points, count, turn, box):
+        """Returns (axis, at, the node below, the node above), or the number of a cell."""
+        if count > 1 and len(points) > 1:
+            axis = int(np.argmax(points.max(0) - points.min(0)))
+            below = min(max(round(_SHARES[turn % len(_SHARES)] * count), 1), count - 1)
+            values = np.sort(points[:, axis])
+            # Points at the cut are above it. Where the lowest point is there, the cut goes to the next coordinate.
+            above = values[values > values[0]]
+            if len(above):
+                at = float(max(values[len(values) * below // count], above[0]))
+                is_below = points[:, axis] < at
+                lower = Box(box.lower, _with(box.upper, axis, at))
+                upper = Box(_with(box.lower, axis, at), box.upper)
+                return (
+                    axis,
+                    at,
+                    self._cut(points[is_below], below, turn + 1, lower),
+                    self._cut(points[~is_below], count - below, turn + 1, upper),
+                )
+        self.boxes.append(box)
+        return len(self.boxes) - 1
+
+    def of(self, points):
+        """Returns the number of the cell that holds each point, (k,)."""
+        found = np.empty(len(points), np.int32)
+
+        def descend(node, rows):
+            if isinstance(node, int):
+                found[rows] = node
+                return
+            axis, at, below, above = node
+            is_below = points[rows, axis] < at
+            descend(below, rows[is_below])
+            descend(above, rows[~is_below])
+
+        descend(self._root, np.arange(len(points)))
+        return found
+
+
+def _with(corner, axis, value):
+    return (*corner[:axis], value, *corner[axis + 1 :])

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cuts triangles along the sides of a box."""
+
+import numpy as np
+
+
+def clipped(corners, box):
+    """Returns triangles, (j, 3, 3) float64, that together are what some triangles, (k, 3, 3), have in common with a box.
+
+    A triangle inside comes back as it is. After I. Sutherland, G. Hodgman, "Reentrant Polygon Clipping", 1974, with a triangle
+    or two in place of each polygon.
+    """
+    corners = corners.astype(np.float64)
+    for axis in range(3):
+        for side, at in ((1, box.lower[axis]), (-1, box.upper[axis])):
+            if np.isfinite(at) and len(corners):
+                corners = _halved(corners, axis, side, at)
+    return corners
+
+
+def rounding(corners):
+    """Returns an upper bound of the distance between what triangles have in common with a box and what clipped() returns.
+
+    Each of six cuts rounds a coordinate by a few units in the last place of the largest coordinate.
+    """
+    return 128 * float(np.finfo(np.float64).eps) * float(np.abs(corners).max(initial=0))
+
+
+def _halved(corners, axis, side, at):
+    """Returns the parts of triangles on one side of a plane: side 1 above, -1 below."""
+    inside = side * (corners[:, :, axis] - at) >= 0
+    number = inside.sum(1)
+    one, two = _turned(corners, inside, number == 1), _turned(corners, ~inside, number == 2)
+    # The first corner is the only one inside, or outside.
+    p, q = _crossing(one[:, 0], one[:, 1], axis, at), _crossing(one[:, 0], one[:, 2], axis, at)
+    r, s = _crossing(two[:, 0], two[:, 1], axis, at), _crossing(two[:, 0], two[:, 2], axis, at)
+    return np.concatenate(
+        [
+            corners[number == 3],
+            np.stack([one[:, 0], p, q], 1),
+            np.stack([r, two[:, 1], two[:, 2]], 1),
+            np.stack([r, two[:, 2], s], 1),
+        ]
+    )
+
+
+def _turned(corners, chosen, rows):
+    """Returns these rows with the corners turned so that the chosen one, of which each row has one, is the first."""
+    order = (np.argmax(chosen[rows], 1)[:, None] + np.arange(3)) % 3
+    return np.take_along_axis(corners[rows], order[:, :, None], 1)
+
+
+def _crossing(a, b, axis, at):
+    share = ((at - a[:, axis]) / (b[:, axis] - a[:, axis]))[:, None]
+    found = a + share * (b - a)
+    found[:, axis] = at
+    return found

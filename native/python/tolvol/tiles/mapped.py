@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reads the triangles of a binary PLY or STL file a block at a time, without the whole file in memory."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ..shared.errors import Refused
+from ..shared.files import ply_file, stl_file
+
+EXTENSIONS = (".ply", ".stl")
+
+_HEADER = 1 << 20  # bytes that hold the header of any PLY file
+_BLOCK = 1 << 19  # triangles that are read at once
+_LARGEST = np.finfo(np.float32).max
+
+
+class _Blocks:
+    def __init__(self, mesh):
+        self._mesh = mesh
+
+    def __len__(self):
+        return -(-self._mesh.count // _BLOCK)
+
+    def __iter__(self):
+        for first in range(0, self._mesh.count, _BLOCK):
+            yield self._mesh.corners(first, min(first + _BLOCK, self._mesh.count))
+
+
+class MappedMesh:
+    """The triangles of a file. Raises Refused, which names the file, for one that is damaged.
+
+    count: the number of triangles; dtype: float32 or float64, as the file stores its coordinates.
+    """
+
+    def __init__(self, path):
+        self.path = Path(path)
+        try:
+            with open(path, "rb") as file:
+                head = file.read(_HEADER)
+            self.size = os.path.getsize(path)
+        except OSError as error:
+            raise Refused(f"{path}: {error.strerror}") from None
+        try:
+            if not head:
+                raise Refused("the file is empty")
+            (self._map_stl if self.path.suffix.lower() == ".stl" else self._map_ply)(head)
+            if not self.count:
+                raise Refused("the file has no faces")
+        except Refused as error:
+            raise Refused(f"{path}: {error}") from None
+
+    def _map_stl(self, head):
+        self.count = int.from_bytes(head[80:84], "little")
+        if len(head) < 84 or self.size != 84 + self.count * stl_file.TRIANGLE.itemsize:
+            raise Refused("this is no binary STL file, or it is truncated: only binary files can be read in parts")
+        self._vertices, self._offset, self._row, self.dtype = None, 84, stl_file.TRIANGLE, np.dtype(np.float32)
+
+    def _map_ply(self, head):
+        form, elements, offset = ply_file.header(head)
+        if form == "ascii":
+            raise Refused("this PLY file is a text: only binary files can be read in parts; save it as a binary one")
+        order = ply_file.byte_order(form)
+        self._vertices, self.count = None, 0
+        for name, count, properties in elements:
+            lists = [field for field, counted, _ in properties if counted]
+            is_face = name == "face"
+            if lists and not (is_face and len(lists) == 1):
+                raise Refused(f"its {name} elements hold lists that cannot be read in parts")
+            row = ply_file.row_type(properties, dict.fromkeys(lists, 3), order)
+            if offset + count * row.itemsize > self.size:
+                more = ", or has faces that are no triangles" if is_face else ""
+                raise Refused(f"the file ends inside its list of {name} elements{more}")
+            if name == "vertex":
+                if not {"x", "y", "z"} <= set(row.names):
+                    raise Refused("its vertices have no x, y, z")
+                self._vertices = np.memmap(self.path, row, "r", offset, (count,))
+                wide = any(row[axis].itemsize == 8 for axis in "xyz")
+                self.dtype = np.dtype(np.float64 if wide else np.float32)
+            elif is_face:
+                if not lists or lists[0] not in ("vertex_indices", "vertex_index"):
+                    raise Refused("its faces name no vertices")
+                self._offset, self._row, self._list, self.count = offset, row, lists[0], count
+            offset += count * row.itemsize
+        if self._vertices is None:
+            raise Refused("it has no vertices")
+        if self.size - offset > _HEADER:  # Some programs fill up the end of a file.
+            raise Refused(f"{self.size - offset:,} bytes are left after all that its header declares")
+
+    def blocks(self):
+        """Returns an iterable with a length: the corners of all triangles a block at a time, (k, 3, 3) each."""
+        return _Blocks(self)
+
+    def corners(self, first, last):
+        """Returns the corners of the triangles from `first` to before `last`, (k, 3, 3) of dtype."""
+        rows = np.fromfile(self.path, self._row, last - first, offset=self._offset + first * self._row.itemsize)
+        if self._vertices is None:
+            corners = np.ascontiguousarray(rows["corners"])
+            self._require_finite(corners, lambda bad: 3 * first + bad + 1, "corner")
+            return corners
+        sizes = rows[self._list + " length"]
+        if (sizes != 3).any():
+            bad = int(np.argmax(sizes != 3))
+            raise Refused(
+                f"{self.path}: face {first + bad + 1} has {sizes[bad]} vertices: only files of triangles can be read in "
+                "parts; cut the faces into triangles with another program"
+            )
+        index = rows[self._list].astype(np.int64)
+        count = len(self._vertices)
+        outside = ((index < 0) | (index >= count)).any(1)
+        if outside.any():
+            bad = int(np.argmax(outside))
+            worst = index[bad][(index[bad] < 0) | (index[bad] >= count)][0]
+            raise Refused(
+                f"{self.path}: face {first + bad + 1} names vertex {worst}, but there are only {count} vertices"
+            )
+        corners = np.empty((len(index), 3, 3), self.dtype)
+        for axis, name in enumerate("xyz"):
+            corners[:, :, axis] = self._vertices[name][index]
+        self._require_finite(corners, lambda bad: int(index.ravel()[bad]) + 1, "vertex")
+        return corners
+
+    def _require_finite(self, corners, number, word):
+        points = corners.reshape(-1, 3)
+        bad = ~(np.abs(points) <= _LARGEST).all(1)
+        if bad.any():
+            place = int(np.argmax(bad))
+            shown = ", ".join(f"{value:g}" for value in points[place])
+            raise Refused(f"{self.path}: {word} {number(place)} is not finite ({shown})")

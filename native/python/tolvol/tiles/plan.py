@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Chooses the cells of each round, so that the work in each cell fits the memory of a worker."""
+
+import math
+
+import numpy as np
+
+from ..shared.errors import Refused
+from .cells import Cells
+
+# What the work in a cell takes at its peak, in bytes: by itself, and for each triangle in the first round, where the mesh is
+# the reference, and in later rounds, where nearly all triangles are those of the reference (docs/benchmark.md).
+FIXED, OF_FIRST, OF_LATER = 160 << 20, 1150, 750
+# As much of this may be the grid of distances.
+OF_GRID = 100
+
+_SAMPLES = 1 << 20  # triangles whose centroids stand for all
+_RUN = 1 << 10  # neighbouring triangles that are sampled together
+_ROUNDS = 5  # over several cells, at most
+
+
+class Plan:
+    """The rounds for a MappedMesh: a list of Cells for each.
+
+    memory: bytes for a worker; tolerance: a length. The last round has a single cell where all triangles fit the memory.
+    Raises Refused, which says how much memory is needed, where not even the smallest part of the mesh fits.
+    """
+
+    def __init__(self, mesh, tolerance, memory):
+        self.points, self.count = _samples(mesh), mesh.count
+        self._tolerance, self._memory = tolerance, memory
+        self.rounds = [self._cells(OF_FIRST, 0)]
+        while len(self.rounds[-1].boxes) > 1 and len(self.rounds) < _ROUNDS:
+            self.rounds.append(self._cells(OF_LATER, len(self.rounds)))
+
+    def parts(self, count):
+        """Returns `count` Cells for the soups of the reference."""
+        return Cells(self.points, count)
+
+    def grid_memory(self):
+        """Returns the most bytes that the grid of a cell's volume may take."""
+        return OF_GRID * self._most(OF_LATER)
+
+    def _most(self, of_each):
+        return max(0, int((self._memory - FIXED) / of_each))
+
+    def _cells(self, of_each, turn):
+        """Returns the fewest Cells whose triangles fit, with those within the tolerance of the cell."""
+        most, least = self._most(of_each), math.inf
+        count = max(1, -(-self.count // most)) if most else len(self.points)
+        while True:
+            cells = Cells(self.points, count, turn)
+            within = [box.grown(self._tolerance).holds(self.points).mean() for box in cells.boxes]
+            largest = math.ceil(max(within) * self.count)
+            if largest <= most:
+                return cells
+            least = min(least, largest)
+            if count >= len(self.points):
+                break
+            count = min(len(self.points), count + max(1, count // 4))
+        needed = (FIXED + least * of_each) / 1e6
+        raise Refused(
+            f"--memory: {self._memory / 1e6:,.0f} MB is too little: the triangles within the tolerance of one place need "
+            f"{needed:,.0f} MB"
+        )
+
+
+def _samples(mesh):
+    """Returns the centroids of triangles all over a MappedMesh, (k, 3)."""
+    run = min(_RUN, mesh.count)
+    firsts = np.linspace(0, mesh.count - run, max(1, min(_SAMPLES, mesh.count) // run)).astype(np.int64)
+    return np.concatenate([mesh.corners(first, first + run).mean(1, dtype=np.float64) for first in np.unique(firsts)])

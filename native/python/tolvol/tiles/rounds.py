@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Decimates a mesh file in rounds over cells, and proves the whole.
+
+Each round refers to the reference as it is in the file. docs/architecture.md says why the proofs of the cells compose ("Cells of
+a large mesh").
+"""
+
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+
+from ..shared.proof.verdict import Interval
+from . import scratch, soups, tile
+from .cells import Box
+from .soups import Soup
+from .tile import Tile
+
+_PARTS = 8  # soups of the reference for each cell of the first round
+_LEAST_GAIN = (
+    0.01  # There is no further round of several cells after one that removes a smaller share of the triangles.
+)
+
+
+@dataclass(frozen=True)
+class Result:
+    """A mesh, and what was measured of it.
+
+    vertices: (n, 3) of the file's dtype, one at each position; triangles: (m, 3) int32; counts: the triangles after each round;
+    forward, backward: Intervals; angle: the largest angle in degrees between a face and its witnesses, or None if some face has
+    no angle.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    counts: tuple
+    forward: Interval
+    backward: Interval
+    angle: float | None
+
+
+def bounds(mesh):
+    """Returns the bounding Box of a MappedMesh. Raises Refused for a vertex that is not finite, and all else that is damaged."""
+    return reduce(Box.joined, (soups.bounds_of(corners) for corners in mesh.blocks()))
+
+
+def needed_space(mesh):
+    """Returns the bytes that a run takes of the scratch folder at its peak, at most.
+
+    They are the soups of the reference, which overlap nowhere, those of the present mesh, and those that replace them.
+    """
+    return 3 * mesh.count * 9 * mesh.dtype.itemsize
+
+
+class Rounds:
+    """A run. `each(title, function, jobs)` yields function(job, progress) for all jobs in their order, and shows the progress."""
+
+    def __init__(self, mesh, plan, folder, tolerance, options, each):
+        self._mesh, self._plan, self._scratch, self._each = mesh, plan, folder, each
+        self._tolerance, self._options = tolerance, options
+
+    def run(self):
+        """Returns the Result. Raises NotWritten where the scratch folder is full, after which the run can go on."""
+        reference = present = self._reference()
+        counts, angles = [], [0.0]
+        rounds = self._plan.rounds
+        for number, cells in enumerate(rounds):
+            if len(counts) > 1 and len(cells.boxes) > 1 and counts[-1] > (1 - _LEAST_GAIN) * counts[-2]:
+                continue
+            # The first of several rounds leaves so many triangles between the cells that a thorough search is in vain.
+            options = self._options if number or len(rounds) == 1 else {**self._options, "effort": "fast"}
+            like = Tile(None, present, reference, self._tolerance, options, self._plan.grid_memory())
+            title = f"round {number + 1} of {len(rounds)}"
+            done = self._steps(title, f"round{number}", decimate, like, cells)
+            present = tuple(Soup.read_from(record["soup"]) for record in done)
+            angles += [record["angle"] for record in done]
+            counts.append(sum(soup.count for soup in present))
+            self._scratch.remove(f"round{number - 1}_")
+        vertices, triangles = tile.mesh_of(np.concatenate([soup.corners() for soup in present]))
+        like = Tile(None, present, reference, self._tolerance, self._options)
+        measured = self._steps("certifying", "measured", measure, like, rounds[-1])
+        forward, backward = (
+            Interval(max(record[way][0] for record in measured), max(record[way][1] for record in measured))
+            for way in ("forward", "backward")
+        )
+        angle = None if None in angles else max(angles)
+        return Result(vertices, triangles, tuple(counts), forward, backward, angle)
+
+    def _reference(self):
+        """Returns the soups of the triangles of the file, each of a part of space."""
+        if record := self._scratch.record("reference"):
+            return tuple(map(Soup.read_from, record["soups"]))
+        parts = self._plan.parts(_PARTS * len(self._plan.rounds[0].boxes))
+        writers = [soups.Writer(self._scratch.path(f"reference_{i:05}")) for i in range(len(parts.boxes))]
+
+        def write(corners, progress):
+            number = parts.of(corners.mean(1, dtype=np.float64))
+            order = np.argsort(number, kind="stable")
+            ends = np.searchsorted(number[order], np.arange(len(writers) + 1))
+            for writer, begin, end in zip(writers, ends, ends[1:]):
+                writer.add(corners[order[begin:end]])
+
+        for _ in self._each("reading", write, self._mesh.blocks()):
+            pass
+        found = tuple(writer.end() for writer in writers)
+        self._scratch.keep("reference", {"soups": [soup.record() for soup in found]})
+        return found
+
+    def _steps(self, title, name, work, like, cells):
+        """Returns the records of the work in all cells, and does what has none yet."""
+        jobs = [
+            (replace(like, cell=box), str(self._scratch.path(f"{name}_{i:05}"))) for i, box in enumerate(cells.boxes)
+        ]
+        missing = [job for i, job in enumerate(jobs) if self._scratch.record(f"{name}_{i:05}") is None]
+        for _ in self._each(title, work, missing):
+            pass
+        return [self._scratch.record(f"{name}_{i:05}") for i in range(len(jobs))]
+
+
+def decimate(job, progress=None):
+    """Does the work of a round in one cell, and notes that it is done. job: (Tile, the path of its soup)."""
+    one, path = job
+    soup, angle = tile.decimate(one, path, progress)
+    scratch.keep(path, {"soup": soup.record(), "angle": angle})
+
+
+def measure(job, progress=None):
+    """Measures both distances in one cell, and notes them. job: (Tile, the path of its record)."""
+    one, path = job
+    forward, backward = tile.measure(one, progress)
+    scratch.keep(path, {"forward": forward, "backward": backward})

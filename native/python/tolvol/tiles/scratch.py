@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scratch folder of a run, from which a run that was interrupted goes on.
+
+It holds run.json, which says what was asked, the soups, and a record for each step that is done: a JSON file that appears as a
+whole, after the soup of the step.
+"""
+
+import contextlib
+import json
+import os
+import shutil
+from pathlib import Path
+
+from ..shared.errors import Refused
+from . import soups
+
+_ASKED = "run"
+
+
+class Scratch:
+    """A folder that one run uses at a time.
+
+    asked: a dictionary of what the result depends on; resume: whether to go on with what is there. Raises Refused where the
+    folder holds something else than that, or another run uses it, and NotWritten where it cannot be written to.
+    """
+
+    def __init__(self, folder, asked, resume):
+        self.folder = Path(folder)
+        try:
+            self.folder.mkdir(exist_ok=True)
+            self._lock = os.open(self.folder / "lock", os.O_RDWR | os.O_CREAT)
+        except OSError as error:
+            raise soups.failed(error, self.folder) from None
+        try:
+            self._take(asked, resume)
+        except BaseException:
+            os.close(self._lock)
+            raise
+
+    def _take(self, asked, resume):
+        with contextlib.suppress(ImportError):  # Windows has no fcntl.
+            import fcntl
+
+            try:
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise Refused(f"{self.folder}: another run uses this scratch folder") from None
+        before = self.record(_ASKED)
+        if before is None:
+            others = [path.name for path in self.folder.iterdir() if path.name != "lock"]
+            if others:
+                raise Refused(f"{self.folder}: this folder holds other files ({others[0]}): choose an empty one")
+            self.keep(_ASKED, asked)
+        elif not resume:
+            raise Refused(f"{self.folder} holds a run that was interrupted: go on with --resume, or remove the folder")
+        elif changed := [name for name in asked if before.get(name) != asked[name]]:
+            name = changed[0]
+            raise Refused(
+                f"--resume: {name} was {before.get(name)} and is {asked[name]} now: run again as before, or remove "
+                f"{self.folder}"
+            )
+
+    def path(self, name):
+        return self.folder / name
+
+    def record(self, name):
+        """Returns the record of a step, or None if it is not done."""
+        try:
+            return json.loads(self.path(f"{name}.json").read_text())
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError):
+            raise Refused(f"{self.path(name)}.json is damaged: remove {self.folder} and start again") from None
+
+    def keep(self, name, record):
+        """Notes that a step is done."""
+        keep(self.path(name), record)
+
+    def remove(self, prefix):
+        """Removes the soups and records of the steps whose names begin with `prefix`."""
+        for path in self.folder.glob(f"{prefix}*"):
+            path.unlink(missing_ok=True)
+
+    def close(self, discard):
+        """Lets others use the folder. discard: whether the run is done, so that the folder is removed."""
+        os.close(self._lock)
+        if discard:
+            shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def keep(path, record):
+    """Writes the record of a step whose soup is, or would be, at `path`."""
+    partial = Path(f"{path}.json.partial")
+    try:
+        with open(partial, "w") as file:
+            json.dump(record, file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(partial, f"{path}.json")
+    except OSError as error:
+        raise soups.failed(error, path) from None

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The work in one cell: decimates the faces in it, or measures the distances of what is there.
+
+Each function reads soups and writes or returns what it found, and depends on nothing else: any process may call it.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..shared import package
+from ..welding import welded
+from . import clipping, soups
+from .cells import Box
+
+_BLOCK = 1 << 16  # triangles that are looked at at once
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A cell, the soups of the present mesh, and those of the reference."""
+
+    cell: Box
+    mesh: tuple
+    reference: tuple  # equal to `mesh` in the first round
+    tolerance: float
+    options: dict = field(default_factory=dict)  # of the native decimate()
+    grid_memory: int | None = None  # the most bytes of the grid of the native volume
+
+
+def decimate(tile, output, progress=None):
+    """Decimates the faces inside the cell, and writes the faces that the cell owns to `output`.
+
+    The cell owns the faces inside it, and of those that reach out of it the ones with their centroid in the cell. Returns
+    (Soup, the largest angle in degrees between a new face and its witnesses, or None if there is a face without an angle).
+    """
+    corners = soups.gather(tile.mesh, tile.cell)
+    inside = tile.cell.strictly_holds_triangles(corners)
+    owned = corners[~inside & tile.cell.holds(corners.mean(1, dtype=np.float64))]
+    vertices, triangles = mesh_of(corners)
+    del corners  # The memory is needed.
+    decimated = (
+        _decimated(tile, vertices, triangles, inside, progress) if _has_area(vertices, triangles[inside]) else None
+    )
+    kept, angle = decimated or (vertices[triangles[inside]], 0.0)
+    return soups.write(output, np.concatenate([kept, owned])), angle
+
+
+def _decimated(tile, vertices, triangles, inside, progress):
+    """Returns (the corners of what the triangles inside become, the angle), or None where the volume is too small."""
+    native = package.module
+    if tile.reference == tile.mesh:
+        around = vertices, triangles
+    else:
+        around = mesh_of(soups.gather(tile.reference, tile.cell.grown(tile.tolerance)))
+    threads = tile.options["threads"]
+    try:
+        volume = native.ToleranceVolume(
+            *around, tile.tolerance, grid_memory=tile.grid_memory, threads=threads, progress=progress
+        )
+    except native.InvalidInput as error:
+        if error.code != "tolerance_too_large":
+            raise
+        return None  # The cell is smaller than the tolerance: the faces wait for a larger one.
+    cell = (tile.cell.lower, tile.cell.upper)
+    result = native.decimate(vertices, triangles, volume, cell=cell, progress=progress, **tile.options)
+    normals = result.report["normals"]
+    known = normals and not normals["unsure"] and not normals["exceeded_after"]
+    angle = (normals["largest"] or 0.0) if known else None
+    return result.vertices[result.triangles[inside[result.triangle_source]]], angle
+
+
+def measure(tile, progress=None):
+    """Measures the distances between the mesh and the reference in the cell. Returns two intervals, (lower, upper) each.
+
+    The first is of the part of the mesh in the cell to the reference, the second of that of the reference to the mesh. The
+    lower ends are valid up to the tolerance: beyond, nothing was looked for.
+    """
+    threads = tile.options["threads"]
+    return (
+        _largest(tile.mesh, tile.reference, tile, threads, progress),
+        _largest(tile.reference, tile.mesh, tile, threads, progress),
+    )
+
+
+def _largest(those, others, tile, threads, progress):
+    corners = soups.gather(those, tile.cell)
+    rounding = clipping.rounding(corners)
+    corners = clipping.clipped(corners, tile.cell)
+    if not len(corners):
+        return 0.0, 0.0
+    around = soups.gather(others, tile.cell.grown(tile.tolerance))
+    if not len(around):
+        return tile.tolerance, np.inf
+    found = package.module.directed_hausdorff(
+        *mesh_of(corners), *mesh_of(around), bound=tile.tolerance, threads=threads, progress=progress
+    )
+    return max(found.lower - rounding, 0.0), found.upper + rounding
+
+
+def mesh_of(corners):
+    """Returns (vertices, triangles) of a soup, with one vertex at each position."""
+    vertices, number = welded(corners.reshape(-1, 3))
+    return vertices, number.reshape(-1, 3)
+
+
+def _has_area(vertices, triangles):
+    wide = vertices.astype(np.float64)
+    for first in range(0, len(triangles), _BLOCK):
+        a, b, c = (wide[corner] for corner in triangles[first : first + _BLOCK].T)
+        if np.cross(b - a, c - a).any():
+            return True
+    return False

@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The parts of a decimation in cells: reading in blocks, cells, clipping, soups and one cell's work."""
+
+import numpy as np
+import pytest
+import tolvol
+from tolvol.command import mesh_files
+from tolvol.command.mesh import Mesh
+from tolvol.shared.errors import Refused
+from tolvol.tiles import clipping, plan, soups
+from tolvol.tiles.cells import EVERYWHERE, Box, Cells
+from tolvol.tiles.mapped import MappedMesh
+from tolvol.tiles.tile import Tile, decimate, measure, mesh_of
+
+import meshes
+
+OPTIONS = {
+    "placement": "optimal",
+    "effort": "fast",
+    "crossings": "keep_out",
+    "max_normal_angle": 90,
+    "threads": None,
+}
+
+
+def written(path, vertices, triangles, dtype=np.float32):
+    mesh_files.write(path, [Mesh("mesh", vertices.astype(dtype), triangles.astype(np.int32))], None)
+    return path
+
+
+def noisy(seed=1):
+    return meshes.torus(columns=96, rows=48, noise=0.004, seed=seed)
+
+
+# Reading --------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_file_is_read_in_blocks_as_it_is_read_whole(tmp_path, dtype, monkeypatch):
+    monkeypatch.setattr("tolvol.tiles.mapped._BLOCK", 100)
+    mesh = MappedMesh(written(tmp_path / "a.ply", *noisy(), dtype))
+    whole = mesh_files.read(tmp_path / "a.ply").objects[0]
+    blocks = list(mesh.blocks())
+    assert len(blocks) == len(mesh.blocks()) > 10
+    found = np.concatenate(blocks)
+    assert found.dtype == mesh.dtype == dtype and mesh.count == len(whole.triangles)
+    assert np.array_equal(found, whole.vertices[whole.triangles])
+    if dtype == np.float32:
+        soup = MappedMesh(written(tmp_path / "a.stl", *noisy()))
+        assert np.array_equal(np.concatenate(list(soup.blocks())), found)
+
+
+def test_properties_beside_coordinates_and_big_endian_numbers_are_read(tmp_path):
+    vertices = np.array([(1, 2, 3), (4, 5, 6), (7, 8, 10)], np.float32)
+    rows = np.zeros(3, [("red", "u1"), ("z", ">f4"), ("y", ">f4"), ("x", ">f4")])
+    for axis, name in enumerate("xyz"):
+        rows[name] = vertices[:, axis]
+    header = (
+        "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty uchar red\nproperty float z\nproperty float y\n"
+        "property float x\nelement face 1\nproperty uchar flag\nproperty list uchar int vertex_index\nend_header\n"
+    )
+    face = b"\7\3" + np.array([2, 0, 1], ">i4").tobytes()
+    (tmp_path / "a.ply").write_bytes(header.encode() + rows.tobytes() + face)
+    assert np.array_equal(MappedMesh(tmp_path / "a.ply").corners(0, 1), vertices[[[2, 0, 1]]])
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda data: b"", "the file is empty"),
+        (lambda data: data[:-5], "the file ends inside its list of face elements"),
+        (lambda data: data.replace(b"binary_little_endian", b"ascii"), "only binary files can be read in parts"),
+        (lambda data: data.replace(b"property float z", b"property float w"), "its vertices have no x, y, z"),
+        (lambda data: data[:-4] + b"\xff\xff\xff\x7f", "face 9216 names vertex 2147483647, but there are only 4608"),
+        (lambda data: data[:-13] + b"\4" + data[-12:], "face 9216 has 4 vertices"),
+        (lambda data: data.replace(b"element face 9216", b"element face 0"), "the file has no faces"),
+    ],
+)
+def test_a_damaged_file_is_named_with_what_is_wrong(tmp_path, damage, message):
+    path = written(tmp_path / "a.ply", *noisy())
+    path.write_bytes(damage(path.read_bytes()))
+    with pytest.raises(Refused, match=message) as refusal:
+        list(MappedMesh(path).blocks())
+    assert str(path) in str(refusal.value)
+
+
+def test_a_vertex_that_is_not_finite_is_named_by_its_number(tmp_path):
+    vertices, triangles = noisy()
+    vertices[3000, 1] = np.nan
+    with pytest.raises(Refused, match="vertex 3001 is not finite"):
+        list(MappedMesh(written(tmp_path / "a.ply", vertices, triangles)).blocks())
+
+
+# Cells ----------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 16])
+def test_cells_are_all_of_space_and_hold_about_as_many_points(count):
+    points = np.random.default_rng(1).normal(size=(4000, 3))
+    sides = []
+    for turn in range(3):
+        cells = Cells(points, count, turn)
+        holders = np.array([box.holds(points) for box in cells.boxes])
+        assert len(cells.boxes) == count and (holders.sum(0) == 1).all()
+        assert np.array_equal(np.argmax(holders, 0), cells.of(points))
+        assert holders.sum(1).max() <= 1.1 * len(points) / count
+        assert (np.array([box.holds(1e6 * points) for box in cells.boxes]).sum(0) == 1).all()
+        sides.append({x for box in cells.boxes for x in (*box.lower, *box.upper) if np.isfinite(x)})
+    assert count == 1 or count == 2 or not sides[0] & sides[1] & sides[2]
+
+
+def test_points_on_each_other_are_not_divided():
+    points = np.repeat([(1.0, 2.0, 3.0), (1.0, 2.0, 4.0)], 50, 0)
+    boxes = Cells(points, 8).boxes
+    assert sorted(box.holds(points).sum() for box in boxes) == [50, 50]
+    assert Cells(points[:50], 8).boxes == [EVERYWHERE]
+
+
+def test_the_parts_of_triangles_in_all_cells_are_the_triangles():
+    corners = np.random.default_rng(2).normal(size=(300, 3, 3))
+
+    def area(found):
+        return np.linalg.norm(np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]), axis=1).sum() / 2
+
+    cells = Cells(corners.mean(1), 7)
+    parts = [clipping.clipped(corners, box) for box in cells.boxes]
+    for part, box in zip(parts, cells.boxes):
+        assert (part >= np.array(box.lower)).all() and (part <= np.array(box.upper)).all()
+    assert sum(map(area, parts)) == pytest.approx(area(corners), rel=1e-12)
+    whole = np.arange(900).reshape(-1, 3)
+    part = np.concatenate(parts)
+    found = tolvol.directed_hausdorff(
+        part.reshape(-1, 3), np.arange(3 * len(part)).reshape(-1, 3), corners.reshape(-1, 3), whole
+    )
+    assert found.lower <= clipping.rounding(corners) < 1e-12
+
+
+# Soups ----------------------------------------------------------------------------------------------------------------
+
+
+def test_a_soup_is_gathered_by_boxes_and_a_damaged_one_is_named(tmp_path):
+    vertices, triangles = noisy()
+    corners = vertices[triangles].astype(np.float32)
+    soup = soups.write(tmp_path / "s", corners)
+    box = Box((0.1, 0.2, -9), (0.8, 9, 9))
+    expected = corners[(corners.max(1) >= box.lower).all(1) & (corners.min(1) <= box.upper).all(1)]
+    assert 100 < len(expected) < len(corners) and np.array_equal(soups.gather([soup], box), expected)
+    data = bytearray((tmp_path / "s").read_bytes())
+    data[1000] ^= 1
+    (tmp_path / "s").write_bytes(data)
+    with pytest.raises(Refused, match=f"{tmp_path}/s is damaged"):
+        soups.gather([soup], box)
+
+
+# A cell ---------------------------------------------------------------------------------------------------------------
+
+
+def rounds(tmp_path, reference, tolerance, counts, **options):
+    """Returns the corners after rounds over so many cells each, in a folder of the test."""
+    whole = (soups.write(tmp_path / "reference", reference),)
+    present = whole
+    for turn, count in enumerate(counts):
+        boxes = Cells(reference.mean(1), count, turn).boxes
+        tiles = [Tile(box, present, whole, tolerance, OPTIONS | options) for box in boxes]
+        present = tuple(decimate(tile, tmp_path / f"{turn}_{i}")[0] for i, tile in enumerate(tiles))
+    return np.concatenate([soup.corners() for soup in present]), present, whole
+
+
+@pytest.mark.parametrize("kind", ["torus", "open", "cut", "soup"])
+def test_the_results_of_cells_are_one_mesh_within_the_tolerance(tmp_path, kind):
+    vertices, triangles = noisy()
+    tolerance = 0.02
+    if kind == "open":
+        triangles = triangles[np.random.default_rng(3).random(len(triangles)) > 0.1]
+    if kind == "cut":
+        vertices, triangles = meshes.join((vertices, triangles), meshes.non_manifold(), meshes.degenerate())
+    corners = vertices[triangles].astype(np.float32)
+    if kind == "soup":
+        corners = corners[np.random.default_rng(4).permutation(len(corners))]
+    found, present, whole = rounds(tmp_path, corners, tolerance, (6, 4, 4))
+    ours, theirs = mesh_of(found), mesh_of(corners)
+    both = tolvol.hausdorff(*ours, *theirs, bound=tolerance)
+    assert both.forward.upper <= tolerance and both.backward.upper <= tolerance
+    assert len(found) < len(corners) / (6 if kind in ("torus", "soup") else 2)
+    assert len(tolvol.crossing_pairs(*ours)) <= len(tolvol.crossing_pairs(*theirs))
+    if kind in ("torus", "soup"):
+        facts = tolvol.solidity(*ours)
+        assert facts["closed"] and facts["manifold"] and facts["oriented"]
+    # The cells' measurements tell the same.
+    for turn in (0, 5):
+        boxes = Cells(corners.mean(1), 5, turn).boxes
+        ends = np.array([measure(Tile(box, present, whole, tolerance, OPTIONS)) for box in boxes])
+        for way, exact in enumerate((both.forward, both.backward)):
+            lower, upper = ends[:, way].max(0)
+            assert lower <= exact.upper and exact.lower <= upper <= tolerance * (1 + 1e-6)
+
+
+def test_a_mesh_that_moved_is_seen_by_measuring_in_cells(tmp_path):
+    vertices, triangles = meshes.torus()
+    corners = vertices[triangles]
+    moved = corners.copy()
+    moved[moved[:, :, 0].min(1) > 1.2] += 0.05
+    boxes = Cells(corners.mean(1), 4).boxes
+    tiles = [(soups.write(tmp_path / "a", moved),), (soups.write(tmp_path / "b", corners),)]
+    ends = np.array([measure(Tile(box, *tiles, 0.01, OPTIONS)) for box in boxes])
+    assert (ends[:, :, 1].max(0) > 0.01).all()
+
+
+def test_cells_smaller_than_the_tolerance_leave_their_faces(tmp_path):
+    vertices, triangles = meshes.sphere(3)
+    corners = vertices[triangles]
+    found, _, _ = rounds(tmp_path, corners, 1.9, (40,))
+    assert sorted(map(tuple, found.reshape(-1, 9))) == sorted(map(tuple, corners.reshape(-1, 9)))
+
+
+# The plan -------------------------------------------------------------------------------------------------------------
+
+
+def test_the_cells_fit_the_memory_and_the_last_round_is_whole_if_it_can_be(tmp_path):
+    mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
+
+    def cells(triangles, each):
+        return [len(cells.boxes) for cells in plan.Plan(mesh, 0.01, plan.FIXED + triangles * each).rounds]
+
+    assert cells(mesh.count, plan.OF_FIRST) == [1]
+    few, last = cells(mesh.count, plan.OF_LATER)
+    assert few == 2 and last == 1
+    many = cells(1000, plan.OF_FIRST)
+    assert len(many) == 5 and mesh.count / 1000 <= many[0] < 2 * mesh.count / 1000
+    assert min(many[1:]) <= max(many[1:]) < many[0]
+
+
+def test_too_little_memory_is_refused_with_what_is_needed(tmp_path):
+    mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
+    with pytest.raises(Refused, match=r"--memory: 1 MB is too little: .* need \d+ MB"):
+        plan.Plan(mesh, 0.1, 1_000_000)
+    with pytest.raises(Refused, match="--memory"):
+        plan.Plan(mesh, 1.0, plan.FIXED + 100 * plan.OF_FIRST)

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "base/errors.h"
+#include "crossing_judge.h"
+#include "decimation/decimation.h"
+#include "measure/hausdorff.h"
+#include "shapes.h"
+
+namespace tolvol {
+namespace {
+
+using glm::dvec3;
+using glm::uvec3;
+
+constexpr double kFar = std::numeric_limits<double>::infinity();
+
+struct Corner {
+  double x, y, z;
+  auto operator<=>(const Corner&) const = default;
+};
+
+/// Triangles by the positions of their corners.
+using Soup = std::vector<std::array<dvec3, 3>>;
+
+Soup soup_of(std::span<const dvec3> vertices, std::span<const uvec3> triangles) {
+  Soup soup;
+  for (const uvec3& t : triangles) soup.push_back({vertices[t.x], vertices[t.y], vertices[t.z]});
+  return soup;
+}
+
+TriangleMesh mesh_of(const Soup& soup) {
+  TriangleMesh mesh;
+  std::map<Corner, std::uint32_t> numbers;
+  for (const auto& corners : soup) {
+    uvec3 t;
+    for (int k = 0; k < 3; ++k) {
+      const dvec3& p = corners[k];
+      const auto [found, made] = numbers.try_emplace({p.x, p.y, p.z}, static_cast<std::uint32_t>(numbers.size()));
+      if (made) mesh.vertices.push_back(p);
+      t[k] = found->second;
+    }
+    mesh.triangles.push_back(t);
+  }
+  return mesh;
+}
+
+Box box_of(const std::array<dvec3, 3>& corners) {
+  Box box;
+  for (const dvec3& p : corners) box.add(p);
+  return box;
+}
+
+bool is_inside(const std::array<dvec3, 3>& corners, const Box& cell) {
+  return strictly_inside(corners[0], cell) && strictly_inside(corners[1], cell) && strictly_inside(corners[2], cell);
+}
+
+StoredSpace space() { return StoredSpace(glm::dmat4(1), Storage::float64); }
+
+/// Decimates a mesh in each of some cells that together are all of space, and puts the results together.
+Soup round(const Soup& mesh, const Soup& reference, double tolerance, const std::vector<Box>& cells,
+           DecimationOptions options = {}) {
+  Soup result;
+  std::vector<bool> stands(mesh.size(), true);
+  for (const Box& cell : cells) {
+    Soup near, around;
+    std::vector<bool> inside;
+    for (std::size_t i = 0; i < mesh.size(); ++i) {
+      if (!meet(box_of(mesh[i]), cell)) continue;
+      near.push_back(mesh[i]);
+      inside.push_back(is_inside(mesh[i], cell));
+      if (inside.back()) stands[i] = false;
+    }
+    const Box reach{cell.lower - tolerance, cell.upper + tolerance};
+    for (const auto& corners : reference) {
+      if (meet(box_of(corners), reach)) around.push_back(corners);
+    }
+    if (near.empty()) continue;
+    const TriangleMesh input = mesh_of(near), other = mesh_of(around);
+    const ToleranceVolume volume(other.vertices, other.triangles, space(), tolerance);
+    options.cell = cell;
+    const DecimationResult r = decimate(input.vertices, input.triangles, space(), &volume, options);
+    EXPECT_EQ(r.uncovered.faces, 0u);
+    const Soup left = soup_of(r.vertices, r.triangles);
+    std::size_t still = 0;
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      const std::uint32_t source = r.triangle_source[i];
+      if (inside[source]) {
+        EXPECT_TRUE(is_inside(left[i], cell)) << "what was inside stays inside";
+        result.push_back(left[i]);
+      } else {
+        EXPECT_EQ(left[i], near[source]) << "what reaches out stands still";
+        ++still;
+      }
+    }
+    EXPECT_EQ(still, static_cast<std::size_t>(std::ranges::count(inside, false)));
+  }
+  for (std::size_t i = 0; i < mesh.size(); ++i) {
+    if (stands[i]) result.push_back(mesh[i]);
+  }
+  return result;
+}
+
+/// Two cells, below and above a plane.
+std::vector<Box> halves(int axis, double at) {
+  Box below{dvec3(-kFar), dvec3(kFar)}, above = below;
+  below.upper[axis] = above.lower[axis] = at;
+  return {below, above};
+}
+
+void expect_within(const Soup& mesh, const Soup& reference, double tolerance) {
+  const TriangleMesh a = mesh_of(mesh), b = mesh_of(reference);
+  EXPECT_LE(hausdorff(a, b, {.bound = tolerance}).upper, tolerance) << "forward";
+  EXPECT_LE(hausdorff(b, a, {.bound = tolerance}).upper, tolerance) << "backward";
+}
+
+TEST(DecimationCell, ResultsOfCellsAreOneProvedMesh) {
+  const TriangleMesh sphere = shapes::sphere(20);
+  const Soup reference = soup_of(sphere.vertices, sphere.triangles);
+  constexpr double kTolerance = 0.02;
+  Soup mesh = reference;
+  std::size_t before = mesh.size();
+  for (const auto effort : {DecimationOptions::Effort::fast, DecimationOptions::Effort::thorough}) {
+    for (int axis = 0; axis < 3; ++axis) {
+      mesh = round(mesh, reference, kTolerance, halves(axis, 0.1 * (axis - 1)), {.effort = effort});
+      expect_within(mesh, reference, kTolerance);
+    }
+    EXPECT_LT(mesh.size(), 3 * before / 4) << "each round goes on where the one before stopped";
+    before = mesh.size();
+  }
+  const TriangleMesh result = mesh_of(mesh);
+  EXPECT_TRUE(crossings_by_cgal(result).empty());
+}
+
+/// Two sheets face each other across a gap of almost twice the tolerance. Each alone covers less than its half of the
+/// gap, and the zigzag of its rim reaches farther than the pieces do into which its half is cut.
+TEST(DecimationCell, HoldsWhatCoversTheRestOfAPiece) {
+  constexpr double kTolerance = 0.2;
+  constexpr int kTeeth = 160;
+  const Soup reference = {{dvec3(-1, -1, 0), dvec3(1, -1, 0), dvec3(1, 1, 0)},
+                          {dvec3(-1, -1, 0), dvec3(1, 1, 0), dvec3(-1, 1, 0)}};
+  Soup mesh;
+  for (const double side : {-1.0, 1.0}) {
+    for (int i = 0; i < kTeeth; ++i) {
+      const double y[] = {-1 + 2.0 * i / kTeeth, -1 + 2.0 * (i + 1) / kTeeth};
+      const double rim[] = {side * (i % 2 ? 0.204 : 0.198), side * (i % 2 ? 0.198 : 0.204)};
+      const auto quad = [&](double a0, double a1, double b0, double b1) {
+        mesh.push_back({dvec3(a0, y[0], 0), dvec3(a1, y[1], 0), dvec3(b0, y[0], 0)});
+        mesh.push_back({dvec3(a1, y[1], 0), dvec3(b1, y[1], 0), dvec3(b0, y[0], 0)});
+      };
+      quad(side * 0.6, side * 0.6, rim[0], rim[1]);
+      quad(side, side, side * 0.6, side * 0.6);
+    }
+  }
+  expect_within(mesh, reference, kTolerance);
+  const Soup result = round(mesh, reference, kTolerance, halves(0, 0), {.max_normal_angle = 180});
+  expect_within(result, reference, kTolerance);
+  EXPECT_LT(result.size(), mesh.size()) << "the far rim is free";
+}
+
+TEST(DecimationCell, NeedsBothDirectionsAndAVolume) {
+  const TriangleMesh mesh = shapes::sphere(4);
+  const ToleranceVolume volume(mesh.vertices, mesh.triangles, space(), 0.01);
+  DecimationOptions options;
+  options.cell = halves(0, 0).front();
+  options.two_sided = false;
+  EXPECT_THROW(decimate(mesh.vertices, mesh.triangles, space(), &volume, options), InvalidInput);
+  options.two_sided = true, options.target_triangles = 4;
+  EXPECT_THROW(decimate(mesh.vertices, mesh.triangles, space(), nullptr, options), InvalidInput);
+}
+
+}  // namespace
+}  // namespace tolvol
