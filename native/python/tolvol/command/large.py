@@ -2,6 +2,7 @@
 """Decimates a file that is larger than the memory: `tolvol decimate` with --memory."""
 
 import argparse
+import contextlib
 import json
 import re
 import shutil
@@ -21,7 +22,7 @@ from ..tiles.rounds import Rounds, bounds, needed_space
 from ..tiles.scratch import Scratch
 from . import mesh_files
 from .mesh import Mesh
-from .workers import here
+from .workers import dask, here, local_count
 
 _UNITS = {"": 1, "k": 1e3, "m": 1e6, "g": 1e9, "t": 1e12}
 # Options of decimate that need the whole mesh at once, or more than one run of the rounds.
@@ -41,6 +42,17 @@ def memory(text):
     return int(float(match[1]) * _UNITS[match[2].lower()])
 
 
+def scheduler(text):
+    """Parses local:N or an address."""
+    try:
+        local_count(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is neither local:N nor an address such as tcp://host:8786"
+        ) from None
+    return text
+
+
 def add(parser):
     """Adds the options of a mesh that is larger than the memory to a parser."""
     group = parser.add_argument_group("larger than the memory", GROUP)
@@ -58,6 +70,13 @@ def add(parser):
         "float64 (default: OUT.tolvol beside OUT). It is removed at the end",
     )
     group.add_argument(
+        "--scheduler",
+        type=scheduler,
+        metavar="ADDRESS",
+        help="do the work in the cells as tasks of Dask, whose workers have SIZE of memory each and see the scratch folder: "
+        "tcp://HOST:PORT, or local:N for N worker processes on this machine. Needs pip install '.[scale]'",
+    )
+    group.add_argument(
         "--resume", action="store_true", help="go on with the run that was interrupted and left its scratch folder"
     )
 
@@ -65,7 +84,7 @@ def add(parser):
 def checked(parser, options):
     """Returns the options. Raises Stop if they make no sense together."""
     if options.memory is None:
-        for name in ("scratch", "resume"):
+        for name in ("scratch", "scheduler", "resume"):
             if getattr(options, name):
                 parser.error(f"--{name} needs --memory")
         return options
@@ -117,8 +136,10 @@ class _Run:
         self._require_space(mesh)
         scratch = Scratch(self.scratch, self._asked(mesh, tolerance), self.options.resume)
         done = False
+        workers = dask(self.options.scheduler) if self.options.scheduler else contextlib.nullcontext(here)
         try:
-            result = Rounds(mesh, plan, scratch, tolerance, self._native_options(), self._each).run()
+            with workers as self._in_cells:
+                result = Rounds(mesh, plan, scratch, tolerance, self._native_options(), self._each).run()
             whole = self._report(mesh, plan, result, tolerance, size)
             if not report.proved(whole):
                 raise NotProved(f"{report.intervals(whole)}; {self.options.output} was not written")
@@ -147,7 +168,8 @@ class _Run:
             "effort": self.options.effort,
             "crossings": self.options.crossings,
             "max_normal_angle": self.options.max_normal_angle,
-            "threads": self.options.threads,
+            # The workers share the cores of a machine.
+            "threads": self.options.threads or (1 if self.options.scheduler else None),
         }
 
     def _asked(self, mesh, tolerance):
@@ -164,7 +186,7 @@ class _Run:
         }
 
     def _each(self, title, work, jobs):
-        yield from here(title, work, jobs)
+        yield from (here if title == "reading" else self._in_cells)(title, work, jobs)
         stage = "read" if title == "reading" else "certify" if title == "certifying" else "decimation"
         self._say(title, self._end_stage(stage))
 

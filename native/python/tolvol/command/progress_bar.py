@@ -39,19 +39,35 @@ def followed(title, work):
     return result
 
 
+def counted(title, results, total):
+    """Yields some results as they come. A bar on stderr shows how many of `total` came, if stderr is a terminal."""
+    if not sys.stderr.isatty():
+        yield from results
+        return
+    with _bars() as bars:
+        task = bars.add_task(title, total=total)
+        for number, result in enumerate(results, 1):
+            bars.update(task, completed=number, description=f"{title}: {number} of {total}")
+            yield result
+
+
 def end():
     """Leaves the terminal as it was: a signal ends the process while a bar may be shown, which hides the cursor."""
     if sys.stderr.isatty():
         os.write(sys.stderr.fileno(), b"\r\x1b[K\x1b[?25h")
 
 
-@contextlib.contextmanager
-def _bar(title):
+def _bars():
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
     columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+    return Progress(*columns, console=Console(stderr=True), transient=True)
+
+
+@contextlib.contextmanager
+def _bar(title):
+    with _bars() as bars:
         task = bars.add_task(title, total=1.0)
 
         def show(progress):

@@ -1,10 +1,88 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Does the work in all cells of a round."""
+"""Does the work in all cells of a round: in this process, or as tasks of Dask."""
 
-from .progress_bar import followed
+import contextlib
+import re
+
+from ..shared import package
+from ..shared.command.arguments import Stop
+from .progress_bar import counted, followed
+
+_GO_ON = "what is done is kept: go on with --resume"
+# A task whose worker dies is done anew so many times.
+_MOST_DEATHS = 10
 
 
 def here(title, work, jobs):
     """Yields work(job, progress) for all jobs, an iterable with a length, in this process and one after another."""
     for number, job in enumerate(jobs, 1):
         yield followed(f"{title}: {number} of {len(jobs)}", lambda progress, job=job: work(job, progress))
+
+
+def local_count(scheduler):
+    """Returns N of a scheduler "local:N", or None for the address of another one. Raises ValueError for neither."""
+    if match := re.fullmatch(r"local:([1-9]\d*)", scheduler):
+        return int(match[1])
+    if not re.fullmatch(r"\w+://\S+", scheduler):
+        raise ValueError
+    return None
+
+
+@contextlib.contextmanager
+def dask(scheduler):
+    """Yields a function like here() whose jobs are tasks of Dask. They find the scratch folder under the same path.
+
+    scheduler: "local:N" starts N worker processes on this machine, and ends them; all else is the address of a scheduler.
+    """
+    import dask.config
+    from distributed import Client, LocalCluster
+
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": _MOST_DEATHS}))
+        if count := local_count(scheduler):
+            # The native code has its own idea of the memory: a worker is not stopped for it.
+            cluster = LocalCluster(
+                n_workers=count, threads_per_worker=1, memory_limit=None, dashboard_address="127.0.0.1:0"
+            )
+            scheduler = stack.enter_context(cluster)
+        try:
+            client = stack.enter_context(Client(scheduler))
+        except OSError as error:
+            raise Stop(f"--scheduler {scheduler}: no connection ({error})") from None
+        _require_same_version(client)
+        print(f"dashboard of Dask: {client.dashboard_link}", flush=True)
+        yield lambda title, work, jobs: _tasks(client, title, work, jobs)
+
+
+def _require_same_version(client):
+    own = package.module.__version__
+    for worker, version in client.run(_version, on_error="return").items():
+        if version != own:
+            raise Stop(f"--scheduler: the worker {worker} has {version!r} in place of tolvol {own}")
+
+
+def _version():
+    import tolvol
+
+    return tolvol.__version__
+
+
+def _tasks(client, title, work, jobs):
+    from distributed import as_completed
+    from distributed.client import FutureCancelledError
+    from distributed.comm import CommClosedError
+    from distributed.scheduler import KilledWorker
+
+    futures = client.map(work, jobs, pure=False)
+    try:
+        for future in counted(title, as_completed(futures), len(jobs)):
+            yield future.result()
+    except KilledWorker:
+        raise Stop(
+            f"{title}: the work in a cell has ended {_MOST_DEATHS} workers, as it does where memory is short: give the "
+            f"workers more; {_GO_ON}"
+        ) from None
+    except (CommClosedError, FutureCancelledError):
+        raise Stop(f"{title}: the connection to the scheduler is lost; {_GO_ON}", 1) from None
+    finally:
+        client.cancel(futures)

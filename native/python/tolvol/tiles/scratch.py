@@ -9,6 +9,7 @@ import contextlib
 import json
 import os
 import shutil
+import uuid
 from pathlib import Path
 
 from ..shared.errors import Refused
@@ -90,7 +91,7 @@ class Scratch:
 
 def keep(path, record):
     """Writes the record of a step whose soup is, or would be, at `path`."""
-    partial = Path(f"{path}.json.partial")
+    partial = Path(f"{path}.{uuid.uuid4().hex}.partial")
     try:
         with open(partial, "w") as file:
             json.dump(record, file)

@@ -2,6 +2,7 @@
 """Soups: files of triangles by the coordinates of their corners, in the scratch folder."""
 
 import os
+import uuid
 import zlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -46,7 +47,8 @@ class Writer:
     """Writes a soup part by part. Nothing is where the soup will be before end()."""
 
     def __init__(self, path):
-        self._path, self._partial = str(path), f"{path}.partial"
+        # A task may be done twice at once, when its worker has only lost the connection.
+        self._path, self._partial = str(path), f"{path}.{uuid.uuid4().hex}.partial"
         self._count, self._bounds, self._checksum, self._dtype = 0, bounds_of(np.empty((0, 3, 3))), 0, "<f4"
         self._write(b"", "wb")
 
