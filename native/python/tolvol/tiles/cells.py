@@ -45,8 +45,8 @@ EVERYWHERE = Box((-math.inf,) * 3, (math.inf,) * 3)
 class Cells:
     """`count` cells that hold about as many of some points, (k, 3), each; fewer where many points lie on each other.
 
-    Each cut is across the longest axis of the points. `turn` chooses how many of the cells are below each cut, so that the sides
-    of the cells of several turns lie apart. O(k log count).
+    Each cut is across a long axis of the points. `turn` chooses the axis, and how many of the cells are below the cut, so that the
+    sides of the cells of several turns lie apart. O(k log count).
     """
 
     def __init__(self, points, count, turn=0):
@@ -56,7 +56,7 @@ class Cells:
     def _cut(self, points, count, turn, box):
         """Returns (axis, at, the node below, the node above), or the number of a cell."""
         if count > 1 and len(points) > 1:
-            axis = int(np.argmax(points.max(0) - points.min(0)))
+            axis = _axis(points.max(0) - points.min(0), turn)
             below = min(max(round(_SHARES[turn % len(_SHARES)] * count), 1), count - 1)
             values = np.sort(points[:, axis])
             # Points at the cut are above it. Where the lowest point is there, the cut goes to the next coordinate.
@@ -90,6 +90,12 @@ class Cells:
 
         descend(self._root, np.arange(len(points)))
         return found
+
+
+def _axis(extent, turn):
+    """Returns one of the axes along which the extent is at least half of the longest, turn by turn."""
+    order = np.argsort(-extent, kind="stable")
+    return int(order[turn % np.count_nonzero(extent >= extent.max() / 2)])
 
 
 def _with(corner, axis, value):
