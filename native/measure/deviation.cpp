@@ -117,7 +117,7 @@ Deviation deviation(const TriangleMesh& a, const TriangleMesh& b, const Deviatio
   if (options.progress) options.progress->begin("averaging");
   const PlacedPair pair(a, b);
   const double scale = pair.frame.scale();
-  SampledSurface surface(pair, b, options.steps, options.threads, options.progress);
+  SampledSurface surface(pair, b, options);
   surface.measure();
   const std::vector<SampledPiece>& pieces = surface.pieces();
 

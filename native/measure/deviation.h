@@ -19,6 +19,9 @@ struct DeviationOptions {
   unsigned threads = 0;                      ///< 0 means one for each core; the result does not depend on it
   Progress* progress = nullptr;              ///< the call throws Cancelled once this is cancelled
   double steps = 128;                        ///< is the mean number of search steps of a piece at which cutting ends
+  /// About how many pieces a is first cut into. Those of a scan are then about 0.25 % of its size apart. Fewer pieces
+  /// that are cut further would not be cheaper: each part and each whole would be bounded.
+  std::size_t pieces = 196608;
 };
 
 /// A number, and the range that holds the true number whatever lies between the samples.
@@ -46,18 +49,18 @@ struct Deviation {
   std::size_t steps;                   ///< counts the nodes of the hierarchy and triangles that were looked at
 };
 
-/// Covers a with pieces of about 1/196,608 of its area, at least one for each triangle, and cuts the worst pieces. It
+/// Covers a with about `pieces` pieces of equal area, at least one for each triangle, and cuts the worst pieces. It
 /// stops when the range of the mean is no wider than 0.1 % of the largest distance that was seen or than rounding,
-/// 3e-14 of the size of both meshes together; when there are about 229,000 pieces, or four for each triangle if that is
-/// more; or when the searches for near triangles have taken `steps` for each of so many pieces, as they do among
-/// needles or if the surfaces cross everywhere. The exact distance of one point of each piece enters the estimates, and
-/// bounds over the whole piece (measure/distance_bounds.h) enter the ranges. The points are fixed, so that equal input
-/// gives equal output, but as good as random: no estimate is biased, and the error of the mean is usually below twice
-/// `mean_error`, which is about 0.05 % of the largest distance between a scan and a copy within 0.1 % of its size, and
-/// less if they are farther apart. The ranges are certain except for rounding, 1e-12 of the size of the meshes (more
-/// only if nearly all the area is in needles), and no estimate is outside of its range. Ranges are wide between
-/// surfaces nearer to each other than `spacing`. Far corners of triangles of b do not count for the size, with the
-/// exceptions that measure/hausdorff.h names. If a has no area, it is measured along the longest edges of its
+/// 3e-14 of the size of both meshes together; when there are a sixth more pieces than that, or four for each triangle
+/// if that is more; or when the searches for near triangles have taken `steps` for each of so many pieces, as they do
+/// among needles or if the surfaces cross everywhere. The exact distance of one point of each piece enters the
+/// estimates, and bounds over the whole piece (measure/distance_bounds.h) enter the ranges. The points are fixed, so
+/// that equal input gives equal output, but as good as random: no estimate is biased, and the error of the mean is
+/// usually below twice `mean_error`, which is about 0.05 % of the largest distance between a scan and a copy within 0.1
+/// % of its size, and less if they are farther apart. The ranges are certain except for rounding, 1e-12 of the size of
+/// the meshes (more only if nearly all the area is in needles), and no estimate is outside of its range. Ranges are
+/// wide between surfaces nearer to each other than `spacing`. Far corners of triangles of b do not count for the size,
+/// with the exceptions that measure/hausdorff.h names. If a has no area, it is measured along the longest edges of its
 /// triangles instead, and if these have no length either, all triangles count alike and `spacing` is 0.
 ///
 /// b is closed if each of its edges has two faces that run along it in opposite directions. Its angle-weighted

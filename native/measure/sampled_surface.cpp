@@ -20,11 +20,8 @@ namespace {
 
 using glm::dvec3;
 
-// A surface is first cut into about so many pieces. Those of a scan are then about 0.25 % of its size apart. Cutting
-// fewer pieces further would bound each part and each whole.
-constexpr double kPieces = 196608;
-// There are at most so many pieces, or so many for each triangle if that is more.
-constexpr std::size_t kBudget = 229376, kBudgetPerTriangle = 4;
+// There are at most so many pieces for each triangle, or a sixth more than at first if that is more.
+constexpr std::size_t kBudgetPerTriangle = 4;
 // Pieces are cut until the range of the mean is no wider than this share of the largest distance.
 constexpr double kEnough = 0.001;
 // Cutting ends when there is room for so small a part of the budget: each round looks at all pieces.
@@ -41,9 +38,12 @@ TriangleMesh searched(const TriangleMesh& b) {
 
 }  // namespace
 
-SampledSurface::SampledSurface(const PlacedPair& pair, const TriangleMesh& world_b, double steps, unsigned threads,
-                               Progress* progress)
-    : b_(searched(pair.b)), hierarchy_(b_), sides_(pair, world_b), threads_(threads), progress_(progress) {
+SampledSurface::SampledSurface(const PlacedPair& pair, const TriangleMesh& world_b, const DeviationOptions& options)
+    : b_(searched(pair.b)),
+      hierarchy_(b_),
+      sides_(pair, world_b),
+      threads_(options.threads),
+      progress_(options.progress) {
   const TriangleMesh& a = pair.a;
   for (const Measure measure : {kArea, kLength, kNumber}) {
     measure_ = measure;
@@ -59,7 +59,7 @@ SampledSurface::SampledSurface(const PlacedPair& pair, const TriangleMesh& world
   std::vector<SampledPiece> triangles;
   triangles.swap(pieces_);
   for (const SampledPiece& triangle : triangles) {
-    const double whole = measure_of(triangle.simplex), parts = whole / total_.value() * kPieces;
+    const double whole = measure_of(triangle.simplex), parts = whole / total_.value() * double(options.pieces);
     const int k = std::max(1, int(std::lround(measure_ == kArea ? std::sqrt(parts) : parts)));
     const double share = measure_ == kNumber ? 1 : 1.0 / (measure_ == kArea ? double(k) * k : k);
     cut(triangle.simplex, k, [&](const Simplex& part) {
@@ -67,8 +67,8 @@ SampledSurface::SampledSurface(const PlacedPair& pair, const TriangleMesh& world
       pieces_.push_back({part, whole * share, {}, 0, 0, false});
     });
   }
-  budget_ = std::max({kBudget, kBudgetPerTriangle * a.triangles.size(), pieces_.size()});
-  most_steps_ = std::size_t(steps * double(budget_));
+  budget_ = std::max({options.pieces + options.pieces / 6, kBudgetPerTriangle * a.triangles.size(), pieces_.size()});
+  most_steps_ = std::size_t(options.steps * double(budget_));
 }
 
 void SampledSurface::measure() {

@@ -12,6 +12,7 @@
 #include "geometry/frame.h"
 #include "geometry/hierarchy.h"
 #include "geometry/triangle_mesh.h"
+#include "measure/deviation.h"
 #include "measure/distribution.h"
 #include "measure/placed_pair.h"
 #include "measure/sampled_piece.h"
@@ -24,10 +25,8 @@ inline constexpr double kRangeNoise = 256 * kUnitRoundoff;
 
 class SampledSurface {
  public:
-  /// Cuts pair.a into pieces. `world_b` is the mesh that pair.b is a part of. `steps` is the mean number of search
-  /// steps of a piece at which cutting ends. Keeps a reference to the progress.
-  SampledSurface(const PlacedPair& pair, const TriangleMesh& world_b, double steps, unsigned threads,
-                 Progress* progress);
+  /// Cuts pair.a into pieces. `world_b` is the mesh that pair.b is a part of. Keeps a reference to the progress.
+  SampledSurface(const PlacedPair& pair, const TriangleMesh& world_b, const DeviationOptions& options);
 
   /// Measures all pieces, and cuts the worst of them until there is nothing more to gain or to spend. Throws Cancelled.
   /// About 2 to 15 us a piece.

@@ -455,7 +455,7 @@ TEST(Allocation, Measures) {
   EXPECT_GT(fail_allocations(
                 [&] {
                   DeviationOptions options;
-                  options.threads = 1;
+                  options.threads = 1, options.pieces = 2000;
                   const Deviation found = deviation(other, scene.mesh, options);
                   return Numbers{found.mean.value, found.rms.value};
                 },

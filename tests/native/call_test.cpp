@@ -106,7 +106,7 @@ std::vector<NamedCall> calls() {
        }},
       {"deviation",
        [] {
-         deviation({moved, wavy().triangles}, wavy(), {.threads = 1, .steps = 1});
+         deviation({moved, wavy().triangles}, wavy(), {.threads = 1, .steps = 1, .pieces = 24000});
        }},
   };
 }

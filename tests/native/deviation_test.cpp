@@ -23,6 +23,9 @@ TriangleMesh plate(unsigned n, double z, double slope = 0) {
   return shapes::squares(n, [&](const dvec3& p) { return dvec3(p.x, p.y, z + slope * p.x); });
 }
 
+/// Pieces enough for tests in which their number is not the point.
+constexpr std::size_t kSome = 24576;
+
 TEST(Deviation, ParallelPlates) {
   const double bounds[] = {0.2, 0.3};
   for (const auto& [n, m] : {std::pair{1u, 30u}, {30u, 1u}}) {
@@ -55,7 +58,8 @@ TEST(Deviation, EveryRangeIsInOrder) {
   std::mt19937 random(8);
   std::normal_distribution<double> normal(0, 1);
   const double bounds[] = {0, 1e-17, 0.25, 1}, percentiles[] = {0, 1, 25, 100.0 / 3, 50, 200.0 / 3, 75, 99, 100};
-  for (int round = 0; round < 24; ++round) {
+  // Twelve rounds have each of the meshes with each of the moves.
+  for (int round = 0; round < 12; ++round) {
     TriangleMesh mesh = round % 3 == 0 ? shapes::box(2) : TriangleMesh{};
     for (int i = 0; i < (round % 2 ? 1 : 3) && round % 3 != 0; ++i) {
       const unsigned first = unsigned(mesh.vertices.size());
@@ -64,7 +68,7 @@ TEST(Deviation, EveryRangeIsInOrder) {
     }
     TriangleMesh moved = mesh;
     for (dvec3& p : moved.vertices) p += round % 4 < 2 ? dvec3(0) : dvec3(0.25, 0, round % 4 == 2 ? 0 : 1e-16);
-    const Deviation d = deviation(mesh, moved, {bounds, percentiles});
+    const Deviation d = deviation(mesh, moved, {.bounds = bounds, .percentiles = percentiles, .pieces = kSome});
     std::vector<Estimate> all{d.mean, d.rms};
     all.insert(all.end(), d.share_beyond.begin(), d.share_beyond.end());
     all.insert(all.end(), d.percentiles.begin(), d.percentiles.end());
@@ -119,7 +123,7 @@ TEST(Deviation, ManyTrianglesAlikeFar) {
   const TriangleMesh outer = shapes::torus(40);
   for (const double length : {1e-3, 0.5}) {
     const TriangleMesh disc{{{0, 0, 0}, {length, 0, 0}, {0, length, 0}}, {{0, 1, 2}}};
-    const Deviation d = deviation(disc, outer);
+    const Deviation d = deviation(disc, outer, {.pieces = kSome});
     // The distance from the inner ring, 0.6 - |x|, but for its 40 corners: the sides sag by 0.3 %.
     const double mean = 0.6 - length * (std::sqrt(2) + std::asinh(1)) / (3 * std::sqrt(2));
     EXPECT_NEAR(d.mean.value, mean, 2e-3);
@@ -187,7 +191,7 @@ TEST(Deviation, FarCornersCostNothing) {
   const auto to_far = [&](double far) {
     TriangleMesh target = torus;
     target.vertices[7] = far * dvec3(1, 0.3, 1);
-    return deviation(moved, target);
+    return deviation(moved, target, {.pieces = kSome});
   };
   const Deviation near = to_far(20), first = to_far(1e4);  // at 20 nothing is cut off
   ASSERT_TRUE(near.sides.has_value());
@@ -216,13 +220,29 @@ TEST(Deviation, FarCornersOfTheMeshItselfCostNothing) {
   TriangleMesh far = torus;
   for (const double at : {1e19, 1e50, 1e100}) {
     far.vertices[7] = at * dvec3(1, 0, 0);
-    const Deviation d = deviation(far, torus);
+    const Deviation d = deviation(far, torus, {.pieces = kSome});
     EXPECT_LE(d.steps, 40 * d.distances.size()) << at;
     EXPECT_NEAR(d.mean.value / at, 1 / 3.0, 1e-3) << at;  // of triangles with two corners at 0 and one at `at`
     EXPECT_LE(d.mean.range.lower / at, 1 / 3.0);
     EXPECT_GE(d.mean.range.upper / at, 1 / 3.0);
     ASSERT_TRUE(d.sides.has_value());
     EXPECT_LE(d.sides->share_inside.value, 1e-9);
+  }
+}
+
+TEST(Deviation, HasAsManyPiecesAsAreAskedFor) {
+  const double percentiles[] = {50, 100};
+  double last = 1;
+  for (const std::size_t pieces : {100u, 3000u, 50000u}) {
+    const TriangleMesh floor{{{-9, -9, 0}, {9, -9, 0}, {9, 9, 0}, {-9, 9, 0}}, {{0, 1, 2}, {0, 2, 3}}};
+    const Deviation d = deviation(plate(1, 0, 1), floor, {.percentiles = percentiles, .pieces = pieces});
+    EXPECT_GT(double(d.distances.size()), 0.9 * double(pieces));
+    EXPECT_LT(double(d.distances.size()), 1.2 * double(pieces));
+    expect(d.percentiles[0], 0.5, d.spacing);
+    expect(d.percentiles[1], 1, d.spacing);
+    const double width = d.percentiles[0].range.upper - d.percentiles[0].range.lower;
+    EXPECT_LT(width, 0.5 * last);
+    last = width;
   }
 }
 
@@ -317,12 +337,13 @@ TEST(Deviation, EndsByItsStepsWhereNeedlesCrowd) {
   moved = fan;
   for (dvec3& p : moved.vertices) p += dvec3(normal(random), normal(random), normal(random));
   const double percentiles[] = {50, 100};
-  const std::size_t pieces = 229376, first = 196608 + 2 * n;  // at most; about how many there are at first
+  const std::size_t wanted = 4 * kSome, pieces = wanted + wanted / 6,
+                    first = wanted + 2 * n;  // at most; about how many there are at first
   for (const auto& [a, b] : {std::pair{fan, moved}, {moved, fan}}) {
     Deviation before{};
-    for (const double steps : {0.0, 2.0, 8.0}) {
+    for (const double steps : {0.0, 4.0, 16.0}) {
       DeviationOptions options;
-      options.percentiles = percentiles, options.steps = steps;
+      options.percentiles = percentiles, options.steps = steps, options.pieces = wanted;
       const Deviation d = deviation(a, b, options);
       // What is begun ends, and each of the first pieces has a search of its own: of 63 nodes at most, with 206 faces.
       EXPECT_LE(double(d.steps), steps * pieces + 63.0 * first + 4096 * 512);
@@ -361,7 +382,7 @@ TEST(Deviation, SameForAnyNumberOfThreads) {
   for (dvec3& p : rough.vertices) p.z += normal(random);
   const double bounds[] = {0.01};
   DeviationOptions options;
-  options.bounds = bounds, options.steps = 16, options.threads = 1;
+  options.bounds = bounds, options.steps = 16, options.threads = 1, options.pieces = kSome;
   const Deviation one = deviation(rough, plate(3, 0), options);
   for (const unsigned threads : {2u, 5u}) {
     options.threads = threads;
