@@ -36,6 +36,7 @@ class Run:
         self.failed = 0
         self.passed = 0
         self.started = time.time()
+        self.used = time.process_time()
         self.current = None
         self.ending = False  # whether what a failed test has left at work is being ended
 
@@ -54,7 +55,8 @@ class Run:
                 self.ending = False
             else:
                 self.passed += 1
-                print(f"... passed after {time.time() - self.started:.0f} s", flush=True)
+                used, self.used = time.process_time() - self.used, time.process_time()
+                print(f"... passed after {time.time() - self.started:.0f} s, {used:.1f} s of the processor", flush=True)
         except Exception:
             traceback.print_exc()
             self.failed += not self.ending
