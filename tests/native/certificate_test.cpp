@@ -88,7 +88,7 @@ TEST_P(RandomCandidates, NoWrongVerdictAndFewUnproved) {
   // Each measurement builds a hierarchy of the reference, so that a small one leaves time for many candidates.
   for (const TriangleMesh& reference : {shapes::torus(20, 0.01), shapes::box(6)}) {
     const ToleranceVolume volume(reference.vertices, reference.triangles, kIdentity, tolerance);
-    const int count = many(20'000);
+    const int count = (is_full_run() ? 20'000 : many(10'000));
     const Candidates candidates = near_surface(reference, tolerance, count, 3);
     const Score score = judge(reference, tolerance, candidates, check(volume, candidates));
     EXPECT_EQ(score.wrong_inside, 0);
@@ -306,7 +306,7 @@ TEST(Certificate, WhatIsProvedOfAPieceIsProvedOfItsParts) {
     const ToleranceVolume volume(reference.vertices, reference.triangles, kIdentity, tolerance);
     const TriangleCertificate certificate(volume.witnesses(), volume.grid(), volume.hierarchy(), volume.provable(0),
                                           volume.refutable(0));
-    std::vector<dvec3> points = barely_inside(volume, certificate, is_full_run() ? 13'000 : many(4'000), 17);
+    std::vector<dvec3> points = barely_inside(volume, certificate, is_full_run() ? 13'000 : many(2'000), 17);
     for (dvec3& p : points) p = volume.frame().to_world(p);
     const Certificate check(volume);
     std::vector<std::uint32_t> whole(points.size());

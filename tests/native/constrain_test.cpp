@@ -110,24 +110,24 @@ std::vector<Scene> scenes() {
   sheared[1][0] = 0.7, sheared[2][1] = -0.4, sheared[0][0] = 3;
   far_away[3] = {5000, -3000, 100, 1};
   tiny[3][3] = huge[3][3] = 1;
-  TriangleMesh slivers = shapes::grid(across(30));
+  TriangleMesh slivers = shapes::grid(across(22));
   for (dvec3& p : slivers.vertices) p = rounded_to_float32(dvec3(p.x, p.y * 1e-3, 0.05 * std::sin(9 * p.x)));
   TriangleMesh odd = shapes::box(6);  // faces that are points and segments, twice the same, a vertex without a face
   odd.triangles.insert(odd.triangles.end(), {{0, 0, 0}, {0, 1, 1}, odd.triangles[0], odd.triangles[7]});
   odd.vertices.emplace_back(100, 100, 100);
-  return {{shapes::torus(across(40), 0.002)},
-          {shapes::torus(across(40), 0.02), glm::dmat4(1), Storage::float64},
-          {shapes::box(10)},
-          {shapes::stored(shapes::grid(across(30)))},
-          {shapes::soup(shapes::torus(across(24)))},
+  return {{shapes::torus(across(28), 0.002)},
+          {shapes::torus(across(28), 0.02), glm::dmat4(1), Storage::float64},
+          {shapes::box(across(8))},
+          {shapes::stored(shapes::grid(across(22)))},
+          {shapes::soup(shapes::torus(across(18)))},
           {slivers},
           {odd},
-          {shapes::torus(across(30)), mirrored},
-          {shapes::torus(across(30)), sheared},
-          {shapes::torus(across(30)), far_away},
-          {shapes::torus(across(30)), tiny},
-          {shapes::torus(across(30)), huge},
-          {shapes::torus(24), glm::dmat4(1), Storage::float32, 0.05},
+          {shapes::torus(across(22)), mirrored},
+          {shapes::torus(across(22)), sheared},
+          {shapes::torus(across(22)), far_away},
+          {shapes::torus(across(22)), tiny},
+          {shapes::torus(across(22)), huge},
+          {shapes::torus(across(20)), glm::dmat4(1), Storage::float32, 0.05},
           {shapes::joined(shapes::box(6), shapes::grid(6)), glm::dmat4(1), Storage::float32, 10}};
 }
 
@@ -293,7 +293,7 @@ TEST(Constrain, WhatHoldsTJunctionsTogetherStays) {
 }
 
 TEST(Constrain, TheResultDoesNotDependOnThreads) {
-  const Scene scene{shapes::torus(across(80))};
+  const Scene scene{shapes::torus(across(60))};
   const Points wish = scene.wish(noise(0.6));
   const ConstrainResult one = run(scene, wish, {.threads = 1});
   for (const unsigned threads : {2u, 3u, 7u}) {

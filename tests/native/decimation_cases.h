@@ -71,28 +71,28 @@ inline std::vector<Case> all() {
     fins.vertices.push_back(fins.vertices[b] + dvec3(0, 0, 0.2));
     fins.triangles.emplace_back(a, b, c), fins.triangles.emplace_back(b, c + 1, c);
   }
-  TriangleMesh misoriented = shapes::torus(across(30));
+  TriangleMesh misoriented = shapes::torus(across(26));
   for (std::size_t i = 0; i < misoriented.triangles.size(); i += 3)
     std::swap(misoriented.triangles[i].y, misoriented.triangles[i].z);
   TriangleMesh duplicates = shapes::box(across(8));
   const auto tenth = static_cast<std::ptrdiff_t>(duplicates.triangles.size() / 10);
   for (std::ptrdiff_t i = 0; i < tenth; ++i) duplicates.triangles.push_back(duplicates.triangles[std::size_t(i)]);
-  TriangleMesh slivers = shapes::grid(across(30));  // a plate squeezed to slivers, bent
+  TriangleMesh slivers = shapes::grid(across(26));  // a plate squeezed to slivers, bent
   for (dvec3& p : slivers.vertices) p = rounded_to_float32(dvec3(p.x, p.y * 1e-3, 0.05 * std::sin(9 * p.x)));
-  return {{shapes::torus(across(40), 0.002)},
-          {shapes::torus(across(40), 0.02), glm::dmat4(1), Storage::float64},
+  return {{shapes::torus(across(34), 0.002)},
+          {shapes::torus(across(34), 0.02), glm::dmat4(1), Storage::float64},
           {shapes::box(across(10))},
-          {shapes::stored(shapes::grid(across(30)))},
+          {shapes::stored(shapes::grid(across(26)))},
           {shapes::soup(shapes::torus(across(24)))},
           {shapes::stored(fins)},
           {misoriented},
           {duplicates},
           {slivers},
-          {shapes::torus(across(30)), mirrored},
-          {shapes::torus(across(30)), sheared},
-          {shapes::torus(across(30)), far_away},
-          {shapes::torus(across(30)), tiny},
-          {shapes::torus(across(30)), huge},
+          {shapes::torus(across(26)), mirrored},
+          {shapes::torus(across(26)), sheared},
+          {shapes::torus(across(26)), far_away},
+          {shapes::torus(across(26)), tiny},
+          {shapes::torus(across(26)), huge},
           {shapes::torus(40, 0.002), glm::dmat4(1), Storage::float32, 0.05},
           {shapes::stored(shapes::joined(shapes::box(across(6)), shapes::grid(across(6)))), glm::dmat4(1),
            Storage::float32, 10}};

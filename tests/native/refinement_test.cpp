@@ -28,7 +28,7 @@ Options thorough() {
 /// The time of thorough grows with the number of triangles that fast leaves.
 constexpr double kPercent = 3;
 
-Case torus() { return {shapes::torus(across(60), 0.002), glm::dmat4(1), Storage::float32, kPercent}; }
+Case torus() { return {shapes::torus(across(44), 0.002), glm::dmat4(1), Storage::float32, kPercent}; }
 
 TEST(Refinement, KeepsBothDirectionsOnEveryMeshAndAddsNoTriangle) {
   std::size_t fast = 0, fewer = 0;

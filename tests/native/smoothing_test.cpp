@@ -10,6 +10,7 @@
 
 #include "base/errors.h"
 #include "check/certificate.h"
+#include "many.h"
 #include "measure/hausdorff.h"
 #include "shapes.h"
 
@@ -240,21 +241,22 @@ std::vector<Scene> scenes() {
   sheared[1][0] = 0.7, sheared[2][1] = -0.4, sheared[0][0] = 3;
   far_away[3] = {5000, -3000, 100, 1};
   tiny[3][3] = 1;
-  TriangleMesh needles = rough_plate(30, 0.02);
+  TriangleMesh needles = rough_plate(across(22), 0.02);
   for (dvec3& p : needles.vertices) p.y *= 1e-3;
-  TriangleMesh odd = shapes::torus(30, 0.02);  // faces that are points and segments, and faces that are there twice
+  TriangleMesh odd =
+      shapes::torus(across(22), 0.02);  // faces that are points and segments, and faces that are there twice
   odd.triangles.insert(odd.triangles.end(), {{0, 0, 0}, {0, 1, 1}, {5, 9, 5}, odd.triangles[7], odd.triangles[8]});
-  return {{shapes::torus(40, 0.02)},
-          {shapes::torus(40, 0.02), glm::dmat4(1), 0.1},
-          {shapes::stored(rough_plate(30, 0.02))},
-          {shapes::box(10), glm::dmat4(1), 0.3},
+  return {{shapes::torus(across(28), 0.02)},
+          {shapes::torus(across(28), 0.02), glm::dmat4(1), 0.1},
+          {shapes::stored(rough_plate(across(22), 0.02))},
+          {shapes::box(across(8)), glm::dmat4(1), 0.3},
           {shapes::stored(needles), glm::dmat4(1), 0.1},
           {odd},
-          {shapes::soup(shapes::torus(24, 0.02))},
-          {shapes::torus(30, 0.02), mirrored},
-          {shapes::torus(30, 0.02), sheared},
-          {shapes::torus(30, 0.02), far_away},
-          {shapes::torus(30, 0.02), tiny}};
+          {shapes::soup(shapes::torus(across(18), 0.02))},
+          {shapes::torus(across(22), 0.02), mirrored},
+          {shapes::torus(across(22), 0.02), sheared},
+          {shapes::torus(across(22), 0.02), far_away},
+          {shapes::torus(across(22), 0.02), tiny}};
 }
 
 TEST(Smoothing, EveryResultIsInsideOnEveryMesh) {
@@ -303,7 +305,7 @@ TEST(Smoothing, PulledBackGoesFartherThanReset) {
 }
 
 TEST(Smoothing, TheResultDoesNotDependOnThreads) {
-  const TriangleMesh mesh = shapes::torus(60, 0.02);
+  const TriangleMesh mesh = shapes::torus(across(48), 0.02);
   const ToleranceVolume volume(mesh.vertices, mesh.triangles, kSingle, 0.02);
   for (const ToleranceVolume* bound : {static_cast<const ToleranceVolume*>(nullptr), &volume}) {
     const SmoothingResult one = smooth(mesh.vertices, mesh.triangles, kSingle, bound, {.threads = 1});
