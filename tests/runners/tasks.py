@@ -141,16 +141,15 @@ def tidy(everything):
 
 def planned(runners, everything):
     """Returns the tasks of these runners; with `everything` those of sh tests/run.sh --all."""
-    length = FULL_LENGTH if everything else {}
     tasks = {
         "native": [*shares("native", "release", 4, everything)],
         "asan": [*shares("asan", "asan", 6)],
         "tsan": [*(shares("tsan", "tsan", 6) if everything else threaded())],
-        "python": [*python(environment=length), *(python_with_addresses_checked() if everything else ())],
+        "python": [*python(), *(python_with_addresses_checked() if everything else ())],
         # About a minute of the processor in every run.
         "fuzz": [*fuzz(300), *fuzz(300, first=300)] if everything else [*fuzz(100), *fuzz(100, first=100)],
         "blender": [*blender(4)],
-        "ui": [Task("ui", "ui", ("sh", "tests/ui/run.sh"), count_pytest, length)],
+        "ui": [Task("ui", "ui", ("sh", "tests/ui/run.sh"), count_pytest, FULL_LENGTH if everything else {})],
         "style": [Task("style", "checks", ("sh", "tests/style/run.sh"), count_checks), *tidy(everything)],
     }
     return [task for name in runners for task in tasks[name]]
