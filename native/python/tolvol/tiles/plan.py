@@ -10,7 +10,7 @@ from .cells import Cells
 
 # What the work in a cell takes at its peak, in bytes: by itself, and for each triangle in the first round, where the mesh is
 # the reference, and in later rounds, where nearly all triangles are those of the reference (docs/benchmark.md).
-FIXED, OF_FIRST, OF_LATER = 160 << 20, 1150, 750
+FIXED, OF_FIRST, OF_LATER = 160 << 20, 1650, 850
 # As much of this may be the grid of distances.
 OF_GRID = 100
 
