@@ -4,9 +4,10 @@
 UV maps: each corner interpolates the UVs of the input triangle that the native result names for it, with the weights
 named there. The decimation keeps UV seams. Other values at corners (colours, custom normals) may differ from face to
 face anywhere: at a vertex that did not move, a corner takes the input value at that vertex that is nearest to the
-corner's old value. Edges: an edge gets the marks of all the edges that were merged into it. Vertices: a remaining vertex
-that moved interpolates attributes, vertex groups and shape keys of the input at its new position; a vertex that did not
-move keeps its values bit for bit.
+corner's old value. At a vertex that was put into a face, to join a T-junction, a corner interpolates the face. Edges:
+an edge gets the marks of all the edges that were merged into it. Vertices: a remaining vertex that moved interpolates
+attributes, vertex groups and shape keys of the input at its new position; a vertex that did not move keeps its values
+bit for bit.
 """
 
 import bpy
@@ -152,7 +153,8 @@ class Carry:
     def _nearest_values(self, values, layout, shared=None):
         """Returns (corners, width), the values for the written mesh.
 
-        At a vertex that moved the values are interpolated; at any other they are chosen among the input values there.
+        At a vertex that moved or was put into the face the values are interpolated; at any other they are chosen among
+        the input values there.
         shared: a label for each corner; corners with the same label get the same value.
         """
         values = values.reshape(len(values), -1)
@@ -164,7 +166,13 @@ class Carry:
         vertices = self._result.triangles[layout.triangles[:, None], layout.corners].ravel()
         still = np.ones(len(self._result.vertices), bool)
         still[self._moved] = False
-        chosen = np.flatnonzero(still[vertices])
+        # A vertex that the decimation has put into a face, or joined to one at the same place, has no input value of the
+        # face there: the corner that the native result names has it.
+        named = self._source.triangles[self._result.source_triangle[layout.triangles[:, None], layout.corners]]
+        nearest = self._corner_weights.argmax(1)
+        named = named.reshape(-1, 3)[np.arange(len(nearest)), nearest]
+        is_there = (self._corner_weights.max(1) > 1 - 1e-6) & (named == self._result.vertex_source[vertices])
+        chosen = np.flatnonzero(still[vertices] & is_there)
         # The input corners are sorted by vertex; the candidates of a corner are the run of input corners at its vertex.
         at_vertex = self._source.triangles.ravel()
         order = np.argsort(at_vertex, kind="stable")

@@ -128,18 +128,20 @@ def _keep_faces(built, source, kept):
 
 
 def _turn(built, faces, result):
-    """Replaces each face around which an edge was flipped by a new one on the remaining vertices, with the same attributes.
+    """Replaces each face around which an edge was flipped by a new one on the remaining vertices, with the same attributes,
+    and one that was divided at T-junctions by its pieces.
 
-    faces: the face of each triangle of the result.
+    faces: the face of each triangle of the result; several triangles may be pieces of one face.
     """
     turned = np.flatnonzero(result.turned).tolist()
     if not turned:
         return
     # A new face may have the vertices of an old one that is not replaced yet, and Blender holds only one face there. So
     # all old faces are deleted first, and copies on vertices of their own keep the attributes meanwhile.
-    copies = bmesh.ops.duplicate(built, geom=[faces[row] for row in turned])["face_map"]
+    replaced = list(dict.fromkeys(faces[row] for row in turned))
+    copies = bmesh.ops.duplicate(built, geom=replaced)["face_map"]
     copies = [copies[faces[row]] for row in turned]
-    bmesh.ops.delete(built, geom=[faces[row] for row in turned], context="FACES_ONLY")
+    bmesh.ops.delete(built, geom=replaced, context="FACES_ONLY")
     built.verts.ensure_lookup_table()
     corners = result.vertex_source[result.triangles[turned]].tolist()
     for copy, vertices in zip(copies, corners):

@@ -18,7 +18,7 @@ class Decimated:
     vertex_map: np.ndarray
     vertex_source: np.ndarray
     triangle_source: np.ndarray
-    # (l,) bool: an edge was flipped, so that the triangle has other corners than its source triangle.
+    # (l,) bool: an edge was flipped or the source triangle divided, so that the triangle has other corners than it.
     turned: np.ndarray
     source_triangle: np.ndarray
     source_weights: np.ndarray
@@ -28,7 +28,9 @@ class Decimated:
     def of(cls, result, source):
         vertices, vertex_map, vertex_source = result.vertices, result.vertex_map, result.vertex_source
         welded = vertex_map[source.triangles[result.triangle_source]]
-        turned = (welded != result.triangles).any(1)
+        # A source triangle that was divided at T-junctions may have several pieces left, and none of them is that triangle.
+        pieces = np.bincount(result.triangle_source, minlength=len(source.triangles))[result.triangle_source]
+        turned = (welded != result.triangles).any(1) | (pieces > 1)
         # The decimation joins vertices at the same position. A face that is only a segment or a point may then name a
         # vertex twice, which Blender cannot hold: such a face keeps its own vertices.
         a, b, c = result.triangles.T

@@ -18,11 +18,11 @@ namespace {
 class Decimation {
  public:
   Decimation(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
-             const ToleranceVolume* volume, const DecimationOptions& options)
+             const ToleranceVolume* volume, const DecimationOptions& options, bool joins_t_junctions)
       : options_(options),
         // A baseline answers one question after another.
         team_(options.baseline ? 1 : std::min(thread_count(options.threads), kMostThreads)),
-        input_(vertices, triangles, space, volume, options, team_, result_) {}
+        input_(vertices, triangles, space, volume, options, joins_t_junctions, team_, result_) {}
 
   DecimationResult run() {
     BoundedMesh mesh(input_.take_mesh(), input_.bounds(), team_);
@@ -82,7 +82,10 @@ class Decimation {
 DecimationResult decimate(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                           const StoredSpace& space, const ToleranceVolume* volume, const DecimationOptions& options) {
   const Call call(options.progress);
-  return Decimation(vertices, triangles, space, volume, options).run();
+  DecimationResult result = Decimation(vertices, triangles, space, volume, options, true).run();
+  // Pieces of triangles that were divided at T-junctions may be left where hardly anything can collapse.
+  if (result.triangles.size() <= triangles.size()) return result;
+  return Decimation(vertices, triangles, space, volume, options, false).run();
 }
 
 }  // namespace tolvol

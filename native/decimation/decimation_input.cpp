@@ -9,7 +9,6 @@
 #include "base/errors.h"
 #include "check/input_checks.h"
 #include "decimation/input_facing.h"
-#include "topology/t_junctions.h"
 #include "topology/wedges.h"
 
 namespace tolvol {
@@ -46,16 +45,26 @@ void check(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> tri
 
 DecimationInput::DecimationInput(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                                  const StoredSpace& space, const ToleranceVolume* volume,
-                                 const DecimationOptions& options, Team& team, DecimationResult& report)
-    : vertices_(vertices), triangles_(triangles), volume_(volume), options_(options), space_(space), report_(report) {
+                                 const DecimationOptions& options, bool joins_t_junctions, Team& team,
+                                 DecimationResult& report)
+    : vertices_(vertices),
+      input_triangles_(triangles),
+      triangles_(triangles),
+      wedges_(options.wedges),
+      volume_(volume),
+      options_(options),
+      space_(space),
+      report_(report) {
   check(vertices, triangles, volume, options);
   space_ = space.in(volume ? volume->frame() : own_frame());
+  if (volume_ && !options_.baseline && input_begins_as_reference()) own_count_ = volume_->reference().triangles.size();
   cut_ = cut_to_manifold(vertices_, triangles_, team);
+  const bool has_t_junctions = join_t_junctions(joins_t_junctions, team);
   positions_.resize(cut_.vertex_input.size());
   for (std::size_t v = 0; v < positions_.size(); ++v) positions_[v] = space_.frame(vertices_[cut_.vertex_input[v]]);
   pin();
   hold_outside_cell();
-  pin_t_junctions(team);
+  if (has_t_junctions) pin_t_junctions(team);
   if (std::none_of(cut_.triangles.begin(), cut_.triangles.end(), [&](const glm::uvec3& t) {
         return glm::cross(positions_[t.y] - positions_[t.x], positions_[t.z] - positions_[t.x]) != glm::dvec3(0);
       })) {
@@ -96,16 +105,6 @@ void DecimationInput::hold_outside_cell() {
   }
 }
 
-/// Faces that meet in a T-junction share no edge along which they could be kept together while it moves.
-void DecimationInput::pin_t_junctions(Team& team) {
-  if (cut_.boundary.empty()) return;
-  TriangleMesh stored{std::vector<glm::dvec3>(cut_.vertex_input.size()), cut_.triangles};
-  for (std::size_t v = 0; v < stored.vertices.size(); ++v) stored.vertices[v] = vertices_[cut_.vertex_input[v]];
-  for (const std::uint32_t v : t_junctions(std::move(stored), cut_.boundary, space_.unit_roundoff(), team)) {
-    pin(v, "T-junction");
-  }
-}
-
 /// Calls visit(input vertex, vertex of the manifold) for all vertices that hold an input vertex: the one that it
 /// became, and those at its place in a face that stands in for a face that was dropped.
 template <class Visit>
@@ -140,8 +139,9 @@ void DecimationInput::pin_corners(std::uint32_t triangle, const std::string& cau
 
 bool DecimationInput::input_begins_as_reference() const {
   const TriangleMesh& reference = volume_->reference();
-  if (reference.vertices.size() != vertices_.size() || reference.triangles.size() > triangles_.size()) return false;
-  if (!std::equal(reference.triangles.begin(), reference.triangles.end(), triangles_.begin())) return false;
+  const std::span<const glm::uvec3> own = input_triangles_;
+  if (reference.vertices.size() != vertices_.size() || reference.triangles.size() > own.size()) return false;
+  if (!std::equal(reference.triangles.begin(), reference.triangles.end(), own.begin())) return false;
   for (std::size_t i = 0; i < vertices_.size(); ++i) {
     if (space_.frame(vertices_[i]) != reference.vertices[i]) return false;
   }
@@ -151,7 +151,7 @@ bool DecimationInput::input_begins_as_reference() const {
 /// Whether a triangle that is none of the reference has an open edge.
 bool DecimationInput::added_triangles_are_open() const {
   for (std::uint32_t side = 0; side < cut_.mates.size(); ++side) {
-    if (cut_.triangle_input[side / 3] >= own_count_ && cut_.mates[side] == kNone) return true;
+    if (parent(cut_.triangle_input[side / 3]) >= own_count_ && cut_.mates[side] == kNone) return true;
   }
   return false;
 }
@@ -170,8 +170,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   }
   const Certificate certificate(*volume_);
   report_.method = certificate.method(), report_.renderer = certificate.renderer();
-  if (input_begins_as_reference()) {
-    own_count_ = volume_->reference().triangles.size();
+  if (own_count_ > 0) {
     element_of_.assign(triangles_.size(), kNone);
     for (std::uint32_t t = 0; t < cut_.triangle_input.size(); ++t) element_of_[cut_.triangle_input[t]] = t;
   }
@@ -206,7 +205,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   std::vector<std::uint32_t> on_reference;
   if (own_count_ > 0) {
     on_reference = cut_.triangle_input;
-    for (std::uint32_t& t : on_reference) t = t < own_count_ ? t : kNone;
+    for (std::uint32_t& t : on_reference) t = is_of_reference(t) ? t : kNone;
   }
   certified_.emplace(directions, MeshView{cut_.triangles, positions_}, on_reference);
   if (facing_ && own_count_ < triangles_.size()) face(provable, mapping_error, team);
@@ -222,7 +221,7 @@ void DecimationInput::face(double provable, double mapping_error, Team& team) {
   } else {
     std::vector<std::uint32_t> added;
     for (std::uint32_t t = 0; t < cut_.triangle_input.size(); ++t) {
-      if (cut_.triangle_input[t] >= own_count_) added.push_back(t);
+      if (!is_of_reference(cut_.triangle_input[t])) added.push_back(t);
     }
     exceeding_ = keep_angles(cut_, positions_, start, *facing_, added, team, *certified_);
   }
@@ -233,8 +232,8 @@ void DecimationInput::face(double provable, double mapping_error, Team& team) {
 /// Proves the triangles that are none of the reference.
 void DecimationInput::certify_input(const Certificate& certificate) {
   std::vector<std::uint32_t> asked, indices;
-  for (auto i = static_cast<std::uint32_t>(own_count_); i < triangles_.size(); ++i) {
-    if (exempt_[i]) continue;
+  for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
+    if (is_of_reference(i) || exempt_[i]) continue;
     const glm::uvec3& t = triangles_[i];
     asked.push_back(i);
     indices.insert(indices.end(), {t.x, t.y, t.z});
@@ -242,11 +241,15 @@ void DecimationInput::certify_input(const Certificate& certificate) {
   if (asked.empty()) return;
   const std::vector<Verdict> verdicts =
       certificate.check({vertices_, space_, indices}, {options_.threads, options_.progress});
+  std::vector<bool> counted(input_triangles_.size(), false);
   for (std::size_t k = 0; k < asked.size(); ++k) {
     if (verdicts[k] == Verdict::inside) continue;
     const std::uint32_t i = asked[k];
     exempt_[i] = true;
-    if (report_.outside.faces++ == 0) report_.outside.first = i;
+    if (!counted[parent(i)]) {
+      if (report_.outside.faces++ == 0) report_.outside.first = parent(i);
+      counted[parent(i)] = true;
+    }
     pin_corners(i, "outside the tolerance");
   }
   if (report_.outside.faces && options_.outside == Outside::error) refuse_outside(report_.outside);
@@ -256,9 +259,11 @@ void DecimationInput::certify_input(const Certificate& certificate) {
 void DecimationInput::cover(double provable) {
   if (own_count_ > 0) {
     for (std::uint32_t i = 0; i < own_count_; ++i) {
+      if (!is_of_reference(i)) continue;
       const std::uint32_t element = element_of_[cut_.stand_in[i]];
       if (element != kNone) backward_->set_witness(element, i);  // what is set aside never changes and covers itself
     }
+    if (joined_) cover_divided(provable);
     return;
   }
   TriangleMesh elements{positions_, cut_.triangles};
@@ -296,6 +301,26 @@ void DecimationInput::hold_near(std::span<const Part> pieces, const TriangleMesh
   }
 }
 
+/// Finds the first witnesses for the triangles of the reference that were divided, among the pieces.
+void DecimationInput::cover_divided(double provable) {
+  TriangleMesh pieces{positions_, {}};
+  std::vector<std::uint32_t> ids, divided;
+  for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
+    if (!joined_->is_piece[i]) continue;
+    if (i < own_count_) divided.push_back(i);
+    const std::uint32_t element = element_of_[cut_.stand_in[i]];
+    if (element == kNone || parent(i) >= own_count_) continue;
+    pieces.triangles.push_back(cut_.triangles[element]);
+    ids.push_back(element);
+  }
+  const Coverage::Uncovered found = backward_->find_witnesses(divided, pieces, ids, provable, nullptr);
+  report_.uncovered = FaceCount::of(found.triangles);
+  if (report_.uncovered.faces) report_.warnings.push_back(take_uncovered(report_.uncovered, options_.outside));
+  for (const std::uint32_t t : found.nearest) {
+    for (int k = 0; k < 3; ++k) pin(pieces.triangles[t][k], "outside the tolerance");
+  }
+}
+
 std::vector<Corners> DecimationInput::faces_aside() const {
   std::vector<Corners> faces;
   faces.reserve(cut_.aside.size());
@@ -329,7 +354,7 @@ BoundedMeshInput DecimationInput::take_mesh() {
   }
   for (const CutCause cause : cut_.cause) input.joined.push_back(cause == CutCause::non_manifold);
   input.slots = slots;
-  if (!options_.wedges.empty()) {
+  if (!wedges_.empty()) {
     // Labels name wedges at one input vertex; vertices welded from several hold those of all of them.
     std::unordered_map<std::uint64_t, std::uint32_t> dense;
     for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
@@ -337,7 +362,7 @@ BoundedMeshInput DecimationInput::take_mesh() {
       for (int k = 0; k < 3; ++k) {
         const std::uint32_t corner = input_corner(t, k);
         const std::uint64_t key =
-            (static_cast<std::uint64_t>(triangles_[corner / 3][corner % 3]) << 32) | options_.wedges[corner];
+            (static_cast<std::uint64_t>(triangles_[corner / 3][corner % 3]) << 32) | wedges_[corner];
         wedges[k] = dense.try_emplace(key, static_cast<std::uint32_t>(dense.size())).first->second;
       }
       input.wedges.push_back(wedges);

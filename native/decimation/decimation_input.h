@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The input of a decimation, made ready: cut to a manifold, in the volume's frame, certified, with the vertices that
-/// must stay and the bounds that were asked for.
+/// The input of a decimation, made ready: joined where it has T-junctions, cut to a manifold, in the volume's frame,
+/// certified, with the vertices that must stay and the bounds that were asked for.
 #pragma once
 
 #include <cstdint>
@@ -19,6 +19,7 @@
 #include "decimation/bounded_mesh.h"
 #include "decimation/certified_bounds.h"
 #include "decimation/decimation.h"
+#include "topology/join_t_junctions.h"
 #include "topology/manifold_cut.h"
 #include "topology/new_crossings.h"
 
@@ -26,12 +27,12 @@ namespace tolvol {
 
 class DecimationInput {
  public:
-  /// Throws as decimate() does. Notes in `report` what it finds: locked vertices, faces outside, warnings and the
-  /// method. Keeps references to all but the team. About 0.7 us a triangle, and 2 us for each that has to be certified:
-  /// all of them, or those after the reference's if the input has the vertices of the reference and begins with its
-  /// triangles.
+  /// Throws as decimate() does. Unless `joins_t_junctions`, T-junctions are pinned instead. Notes in `report` what it
+  /// finds: locked vertices, faces outside, warnings and the method. Keeps references to all but the team. About 0.7 us
+  /// a triangle, and 2 us for each that has to be certified: all of them, or those after the reference's if the input
+  /// has the vertices of the reference and begins with its triangles.
   DecimationInput(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
-                  const ToleranceVolume* volume, const DecimationOptions& options, Team& team,
+                  const ToleranceVolume* volume, const DecimationOptions& options, bool joins_t_junctions, Team& team,
                   DecimationResult& report);
   DecimationInput(const DecimationInput&) = delete;
   DecimationInput& operator=(const DecimationInput&) = delete;
@@ -42,7 +43,16 @@ class DecimationInput {
   BoundedMeshInput take_mesh();
 
   std::span<const glm::dvec3> vertices() const { return vertices_; }
+  /// The triangles of the input. Those that were divided to join T-junctions have a piece in their place, and further
+  /// pieces at the end.
   std::span<const glm::uvec3> triangles() const { return triangles_; }
+  /// The triangle of the input that one of triangles() is, or is a piece of.
+  std::uint32_t parent(std::uint32_t triangle) const { return joined_ ? joined_->parent[triangle] : triangle; }
+  bool is_piece(std::uint32_t triangle) const { return joined_ && joined_->is_piece[triangle]; }
+  /// The barycentric weights of the corners of one of triangles() in its parent, a column for each corner.
+  glm::dmat3 weights_in_parent(std::uint32_t triangle) const;
+  /// The number of places at which vertices were put into edges and triangles.
+  std::size_t joined_count() const { return joined_ ? joined_->count : 0; }
   const CutMesh& cut() const { return cut_; }
   /// The positions of the cut mesh's vertices, in the frame.
   const std::vector<glm::dvec3>& positions() const { return positions_; }
@@ -63,11 +73,11 @@ class DecimationInput {
   const Hierarchy* own_hierarchy() const {
     return own_count_ > 0 && own_count_ == triangles_.size() ? &volume_->hierarchy() : nullptr;
   }
-  /// For each input triangle, its triangle in the cut mesh or CutMesh::kNone; empty unless the input has the vertices
+  /// For each of triangles(), its triangle in the cut mesh or CutMesh::kNone; empty unless the input has the vertices
   /// of the reference and begins with its triangles.
   const std::vector<std::uint32_t>& element_of() const { return element_of_; }
 
-  /// The input corner, as 3 * triangle + corner, of a corner of the cut mesh.
+  /// The corner of triangles(), as 3 * triangle + corner, of a corner of the cut mesh.
   std::uint32_t input_corner(std::uint32_t triangle, int corner) const {
     return 3 * cut_.triangle_input[triangle] + static_cast<std::uint32_t>(own_corner(triangle, corner));
   }
@@ -81,32 +91,43 @@ class DecimationInput {
   void pin();
   void hold_outside_cell();
   void hold_near(std::span<const Part> pieces, const TriangleMesh& elements, double provable);
+  TriangleMesh stored_cut() const;
+  bool join_t_junctions(bool may_divide, Team& team);
+  bool may_join(const TJunction& junction) const;
+  void label_joined_wedges();
   void pin_t_junctions(Team& team);
   template <class Visit>
   void for_holders(Visit&& visit) const;
   void pin(std::uint32_t vertex, const std::string& cause);
   void pin_corners(std::uint32_t triangle, const std::string& cause);
   bool input_begins_as_reference() const;
+  /// Whether triangle i of triangles() is triangle i of the reference.
+  bool is_of_reference(std::uint32_t i) const { return i < own_count_ && !is_piece(i); }
   bool added_triangles_are_open() const;
   Bounds* set_bounds(Team& team);
   void certify_input(const Certificate& certificate);
   void cover(double provable);
+  void cover_divided(double provable);
   void face(double provable, double mapping_error, Team& team);
 
   std::span<const glm::dvec3> vertices_;
-  std::span<const glm::uvec3> triangles_;
+  std::span<const glm::uvec3> input_triangles_;
+  std::span<const glm::uvec3> triangles_;  ///< of joined_, or those of the input
+  std::span<const std::uint32_t> wedges_;  ///< of the same
   const ToleranceVolume* volume_;
   const DecimationOptions& options_;
   StoredSpace space_;
   DecimationResult& report_;
 
+  std::optional<JoinedMesh> joined_;
+  std::vector<std::uint32_t> joined_wedges_;
   CutMesh cut_;
   std::vector<glm::dvec3> positions_;
   std::vector<glm::dvec3> stored_;
   std::vector<bool> pinned_;  ///< For each vertex of the cut mesh.
   std::vector<std::uint32_t> islands_;
   /// Triangle i of the input is triangle i of the reference below this number, which is 0 or that of all triangles of
-  /// the reference. All others were added, as to close holes.
+  /// the reference. All others were added, as to close holes. See is_of_reference() for pieces.
   std::size_t own_count_ = 0;
   std::vector<std::uint32_t> element_of_;
   std::optional<TriangleCertificate> forward_;
@@ -115,7 +136,7 @@ class DecimationInput {
   std::optional<FacingRule> facing_;
   std::optional<CertifiedBounds> certified_;
   std::vector<std::uint32_t> exceeding_;
-  std::vector<bool> exempt_;  ///< For each input triangle: it is outside, or stands still outside of the cell.
+  std::vector<bool> exempt_;  ///< For each of triangles(): it is outside, or stands still outside of the cell.
   Bounds* bounds_ = nullptr;
 };
 

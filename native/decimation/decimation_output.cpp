@@ -35,7 +35,7 @@ class Output {
       if (chosen[same] == kNone) chosen[same] = same_.find(copy) == same ? copy : survivor;
       return chosen[same];
     };
-    // This is corner k of a result triangle, in the order of the input triangle that it continues.
+    // This is corner k of a result triangle, in the order of the triangle that it continues.
     const auto corner = [&](std::uint32_t input, std::uint32_t t, int k) {
       return slot(t == kNone ? cut_.input_vertex[input_.triangles()[input][k]]
                              : mesh_.triangle(t)[input_.own_corner(t, k)]);
@@ -43,12 +43,12 @@ class Output {
     const auto use = [&](std::uint32_t s) {
       if (used[s] == kNone) used[s] = 0, order.push_back(s);
     };
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> kept;  // (input triangle, triangle of the cut mesh or kNone)
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> kept;  // (of input_.triangles(), of the cut mesh or kNone)
     for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
       if (mesh_.alive(t)) kept.emplace_back(cut_.triangle_input[t], t);
     }
     for (const std::uint32_t i : cut_.aside) kept.emplace_back(i, kNone);
-    std::sort(kept.begin(), kept.end());
+    std::ranges::sort(kept, {}, [&](const auto& k) { return std::pair(input_.parent(k.first), k.first); });
     for (const auto& [input, t] : kept) {
       poll_at(order.size());
       for (int k = 0; k < 3; ++k) use(corner(input, t, k));
@@ -66,7 +66,7 @@ class Output {
       glm::uvec3 triangle;
       for (int k = 0; k < 3; ++k) triangle[k] = used[corner(input, t, k)];
       result_.triangles.push_back(triangle);
-      result_.triangle_source.push_back(input);
+      result_.triangle_source.push_back(input_.parent(input));
       kept_.push_back(t);
     }
     result_.vertex_map.assign(input_.vertices().size(), -1);
@@ -97,10 +97,13 @@ class Output {
         const int corner = input_.own_corner(t, k);
         const std::uint32_t v = mesh_.triangle(t)[corner];
         if (!mesh_.left_original(v)) {
-          const std::uint32_t source = islands.empty() ? any_corner[v] : mesh_.corner_source(t, corner);
+          const bool is_own = input_.is_piece(cut_.triangle_input[t]) && cut_.triangles[t][corner] == v;
+          const std::uint32_t source = !islands.empty() ? mesh_.corner_source(t, corner)
+                                       : is_own         ? 3 * t + static_cast<std::uint32_t>(corner)
+                                                        : any_corner[v];
           const std::uint32_t original = input_.input_corner(source / 3, static_cast<int>(source % 3));
-          triangle[k] = original / 3;
-          weights[k] = unit[static_cast<int>(original % 3)];
+          triangle[k] = input_.parent(original / 3);
+          weights[k] = input_.weights_in_parent(original / 3)[static_cast<int>(original % 3)];
           continue;
         }
         const auto same_island = [&](std::uint32_t other) { return islands.empty() || islands[other] == islands[t]; };
@@ -115,9 +118,11 @@ class Output {
         }
         if (!own) own.emplace(input);
         const Hierarchy::Nearest nearest = own->nearest_if(p, same_island);
-        triangle[k] = cut_.triangle_input[nearest.triangle];
-        weights[k] = nearest.weights;
-        if (cut_.reversed[nearest.triangle]) std::swap(weights[k].y, weights[k].z);
+        const std::uint32_t source = cut_.triangle_input[nearest.triangle];
+        glm::dvec3 own = nearest.weights;
+        if (cut_.reversed[nearest.triangle]) std::swap(own.y, own.z);
+        triangle[k] = input_.parent(source);
+        weights[k] = input_.weights_in_parent(source) * own;
       }
       result_.source_triangle.push_back(triangle);
       result_.source_weights.push_back(weights);
@@ -131,6 +136,7 @@ class Output {
     repair(cut_.duplicates, "duplicate", "exact duplicate faces dropped");
     repair(cut_.degenerate_on_edge, "degenerate", "degenerate faces on an edge of another face dropped");
     repair(cut_.aside.size(), "kept_degenerate", "degenerate faces kept as they are");
+    repair(input_.joined_count(), "T-junction", "vertices put into the edges and faces that they lie on");
     repair(cut_.welded, "welded", "vertices at exactly the position of another stay with it");
     repair(cut_.cut_edges, "cut", "non-manifold edges, which collapse along themselves alone");
     repair(cut_.reversed_count, "misoriented", "faces against their neighbours' orientation, kept so");

@@ -180,7 +180,7 @@ void bind_decimation(py::module_& module) {
                     R"doc((l,) int32: the input triangle that each result triangle continues.
 
 The corners of a result triangle are vertex_map of the corners of that input triangle, in order, unless edges around it
-were flipped.)doc")
+were flipped, or the triangle was divided where vertices lie on it (a T-junction).)doc")
       .def_readonly("source_triangle", &Result::source_triangle,
                     "(l, 3) int32: for each corner of the result the input triangle that its attributes are read from.")
       .def_readonly("source_weights", &Result::source_weights,
@@ -191,7 +191,8 @@ triangles_in, triangles_out : the number of triangles before and after
 seconds : the time that the call took
 stopped_by : "tolerance", "target", "time" or "request"
 method, renderer : which check was used, and what computed it
-repairs : a list of dicts with `kind`, `count` and `message`
+repairs : a list of dicts with `kind`, `count` and `message`; the kind "T-junction" counts vertices that were put into the
+    edges and faces that they lie on, so that the faces that meet there go on to meet
 locked : a dict from a cause to the number of vertices that could not move
 outside : a dict of `faces`, the number of input faces that were outside and were kept, `first`, the first of them, and
     `reference_faces`, the number of reference faces that were beyond the tolerance of the input

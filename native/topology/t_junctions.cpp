@@ -10,14 +10,17 @@
 #include "base/union_find.h"
 #include "geometry/closest_point.h"
 #include "geometry/hierarchy.h"
+#include "topology/face_tree.h"
 
 namespace tolvol {
 namespace {
 
-constexpr double kUnits = 4;
 /// The rounding of vertices that are so many times farther from the origin than the others does not count.
 constexpr double kFar = 8;
 constexpr std::size_t kBlock = 256;
+/// Open edges from a place where more vertices are than this are not compared with other edges: the triangles there are
+/// in the way of each other.
+constexpr std::uint32_t kCrowd = 100;
 
 double largest(const glm::dvec3& p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
 
@@ -25,9 +28,9 @@ bool before(const glm::dvec3& a, const glm::dvec3& b) {
   return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
-class TJunctions {
+class Finder {
  public:
-  TJunctions(TriangleMesh mesh, std::span<const glm::uvec2> open, double unit) : mesh_(std::move(mesh)), unit_(unit) {
+  Finder(TriangleMesh mesh, std::span<const glm::uvec2> open, double unit) : mesh_(std::move(mesh)), unit_(unit) {
     double farthest = 0;
     for (const glm::dvec3& p : mesh_.vertices) farthest = std::max(farthest, largest(p));
     // Squares of coordinates stay within double in a mesh of a size of about 1.
@@ -58,15 +61,14 @@ class TJunctions {
     std::ranges::stable_sort(around_, {}, &Around::first);
   }
 
-  /// The places of what holds the T-junctions together.
-  std::vector<glm::dvec3> places(Team& team) const {
+  TJunctions find(Team& team) const {
     std::vector<std::uint32_t> ends;
     for (const auto& [vertex, triangle] : around_) {
       if (ends.empty() || ends.back() != vertex) ends.push_back(vertex);
     }
     const std::vector<std::size_t> starts = sort_by_place(ends);
     const Hierarchy hierarchy(mesh_);
-    std::vector<std::vector<glm::dvec3>> found((starts.size() + kBlock - 1) / kBlock);
+    std::vector<std::vector<TJunction>> found((starts.size() + kBlock - 1) / kBlock);
     team.run(starts.size() - 1, kBlock, [&](std::size_t begin, std::size_t end) {
       std::vector<std::uint32_t> near;
       for (std::size_t i = begin; i < end; ++i) {
@@ -74,16 +76,24 @@ class TJunctions {
         for (std::size_t k = starts[i]; k < starts[i + 1]; ++k) add(ends[k], near, found[begin / kBlock]);
       }
     });
-    std::vector<glm::dvec3> result;
-    for (const std::vector<glm::dvec3>& f : found) result.insert(result.end(), f.begin(), f.end());
-    add_on_open_edges(team, result);
+    TJunctions result;
+    for (const std::vector<TJunction>& f : found) {
+      result.vertices.insert(result.vertices.end(), f.begin(), f.end());
+    }
+    add_on_open_edges(team, result.vertices);
+    add_across(team, result);
     return result;
   }
 
-  /// The vertices at these places.
-  std::vector<std::uint32_t> at(std::vector<glm::dvec3> places) const {
+  /// The vertices at the places of what holds these together.
+  std::vector<std::uint32_t> holding(const TJunctions& junctions) const {
     std::vector<std::uint32_t> result;
-    if (places.empty()) return result;
+    if (junctions.empty()) return result;
+    std::vector<glm::dvec3> places;
+    for (const auto& [vertex, on] : junctions.vertices) {
+      places.insert(places.end(), {place(vertex), place(on.x), place(on.y), place(on.z)});
+    }
+    for (const std::uint32_t v : junctions.across) places.push_back(place(v));
     std::ranges::sort(places, before);
     for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
       poll_at(v);
@@ -105,11 +115,11 @@ class TJunctions {
   const glm::dvec3& place(std::uint32_t vertex) const { return mesh_.vertices[vertex]; }
 
   /// No vertex farther than this is on anything, whatever else the mesh has far away.
-  double most_reach(const glm::dvec3& p) const { return kUnits * unit_ * kFar * std::max(usual_, largest(p)); }
+  double most_reach(const glm::dvec3& p) const { return kTJunctionUnits * unit_ * kFar * std::max(usual_, largest(p)); }
   /// How far rounding may have put `p` from what has these corners.
   double reach(const glm::dvec3& p, const glm::uvec3& t) const {
     const double size = std::max({largest(p), largest(place(t.x)), largest(place(t.y)), largest(place(t.z))});
-    return std::min(kUnits * unit_ * size, most_reach(p));
+    return std::min(kTJunctionUnits * unit_ * size, most_reach(p));
   }
 
   /// Whether `p` lies between the ends, and not where one of them may have been before rounding.
@@ -172,8 +182,8 @@ class TJunctions {
     });
   }
 
-  /// Adds the places of the T-junctions of a vertex with the triangles near it.
-  void add(std::uint32_t vertex, std::span<const std::uint32_t> near, std::vector<glm::dvec3>& places) const {
+  /// Adds the T-junctions of a vertex with the triangles near it.
+  void add(std::uint32_t vertex, std::span<const std::uint32_t> near, std::vector<TJunction>& junctions) const {
     const glm::dvec3& p = place(vertex);
     std::vector<Contact> contacts;
     for (std::size_t i = 0; i < near.size(); ++i) {
@@ -186,7 +196,7 @@ class TJunctions {
         if (touches) contacts.push_back({std::minmax(a, b), lies_in_plane(vertex, t, around_)});
       }
       if (touches || !lies_inside(p, t) || lies_in_plane(vertex, t, around_)) continue;
-      places.insert(places.end(), {p, place(t.x), place(t.y), place(t.z)});
+      junctions.push_back({vertex, t});
     }
     // The sides on one edge stand together, and those in whose plane the faces lie are first.
     std::ranges::sort(contacts, std::greater<>(), [](const Contact& c) { return std::pair(c.edge, c.in_plane); });
@@ -194,7 +204,7 @@ class TJunctions {
       const auto& [edge, lies_upon_a_face] = contacts[i];
       if ((i > 0 && contacts[i - 1].edge == edge) || is_joined(vertex, edge)) continue;
       const bool is_open = std::ranges::binary_search(open_, edge);
-      if (is_open || !lies_upon_a_face) places.insert(places.end(), {p, place(edge.first), place(edge.second)});
+      if (is_open || !lies_upon_a_face) junctions.push_back({vertex, {edge.first, edge.second, edge.second}});
     }
   }
 
@@ -205,8 +215,8 @@ class TJunctions {
     Edge edge;
   };
 
-  /// Adds the places of vertices at no open edge that lie on one, and of its ends.
-  void add_on_open_edges(Team& team, std::vector<glm::dvec3>& places) const {
+  /// Adds the T-junctions of vertices at no open edge that lie on one.
+  void add_on_open_edges(Team& team, std::vector<TJunction>& junctions) const {
     const auto is_open = [&](std::uint32_t a, std::uint32_t b) {
       return is_end_[a] && is_end_[b] && std::ranges::binary_search(open_, Edge(std::minmax(a, b)));
     };
@@ -254,9 +264,97 @@ class TJunctions {
     for (const auto& block : found) {
       for (const OnOpenEdge& f : block) {
         if (lies_in_plane(f.vertex, f.triangle, around)) continue;
-        places.insert(places.end(), {place(f.vertex), place(f.edge.first), place(f.edge.second)});
+        junctions.push_back({f.vertex, {f.edge.first, f.edge.second, f.edge.second}});
       }
     }
+  }
+
+  /// Adds open edges that lie across other edges. Faces without a vertex on the edge meet it there.
+  void add_across(Team& team, TJunctions& junctions) const {
+    const std::vector<std::uint32_t> first = weld_equal_positions(mesh_.vertices);
+    std::vector<std::uint32_t> touching(first.size(),
+                                        0);  // by the first vertex at each place: vertices that it touches
+    for (std::uint32_t v = 0; v < first.size(); ++v) touching[first[v]] += first[v] != v;
+    for (const TJunction& j : junctions.vertices) ++touching[first[j.vertex]];
+    std::vector<Around> edges;  // by the number among the open edges: the triangle at it
+    for (std::uint32_t i = 0; i < open_.size(); ++i) {
+      const std::uint32_t a = open_[i].first, b = open_[i].second;
+      const std::uint32_t at_a = touching[first[a]], at_b = touching[first[b]];
+      if (at_a == 0 || at_b == 0 || std::max(at_a, at_b) > kCrowd) continue;
+      auto face = std::ranges::lower_bound(around_, a, {}, &Around::first);
+      for (; face != around_.end() && face->first == a; ++face) {
+        const glm::uvec3& t = face->second;
+        if (t.x == b || t.y == b || t.z == b) edges.emplace_back(i, t);
+      }
+    }
+    if (edges.empty()) return;
+    std::vector<std::uint32_t> all(mesh_.triangles.size());
+    std::vector<Box> boxes(all.size());
+    for (std::uint32_t i = 0; i < all.size(); ++i) {
+      all[i] = i;
+      for (int k = 0; k < 3; ++k) boxes[i].add(place(mesh_.triangles[i][k]));
+    }
+    const FaceTree tree(all, boxes, team);
+    std::vector<std::vector<std::uint32_t>> found((edges.size() + kBlock - 1) / kBlock);
+    team.run(edges.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const auto& [a, b] = open_[edges[i].first];
+        const double most = std::min(most_reach(place(a)), most_reach(place(b)));
+        const auto may = [&](const Box& box) { return meets(place(a), place(b), box, most); };
+        tree.for_each_where(may, [&](std::uint32_t t) { add_across(a, b, edges[i].second, t, found[begin / kBlock]); });
+      }
+    });
+    for (const std::vector<std::uint32_t>& f : found) {
+      junctions.across.insert(junctions.across.end(), f.begin(), f.end());
+    }
+  }
+
+  /// Adds the ends of the edge (a, b) of a face and of an edge of another triangle that it lies across.
+  void add_across(std::uint32_t a, std::uint32_t b, const glm::uvec3& face, std::uint32_t triangle,
+                  std::vector<std::uint32_t>& across) const {
+    poll();
+    const glm::uvec3& t = mesh_.triangles[triangle];
+    for (int k = 0; k < 3; ++k) {
+      if (!crosses(a, b, t[k], t[(k + 1) % 3])) continue;
+      const glm::dvec3 normal = glm::cross(place(t.y) - place(t.x), place(t.z) - place(t.x));
+      bool is_in_plane = true;
+      for (int c = 0; c < 3; ++c) {
+        const double height = std::abs(glm::dot(normal, place(face[c]) - place(t.x)));
+        is_in_plane = is_in_plane && height <= reach(place(face[c]), t) * glm::length(normal);
+      }
+      if (!is_in_plane) across.insert(across.end(), {a, b, t[k], t[(k + 1) % 3]});
+    }
+  }
+
+  /// Whether two edges meet between the ends of both.
+  bool crosses(std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t d) const {
+    const glm::dvec3 along = place(b) - place(a), other = place(d) - place(c), between = place(c) - place(a);
+    const glm::dvec3 normal = glm::cross(along, other);
+    const double square = glm::dot(normal, normal);
+    if (!(square > 0)) return false;
+    const double s = glm::dot(glm::cross(between, other), normal) / square;
+    const double t = glm::dot(glm::cross(between, along), normal) / square;
+    if (!(s > 0 && s < 1 && t > 0 && t < 1)) return false;
+    const glm::dvec3 p = place(a) + s * along, q = place(c) + t * other;
+    const double room = std::min(reach(place(a), {b, c, d}), most_reach(place(c)));
+    return glm::length(p - q) <= room && std::min({glm::length(p - place(a)), glm::length(p - place(b)),
+                                                   glm::length(q - place(c)), glm::length(q - place(d))}) > room;
+  }
+
+  /// Whether a segment meets a box that is larger by `room` on all sides, which is true of every box around such a box.
+  static bool meets(const glm::dvec3& a, const glm::dvec3& b, const Box& box, double room) {
+    if (box.empty()) return false;
+    double from = 0, to = 1;
+    for (int k = 0; k < 3; ++k) {
+      const double lower = box.lower[k] - room - a[k], upper = box.upper[k] + room - a[k], way = b[k] - a[k];
+      if (way == 0) {
+        if (lower > 0 || upper < 0) return false;
+        continue;
+      }
+      from = std::max(from, std::min(lower / way, upper / way));
+      to = std::min(to, std::max(lower / way, upper / way));
+    }
+    return from <= to;
   }
 
   /// Whether `p`, which lies on none of its edges, lies in a triangle and at none of its corners.
@@ -278,10 +376,15 @@ class TJunctions {
 
 }  // namespace
 
+TJunctions find_t_junctions(TriangleMesh mesh, std::span<const glm::uvec2> open, double unit, Team& team) {
+  if (open.empty()) return {};
+  return Finder(std::move(mesh), open, unit).find(team);
+}
+
 std::vector<std::uint32_t> t_junctions(TriangleMesh mesh, std::span<const glm::uvec2> open, double unit, Team& team) {
   if (open.empty()) return {};
-  const TJunctions junctions(std::move(mesh), open, unit);
-  return junctions.at(junctions.places(team));
+  const Finder finder(std::move(mesh), open, unit);
+  return finder.holding(finder.find(team));
 }
 
 }  // namespace tolvol

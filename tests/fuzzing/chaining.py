@@ -4,6 +4,8 @@
 import numpy as np
 import tolvol
 
+import judge
+
 from . import judges
 from .moving import draw_deform
 from .parts import lattice_of
@@ -52,6 +54,6 @@ def chain(run):
         if both_ways:
             judges.within(run, reference, (case.world(vertices), triangles), case.tolerance, f"reference to {step}")
         if decimates:
-            judges.connected_alike(run, before, (vertices, triangles))
+            judges.connected_alike(run, before, (vertices, triangles), judge.joins_t_junctions(result))
         else:
             judges.uncrossed(run, before[0], vertices, triangles)

@@ -4,6 +4,8 @@
 import numpy as np
 import tolvol
 
+import judge
+
 from . import judges
 from .case import Finding
 from .decimating import RESULT
@@ -74,7 +76,8 @@ def close_holes(run):
     placed = case.world(result.vertices), result.triangles
     judges.within(run, placed, reference, case.tolerance, "decimated to reference")
     judges.within(run, reference, placed, case.tolerance, "reference to decimated")
-    judges.connected_alike(run, (case.vertices, closed.triangles), (result.vertices, result.triangles))
+    joins = judge.joins_t_junctions(result)
+    judges.connected_alike(run, (case.vertices, closed.triangles), (result.vertices, result.triangles), joins)
 
 
 def _judge(run, closed, given):

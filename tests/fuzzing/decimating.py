@@ -130,8 +130,9 @@ def _judge_decimation(run, result, vertices, triangles, volume, given, side):
     if vertices is case.vertices:
         angle = given.get("max_normal_angle", 90)
         judges.angles_kept(run, after, before, report, angle)
-    judges.connected_alike(run, before, after)
-    if not given["two_sided"] and vertices is case.vertices:
+    joins = judge.joins_t_junctions(result)
+    judges.connected_alike(run, before, after, joins)
+    if not given["two_sided"] and vertices is case.vertices and not joins:
         judges.rims_alike(run, reference, (placed, result.triangles), case.tolerance)
 
 

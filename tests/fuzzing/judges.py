@@ -225,18 +225,21 @@ def _components(faces):
     return meshes.component_count(np.arange(len(edges))[:, None], side_edge.reshape(-1, 3))
 
 
-def connected_alike(run, before, after):
+def connected_alike(run, before, after, joins=False):
     """Requires of the welded meshes that the result has no new edges of more than two faces, and that no component was lost
-    or joined to another one."""
+    or joined to another one.
+
+    joins: whether T-junctions were joined. Then sheets that met there may be one component and share edges.
+    """
     faces, (new_places, new_faces) = proper_faces(*before)[1], proper_faces(*after)
     had = (edge_counts(faces)[1] > 2).sum()
     edges, count = edge_counts(new_faces)
-    if (count > 2).sum() > had:
+    if (count > 2).sum() > had and not joins:
         a, b = new_places[edges[count > 2][0]]
         raise Finding("non-manifold", f"{(count > 2).sum()} edges have more than two faces, {had} had: {a} to {b}")
     components, left = _components(faces), _components(new_faces)
     # Where more than two faces meet, some of them may be sheets that only touch and may move apart.
-    if left < components or (left > components and not had):
+    if (left < components and not joins) or (left > components and not had):
         raise Finding("components", f"{components} components became {left}")
 
 

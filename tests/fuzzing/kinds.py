@@ -194,6 +194,22 @@ def furniture(rng, n):
     return welded(np.round(vertices, 9) * rng.uniform(0.2, 1, 3), triangles)
 
 
+def t_junctions(rng, n):
+    """Walls of a lattice as in furniture, but each of other squares, so that they meet along edges without common vertices."""
+    cells = int(rng.integers(1, 3))
+    walls = [(axis, *p) for axis in range(3) for p in np.ndindex(*np.where(np.arange(3) == axis, cells + 1, cells))]
+    walls = [wall for wall in walls if rng.random() < 0.6] or walls
+    boards = []
+    for axis, *place in walls:
+        m = int(max(1, np.sqrt(n / 2 / len(walls)) * rng.uniform(0.5, 2)))
+        flat, triangles = meshes.plate(m + 1)
+        board = np.roll(flat, axis + 1, axis=1)
+        shift = rng.choice([0, 0, 0.5, 0.3]) * (np.arange(3) != axis)  # or on the inside of others
+        boards.append((np.round(board, 12) + place + shift * (rng.random() < 0.3), triangles))
+    vertices, triangles = meshes.join(*boards)
+    return np.round(vertices, 9) * rng.uniform(0.2, 1, 3), triangles
+
+
 def moebius(rng, n):
     columns, rows = _grid(rng, n)
     u, v = np.meshgrid(np.arange(columns) * 2 * np.pi / columns, np.linspace(-0.4, 0.4, rows))
@@ -302,6 +318,7 @@ KINDS = {
         random_soup,
         tangle,
         furniture,
+        t_junctions,
         moebius,
         misoriented,
         duplicated,

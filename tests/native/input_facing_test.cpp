@@ -34,7 +34,8 @@ TEST(InputFacing, AFaceKeepsTheLeastAngleThatIsProved) {
   options.two_sided = false, options.max_normal_angle = 10;
   Team team(1);
   DecimationResult report;
-  const DecimationInput input(plate.vertices, plate.triangles, candidates::kIdentity, &volume, options, team, report);
+  const DecimationInput input(plate.vertices, plate.triangles, candidates::kIdentity, &volume, options, true, team,
+                              report);
   EXPECT_EQ(input.exceeding().size(), plate.triangles.size());
   for (std::uint32_t t = 0; t < plate.triangles.size(); ++t) {
     const double kept = glm::degrees(input.bounds()->certified()->rule(t).limit);

@@ -89,6 +89,17 @@ def join(*meshes):
     return np.concatenate(vertices), np.concatenate(triangles).astype(np.int32)
 
 
+def sheets_with_t_junctions(n=8):
+    """Returns a plate of n x n squares, one of 2 n x 2 n beside it, and a wall of other squares that stands on the edge where
+    they meet: the sheets share hardly a vertex."""
+    coarse, fine, wall = plate(n + 1), plate(2 * n + 1), plate(3 * n // 2 + 1)
+    (a, _), (b, _), (c, _) = coarse, fine, wall
+    c = np.stack([0 * c[:, 0], c[:, 1], c[:, 0]], 1)
+    vertices, triangles = join((a - [1, 0, 0], coarse[1]), (b, fine[1]), (c, wall[1]))
+    vertices[:, 2] += 0.05 * np.sin(4 * vertices[:, 0])
+    return vertices, triangles, np.repeat([0, 1, 2], [len(coarse[1]), len(fine[1]), len(wall[1])])
+
+
 def soup(vertices, triangles):
     """Returns the same surface with three separate vertices for every triangle, like an STL file."""
     return vertices[triangles.ravel()], np.arange(triangles.size, dtype=np.int32).reshape(-1, 3)
