@@ -19,19 +19,19 @@ import meshes
 from commands import ENVIRONMENT, assert_within, command, read, refused, scan, succeeded, words, write
 
 TOLERANCE = 0.02
-SMALL = f"{plan.FIXED + 1200 * plan.OF_FIRST}"  # bytes, for about a thousand triangles in a cell
+SMALL = f"{plan.FIXED + 800 * plan.OF_FIRST}"  # bytes, for at most 800 triangles in a cell
 
 
 @pytest.fixture
 def torus(tmp_path):
-    return scan(tmp_path / "scan.ply", columns=96, rows=48)
+    return scan(tmp_path / "scan.ply", columns=64, rows=32)
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """The bytes of an uninterrupted run."""
     folder = tmp_path_factory.mktemp("whole")
-    succeeded(decimate(scan(folder / "scan.ply", columns=96, rows=48), folder / "whole.ply", "--threads", "3"))
+    succeeded(decimate(scan(folder / "scan.ply", columns=64, rows=32), folder / "whole.ply", "--threads", "3"))
     return (folder / "whole.ply").read_bytes()
 
 
@@ -46,9 +46,9 @@ def test_the_file_is_within_and_the_report_tells_the_rounds(torus, tmp_path):
     assert_within(out, torus, TOLERANCE)
     run, mesh = json.loads(report.read_text()), read(out)
     assert int(match[2].replace(",", "")) == len(mesh.triangles) == run["output"]["triangles"]
-    assert run["input"] == {"file": str(torus), "triangles": 9216}
+    assert run["input"] == {"file": str(torus), "triangles": 4096}
     cells, counts = zip(*((each["cells"], each["triangles"]) for each in run["rounds"]))
-    assert cells[0] >= 8 and len(cells) >= 3 and counts[-1] == len(mesh.triangles)
+    assert cells[0] >= 6 and len(cells) >= 3 and counts[-1] == len(mesh.triangles)
     assert list(counts) == sorted(counts, reverse=True) and counts[0] > 2 * counts[-1]
     assert run["solidity"]["after"]["closed"] and run["solidity"]["after"]["crossing_pairs"] == 0
     assert run["forward"][1] <= TOLERANCE and run["backward"][1] <= TOLERANCE
@@ -58,8 +58,8 @@ def test_the_file_is_within_and_the_report_tells_the_rounds(torus, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.ply", "report.json", "scan.ply"]
 
 
-def test_enough_memory_is_one_round_and_thorough_leaves_fewer(torus, tmp_path):
-    found = {}
+def test_enough_memory_is_one_round_and_thorough_leaves_fewer(tmp_path):
+    torus, found = scan(tmp_path / "scan.ply", columns=32, rows=16), {}
     for name, extra in {"fast": [], "thorough": ["--effort", "thorough"], "subset": ["--placement", "subset"]}.items():
         out, report = tmp_path / f"{name}.ply", tmp_path / f"{name}.json"
         succeeded(decimate(torus, out, "--report", report, *extra, memory="1GB"))
@@ -99,7 +99,7 @@ def interrupted(torus, out, step, *extra):
     return folder
 
 
-@pytest.mark.parametrize("step", ["run", "round0_00003", "round2_00000", "measured_00001"])
+@pytest.mark.parametrize("step", ["run", "round0_00003", "measured_00001"])
 def test_a_killed_run_goes_on_to_the_same_bytes_on_any_number_of_threads(torus, tmp_path, whole, step):
     out = tmp_path / "out.ply"
     folder = interrupted(torus, out, step, "--threads", "1")
@@ -111,7 +111,7 @@ def test_only_the_same_run_goes_on(torus, tmp_path):
     out = tmp_path / "out.ply"
     folder = interrupted(torus, out, "round0_00001")
     refused(decimate(torus, out), folder, "go on with --resume, or remove the folder")
-    larger = str(int(SMALL) + 1000 * plan.OF_FIRST)
+    larger = str(int(SMALL) + 500 * plan.OF_FIRST)
     refused(decimate(torus, out, "--resume", memory=larger), "--memory was", "run again as before", folder)
     refused(decimate(torus, out, "--resume", "--effort", "thorough"), "--effort was fast and is thorough now")
     os.utime(torus, (1, 1))
@@ -184,11 +184,11 @@ def test_a_full_disk_is_said_and_the_run_goes_on_with_more_space(torus, tmp_path
 
 def test_too_small_a_disk_is_refused_before_any_work(torus, tmp_path, monkeypatch):
     usage = shutil.disk_usage(tmp_path)
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=900_000))
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=400_000))
     options = main.parser().parse(
         ["decimate", str(torus), str(tmp_path / "out.ply"), "--tolerance", "1%", "--memory", SMALL]
     )
-    with pytest.raises(Stop, match="the disk has 0.9 MB free, and 1.0 MB may be needed; choose a folder on another"):
+    with pytest.raises(Stop, match="the disk has 0.4 MB free, and 0.4 MB may be needed; choose a folder on another"):
         large.decimate(options)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["scan.ply"]
 

@@ -12,12 +12,12 @@ from tolvol.tiles import plan
 
 from commands import ENVIRONMENT, command, refused, scan, succeeded, words
 
-SMALL = f"{plan.FIXED + 1200 * plan.OF_FIRST}"  # bytes, for about a thousand triangles in a cell
+SMALL = f"{plan.FIXED + 800 * plan.OF_FIRST}"  # bytes, for at most 800 triangles in a cell
 
 
 @pytest.fixture(scope="module")
 def torus(tmp_path_factory):
-    return scan(tmp_path_factory.mktemp("scan") / "scan.ply", columns=96, rows=48)
+    return scan(tmp_path_factory.mktemp("scan") / "scan.ply", columns=64, rows=32)
 
 
 @pytest.fixture(scope="module")

@@ -71,8 +71,12 @@ TEST(MovingMesh, WhatIsKeptOfARefusalChangesNoAnswer) {
       MovingMesh::Blame none;
       const bool expected = face.lift(height, none);
       EXPECT_EQ(face.lift(height, blame), expected) << height;
-      if (height > 0.9) EXPECT_FALSE(expected);
-      if (height < 0.1) EXPECT_TRUE(expected);
+      if (height > 0.9) {
+        EXPECT_FALSE(expected);
+      }
+      if (height < 0.1) {
+        EXPECT_TRUE(expected);
+      }
     }
     EXPECT_FALSE(std::isnan(blame.weights.x));
   }
