@@ -45,8 +45,8 @@ EVERYWHERE = Box((-math.inf,) * 3, (math.inf,) * 3)
 class Cells:
     """`count` cells that hold about as many of some points, (k, 3), each; fewer where many points lie on each other.
 
-    Each cut is across a long axis of the points. `turn` chooses the axis, and how many of the cells are below the cut, so that the
-    sides of the cells of several turns lie apart. O(k log count).
+    Each cut is across a long axis of the points. `turn` chooses the axis, and how many of the cells are below the cut, so that
+    the sides of the cells of several turns lie apart. O(k log count).
     """
 
     def __init__(self, points, count, turn=0):
