@@ -135,6 +135,32 @@ def test_the_parts_of_triangles_in_all_cells_are_the_triangles():
     assert found.lower <= clipping.rounding(corners) < 1e-12
 
 
+def test_no_point_of_a_triangle_that_lies_in_a_side_but_for_rounding_is_missed():
+    random = np.random.default_rng(3)
+    at, far = 0.3, np.inf
+    missed = 0
+    for _ in range(100):
+        heights = at + np.spacing(at) * random.integers(-3, 4, 3)
+        corners = np.column_stack([random.uniform(-2, 2, (3, 2)), heights])[None]
+        below, above = random.uniform(-1, 1, 2)
+        boxes = [
+            Box((-far, -far, -far), (below, far, at)),
+            Box((below, -far, -far), (far, far, at)),
+            Box((-far, -far, at), (above, far, far)),
+            Box((above, -far, at), (far, far, far)),
+        ]
+        for margin in (0, clipping.rounding(corners)):
+            part = np.concatenate([clipping.clipped(corners, box.grown(margin)) for box in boxes])
+            found = tolvol.directed_hausdorff(
+                corners[0], np.array([(0, 1, 2)]), part.reshape(-1, 3), np.arange(3 * len(part)).reshape(-1, 3)
+            )
+            if margin:
+                assert found.lower <= margin
+            else:
+                missed += found.lower > 0.01
+    assert missed, "without the margin some points are missed"
+
+
 # Soups ----------------------------------------------------------------------------------------------------------------
 
 

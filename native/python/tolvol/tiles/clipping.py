@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cuts triangles along the sides of a box."""
+"""Cuts triangles along the sides of a box.
+
+A cut rounds, and the next cut is of the rounded parts. Where a triangle lies in a side of two cells but for rounding, the parts in
+both cells may miss the same points of it. So what is to miss nothing is clipped by boxes that are larger by rounding().
+"""
 
 import numpy as np
 
 
 def clipped(corners, box):
-    """Returns triangles, (j, 3, 3) float64, that together are what some triangles, (k, 3, 3), have in common with a box.
+    """Returns triangles, (j, 3, 3) float64, that together are about what some triangles, (k, 3, 3), have in common with a box.
 
-    A triangle inside comes back as it is. After I. Sutherland, G. Hodgman, "Reentrant Polygon Clipping", 1974, with a triangle
+    Every point of the triangles that is in the box and at least rounding() away from its sides is within rounding() of the result,
+    and every point of the result is within rounding() of the triangles. A triangle inside comes back as it is. After I. Sutherland, G. Hodgman, "Reentrant Polygon Clipping", 1974, with a triangle
     or two in place of each polygon.
     """
     corners = corners.astype(np.float64)
@@ -19,7 +24,7 @@ def clipped(corners, box):
 
 
 def rounding(corners):
-    """Returns an upper bound of the distance between what triangles have in common with a box and what clipped() returns.
+    """Returns an upper bound, a length, of how far clipped() carries a point of triangles, (k, 3, 3), by its rounding.
 
     Each of six cuts rounds a coordinate by a few units in the last place of the largest coordinate.
     """

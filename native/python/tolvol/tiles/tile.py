@@ -86,10 +86,11 @@ def measure(tile, progress=None):
 def _largest(those, others, tile, threads, progress):
     corners = soups.gather(those, tile.cell)
     rounding = clipping.rounding(corners)
-    corners = clipping.clipped(corners, tile.cell)
+    box = tile.cell.grown(rounding)  # so that the cells together miss no point
+    corners = clipping.clipped(corners, box)
     if not len(corners):
         return 0.0, 0.0
-    around = soups.gather(others, tile.cell.grown(tile.tolerance))
+    around = soups.gather(others, box.grown(tile.tolerance))
     if not len(around):
         return tile.tolerance, np.inf
     found = package.module.directed_hausdorff(
