@@ -239,6 +239,25 @@ def test_cells_smaller_than_the_tolerance_leave_their_faces(tmp_path):
     assert sorted(map(tuple, found.reshape(-1, 9))) == sorted(map(tuple, corners.reshape(-1, 9)))
 
 
+def test_a_face_whose_centroid_is_rounded_into_another_cell_is_kept(tmp_path):
+    x = 1.4000000000000008
+    at = np.full(3, x).mean()
+    assert at > x
+    y, z = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 5))
+    grid = np.column_stack([np.full(25, x), y.ravel(), z.ravel()])
+    a = (5 * np.arange(4)[:, None] + np.arange(4)).ravel()
+    corners = grid[np.concatenate([np.stack([a, a + 1, a + 6], 1), np.stack([a, a + 6, a + 5], 1)])]
+    far = np.inf
+    boxes = [Box((-far,) * 3, (at, 0.6, far)), Box((-far, 0.6, -far), (at, far, far)), Box((at, -far, -far), (far,) * 3)]
+    whole = (soups.write(tmp_path / "reference", corners),)
+    parts = [
+        decimate(Tile(box, whole, whole, 0.001, OPTIONS), tmp_path / str(i))[0].corners() for i, box in enumerate(boxes)
+    ]
+    found = np.concatenate(parts)
+    area = np.linalg.norm(np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]), axis=1).sum() / 2
+    assert area == pytest.approx(1)
+
+
 # The plan -------------------------------------------------------------------------------------------------------------
 
 

@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from ..shared.errors import Refused
-from .cells import Cells
+from .cells import Cells, centroids
 
 # What the work in a cell takes at its peak, in bytes: by itself, and for each triangle in the first round, where the mesh is
 # the reference, and in later rounds, where nearly all triangles are those of the reference (docs/benchmark.md).
@@ -69,4 +69,4 @@ def _samples(mesh):
     """Returns the centroids of triangles all over a MappedMesh, (k, 3)."""
     run = min(_RUN, mesh.count)
     firsts = np.linspace(0, mesh.count - run, max(1, min(_SAMPLES, mesh.count) // run)).astype(np.int64)
-    return np.concatenate([mesh.corners(first, first + run).mean(1, dtype=np.float64) for first in np.unique(firsts)])
+    return np.concatenate([centroids(mesh.corners(first, first + run)) for first in np.unique(firsts)])

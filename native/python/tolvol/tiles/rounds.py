@@ -12,7 +12,7 @@ import numpy as np
 
 from ..shared.proof.verdict import Interval
 from . import scratch, soups, tile
-from .cells import Box
+from .cells import Box, centroids
 from .soups import Soup
 from .tile import Tile
 
@@ -94,7 +94,7 @@ class Rounds:
         writers = [soups.Writer(self._scratch.path(f"reference_{i:05}")) for i in range(len(parts.boxes))]
 
         def write(corners, progress):
-            number = parts.of(corners.mean(1, dtype=np.float64))
+            number = parts.of(centroids(corners))
             order = np.argsort(number, kind="stable")
             ends = np.searchsorted(number[order], np.arange(len(writers) + 1))
             for writer, begin, end in zip(writers, ends, ends[1:]):

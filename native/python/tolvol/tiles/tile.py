@@ -11,7 +11,7 @@ import numpy as np
 from ..shared import package
 from ..welding import welded
 from . import clipping, soups
-from .cells import Box
+from .cells import Box, centroids
 
 _BLOCK = 1 << 16  # triangles that are looked at at once
 
@@ -36,7 +36,7 @@ def decimate(tile, output, progress=None):
     """
     corners = soups.gather(tile.mesh, tile.cell)
     inside = tile.cell.strictly_holds_triangles(corners)
-    owned = corners[~inside & tile.cell.holds(corners.mean(1, dtype=np.float64))]
+    owned = corners[~inside & tile.cell.holds(centroids(corners))]
     vertices, triangles = mesh_of(corners)
     del corners  # The memory is needed.
     decimated = (
