@@ -95,7 +95,8 @@ class Cells:
 def centroids(corners):
     """Returns the centroids of triangles, (k, 3, 3), as (k, 3) float64, each in the bounding box of its triangle.
 
-    By rounding alone the mean of three equal coordinates may be another number, and then in a cell that the triangle does not meet.
+    By rounding alone the mean of three equal coordinates may be another number, which may be in a cell that the triangle does not
+    meet.
     """
     return np.clip(corners.mean(1, dtype=np.float64), corners.min(1), corners.max(1))
 
