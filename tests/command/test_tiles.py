@@ -10,6 +10,8 @@ from tolvol.shared.errors import Refused
 from tolvol.tiles import clipping, plan, soups
 from tolvol.tiles.cells import EVERYWHERE, Box, Cells
 from tolvol.tiles.mapped import MappedMesh
+from tolvol.tiles.rounds import Rounds
+from tolvol.tiles.scratch import Scratch
 from tolvol.tiles.tile import Tile, decimate, measure, mesh_of
 
 import meshes
@@ -248,7 +250,11 @@ def test_a_face_whose_centroid_is_rounded_into_another_cell_is_kept(tmp_path):
     a = (5 * np.arange(4)[:, None] + np.arange(4)).ravel()
     corners = grid[np.concatenate([np.stack([a, a + 1, a + 6], 1), np.stack([a, a + 6, a + 5], 1)])]
     far = np.inf
-    boxes = [Box((-far,) * 3, (at, 0.6, far)), Box((-far, 0.6, -far), (at, far, far)), Box((at, -far, -far), (far,) * 3)]
+    boxes = [
+        Box((-far,) * 3, (at, 0.6, far)),
+        Box((-far, 0.6, -far), (at, far, far)),
+        Box((at, -far, -far), (far,) * 3),
+    ]
     whole = (soups.write(tmp_path / "reference", corners),)
     parts = [
         decimate(Tile(box, whole, whole, 0.001, OPTIONS), tmp_path / str(i))[0].corners() for i, box in enumerate(boxes)
@@ -281,3 +287,35 @@ def test_too_little_memory_is_refused_with_what_is_needed(tmp_path):
         plan.Plan(mesh, 0.1, 1_000_000)
     with pytest.raises(Refused, match="--memory"):
         plan.Plan(mesh, 1.0, plan.FIXED + 100 * plan.OF_FIRST)
+
+
+# A run ----------------------------------------------------------------------------------------------------------------
+
+
+def test_a_run_that_goes_on_does_no_finished_step_again(tmp_path):
+    mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
+    cells = plan.Plan(mesh, 0.02, plan.FIXED + 2000 * plan.OF_FIRST)
+    done = []
+
+    def run(last):
+        def each(title, work, jobs):
+            for job in jobs:
+                if title.startswith(last):
+                    raise KeyboardInterrupt
+                done.append((title, work(job, None)))
+                yield done[-1]
+
+        folder = Scratch(tmp_path / "scratch", {}, resume=bool(done))
+        try:
+            Rounds(mesh, cells, folder, 0.02, OPTIONS, each).run()
+        finally:
+            folder.close(discard=False)
+
+    with pytest.raises(KeyboardInterrupt):
+        run("round 3")
+    before = {title for title, _ in done}
+    assert {title.partition(" of")[0] for title in before} == {"reading", "round 1", "round 2"}
+    done.clear()
+    done.append(("interrupted", None))
+    run("nothing")
+    assert not before & {title for title, _ in done}

@@ -75,7 +75,7 @@ class Rounds:
             present = tuple(Soup.read_from(record["soup"]) for record in done)
             angles += [record["angle"] for record in done]
             counts.append(sum(soup.count for soup in present))
-            self._scratch.remove(f"round{number - 1}_")
+            self._scratch.remove_soups(f"round{number - 1}_")
         vertices, triangles = tile.mesh_of(np.concatenate([soup.corners() for soup in present]))
         like = Tile(None, present, reference, self._tolerance, self._options)
         measured = self._steps("certifying", "measured", measure, like, rounds[-1])

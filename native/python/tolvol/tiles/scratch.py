@@ -77,10 +77,11 @@ class Scratch:
         """Notes that a step is done."""
         keep(self.path(name), record)
 
-    def remove(self, prefix):
-        """Removes the soups and records of the steps whose names begin with `prefix`."""
+    def remove_soups(self, prefix):
+        """Removes the soups of the steps whose names begin with `prefix`. Their records stay, so that no step is done again."""
         for path in self.folder.glob(f"{prefix}*"):
-            path.unlink(missing_ok=True)
+            if path.suffix != ".json":
+                path.unlink(missing_ok=True)
 
     def close(self, discard):
         """Lets others use the folder. discard: whether the run is done, so that the folder is removed."""
