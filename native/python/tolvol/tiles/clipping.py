@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cuts triangles along the sides of a box.
 
-A cut rounds, and the next cut is of the rounded parts. Where a triangle lies in a side of two cells but for rounding, the parts in
-both cells may miss the same points of it. So what is to miss nothing is clipped by boxes that are larger by rounding().
+A cut rounds, and the next cut is of the rounded parts. Where a triangle lies in a side of two cells but for rounding, the parts
+in both cells may miss the same points of it. So what is to miss nothing is clipped by boxes that are larger by rounding().
 """
 
 import numpy as np
@@ -11,9 +11,9 @@ import numpy as np
 def clipped(corners, box):
     """Returns triangles, (j, 3, 3) float64, that together are about what some triangles, (k, 3, 3), have in common with a box.
 
-    Every point of the triangles that is in the box and at least rounding() away from its sides is within rounding() of the result,
-    and every point of the result is within rounding() of the triangles. A triangle inside comes back as it is. After I. Sutherland, G. Hodgman, "Reentrant Polygon Clipping", 1974, with a triangle
-    or two in place of each polygon.
+    Every point of the triangles that is in the box and at least rounding() away from its sides is within rounding() of the
+    result, and every point of the result is within rounding() of the triangles. A triangle inside comes back as it is. After
+    I. Sutherland, G. Hodgman, "Reentrant Polygon Clipping", 1974, with a triangle or two in place of each polygon.
     """
     corners = corners.astype(np.float64)
     for axis in range(3):
