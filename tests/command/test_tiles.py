@@ -8,7 +8,7 @@ from tolvol.command import mesh_files
 from tolvol.command.mesh import Mesh
 from tolvol.shared.errors import Refused
 from tolvol.tiles import clipping, plan, soups
-from tolvol.tiles.cells import EVERYWHERE, Box, Cells
+from tolvol.tiles.cells import EVERYWHERE, Box, Cells, centroids
 from tolvol.tiles.mapped import MappedMesh
 from tolvol.tiles.rounds import Rounds
 from tolvol.tiles.scratch import Scratch
@@ -232,6 +232,26 @@ def test_a_mesh_that_moved_is_seen_by_measuring_in_cells(tmp_path):
     tiles = [(soups.write(tmp_path / "a", moved),), (soups.write(tmp_path / "b", corners),)]
     ends = np.array([measure(Tile(box, *tiles, 0.01, OPTIONS)) for box in boxes])
     assert (ends[:, :, 1].max(0) > 0.01).all()
+
+
+def test_faces_in_a_plane_whose_centroids_round_out_of_it_are_not_lost(tmp_path):
+    x = 1.5000000000000004
+    assert (x + x + x) / 3 != x
+    vertices, triangles = meshes.box(upper=np.array([x, 1, 1]))
+    for _ in range(3):
+        vertices, triangles = meshes.subdivide(vertices, triangles)
+    corners = vertices[triangles]
+    assert (centroids(corners) >= corners.min(1)).all() and (centroids(corners) <= corners.max(1)).all()
+    # The face at x is on the side of cells that divide it.
+    side = np.nextafter(x, 2)
+    middle = [Box((side, low, -np.inf), (np.inf, high, np.inf)) for low, high in ((-np.inf, 0.3), (0.3, np.inf))]
+    boxes = [Box((-np.inf,) * 3, (side, 0.6, np.inf)), Box((-np.inf, 0.6, -np.inf), (side, np.inf, np.inf)), *middle]
+    whole = (soups.write(tmp_path / "whole", corners),)
+    present = tuple(
+        decimate(Tile(box, whole, whole, 0.01, OPTIONS), tmp_path / str(i))[0] for i, box in enumerate(boxes)
+    )
+    found = np.concatenate([soup.corners() for soup in present])
+    assert tolvol.solidity(*mesh_of(found))["closed"] and len(found) < len(corners)
 
 
 def test_cells_smaller_than_the_tolerance_leave_their_faces(tmp_path):

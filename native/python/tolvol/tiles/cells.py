@@ -39,6 +39,14 @@ class Box:
         return ((corners.min(1) > np.array(self.lower)) & (corners.max(1) < np.array(self.upper))).all(1)
 
 
+def centroids(corners):
+    """Returns the centroids of triangles, (k, 3, 3), as float64. Each is in the bounding box of its triangle.
+
+    Rounding alone would put some beside it: (x + x + x) / 3 may differ from x.
+    """
+    return np.clip(corners.mean(1, dtype=np.float64), corners.min(1), corners.max(1))
+
+
 EVERYWHERE = Box((-math.inf,) * 3, (math.inf,) * 3)
 
 
