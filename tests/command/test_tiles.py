@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The parts of a decimation in cells: reading in blocks, cells, clipping, soups and one cell's work."""
 
+
 import numpy as np
 import pytest
 import tolvol
@@ -303,10 +304,26 @@ def test_the_cells_fit_the_memory_and_the_last_round_is_whole_if_it_can_be(tmp_p
 
 def test_too_little_memory_is_refused_with_what_is_needed(tmp_path):
     mesh = MappedMesh(written(tmp_path / "a.ply", *noisy()))
-    with pytest.raises(Refused, match=r"--memory: 1 MB is too little: .* need \d+ MB"):
+    with pytest.raises(Refused, match=r"--memory: 1 MB is too little: .* need at least \d+ MB"):
         plan.Plan(mesh, 0.1, 1_000_000)
     with pytest.raises(Refused, match="--memory"):
         plan.Plan(mesh, 1.0, plan.FIXED + 100 * plan.OF_FIRST)
+
+
+def test_cells_know_how_many_points_are_near_them():
+    points = np.random.default_rng(1).normal(size=(3000, 3))
+    cells = Cells(points, 12, 1)
+    expected = [box.grown(0.2).holds(points).sum() for box in cells.boxes]
+    assert cells.near(points, 0.2).tolist() == expected and min(expected) > 3000 / 12
+
+
+def test_hopelessly_little_memory_for_many_triangles_is_refused_after_few_tries(tmp_path, monkeypatch):
+    mesh, made = MappedMesh(written(tmp_path / "a.ply", *meshes.plate(n=257))), []
+    monkeypatch.setattr(plan, "Cells", lambda points, count, turn: made.append(count) or Cells(points, count, turn))
+    for tolerance, memory in ((0.001, 1_000_000), (0.5, plan.FIXED + 100 * plan.OF_FIRST)):
+        with pytest.raises(Refused, match="--memory"):
+            plan.Plan(mesh, tolerance, memory)
+    assert sum(made) < mesh.count / 8  # Cells of a triangle each would take minutes.
 
 
 # A run ----------------------------------------------------------------------------------------------------------------

@@ -66,11 +66,12 @@ class Cells:
         if count > 1 and len(points) > 1:
             axis = _axis(points.max(0) - points.min(0), turn)
             below = min(max(round(_SHARES[turn % len(_SHARES)] * count), 1), count - 1)
-            values = np.sort(points[:, axis])
+            values = points[:, axis]
             # Points at the cut are above it. Where the lowest point is there, the cut goes to the next coordinate.
-            above = values[values > values[0]]
+            above = values[values > values.min()]
             if len(above):
-                at = float(max(values[len(values) * below // count], above[0]))
+                rank = len(values) * below // count
+                at = float(max(np.partition(values, rank)[rank], above.min()))
                 is_below = points[:, axis] < at
                 lower = Box(box.lower, _with(box.upper, axis, at))
                 upper = Box(_with(box.lower, axis, at), box.upper)
@@ -98,6 +99,21 @@ class Cells:
 
         descend(self._root, np.arange(len(points)))
         return found
+
+    def near(self, points, length):
+        """Returns how many points are within a length of each cell along each axis, (count,): those that the grown box holds."""
+        counts = np.zeros(len(self.boxes), np.int64)
+
+        def descend(node, points):
+            if isinstance(node, int):
+                counts[node] = len(points)
+                return
+            axis, at, below, above = node
+            descend(below, points[points[:, axis] < at + length])
+            descend(above, points[points[:, axis] >= at - length])
+
+        descend(self._root, points)
+        return counts
 
 
 def centroids(corners):

@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from ..shared.errors import Refused
-from .cells import Cells, centroids
+from .cells import Box, Cells, centroids
 
 # What the work in a cell takes at its peak, in bytes: by itself, and for each triangle in the first round, where the mesh is
 # the reference, and in later rounds, where nearly all triangles are those of the reference (docs/benchmark.md).
@@ -17,6 +17,9 @@ OF_GRID = 100
 _SAMPLES = 1 << 20  # triangles whose centroids stand for all
 _RUN = 1 << 10  # neighbouring triangles that are sampled together
 _ROUNDS = 5  # over several cells, at most
+_FINEST = 64  # times as many cells as would do if each had the same number of triangles, and none around it
+_SMALL = 1000  # triangles in a small cell
+_PLACES = 16  # where the triangles within the tolerance are counted before any cell is made
 
 
 class Plan:
@@ -46,23 +49,41 @@ class Plan:
 
     def _cells(self, of_each, turn):
         """Returns the fewest Cells whose triangles fit, with those within the tolerance of the cell."""
-        most, least = self._most(of_each), math.inf
-        count = max(1, -(-self.count // most)) if most else len(self.points)
-        while True:
-            cells = Cells(self.points, count, turn)
-            within = [box.grown(self._tolerance).holds(self.points).mean() for box in cells.boxes]
-            largest = math.ceil(max(within) * self.count)
-            if largest <= most:
+        most = self._most(of_each)
+        wanted = most or _SMALL  # The need of small cells is told where not even FIXED is there.
+        least = self._triangles(self._near_places())
+        if least <= wanted:
+            cells, least = self._small_enough(wanted, turn)
+            if least <= most:
                 return cells
-            least = min(least, largest)
-            if count >= len(self.points):
-                break
-            count = min(len(self.points), count + max(1, count // 4))
         needed = (FIXED + least * of_each) / 1e6
         raise Refused(
-            f"--memory: {self._memory / 1e6:,.0f} MB is too little: the triangles within the tolerance of one place need "
-            f"{needed:,.0f} MB"
+            f"--memory: {self._memory / 1e6:,.0f} MB is too little: the triangles within the tolerance of one place need at "
+            f"least {needed:,.0f} MB"
         )
+
+    def _small_enough(self, wanted, turn):
+        """Returns (the fewest Cells with at most `wanted` triangles in each, the most in one), or (None, more than wanted)."""
+        count = min(-(-self.count // wanted), len(self.points))
+        limit, least = min(_FINEST * count, len(self.points)), math.inf
+        while True:
+            cells = Cells(self.points, count, turn)
+            largest = self._triangles(cells.near(self.points, self._tolerance))
+            if largest <= wanted:
+                return cells, largest
+            least = min(least, largest)
+            if count == limit:
+                return None, least
+            count = min(limit, count + max(1, count // 4))
+
+    def _triangles(self, counts):
+        """Returns for how many triangles of the mesh the largest of some numbers of points stands."""
+        return math.ceil(counts.max() / len(self.points) * self.count)
+
+    def _near_places(self):
+        """Returns how many points are within the tolerance of some of them: no cell that holds one of these has fewer."""
+        places = self.points[:: max(1, len(self.points) // _PLACES)]
+        return np.array([Box(tuple(p), tuple(p)).grown(self._tolerance).holds(self.points).sum() for p in places])
 
 
 def _samples(mesh):
