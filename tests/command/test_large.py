@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 from tolvol.command import large, main
 from tolvol.shared.command.arguments import Stop
+from tolvol.shared.errors import Refused
 from tolvol.tiles import plan
+from tolvol.tiles.mapped import MappedMesh
 
 import meshes
 from commands import ENVIRONMENT, assert_within, command, read, refused, scan, succeeded, words, write
@@ -161,10 +163,13 @@ def test_what_cannot_be_done_is_refused_before_any_work(torus, tmp_path):
         refused(decimate(torus, out, *extra), message)
     refused(decimate(torus, tmp_path / "out.obj"), "IN and OUT are files of the extension .ply or .stl")
     refused(decimate(torus, out, memory="20MB"), "--memory: 20 MB is too little", "need")
-    refused(decimate(torus, out, memory="much"), "is not a number of bytes such as 500MB or 4GB")
+    for wrong in ("much", "9" * 400, "9999999999TB"):
+        refused(decimate(torus, out, memory=wrong), "is not a number of bytes such as 500MB or 4GB")
+    refused(decimate(torus, out, "--threads", 10**20), "--threads: 100000000000000000000 is more than 2147483647")
     refused(command("decimate", torus, out, "--tolerance", "1%", "--resume"), "--resume needs --memory")
     refused(command("decimate", torus, out, "--tolerance", "900%", "--memory", "1GB"), "more than the size")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["other", "scan.ply"]
+    assert [path.name for path in other.iterdir()] == ["letter.txt"]
 
 
 def test_a_full_disk_is_said_and_the_run_goes_on_with_more_space(torus, tmp_path, whole):
@@ -200,3 +205,41 @@ def test_a_mesh_of_large_faces_and_a_small_one_are_done_as_well(tmp_path):
         match = succeeded(decimate(path, out))
         assert_within(out, path, TOLERANCE)
         assert name != "plate" or int(match[2]) <= 600
+
+
+def test_out_may_be_in(torus, tmp_path, whole):
+    succeeded(decimate(torus, torus))
+    assert torus.read_bytes() == whole
+    assert [path.name for path in tmp_path.iterdir()] == ["scan.ply"]
+
+
+def test_the_scratch_folder_may_be_a_link_and_a_run_goes_on_from_another_folder(torus, tmp_path, whole):
+    real, link, out = tmp_path / "real", tmp_path / "link", tmp_path / "out.ply"
+    real.mkdir()
+    link.symlink_to(real)
+    arguments = words("decimate", torus, out, "--tolerance", TOLERANCE, "--memory", SMALL, "--scratch", "link")
+    process = subprocess.Popen(arguments, stdout=subprocess.DEVNULL, cwd=tmp_path, env=ENVIRONMENT)
+    while not (real / "round0_00001.json").exists():
+        assert process.poll() is None
+        time.sleep(0.001)
+    process.kill()
+    process.wait()
+    succeeded(decimate(torus, out, "--scratch", link, "--resume"))
+    assert out.read_bytes() == whole and not real.exists()
+
+
+def test_a_scratch_folder_that_cannot_be_made_is_no_full_disk(torus, tmp_path):
+    (tmp_path / "file").touch()
+    error = decimate(torus, tmp_path / "out.ply", "--scratch", tmp_path / "file")[2]
+    assert "File exists" in error and "free some space" not in error
+
+
+def test_a_file_that_changes_while_it_is_read_is_refused(torus):
+    mesh = MappedMesh(torus)
+    mesh.require_unchanged()
+    os.truncate(torus, torus.stat().st_size - 1300)
+    with pytest.raises(Refused, match="scan.ply was changed while it was read: start again"):
+        list(mesh.blocks())
+    os.utime(torus, (1, 1))
+    with pytest.raises(Refused, match="was changed"):
+        mesh.require_unchanged()

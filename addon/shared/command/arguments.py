@@ -57,6 +57,9 @@ class Parser(argparse.ArgumentParser):
         return valued
 
 
+_LARGEST_WHOLE = 2**31 - 1  # that the native code takes
+
+
 def whole_number(least):
     def parse(text):
         try:
@@ -65,6 +68,8 @@ def whole_number(least):
             raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
         if value < least:
             raise argparse.ArgumentTypeError(f"{value} is less than {least}")
+        if value > _LARGEST_WHOLE:
+            raise argparse.ArgumentTypeError(f"{value} is more than {_LARGEST_WHOLE}")
         return value
 
     return parse

@@ -25,6 +25,7 @@ from .mesh import Mesh
 from .workers import dask, here, local_count
 
 _UNITS = {"": 1, "k": 1e3, "m": 1e6, "g": 1e9, "t": 1e12}
+_TOO_MUCH = 1e18  # bytes: more than any machine has, and less than the native code can count
 # Options of decimate that need the whole mesh at once, or more than one run of the rounds.
 _WHOLE = ("reference", "one_sided", "max_seconds", "target_triangles", "close_holes", "lod", "lod_pixels", "picture")
 
@@ -37,9 +38,10 @@ normals and colours, is left out."""
 def memory(text):
     """Parses a number of bytes such as 4GB."""
     match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*([kmgt]?)i?b?\s*", text, re.IGNORECASE)
-    if not match or not float(match[1]):
+    count = float(match[1]) * _UNITS[match[2].lower()] if match else 0
+    if not 0 < count < _TOO_MUCH:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of bytes such as 500MB or 4GB")
-    return int(float(match[1]) * _UNITS[match[2].lower()])
+    return int(count)
 
 
 def scheduler(text):
@@ -116,7 +118,9 @@ class _Run:
         for target in written:
             if target.is_device:
                 raise Stop(f"{target.name}: this is a device or a pipe, not a file")
-        safe_files.require_apart([(target.name, target.place) for target in written], [("IN", options.input)])
+        is_own = safe_files.identity(self.target.place) == safe_files.identity(options.input)
+        read = [] if is_own else [("IN", options.input)]
+        safe_files.require_apart([(target.name, target.place) for target in written], read)
         for target in written:
             staged.folder(target)
         self.scratch = Path(options.scratch or f"{self.target.place}.tolvol")

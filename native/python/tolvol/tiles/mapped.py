@@ -39,7 +39,8 @@ class MappedMesh:
         try:
             with open(path, "rb") as file:
                 head = file.read(_HEADER)
-            self.size = os.path.getsize(path)
+            self._stamp = self._seen()
+            self.size = self._stamp[0]
         except OSError as error:
             raise Refused(f"{path}: {error.strerror}") from None
         try:
@@ -50,6 +51,19 @@ class MappedMesh:
                 raise Refused("the file has no faces")
         except Refused as error:
             raise Refused(f"{path}: {error}") from None
+
+    def _seen(self):
+        found = os.stat(self.path)
+        return found.st_size, found.st_mtime_ns, found.st_ino
+
+    def require_unchanged(self):
+        """Raises Refused if the file is not the one that it was at first."""
+        try:
+            if self._seen() == self._stamp:
+                return
+        except OSError:
+            pass
+        raise Refused(f"{self.path} was changed while it was read: start again")
 
     def _map_stl(self, head):
         self.count = int.from_bytes(head[80:84], "little")
@@ -95,6 +109,9 @@ class MappedMesh:
     def corners(self, first, last):
         """Returns the corners of the triangles from `first` to before `last`, (k, 3, 3) of dtype."""
         rows = np.fromfile(self.path, self._row, last - first, offset=self._offset + first * self._row.itemsize)
+        if len(rows) != last - first:
+            self.require_unchanged()
+            raise Refused(f"{self.path}: the file could not be read to its end; check the disk")
         if self._vertices is None:
             corners = np.ascontiguousarray(rows["corners"])
             self._require_finite(corners, lambda bad: 3 * first + bad + 1, "corner")

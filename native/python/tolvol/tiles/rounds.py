@@ -102,6 +102,7 @@ class Rounds:
 
         for _ in self._each("reading", write, self._mesh.blocks()):
             pass
+        self._mesh.require_unchanged()
         found = tuple(writer.end() for writer in writers)
         self._scratch.keep("reference", {"soups": [soup.record() for soup in found]})
         return found

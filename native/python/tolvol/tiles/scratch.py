@@ -26,9 +26,11 @@ class Scratch:
     """
 
     def __init__(self, folder, asked, resume):
-        self.folder = Path(folder)
+        # Records name soups by their path, which other working directories and the workers of Dask have to find.
+        self.folder = Path(os.path.realpath(folder))
         try:
             self.folder.mkdir(exist_ok=True)
+            self._require_own()
             self._lock = os.open(self.folder / "lock", os.O_RDWR | os.O_CREAT)
         except OSError as error:
             raise soups.failed(error, self.folder) from None
@@ -48,9 +50,6 @@ class Scratch:
                 raise Refused(f"{self.folder}: another run uses this scratch folder") from None
         before = self.record(_ASKED)
         if before is None:
-            others = [path.name for path in self.folder.iterdir() if path.name != "lock"]
-            if others:
-                raise Refused(f"{self.folder}: this folder holds other files ({others[0]}): choose an empty one")
             self.keep(_ASKED, asked)
         elif not resume:
             raise Refused(f"{self.folder} holds a run that was interrupted: go on with --resume, or remove the folder")
@@ -60,6 +59,13 @@ class Scratch:
                 f"--resume: {name} was {before.get(name)} and is {asked[name]} now: run again as before, or remove "
                 f"{self.folder}"
             )
+
+    def _require_own(self):
+        """Raises Refused for a folder of other files, into which nothing is written."""
+        names = sorted(path.name for path in self.folder.iterdir())
+        others = [name for name in names if name != "lock"]
+        if others and f"{_ASKED}.json" not in names:
+            raise Refused(f"{self.folder}: this folder holds other files ({others[0]}): choose an empty one")
 
     def path(self, name):
         return self.folder / name
@@ -85,9 +91,9 @@ class Scratch:
 
     def close(self, discard):
         """Lets others use the folder. discard: whether the run is done, so that the folder is removed."""
-        os.close(self._lock)
         if discard:
             shutil.rmtree(self.folder, ignore_errors=True)
+        os.close(self._lock)
 
 
 def keep(path, record):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Soups: files of triangles by the coordinates of their corners, in the scratch folder."""
 
+import errno
 import os
 import uuid
 import zlib
@@ -13,6 +14,7 @@ from ..shared.errors import NotWritten, Refused
 from .cells import Box
 
 _BLOCK = 1 << 16  # triangles
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,11 @@ def write(path, corners):
 
 def failed(error, path):
     """Returns the NotWritten for an OSError of a file in the scratch folder."""
-    return NotWritten(f"{path}: {error.strerror}; what is done is kept: free some space, and go on with --resume")
+    if error.errno == errno.ENOENT:
+        return NotWritten(f"{path}: {error.strerror}: the scratch folder has been removed; start again")
+    if error.errno in _FULL:
+        return NotWritten(f"{path}: {error.strerror}; what is done is kept: free some space, and go on with --resume")
+    return NotWritten(f"{path}: {error.strerror}")
 
 
 def bounds_of(corners):
