@@ -24,7 +24,8 @@ Field to_field(const std::string& name) {
 
 std::unique_ptr<Volume> make_volume(const py::object& vertices, const py::object& triangles, double tolerance,
                                     const py::object& to_world, std::optional<double> precision,
-                                    std::optional<std::int64_t> grid_memory, const std::string& field, std::optional<int> threads, Progress* progress) {
+                                    std::optional<std::int64_t> grid_memory, const std::string& field,
+                                    std::optional<int> threads, Progress* progress) {
   const Vertices v = to_vertices(vertices, "vertices");
   const std::vector<glm::uvec3> t = to_triangles(triangles, "triangles");
   const StoredSpace space(to_matrix(to_world), v.storage);
@@ -34,8 +35,8 @@ std::unique_ptr<Volume> make_volume(const py::object& vertices, const py::object
   if (grid_memory) options.grid_memory = std::min(kGridBudget, static_cast<std::size_t>(*grid_memory));
   const Interruptible call(progress);
   const auto start = std::chrono::steady_clock::now();
-  auto volume = std::unique_ptr<Volume>(
-      new Volume{{v.values, t, space, tolerance, options}, v.values.size(), t.size()});
+  auto volume =
+      std::unique_ptr<Volume>(new Volume{{v.values, t, space, tolerance, options}, v.values.size(), t.size()});
   volume->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return volume;
 }
@@ -141,8 +142,7 @@ void bind_volume(py::module_& module) {
                      "All points within a tolerance of a reference mesh, with what makes questions about them fast.")
       .def(py::init(&make_volume), py::arg("vertices"), py::arg("triangles"), py::arg("tolerance"), py::kw_only(),
            py::arg("to_world") = py::none(), py::arg("precision") = py::none(), py::arg("grid_memory") = py::none(),
-           py::arg("field") = "scatter",
-           py::arg("threads") = py::none(), py::arg("progress") = py::none(),
+           py::arg("field") = "scatter", py::arg("threads") = py::none(), py::arg("progress") = py::none(),
            R"doc(Build the volume of a reference mesh.
 
 Parameters

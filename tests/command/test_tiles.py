@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The parts of a decimation in cells: reading in blocks, cells, clipping, soups and one cell's work."""
 
-
 import numpy as np
 import pytest
 import tolvol

@@ -27,7 +27,17 @@ from .workers import dask, here, local_count
 _UNITS = {"": 1, "k": 1e3, "m": 1e6, "g": 1e9, "t": 1e12}
 _TOO_MUCH = 1e18  # bytes: more than any machine has, and less than the native code can count
 # Options of decimate that need the whole mesh at once, or more than one run of the rounds.
-_WHOLE = ("reference", "one_sided", "max_seconds", "target_triangles", "close_holes", "lod", "lod_pixels", "picture")
+_WHOLE = (
+    "reference",
+    "one_sided",
+    "max_seconds",
+    "target_triangles",
+    "close_holes",
+    "outside",
+    "lod",
+    "lod_pixels",
+    "picture",
+)
 
 GROUP = """\
 A mesh that is larger than the memory is decimated part by part, from and to files of the extension .ply or .stl, IN binary. The
@@ -91,7 +101,7 @@ def checked(parser, options):
                 parser.error(f"--{name} needs --memory")
         return options
     for name in _WHOLE:
-        if getattr(options, name):
+        if getattr(options, name) not in (None, False, parser.get_default(name)):
             parser.error(f"--{name.replace('_', '-')} cannot be used with --memory")
     return options
 
@@ -151,6 +161,8 @@ class _Run:
             done = True
         finally:
             scratch.close(discard=done)
+        for note in whole["warnings"]:
+            print(f"note: {note}")
         print(report.line(whole, whole["seconds"]["total"]))
         return 0
 
@@ -229,11 +241,14 @@ class _Run:
             "forward": [result.forward.lower, result.forward.upper],
             "backward": [result.backward.lower, result.backward.upper],
             "outside": {"faces": 0, "first": None},
-            "normals": {"largest": result.angle, "unsure": 0, "exceeded_before": 0, "exceeded_after": 0},
+            # Where some face has no angle, how many have none is not known of the whole.
+            "normals": None
+            if result.angle is None
+            else {"largest": result.angle, "unsure": 0, "exceeded_before": 0, "exceeded_after": 0},
             "solidity": {"after": found},
             "crossings": {"before": None, "after": found["crossing_pairs"]},
             "repairs": [],
-            "warnings": [],
+            "warnings": list(result.warnings),
         }
 
     def _write(self, result, whole):

@@ -103,8 +103,9 @@ def run(words):
             options.words = made.joined(words)
             return options.work(options)
         except ModuleNotFoundError as error:
+            extra = "scale" if error.name in ("dask", "distributed") else "cli"
             raise Stop(
-                f"the package {error.name} is missing: pip install {error.name}, or '.[cli]' of the checkout"
+                f"the package {error.name} is missing: pip install {error.name}, or '.[{extra}]' of the checkout"
             ) from None
 
     return exit_code(name, work)

@@ -28,7 +28,7 @@ class Result:
 
     vertices: (n, 3) of the file's dtype, one at each position; triangles: (m, 3) int32; counts: the triangles after each round;
     forward, backward: Intervals; angle: the largest angle in degrees between a face and its witnesses, or None if some face has
-    no angle.
+    no angle; warnings: sentences, each once.
     """
 
     vertices: np.ndarray
@@ -37,6 +37,7 @@ class Result:
     forward: Interval
     backward: Interval
     angle: float | None
+    warnings: tuple
 
 
 def bounds(mesh):
@@ -62,7 +63,7 @@ class Rounds:
     def run(self):
         """Returns the Result. Raises NotWritten where the scratch folder is full, after which the run can go on."""
         reference = present = self._reference()
-        counts, angles = [], [0.0]
+        counts, angles, warnings = [], [0.0], {}
         rounds = self._plan.rounds
         for number, cells in enumerate(rounds):
             if len(counts) > 1 and len(cells.boxes) > 1 and counts[-1] > (1 - _LEAST_GAIN) * counts[-2]:
@@ -74,6 +75,7 @@ class Rounds:
             done = self._steps(title, f"round{number}", decimate, like, cells)
             present = tuple(Soup.read_from(record["soup"]) for record in done)
             angles += [record["angle"] for record in done]
+            warnings |= dict.fromkeys(text for record in done for text in record["warnings"])
             counts.append(sum(soup.count for soup in present))
             self._scratch.remove_soups(f"round{number - 1}_")
         vertices, triangles = tile.mesh_of(np.concatenate([soup.corners() for soup in present]))
@@ -84,7 +86,7 @@ class Rounds:
             for way in ("forward", "backward")
         )
         angle = None if None in angles else max(angles)
-        return Result(vertices, triangles, tuple(counts), forward, backward, angle)
+        return Result(vertices, triangles, tuple(counts), forward, backward, angle, tuple(warnings))
 
     def _reference(self):
         """Returns the soups of the triangles of the file, each of a part of space."""
@@ -121,8 +123,8 @@ class Rounds:
 def decimate(job, progress=None):
     """Does the work of a round in one cell, and notes that it is done. job: (Tile, the path of its soup)."""
     one, path = job
-    soup, angle = tile.decimate(one, path, progress)
-    scratch.keep(path, {"soup": soup.record(), "angle": angle})
+    soup, angle, warnings = tile.decimate(one, path, progress)
+    scratch.keep(path, {"soup": soup.record(), "angle": angle, "warnings": warnings})
 
 
 def measure(job, progress=None):

@@ -48,6 +48,8 @@ class Scratch:
                 fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise Refused(f"{self.folder}: another run uses this scratch folder") from None
+        for path in self.folder.glob("*.partial"):  # what an interrupted run was writing
+            path.unlink()
         before = self.record(_ASKED)
         if before is None:
             self.keep(_ASKED, asked)

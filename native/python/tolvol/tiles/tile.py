@@ -32,7 +32,8 @@ def decimate(tile, output, progress=None):
     """Decimates the faces inside the cell, and writes the faces that the cell owns to `output`.
 
     The cell owns the faces inside it, and of those that reach out of it the ones with their centroid in the cell. Returns
-    (Soup, the largest angle in degrees between a new face and its witnesses, or None if there is a face without an angle).
+    (Soup, the largest angle in degrees between a new face and its witnesses, or None if there is a face without an angle, and a
+    list of warnings).
     """
     corners = soups.gather(tile.mesh, tile.cell)
     inside = tile.cell.strictly_holds_triangles(corners)
@@ -42,12 +43,12 @@ def decimate(tile, output, progress=None):
     decimated = (
         _decimated(tile, vertices, triangles, inside, progress) if _has_area(vertices, triangles[inside]) else None
     )
-    kept, angle = decimated or (vertices[triangles[inside]], 0.0)
-    return soups.write(output, np.concatenate([kept, owned])), angle
+    kept, angle, warnings = decimated or (vertices[triangles[inside]], 0.0, [])
+    return soups.write(output, np.concatenate([kept, owned])), angle, warnings
 
 
 def _decimated(tile, vertices, triangles, inside, progress):
-    """Returns (the corners of what the triangles inside become, the angle), or None where the volume is too small."""
+    """Returns (the corners of what the triangles inside become, the angle, warnings), or None where the volume is too small."""
     native = package.module
     if tile.reference == tile.mesh:
         around = vertices, triangles
@@ -63,11 +64,13 @@ def _decimated(tile, vertices, triangles, inside, progress):
             raise
         return None  # The cell is smaller than the tolerance: the faces wait for a larger one.
     cell = (tile.cell.lower, tile.cell.upper)
-    result = native.decimate(vertices, triangles, volume, cell=cell, progress=progress, **tile.options)
+    # A face of an earlier round that is not proved again, in another frame, stays as it is; the measuring decides about it.
+    result = native.decimate(vertices, triangles, volume, cell=cell, outside="keep", progress=progress, **tile.options)
     normals = result.report["normals"]
     known = normals and not normals["unsure"] and not normals["exceeded_after"]
     angle = (normals["largest"] or 0.0) if known else None
-    return result.vertices[result.triangles[inside[result.triangle_source]]], angle
+    kept = result.vertices[result.triangles[inside[result.triangle_source]]]
+    return kept, angle, result.report["warnings"]
 
 
 def measure(tile, progress=None):
