@@ -116,15 +116,6 @@ class Cells:
         return counts
 
 
-def centroids(corners):
-    """Returns the centroids of triangles, (k, 3, 3), as (k, 3) float64, each in the bounding box of its triangle.
-
-    By rounding alone the mean of three equal coordinates may be another number, which may be in a cell that the triangle does not
-    meet.
-    """
-    return np.clip(corners.mean(1, dtype=np.float64), corners.min(1), corners.max(1))
-
-
 def _axis(extent, turn):
     """Returns one of the axes along which the extent is at least half of the longest, turn by turn."""
     order = np.argsort(-extent, kind="stable")
