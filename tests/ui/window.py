@@ -39,12 +39,11 @@ class TOLVOL_TEST_OT_mark(bpy.types.Operator):
     """Counts how often its key was handled"""
 
     bl_idname, bl_label = "tolvol_test.mark", "Mark"
-    bl_options = {"INTERNAL"}
     count = 0
 
     def execute(self, context):
         TOLVOL_TEST_OT_mark.count += 1
-        return {"CANCELLED"}  # An operator that has finished makes Blender draw again.
+        return {"FINISHED"}
 
 
 _MARK = "Pause"  # a key that Blender does not use
@@ -181,18 +180,18 @@ def find_hold():
 
 
 _found_at = {}
-_ROW = 18  # pixels, fewer than a button is high
 
 
 def _find(copied, keys, across):
     sidebar = region("UI")
-    # In most cases the button is where it was the last time, or near to that.
-    rows = range(30, sidebar.height - 5, _ROW)
+    # In most cases the button is where it was the last time.
+    rows = range(30, sidebar.height - 5, 12)
     last = _found_at.get((copied, across))
-    for y in rows if last is None else (last, *sorted(rows, key=lambda y: abs(y - last))):
+    for y in rows if last is None else (last, *rows):
         place = on_screen(sidebar, int(sidebar.width * across), y)
         bpy.context.window_manager.clipboard = ""
-        yield from sent("mousemove", *place, "key", keys)
+        yield from sent("mousemove", *place)
+        yield from sent("key", keys)
         if copied in bpy.context.window_manager.clipboard:
             _found_at[copied, across] = y
             return place
@@ -203,11 +202,14 @@ def press(operator, across=0.33):
     """Clicks the button of an operator in the sidebar. If necessary, it scrolls the sidebar, and back up after that."""
     place = yield from find(operator, across)
     scrolled = place is None
-    if scrolled and (yield from scroll(_UP)):
+    if scrolled:
+        yield from scroll(_UP)
         place = yield from find(operator, across)
     # The sidebar may be several times as high as the window.
-    while place is None and (yield from scroll(_DOWN, _PAGE)):
-        place = yield from find(operator, across)
+    for _ in range(_PAGES):
+        if place is None:
+            yield from scroll(_DOWN, _PAGE)
+            place = yield from find(operator, across)
     assert place is not None, f"no button for {operator}"
     yield 0.6  # After so many seconds no tooltip is in the way.
     click(*place)
@@ -217,17 +219,15 @@ def press(operator, across=0.33):
 
 
 _UP, _DOWN = 4, 5  # X counts the two directions of the wheel as these buttons of the mouse.
-_PAGE = 6  # Steps of the wheel after which a part of the sidebar is still seen.
+_PAGE, _PAGES = 6, 6  # Steps of the wheel after which a part of the sidebar is still seen, and how often that is done.
 
 
 def scroll(button=_UP, steps=30):
-    """Turns the wheel over the sidebar. After 30 steps it no longer scrolls. Returns whether it has scrolled."""
+    """Turns the wheel over the sidebar. After 30 steps it no longer scrolls."""
     sidebar = region("UI")
     middle = on_screen(sidebar, sidebar.width // 2, sidebar.height // 2)
-    top = sidebar.view2d.region_to_view(0, 0)[1]
     xdotool("mousemove", *middle, "sleep", "0.1", "click", "--repeat", steps, "--delay", 20, button)
     yield 0.5
-    return sidebar.view2d.region_to_view(0, 0)[1] != top
 
 
 def scroll_down():
