@@ -230,7 +230,7 @@ TEST(TJunctions, LookOnceAtWhatIsAroundManyVerticesAtOnePlace) {
 
 TEST(TJunctions, ALongFootStaysOnItsPlate) {
   // The plate is bent on both sides of the foot, which goes over many of its squares.
-  const unsigned n = across(24);
+  const unsigned n = 24;
   TriangleMesh plate = shapes::squares(n, [&](const dvec3& p) {
     return dvec3(p.x, p.y, 0.3 * std::max(0.0, std::abs(p.x - 0.43) - 1.0 / n) * std::cos(3 * p.y));
   });
