@@ -7,6 +7,11 @@ in both cells may miss the same points of it. So what is to miss nothing is clip
 
 import numpy as np
 
+# A triangle is shallow against a side if it reaches less than this share of its longest extent across it.
+_SHALLOW = 1 / 16
+# So many times rounding() is the distance by which a triangle that is not shallow may miss points beside the sides of the box.
+STEEP_LOSS = 64
+
 
 def clipped(corners, box):
     """Returns triangles, (j, 3, 3) float64, that together are about what some triangles, (k, 3, 3), have in common with a box.
@@ -29,6 +34,15 @@ def rounding(corners):
     Each of six cuts rounds a coordinate by a few units in the last place of the largest coordinate.
     """
     return 128 * float(np.finfo(np.float64).eps) * float(np.abs(corners).max(initial=0))
+
+
+def are_shallow(corners, box, margin):
+    """Tells which triangles, (k, 3, 3), are shallow against a side of the box that is within `margin`, a length, of them."""
+    lower, upper = corners.min(1).astype(np.float64), corners.max(1).astype(np.float64)
+    extent = upper - lower
+    flat = extent < _SHALLOW * extent.max(1, keepdims=True)
+    sides = np.array([box.lower, box.upper])[:, None]
+    return (flat & ((lower - margin <= sides) & (sides <= upper + margin)).any(0)).any(1)
 
 
 def _halved(corners, axis, side, at):
