@@ -298,7 +298,7 @@ class Finder {
     std::vector<std::vector<std::uint32_t>> found((edges.size() + kBlock - 1) / kBlock);
     team.run(edges.size(), kBlock, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        const auto& [a, b] = open_[edges[i].first];
+        const std::uint32_t a = open_[edges[i].first].first, b = open_[edges[i].first].second;
         const double most = std::min(most_reach(place(a)), most_reach(place(b)));
         const auto may = [&](const Box& box) { return meets(place(a), place(b), box, most); };
         tree.for_each_where(may, [&](std::uint32_t t) { add_across(a, b, edges[i].second, t, found[begin / kBlock]); });
