@@ -208,7 +208,7 @@ TEST(JoinedSheets, ThatTouchInAPointStayTogether) {
 TEST(TouchingSheets, AreNotJoinedAlongAnEdge) {
   for (const auto& [c, effort, most] : {std::tuple{torn_wave(24), Options::Effort::fast, 0.66},
                                         {torn_wave(24), Options::Effort::thorough, 0.65},
-                                        {torn_wave(kSanitized ? 50 : 80), Options::Effort::fast, 0.48}}) {
+                                        {torn_wave(across(80)), Options::Effort::fast, 0.48}}) {
     Options options;
     options.effort = effort;
     const DecimationResult r = run(c, options);
