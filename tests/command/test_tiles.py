@@ -76,6 +76,7 @@ def test_properties_beside_coordinates_and_big_endian_numbers_are_read(tmp_path)
         (lambda data: data[:-4] + b"\xff\xff\xff\x7f", "face 9216 names vertex 2147483647, but there are only 4608"),
         (lambda data: data[:-13] + b"\4" + data[-12:], "face 9216 has 4 vertices"),
         (lambda data: data.replace(b"element face 9216", b"element face 0"), "the file has no faces"),
+        (lambda data: data.replace(b"element face 9216", b"element face 9215"), "10 bytes are left after all"),
     ],
 )
 def test_a_damaged_file_is_named_with_what_is_wrong(tmp_path, damage, message):
@@ -84,6 +85,18 @@ def test_a_damaged_file_is_named_with_what_is_wrong(tmp_path, damage, message):
     with pytest.raises(Refused, match=message) as refusal:
         list(MappedMesh(path).blocks())
     assert str(path) in str(refusal.value)
+
+
+def test_a_file_of_quads_is_refused_as_such(tmp_path):
+    vertices = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], "<f4")
+    header = (
+        "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    quad = b"\4" + np.arange(4, dtype="<i4").tobytes()
+    (tmp_path / "a.ply").write_bytes(header.encode() + vertices.tobytes() + 2 * quad)
+    with pytest.raises(Refused, match="face 1 has 4 vertices: only files of triangles"):
+        MappedMesh(tmp_path / "a.ply")
 
 
 def test_a_vertex_that_is_not_finite_is_named_by_its_number(tmp_path):
@@ -334,7 +347,7 @@ def test_a_run_that_goes_on_does_no_finished_step_again(tmp_path):
     done = []
 
     def run(last):
-        def each(title, work, jobs):
+        def each(stage, title, work, jobs):
             for job in jobs:
                 if title.startswith(last):
                     raise KeyboardInterrupt

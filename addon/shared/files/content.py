@@ -41,23 +41,26 @@ class Content:
         return self.corners.reshape(-1, self.sizes)
 
 
-def require_finite(coordinates):
-    """coordinates: (n, 3). A number beyond float32 counts as infinite, because Blender's readers store float32."""
+def require_finite(coordinates, number=lambda row: row + 1):
+    """coordinates: (n, 3). A number beyond float32 counts as infinite, because Blender's readers store float32.
+
+    number: returns the number of the vertex in a row, as the message gives it.
+    """
     if not len(coordinates) or -_LARGEST <= coordinates.min() and coordinates.max() <= _LARGEST:
         return
     bad = np.flatnonzero(~(np.abs(coordinates) <= _LARGEST).all(1))
     if len(bad):
         shown = ", ".join(f"{value:g}" for value in coordinates[bad[0]])
-        raise Refused(f"vertex {bad[0] + 1} is not finite ({shown})")
+        raise Refused(f"vertex {number(bad[0])} is not finite ({shown})")
 
 
-def require_indices(lowest, highest, count, first):
+def require_indices(lowest, highest, count, first, faces_before=0):
     """lowest, highest: the smallest and largest vertex number of each face; vertices are numbered from `first`."""
     bad = np.flatnonzero((lowest < first) | (highest >= first + count))
     if len(bad):
         face = bad[0]
         index = lowest[face] if lowest[face] < first else highest[face]
-        raise Refused(f"face {face + 1} names vertex {index}, but there are only {count} vertices")
+        raise Refused(f"face {faces_before + face + 1} names vertex {index}, but there are only {count} vertices")
 
 
 def positions(lines):

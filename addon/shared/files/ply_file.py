@@ -64,11 +64,16 @@ def read(data):
             others.append(f"{count:,} elements {name}")
     if vertices is None:
         raise Refused("it has no vertices")
-    if rest := len(bytes(body[offset:]).strip(_BLANK)):
-        raise Refused(
-            f"{rest:,} bytes are left after all that its header declares: the numbers in its header are wrong"
-        )
+    require_end(bytes(body[offset:]))
     return Content(faces, vertices, corners, sizes, columns, others=tuple(others))
+
+
+def require_end(rest, more=0):
+    """Raises Refused unless nothing but blanks is left after all that the header declares: the bytes `rest`, and `more`."""
+    if left := len(rest.strip(_BLANK)) + more:
+        raise Refused(
+            f"{left:,} bytes are left after all that its header declares: the numbers in its header are wrong"
+        )
 
 
 def _positions(rows, dtype):

@@ -8,12 +8,12 @@ import numpy as np
 
 from ..shared.errors import Refused
 from ..shared.files import ply_file, stl_file
+from ..shared.files.content import require_finite, require_indices
 
 EXTENSIONS = (".ply", ".stl")
 
 _HEADER = 1 << 20  # bytes that hold the header of any PLY file
 _BLOCK = 1 << 19  # triangles that are read at once
-_LARGEST = np.finfo(np.float32).max
 
 
 class _Blocks:
@@ -99,8 +99,13 @@ class MappedMesh:
             offset += count * row.itemsize
         if self._vertices is None:
             raise Refused("it has no vertices")
-        if self.size - offset > _HEADER:  # Some programs fill up the end of a file.
-            raise Refused(f"{self.size - offset:,} bytes are left after all that its header declares")
+        if self.count:
+            # Faces of more corners leave bytes behind, too, so they are looked for first.
+            self._require_triangles(np.fromfile(self.path, self._row, 1, offset=self._offset), 0)
+            with open(self.path, "rb") as file:
+                file.seek(offset)
+                rest = file.read(_HEADER)
+            ply_file.require_end(rest, self.size - offset - len(rest))
 
     def blocks(self):
         """Returns an iterable with a length: the corners of all triangles a block at a time, (k, 3, 3) each."""
@@ -112,36 +117,32 @@ class MappedMesh:
         if len(rows) != last - first:
             self.require_unchanged()
             raise Refused(f"{self.path}: the file could not be read to its end; check the disk")
-        if self._vertices is None:
-            corners = np.ascontiguousarray(rows["corners"])
-            self._require_finite(corners, lambda bad: 3 * first + bad + 1, "corner")
-            return corners
+        try:
+            return self._soup(rows, first) if self._vertices is None else self._indexed(rows, first)
+        except Refused as error:
+            raise Refused(f"{self.path}: {error}") from None
+
+    @staticmethod
+    def _soup(rows, first):
+        corners = np.ascontiguousarray(rows["corners"])
+        require_finite(corners.reshape(-1, 3), lambda row: 3 * first + row + 1)
+        return corners
+
+    def _require_triangles(self, rows, first):
         sizes = rows[self._list + " length"]
         if (sizes != 3).any():
             bad = int(np.argmax(sizes != 3))
             raise Refused(
-                f"{self.path}: face {first + bad + 1} has {sizes[bad]} vertices: only files of triangles can be read in "
-                "parts; cut the faces into triangles with another program"
+                f"face {first + bad + 1} has {sizes[bad]} vertices: only files of triangles can be read in parts; cut the "
+                "faces into triangles with another program"
             )
+
+    def _indexed(self, rows, first):
+        self._require_triangles(rows, first)
         index = rows[self._list].astype(np.int64)
-        count = len(self._vertices)
-        outside = ((index < 0) | (index >= count)).any(1)
-        if outside.any():
-            bad = int(np.argmax(outside))
-            worst = index[bad][(index[bad] < 0) | (index[bad] >= count)][0]
-            raise Refused(
-                f"{self.path}: face {first + bad + 1} names vertex {worst}, but there are only {count} vertices"
-            )
+        require_indices(index.min(1), index.max(1), len(self._vertices), 0, first)
         corners = np.empty((len(index), 3, 3), self.dtype)
         for axis, name in enumerate("xyz"):
             corners[:, :, axis] = self._vertices[name][index]
-        self._require_finite(corners, lambda bad: int(index.ravel()[bad]) + 1, "vertex")
+        require_finite(corners.reshape(-1, 3), lambda row: int(index.ravel()[row]) + 1)
         return corners
-
-    def _require_finite(self, corners, number, word):
-        points = corners.reshape(-1, 3)
-        bad = ~(np.abs(points) <= _LARGEST).all(1)
-        if bad.any():
-            place = int(np.argmax(bad))
-            shown = ", ".join(f"{value:g}" for value in points[place])
-            raise Refused(f"{self.path}: {word} {number(place)} is not finite ({shown})")
