@@ -129,6 +129,12 @@ def in_units(value_and_percent, size):
     return value / 100 * size if is_percent else value
 
 
+def require_within_size(tolerance, size, option="--tolerance"):
+    """Raises Stop if a tolerance, a length, is more than the size of the reference."""
+    if tolerance > size:
+        raise Stop(f"{option}: {tolerance:.6g} is more than the size of the reference, {size:.6g}")
+
+
 def require_folder(path, what):
     """Raises Stop before the work begins if a file cannot be written to this path. what: the option, for the message."""
     folder = Path(os.path.realpath(path)).parent

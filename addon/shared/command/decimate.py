@@ -21,7 +21,6 @@ they exchange have a `name`, which may be set.
 
 import io
 import json
-import time
 from pathlib import Path
 
 from ..decimation import seen_as
@@ -31,7 +30,8 @@ from ..proof import report, solidity
 from ..proof.certify import certify
 from ..surface import joined
 from . import arguments, file_report, pictures
-from .arguments import Stop, in_units
+from .arguments import Stop, in_units, require_within_size
+from .stages import Stages, say
 
 # The name of the entry of a glTF node's extras, and of the report. It is the word of 3D Tiles for how far a level is from the
 # full detail, as a length.
@@ -69,8 +69,7 @@ class Command:
         self.options = options
         self.staged = staged
         self.files = files
-        self.last_stage_ended = time.perf_counter()
-        self.seconds = {}
+        self.stages = Stages()
         self.textures = set()  # the places of the textures that are written
         files.extension_of(options.input)
         extension = files.extension_of(options.output)
@@ -120,7 +119,7 @@ class Command:
 
     def run(self):
         wholes = [self._level(i, output) for i, output in enumerate(self.outputs)]
-        seconds = {**self.seconds, "total": sum(self.seconds.values())}
+        seconds = {**self.stages.seconds, "total": sum(self.stages.seconds.values())}
         if self.options.tolerance:
             written = {**wholes[0], "seconds": seconds}
         else:
@@ -141,7 +140,7 @@ class Command:
 
     def _level(self, level, output):
         """Writes one file beside its place. Returns its report. Each level reads IN anew, so none comes from another."""
-        seconds_before = dict(self.seconds)
+        seconds_before = dict(self.stages.seconds)
         self.files.clear()
         reference_file = self._read("--reference", self.options.reference) if self.options.reference else None
         for ob in reference_file.objects if reference_file else ():
@@ -179,28 +178,16 @@ class Command:
         whole["repairs"] = repairs + whole["repairs"]
         if not self.options.tolerance:
             whole[GEOMETRIC_ERROR] = file_report.deviation(whole)
-        self._end_stage("write")
-        seconds = {stage: took - seconds_before.get(stage, 0.0) for stage, took in self.seconds.items()}
+        self.stages.end("write")
+        seconds = {stage: took - seconds_before.get(stage, 0.0) for stage, took in self.stages.seconds.items()}
         whole["seconds"] = {**seconds, "total": sum(seconds.values())}
         return whole
 
     def _read(self, what, path):
         found = self.files.read(path)
-        took = self._end_stage("read")
-        self._say(f"{what} {path}: {found.counts['triangles']:,} triangles", took)
+        took = self.stages.end("read")
+        say(f"{what} {path}: {found.counts['triangles']:,} triangles", took)
         return found
-
-    def _end_stage(self, stage):
-        """Adds the time since the end of the stage before to `stage`, and returns it. So the stages sum to the total."""
-        now = time.perf_counter()
-        took = now - self.last_stage_ended
-        self.last_stage_ended = now
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + took
-        return took
-
-    @staticmethod
-    def _say(text, took):
-        print(f"{text}, {report.duration(took)}", flush=True)
 
     def _pair(self, objects, reference_file):
         """Returns, for each object, the object to which its tolerance refers."""
@@ -231,14 +218,11 @@ class Command:
         else:
             found = [in_units(asked, size) for asked in self.options.lod or [self.options.tolerance]]
         for i, tolerance in enumerate(found):
-            level = "" if self.options.tolerance else f"level {i}: "
-            if tolerance > size:
-                raise Stop(
-                    f"{self._asked()}: {level}{tolerance:.6g} is more than the size of the reference, {size:.6g}"
-                )
+            level = "" if self.options.tolerance else f": level {i}"
+            require_within_size(tolerance, size, f"{self._asked()}{level}")
             if i and tolerance <= found[i - 1]:
                 raise Stop(
-                    f"{self._asked()}: {level}{tolerance:.6g} is not more than {found[i - 1]:.6g} of level {i - 1}"
+                    f"{self._asked()}{level}: {tolerance:.6g} is not more than {found[i - 1]:.6g} of level {i - 1}"
                 )
         return found
 
@@ -253,17 +237,17 @@ class Command:
     def _decimate(self, ob, reference, tolerance, target):
         """Decimates one object and returns the report about it."""
         run = self.files.decimate(ob, reference, tolerance, target, self.options, self.largest_perimeter)
-        took = self._end_stage("transfer")
+        took = self.stages.end("transfer")
         for stage, part in run["seconds"].items():
-            self.seconds[stage] = self.seconds.get(stage, 0.0) + part
-            self.seconds["transfer"] -= part
-        self._say(f"decimated {ob.name}: {report.counts(run)}", took)
+            self.stages.seconds[stage] = self.stages.seconds.get(stage, 0.0) + part
+            self.stages.seconds["transfer"] -= part
+        say(f"decimated {ob.name}: {report.counts(run)}", took)
         return run
 
     def _write(self, output, source, names, inputs, references, runs, tolerance, size):
         """Writes a file beside its place, reads it back and certifies it. Returns the report of the whole file."""
         written = self._export(output, source.objects)
-        self._say(f"wrote {output.exported.name} and read it back", self._end_stage("write"))
+        say(f"wrote {output.exported.name} and read it back", self.stages.end("write"))
         found = {ob.name: self.files.surface_of(ob) for ob in written.objects}
         if found.keys() == set(names):
             judged = [
@@ -291,13 +275,13 @@ class Command:
             if lost := count - written.extras.get(kind, 0):
                 message = f"{lost} of the {count} {kind} of IN are not in OUT"
                 whole["repairs"].append({"kind": kind, "count": lost, "message": message})
-        self._say("certified both ways", self._end_stage("certify"))
+        say("certified both ways", self.stages.end("certify"))
         print(f"{output.exported.name}: {solidity.line(whole['solidity']['after'])}")
         if not report.proved(whole):
             raise Stop(f"{NOT_PROVED}: {report.intervals(whole)}; {output.path} was not written", arguments.NOT_PROVED)
         if output.picture:
             self._draw(output, joined(found.values()), joined(references), tolerance, size)
-            self._say(f"drew {output.picture.path}", self._end_stage("picture"))
+            say(f"drew {output.picture.path}", self.stages.end("picture"))
         return whole
 
     def _export(self, output, objects):

@@ -3,7 +3,7 @@
 
 import time
 
-from ..shared.command.arguments import NOT_PROVED, Stop, file_name, in_units, length, whole_number
+from ..shared.command.arguments import NOT_PROVED, file_name, in_units, length, require_within_size, whole_number
 from ..shared.proof import measure, report
 from ..shared.proof.verdict import Verdict
 from . import mesh_files
@@ -38,8 +38,7 @@ def check(options):
     surface, reference = (mesh_files.surface_of(file.objects[0]) for file in files)
     size = reference.size()
     tolerance = in_units(options.tolerance, size)
-    if tolerance > size:
-        raise Stop(f"--tolerance: {tolerance:.6g} is more than the size of the reference, {size:.6g}")
+    require_within_size(tolerance, size)
     pairs = [(each.world(), each.arrays.triangles) for each in (surface, reference)]
     ways = mesh_files.followed(
         "measuring", lambda progress: measure.both_ways(*pairs, tolerance, options.threads, progress)

@@ -6,13 +6,13 @@ import contextlib
 import json
 import re
 import shutil
-import time
 from pathlib import Path
 
 import numpy as np
 
 from ..shared import package
-from ..shared.command.arguments import Stop, file_name, in_units
+from ..shared.command.arguments import Stop, file_name, in_units, require_within_size
+from ..shared.command.stages import Stages, say
 from ..shared.errors import NotProved, NotWritten
 from ..shared.files import safe_files
 from ..shared.proof import report, solidity
@@ -115,8 +115,7 @@ def decimate(options):
 class _Run:
     def __init__(self, options, staged):
         self.options, self.staged = options, staged
-        self.began = self.last_stage_ended = time.perf_counter()
-        self.seconds = {}
+        self.stages = Stages()
         for path in (options.input, options.output):
             if Path(path).suffix.lower() not in mapped.EXTENSIONS:
                 raise Stop(
@@ -141,11 +140,10 @@ class _Run:
         lower, upper = np.array(box.lower, np.float64), np.array(box.upper, np.float64)
         size = float(np.linalg.norm(upper - lower))
         tolerance = in_units(self.options.tolerance, size)
-        if tolerance > size:
-            raise Stop(f"--tolerance: {tolerance:.6g} is more than the size of the reference, {size:.6g}")
+        require_within_size(tolerance, size)
         if mesh.dtype == np.float64 and self.target.place.suffix.lower() == ".stl":
             raise Stop(f"{self.target.name}: IN holds float64 coordinates, which .stl would round: use .ply for OUT")
-        self._say(f"IN {self.options.input}: {mesh.count:,} triangles", self._end_stage("read"))
+        say(f"IN {self.options.input}: {mesh.count:,} triangles", self.stages.end("read"))
         plan = Plan(mesh, tolerance, self.options.memory)
         self._require_space(mesh)
         scratch = Scratch(self.scratch, self._asked(mesh, tolerance), self.options.resume)
@@ -154,7 +152,7 @@ class _Run:
         try:
             with workers as self._in_cells:
                 result = Rounds(mesh, plan, scratch, tolerance, self._native_options(), self._each).run()
-            whole = self._report(mesh, plan, result, tolerance, size)
+            whole = self._report(mesh, result, tolerance, size)
             if not report.proved(whole):
                 raise NotProved(f"{report.intervals(whole)}; {self.options.output} was not written")
             self._write(result, whole)
@@ -201,23 +199,12 @@ class _Run:
             **{f"--{name.replace('_', '-')}": value for name, value in options.items()},
         }
 
-    def _each(self, title, work, jobs):
-        yield from (here if title == "reading" else self._in_cells)(title, work, jobs)
-        stage = "read" if title == "reading" else "certify" if title == "certifying" else "decimation"
-        self._say(title, self._end_stage(stage))
+    def _each(self, stage, title, work, jobs):
+        # A file is read where the command runs.
+        yield from (here if stage == "read" else self._in_cells)(title, work, jobs)
+        say(title, self.stages.end(stage))
 
-    def _end_stage(self, stage):
-        """Adds the time since the end of the stage before to `stage`, and returns it."""
-        now = time.perf_counter()
-        took, self.last_stage_ended = now - self.last_stage_ended, now
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + took
-        return took
-
-    @staticmethod
-    def _say(text, took):
-        print(f"{text}, {report.duration(took)}", flush=True)
-
-    def _report(self, mesh, plan, result, tolerance, size):
+    def _report(self, mesh, result, tolerance, size):
         found = solidity.facts(mesh_files.surface_of(_mesh(result)), self.options.threads)
         print(f"{self.target.place.name}: {solidity.line(found)}")
         return {
@@ -235,9 +222,7 @@ class _Run:
             "target_triangles": 0,
             "stopped_by": "tolerance",
             "memory": self.options.memory,
-            "rounds": [
-                {"cells": len(cells.boxes), "triangles": count} for cells, count in zip(plan.rounds, result.counts)
-            ],
+            "rounds": [{"cells": cells, "triangles": triangles} for cells, triangles in result.rounds],
             "forward": [result.forward.lower, result.forward.upper],
             "backward": [result.backward.lower, result.backward.upper],
             "outside": {"faces": 0, "first": None},
@@ -261,8 +246,8 @@ class _Run:
         written = mesh_files.read(file).objects[0]
         if not np.array_equal(written.vertices[written.triangles], result.vertices[result.triangles]):
             raise NotWritten(f"{self.target.name}: the written file differs from the result; check the disk")
-        self._end_stage("write")
-        whole["seconds"] = {**self.seconds, "total": time.perf_counter() - self.began}
+        self.stages.end("write")
+        whole["seconds"] = {**self.stages.seconds, "total": sum(self.stages.seconds.values())}
         if self.report:
             self.staged.write(self.report, (json.dumps(whole, indent=1) + "\n").encode())
         self.staged.add(self.target, file)

@@ -50,10 +50,11 @@ class Plan:
     def _cells(self, of_each, turn):
         """Returns the fewest Cells whose triangles fit, with those within the tolerance of the cell."""
         most = self._most(of_each)
-        wanted = most or _SMALL  # The need of small cells is told where not even FIXED is there.
+        # Where not even FIXED is there, no cells will do, and the need of small ones is told.
+        wanted, finest = (most, _FINEST) if most else (_SMALL, 1)
         least = self._triangles(self._near_places())
         if least <= wanted:
-            cells, least = self._small_enough(wanted, turn)
+            cells, least = self._small_enough(wanted, finest, turn)
             if least <= most:
                 return cells
         needed = (FIXED + least * of_each) / 1e6
@@ -62,10 +63,10 @@ class Plan:
             f"least {needed:,.0f} MB"
         )
 
-    def _small_enough(self, wanted, turn):
+    def _small_enough(self, wanted, finest, turn):
         """Returns (the fewest Cells with at most `wanted` triangles in each, the most in one), or (None, more than wanted)."""
         count = min(-(-self.count // wanted), len(self.points))
-        limit, least = min(_FINEST * count, len(self.points)), math.inf
+        limit, least = min(finest * count, len(self.points)), math.inf
         while True:
             cells = Cells(self.points, count, turn)
             largest = self._triangles(cells.near(self.points, self._tolerance))

@@ -17,23 +17,22 @@ from .soups import Soup
 from .tile import Tile
 
 _PARTS = 8  # soups of the reference for each cell of the first round
-_LEAST_GAIN = (
-    0.01  # There is no further round of several cells after one that removes a smaller share of the triangles.
-)
+# There is no further round of several cells after one that removes a smaller share of the triangles.
+_LEAST_GAIN = 0.01
 
 
 @dataclass(frozen=True)
 class Result:
     """A mesh, and what was measured of it.
 
-    vertices: (n, 3) of the file's dtype, one at each position; triangles: (m, 3) int32; counts: the triangles after each round;
-    forward, backward: Intervals; angle: the largest angle in degrees between a face and its witnesses, or None if some face has
-    no angle; warnings: sentences, each once.
+    vertices: (n, 3) of the file's dtype, one at each position; triangles: (m, 3) int32; rounds: (the number of cells, the
+    triangles after it) for each round that was made; forward, backward: Intervals; angle: the largest angle in degrees between a
+    face and its witnesses, or None if some face has no angle; warnings: sentences, each once.
     """
 
     vertices: np.ndarray
     triangles: np.ndarray
-    counts: tuple
+    rounds: tuple
     forward: Interval
     backward: Interval
     angle: float | None
@@ -54,7 +53,11 @@ def needed_space(mesh):
 
 
 class Rounds:
-    """A run. `each(title, function, jobs)` yields function(job, progress) for all jobs in their order, and shows the progress."""
+    """A run. `each(stage, title, function, jobs)` yields function(job, progress) for all jobs, and shows the progress.
+
+    The stage is "read", whose jobs are to be done here and in their order, "decimation" or "certify". The jobs of these are for
+    any process, in any order.
+    """
 
     def __init__(self, mesh, plan, folder, tolerance, options, each):
         self._mesh, self._plan, self._scratch, self._each = mesh, plan, folder, each
@@ -63,30 +66,31 @@ class Rounds:
     def run(self):
         """Returns the Result. Raises NotWritten where the scratch folder is full, after which the run can go on."""
         reference = present = self._reference()
-        counts, angles, warnings = [], [0.0], {}
+        made, angles, warnings = [], [0.0], {}
         rounds = self._plan.rounds
         for number, cells in enumerate(rounds):
-            if len(counts) > 1 and len(cells.boxes) > 1 and counts[-1] > (1 - _LEAST_GAIN) * counts[-2]:
+            if len(made) > 1 and len(cells.boxes) > 1 and made[-1][1] > (1 - _LEAST_GAIN) * made[-2][1]:
                 continue
             # The first of several rounds leaves so many triangles between the cells that a thorough search is in vain.
             options = self._options if number or len(rounds) == 1 else {**self._options, "effort": "fast"}
             like = Tile(None, present, reference, self._tolerance, options, self._plan.grid_memory())
             title = f"round {number + 1} of {len(rounds)}"
-            done = self._steps(title, f"round{number}", decimate, like, cells)
-            present = tuple(Soup.read_from(record["soup"]) for record in done)
+            done = self._steps("decimation", title, f"round{number}", decimate, like, cells)
+            before, present = present, tuple(Soup.read_from(record["soup"]) for record in done)
+            if before != reference:
+                self._scratch.remove_soups(before)
             angles += [record["angle"] for record in done]
             warnings |= dict.fromkeys(text for record in done for text in record["warnings"])
-            counts.append(sum(soup.count for soup in present))
-            self._scratch.remove_soups(f"round{number - 1}_")
+            made.append((len(cells.boxes), sum(soup.count for soup in present)))
         vertices, triangles = tile.mesh_of(np.concatenate([soup.corners() for soup in present]))
         like = Tile(None, present, reference, self._tolerance, self._options)
-        measured = self._steps("certifying", "measured", measure, like, rounds[-1])
+        measured = self._steps("certify", "certifying", "measured", measure, like, rounds[-1])
         forward, backward = (
             Interval(max(record[way][0] for record in measured), max(record[way][1] for record in measured))
             for way in ("forward", "backward")
         )
         angle = None if None in angles else max(angles)
-        return Result(vertices, triangles, tuple(counts), forward, backward, angle, tuple(warnings))
+        return Result(vertices, triangles, tuple(made), forward, backward, angle, tuple(warnings))
 
     def _reference(self):
         """Returns the soups of the triangles of the file, each of a part of space."""
@@ -102,20 +106,20 @@ class Rounds:
             for writer, begin, end in zip(writers, ends, ends[1:]):
                 writer.add(corners[order[begin:end]])
 
-        for _ in self._each("reading", write, self._mesh.blocks()):
+        for _ in self._each("read", "reading", write, self._mesh.blocks()):
             pass
         self._mesh.require_unchanged()
         found = tuple(writer.end() for writer in writers)
         self._scratch.keep("reference", {"soups": [soup.record() for soup in found]})
         return found
 
-    def _steps(self, title, name, work, like, cells):
+    def _steps(self, stage, title, name, work, like, cells):
         """Returns the records of the work in all cells, and does what has none yet."""
         jobs = [
             (replace(like, cell=box), str(self._scratch.path(f"{name}_{i:05}"))) for i, box in enumerate(cells.boxes)
         ]
         missing = [job for i, job in enumerate(jobs) if self._scratch.record(f"{name}_{i:05}") is None]
-        for _ in self._each(title, work, missing):
+        for _ in self._each(stage, title, work, missing):
             pass
         return [self._scratch.record(f"{name}_{i:05}") for i in range(len(jobs))]
 

@@ -85,11 +85,10 @@ class Scratch:
         """Notes that a step is done."""
         keep(self.path(name), record)
 
-    def remove_soups(self, prefix):
-        """Removes the soups of the steps whose names begin with `prefix`. Their records stay, so that no step is done again."""
-        for path in self.folder.glob(f"{prefix}*"):
-            if path.suffix != ".json":
-                path.unlink(missing_ok=True)
+    def remove_soups(self, soups):
+        """Removes the files of soups. The records of their steps stay, so that no step is done again."""
+        for soup in soups:
+            Path(soup.path).unlink(missing_ok=True)
 
     def close(self, discard):
         """Lets others use the folder. discard: whether the run is done, so that the folder is removed."""
