@@ -44,7 +44,7 @@ struct BoundedMeshInput {
   std::vector<bool> joined;          ///< For each vertex: an edge of it lies on edges of other sheets. May be empty.
   std::vector<glm::uvec3> wedges;    ///< For each corner: equal at a vertex where attributes are equal. May be empty.
   bool subset = false;               ///< Every surviving vertex keeps its position.
-  /// Vertices move strictly inside this box of stored positions alone.
+  /// A vertex that moves may be put only strictly inside this box of stored positions.
   Box cell{glm::dvec3(-std::numeric_limits<double>::infinity()), glm::dvec3(std::numeric_limits<double>::infinity())};
   /// Rounds a position in the frame to what can be stored.
   std::function<VertexPosition(const glm::dvec3&)> store;

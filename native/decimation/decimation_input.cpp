@@ -34,7 +34,7 @@ void check(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> tri
   }
   require_normal_angle(options.max_normal_angle);
   if (options.cell && (!volume || !options.two_sided || options.baseline)) {
-    throw InvalidInput("a cell needs a volume and both directions");
+    throw InvalidInput("a cell needs a volume and two_sided=True");
   }
   if (!options.wedges.empty() && options.wedges.size() != 3 * triangles.size()) {
     throw InvalidInput("wedges must have one label for each corner of each triangle");

@@ -152,11 +152,11 @@ vertices : (n, 3) float32 or float64 array
 triangles : (m, 3) integer array
 tolerance : float
     A positive length in world units, at most the diagonal of the reference.
-grid_memory : int, optional
-    The most bytes that the grid of distances takes if no precision is given: its precision is the finest of 1, 1/2, 1/4,
-    ... that fits. None, and any number above, is 256 MiB. Less makes proofs slower, and no verdict wrong.
 precision : float, optional
-    Grid nodes per tolerance. None takes the finest of 1, 1/2, 1/4, ... that fits 256 MB.
+    Grid nodes per tolerance. None takes the finest of 1, 1/2, 1/4, ... whose grid fits grid_memory.
+grid_memory : int, optional
+    The most bytes that the grid takes if no precision is given. None, and any number above, is 256 MiB. Less makes proofs
+    slower, and no verdict wrong.
 field : {"scatter", "fast_marching"}
     What fills the grid: exact distances, or the method of the paper, which is signed, for comparison.
 to_world, threads, progress
