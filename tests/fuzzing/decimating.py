@@ -46,6 +46,11 @@ def draw_decimate(rng, case):
     if rng.random() < 0.05 and not options.get("moved"):
         options["free"] = True
         options.setdefault("target_triangles", int(rng.integers(1, len(case.triangles) + 2)))
+    # This comes last, so that it changes nothing else of a case.
+    if options["two_sided"] and not options.get("moved") and not options.get("free") and n and rng.random() < 0.1:
+        lower, upper = case.vertices.min(0).astype(float), case.vertices.max(0).astype(float)
+        margin = 0.1 * ((upper - lower).max() or 1.0)
+        options["cell"] = np.sort(rng.uniform(lower - margin, upper + margin, (2, 3)), axis=0).tolist()
 
 
 def decimate(run):
@@ -63,6 +68,7 @@ def decimate(run):
             "target_triangles",
             "outside",
             "crossings",
+            "cell",
         )
         if name in options
     }
@@ -105,6 +111,8 @@ def _judge_decimation(run, result, vertices, triangles, volume, given, side):
             raise Finding("wedges", f"{crossing.sum()} corners take their attributes from across a seam")
     if "locked" in given:
         _judge_locked(result, vertices, triangles, given["locked"])
+    if "cell" in given:
+        _judge_cell(result, vertices, triangles, np.array(given["cell"]))
 
     if volume is None:
         return
@@ -134,6 +142,18 @@ def _judge_decimation(run, result, vertices, triangles, volume, given, side):
     judges.connected_alike(run, before, after, joins)
     if not given["two_sided"] and vertices is case.vertices and not joins:
         judges.rims_alike(run, reference, (placed, result.triangles), case.tolerance)
+
+
+def _judge_cell(result, vertices, triangles, cell):
+    """Faces that are not strictly inside the cell are as they were, and what becomes of the others is inside."""
+    corners, before = result.vertices[result.triangles], vertices[triangles[result.triangle_source]]
+    inside = ((before > cell[0]) & (before < cell[1])).all((1, 2))
+    # -0.0 may have become 0.0, which is the same place. A face may begin at another corner.
+    turned = (np.roll(before[~inside], k, axis=1) for k in range(3))
+    if not np.any([(corners[~inside] == one).all((1, 2)) for one in turned], axis=0).all():
+        raise Finding("cell", "a face that reaches out of the cell is not as it was")
+    if not ((corners[inside] > cell[0]) & (corners[inside] < cell[1])).all():
+        raise Finding("cell", "a face has left the cell")
 
 
 def _judge_locked(result, vertices, triangles, locked):

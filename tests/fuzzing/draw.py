@@ -16,7 +16,9 @@ def case_of(seed, number):
     rng = np.random.default_rng([seed, number])
     # Small meshes find as many failures as large ones in less time. A twentieth of the meshes are large enough to be slow.
     most = np.log10(kinds.MAX_FACES) if rng.random() < 0.05 else 3.5
-    kind, vertices, triangles = kinds.draw(rng, int(10 ** rng.uniform(0, most)))
+    kind, vertices, triangles = kinds.draw(
+        rng, np.random.default_rng([seed, number, 1]), int(10 ** rng.uniform(0, most))
+    )
     names = list(operations.OPERATIONS)
     weights = np.array([LIKELY.get(name, 1) for name in names], float)
     case = Case(kind, str(rng.choice(names, p=weights / weights.sum())), vertices, triangles, tolerance=1.0)
