@@ -191,7 +191,7 @@ _OTHERS = {
     ("addon/shared/proof/deviation_drawings.py", "abs(lower)"),  # the bars of the histogram that are striped
     ("addon/operators/modifiers.py", "largest > self.tolerance"),  # where sampling ends; the proof decides afterwards
     ("addon/estimate/curve.py", ""),  # the order of tolerances on a curve
-    ("addon/shared/command/decimate.py", "tolerance > size"),  # an argument that makes no sense
+    ("addon/shared/command/arguments.py", "tolerance > size"),  # an argument that makes no sense
     ("addon/shared/command/file_report.py", "left <= target"),  # numbers of triangles
     ("addon/shared/command/decimate.py", "tolerance <= found[i - 1]"),  # the order of the levels
 }

@@ -2,6 +2,7 @@
 """Does the work in all cells of a round: in this process, or as tasks of Dask."""
 
 import contextlib
+import logging
 import re
 
 from ..shared import package
@@ -11,6 +12,9 @@ from .progress_bar import counted, followed
 _GO_ON = "what is done is kept: go on with --resume"
 # A task whose worker dies is done anew so many times.
 _MOST_DEATHS = 10
+# What the worker processes of this machine log, which they read when they start. A worker that is ended in the middle of a
+# heartbeat logs an error after all is done; the command says itself where a task fails.
+_LOGGED = "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED"
 
 
 def here(title, work, jobs):
@@ -38,11 +42,15 @@ def dask(scheduler):
     from distributed import Client, LocalCluster
 
     with contextlib.ExitStack() as stack:
-        stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": _MOST_DEATHS}))
+        stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": _MOST_DEATHS, _LOGGED: "critical"}))
         if count := local_count(scheduler):
             # The native code has its own idea of the memory: a worker is not stopped for it.
             cluster = LocalCluster(
-                n_workers=count, threads_per_worker=1, memory_limit=None, dashboard_address="127.0.0.1:0"
+                n_workers=count,
+                threads_per_worker=1,
+                memory_limit=None,
+                dashboard_address="127.0.0.1:0",
+                silence_logs=logging.CRITICAL,
             )
             scheduler = stack.enter_context(cluster)
         try:
