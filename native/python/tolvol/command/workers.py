@@ -42,7 +42,9 @@ def dask(scheduler):
     from distributed import Client, LocalCluster
 
     with contextlib.ExitStack() as stack:
-        stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": _MOST_DEATHS, _LOGGED: "critical"}))
+        stack.enter_context(
+            dask.config.set({"distributed.scheduler.allowed-failures": _MOST_DEATHS, _LOGGED: "critical"})
+        )
         if count := local_count(scheduler):
             # The native code has its own idea of the memory: a worker is not stopped for it.
             cluster = LocalCluster(
