@@ -17,13 +17,20 @@ constexpr double kFoldCosine = 0.2;
 
 double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
+/// Whether the vertices are neighbours. O(faces around the one that has fewer), because both are walked around in turn.
+bool are_neighbours(const OpenMesh::TriConnectivity& mesh, OpenMesh::VertexHandle a, OpenMesh::VertexHandle b) {
+  auto around_a = mesh.cvv_iter(a), around_b = mesh.cvv_iter(b);
+  for (; around_a.is_valid() && around_b.is_valid(); ++around_a, ++around_b) {
+    if (*around_a == b || *around_b == a) return true;
+  }
+  return false;
+}
+
 /// Whether the vertices are neighbours, or have one in common other than `end`.
 bool have_common_neighbour(const OpenMesh::TriConnectivity& mesh, OpenMesh::VertexHandle a, OpenMesh::VertexHandle b,
                            std::uint32_t end) {
   return std::ranges::any_of(mesh.vv_range(a), [&](const auto& near) {
-    if (near == b) return true;
-    return near != BoundedMesh::handle(end) &&
-           std::ranges::any_of(mesh.vv_range(b), [&](const auto& v) { return v == near; });
+    return near == b || (near != BoundedMesh::handle(end) && are_neighbours(mesh, near, b));
   });
 }
 
@@ -136,11 +143,11 @@ bool Change::link_condition(Halfedge h) {
       return false;
   }
   if (apex[0] == apex[1]) return false;
-  neighbours_.clear();
-  for (const auto v : mesh.vv_range(v1)) neighbours_.push_back(v.idx());
-  for (const auto v : mesh.vv_range(v0)) {
-    if (v.idx() == apex[0] || v.idx() == apex[1]) continue;
-    if (std::find(neighbours_.begin(), neighbours_.end(), v.idx()) != neighbours_.end()) return false;
+  const bool fewer = mesh_->faces_around(mesh_->from(h)) <= mesh_->faces_around(mesh_->to(h));
+  const auto end = fewer ? v0 : v1, other_end = fewer ? v1 : v0;
+  for (const auto v : mesh.vv_range(end)) {
+    const bool is_apex = v == other_end || v.idx() == apex[0] || v.idx() == apex[1];
+    if (!is_apex && are_neighbours(mesh, v, other_end)) return false;
   }
   // Two places of a boundary may not be joined across the inside.
   return !(mesh.is_boundary(v0) && mesh.is_boundary(v1) && !mesh.is_boundary(h) && !mesh.is_boundary(o));

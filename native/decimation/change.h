@@ -104,7 +104,6 @@ class Change {
   std::vector<Coverage::Removed> removed_;
   std::vector<int> vanishing_;  ///< The faces that the collapses remove; negative numbers at a boundary.
   std::vector<NewWedge> new_wedges_;
-  std::vector<int> neighbours_;
   std::vector<std::uint32_t> apexes_, around_;
 };
 

@@ -190,6 +190,7 @@ std::vector<std::uint32_t> CollapseLoop::with_next(std::uint32_t edge) {
   std::vector<CollapseQueue::Entry> next;
   ++batches_;
   reserved_boxes_.clear();
+  crowd_in_batch_ = false;
   reserve_around(edge);
   while (next.size() + 1 < most) {
     const auto entry = queue_.pop();
@@ -213,6 +214,11 @@ void CollapseLoop::reserve_around(std::uint32_t edge) {
   for (const std::uint32_t end : {mesh_.from(h), mesh_.to(h)}) {
     // Edges that come one after another often share an end that has many neighbours.
     if (std::exchange(surrounded_[end], batches_) == batches_) continue;
+    reserved_[end] = batches_;
+    if (mesh_.faces_around(end) > kGreatMany) {
+      crowd_in_batch_ = true;
+      continue;
+    }
     for (const auto near : connectivity.vv_range(BoundedMesh::handle(end))) {
       reserved_[static_cast<std::size_t>(near.idx())] = batches_;
     }
@@ -221,10 +227,22 @@ void CollapseLoop::reserve_around(std::uint32_t edge) {
 
 bool CollapseLoop::reserved(std::uint32_t edge) const {
   const auto h = mesh_.connectivity().halfedge_handle(BoundedMesh::edge(edge), 0);
-  if (reserved_[mesh_.from(h)] == batches_ || reserved_[mesh_.to(h)] == batches_) return true;
+  for (const std::uint32_t end : {mesh_.from(h), mesh_.to(h)}) {
+    if (reserved_[end] == batches_ || is_next_to_crowd(end)) return true;
+  }
   if (!around_) return false;
   const Box box = box_around(edge);
   return std::ranges::any_of(reserved_boxes_, [&](const Box& other) { return meet(box, other); });
+}
+
+/// Whether the vertex may be next to an end, of an edge of the batch, that has a great many neighbours.
+bool CollapseLoop::is_next_to_crowd(std::uint32_t vertex) const {
+  if (!crowd_in_batch_) return false;
+  if (mesh_.faces_around(vertex) > kGreatMany) return true;
+  return std::ranges::any_of(mesh_.connectivity().vv_range(BoundedMesh::handle(vertex)), [&](const auto& near) {
+    const auto end = static_cast<std::uint32_t>(near.idx());
+    return surrounded_[end] == batches_ && mesh_.faces_around(end) > kGreatMany;
+  });
 }
 
 /// A box of stored positions around the faces at the ends of the edge; around everything where these are a great many.

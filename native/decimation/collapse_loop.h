@@ -88,6 +88,7 @@ class CollapseLoop {
   void try_now(std::uint32_t edge, Tried& tried);
   void reserve_around(std::uint32_t edge);
   bool reserved(std::uint32_t edge) const;
+  bool is_next_to_crowd(std::uint32_t vertex) const;
   Box box_around(std::uint32_t edge) const;
   void carry_out(std::uint32_t edge, Tried& tried);
   std::unique_ptr<Attempt> take_attempt();
@@ -114,6 +115,8 @@ class CollapseLoop {
   std::vector<std::uint32_t> reserved_;
   std::vector<Box> reserved_boxes_;        ///< The boxes of space, in the last batch, in which a face could change so.
   std::vector<std::uint32_t> surrounded_;  ///< And the last batch in which its neighbours were noted so.
+  /// Whether an end of an edge of the last batch has a great many neighbours, which are then not noted.
+  bool crowd_in_batch_ = false;
   std::uint32_t batches_ = 0;              ///< The number of batches so far.
   std::vector<std::uint32_t> ring_;        ///< The neighbours of the vertex that vanished last.
   /// The crowds by vertex: those with many faces around them where a try was refused.

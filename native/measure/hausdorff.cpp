@@ -68,6 +68,13 @@ constexpr std::size_t kChunk = 16384, kBlock = 64, kBatch = 512, kSmallBlock = 8
 // The budget, in pieces. An edge of b that crosses a triangle of a costs a few pieces, so that a subdivided copy needs
 // about ten for each of its triangles. A piece costs 1 us and, while it waits, 100 bytes.
 constexpr std::size_t kPieces = 4'000'000, kPiecesPerTriangle = 16;
+// After this many pieces the search is content with less: the width that is narrow grows, by kGap of the bound for as
+// many pieces again. Nearly all searches are at their end before that, those between a surface and its subdivided copy
+// among them. Needles that lie on one another would need a million pieces to show that nothing but rounding is between
+// them.
+constexpr std::size_t kPatience = 20'000, kPatiencePerTriangle = 8;
+// Stands for the bound where there is none, in frame lengths.
+constexpr double kWithoutBound = 1e-3;
 
 struct Piece {
   std::array<dvec3, 3> corner;
@@ -128,7 +135,12 @@ dvec3 without(const dvec3& v, const dvec3& direction) {
 class Search {
  public:
   Search(const TriangleMesh& a, const TriangleMesh& b, double bound, const HausdorffOptions& options)
-      : a_(a), b_(b), hierarchy_(b), bound_(bound), options_(options) {}
+      : a_(a),
+        b_(b),
+        hierarchy_(b),
+        bound_(bound),
+        options_(options),
+        patience_(kPatience + kPatiencePerTriangle * (a.triangles.size() + b.triangles.size())) {}
 
   void run() {
     const std::size_t budget = kPieces + kPiecesPerTriangle * a_.triangles.size();
@@ -144,9 +156,15 @@ class Search {
  private:
   /// Pieces whose upper bound is no larger than this need no more work.
   double cutoff() const {
-    const double narrow = lower_ / (1 - kGap);
+    const double narrow = std::max(lower_ / (1 - kGap), lower_ + growth());
     if (lower_ > bound_) return std::max(narrow, lower_ + kNoise);
     return std::max(options_.narrow ? std::min(bound_, narrow) : bound_, lower_ + kNoise);
+  }
+
+  /// Returns the width that has become narrow because the search takes long.
+  double growth() const {
+    const double beyond = double(pieces_) / double(patience_) - 1;
+    return beyond <= 0 ? 0 : kGap * beyond * (bound_ < kInfinity ? bound_ : kWithoutBound);
   }
 
   std::array<dvec3, 3> corners(const TriangleMesh& mesh, std::uint32_t i) const {
@@ -369,6 +387,7 @@ class Search {
   Hierarchy hierarchy_;
   double bound_;
   const HausdorffOptions& options_;
+  const std::size_t patience_;  // in pieces
   std::vector<Waiting> queue_;  // is a heap with the largest upper bound in front
   std::vector<Piece> store_;    // holds the pieces of the queue, at places that are not in `free_`
   std::vector<std::uint32_t> free_;
