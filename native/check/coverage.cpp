@@ -24,6 +24,8 @@ constexpr std::size_t kBudget = 1 << 12;
 // the headroom below the tolerance, so that it finds witnesses again for a mesh that kept within the headroom. Once a
 // point of a triangle is known to be beyond the tolerance, it goes no deeper than a change does.
 constexpr std::size_t kBudgetOfElement = 64, kBudgetOfFirst = 1 << 16;
+// It looks at so many parts of any such triangle, and at so many more as above for all of them together.
+constexpr std::size_t kBudgetOfBeyond = 64;
 // The budget grows by this many pieces for each piece that a change places.
 constexpr std::size_t kBudgetOfPiece = 4;
 // A triangle of so many pieces, all of which lose their witness, is placed as a whole even if each piece has a budget.
@@ -41,6 +43,8 @@ FourPoints with_centre(const Part& part) {
   points.set(a, b, c, (a + b + c) * (1.0 / 3));
   return points;
 }
+
+bool take(std::size_t& budget) { return budget > 0 && budget-- > 0; }
 
 TriangleMesh mesh_of(std::span<const Coverage::Element> elements) {
   TriangleMesh mesh;
@@ -60,6 +64,7 @@ Coverage::Coverage(const TriangleMesh& reference, double limit, std::size_t elem
       limit2_(limit * limit),
       lists_(element_count),
       budget_of_first_(kBudgetOfFirst + kBudgetOfElement * element_count),
+      budget_of_beyond_(budget_of_first_),
       split_into_(reference.triangles.size()) {}
 
 Part Coverage::whole(std::uint32_t triangle) const {
@@ -114,8 +119,10 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
                             glm::dot(c[2] - centre, c[2] - centre)}));
     found_beyond = found_beyond || closest.distance > provable;
     const double floor = (found_beyond ? kFloor : kHeadroom) * limit_;
+    ++looked;
     const bool finest = longest_squared(piece) <= floor * floor || piece.cuts == kMostCuts ||
-                        (++looked > kBudget && (found_beyond || budget_of_first_ == 0 || --budget_of_first_ == 0));
+                        (found_beyond ? looked > kBudget || (looked > kBudgetOfBeyond && !take(budget_of_beyond_))
+                                      : looked > kBudget && !take(budget_of_first_));
     const bool is_beyond = closest.distance > provable + radius;
     if (is_beyond || finest) {
       if (!is_beyond) uncovered.in_part.push_back(piece);
