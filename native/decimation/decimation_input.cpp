@@ -174,27 +174,19 @@ Bounds* DecimationInput::set_bounds(Team& team) {
     element_of_.assign(triangles_.size(), kNone);
     for (std::uint32_t t = 0; t < cut_.triangle_input.size(); ++t) element_of_[cut_.triangle_input[t]] = t;
   }
-  certify_input(certificate);
-
   forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), limit,
                    volume_->refutable(mapping_error));
   CertifiedBounds::Directions directions{*forward_};
   if (options_.two_sided) {
     backward_.emplace(volume_->reference(), limit, cut_.triangles.size());
-    cover(provable);
     directions.backward = &*backward_;
   } else {
     // Open edges of the reference that were closed are no boundary any more.
     const bool is_own_boundary = own_count_ > 0 && !added_triangles_are_open();
     boundary_.emplace(*volume_, cut_, positions_, is_own_boundary, limit, provable, team);
-    for (const std::uint32_t v : boundary_->uncertified()) pin(v, "boundary not near the reference's boundary");
     if (boundary_->any()) {
       directions.boundary_forward = &boundary_->forward();
       directions.boundary_backward = &boundary_->backward();
-      // Edges that were cut count as boundary in the kernel, although they are none.
-      for (std::uint32_t v = 0; v < cut_.cause.size(); ++v) {
-        if (cut_.cause[v] == CutCause::non_manifold) pin(v, "non-manifold");
-      }
     }
   }
   facing_ = facing_rule(*volume_, mapping_error, options_.max_normal_angle, report_.warnings);
@@ -208,32 +200,52 @@ Bounds* DecimationInput::set_bounds(Team& team) {
     for (std::uint32_t& t : on_reference) t = is_of_reference(t) ? t : kNone;
   }
   certified_.emplace(directions, MeshView{cut_.triangles, positions_}, on_reference);
-  if (facing_ && own_count_ < triangles_.size()) face(provable, mapping_error, team);
+  // What is proved to face the reference is within the tolerance, so that nothing is proved twice.
+  std::vector<std::uint8_t> proved(cut_.triangles.size(), 0);
+  if (facing_ && own_count_ < triangles_.size()) proved = face(provable, mapping_error, team);
+  certify_input(certificate, proved);
+  // A face that is outside has no witness, and so no angle. It is counted as outside.
+  std::erase_if(exceeding_, [&](std::uint32_t t) { return exempt_[cut_.triangle_input[t]]; });
+  options_.two_sided ? cover(provable) : pin_boundary();
   return &*certified_;
 }
 
-/// Finds how the triangles that are none of the reference face it.
-void DecimationInput::face(double provable, double mapping_error, Team& team) {
+/// Pins what may not move where the boundary alone proves the direction from the reference.
+void DecimationInput::pin_boundary() {
+  for (const std::uint32_t v : boundary_->uncertified()) pin(v, "boundary not near the reference's boundary");
+  if (!boundary_->any()) return;
+  // Edges that were cut count as boundary in the kernel, although they are none.
+  for (std::uint32_t v = 0; v < cut_.cause.size(); ++v) {
+    if (cut_.cause[v] == CutCause::non_manifold) pin(v, "non-manifold");
+  }
+}
+
+/// Finds how the triangles that are none of the reference face it. Returns for each triangle of the manifold whether it
+/// is proved to be within the tolerance.
+std::vector<std::uint8_t> DecimationInput::face(double provable, double mapping_error, Team& team) {
   const TriangleCertificate start(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), provable,
                                   volume_->refutable(mapping_error));
+  InputFacing found;
   if (own_count_ == 0) {
-    exceeding_ = face_as_reference(cut_, positions_, start, volume_->hierarchy(), *facing_, team, *certified_);
+    found = face_as_reference(cut_, positions_, start, volume_->hierarchy(), *facing_, team, *certified_);
   } else {
     std::vector<std::uint32_t> added;
     for (std::uint32_t t = 0; t < cut_.triangle_input.size(); ++t) {
       if (!is_of_reference(cut_.triangle_input[t])) added.push_back(t);
     }
-    exceeding_ = keep_angles(cut_, positions_, start, *facing_, added, team, *certified_);
+    found = keep_angles(cut_, positions_, start, *facing_, added, team, *certified_);
   }
-  // A face that is outside has no witness, and so no angle. It is counted as outside.
-  std::erase_if(exceeding_, [&](std::uint32_t t) { return exempt_[cut_.triangle_input[t]]; });
+  exceeding_ = std::move(found.exceeding);
+  return std::move(found.proved);
 }
 
-/// Proves the triangles that are none of the reference.
-void DecimationInput::certify_input(const Certificate& certificate) {
+/// Proves the triangles that are none of the reference. `proved`: for each triangle of the manifold, whether it is so.
+void DecimationInput::certify_input(const Certificate& certificate, std::span<const std::uint8_t> proved) {
+  std::vector<std::uint8_t> is_proved(triangles_.size(), 0);
+  for (std::uint32_t t = 0; t < proved.size(); ++t) is_proved[cut_.triangle_input[t]] = proved[t];
   std::vector<std::uint32_t> asked, indices;
   for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
-    if (is_of_reference(i) || exempt_[i]) continue;
+    if (is_of_reference(i) || exempt_[i] || is_proved[i]) continue;
     const glm::uvec3& t = triangles_[i];
     asked.push_back(i);
     indices.insert(indices.end(), {t.x, t.y, t.z});

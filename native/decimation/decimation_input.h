@@ -105,10 +105,11 @@ class DecimationInput {
   bool is_of_reference(std::uint32_t i) const { return i < own_count_ && !is_piece(i); }
   bool added_triangles_are_open() const;
   Bounds* set_bounds(Team& team);
-  void certify_input(const Certificate& certificate);
+  void certify_input(const Certificate& certificate, std::span<const std::uint8_t> proved);
   void cover(double provable);
   void cover_divided(double provable);
-  void face(double provable, double mapping_error, Team& team);
+  std::vector<std::uint8_t> face(double provable, double mapping_error, Team& team);
+  void pin_boundary();
 
   std::span<const glm::dvec3> vertices_;
   std::span<const glm::uvec3> input_triangles_;

@@ -42,9 +42,9 @@ void face_as_cut(const CutMesh& cut, const Hierarchy& hierarchy, FacingRule& rul
   rule.bound_normals(hierarchy);
 }
 
-std::vector<std::uint32_t> face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> positions,
-                                             const TriangleCertificate& certificate, const Hierarchy& hierarchy,
-                                             const FacingRule& rule, Team& team, CertifiedBounds& bounds) {
+InputFacing face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> positions,
+                              const TriangleCertificate& certificate, const Hierarchy& hierarchy,
+                              const FacingRule& rule, Team& team, CertifiedBounds& bounds) {
   struct Place {
     double area = 0;  ///< Of the triangle, negative if all near it face against it, and 0 if some do and some do not.
     std::uint32_t below = kNone;  ///< The nearest triangle that faces as this one, or else the nearest one.
@@ -77,11 +77,13 @@ std::vector<std::uint32_t> face_as_reference(const CutMesh& cut, std::span<const
   return keep_angles(cut, positions, certificate, rule, all, team, bounds, below);
 }
 
-std::vector<std::uint32_t> keep_angles(const CutMesh& cut, std::span<const glm::dvec3> positions,
-                                       const TriangleCertificate& certificate, const FacingRule& rule,
-                                       std::span<const std::uint32_t> faces, Team& team, CertifiedBounds& bounds,
-                                       std::span<const std::uint32_t> hints) {
+InputFacing keep_angles(const CutMesh& cut, std::span<const glm::dvec3> positions,
+                        const TriangleCertificate& certificate, const FacingRule& rule,
+                        std::span<const std::uint32_t> faces, Team& team, CertifiedBounds& bounds,
+                        std::span<const std::uint32_t> hints) {
   std::vector<std::uint8_t> exceeds(faces.size(), 0);  // Threads would share bits.
+  InputFacing found;
+  found.proved.assign(cut.triangles.size(), 0);
   team.run(faces.size(), kBlock, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t f = faces[i];
@@ -97,6 +99,7 @@ std::vector<std::uint32_t> keep_angles(const CutMesh& cut, std::span<const glm::
         if (!question) return 0;
         if (certificate.verdict(corners, glm::dvec3(kAnywhere), hint, &*question) != Verdict::inside) return {};
         bounds.note_face(f, {bounds.face_bound(f).distance, question->angle()});
+        found.proved[f] = 1;
         return question->angle();
       };
       if (prove(rule.angle)) continue;
@@ -105,11 +108,10 @@ std::vector<std::uint32_t> keep_angles(const CutMesh& cut, std::span<const glm::
       bounds.set_rule(f, of_face);
     }
   });
-  std::vector<std::uint32_t> result;
   for (std::size_t i = 0; i < faces.size(); ++i) {
-    if (exceeds[i]) result.push_back(faces[i]);
+    if (exceeds[i]) found.exceeding.push_back(faces[i]);
   }
-  return result;
+  return found;
 }
 
 }  // namespace tolvol
