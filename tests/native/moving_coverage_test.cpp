@@ -6,6 +6,8 @@
 #include <memory>
 
 #include "check/tolerance_volume.h"
+#include "polls.h"
+#include "shapes.h"
 
 namespace {
 
@@ -63,6 +65,25 @@ TEST(MovingCoverage, ATipMayGoDownByTheToleranceAndNoFurther) {
   EXPECT_TRUE(scene.tried(kTip, {0, 0, -0.095}).empty());
   EXPECT_FALSE(scene.tried(kTip, {0, 0, -0.105}).empty());
   EXPECT_TRUE(scene.tried(kTip, {0, 0, -0.095}).empty()) << "a trial must change nothing";
+}
+
+// Beyond the tolerance there is no witness, however small the parts are.
+TEST(MovingCoverage, AStartFarFromTheReferenceTakesFewPartsOfATriangle) {
+  const TriangleMesh reference = shapes::squares(30, [](const dvec3& p) { return 20.0 * p; });
+  shapes::Random random(1);
+  TriangleMesh moved = reference;
+  for (dvec3& p : moved.vertices) p += 2 * kTolerance * random.point();
+  const StoredSpace space{glm::dmat4(1), Storage::float64};
+  const ToleranceVolume volume(reference.vertices, reference.triangles, space, kTolerance);
+  std::vector<std::uint32_t> faces;
+  for (const glm::uvec3& t : moved.triangles) faces.insert(faces.end(), {t.x, t.y, t.z});
+  MovingMesh moving(volume, space, faces, 3, moved.vertices.size(), 1);
+  moving.start(moved.vertices, 180, {}, nullptr);
+  const std::size_t polls = polls_of([&] {
+    const MovingCoverage coverage(moving, nullptr);
+    EXPECT_GT(coverage.uncovered().faces, reference.triangles.size() / 2);
+  });
+  EXPECT_LT(polls, 400 * reference.triangles.size());
 }
 
 TEST(MovingCoverage, StepsAddUp) {

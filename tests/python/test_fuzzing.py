@@ -205,3 +205,21 @@ def test_double_sheets_are_told_from_others():
     lies_on_another[:count] = lies_on_another[count + len(torus[1]) :][:count] = True
     assert np.array_equal(sheet >= 0, lies_on_another)
     assert len(np.unique(sheet[lies_on_another])) == 1
+
+
+@pytest.mark.parametrize(
+    ("seed", "number"),
+    [
+        (5012, 367),  # hausdorff() between needles whose planes differ by rounding
+        (5003, 124),  # the same, with float64
+        (5006, 281),  # hausdorff() from a few of a strip's needles to all of them
+        (5002, 339),  # deform() from two tolerances away, to the reference
+        (5010, 100),  # Guard from two tolerances away, needles
+    ],
+)
+def test_cases_that_took_very_long_once(seed, number):
+    watchdog = Watchdog()
+    try:
+        assert watchdog.run(draw.case_of(seed, number))[0] == "passed"
+    finally:
+        watchdog.close()
