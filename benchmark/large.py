@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measures the decimation of large meshes, whole and cell by cell: time, memory, triangles.
 
-build/command/bin/python benchmark/large.py [--triangles 1 4] [--tolerance 0.1%] [--memory 500MB] [--no-whole] [--folder DIR]
+build/command/bin/python benchmark/large.py [--triangles 1 4] [--tolerance 0.1% 1%] [--memory 500MB] [--no-whole]
+                                           [--folder DIR] [--write FILE.md]
 """
 
 import argparse
@@ -15,6 +16,7 @@ import time
 from pathlib import Path
 
 import planet
+import tables
 from machine import machine
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -24,7 +26,7 @@ RESULT = re.compile(r"result within (\S+) %, reference within (\S+) %")
 
 
 def run(source, folder, tolerance, extra):
-    """Runs `tolvol decimate`. Returns a row: seconds, seconds of the processor, peak memory in MB, triangles, and a text."""
+    """Runs `tolvol decimate`. Returns the cells of a row from the column "s" on."""
     out, report = folder / "out.ply", folder / "report.json"
     words = [
         sys.executable,
@@ -52,30 +54,52 @@ def run(source, folder, tolerance, extra):
     ends = RESULT.search(text.splitlines()[-1])
     rounds = " ".join(f"{one['cells']}:{one['triangles']:,}" for one in found.get("rounds", ()))
     return (
-        f"{took:.0f} | {used.ru_utime + used.ru_stime:.0f} | {used.ru_maxrss / 1000:,.0f} | "
-        f"{found['output']['triangles']:,} | {ends[1]} / {ends[2]} | {rounds}"
+        f"{took:.0f}",
+        f"{used.ru_utime + used.ru_stime:.0f}",
+        f"{used.ru_maxrss / 1000:,.0f}",
+        f"{found['output']['triangles']:,}",
+        f"{ends[1]} / {ends[2]}",
+        rounds,
     )
+
+
+HEADS = [
+    "Triangles",
+    "Tolerance",
+    "Memory",
+    "s",
+    "Of the processor, s",
+    "Peak, MB",
+    "Left",
+    "Within, %",
+    "Cells: left, round by round",
+]
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--triangles", type=float, nargs="+", default=[1, 4], help="millions")
-    parser.add_argument("--tolerance", default="0.1%")
+    parser.add_argument("--tolerance", nargs="+", default=["0.1%"])
     parser.add_argument("--memory", default="500MB")
     parser.add_argument("--no-whole", action="store_true", help="leave out the runs without --memory")
     parser.add_argument("--folder", help="for the files (default: a temporary folder)")
+    parser.add_argument("--write", metavar="FILE.md", help="put the table into this file")
     options = parser.parse_args()
-    print(f"{machine()}, tolerance {options.tolerance}\n")
-    print("| Triangles | Memory | s | Of the processor, s | Peak, MB | Left | Within, % | Cells:left, round by round |")
-    print("|---:|---|---:|---:|---:|---:|---|---|")
+    rows = []
     with tempfile.TemporaryDirectory(dir=options.folder) as folder:
         for millions in options.triangles:
             source = Path(folder) / "planet.ply"
             count = planet.write(source, planet.rows_of(millions * MILLION))
-            for memory in (options.memory,) if options.no_whole else ("", options.memory):
-                extra = ("--memory", memory) if memory else ()
-                row = run(source, Path(folder), options.tolerance, extra)
-                print(f"| {count:,} | {memory or 'whole'} | {row} |", flush=True)
+            for tolerance in options.tolerance:
+                for memory in (options.memory,) if options.no_whole else ("", options.memory):
+                    extra = ("--memory", memory) if memory else ()
+                    row = run(source, Path(folder), tolerance, extra)
+                    rows.append([f"{count:,}", tolerance, memory or "whole", *row])
+                    print(*rows[-1], sep=" | ", flush=True)
+    text = f"{machine()}.\n\n{tables.table(HEADS, rows, 'rllrrrrll')}"
+    print(text)
+    if options.write:
+        tables.write(options.write, "large meshes", text)
 
 
 if __name__ == "__main__":

@@ -101,7 +101,7 @@ class PullBack {
     double retreat = 0;        ///< The share of `factor_before` by which it went back for the reference or a crossing.
     double factor_before = 0;  ///< The factor before it did.
     bool kept_from_crossing = false;  ///< Whether it went back because of a crossing.
-    MovingMesh::Blame blame;
+    MovingMesh::Blame blame{};
     std::uint32_t colour = 0;
   };
 
