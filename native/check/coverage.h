@@ -108,8 +108,8 @@ class Coverage {
   const TriangleMesh* reference_;
   double limit_, limit2_;
   std::vector<List> lists_;
-  /// The number of parts that find_witnesses() may still look at beyond those of each triangle; and where a point of the
-  /// triangle is beyond the tolerance.
+  /// The number of parts that find_witnesses() may still look at beyond those of each triangle; and where a point of
+  /// the triangle is beyond the tolerance.
   std::size_t budget_of_first_, budget_of_beyond_;
   /// Counts for each triangle of the reference the pieces that it was split into, 0 while it is whole. Other threads
   /// may read a count while it changes, but it is never less than the number of pieces that exist.

@@ -117,8 +117,8 @@ class CollapseLoop {
   std::vector<std::uint32_t> surrounded_;  ///< And the last batch in which its neighbours were noted so.
   /// Whether an end of an edge of the last batch has a great many neighbours, which are then not noted.
   bool crowd_in_batch_ = false;
-  std::uint32_t batches_ = 0;              ///< The number of batches so far.
-  std::vector<std::uint32_t> ring_;        ///< The neighbours of the vertex that vanished last.
+  std::uint32_t batches_ = 0;        ///< The number of batches so far.
+  std::vector<std::uint32_t> ring_;  ///< The neighbours of the vertex that vanished last.
   /// The crowds by vertex: those with many faces around them where a try was refused.
   std::unordered_map<std::uint32_t, Crowd> crowds_;
   bool at_any_cost_ = false;  ///< Whether the spared edges were called back.
