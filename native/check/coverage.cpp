@@ -24,7 +24,7 @@ constexpr std::size_t kBudget = 1 << 12;
 // the headroom below the tolerance, so that it finds witnesses again for a mesh that kept within the headroom. Once a
 // point of a triangle is known to be beyond the tolerance, it goes no deeper than a change does.
 constexpr std::size_t kBudgetOfElement = 64, kBudgetOfFirst = 1 << 16;
-// It looks at so many parts of any such triangle, and at so many more as above for all of them together.
+// Of such a triangle it looks at this many parts. All such triangles share a further budget, as large as the one above.
 constexpr std::size_t kBudgetOfBeyond = 64;
 // The budget grows by this many pieces for each piece that a change places.
 constexpr std::size_t kBudgetOfPiece = 4;
@@ -44,7 +44,12 @@ FourPoints with_centre(const Part& part) {
   return points;
 }
 
-bool take(std::size_t& budget) { return budget > 0 && budget-- > 0; }
+/// Takes one from the budget, if there is any left.
+bool take(std::size_t& budget) {
+  if (budget == 0) return false;
+  --budget;
+  return true;
+}
 
 TriangleMesh mesh_of(std::span<const Coverage::Element> elements) {
   TriangleMesh mesh;

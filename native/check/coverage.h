@@ -57,7 +57,8 @@ class Coverage {
   };
   /// Finds witnesses for triangles of the reference, whose numbers ascend, among the triangles of a mesh. `ids[i]` is
   /// the element that triangle i of the mesh is, or kNone if it never changes. A piece farther than `provable` from all
-  /// triangles gets no witness. About 2 us a triangle.
+  /// triangles gets no witness; in a triangle with a point that far, a small part near the mesh may get none either.
+  /// About 2 us a triangle.
   Uncovered find_witnesses(std::span<const std::uint32_t> triangles, const TriangleMesh& mesh,
                            std::span<const std::uint32_t> ids, double provable, Progress* progress);
 
@@ -108,9 +109,9 @@ class Coverage {
   const TriangleMesh* reference_;
   double limit_, limit2_;
   std::vector<List> lists_;
-  /// The number of parts that find_witnesses() may still look at beyond those of each triangle; and where a point of
-  /// the triangle is beyond the tolerance.
-  std::size_t budget_of_first_, budget_of_beyond_;
+  /// The number of parts that find_witnesses() may still look at, when a triangle has taken its own share.
+  std::size_t budget_of_first_;
+  std::size_t budget_of_beyond_;  ///< The same for triangles with a point beyond the tolerance.
   /// Counts for each triangle of the reference the pieces that it was split into, 0 while it is whole. Other threads
   /// may read a count while it changes, but it is never less than the number of pieces that exist.
   std::vector<std::atomic<std::uint32_t>> split_into_;

@@ -146,8 +146,8 @@ bool Change::link_condition(Halfedge h) {
   const bool fewer = mesh_->faces_around(mesh_->from(h)) <= mesh_->faces_around(mesh_->to(h));
   const auto end = fewer ? v0 : v1, other_end = fewer ? v1 : v0;
   for (const auto v : mesh.vv_range(end)) {
-    const bool is_apex = v == other_end || v.idx() == apex[0] || v.idx() == apex[1];
-    if (!is_apex && are_neighbours(mesh, v, other_end)) return false;
+    const bool may_be_near_both = v == other_end || v.idx() == apex[0] || v.idx() == apex[1];
+    if (!may_be_near_both && are_neighbours(mesh, v, other_end)) return false;
   }
   // Two places of a boundary may not be joined across the inside.
   return !(mesh.is_boundary(v0) && mesh.is_boundary(v1) && !mesh.is_boundary(h) && !mesh.is_boundary(o));

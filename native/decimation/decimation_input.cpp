@@ -200,7 +200,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
     for (std::uint32_t& t : on_reference) t = is_of_reference(t) ? t : kNone;
   }
   certified_.emplace(directions, MeshView{cut_.triangles, positions_}, on_reference);
-  // What is proved to face the reference is within the tolerance, so that nothing is proved twice.
+  // What is proved to face the reference is within the tolerance, and is not proved again.
   std::vector<std::uint8_t> proved(cut_.triangles.size(), 0);
   if (facing_ && own_count_ < triangles_.size()) proved = face(provable, mapping_error, team);
   certify_input(certificate, proved);
@@ -225,15 +225,17 @@ void DecimationInput::pin_boundary() {
 std::vector<std::uint8_t> DecimationInput::face(double provable, double mapping_error, Team& team) {
   const TriangleCertificate start(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), provable,
                                   volume_->refutable(mapping_error));
+  Progress* const progress = options_.progress;
+  if (progress) progress->begin("checking");
   InputFacing found;
   if (own_count_ == 0) {
-    found = face_as_reference(cut_, positions_, start, volume_->hierarchy(), *facing_, team, *certified_);
+    found = face_as_reference(cut_, positions_, start, volume_->hierarchy(), *facing_, team, *certified_, progress);
   } else {
     std::vector<std::uint32_t> added;
     for (std::uint32_t t = 0; t < cut_.triangle_input.size(); ++t) {
       if (!is_of_reference(cut_.triangle_input[t])) added.push_back(t);
     }
-    found = keep_angles(cut_, positions_, start, *facing_, added, team, *certified_);
+    found = keep_angles(cut_, positions_, start, *facing_, added, team, *certified_, progress);
   }
   exceeding_ = std::move(found.exceeding);
   return std::move(found.proved);

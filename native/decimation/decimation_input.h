@@ -29,8 +29,8 @@ class DecimationInput {
  public:
   /// Throws as decimate() does. Unless `joins_t_junctions`, T-junctions are pinned instead. Notes in `report` what it
   /// finds: locked vertices, faces outside, warnings and the method. Keeps references to all but the team. About 0.7 us
-  /// a triangle, and 2 us for each that has to be certified: all of them, or those after the reference's if the input
-  /// has the vertices of the reference and begins with its triangles.
+  /// a triangle, and the proof of each that has to be certified: all of them, or those after the reference's if the
+  /// input has the vertices of the reference and begins with its triangles.
   DecimationInput(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
                   const ToleranceVolume* volume, const DecimationOptions& options, bool joins_t_junctions, Team& team,
                   DecimationResult& report);

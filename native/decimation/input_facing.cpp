@@ -44,7 +44,7 @@ void face_as_cut(const CutMesh& cut, const Hierarchy& hierarchy, FacingRule& rul
 
 InputFacing face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> positions,
                               const TriangleCertificate& certificate, const Hierarchy& hierarchy,
-                              const FacingRule& rule, Team& team, CertifiedBounds& bounds) {
+                              const FacingRule& rule, Team& team, CertifiedBounds& bounds, Progress* progress) {
   struct Place {
     double area = 0;  ///< Of the triangle, negative if all near it face against it, and 0 if some do and some do not.
     std::uint32_t below = kNone;  ///< The nearest triangle that faces as this one, or else the nearest one.
@@ -74,17 +74,18 @@ InputFacing face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> po
     of_face.reversed = area[part[f]] < 0;
     bounds.set_rule(f, of_face);
   }
-  return keep_angles(cut, positions, certificate, rule, all, team, bounds, below);
+  return keep_angles(cut, positions, certificate, rule, all, team, bounds, progress, below);
 }
 
 InputFacing keep_angles(const CutMesh& cut, std::span<const glm::dvec3> positions,
                         const TriangleCertificate& certificate, const FacingRule& rule,
-                        std::span<const std::uint32_t> faces, Team& team, CertifiedBounds& bounds,
+                        std::span<const std::uint32_t> faces, Team& team, CertifiedBounds& bounds, Progress* progress,
                         std::span<const std::uint32_t> hints) {
   std::vector<std::uint8_t> exceeds(faces.size(), 0);  // Threads would share bits.
   InputFacing found;
   found.proved.assign(cut.triangles.size(), 0);
   team.run(faces.size(), kBlock, [&](std::size_t begin, std::size_t end) {
+    if (progress) progress->update(static_cast<double>(begin) / static_cast<double>(faces.size()));
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t f = faces[i];
       const glm::uvec3& t = cut.triangles[f];

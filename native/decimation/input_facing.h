@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "base/progress.h"
 #include "check/certificate.h"
 #include "check/facing.h"
 #include "decimation/certified_bounds.h"
@@ -34,14 +35,14 @@ struct InputFacing {
 /// of its reference. Returns what keep_angles() does. About 3 us a triangle.
 InputFacing face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> positions,
                               const TriangleCertificate& certificate, const Hierarchy& hierarchy,
-                              const FacingRule& rule, Team& team, CertifiedBounds& bounds);
+                              const FacingRule& rule, Team& team, CertifiedBounds& bounds, Progress* progress);
 
 /// Sets the rules of some faces. A face without a proof that it keeps the angle of the rule keeps the least angle that
 /// is proved for it, to within a degree; a face that looks against all triangles near it is free of the rule. `hints`
 /// are triangles of the reference near each face, or empty.
 InputFacing keep_angles(const CutMesh& cut, std::span<const glm::dvec3> positions,
                         const TriangleCertificate& certificate, const FacingRule& rule,
-                        std::span<const std::uint32_t> faces, Team& team, CertifiedBounds& bounds,
+                        std::span<const std::uint32_t> faces, Team& team, CertifiedBounds& bounds, Progress* progress,
                         std::span<const std::uint32_t> hints = {});
 
 }  // namespace tolvol

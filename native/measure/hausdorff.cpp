@@ -68,13 +68,11 @@ constexpr std::size_t kChunk = 16384, kBlock = 64, kBatch = 512, kSmallBlock = 8
 // The budget, in pieces. An edge of b that crosses a triangle of a costs a few pieces, so that a subdivided copy needs
 // about ten for each of its triangles. A piece costs 1 us and, while it waits, 100 bytes.
 constexpr std::size_t kPieces = 4'000'000, kPiecesPerTriangle = 16;
-// After this many pieces the search is content with less: the width that is narrow grows, by kGap of the bound for as
-// many pieces again. Nearly all searches are at their end before that, those between a surface and its subdivided copy
-// among them. Needles that lie on one another would need a million pieces to show that nothing but rounding is between
-// them.
-constexpr std::size_t kPatience = 20'000, kPatiencePerTriangle = 8;
-// Stands for the bound where there is none, in frame lengths.
-constexpr double kWithoutBound = 1e-3;
+// After this many pieces the search accepts a wider interval: by kGap of the bound, or of the length below if that is
+// less, for as many pieces again. Nearly all searches end before, those between a surface and its subdivided copy among
+// them. Needles that lie on one another would need a million pieces to show that nothing but rounding is between them.
+constexpr std::size_t kPatience = 20'000, kPatiencePerTriangle = 16;
+constexpr double kLargestBound = 1e-3;  // in frame lengths
 
 struct Piece {
   std::array<dvec3, 3> corner;
@@ -161,10 +159,10 @@ class Search {
     return std::max(options_.narrow ? std::min(bound_, narrow) : bound_, lower_ + kNoise);
   }
 
-  /// Returns the width that has become narrow because the search takes long.
+  /// Returns the width that the search accepts because it takes long.
   double growth() const {
     const double beyond = double(pieces_) / double(patience_) - 1;
-    return beyond <= 0 ? 0 : kGap * beyond * (bound_ < kInfinity ? bound_ : kWithoutBound);
+    return beyond <= 0 ? 0 : kGap * beyond * std::min(bound_, kLargestBound);
   }
 
   std::array<dvec3, 3> corners(const TriangleMesh& mesh, std::uint32_t i) const {

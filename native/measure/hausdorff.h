@@ -35,10 +35,10 @@ struct HausdorffInterval {
 /// triangles of b do not add to this size: at most a few hundred times the size of a and its distance from b counts.
 /// The exceptions are triangles whose corners are all far away and whose plane passes near a, and triangles that open
 /// to more than about 170 degrees at the one near corner; they count as a whole. So do far corners of a, whose own
-/// distance is measured: the interval is then no narrower than about 1e-15 of the size of a. A search that takes many
-/// pieces, as it does between needles that lie on one another, is content with a width that grows by 0.1 % of the bound
-/// (or of a thousandth of the size) for every 20,000 pieces and eight for each triangle, and stops at many millions;
-/// the interval is then wider, and still true. The search also stops as soon as lower > bound.
+/// distance is measured: the interval is then no narrower than about 1e-15 of the size of a. A long search,
+/// as between needles that lie on one another, accepts a wider interval, which is still true: with every 20,000 pieces
+/// and 16 for each triangle the width may grow by 0.1 % of the bound, or of a thousandth of the size if that is less.
+/// The search stops after many millions of pieces, and as soon as lower > bound.
 ///
 /// Throws InvalidInput if a mesh is not valid (measure/placed_pair.h) or the bound is negative or not a number, and
 /// Cancelled. The bounds share no code with the check of operations (check/), which they judge. They share with it the

@@ -87,8 +87,9 @@ Returns
 -------
 DirectedHausdorffResult
     Its `upper` - `lower` is at most 0.1 % of `upper`, unless the distance is rounding itself or the search takes very
-    many pieces, as it does between needles that lie on one another: the width may then be a share of a per cent of the
-    bound (of a thousandth of the size without a bound). The interval is true in every case.
+    many pieces, as it does between needles that lie on one another. With every 20,000 pieces and 16 for each triangle
+    the width may then grow by 0.1 % of the bound, or of a thousandth of the size if that is less, until the search stops
+    after millions of pieces. The interval is true in every case.
 
     Rounding is about 1e-15 of the size of both meshes together. Far corners of mesh b do not add to this size, unless
     they are those of a triangle whose corners are all far away and whose plane passes near mesh a, or of a triangle that

@@ -235,39 +235,49 @@ def guard(run):
     case, options = run.case, run.case.options
     start, volume = moved(run), run.volume()
 
+    def begun(threads, progress):
+        guard = tolvol.Guard(
+            start,
+            case.triangles,
+            volume,
+            to_world=case.to_world,
+            two_sided=options["two_sided"],
+            outside=options.get("outside", "error"),
+            crossings=options["crossings"],
+            max_normal_angle=options.get("max_normal_angle"),
+            threads=threads,
+            progress=progress,
+        )
+        if options.get("resets"):
+            guard.reset(start, progress=progress)
+        return guard
+
     class Edited:
         """Makes some edits, lets the guard correct each, and returns the mesh."""
 
-        def __init__(self, threads, progress):
+        def __init__(self, threads):
             rng = np.random.default_rng(options["seed"])
-            guard = tolvol.Guard(
-                start,
-                case.triangles,
-                volume,
-                to_world=case.to_world,
-                two_sided=options["two_sided"],
-                outside=options.get("outside", "error"),
-                crossings=options["crossings"],
-                max_normal_angle=options.get("max_normal_angle"),
-                threads=threads,
-                progress=progress,
-            )
+            guard = begun(threads, None)
             self.vertices = start.copy()
             scale = 1 if case.to_world is None else np.linalg.norm(case.to_world[:3, :3], 2)
             for edit in range(options["edits"]):
                 if options.get("resets") and edit == options["edits"] // 2:
                     # As after opening another version: what was corrected, or what was there at first.
                     self.vertices = self.vertices if rng.random() < 0.5 else start.copy()
-                    guard.reset(self.vertices, progress=progress)
+                    run.call("Guard.reset", lambda: guard.reset(self.vertices), threads)
                 touched = rng.random(len(self.vertices)) < rng.random()
                 motion = rng.standard_normal((touched.sum(), 3)) * options["amplitude"] * case.tolerance / scale
                 self.vertices[touched] += motion.astype(np.float32)
-                indices, back = guard.constrain(self.vertices)
+                indices, back = self.corrections(guard, threads)
                 self.vertices[indices] = back
-            self.again = len(guard.constrain(self.vertices)[0])
+            self.again = len(self.corrections(guard, threads)[0])
             self.outside, self.uncovered = guard.outside, guard.uncovered
 
-    result = run.repeated("Guard", Edited, ("vertices", "outside", "uncovered"))
+        def corrections(self, guard, threads):
+            return run.call("Guard.constrain", lambda: guard.constrain(self.vertices), threads)
+
+    run.repeated("Guard", begun, ("outside", "uncovered"))
+    result = run.repeated_in_steps("Guard", Edited, ("vertices", "outside", "uncovered"))
     if result.again:
         raise Finding("guard", f"{result.again} vertices go back again, though nothing was edited")
     judges.valid(run, result.vertices, case.triangles, np.float32)

@@ -54,12 +54,23 @@ class Run:
             self._cancel(name, call, share * seconds)
         if same:
             second = self.call(name, lambda: call(self.threads[1], None), self.threads[1])
-            for field in fields:
-                a, b = getattr(first, field), getattr(second, field)
-                if not np.array_equal(a, b):
-                    after = "" if share is None else ", with a call between them that was cancelled"
-                    raise Finding(f"threads: {name}", f"{field} differs on {self.threads} threads{after}")
+            after = "" if share is None else ", with a call between them that was cancelled"
+            self._require_same(name, first, second, fields, after)
         return first
+
+    def repeated_in_steps(self, name, steps, fields):
+        """Calls steps(threads), which makes several calls by call(), on several numbers of threads.
+
+        The results have to be the same bit for bit.
+        """
+        first, second = (steps(threads) for threads in self.threads)
+        self._require_same(name, first, second, fields)
+        return first
+
+    def _require_same(self, name, first, second, fields, after=""):
+        for field in fields:
+            if not np.array_equal(getattr(first, field), getattr(second, field)):
+                raise Finding(f"threads: {name}", f"{field} differs on {self.threads} threads{after}")
 
     def volume(self):
         case = self.case

@@ -208,18 +208,25 @@ def test_double_sheets_are_told_from_others():
 
 
 @pytest.mark.parametrize(
-    ("seed", "number"),
+    ("seed", "number", "operation", "kind"),
     [
-        (5012, 367),  # hausdorff() between needles whose planes differ by rounding
-        (5003, 124),  # the same, with float64
-        (5006, 281),  # hausdorff() from a few of a strip's needles to all of them
-        (5002, 339),  # deform() from two tolerances away, to the reference
-        (5010, 100),  # Guard from two tolerances away, needles
+        (5012, 367, "chain", "needles_far"),  # hausdorff() between needles whose planes differ by rounding
+        (5003, 124, "chain", "needles_shuffled_far"),  # the same, with float64
+        (
+            5006,
+            281,
+            "decimate",
+            "collinear_strip_shuffled",
+        ),  # hausdorff() from a few of a strip's needles to all of them
+        (5002, 339, "deform", "furniture_shuffled"),  # deform() from two tolerances away, to the reference
+        (5010, 100, "guard", "needles_scaled"),  # Guard from two tolerances away, needles
     ],
 )
-def test_cases_that_took_very_long_once(seed, number):
+def test_cases_that_took_very_long_once(seed, number, operation, kind):
+    case = draw.case_of(seed, number)
+    assert (case.operation, case.kind) == (operation, kind), "another mesh is drawn for this number"
     watchdog = Watchdog()
     try:
-        assert watchdog.run(draw.case_of(seed, number))[0] == "passed"
+        assert watchdog.run(case)[0] == "passed"
     finally:
         watchdog.close()

@@ -12,8 +12,8 @@ from .progress_bar import counted, followed
 _GO_ON = "what is done is kept: go on with --resume"
 # A task whose worker dies is done anew so many times.
 _MOST_DEATHS = 10
-# What the worker processes of this machine log, which they read when they start. A worker that is ended in the middle of a
-# heartbeat logs an error after all is done; the command says itself where a task fails.
+# The level of the logs of the workers on this machine. A worker reads it when it starts. One that is ended in the middle of a
+# heartbeat would log an error after all is done; the command says itself where a task fails.
 _LOGGED = "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED"
 
 
