@@ -71,7 +71,7 @@ constexpr std::size_t kPieces = 4'000'000, kPiecesPerTriangle = 16;
 // After this many pieces the search accepts a wider interval: by kGap of the bound, or of the length below if that is
 // less, for as many pieces again. Nearly all searches end before, those between a surface and its subdivided copy among
 // them. Needles that lie on one another would need a million pieces to show that nothing but rounding is between them.
-constexpr std::size_t kPatience = 20'000, kPatiencePerTriangle = 16;
+constexpr std::size_t kPatience = 20'000, kPatiencePerTriangle = 12;
 constexpr double kLargestBound = 1e-3;  // in frame lengths
 
 struct Piece {

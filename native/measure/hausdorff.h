@@ -37,7 +37,7 @@ struct HausdorffInterval {
 /// to more than about 170 degrees at the one near corner; they count as a whole. So do far corners of a, whose own
 /// distance is measured: the interval is then no narrower than about 1e-15 of the size of a. A long search,
 /// as between needles that lie on one another, accepts a wider interval, which is still true: with every 20,000 pieces
-/// and 16 for each triangle the width may grow by 0.1 % of the bound, or of a thousandth of the size if that is less.
+/// and 12 for each triangle the width may grow by 0.1 % of the bound, or of a thousandth of the size if that is less.
 /// The search stops after many millions of pieces, and as soon as lower > bound.
 ///
 /// Throws InvalidInput if a mesh is not valid (measure/placed_pair.h) or the bound is negative or not a number, and

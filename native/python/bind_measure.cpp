@@ -87,7 +87,7 @@ Returns
 -------
 DirectedHausdorffResult
     Its `upper` - `lower` is at most 0.1 % of `upper`, unless the distance is rounding itself or the search takes very
-    many pieces, as it does between needles that lie on one another. With every 20,000 pieces and 16 for each triangle
+    many pieces, as it does between needles that lie on one another. With every 20,000 pieces and 12 for each triangle
     the width may then grow by 0.1 % of the bound, or of a thousandth of the size if that is less, until the search stops
     after millions of pieces. The interval is true in every case.
 
