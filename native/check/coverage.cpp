@@ -124,10 +124,8 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
                             glm::dot(c[2] - centre, c[2] - centre)}));
     found_beyond = found_beyond || closest.distance > provable;
     const double floor = (found_beyond ? kFloor : kHeadroom) * limit_;
-    ++looked;
-    const bool finest = longest_squared(piece) <= floor * floor || piece.cuts == kMostCuts ||
-                        (found_beyond ? looked > kBudget || (looked > kBudgetOfBeyond && !take(budget_of_beyond_))
-                                      : looked > kBudget && !take(budget_of_first_));
+    const bool finest =
+        longest_squared(piece) <= floor * floor || piece.cuts == kMostCuts || !may_look(++looked, found_beyond);
     const bool is_beyond = closest.distance > provable + radius;
     if (is_beyond || finest) {
       if (!is_beyond) uncovered.in_part.push_back(piece);
@@ -140,6 +138,12 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
       if (!cut(piece, below, kWorthCutting * limit_, stack)) split(piece, stack);
     }
   }
+}
+
+/// Whether find_witnesses() may look at this many parts of a triangle.
+bool Coverage::may_look(std::size_t parts, bool found_beyond) {
+  if (!found_beyond) return parts <= kBudget || take(budget_of_first_);
+  return parts <= kBudgetOfBeyond || (parts <= kBudget && take(budget_of_beyond_));
 }
 
 void Coverage::sample(std::uint32_t element, std::size_t stride, std::vector<Sample>& out) const {

@@ -103,6 +103,7 @@ class Coverage {
   Part whole(std::uint32_t triangle) const;
   void find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
                          std::span<const std::uint32_t> ids, double provable, Uncovered& uncovered);
+  bool may_look(std::size_t parts, bool found_beyond);
   bool place_all(Trial& trial, std::vector<std::uint32_t>& gathered) const;
   bool place(const Part& whole, std::uint32_t first, Trial& trial) const;
 

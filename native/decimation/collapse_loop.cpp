@@ -60,7 +60,7 @@ CollapseLoop::CollapseLoop(Shared& shared, Surroundings* around, Team& team)
   ahead_ = TriesAhead(team, 2 * kMostAttempts, mesh_.connectivity().n_edges(), mesh_.connectivity().n_vertices());
   tried_.resize(ahead_.slot_count());
   reserved_.assign(mesh_.connectivity().n_vertices(), 0);
-  surrounded_.assign(mesh_.connectivity().n_vertices(), 0);
+  batch_of_end_.assign(mesh_.connectivity().n_vertices(), 0);
 }
 
 bool CollapseLoop::deleted(std::uint32_t edge) const {
@@ -213,7 +213,7 @@ void CollapseLoop::reserve_around(std::uint32_t edge) {
   if (around_) reserved_boxes_.push_back(box_around(edge));
   for (const std::uint32_t end : {mesh_.from(h), mesh_.to(h)}) {
     // Edges that come one after another often share an end that has many neighbours.
-    if (std::exchange(surrounded_[end], batches_) == batches_) continue;
+    if (std::exchange(batch_of_end_[end], batches_) == batches_) continue;
     reserved_[end] = batches_;
     if (mesh_.faces_around(end) > kGreatMany) {
       crowd_in_batch_ = true;
@@ -241,7 +241,7 @@ bool CollapseLoop::is_next_to_crowd(std::uint32_t vertex) const {
   if (mesh_.faces_around(vertex) > kGreatMany) return true;
   return std::ranges::any_of(mesh_.connectivity().vv_range(BoundedMesh::handle(vertex)), [&](const auto& near) {
     const auto end = static_cast<std::uint32_t>(near.idx());
-    return surrounded_[end] == batches_ && mesh_.faces_around(end) > kGreatMany;
+    return batch_of_end_[end] == batches_ && mesh_.faces_around(end) > kGreatMany;
   });
 }
 

@@ -201,7 +201,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   }
   certified_.emplace(directions, MeshView{cut_.triangles, positions_}, on_reference);
   // What is proved to face the reference is within the tolerance, and is not proved again.
-  std::vector<std::uint8_t> proved(cut_.triangles.size(), 0);
+  std::vector<std::uint8_t> proved;
   if (facing_ && own_count_ < triangles_.size()) proved = face(provable, mapping_error, team);
   certify_input(certificate, proved);
   // A face that is outside has no witness, and so no angle. It is counted as outside.
@@ -241,7 +241,8 @@ std::vector<std::uint8_t> DecimationInput::face(double provable, double mapping_
   return std::move(found.proved);
 }
 
-/// Proves the triangles that are none of the reference. `proved`: for each triangle of the manifold, whether it is so.
+/// Proves the triangles that are none of the reference. `proved`: for each triangle of the manifold, whether it is so;
+/// empty if none is.
 void DecimationInput::certify_input(const Certificate& certificate, std::span<const std::uint8_t> proved) {
   std::vector<std::uint8_t> is_proved(triangles_.size(), 0);
   for (std::uint32_t t = 0; t < proved.size(); ++t) is_proved[cut_.triangle_input[t]] = proved[t];

@@ -172,6 +172,11 @@ def test_package_holds_what_is_here():
     modules = {name for name in libraries if "/_native." in name}
     assert {Path(name).name for name in modules} == {path.name for path in native.path.parent.glob("_native.*.so")}
     assert native.path.name in {Path(name).name for name in modules} and len(shaders) == 2
+    listed = subprocess.run(["readelf", "-d", native.path], capture_output=True, text=True, check=True).stdout
+    needed = set(re.findall(r"\(NEEDED\).*\[(.+)\]", listed))
+    # These come with every Linux for PCs that Blender runs on.
+    everywhere = {"ld-linux-x86-64.so.2", "libc.so.6", "libm.so.6", "libgcc_s.so.1", "libstdc++.so.6"}
+    assert needed and needed - everywhere <= {Path(name).name for name in libraries}
     assert others - libraries - shaders == {
         "tolerance_volumes/LICENSE",
         "tolerance_volumes/manual.md",

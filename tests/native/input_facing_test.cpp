@@ -7,6 +7,7 @@
 
 #include "candidates.h"
 #include "decimation/decimation_input.h"
+#include "polls.h"
 #include "shapes.h"
 
 namespace {
@@ -42,6 +43,25 @@ TEST(InputFacing, AFaceKeepsTheLeastAngleThatIsProved) {
     EXPECT_GT(kept, 19.99);
     EXPECT_LT(kept, 21.01);
   }
+}
+
+// A proof that a face faces its reference proves the face, too, so that the angle costs little more than it.
+TEST(InputFacing, FacesAreProvedOnce) {
+  shapes::Random random(1);
+  const TriangleMesh plate = shapes::grid(2);
+  const TriangleMesh reference =
+      shapes::squares(100, [&](const dvec3& p) { return p + dvec3(0, 0, 0.001 * random.point().z); });
+  const ToleranceVolume volume(reference.vertices, reference.triangles, candidates::kIdentity, 0.005);
+  const auto polls_at = [&](double angle) {
+    DecimationOptions options;
+    options.two_sided = false, options.max_normal_angle = angle;
+    Team team(1);
+    DecimationResult report;
+    return polls_of([&] {
+      DecimationInput(plate.vertices, plate.triangles, candidates::kIdentity, &volume, options, true, team, report);
+    });
+  };
+  EXPECT_LT(polls_at(90), 1.2 * polls_at(180));
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ _GO_ON = "what is done is kept: go on with --resume"
 _MOST_DEATHS = 10
 # The level of the logs of the workers on this machine. A worker reads it when it starts. One that is ended in the middle of a
 # heartbeat would log an error after all is done; the command says itself where a task fails.
-_LOGGED = "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED"
+_LOG_LEVEL = "distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED"
 
 
 def here(title, work, jobs):
@@ -43,7 +43,7 @@ def dask(scheduler):
 
     with contextlib.ExitStack() as stack:
         stack.enter_context(
-            dask.config.set({"distributed.scheduler.allowed-failures": _MOST_DEATHS, _LOGGED: "critical"})
+            dask.config.set({"distributed.scheduler.allowed-failures": _MOST_DEATHS, _LOG_LEVEL: "critical"})
         )
         if count := local_count(scheduler):
             # The native code has its own idea of the memory: a worker is not stopped for it.
