@@ -214,7 +214,7 @@ TEST(Allocation, DecimationInEveryForm) {
 }
 
 TEST(Allocation, ThoroughWithOptimalPlacement) {
-  const Scene scene(6);  // one decimation of the other scene takes as long as eight of this one
+  const Scene scene(kSanitized ? 5 : 6);  // one decimation of the other scene takes as long as eight of this one
   DecimationOptions options;
   options.effort = DecimationOptions::Effort::thorough, options.threads = 1;
   EXPECT_GT(fail_allocations([&] { return scene.decimated(options); }, 3), 100);
@@ -374,7 +374,7 @@ TEST(Allocation, Motion) {
 }
 
 TEST(Allocation, Deformation) {
-  const Scene scene;
+  const Scene scene(6);
   Lattice lattice;
   lattice.size = glm::uvec3(4);
   lattice.domain = glm::dmat4(4);

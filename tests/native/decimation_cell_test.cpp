@@ -11,6 +11,7 @@
 #include "base/errors.h"
 #include "crossing_judge.h"
 #include "decimation/decimation.h"
+#include "many.h"
 #include "measure/hausdorff.h"
 #include "shapes.h"
 
@@ -122,7 +123,7 @@ void expect_within(const Soup& mesh, const Soup& reference, double tolerance) {
 }
 
 TEST(DecimationCell, ResultsOfCellsAreOneProvedMesh) {
-  const TriangleMesh sphere = shapes::sphere(20);
+  const TriangleMesh sphere = shapes::sphere(across(20));
   const Soup reference = soup_of(sphere.vertices, sphere.triangles);
   constexpr double kTolerance = 0.02;
   Soup mesh = reference;

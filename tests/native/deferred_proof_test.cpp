@@ -22,7 +22,7 @@ using glm::dvec3;
 
 /// A square, with a row of triangles at one of its sides that have no other neighbour.
 TriangleMesh square_with_ears() {
-  constexpr unsigned kSquares = 60;
+  constexpr unsigned kSquares = 44;
   TriangleMesh mesh = shapes::grid(kSquares);
   for (unsigned j = 0; j < kSquares; ++j) {
     mesh.triangles.emplace_back(j, j + 1, unsigned(mesh.vertices.size()));

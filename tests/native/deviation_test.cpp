@@ -122,6 +122,7 @@ TEST(Deviation, FoldsBetweenTheSamples) {
 TEST(Deviation, ManyTrianglesAlikeFar) {
   const TriangleMesh outer = shapes::torus(40);
   for (const double length : {1e-3, 0.5}) {
+    if (kSanitized && length < 0.5) continue;
     const TriangleMesh disc{{{0, 0, 0}, {length, 0, 0}, {0, length, 0}}, {{0, 1, 2}}};
     const Deviation d = deviation(disc, outer, {.pieces = kSome});
     // The distance from the inner ring, 0.6 - |x|, but for its 40 corners: the sides sag by 0.3 %.
@@ -197,6 +198,7 @@ TEST(Deviation, FarCornersCostNothing) {
   ASSERT_TRUE(near.sides.has_value());
   EXPECT_NEAR(first.mean.value, near.mean.value, 0.02 * near.mean.value);
   for (const double far : {1e7, 1e14, 1e19, 1e150, 1e300}) {
+    if (kSanitized && far != 1e19) continue;
     const Deviation d = to_far(far);
     EXPECT_LE(d.steps, first.steps + first.steps / 100) << far;
     EXPECT_NEAR(d.mean.value, first.mean.value, 0.001 * first.mean.value) << far;
@@ -341,6 +343,7 @@ TEST(Deviation, EndsByItsStepsWhereNeedlesCrowd) {
                     first = wanted + 2 * n;  // at most; about how many there are at first
   for (const auto& [a, b] : {std::pair{fan, moved}, {moved, fan}}) {
     Deviation before{};
+    const HausdorffInterval largest = hausdorff(a, b);
     for (const double steps : {0.0, 4.0, 16.0}) {
       DeviationOptions options;
       options.percentiles = percentiles, options.steps = steps, options.pieces = wanted;
@@ -349,7 +352,6 @@ TEST(Deviation, EndsByItsStepsWhereNeedlesCrowd) {
       EXPECT_LE(double(d.steps), steps * pieces + 63.0 * first + 4096 * 512);
       EXPECT_LE(d.distances.size(), pieces);
       EXPECT_NEAR(std::accumulate(d.weights.begin(), d.weights.end(), 0.0), 1, 1e-9);
-      const HausdorffInterval largest = hausdorff(a, b);
       EXPECT_GE(d.percentiles[1].range.upper, largest.lower - 1e-12);
       EXPECT_LE(d.percentiles[1].range.lower, largest.upper + 1e-12);
       double mean = 0, square = 0;
@@ -372,6 +374,7 @@ TEST(Deviation, EndsByItsStepsWhereNeedlesCrowd) {
       EXPECT_EQ(again.distances, d.distances);
       before = d;
     }
+    if (kSanitized) break;
   }
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "geometry/hierarchy.h"
+#include "many.h"
 
 #include <gtest/gtest.h>
 
@@ -274,16 +275,17 @@ TEST(Hierarchy, OneTriangleAndAPoint) {
 
 // Neither deep recursion nor a quadratic blow-up: a million triangles in one place, and half of them there.
 TEST(Hierarchy, HeapsOfEqualTriangles) {
+  const int count = many(300000);
   TriangleMesh mesh;
   mesh.vertices = {{0, 0, 0}, {1e-3, 0, 0}, {0, 1e-3, 0}, {5, 5, 5}};
-  mesh.triangles.assign(300000, {0, 1, 2});
+  mesh.triangles.assign(std::size_t(count), {0, 1, 2});
   const std::size_t polls = polls_of([&] {
     EXPECT_EQ(Hierarchy(mesh).nearest({0, 0, 1}).triangle, 0u);
-    mesh.triangles.assign(300000, {3, 3, 3});
+    mesh.triangles.assign(std::size_t(count), {3, 3, 3});
     const Hierarchy points(mesh);
-    for (int i = 0; i < 100000; ++i) ASSERT_EQ(points.nearest({5, 5, 6}).distance, 1);
+    for (int i = 0; i < count / 3; ++i) ASSERT_EQ(points.nearest({5, 5, 6}).distance, 1);
     shapes::Random random(9);
-    for (int i = 0; i < 300000; ++i) {
+    for (int i = 0; i < count; ++i) {
       mesh.vertices.push_back(random.point());
       const unsigned n = unsigned(mesh.vertices.size());
       mesh.triangles.push_back({n - 1, n - 2, n - 3});

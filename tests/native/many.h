@@ -18,8 +18,8 @@ inline constexpr bool kSanitized = false;
 /// So many, or an eighth under the sanitizers: they are ten times as slow, and what they look for any few show.
 constexpr int many(int count) { return kSanitized ? count / 8 : count; }
 
-/// So many squares along a side of a mesh, or five eighths of them under the sanitizers: the ordinary build holds the
+/// So many squares along a side of a mesh, or half of them under the sanitizers: the ordinary build holds the
 /// full size.
-constexpr unsigned across(unsigned count) { return kSanitized ? count * 5 / 8 : count; }
+constexpr unsigned across(unsigned count) { return kSanitized ? count / 2 : count; }
 
 }  // namespace tolvol

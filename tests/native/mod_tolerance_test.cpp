@@ -9,6 +9,7 @@
 #include <OpenMesh/Tools/Decimater/McDecimaterT.hh>
 #include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
 
+#include "many.h"
 #include "measure/hausdorff.h"
 #include "shapes.h"
 
@@ -71,7 +72,7 @@ using Meshes = testing::Types<FloatMesh, DoubleMesh>;
 TYPED_TEST_SUITE(ModTolerance, Meshes);
 
 TYPED_TEST(ModTolerance, KeepsTheTolerance) {
-  const TriangleMesh reference = shapes::torus(40, 0.004);
+  const TriangleMesh reference = shapes::torus(across(40), 0.004);
   auto mesh = to_openmesh<TypeParam>(reference);
   const ToleranceVolume volume = volume_of(mesh, kTolerance);
   decimate_within(mesh, volume);
@@ -82,7 +83,7 @@ TYPED_TEST(ModTolerance, KeepsTheTolerance) {
 }
 
 TYPED_TEST(ModTolerance, KeepsOneToleranceThroughAChain) {
-  const TriangleMesh reference = shapes::torus(40, 0.004);
+  const TriangleMesh reference = shapes::torus(across(40), 0.004);
   auto mesh = to_openmesh<TypeParam>(reference);
   const ToleranceVolume volume = volume_of(mesh, kTolerance);
   decimate_within(mesh, volume, 0.3);

@@ -12,6 +12,7 @@
 
 #include "base/errors.h"
 #include "crossing_judge.h"
+#include "many.h"
 #include "measure/hausdorff.h"
 #include "motion/constrain.h"
 #include "motion/deformation.h"
@@ -357,6 +358,7 @@ TEST(MovingCrossings, SmoothingKeepsWallsApart) {
   for (std::size_t v = count / 2; v < count; ++v) locked[v] = true;
   for (const auto weights : {SmoothingOptions::Weights::uniform, SmoothingOptions::Weights::cotangent}) {
     for (const bool reset : {false, true}) {
+      if (kSanitized && reset != (weights == SmoothingOptions::Weights::uniform)) continue;
       SmoothingOptions options{.iterations = 30,
                                .kind = SmoothingOptions::Operator::laplacian,
                                .weights = weights,
@@ -372,7 +374,7 @@ TEST(MovingCrossings, SmoothingKeepsWallsApart) {
       for (std::size_t i = 0; i < 30; ++i) EXPECT_LE(kept.kept_from_crossing[i], kept.held_back[i]);
       options.crossings = Crossed::allow;
       std::size_t crossed = 0;
-      for (options.iterations = 2; options.iterations < 30; options.iterations += 4) {
+      for (options.iterations = 2; options.iterations < 30; options.iterations += 8) {
         crossed += pairs_of(run().vertices, motion.mesh.triangles).size();
       }
       EXPECT_GT(crossed, 20u);
@@ -383,7 +385,7 @@ TEST(MovingCrossings, SmoothingKeepsWallsApart) {
 TEST(MovingCrossings, EveryIterationOfASmoothingIsFreeOfCrossings) {
   const Motion clean(hollow(8, 0.03), 0.2);
   const std::vector<dvec3> rough = clean.run(clean.noise(0.04, 4)).vertices;
-  for (unsigned iterations = 1; iterations < 25; ++iterations) {
+  for (unsigned iterations = 1; iterations < 25; iterations += kSanitized ? 4 : 1) {
     const SmoothingResult kept =
         smooth(rough, clean.mesh.triangles, kSingle, &clean.volume, {.iterations = iterations});
     EXPECT_TRUE(pairs_of(kept.vertices, clean.mesh.triangles).empty()) << iterations;
@@ -439,15 +441,16 @@ std::vector<dvec3> points(const std::vector<float>& flat) {
   return result;
 }
 
-TEST(MovingCrossings, AGuardKeepsThroughTwoHundredDabs) {
+TEST(MovingCrossings, AGuardKeepsThroughManyDabs) {
   const Motion motion(hollow(9, 0.04), 0.15);
+  const int dabs = kSanitized ? 50 : 200;
   for (const Crossed crossings : {Crossed::keep_out, Crossed::allow}) {
     Guard guard(flat(motion.mesh.vertices), indices(motion.mesh), 3, glm::dmat4(1), motion.volume,
                 {.crossings = crossings});
     std::vector<float> now = flat(motion.mesh.vertices);
     shapes::Random random(11);
     std::size_t crossed = 0;
-    for (int dab = 0; dab < 200; ++dab) {
+    for (int dab = 0; dab < dabs; ++dab) {
       const std::vector<dvec3> at = points(now);
       const dvec3 middle = at[random.below(unsigned(at.size()))], way = 0.05 * random.point();
       for (std::size_t v = 0; v < at.size(); ++v) {
@@ -499,7 +502,7 @@ TEST(MovingCrossings, ACancelInTheMiddleKeepsTheState) {
     return correction;
   }();
   ASSERT_GT(polls, 50u);
-  for (std::size_t last = 1; last < polls; last += std::max<std::size_t>(1, polls / 40)) {
+  for (std::size_t last = 1; last < polls; last += std::max<std::size_t>(1, polls / (kSanitized ? 10 : 40))) {
     Guard guard = made();
     {
       const Counted cancelled(last);

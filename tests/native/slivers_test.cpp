@@ -7,6 +7,7 @@
 
 #include "check/certificate.h"
 #include "decimation_cases.h"
+#include "many.h"
 #include "polls.h"
 
 namespace {
@@ -103,7 +104,7 @@ TEST(Slivers, AStarIsFilledFromTheTipsOfItsRays) {
 
 TEST(Slivers, TheWorkAtAFanGrowsHardlyFasterThanItsFaces) {
   std::size_t before = 0;
-  for (const unsigned rim : {500u, 1000u, 2000u}) {
+  for (const unsigned rim : {across(500), across(1000), across(2000)}) {
     const Case c = star(rim);
     const auto volume = c.volume();
     const std::size_t polls =

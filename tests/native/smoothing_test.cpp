@@ -293,7 +293,7 @@ TEST(Smoothing, EveryResultIsInsideOnEveryMesh) {
 }
 
 TEST(Smoothing, PulledBackGoesFartherThanReset) {
-  const TriangleMesh mesh = shapes::torus(40, 0.02);
+  const TriangleMesh mesh = shapes::torus(across(40), 0.02);
   const ToleranceVolume volume(mesh.vertices, mesh.triangles, kSingle, 0.02);
   const auto moved = [&](bool reset) {
     const SmoothingResult r = smooth(mesh.vertices, mesh.triangles, kSingle, &volume, {.reset = reset});

@@ -2,6 +2,7 @@
 """tests/runners: which tasks count as failed, and what the closing line says then."""
 
 import re
+import shutil
 import sys
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "runners"))
 
+import passes
 import run
 import tasks
 
@@ -63,3 +65,32 @@ def test_a_task_fails_by_its_end_and_by_its_closing_line(
     )
     assert (output in printed) == failed
     assert ("native/one" in (tmp_path / "times.json").read_text()) == (not failed)
+
+
+def test_a_task_that_its_program_decides_is_not_run_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(run, "OUT", tmp_path)
+    monkeypatch.setattr(run, "TIMES", tmp_path / "times.json")
+    monkeypatch.setattr(passes, "FOLDER", tmp_path / "passes")
+    passes.hash_of.cache_clear()
+    program, runs, passing = tmp_path / "program", tmp_path / "runs", tmp_path / "passing"
+    shutil.copy("/bin/sh", program)
+    script = f"echo >>'{runs}'; [ -e '{passing}' ] && echo '[  PASSED  ] 3 tests.'"
+
+    def number_of_runs(argument="1", environment=None, everything=False):
+        command = (str(program), "-c", script, argument)
+        task = tasks.Task("asan", "one", command, tasks.count_gtest, environment or {}, program=str(program))
+        failed = run.Run([task], everything).run()
+        printed = capsys.readouterr().out
+        assert failed == (not passing.exists()) and ("3 passed" in printed) == (not failed)
+        return len(runs.read_text())
+
+    assert [number_of_runs(), number_of_runs()] == [1, 2], "what failed runs again"
+    passing.touch()
+    assert [number_of_runs(), number_of_runs()] == [3, 3]
+    assert "one" in (tmp_path / "times.json").read_text(), "the time of the last run stays"
+    assert [number_of_runs(everything=True), number_of_runs()] == [4, 4]
+    assert [number_of_runs("2"), number_of_runs(environment={"A": "1"}), number_of_runs()] == [5, 6, 6]
+    with program.open("ab") as file:
+        file.write(b"changed")
+    passes.hash_of.cache_clear()
+    assert [number_of_runs(), number_of_runs()] == [7, 7]

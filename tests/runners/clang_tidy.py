@@ -2,31 +2,22 @@
 """Runs clang-tidy on a share of the native sources: clang_tidy.py INDEX COUNT [--all].
 
 A source is left out if clang-tidy has passed it with the same contents, the same contents of all files that it includes, the
-same compile command, the same configuration and the same clang-tidy. The passes are remembered in the user's cache folder,
-so that another checkout knows them too. With --all no source is left out.
+same compile command, the same configuration and the same clang-tidy. With --all no source is left out.
 """
 
 import argparse
-import hashlib
 import json
 import os
 import re
 import subprocess
 import sys
-import time
-from functools import cache
 from pathlib import Path
+
+from passes import Passes, hash_of, key_of
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build/release"
-PASSES = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "tolvol" / "clang_tidy"
-KEPT = 60 * 86400  # seconds for which a pass is remembered after its last use
 OPTIONS = ("--quiet", "--extra-arg=-Wno-unknown-warning-option")  # clang does not know some options of GCC.
-
-
-@cache
-def hash_of(path):
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def said_by(*command):
@@ -58,12 +49,11 @@ def keys():
     found = {}
     for source, files in included().items():
         contents = sorted((name_of(path), hash_of(path)) for path in files if path.exists())
-        key = json.dumps([common, name_of(source), sorted(commands.get(source, [])), contents])
-        found[source] = hashlib.sha256(key.encode()).hexdigest()
+        found[source] = key_of(common, name_of(source), sorted(commands.get(source, [])), contents)
     return found
 
 
-def passes(source):
+def is_passed(source):
     """Whether clang-tidy passes a source. Prints what it says."""
     command = ["clang-tidy", *OPTIONS, "-p", str(BUILD), str(source)]
     run = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -73,34 +63,28 @@ def passes(source):
     return run.returncode == 0 and not said.strip()
 
 
-def forget_old_passes():
-    for path in PASSES.iterdir():
-        if time.time() - path.stat().st_mtime > KEPT:
-            path.unlink(missing_ok=True)
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("index", type=int, help="0, 1, ... COUNT - 1")
     parser.add_argument("count", type=int)
     parser.add_argument("--all", action="store_true")
     options = parser.parse_args()
-    PASSES.mkdir(parents=True, exist_ok=True)
+    passes = Passes("clang_tidy")
     known, checked, failed = keys(), 0, []
     sources = sorted(ROOT.glob("native/**/*.cpp"))[options.index :: options.count]
     for source in sources:
-        passed = PASSES / known[source] if source in known else None
-        if options.all or not passed or not passed.exists():
+        key = known.get(source)
+        if options.all or not key or passes.text(key) is None:
             checked += 1
-            if not passes(source):
+            if not is_passed(source):
                 failed.append(name_of(source))
                 print(f"{name_of(source)}: FAILED", flush=True)
                 continue
-        if passed:
-            passed.touch()
+            if key:
+                passes.note(key)
         print(f"{name_of(source)}: ok", flush=True)
     if options.index == 0:
-        forget_old_passes()
+        passes.forget_old()
     outcome = f"not {', '.join(failed)}" if failed else "all pass"
     print(f"style: clang-tidy on {checked} of {len(sources)} files, the others are as they passed before: {outcome}")
     return bool(failed)

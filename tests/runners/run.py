@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sets up and runs the tests: one queue of tasks for as many workers as there are cores, and a lane for the window tests.
 
-The window tests mostly wait, so they run beside the compilation of the sanitizer presets and beside the queue.
+The window tests mostly wait, so they run beside the compilation of the sanitizer presets and beside the queue. A task of
+a sanitizer preset is left out if it has passed with the same program before, except in a full run.
 """
 
 import argparse
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,6 +18,7 @@ from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 
 import tasks
+from passes import Passes, hash_of, key_of
 
 OUT = tasks.ROOT / "build/tests"
 TIMES = OUT / "times.json"
@@ -73,20 +76,23 @@ class Report:
         self._open = Counter(task.runner for task in planned)
         self._counts = {runner: Counter() for runner in self._open}
         self._seconds = Counter()
+        self._known = Counter()
         self._failures = {runner: [] for runner in self._open}
         self._started = time.monotonic()
         self.times = {}
 
     def add(self, task, counts, seconds, failure, log):
+        """Adds the end of a task. seconds: None for a task that was left out, since it has passed before."""
         with self._lock:
+            self._known[task.runner] += seconds is None
             self._counts[task.runner].update(counts)
-            self._seconds[task.runner] += seconds
+            self._seconds[task.runner] += seconds or 0
             if failure:
                 self._counts[task.runner]["failed"] += not counts["failed"]
                 self._failures[task.runner].append(f"{task.name} {failure}")
                 print(f"{task.key}: {failure}, its output:", flush=True)
                 print(log.read_text(errors="replace"), flush=True)
-            else:
+            elif seconds is not None:
                 self.times[task.key] = round(seconds, 1)
             self._open[task.runner] -= 1
             if not self._open[task.runner]:
@@ -96,6 +102,8 @@ class Report:
         failures = self._failures[runner]
         outcome = "FAILED" if failures else "passed"
         line = f"{runner}: {outcome} in {self._seconds[runner]:.0f} s of the processor: {said(self._counts[runner])}"
+        if self._known[runner]:
+            line += f", {self._known[runner]} of its tasks not run again: they have passed with the same program"
         print(f"{line} ({'; '.join(failures)})" if failures else line, flush=True)
 
     def end(self):
@@ -125,9 +133,17 @@ def failure_of(code, counts):
     return "" if counts["passed"] + counts["skipped"] else "ran no test"
 
 
+def key(task):
+    """Returns the key of a pass of a task that its program alone decides, with the libraries that this loads."""
+    listed = subprocess.run(["ldd", task.program], cwd=tasks.ROOT, check=True, capture_output=True, text=True).stdout
+    libraries = re.findall(r"=> (/\S+)", listed)
+    return key_of(task.command, task.environment, [hash_of(tasks.ROOT / path) for path in (task.program, *libraries)])
+
+
 class Run:
-    def __init__(self, planned):
+    def __init__(self, planned, everything=False):
         self._planned, self._report, self._commands = planned, Report(planned), Commands()
+        self._everything, self._passes = everything, Passes("tests")
         self._broken = set()  # presets that could not be built
         known = {}
         for file in (FIRST_TIMES, TIMES):
@@ -154,6 +170,7 @@ class Run:
                 raise
         old = json.loads(TIMES.read_text()) if TIMES.exists() else {}
         TIMES.write_text(json.dumps({**old, **self._report.times}, indent=1, sort_keys=True) + "\n")
+        self._passes.forget_old()
         return self._report.end()
 
     def _build(self, preset, target):
@@ -171,9 +188,17 @@ class Run:
             built = OUT / f"build_{task.preset}.log"
             self._report.add(task, Counter(), 0, "could not be built", built)
             return
+        known = key(task) if task.program else None
+        passed = self._passes.text(known) if known and not self._everything else None
+        if passed is not None:
+            self._report.add(task, Counter(json.loads(passed)), None, "", log)
+            return
         code, seconds = self._commands.run(task.command, log, task.environment)
         counts = task.count(log.read_text(errors="replace"))
-        self._report.add(task, counts or Counter(), seconds, failure_of(code, counts), log)
+        failure = failure_of(code, counts)
+        if known and not failure:
+            self._passes.note(known, json.dumps(counts))
+        self._report.add(task, counts or Counter(), seconds, failure, log)
 
 
 def main():
@@ -189,7 +214,7 @@ def main():
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     subprocess.run(["sh", "setup.sh", "--tests"], cwd=tasks.ROOT, check=True)
     OUT.mkdir(parents=True, exist_ok=True)
-    return Run(tasks.planned(list(dict.fromkeys(options.runners)) or tasks.RUNNERS, options.all)).run()
+    return Run(tasks.planned(list(dict.fromkeys(options.runners)) or tasks.RUNNERS, options.all), options.all).run()
 
 
 if __name__ == "__main__":
