@@ -12,7 +12,7 @@ from addon.files import file_io
 from addon.reference import snapshots
 from addon.shared.surface import joined
 from result_line import LINE, succeeded  # noqa: F401
-from scenes import add_object
+from scenes import add_object, empty_scene
 
 FOLDER = Path(__file__).resolve().parent
 SCRIPTS = FOLDER.parents[1] / "blender_scripts"
@@ -47,8 +47,8 @@ class _Served:
         )
         there.close()
 
-    def run(self, script, arguments):
-        self._link.send((str(SCRIPTS / script), [str(argument) for argument in arguments]))
+    def run(self, script, arguments, patches):
+        self._link.send((str(SCRIPTS / script), [str(argument) for argument in arguments], patches))
         if self._link.poll(PATIENCE):
             return self._link.recv()
         self._process.kill()
@@ -62,15 +62,16 @@ class _Served:
 _served = None
 
 
-def command(script, *arguments, before=None, alone=False):
+def command(script, *arguments, patches="", before=None, alone=False):
     """Runs a command and returns (exit code, stdout, stderr).
 
-    With `alone`, and with `before`, it runs in a process of its own, as a user runs it.
+    With `alone`, and with `before`, it runs in a process of its own, as a user runs it. `patches` is Python that runs first in
+    the Blender of all other commands, and sets attributes for this command alone: see serve_commands.py.
     """
     global _served
     if not (before or alone):
         one, _served = _served or _Served(), None  # If this Blender fails, the next command gets another one.
-        done = one.run(script, arguments)
+        done = one.run(script, arguments, patches)
         _served = one
         return done
     with running(script, *arguments, before=before) as process:
@@ -96,12 +97,12 @@ def save(path, *meshes):
     """Writes a file with an object for each (name, vertices, faces)."""
     objects = [add_object(*mesh) for mesh in meshes]
     file_io.write_file(path, objects, path.parent)
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    empty_scene()
     return path
 
 
 def world(path):
     """Returns (vertices, triangles) of all objects of a file."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    empty_scene()
     surface = joined([snapshots.surface_of(ob) for ob in file_io.read_file(path).objects])
     return surface.world(), surface.arrays.triangles

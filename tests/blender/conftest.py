@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
+import hashlib
 import os
 
-import bpy
+import numpy as np
 import pytest
 
 import addon
 from addon import native
 from commands import end_served, save
-from scenes import torus_arrays
+from scenes import empty_scene, torus_arrays
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -21,7 +22,30 @@ def _registered():
 
 @pytest.fixture(autouse=True)
 def _empty_scene(_registered):
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    empty_scene()
+
+
+@pytest.fixture(scope="session")
+def _spreads():
+    """{what was measured: its DeviationResult}"""
+    return {}
+
+
+@pytest.fixture
+def measured_once(monkeypatch, _spreads):
+    """Measures the statistics of one pair of surfaces once in the session: their samples are as many for any mesh."""
+    deviation = native.module.deviation
+
+    def once(*arrays, threads=None, progress=None, **options):
+        content = hashlib.sha256(repr(sorted(options.items())).encode())
+        for array in arrays:
+            content.update(repr((array.shape, array.dtype)).encode() + np.ascontiguousarray(array).tobytes())
+        key = content.digest()
+        if key not in _spreads:
+            _spreads[key] = deviation(*arrays, threads=threads, progress=progress, **options)
+        return _spreads[key]
+
+    monkeypatch.setattr(native.module, "deviation", once)
 
 
 @pytest.fixture(scope="session")

@@ -10,6 +10,11 @@ from addon.mesh import mesh_io
 from addon.shared.surface import to_world
 
 
+def empty_scene():
+    """Opens an empty file. The preferences stay: to read them again takes several times as long."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
 def add_object(name, vertices, faces, matrix=None):
     """A new object with a tolerance of 1 %, selected and active."""
     mesh = bpy.data.meshes.new(name)

@@ -71,6 +71,7 @@ def rims(arrays, missing, matrix):
     return {tuple(np.round(centre, 5)): side for centre, side in zip(corners.mean(1), sides)}
 
 
+@pytest.mark.usefixtures("measured_once")
 def test_the_report_says_where_holes_were_closed(tmp_path, monkeypatch):
     arrays, missing = sheet_arrays(), (100, 215, 430, 500)
     matrix = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Scale(10, 4)
@@ -279,6 +280,7 @@ def test_n_gons_and_several_objects():
     assert loops_of(objects[1]) == 0
 
 
+@pytest.mark.usefixtures("measured_once")
 def test_save_report_tells_it(tmp_path):
     ob = holed()
     bpy.ops.tolvol.decimate(tolerance_percent=4, close_holes=True)

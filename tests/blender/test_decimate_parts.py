@@ -52,18 +52,18 @@ def lines(mesh, edges):
 
 
 def test_thorough_leaves_fewer_and_says_so():
-    fast = decimate(torus("one"))
+    fast = decimate(torus("one"), 2)
     ob = torus("two")
-    assert decimate(ob, effort="THOROUGH") < fast
+    assert decimate(ob, 2, effort="THOROUGH") < fast
     assert json.loads(ob.tolvol.last_run)["effort"] == "thorough" and ob.tolvol.effort == "THOROUGH"
     assert ob.tolvol.last_run_of
 
 
 @pytest.mark.parametrize("effort", ["FAST", "THOROUGH"])
 def test_a_decimation_stops_at_its_time_limit(effort):
-    whole = decimate(torus("one"), effort=effort)
+    whole = decimate(torus("one"), 2, effort=effort)
     ob = torus("two")
-    assert decimate(ob, effort=effort, max_seconds=1e-6) > whole
+    assert decimate(ob, 2, effort=effort, max_seconds=1e-6) > whole
     run = json.loads(ob.tolvol.last_run)
     assert run["stopped_by"] == "time" and "(stopped at the time limit)" in report.counts(run)
 

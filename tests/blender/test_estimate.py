@@ -68,7 +68,7 @@ def cylinders():
 
 
 def noise():
-    vertices, quads = sheet_arrays(count=30, bumps=0.05)
+    vertices, quads = sheet_arrays(count=20, bumps=0.05)
     vertices[:, 2] += np.random.default_rng(4).normal(0, 0.004, len(vertices)).astype(np.float32)
     return add_object("noise", vertices, quads)
 
@@ -76,10 +76,10 @@ def noise():
 MODELS = {
     "small ball": lambda: ball(2),
     "ball": lambda: ball(4),
-    "torus": lambda: torus(around=32, across=16, noise=0.0),
-    "rough torus": lambda: torus(around=32, across=16),
-    "sheet": lambda: sheet(count=20),
-    "flat": lambda: sheet(bumps=0.0),
+    "torus": lambda: torus(around=24, across=12, noise=0.0),
+    "rough torus": lambda: torus(around=24, across=12),
+    "sheet": lambda: sheet(count=14),
+    "flat": lambda: sheet(count=16, bumps=0.0),
     "CAD": cylinders,
     "noise": noise,
 }

@@ -18,7 +18,7 @@ from addon.shared.files import safe_files
 from commands import READS_GLTF, SCRIPTS, command, decimate, running, save, succeeded, world
 from scenes import sheet, sheet_arrays
 
-# Python code that runs in a command before the command itself.
+# Python code that runs in a command before the command itself. patch() is that of serve_commands.py.
 FAILING_REPLACE = """
 import os
 replace = os.replace
@@ -26,7 +26,7 @@ def failing(source, place):
     if os.path.basename(place) == {name!r} and not str(source).endswith(".replaced"):
         raise PermissionError(1, "Operation not permitted")
     replace(source, place)
-os.replace = failing
+patch(os, "replace", failing)
 """
 # This code simulates a full disk by a limit of the length of files: from the export of OUT on, or after the export.
 FULL_DISK = f"""
@@ -42,7 +42,8 @@ def limited(*arguments):
 file_io.write_file = limited
 """
 PROTECTED = (
-    "import os; access = os.access; os.access = lambda path, mode: access(path, mode) and '{name}' not in str(path)"
+    "import os; access = os.access; "
+    "patch(os, 'access', lambda path, mode: access(path, mode) and '{name}' not in str(path))"
 )
 
 
@@ -281,7 +282,7 @@ def test_a_protected_file_is_not_replaced(scan, tmp_path):
     (tmp_path / "out.ply").write_text("kept")
     protected = PROTECTED.format(name="out.ply")  # A mode without write permission would not protect it from root.
     with unchanged(tmp_path):
-        failed(decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", before=protected), 1, "OUT", "protected")
+        failed(decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", patches=protected), 1, "OUT", "protected")
 
 
 @pytest.mark.parametrize("name", ["out.obj", "r.json", "out.mtl"])
@@ -291,7 +292,7 @@ def test_a_failing_move_undoes_those_before_it(tmp_path, name):
         (tmp_path / other).write_text("kept")
     arguments = source, tmp_path / "out.obj", "--tolerance", "1%", "--report", tmp_path / "r.json"
     with unchanged(tmp_path):
-        failed(decimate(*arguments, before=FAILING_REPLACE.format(name=name)), 1, name, "not permitted", "not written")
+        failed(decimate(*arguments, patches=FAILING_REPLACE.format(name=name)), 1, name, "not permitted", "not written")
 
 
 def test_reports_may_be_pipes(scan, tmp_path):
@@ -419,7 +420,7 @@ def test_reports_are_written_all_or_none(scan, tmp_path):
         _, out, _ = failed(command(*arguments, "/proc/b.csv"), 1, "--report /proc/b.csv")
         assert "largest" not in out
         spoiled = FAILING_REPLACE.format(name="b.csv")
-        failed(command(*arguments, tmp_path / "b.csv", before=spoiled), 1, "b.csv: Operation not permitted")
+        failed(command(*arguments, tmp_path / "b.csv", patches=spoiled), 1, "b.csv: Operation not permitted")
 
 
 def test_a_report_follows_links_and_keeps_the_mode(scan, tmp_path):
@@ -437,7 +438,7 @@ def test_a_report_follows_links_and_keeps_the_mode(scan, tmp_path):
 
 
 @pytest.fixture
-def measured():
+def measured(measured_once):
     ob = sheet(count=6)
     bpy.ops.tolvol.set_reference()
     return ob

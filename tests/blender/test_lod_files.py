@@ -100,15 +100,15 @@ def test_bad_options_are_refused_by_name(scan, tmp_path, arguments, said):
 def test_all_files_or_none(scan, tmp_path):
     (tmp_path / "out_LOD0.ply").write_text("old")
     with unchanged(tmp_path):
-        before = FAILING_REPLACE.format(name="out_LOD1.ply")
-        failed(decimate(scan, tmp_path / "out.ply", "--lod", "1%,2%", before=before), 1, "out_LOD1.ply")
+        patches = FAILING_REPLACE.format(name="out_LOD1.ply")
+        failed(decimate(scan, tmp_path / "out.ply", "--lod", "1%,2%", patches=patches), 1, "out_LOD1.ply")
 
 
 def test_a_level_that_cannot_be_proved_leaves_no_file(scan, tmp_path):
     """The second file is changed after it was written."""
     spoil = PATCH.format('objects[0].data.vertices[5].co *= 1.1 if "LOD1" in str(path) else 1')
     with unchanged(tmp_path):
-        done = decimate(scan, tmp_path / "out.ply", "--lod", "1%,2%", before=spoil)
+        done = decimate(scan, tmp_path / "out.ply", "--lod", "1%,2%", patches=spoil)
         failed(done, 3, "Not proved", "out_LOD1.ply was not written")
 
 

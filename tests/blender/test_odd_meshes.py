@@ -79,7 +79,7 @@ def test_soup_is_joined():
 
 
 def test_sheets_that_coincide_become_one_where_blender_holds_but_one():
-    vertices, quads = sheet_arrays(bumps=0.0)
+    vertices, quads = sheet_arrays(count=16, bumps=0.0)
     before, after, repairs = decimated(
         np.vstack([vertices, vertices]), np.vstack([quads, quads[:, ::-1] + len(vertices)])
     )

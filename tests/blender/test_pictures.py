@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from addon import native
-from commands import FIGURES, command, decimate, succeeded
+from commands import FIGURES, command, decimate, save, succeeded
+from scenes import sheet_arrays
 
 pytestmark = pytest.mark.usefixtures("gl")
 
@@ -31,13 +32,14 @@ def marked(picture):
 
 def test_decimate_draws_its_result(scan, tmp_path):
     picture = tmp_path / "picture.png"
-    succeeded(decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", "--picture", picture, alone=True))
+    succeeded(decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", "--picture", picture))
     drawn = pixels(picture)
     assert drawn.shape[1] > drawn.shape[0] > 400 and marked(drawn) == 0
     assert len(np.unique(drawn.reshape(-1, 4), axis=0)) > 1000
 
 
-def test_report_draws_both_directions_into_its_page(scan, tmp_path):
+def test_report_draws_both_directions_into_its_page(tmp_path):
+    scan = save(tmp_path / "scan.ply", ("scan", *sheet_arrays(count=20, bumps=0.2)))
     page, picture = tmp_path / "r.html", tmp_path / "picture.png"
     arguments = scan, tmp_path / "out.ply", "--tolerance", "1%"
     succeeded(decimate(*arguments))
@@ -65,7 +67,7 @@ def test_a_picture_needs_a_folder_and_a_png(scan, tmp_path):
 
 
 def test_figures_are_drawn_of_any_mesh(scan, tmp_path):
-    assert command(FIGURES / "figures.py", scan, "--output", tmp_path, "--tolerance", "2%", alone=True)[::2] == (0, "")
+    assert command(FIGURES / "figures.py", scan, "--output", tmp_path, "--tolerance", "2%")[::2] == (0, "")
     volume, distance = pixels(tmp_path / "volume.png"), pixels(tmp_path / "distance.png")
     for picture in (volume, distance):
         assert len(np.unique(picture.reshape(-1, 4), axis=0)) > 1000

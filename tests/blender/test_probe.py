@@ -296,6 +296,7 @@ def test_labels_that_are_out_of_date_are_measured_again_where_they_were():
         bpy.ops.tolvol.renew_labels()
 
 
+@pytest.mark.usefixtures("measured_once")
 def test_labels_are_in_the_report(tmp_path):
     ob = lifted()
     ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.2

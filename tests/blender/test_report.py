@@ -19,6 +19,7 @@ from addon.shared.proof.deviation_pictures import Picture
 from commands import command, save
 from scenes import activate, add_object, sheet, sheet_arrays, torus, torus_arrays
 
+pytestmark = pytest.mark.usefixtures("measured_once")
 PNG = b"\x89PNG\r\n\x1a\n not looked at"
 
 
@@ -71,8 +72,9 @@ def test_place_percentiles_bands_and_both_directions():
 
 def test_tolerance_is_an_edge_of_the_histogram():
     a, b = step()
-    for tolerance in (0.03, 0.05, 0.1, 1.0, None, 1e-4):
-        run = measured(a, b, tolerance)
+    tolerances = (0.03, 0.05, 0.1, 1.0, 1e-4)
+    for tolerance in (*tolerances, None):
+        run = measured(a, b, tolerance, tolerances)
         for way in ("forward", "backward"):
             edges, shares = np.array(run[way]["histogram"]["edges"]), run[way]["histogram"]["shares"]
             assert sum(shares) == pytest.approx(1) and len(shares) == len(edges) - 1 <= 61
@@ -174,7 +176,7 @@ def test_page_stands_alone_and_says_what_was_measured():
 def test_page_bars_beyond_the_tolerance_are_striped():
     a, b = step()
     for tolerance, striped in ((0.05, True), (0.2, False)):
-        text = deviation.deviation_page.page(measured(a, b, tolerance))
+        text = deviation.deviation_page.page(measured(a, b, tolerance, bounds=(0.05, 0.2)))
         assert ('fill="url(#stripes-forward)"' in text) == striped
 
 
@@ -244,9 +246,8 @@ def test_names_of_files_need_not_be_text():
 
 
 def test_command_writes_every_format(tmp_path):
-    vertices, quads = torus_arrays()
-    first = save(tmp_path / "a.ply", ("a", vertices, quads))
-    second = save(tmp_path / "b.ply", ("b", *torus_arrays(seed=2)))
+    first = save(tmp_path / "a.ply", ("a", *torus_arrays(around=24, across=12)))
+    second = save(tmp_path / "b.ply", ("b", *torus_arrays(around=24, across=12, seed=2)))
     reports = [tmp_path / name for name in ("r.json", "r.csv", "R.HTML")]
     options = [option for path in reports for option in ("--report", path)]
     code, out, err = command("report.py", first, second, "--tolerance", "0.5%", "--unit", "mm", *options)

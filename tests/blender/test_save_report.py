@@ -25,6 +25,7 @@ from addon.units import chosen_unit
 from scenes import activate, add_object, sheet_arrays, torus
 from test_report import Page, lifted_sheet, measured, step
 
+pytestmark = pytest.mark.usefixtures("measured_once")
 save_report = bpy.ops.tolvol.save_report
 
 

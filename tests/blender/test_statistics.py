@@ -8,6 +8,8 @@ import pytest
 from addon.proof import statistics, verdict
 from scenes import sheet, torus
 
+pytestmark = pytest.mark.usefixtures("measured_once")
+
 
 def half_lifted(height=0.1):
     """A flat sheet of which one half was lifted after its reference was set, with a steep step between the halves."""

@@ -67,6 +67,7 @@ def shifted(length=0.1):
     return ob
 
 
+@pytest.mark.usefixtures("measured_once")
 @pytest.mark.parametrize(("tolerance", "word"), ((0.2, PASS), (0.05, FAIL)))
 def test_check_report_and_select_outside_say_the_same(tolerance, word, tmp_path, capfd):
     ob = shifted()
@@ -94,6 +95,7 @@ def test_check_report_and_select_outside_say_the_same(tolerance, word, tmp_path,
     assert verdict.word(ob) == word  # Select Outside has measured both ways.
 
 
+@pytest.mark.usefixtures("measured_once")
 def test_one_way_is_enough_only_if_it_was_asked_for(tmp_path, capfd):
     ob = sheet(bumps=0.0)
     assert bpy.ops.tolvol.set_reference() == {"FINISHED"}

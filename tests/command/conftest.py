@@ -19,3 +19,8 @@ def pytest_sessionstart(session):
         import trimesh  # noqa: F401
     except ImportError as error:
         pytest.exit(f"{error}: run sh setup.sh --tests", returncode=3)
+
+
+def pytest_sessionfinish(session):
+    if commands := sys.modules.get("commands"):
+        commands.end_served()

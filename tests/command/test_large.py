@@ -64,8 +64,8 @@ def test_enough_memory_is_one_round_and_thorough_leaves_fewer(tmp_path):
     torus, found = scan(tmp_path / "scan.ply", columns=32, rows=16), {}
     for name, extra in {"fast": [], "thorough": ["--effort", "thorough"], "subset": ["--placement", "subset"]}.items():
         out, report = tmp_path / f"{name}.ply", tmp_path / f"{name}.json"
-        succeeded(decimate(torus, out, "--tolerance", 0.05, "--report", report, *extra, memory="1GB"))
-        assert_within(out, torus, 0.05)
+        succeeded(decimate(torus, out, "--tolerance", 0.1, "--report", report, *extra, memory="1GB"))
+        assert_within(out, torus, 0.1)
         assert [each["cells"] for each in json.loads(report.read_text())["rounds"]] == [1]
         found[name] = read(out)
     assert len(found["thorough"].triangles) < 0.9 * len(found["fast"].triangles)

@@ -8,6 +8,7 @@ from meshes import transform
 
 # The points of a face at which its angle is looked at.
 STEPS = 6
+AT_ONCE = 32  # triangles
 WEIGHTS = np.array([(i, j, STEPS - i - j) for i in range(STEPS + 1) for j in range(STEPS + 1 - i)]) / STEPS
 
 
@@ -98,8 +99,20 @@ def angles_of(reference, faces, tolerance):
     low, high = reference.min(1) - tolerance, reference.max(1) + tolerance
 
     def at_worst_point(face, angle):
-        candidates = ((low <= face.max(0)) & (high >= face.min(0))).all(1)
-        near = distances_to(WEIGHTS @ face, reference[candidates]) <= tolerance
-        return np.where(near, angle[candidates], 180).min(1).max()
+        candidates = np.flatnonzero(((low <= face.max(0)) & (high >= face.min(0))).all(1))
+        candidates = candidates[np.argsort(angle[candidates])]
+        points = WEIGHTS @ face
+        least = np.full(len(points), 180.0)
+        searched = np.arange(len(points))
+        # The first triangle near a point has the least angle there: most of the others need no distance.
+        for first in range(0, len(candidates), AT_ONCE):
+            part = candidates[first : first + AT_ONCE]
+            near = distances_to(points[searched], reference[part]) <= tolerance
+            found = near.any(1)
+            least[searched[found]] = angle[part[near[found].argmax(1)]]
+            searched = searched[~found]
+            if not len(searched):
+                break
+        return least.max()
 
     return np.array([at_worst_point(face, angle) for face, angle in zip(faces, angles, strict=True)])

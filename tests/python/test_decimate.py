@@ -32,8 +32,10 @@ PLACES = {
 }
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("placement", ["optimal", "subset"])
+# The places of a subset are those of the input, so that their type hardly matters.
+@pytest.mark.parametrize(
+    ("placement", "dtype"), [("optimal", np.float32), ("optimal", np.float64), ("subset", np.float32)]
+)
 @pytest.mark.parametrize("name", SOLIDS)
 def test_promise_both_ways(name, placement, dtype):
     vertices, triangles = SOLIDS[name]

@@ -143,9 +143,8 @@ def test_blocked_and_as_far_as_permitted(volume):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_hostile_meshes_stay_within_as_stored(seed):
-    mesh = [meshes.needles, meshes.non_manifold, meshes.degenerate, meshes.spike, meshes.rod, meshes.misoriented][
-        seed
-    ]()
+    spike, rod = meshes.spike(levels=4), meshes.rod(levels=4)
+    mesh = [meshes.needles(), meshes.non_manifold(), meshes.degenerate(), spike, rod, meshes.misoriented()][seed]
     to_world = meshes.matrix(meshes.random_rotation(seed) @ np.diag([1, 30, 0.2]), (100, 0, 0))
     vertices, triangles = mesh[0].astype(np.float32), mesh[1]
     world = meshes.transform(to_world, vertices[np.unique(triangles)])

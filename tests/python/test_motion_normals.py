@@ -99,9 +99,9 @@ def test_smooth_turns_no_face():
     assert_promise(vertices, triangles, Moved(result, triangles), volume.tolerance)
 
 
-@pytest.mark.parametrize("mode", ["blocked", "farthest", "pull_back"])
-@pytest.mark.parametrize("two_sided", [True, False])
-def test_deform_turns_no_face(mode, two_sided):
+@pytest.fixture(scope="module")
+def turning():
+    """A torus, its volume, and a lattice that would turn faces of it over."""
     vertices, triangles, volume, _ = scene(20)
     low, size = vertices.min(0), np.ptp(vertices, axis=0)
     domain = np.eye(4)
@@ -109,9 +109,16 @@ def test_deform_turns_no_face(mode, two_sided):
     points = tolvol.lattice_points((5, 5, 5), domain)
     points += np.random.default_rng(2).standard_normal(points.shape) * 0.7
     lattice = tolvol.Lattice(points, domain)
-    given = {"mode": mode, "two_sided": two_sided, "crossings": "allow"}
     wished = tolvol.deform(vertices, lattice).vertices
     assert (angles(vertices, triangles, wished, volume.tolerance) > 90).any()
+    return vertices, triangles, volume, lattice
+
+
+@pytest.mark.parametrize("mode", ["blocked", "farthest", "pull_back"])
+@pytest.mark.parametrize("two_sided", [True, False])
+def test_deform_turns_no_face(turning, mode, two_sided):
+    vertices, triangles, volume, lattice = turning
+    given = {"mode": mode, "two_sided": two_sided, "crossings": "allow"}
     result = tolvol.deform(vertices, lattice, triangles, volume, **given)
     assert judged(vertices, triangles, volume, result) == 0
     assert (mode == "blocked") == np.array_equal(result.vertices, vertices)

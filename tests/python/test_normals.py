@@ -18,7 +18,7 @@ ROUNDING = 1e-4  # degrees
 def test_no_face_of_the_result_is_turned_over():
     vertices, triangles = PLATES
     turned, counts = [], []
-    for percent in (1, 2):
+    for percent in (2, 3):
         tolerance = percent / 100 * tolvol.diagonal(vertices, triangles)
         for effort in ("fast", "thorough"):
             free = decimate(vertices, triangles, tolerance, effort=effort, max_normal_angle=180)
@@ -38,23 +38,23 @@ def test_no_face_of_the_result_is_turned_over():
 
 
 @pytest.mark.parametrize("options", [{}, {"effort": "thorough"}, {"placement": "subset"}, {"two_sided": False}])
-@pytest.mark.parametrize("angle", [12, 40])
-def test_the_angle_is_a_bound_of_ones_own(options, angle):
+def test_the_angle_is_a_bound_of_ones_own(options):
     vertices, triangles = meshes.torus(32, 16, noise=0.003)
-    tolerance = 0.02 * tolvol.diagonal(vertices, triangles)
-    result = decimate(vertices, triangles, tolerance, max_normal_angle=angle, **options)
-    assert largest_angles(vertices, triangles, result, tolerance).max() <= angle + ROUNDING
-    assert 0 < result.report["normals"]["largest"] <= angle
+    tolerance = 0.03 * tolvol.diagonal(vertices, triangles)
     free = decimate(vertices, triangles, tolerance, **options)
-    assert largest_angles(vertices, triangles, free, tolerance).max() > angle
-    assert len(free.triangles) < len(result.triangles) < len(triangles)
-    assert_promise(vertices, triangles, result, tolerance, two_sided=options.get("two_sided", True))
+    largest_of_free = largest_angles(vertices, triangles, free, tolerance).max()
+    for angle in (12, 40):
+        result = decimate(vertices, triangles, tolerance, max_normal_angle=angle, **options)
+        assert largest_angles(vertices, triangles, result, tolerance).max() <= angle + ROUNDING < largest_of_free
+        assert 0 < result.report["normals"]["largest"] <= angle
+        assert len(free.triangles) < len(result.triangles) < len(triangles)
+        assert_promise(vertices, triangles, result, tolerance, two_sided=options.get("two_sided", True))
 
 
 @pytest.mark.parametrize("effort", ["fast", "thorough"])
 def test_the_bits_do_not_depend_on_the_number_of_threads(effort):
-    vertices, triangles = meshes.torus(80, 40, noise=0.002)
-    tolerance = 0.01 * tolvol.diagonal(vertices, triangles)
+    vertices, triangles = meshes.torus(64, 32, noise=0.002)
+    tolerance = 0.02 * tolvol.diagonal(vertices, triangles)
     one, three = (
         decimate(vertices, triangles, tolerance, effort=effort, max_normal_angle=25, threads=n) for n in (1, 3)
     )

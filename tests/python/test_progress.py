@@ -12,8 +12,10 @@ import tolvol
 
 import meshes
 
-LARGE = meshes.torus(600, 200, noise=0.0005)
+LARGE = meshes.torus(400, 150, noise=0.0005)
 TOLERANCE = 0.005 * tolvol.diagonal(*LARGE)
+# Large enough for a refinement that takes long.
+SMALLER = meshes.torus(120, 60, noise=0.0005)
 
 
 def watch(call):
@@ -49,6 +51,7 @@ CALLS = {
 }
 LATTICE = tolvol.Lattice(tolvol.lattice_points(4))
 VOLUME = tolvol.ToleranceVolume(*LARGE, TOLERANCE)
+VOLUME_OF_SMALLER = tolvol.ToleranceVolume(*SMALLER, TOLERANCE)
 
 
 def test_progress_moves_while_python_runs_on():
@@ -90,9 +93,9 @@ def test_cancel_while_the_input_is_compared_with_the_reference():
 
 
 def test_finish_keeps_the_last_state_of_a_thorough_decimation():
-    fast = tolvol.decimate(*LARGE, VOLUME)
+    fast = tolvol.decimate(*SMALLER, VOLUME_OF_SMALLER)
     progress, thread, outcome = watch(
-        lambda progress: tolvol.decimate(*LARGE, VOLUME, effort="thorough", progress=progress)
+        lambda progress: tolvol.decimate(*SMALLER, VOLUME_OF_SMALLER, effort="thorough", progress=progress)
     )
     while thread.is_alive() and not (progress.stage == "refining" and progress.count < len(fast.triangles) - 4):
         time.sleep(0.001)
@@ -103,8 +106,8 @@ def test_finish_keeps_the_last_state_of_a_thorough_decimation():
     assert len(outcome[0].triangles) < len(fast.triangles)
     result = outcome[0].vertices, outcome[0].triangles
     # Without the bound the interval may reach beyond the tolerance although the true distance is within it.
-    assert tolvol.directed_hausdorff(*result, *LARGE, bound=TOLERANCE).upper <= TOLERANCE
-    assert tolvol.directed_hausdorff(*LARGE, *result, bound=TOLERANCE).upper <= TOLERANCE
+    assert tolvol.directed_hausdorff(*result, *SMALLER, bound=TOLERANCE).upper <= TOLERANCE
+    assert tolvol.directed_hausdorff(*SMALLER, *result, bound=TOLERANCE).upper <= TOLERANCE
 
 
 @pytest.mark.parametrize("call", CALLS)
@@ -141,19 +144,19 @@ def test_a_handler_of_ctrl_c_may_keep_what_a_thorough_decimation_has():
 
     timer = after(0, interrupt)
     try:
-        result = tolvol.decimate(*LARGE, VOLUME, effort="thorough", progress=progress)
+        result = tolvol.decimate(*SMALLER, VOLUME_OF_SMALLER, effort="thorough", progress=progress)
     finally:
         signal.signal(signal.SIGINT, before)
     timer.join()
     assert result.report["stopped_by"] == "request"
-    assert tolvol.directed_hausdorff(result.vertices, result.triangles, *LARGE, bound=TOLERANCE).upper <= TOLERANCE
+    assert tolvol.directed_hausdorff(result.vertices, result.triangles, *SMALLER, bound=TOLERANCE).upper <= TOLERANCE
 
 
 def test_max_seconds_ends_the_fast_phase_with_what_is_proved():
-    whole = tolvol.decimate(*LARGE, VOLUME)
-    result = tolvol.decimate(*LARGE, VOLUME, max_seconds=1e-9)
+    whole = tolvol.decimate(*SMALLER, VOLUME_OF_SMALLER)
+    result = tolvol.decimate(*SMALLER, VOLUME_OF_SMALLER, max_seconds=1e-9)
     assert result.report["stopped_by"] == "time" and len(result.triangles) > len(whole.triangles)
-    assert tolvol.directed_hausdorff(result.vertices, result.triangles, *LARGE, bound=TOLERANCE).upper <= TOLERANCE
+    assert tolvol.directed_hausdorff(result.vertices, result.triangles, *SMALLER, bound=TOLERANCE).upper <= TOLERANCE
 
 
 def test_progress_changes_no_result():

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sets up and runs the tests: one queue of tasks for as many workers as there are cores, and a lane for the window tests.
+"""Sets up and runs the tests: one queue of tasks for as many workers as there are cores, and a lane for each share of the
+window tests.
 
 The window tests mostly wait, so they run beside the compilation of the sanitizer presets and beside the queue. A task of
 a sanitizer preset is left out if it has passed with the same program before, except in a full run.
@@ -157,7 +158,7 @@ class Run:
         workers = len(os.sched_getaffinity(0))
         lane = [task for task in self._planned if task.runner == "ui"]
         queue = [task for task in self._planned if task.runner != "ui"]
-        with ThreadPoolExecutor(1) as window, ThreadPoolExecutor(workers) as pool:
+        with ThreadPoolExecutor(max(1, len(lane))) as window, ThreadPoolExecutor(workers) as pool:
             try:
                 ends = [window.submit(self._do, task) for task in lane]
                 for preset, target in sorted({(task.preset, task.target) for task in queue if task.preset}):

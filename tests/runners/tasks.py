@@ -134,6 +134,13 @@ def blender(count):
         yield Task("blender", f"{index + 1}_of_{count}", command, count_pytest)
 
 
+def windows(count, everything):
+    """The window tests, in as many shares."""
+    for index in range(count):
+        command = ("sh", "tests/ui/run.sh", "--share", f"{index + 1}/{count}")
+        yield Task("ui", f"{index + 1}_of_{count}", command, count_pytest, FULL_LENGTH if everything else {})
+
+
 def tidy(everything):
     count = 4
     for index in range(count):
@@ -151,7 +158,7 @@ def planned(runners, everything):
         # About a minute of the processor in every run.
         "fuzz": [*fuzz(300), *fuzz(300, first=300)] if everything else [*fuzz(100), *fuzz(100, first=100)],
         "blender": [*blender(4)],
-        "ui": [Task("ui", "ui", ("sh", "tests/ui/run.sh"), count_pytest, FULL_LENGTH if everything else {})],
+        "ui": [*windows(2, everything)],
         "style": [Task("style", "checks", ("sh", "tests/style/run.sh"), count_checks), *tidy(everything)],
     }
     return [task for name in runners for task in tasks[name]]

@@ -15,6 +15,7 @@ bpy.context.preferences.view.show_splash = False
 bpy.context.preferences.view.use_save_prompt = False
 
 import addon  # noqa: E402
+import unending  # noqa: E402
 from addon.background import thread  # noqa: E402
 from addon.reference import snapshots  # noqa: E402
 from window import draw_finely, window_context  # noqa: E402
@@ -66,18 +67,6 @@ def start():
         globals()[sys.argv[sys.argv.index("--") + 1]]()
 
 
-def repeated(work):
-    """Repeats the work until it is cancelled: on a slow machine drawing may take longer than the work once."""
-
-    def again(progress):
-        while True:
-            outcome = work(progress)
-            if progress.cancelled:
-                return outcome
-
-    return again
-
-
 _ticks = iter(range(_MOST_TICKS))
 
 
@@ -91,8 +80,7 @@ def leave():
     return None
 
 
-run = thread.Job._run
-thread.Job._run = lambda self, work: run(self, repeated(work))
 addon.register()
+unending.jobs().__enter__()  # On a slow machine drawing may take longer than the work once.
 bpy.app.timers.register(start, first_interval=1.0)
 bpy.app.timers.register(leave, first_interval=1.0 + _TICK)

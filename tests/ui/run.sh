@@ -1,10 +1,16 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Tests the add-on in a real Blender window on a virtual screen, by mouse and keyboard: sh tests/ui/run.sh [TEST NAME]...
-# Screenshots and Blender's output go to build/ui/.
+# `--share 1/2` and `--share 2/2` run a half each and can run side by side.
+# Screenshots and Blender's output go to build/ui/, and those of a second share to build/ui_2/.
 set -eu
 cd "$(dirname "$0")/../.."
 out=build/ui
+case "$*" in
+  --share\ 1/*) ;;
+  --share*) share=${2%/*}; out=build/ui_$share ;;
+esac
+export TOLVOL_UI_OUT="$out"
 mkdir -p "$out"
 rm -f "$out"/*.png "$out/display"
 
@@ -21,7 +27,7 @@ done
 
 code=0
 DISPLAY=":$(cat "$out/display")" LIBGL_ALWAYS_SOFTWARE=1 timeout 3000 \
-  blender --factory-startup --window-geometry 0 0 1280 800 --python-exit-code 5 --python tests/ui/run.py -- "$@" \
+  blender --factory-startup --window-geometry 0 54 1060 746 --python-exit-code 5 --python tests/ui/run.py -- "$@" \
   >"$out/blender.log" 2>&1 || code=$?
 # An exception in the draw function of a panel appears only in Blender's output.
 if grep -q Traceback "$out/blender.log"; then

@@ -7,7 +7,7 @@ import time
 from addon import estimate
 from addon.estimate import known
 from addon.proof import verdict
-from test_panel import monkey, suzanne
+from test_panel import TRIANGLES, monkey, suzanne
 from window import find_property, finished, on_screen, open_tab, press, region, reset, screenshot, xdotool
 
 
@@ -40,7 +40,7 @@ def test_the_number_follows_the_tolerance_while_it_is_dragged():
         yield from finished(lambda: is_known(answers))
         screenshot("estimate 1 before the click")
         before = answers[-1][1]
-        assert suzanne().tolvol.snapshot is None and before.before == 62976 and not before.known
+        assert suzanne().tolvol.snapshot is None and before.before == TRIANGLES and not before.known
         # The curve reaches as far as the tolerance is dragged below.
         yield from finished(lambda: "Suzanne" in known._known and known._known["Suzanne"].curve.count(6))
         x, y = yield from find_property("tolerance_percent", 0.6)
@@ -69,5 +69,5 @@ def test_the_number_follows_the_tolerance_while_it_is_dragged():
         yield 0.5
         screenshot("estimate 3 decimated")
         count = len(suzanne().data.polygons)
-        assert answers[-1][1] == estimate.Estimate(62976, count, True)
+        assert answers[-1][1] == estimate.Estimate(TRIANGLES, count, True)
         assert abs(estimated - count) <= 0.15 * count

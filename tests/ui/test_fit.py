@@ -4,7 +4,7 @@
 import bpy
 
 import scenes
-from test_panel import assert_proved, monkey, stored, suzanne
+from test_panel import assert_proved, large_monkey, stored, suzanne
 from window import centre, finished, key, reset, screenshot, status_texts, view, xdotool
 
 
@@ -16,7 +16,7 @@ def fit(ob):
 
 
 def test_escape_while_a_modifier_is_fitted_changes_nothing():
-    yield from reset(monkey)
+    yield from reset(large_monkey)
     before = stored()
     said = status_texts()
     fit(suzanne())
@@ -31,7 +31,7 @@ def test_escape_while_a_modifier_is_fitted_changes_nothing():
 
 
 def test_escape_keeps_the_best_so_far():
-    yield from reset(monkey)
+    yield from reset(large_monkey)
     reference = scenes.world_triangles(suzanne())
     said = status_texts()
     fit(suzanne())

@@ -17,14 +17,14 @@ from panels_open import alone
 from window import (
     centre,
     click,
+    copied_in_sidebar,
     finished,
+    hover,
     key,
-    on_screen,
     open_tab,
     region,
     reset,
     screenshot,
-    sent,
     view,
     window_context,
     xdotool,
@@ -33,7 +33,7 @@ from window import (
 TOLERANCE = 0.02
 
 
-def sheet(count=120, z=0.0):
+def sheet(count=60, z=0.0):
     """Makes a flat square that is its own reference, seen from above."""
     ob = scenes.sheet(count=count, bumps=z)
     ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", TOLERANCE
@@ -86,14 +86,11 @@ def across(length=200, steps=12):
 
 def switch(setting):
     """Clicks a switch in the sidebar. To find it, Blender's Shift Ctrl C copies the data path of the property below the mouse."""
-    sidebar = region("UI")
-    for y in range(150, sidebar.height - 5, 10):
-        place = on_screen(sidebar, sidebar.width // 3, y)
-        bpy.context.window_manager.clipboard = ""
-        yield from sent("mousemove", *place)
-        yield from sent("key", "ctrl+shift+c")
-        if bpy.context.window_manager.clipboard == f"tolvol.guard.{setting}":
-            click(*place)
+    found = yield from copied_in_sidebar("ctrl+shift+c")
+    for place, copied in found:
+        if copied == f"tolvol.guard.{setting}":
+            yield from hover(place)
+            xdotool("click", 1)
             yield 0.3
             return
     screenshot(f"guard without {setting}")
@@ -137,7 +134,7 @@ def test_guard_sculpting_by_mouse():
 
 
 def test_guard_other_brushes():
-    yield from reset(lambda: sheet(60, 0.1))
+    yield from reset(lambda: sheet(z=0.1))
     look(1.0)
     reference = scenes.world_triangles(ob())
     ob().tolvol.guard.sculpting = True

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The probe reads what is under the mouse, and a click leaves a label."""
 
+import tempfile
+from pathlib import Path
+
 import bpy
 import numpy as np
 
@@ -10,7 +13,6 @@ from addon.operators.probe import TOLVOL_OT_probe
 from addon.proof import labels, probing
 from test_layout import dark, drag_sidebar, light
 from window import (
-    PICTURES,
     click,
     finished,
     key,
@@ -197,14 +199,15 @@ def test_the_probe_ends_when_its_object_or_file_does():
     yield from finished(lambda: not TOLVOL_OT_probe.running())
     assert probing.hover() is None
     yield from reset(ball)
-    path = str(PICTURES / "probe.blend")
-    bpy.ops.tolvol.add_label(position=(1, 0, 0))
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    with window_context():
-        bpy.ops.tolvol.probe("INVOKE_DEFAULT")
-    yield from finished(TOLVOL_OT_probe.running)
-    with window_context():
-        bpy.ops.wm.open_mainfile(filepath=path)
+    with tempfile.TemporaryDirectory() as folder:
+        path = str(Path(folder) / "probe.blend")
+        bpy.ops.tolvol.add_label(position=(1, 0, 0))
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        with window_context():
+            bpy.ops.tolvol.probe("INVOKE_DEFAULT")
+        yield from finished(TOLVOL_OT_probe.running)
+        with window_context():
+            bpy.ops.wm.open_mainfile(filepath=path)
     yield from finished(lambda: not TOLVOL_OT_probe.running())
     yield 1.0
     assert probing.hover() is None and len(the_ball().tolvol.labels) == 1

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import bpy
 
+import unending
 from addon import job, status_bar
 from addon.background import thread
 from addon.job import run as job_run
@@ -24,14 +25,10 @@ from window import (
     xdotool,
 )
 
-_SMOOTHER = 1  # levels of subdivision on top of the monkey's, which make the job slow enough
-
 
 def begin():
-    """Starts a decimation. Returns the number of reports before it: all later reports are of the decimation."""
-    with window_context():
-        suzanne().modifiers.new("more", "SUBSURF").levels = _SMOOTHER
-        bpy.ops.object.modifier_apply(modifier="more")
+    """Starts a decimation that goes on. Returns the number of reports before it: all later reports are of the decimation."""
+    with window_context(), unending.jobs():
         suzanne().tolvol.tolerance_percent = 0.05
         bpy.ops.ed.undo_push(message="ready")
         suzanne().location.x = 1
@@ -111,7 +108,8 @@ def test_no_workspace_keeps_the_text_of_a_job():
         yield from finished(lambda before=plain[workspace]: (status_bar_pixels() != before).any())
     xdotool("key", "Escape")
     yield from finished(lambda: not job.under_way())
-    yield 12.0  # Until then the status bar shows what the job has reported.
+    # For some seconds the status bar shows what the job has reported.
+    yield from finished(lambda: (status_bar_pixels() == plain[window.workspace]).all(), pause=1.0)
     for workspace in workspaces:
         window.workspace = workspace
         yield 1.0
@@ -216,7 +214,8 @@ def test_escape_while_adjusting_leaves_the_mesh_as_before_the_operation():
     yield from reset(monkey)
     left, _ = yield from decimated()
     said = len(reports())
-    adjust(tolerance_percent=0.1)
+    with unending.jobs():
+        adjust(tolerance_percent=0.1)
     xdotool("mousemove", *centre(), "key", "Escape")
     yield from ends(said, "Decimate in Tolerance was cancelled. The mesh is as it was before that operation")
     assert suzanne().tolvol.snapshot is None and len(suzanne().data.polygons) > 3 * left
@@ -242,7 +241,8 @@ def test_adjusting_again_while_a_job_runs_begins_anew():
     yield from reset(monkey)
     left, _ = yield from decimated()
     said = len(reports())
-    adjust(tolerance_percent=0.1)
+    with unending.jobs():
+        adjust(tolerance_percent=0.1)
     adjust(tolerance_percent=0.4)
     yield from finished(lambda: not job.under_way())
     assert len(suzanne().data.polygons) < left

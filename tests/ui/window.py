@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Functions for the tests that use the mouse and the keyboard, take screenshots, and find buttons."""
 
+import os
 import subprocess
 import time
 from pathlib import Path
@@ -10,7 +11,8 @@ import numpy as np
 
 from addon.job import progress_text
 
-PICTURES = Path(__file__).resolve().parents[2] / "build" / "ui"
+# run.sh tells the folder.
+PICTURES = Path(__file__).resolve().parents[2] / os.environ.get("TOLVOL_UI_OUT", "build/ui")
 
 
 def xdotool(*arguments):
@@ -36,13 +38,14 @@ def status_texts():
 
 
 class TOLVOL_TEST_OT_mark(bpy.types.Operator):
-    """Counts how often its key was handled"""
+    """Notes what is in the clipboard when its key is handled, and empties the clipboard"""
 
     bl_idname, bl_label = "tolvol_test.mark", "Mark"
-    count = 0
+    noted = []
 
     def execute(self, context):
-        TOLVOL_TEST_OT_mark.count += 1
+        self.noted.append(context.window_manager.clipboard)
+        context.window_manager.clipboard = ""
         return {"FINISHED"}
 
 
@@ -53,15 +56,21 @@ _STUCK = 120  # seconds after which Blender counts as stuck
 def sent(*events):
     """Sends events by xdotool and waits until Blender has handled them: it then handles the key that follows them.
 
-    No operator may be at work that takes all keys.
+    Returns what was in the clipboard each time that this key was handled. No operator may be at work that takes all keys.
     """
     if not hasattr(bpy.types, TOLVOL_TEST_OT_mark.__name__):
         bpy.utils.register_class(TOLVOL_TEST_OT_mark)
-        keymap = bpy.context.window_manager.keyconfigs.addon.keymaps.new("Window")
+        configurations = bpy.context.window_manager.keyconfigs
+        keymap = configurations.addon.keymaps.new("Window")
         keymap.keymap_items.new(TOLVOL_TEST_OT_mark.bl_idname, _MARK.upper(), "PRESS")
-    count = TOLVOL_TEST_OT_mark.count
-    xdotool(*events, "key", _MARK)
-    yield from finished(lambda: TOLVOL_TEST_OT_mark.count > count, pause=0.01)
+        # Where the mouse is over no button, Ctrl C would write the selected objects to a file.
+        configurations.user.keymaps["3D View"].keymap_items["view3d.copybuffer"].active = False
+    events += "key", _MARK
+    noted = TOLVOL_TEST_OT_mark.noted
+    noted.clear()
+    xdotool(*events)
+    yield from finished(lambda: len(noted) == events.count(_MARK), pause=0.01)
+    return noted[:]
 
 
 def finished(change, seconds=_STUCK, pause=0.2):
@@ -81,9 +90,15 @@ def still(read):
     return now
 
 
+def _grab():
+    """Returns the beginning of a command that takes a picture of the window, which is in a corner of the screen."""
+    window = bpy.context.window_manager.windows[0]
+    return ["import", "-window", "root", "-crop", f"{window.width}x{window.height}+0+0", "+repage"]
+
+
 def screenshot(name):
     # This quality is the least compression, which takes a quarter of the time.
-    subprocess.run(["import", "-window", "root", "-quality", "10", str(PICTURES / f"{name}.png")], check=True)
+    subprocess.run([*_grab(), "-quality", "10", str(PICTURES / f"{name}.png")], check=True)
 
 
 def picture(name):
@@ -97,9 +112,7 @@ def picture(name):
 
 def pixels():
     """Returns a screenshot, (height, width, 3) integers."""
-    picture = subprocess.run(
-        ["import", "-window", "root", "-depth", "8", "ppm:-"], check=True, capture_output=True
-    ).stdout
+    picture = subprocess.run([*_grab(), "-depth", "8", "ppm:-"], check=True, capture_output=True).stdout
     _, width, height, _ = picture.split(maxsplit=4)[:4]
     count = 3 * int(width) * int(height)
     return np.frombuffer(picture[-count:], np.uint8).reshape(int(height), int(width), 3).astype(int)
@@ -136,7 +149,7 @@ def window_context():
 
 
 def on_screen(area_region, x, y):
-    """Converts a place in a region, from its upper left corner, to pixels of the screen. The window fills the screen."""
+    """Converts a place in a region, from its upper left corner, to pixels of the screen."""
     window, _ = view()
     return area_region.x + x, window.height - (area_region.y + area_region.height) + y
 
@@ -149,14 +162,14 @@ def centre():
 def open_tab():
     """Shows the sidebar with the tab Tolerance."""
     view()[1].spaces[0].show_region_ui = True
-    yield 0.5
+    yield from finished(lambda: region("UI").width > 100)
     sidebar = region("UI")
-    # The tabs are at the right edge, and the tab Tolerance is the last one.
+    # The tabs are at the right edge, and the tab Tolerance is the last one. It may be open already.
     for y in range(150, 260, 20):
-        click(*on_screen(sidebar, sidebar.width - 12, y))
-        yield 0.3
         if (yield from find("tolvol.")) is not None:
             return
+        click(*on_screen(sidebar, sidebar.width - 12, y))
+        yield 0.3
     raise AssertionError("no tab Tolerance")
 
 
@@ -179,23 +192,52 @@ def find_hold():
     return (yield from _find("tolvol_show_original", "ctrl+shift+alt+c", 0.33))
 
 
-_found_at = {}
+_last_seen = {}
 
 
-def _find(copied, keys, across):
-    sidebar = region("UI")
-    # In most cases the button is where it was the last time.
-    rows = range(30, sidebar.height - 5, 12)
-    last = _found_at.get((copied, across))
-    for y in rows if last is None else (last, *rows):
-        place = on_screen(sidebar, int(sidebar.width * across), y)
-        bpy.context.window_manager.clipboard = ""
-        yield from sent("mousemove", *place)
-        yield from sent("key", keys)
-        if copied in bpy.context.window_manager.clipboard:
-            _found_at[copied, across] = y
-            return place
-    return None
+def copied_in_sidebar(keys, across=0.33):
+    """Moves the mouse down the sidebar and presses keys that copy something from the button below the mouse.
+
+    Returns pairs (place, what was copied). Buttons that moved since the last time may move still: it then does so again.
+    """
+    end = time.monotonic() + _STUCK
+    while time.monotonic() < end:
+        copied = yield from _down_the_sidebar(keys, across)
+        if _last_seen.get((keys, across)) == copied:
+            return copied
+        _last_seen[keys, across] = copied
+        yield 0.1
+    raise AssertionError("the buttons do not come to rest")
+
+
+def _down_the_sidebar(keys, across, step=8):
+    """The events come so quickly that Blender draws few times meanwhile."""
+    sidebar, events = region("UI"), []
+    places = [on_screen(sidebar, int(sidebar.width * across), y) for y in range(30, sidebar.height - 5, step)]
+    for x, y in places:
+        if events:
+            events += "key", "--delay", 0, _MARK
+        events += *_onto(x, y), "key", "--delay", 0, keys
+    bpy.context.window_manager.clipboard = ""
+    copied = yield from sent(*events)
+    return list(zip(places, copied))
+
+
+def _onto(x, y):
+    """Returns events that move the mouse onto a button.
+
+    At one move of the mouse Blender leaves a button, and at the next one it enters another. It takes moves that follow each
+    other for one: a key keeps them apart.
+    """
+    return "mousemove", x, y, "key", "--delay", 0, "Insert", "mousemove", x + 1, y
+
+
+def _find(wanted, keys, across):
+    found = yield from copied_in_sidebar(keys, across)
+    place = next((place for place, copied in found if wanted in copied), None)
+    if place is not None:
+        yield from hover(place)
+    return place
 
 
 def press(operator, across=0.33):
@@ -211,11 +253,15 @@ def press(operator, across=0.33):
             yield from scroll(_DOWN, _PAGE)
             place = yield from find(operator, across)
     assert place is not None, f"no button for {operator}"
-    yield 0.6  # After so many seconds no tooltip is in the way.
-    click(*place)
+    xdotool("click", 1)
     yield 0.3
     if scrolled and _view_areas():  # A file browser may fill the window now.
         yield from scroll(_UP)
+
+
+def hover(place):
+    """Moves the mouse onto a button, and waits until Blender has noticed it."""
+    yield from sent(*_onto(*place))
 
 
 _UP, _DOWN = 4, 5  # X counts the two directions of the wheel as these buttons of the mouse.
@@ -251,10 +297,24 @@ def end_operators():
 _first_view = {}
 
 
-def maximize():
-    """Makes the 3D view fill the whole window, or gives it its former place."""
-    with window_context():
-        bpy.ops.screen.screen_full_area()
+def close_other_areas():
+    """Closes all areas beside the 3D view, which then fills the window: drawing in software takes as long as there are pixels."""
+    window, _ = view()
+    for area in list(window.screen.areas):
+        if area.type != "VIEW_3D":
+            with bpy.context.temp_override(window=window, area=area, region=area.regions[0]):
+                bpy.ops.screen.area_close()
+    yield 0.5
+    # Until Blender has drawn the window again its context is incomplete.
+    yield from finished(lambda: hasattr(bpy.context, "object"))
+
+
+def resize(width, height):
+    """Gives the window another size."""
+    window = view()[0]
+    shell = subprocess.run(["xdotool", "search", "--class", "blender"], check=True, capture_output=True, text=True)
+    xdotool("windowsize", shell.stdout.split()[-1], width, height)
+    yield from finished(lambda: (window.width, view()[1].width, window.height) == (width, width, height))
     yield 0.5
 
 
