@@ -69,6 +69,7 @@ def command(script, *arguments, patches="", before=None, alone=False):
     the Blender of all other commands, and sets attributes for this command alone: see serve_commands.py.
     """
     global _served
+    assert not patches or not (before or alone)
     if not (before or alone):
         one, _served = _served or _Served(), None  # If this Blender fails, the next command gets another one.
         done = one.run(script, arguments, patches)

@@ -32,7 +32,7 @@ def marked(picture):
 
 def test_decimate_draws_its_result(scan, tmp_path):
     picture = tmp_path / "picture.png"
-    succeeded(decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", "--picture", picture))
+    succeeded(decimate(scan, tmp_path / "out.ply", "--tolerance", "1%", "--picture", picture, alone=True))
     drawn = pixels(picture)
     assert drawn.shape[1] > drawn.shape[0] > 400 and marked(drawn) == 0
     assert len(np.unique(drawn.reshape(-1, 4), axis=0)) > 1000

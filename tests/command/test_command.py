@@ -43,13 +43,13 @@ def test_the_file_on_the_disk_is_within_and_the_report_says_so(torus, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.ply", "report.json", "scan.ply"]
 
 
-def test_options_have_their_effect(tmp_path):
-    torus, found = scan(tmp_path / "scan.ply", columns=32, rows=16), {}
+def test_options_have_their_effect(torus, tmp_path):
+    found = {}
     for name, extra in {
         "plain": [],
         "one-sided": ["--one-sided"],
         "subset": ["--placement", "subset"],
-        "target": ["--target-triangles", "600"],
+        "target": ["--target-triangles", "900"],
         "thorough": ["--effort", "thorough"],
         "threads": ["--threads", "1"],
         "angle": ["--max-normal-angle", "20"],
@@ -63,7 +63,7 @@ def test_options_have_their_effect(tmp_path):
     originals = {vertex.tobytes() for vertex in read(torus).vertices}
     kept = {name: all(vertex.tobytes() in originals for vertex in mesh.vertices) for name, (_, mesh) in found.items()}
     assert kept["subset"] and not kept["plain"]
-    assert 560 <= found["target"][0]["output"]["triangles"] <= 600
+    assert 850 <= found["target"][0]["output"]["triangles"] <= 900
     assert found["thorough"][0]["output"]["triangles"] < plain and found["thorough"][0]["effort"] == "thorough"
     assert np.array_equal(found["threads"][1].vertices, found["plain"][1].vertices)
     assert found["angle"][0]["normals"]["largest"] <= 20 < found["plain"][0]["normals"]["largest"]

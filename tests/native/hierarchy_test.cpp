@@ -273,7 +273,7 @@ TEST(Hierarchy, OneTriangleAndAPoint) {
   EXPECT_EQ(Hierarchy(mesh).nearest({3, 4, 0}).distance, 5);
 }
 
-// Neither deep recursion nor a quadratic blow-up: a million triangles in one place, and half of them there.
+// Neither deep recursion nor a quadratic blow-up: many triangles in one place, alone and among as many others.
 TEST(Hierarchy, HeapsOfEqualTriangles) {
   const int count = many(300000);
   TriangleMesh mesh;

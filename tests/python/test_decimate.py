@@ -32,9 +32,8 @@ PLACES = {
 }
 
 
-# The places of a subset are those of the input, so that their type hardly matters.
 @pytest.mark.parametrize(
-    ("placement", "dtype"), [("optimal", np.float32), ("optimal", np.float64), ("subset", np.float32)]
+    ("placement", "dtype"), [("optimal", np.float32), ("optimal", np.float64), ("subset", np.float64)]
 )
 @pytest.mark.parametrize("name", SOLIDS)
 def test_promise_both_ways(name, placement, dtype):

@@ -89,8 +89,14 @@ def test_a_task_that_its_program_decides_is_not_run_again(tmp_path, monkeypatch,
     assert [number_of_runs(), number_of_runs()] == [3, 3]
     assert "one" in (tmp_path / "times.json").read_text(), "the time of the last run stays"
     assert [number_of_runs(everything=True), number_of_runs()] == [4, 4]
-    assert [number_of_runs("2"), number_of_runs(environment={"A": "1"}), number_of_runs()] == [5, 6, 6]
+    passing.unlink()
+    assert [number_of_runs(everything=True), number_of_runs()] == [5, 6], "a failure ends what has passed before"
+    passing.touch()
+    assert [number_of_runs(), number_of_runs()] == [7, 7]
+    assert [number_of_runs("2"), number_of_runs(environment={"A": "1"}), number_of_runs()] == [8, 9, 9]
+    monkeypatch.setenv("ASAN_OPTIONS", "detect_leaks=0")
+    assert [number_of_runs(), number_of_runs()] == [10, 10]
     with program.open("ab") as file:
         file.write(b"changed")
     passes.hash_of.cache_clear()
-    assert [number_of_runs(), number_of_runs()] == [7, 7]
+    assert [number_of_runs(), number_of_runs()] == [11, 11]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What has passed before: it passes again as long as nothing that it depends on has changed.
 
-The passes are remembered in the user's cache folder, so that another checkout knows them too.
+The passes are remembered in the user's cache folder.
 """
 
 import hashlib
@@ -36,11 +36,10 @@ class Passes:
         """Returns the text of a pass, or None where nothing with this key has passed."""
         file = self._folder / key
         try:
-            text = file.read_text()
-            file.touch()
+            os.utime(file)
+            return file.read_text()
         except FileNotFoundError:
             return None
-        return text
 
     def note(self, key, text=""):
         file = self._folder / key
@@ -48,7 +47,13 @@ class Passes:
         part.write_text(text)
         part.replace(file)
 
+    def forget(self, key):
+        (self._folder / key).unlink(missing_ok=True)
+
     def forget_old(self):
         for file in self._folder.iterdir():
-            if time.time() - file.stat().st_mtime > KEPT:
-                file.unlink(missing_ok=True)
+            try:
+                if time.time() - file.stat().st_mtime > KEPT:
+                    file.unlink()
+            except FileNotFoundError:  # Another process has forgotten it, or given it its name.
+                pass

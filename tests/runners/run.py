@@ -3,7 +3,7 @@
 window tests.
 
 The window tests mostly wait, so they run beside the compilation of the sanitizer presets and beside the queue. A task of
-a sanitizer preset is left out if it has passed with the same program before, except in a full run.
+`asan` is left out if it has passed with the same program before, except in a full run.
 """
 
 import argparse
@@ -135,10 +135,13 @@ def failure_of(code, counts):
 
 
 def key(task):
-    """Returns the key of a pass of a task that its program alone decides, with the libraries that this loads."""
+    """Returns the key of a pass of a task that its program decides, with the libraries that this loads and what these
+    read of the environment."""
     listed = subprocess.run(["ldd", task.program], cwd=tasks.ROOT, check=True, capture_output=True, text=True).stdout
     libraries = re.findall(r"=> (/\S+)", listed)
-    return key_of(task.command, task.environment, [hash_of(tasks.ROOT / path) for path in (task.program, *libraries)])
+    given = {name: value for name, value in os.environ.items() if re.match(r"TOLVOL_|GTEST_|\w+SAN_OPTIONS", name)}
+    contents = [hash_of(tasks.ROOT / path) for path in (task.program, *libraries)]
+    return key_of(task.command, sorted((given | task.environment).items()), os.cpu_count(), contents)
 
 
 class Run:
@@ -197,7 +200,9 @@ class Run:
         code, seconds = self._commands.run(task.command, log, task.environment)
         counts = task.count(log.read_text(errors="replace"))
         failure = failure_of(code, counts)
-        if known and not failure:
+        if known and failure:
+            self._passes.forget(known)
+        elif known:
             self._passes.note(known, json.dumps(counts))
         self._report.add(task, counts or Counter(), seconds, failure, log)
 

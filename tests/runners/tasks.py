@@ -38,7 +38,7 @@ class Task:
     environment: dict = field(default_factory=dict)
     preset: str = ""  # besides release, has to be built before, and
     target: str = "all"  # of it
-    program: str = ""  # decides alone, with the command and the environment, how the task ends
+    program: str = ""  # decides, with the command and the environment, how the task ends
 
     @property
     def key(self):
@@ -80,9 +80,10 @@ def count_checks(output):
 
 def native(runner, preset, name, program="tolvol_tests", only="*", environment=None):
     command = (f"build/{preset}/tests/native/{program}", "--gtest_brief=1", f"--gtest_filter={only}")
-    # The tests of the sanitizer presets read no file and use no GPU.
-    decides = "" if preset == "release" else command[0]
-    return Task(runner, name, command, count_gtest, environment or {}, preset if decides else "", program, decides)
+    built = "" if preset == "release" else preset
+    # The tests of the sanitizer presets read no file and use no GPU. What tsan sees depends on how the threads meet.
+    decides = command[0] if preset == "asan" else ""
+    return Task(runner, name, command, count_gtest, environment or {}, built, program, decides)
 
 
 def shares(runner, preset, count, everything=False):

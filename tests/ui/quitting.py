@@ -81,6 +81,8 @@ def leave():
 
 
 addon.register()
-unending.jobs().__enter__()  # On a slow machine drawing may take longer than the work once.
+# On a slow machine drawing may take longer than the work once. The context ends with the process.
+endless = unending.jobs()
+endless.__enter__()
 bpy.app.timers.register(start, first_interval=1.0)
 bpy.app.timers.register(leave, first_interval=1.0 + _TICK)

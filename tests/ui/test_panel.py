@@ -145,9 +145,8 @@ def test_adjust_last_operation():
     yield 1.0
     screenshot("4 adjusted")
     assert suzanne().tolvol.tolerance_percent == 3
-    assert (
-        len(suzanne().tolvol.snapshot.polygons) == TRIANGLES
-    )  # The reference is the first mesh and not the first result.
+    # The reference is the first mesh and not the first result.
+    assert len(suzanne().tolvol.snapshot.polygons) == TRIANGLES
     assert_proved(suzanne(), reference, 3)
     xdotool("mousemove", *centre())
     yield

@@ -253,6 +253,10 @@ def press(operator, across=0.33):
             yield from scroll(_DOWN, _PAGE)
             place = yield from find(operator, across)
     assert place is not None, f"no button for {operator}"
+    # The button may have moved since it was found.
+    while not any(f"bpy.ops.{operator}" in copied for copied in (yield from sent("key", "ctrl+c"))):
+        place = yield from find(operator, across)
+        assert place is not None, f"the button for {operator} has gone"
     xdotool("click", 1)
     yield 0.3
     if scrolled and _view_areas():  # A file browser may fill the window now.
