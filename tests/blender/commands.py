@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs decimate.py and report.py as a user does, on files that the tests write."""
 
-import multiprocessing
 import subprocess
 from pathlib import Path
 
@@ -13,11 +12,11 @@ from addon.reference import snapshots
 from addon.shared.surface import joined
 from result_line import LINE, succeeded  # noqa: F401
 from scenes import add_object, empty_scene
+from served import PATIENCE, Served
 
 FOLDER = Path(__file__).resolve().parent
 SCRIPTS = FOLDER.parents[1] / "blender_scripts"
 BENCHMARK, FIGURES = FOLDER.parents[1] / "benchmark", FOLDER.parents[1] / "docs" / "figures"
-PATIENCE = 120  # seconds after which a command counts as stuck
 READS_GLTF = bpy.app.version >= (4, 0) or "bool" in vars(np)
 
 
@@ -32,34 +31,11 @@ def running(script, *arguments, before=None):
     )
 
 
-class _Served:
-    """A Blender that runs commands one after another."""
-
-    def __init__(self):
-        self._link, there = multiprocessing.Pipe()
-        served = FOLDER / "serve_commands.py", "--", str(there.fileno())
-        self._process = subprocess.Popen(
-            [bpy.app.binary_path, "--background", "--python", *served],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            pass_fds=[there.fileno()],
-        )
-        there.close()
-
-    def run(self, script, arguments, patches):
-        self._link.send((str(SCRIPTS / script), [str(argument) for argument in arguments], patches))
-        if self._link.poll(PATIENCE):
-            return self._link.recv()
-        self._process.kill()
-        raise subprocess.TimeoutExpired(script, PATIENCE)
-
-    def end(self):
-        self._link.close()
-        self._process.wait(PATIENCE)
-
-
-_served = None
+_served = Served(
+    [bpy.app.binary_path, "--background", "--python", FOLDER / "serve_commands.py", "--"],
+    stdout=subprocess.DEVNULL,
+    stderr=subprocess.DEVNULL,
+)
 
 
 def command(script, *arguments, patches="", before=None, alone=False):
@@ -68,13 +44,9 @@ def command(script, *arguments, patches="", before=None, alone=False):
     With `alone`, and with `before`, it runs in a process of its own, as a user runs it. `patches` is Python that runs first in
     the Blender of all other commands, and sets attributes for this command alone: see serve_commands.py.
     """
-    global _served
     assert not patches or not (before or alone)
     if not (before or alone):
-        one, _served = _served or _Served(), None  # If this Blender fails, the next command gets another one.
-        done = one.run(script, arguments, patches)
-        _served = one
-        return done
+        return _served.ask(str(SCRIPTS / script), [str(argument) for argument in arguments], patches)
     with running(script, *arguments, before=before) as process:
         try:
             out, err = process.communicate(timeout=PATIENCE)
@@ -86,8 +58,7 @@ def command(script, *arguments, patches="", before=None, alone=False):
 
 def end_served():
     """Ends the Blender that runs commands, if there is one."""
-    if _served is not None:
-        _served.end()
+    _served.end()
 
 
 def decimate(*arguments, **options):

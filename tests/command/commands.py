@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs the command as a user does, and writes the files that it reads."""
 
-import multiprocessing
 import os
-import signal
-import subprocess
 import sys
 from pathlib import Path
 
@@ -15,8 +12,8 @@ from tolvol.command.mesh import Mesh
 
 import meshes
 from result_line import LINE, succeeded  # noqa: F401
+from served import Served
 
-PATIENCE = 120  # seconds after which a command counts as stuck
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(tolvol.__file__).parents[1])}
 
 
@@ -24,48 +21,17 @@ def words(*arguments):
     return [sys.executable, "-m", "tolvol", *map(str, arguments)]
 
 
-class _Served:
-    """A process that runs commands one after another, each in a fork of itself: see serve_commands.py."""
-
-    def __init__(self):
-        self._link, there = multiprocessing.Pipe()
-        self._process = subprocess.Popen(
-            [sys.executable, Path(__file__).with_name("serve_commands.py"), str(there.fileno())],
-            stdin=subprocess.DEVNULL,
-            env=ENVIRONMENT,
-            pass_fds=[there.fileno()],
-            start_new_session=True,
-        )
-        there.close()
-
-    def run(self, arguments, environment):
-        self._link.send(([str(argument) for argument in arguments], environment, os.getcwd()))
-        if self._link.poll(PATIENCE):
-            return self._link.recv()
-        os.killpg(self._process.pid, signal.SIGKILL)  # The command is a process of this group.
-        raise subprocess.TimeoutExpired("tolvol", PATIENCE)
-
-    def end(self):
-        self._link.close()
-        self._process.wait(PATIENCE)
-
-
-_served = None
+_served = Served([sys.executable, Path(__file__).with_name("serve_commands.py")], env=ENVIRONMENT)
 
 
 def command(*arguments, **environment):
     """Returns (exit code, stdout, stderr)."""
-    global _served
-    one, _served = _served or _Served(), None  # If this process fails, the next command gets another one.
-    done = one.run(arguments, environment)
-    _served = one
-    return done
+    return _served.ask([str(argument) for argument in arguments], environment, os.getcwd())
 
 
 def end_served():
     """Ends the process that runs commands, if there is one."""
-    if _served is not None:
-        _served.end()
+    _served.end()
 
 
 def refused(done, *parts, code=2):

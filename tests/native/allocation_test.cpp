@@ -214,7 +214,7 @@ TEST(Allocation, DecimationInEveryForm) {
 }
 
 TEST(Allocation, ThoroughWithOptimalPlacement) {
-  const Scene scene(kSanitized ? 5 : 6);  // one decimation of the other scene takes as long as eight of this one
+  const Scene scene(kSanitized ? 5 : 6);  // without sanitizers one decimation of the other takes as long as eight
   DecimationOptions options;
   options.effort = DecimationOptions::Effort::thorough, options.threads = 1;
   EXPECT_GT(fail_allocations([&] { return scene.decimated(options); }, 3), 100);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "geometry/hierarchy.h"
-#include "many.h"
 
 #include <gtest/gtest.h>
 
@@ -10,6 +9,7 @@
 #include <random>
 #include <thread>
 
+#include "many.h"
 #include "polls.h"
 #include "shapes.h"
 

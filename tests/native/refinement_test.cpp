@@ -181,7 +181,7 @@ TEST(Refinement, ThreadsDoNotChangeABit) {
     for (const bool two_sided : {true, false}) {
       for (const auto placement : {Options::Placement::optimal, Options::Placement::subset}) {
         for (const bool bound : {true, false}) {
-          if (kSanitized && bound != two_sided) continue;  // these run the same code
+          if (kSanitized && bound != two_sided) continue;  // the others run the same code
           Options options = thorough();
           options.two_sided = two_sided, options.placement = placement;
           if (bound) options.shares = shares, options.locked = {locked.get(), shares.size()};

@@ -28,49 +28,16 @@ window.draw_finely(False)
 _SETTLE = 0.3  # seconds that Blender needs to handle an event and to draw again
 
 
-# Processor seconds that the tests of each file have taken, by which the files are shared out. Those of test_quit are spent
-# in other processes. A new file counts as a short one.
-_SECONDS = {
-    "test_appearance": 25,
-    "test_estimate": 18,
-    "test_fit": 17,
-    "test_guard": 41,
-    "test_inspect": 28,
-    "test_inspect_probe": 42,
-    "test_job": 35,
-    "test_layout": 38,
-    "test_legend": 20,
-    "test_lod": 20,
-    "test_original": 14,
-    "test_panel": 66,
-    "test_pictures": 38,
-    "test_quit": 30,
-    "test_save_report": 37,
-    "test_show_deviation": 83,
-}
-
-
-def share(modules, text):
-    """Returns the modules of one share of as many, such as "1/2". All shares take about as long."""
-    number, count = map(int, text.split("/"))
-    shares = [[] for _ in range(count)]
-    for module in sorted(modules, key=lambda module: -_SECONDS.get(module, 5)):
-        min(shares, key=lambda given: sum(_SECONDS.get(module, 5) for module in given)).append(module)
-    return sorted(shares[number - 1])
-
-
 class Run:
     def __init__(self, names):
-        files = sorted(path.stem for path in FOLDER.glob("test_*.py"))
+        modules = [importlib.import_module(path.stem) for path in sorted(FOLDER.glob("test_*.py"))]
+        tests = [value for module in modules for name, value in vars(module).items() if name.startswith("test_")]
         if names[:1] == ["--share"]:
-            files, names = share(files, names[1]), names[2:]
-        tests = [
-            value
-            for file in files
-            for name, value in vars(importlib.import_module(file)).items()
-            if name.startswith("test_")
-        ]
-        self.waiting = [test for test in tests if not names or test.__name__ in names]
+            # Tests of one file take about as long, so that these shares do, too.
+            number, count = map(int, names[1].split("/"))
+            self.waiting = tests[number - 1 :: count]
+        else:
+            self.waiting = [test for test in tests if not names or test.__name__ in names]
         self.failed = 0
         self.passed = 0
         self.started = time.time()

@@ -17,9 +17,8 @@ from panels_open import alone
 from window import (
     centre,
     click,
-    copied_in_sidebar,
+    find_setting,
     finished,
-    hover,
     key,
     open_tab,
     region,
@@ -85,16 +84,12 @@ def across(length=200, steps=12):
 
 
 def switch(setting):
-    """Clicks a switch in the sidebar. To find it, Blender's Shift Ctrl C copies the data path of the property below the mouse."""
-    found = yield from copied_in_sidebar("ctrl+shift+c")
-    for place, copied in found:
-        if copied == f"tolvol.guard.{setting}":
-            yield from hover(place)
-            xdotool("click", 1)
-            yield 0.3
-            return
-    screenshot(f"guard without {setting}")
-    raise AssertionError(f"no switch {setting}")
+    """Clicks a switch in the sidebar."""
+    if (yield from find_setting(f"tolvol.guard.{setting}")) is None:
+        screenshot(f"guard without {setting}")
+        raise AssertionError(f"no switch {setting}")
+    xdotool("click", 1)
+    yield 0.3
 
 
 def undone_and_redone(read, *steps):

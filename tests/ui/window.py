@@ -186,6 +186,11 @@ def find_property(name, across):
     return (yield from _find(f".tolvol.{name}", "ctrl+shift+alt+c", across))
 
 
+def find_setting(path):
+    """Does the same as find() for a property, by its whole data path: Blender's Shift Ctrl C copies that."""
+    return (yield from _find(path, "ctrl+shift+c", 0.33))
+
+
 def find_hold():
     """Does the same as find() for the button that shows the original while it is held. It scrolls the sidebar down."""
     yield from scroll_down()
@@ -195,7 +200,7 @@ def find_hold():
 _last_seen = {}
 
 
-def copied_in_sidebar(keys, across=0.33):
+def _copied_in_sidebar(keys, across=0.33):
     """Moves the mouse down the sidebar and presses keys that copy something from the button below the mouse.
 
     Returns pairs (place, what was copied). Buttons that moved since the last time may move still: it then does so again.
@@ -233,11 +238,16 @@ def _onto(x, y):
 
 
 def _find(wanted, keys, across):
-    found = yield from copied_in_sidebar(keys, across)
-    place = next((place for place, copied in found if wanted in copied), None)
-    if place is not None:
-        yield from hover(place)
-    return place
+    end = time.monotonic() + _STUCK
+    while time.monotonic() < end:
+        found = yield from _copied_in_sidebar(keys, across)
+        place = next((place for place, copied in found if wanted in copied), None)
+        if place is None:
+            return None
+        # The button may have moved since.
+        if wanted in (yield from sent(*_onto(*place), "key", keys))[0]:
+            return place
+    raise AssertionError(f"{wanted} does not come to rest")
 
 
 def press(operator, across=0.33):
@@ -253,19 +263,10 @@ def press(operator, across=0.33):
             yield from scroll(_DOWN, _PAGE)
             place = yield from find(operator, across)
     assert place is not None, f"no button for {operator}"
-    # The button may have moved since it was found.
-    while not any(f"bpy.ops.{operator}" in copied for copied in (yield from sent("key", "ctrl+c"))):
-        place = yield from find(operator, across)
-        assert place is not None, f"the button for {operator} has gone"
     xdotool("click", 1)
     yield 0.3
     if scrolled and _view_areas():  # A file browser may fill the window now.
         yield from scroll(_UP)
-
-
-def hover(place):
-    """Moves the mouse onto a button, and waits until Blender has noticed it."""
-    yield from sent(*_onto(*place))
 
 
 _UP, _DOWN = 4, 5  # X counts the two directions of the wheel as these buttons of the mouse.
