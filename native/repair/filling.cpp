@@ -16,6 +16,11 @@ namespace {
 constexpr int kMostTries = 32, kMostTriesOfLong = 8;
 /// A loop with more corners than this is long.
 constexpr std::size_t kLong = 200;
+/// So many triangulations of a loop that is not long are guessed: found without the rules, which are then asked about
+/// its triangles. Where a guess keeps the rules, which is usual, they are asked about each of its triangles, and not
+/// about each that these were chosen from, of which there are n / 2 times as many. A long loop is often the border of
+/// an open surface, most of whose triangles are refused: to find a guess takes longer then than to ask.
+constexpr int kMostGuesses = 8;
 /// A loop is given up after so many of its triangles were refused, in all searches together.
 constexpr std::size_t kMostRefused = 50000;
 /// Where the triangles of a loop cross more faces than so many, each further triangle is compared with all faces near
@@ -27,14 +32,23 @@ constexpr std::size_t kMostObstacles = 64;
 LoopOutcome Filling::run() {
   TriangulationRules rules{[this](std::uint32_t i, std::uint32_t j) { return admits_edge(i, j); },
                            [this](const glm::uvec3& face) { return admits(face); }};
-  const int most = hole_.at.size() > kLong ? kMostTriesOfLong : kMostTries;
-  for (int tries = 0; tries < most; ++tries) {
+  const bool is_long = hole_.at.size() > kLong;
+  const int most_tries = is_long ? kMostTriesOfLong : kMostTries;
+  int guesses = is_long ? 0 : kMostGuesses;
+  for (int tries = 0; tries < most_tries;) {
+    guesses_ = guesses > 0;
     hole_.faces = least_triangulation(hole_.at, rules);
     if (hole_.faces.empty() || gives_up()) break;
     std::sort(hole_.faces.begin(), hole_.faces.end(), [](const glm::uvec3& a, const glm::uvec3& b) {
       return std::array{a.x, a.y, a.z} < std::array{b.x, b.y, b.z};
     });
+    if (guesses_ && !keeps_rules()) {
+      --guesses;
+      continue;
+    }
+    ++tries;
     if (is_clear() && is_sound()) return LoopOutcome::closed;
+    if (is_triangle()) break;
   }
   hole_.faces.clear();
   return reason();
@@ -60,21 +74,42 @@ bool Filling::admits_edge(std::uint32_t i, std::uint32_t j) {
   if (left_out_edges_.contains({i, j}) || (earlier_ && earlier_->has_edge(rules_.edge_of(hole_, i, j)))) {
     return refuse(LoopOutcome::non_manifold);
   }
-  const std::optional<LoopOutcome> refusal = rules_.refusal_of_edge(hole_, i, j);
-  return !refusal || refuse(*refusal);
+  const auto [known, is_new] = of_edges_.try_emplace({i, j});
+  if (is_new) known->second = rules_.refusal_of_edge(hole_, i, j);
+  return !known->second || refuse(*known->second);
 }
 
 bool Filling::admits(const glm::uvec3& face) {
   if (gives_up()) return false;
-  const bool is_admitted = keeps_rules(face);
-  refused_triangles_ += !is_admitted;
-  return is_admitted;
+  const std::optional<LoopOutcome> refusal = refusal_of(face);
+  refused_triangles_ += refusal.has_value();
+  return !refusal || refuse(*refusal);
 }
 
-bool Filling::keeps_rules(const glm::uvec3& face) {
-  if (left_out_.contains({face.x, face.y, face.z})) return refuse(LoopOutcome::crossing);
-  if (const std::optional<LoopOutcome> refusal = rules_.refusal_of_face(hole_, face)) return refuse(*refusal);
-  return goes_around(rules_.corners_of(hole_, face)) || refuse(LoopOutcome::crossing);
+std::optional<LoopOutcome> Filling::refusal_of(const glm::uvec3& face) {
+  const Key key = key_of(face);
+  if (left_out_.contains(key)) return LoopOutcome::crossing;
+  if (guesses_) {
+    const auto known = of_faces_.find(key);
+    if (known != of_faces_.end() && known->second) return known->second;
+  } else if (const std::optional<LoopOutcome> refusal = refusal_by_rules(face)) {
+    return refusal;
+  }
+  if (!goes_around(rules_.corners_of(hole_, face))) return LoopOutcome::crossing;
+  return std::nullopt;
+}
+
+/// Asks the rules once about each triangle, whatever the number of searches.
+std::optional<LoopOutcome> Filling::refusal_by_rules(const glm::uvec3& face) {
+  const auto [known, is_new] = of_faces_.try_emplace(key_of(face));
+  if (is_new) known->second = rules_.refusal_of_face(hole_, face);
+  return known->second;
+}
+
+/// Whether all triangles of a guess keep the rules. Those that do not are left out from now on.
+bool Filling::keeps_rules() {
+  return std::ranges::count_if(hole_.faces,
+                               [&](const glm::uvec3& face) { return refusal_by_rules(face).has_value(); }) == 0;
 }
 
 /// Calls visit(corners) for the faces of the input, and of the fillings that the hole has to keep apart from, whose
@@ -112,7 +147,7 @@ bool Filling::is_clear() {
       if (!faces_cross(stored, other)) return true;
       clear = refuse(LoopOutcome::crossing);
       obstacles_.push_back({other, box_of(other)});
-      return obstacles_.size() <= kMostObstacles;
+      return obstacles_.size() <= kMostObstacles && !is_triangle();
     });
   }
   return clear;
@@ -138,7 +173,7 @@ bool Filling::is_sound() {
     for (std::size_t b = 0; b < a && sound; ++b) {
       if (!meet(boxes[a], boxes[b]) || !faces_cross(corners[a], corners[b])) continue;
       sound = false;
-      left_out_.insert({hole_.faces[a].x, hole_.faces[a].y, hole_.faces[a].z});
+      left_out_.insert(key_of(hole_.faces[a]));
     }
   }
   if (!sound) refuse(left_out_.empty() ? LoopOutcome::non_manifold : LoopOutcome::crossing);

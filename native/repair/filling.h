@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <map>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -33,12 +35,19 @@ class Filling {
     Box box;
   };
 
+  using Key = std::array<std::uint32_t, 3>;
+  static Key key_of(const glm::uvec3& face) { return {face.x, face.y, face.z}; }
+
+  /// Whether the hole has one triangulation only.
+  bool is_triangle() const { return hole_.at.size() == 3; }
   LoopOutcome reason() const;
   bool refuse(LoopOutcome reason);
   bool gives_up() const;
   bool admits_edge(std::uint32_t i, std::uint32_t j);
   bool admits(const glm::uvec3& face);
-  bool keeps_rules(const glm::uvec3& face);
+  std::optional<LoopOutcome> refusal_of(const glm::uvec3& face);
+  std::optional<LoopOutcome> refusal_by_rules(const glm::uvec3& face);
+  bool keeps_rules();
   template <class Visit>
   void for_each_near(const Corners& stored, Visit&& visit) const;
   bool goes_around(const Corners& stored) const;
@@ -50,7 +59,10 @@ class Filling {
   const EarlierFillings* earlier_;
   std::size_t refused_triangles_ = 0;
   std::vector<Obstacle> obstacles_;  ///< faces that an earlier try crossed
-  std::set<std::array<std::uint32_t, 3>> left_out_;
+  bool guesses_ = true;  ///< whether triangulations are found without asking the rules about their triangles
+  std::map<Key, std::optional<LoopOutcome>> of_faces_;  ///< what refuses the triangles that the rules were asked about
+  std::map<std::array<std::uint32_t, 2>, std::optional<LoopOutcome>> of_edges_;
+  std::set<Key> left_out_;
   std::set<std::array<std::uint32_t, 2>> left_out_edges_;
   std::array<std::size_t, kLoopOutcomeNames.size()> refused_{};  ///< for each outcome
 };

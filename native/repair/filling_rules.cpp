@@ -112,12 +112,16 @@ std::optional<LoopOutcome> FillingRules::refusal_of_face(const Hole& hole, const
   const TriangleCertificate::PointBound &a = hole.bounds[face.z], &b = hole.bounds[face.y], &c = hole.bounds[face.x];
   const glm::dvec3 bounds(a.distance, b.distance, c.distance);
   const glm::uvec3 no_hints(Hierarchy::kNone);
-  if (facing) facing->set_corners({a.triangle, b.triangle, c.triangle});
-  if (certificate.bound_in_any_order(placed, bounds, no_hints, facing ? &*facing : nullptr) ==
+  if (facing) {
+    if (certificate.shows_outside(placed, &*facing)) return LoopOutcome::turned;
+    facing->set_corners({a.triangle, b.triangle, c.triangle});
+  }
+  glm::dvec3 open;
+  if (certificate.bound_in_any_order(placed, bounds, no_hints, facing ? &*facing : nullptr, &open) ==
       TriangleCertificate::kUnproved) {
-    // Without the rule a proof may exist: then it is the rule that refuses.
-    const bool is_inside = facing && certificate.bound_in_any_order(placed, bounds) != TriangleCertificate::kUnproved;
-    return is_inside ? LoopOutcome::turned : LoopOutcome::outside;
+    // It is the rule that refuses where triangles of the reference are near the point, but none that the rule admits.
+    const bool is_turned = facing && certificate.is_open(open, &*facing) && !certificate.is_open(open, nullptr);
+    return is_turned ? LoopOutcome::turned : LoopOutcome::outside;
   }
   return std::nullopt;
 }

@@ -9,6 +9,21 @@
 #include "topology/near_faces.h"
 
 namespace tolvol {
+namespace {
+
+/// Appends the pairs of face `i` and a higher one, in order.
+void append_pairs(std::uint32_t i, std::span<const Corners> corners, const NearFaces& near,
+                  std::vector<glm::uvec2>& pairs) {
+  const auto before = static_cast<std::ptrdiff_t>(pairs.size());
+  near.for_each_near(corners[i], [&](std::uint32_t j) {
+    poll_at(j);
+    if (j > i && faces_cross(corners[i], corners[j])) pairs.emplace_back(i, j);
+    return true;
+  });
+  std::sort(pairs.begin() + before, pairs.end(), [](const glm::uvec2& a, const glm::uvec2& b) { return a.y < b.y; });
+}
+
+}  // namespace
 
 Crossings crossings(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, std::size_t most,
                     Team& team, Progress* progress) {
@@ -23,29 +38,25 @@ Crossings crossings(std::span<const glm::dvec3> vertices, std::span<const glm::u
   const NearFaces near(faces, corners, NearFaces::hubs_of(triangles, vertices.size()), team);
   if (progress) progress->begin("finding crossings");
   Crossings found;
-  // One face may cross all others, so that pairs are collected from a few faces at a time before they are counted.
-  constexpr std::size_t kAtOnce = 128, kBlock = 8;
-  std::vector<std::vector<glm::uvec2>> of_block(kAtOnce / kBlock);
-  for (std::size_t first = 0; first < triangles.size() && found.complete; first += kAtOnce) {
-    team.run(std::min(kAtOnce, triangles.size() - first), kBlock, [&](std::size_t begin, std::size_t end) {
-      std::vector<glm::uvec2>& pairs = of_block[begin / kBlock];
+  // One face may cross all others: few faces are searched at once, and more only as long as they cross few.
+  constexpr std::size_t kBlocks = 16, kFewest = 128, kMost = 8192;
+  std::vector<std::vector<glm::uvec2>> of_block(kBlocks);
+  std::size_t at_once = kFewest, count;
+  for (std::size_t first = 0; first < triangles.size() && found.complete; first += count) {
+    count = std::min(at_once, triangles.size() - first);
+    const std::size_t block = at_once / kBlocks, before = found.pairs.size(), more = most - before;
+    team.run(count, block, [&](std::size_t begin, std::size_t end) {
+      std::vector<glm::uvec2>& pairs = of_block[begin / block];
       pairs.clear();
-      for (auto i = static_cast<std::uint32_t>(first + begin); i < first + end; ++i) {
-        const std::size_t before = pairs.size();
-        near.for_each_near(corners[i], [&](std::uint32_t j) {
-          poll_at(j);
-          if (j > i && faces_cross(corners[i], corners[j])) pairs.emplace_back(i, j);
-          return true;
-        });
-        std::sort(pairs.begin() + static_cast<std::ptrdiff_t>(before), pairs.end(),
-                  [](const glm::uvec2& a, const glm::uvec2& b) { return a.y < b.y; });
+      for (std::size_t i = first + begin; i < first + end && pairs.size() <= more; ++i) {
+        append_pairs(static_cast<std::uint32_t>(i), corners, near, pairs);
       }
     });
-    const std::size_t blocks = (std::min(kAtOnce, triangles.size() - first) + kBlock - 1) / kBlock;
-    for (std::size_t block = 0; block < blocks && found.complete; ++block) {
-      found.pairs.insert(found.pairs.end(), of_block[block].begin(), of_block[block].end());
+    for (std::size_t i = 0; i * block < count && found.complete; ++i) {
+      found.pairs.insert(found.pairs.end(), of_block[i].begin(), of_block[i].end());
       found.complete = found.pairs.size() <= most;
     }
+    at_once = found.pairs.size() - before > count ? kFewest : std::min(2 * at_once, kMost);
     if (progress) progress->update(static_cast<double>(first) / static_cast<double>(triangles.size()));
   }
   if (!found.complete) found.pairs.resize(most);

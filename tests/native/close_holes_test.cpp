@@ -441,6 +441,24 @@ TEST(CloseHoles, TheBorderOfALargeSheetIsRefusedSoon) {
   EXPECT_LT(polls, 800u * 800u);
 }
 
+TEST(CloseHoles, AWideHoleNeedsFewProofs) {
+  // 144 corners; the proof of a triangle across the hole takes thousands of parts, and only 142 triangles need one.
+  const unsigned n = 60;
+  const TriangleMesh whole = shapes::grid(n);
+  const TriangleMesh mesh = without(whole, [&](unsigned t) {
+    const unsigned row = t / 2 / n, column = t / 2 % n;
+    return row >= 12 && row < 48 && column >= 12 && column < 48;
+  });
+  const auto volume = volume_of(whole, 0.002);
+  CloseHolesOptions options;
+  options.largest_perimeter = 3;  // between those of the hole, 2.4, and of the border, 4
+  const std::size_t polls = polls_of([&] {
+    const HoleClosingResult result = close_holes(mesh.vertices, mesh.triangles, kSpace, *volume, options);
+    EXPECT_EQ(outcomes(result), (Outcomes{LoopOutcome::perimeter, LoopOutcome::closed}));
+  });
+  EXPECT_LT(polls, 18000u);
+}
+
 TEST(CloseHoles, ALoopThatMeandersIsGivenUp) {
   // Many triangles between the corners of a long loop are within the tolerance and most of them are refused.
   shapes::Random random(6);

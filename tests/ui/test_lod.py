@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """LOD Chain by mouse and keyboard: the levels, one undo step, and Esc in the middle of a chain."""
 
+import re
+
 import bpy
 
 import scenes
@@ -42,7 +44,7 @@ def test_levels_by_mouse_and_one_ctrl_z():
     assert stored() == before
     for name, percent in zip(levels(), (0.1, 0.5, 2)):
         assert_proved(bpy.data.objects[name], reference, percent)
-    assert any(text.startswith("Level 1 of 3: ") for text in said), said
+    assert any(re.match("Level [123] of 3: ", text) for text in said), said
     xdotool("mousemove", *centre())
     yield
     key("ctrl+z")
