@@ -148,7 +148,8 @@ bool TriangleCertificate::is_open(const glm::dvec3& p, const Facing* facing) con
   return !nearest_point(p, limit_ + kBeyondRounding, facing);
 }
 
-bool TriangleCertificate::shows_outside(const glm::dvec3 (&corners)[3], const Facing* facing) const {
+std::optional<glm::dvec3> TriangleCertificate::point_outside(const glm::dvec3 (&corners)[3],
+                                                             const Facing* facing) const {
   const auto& [a, b, c] = corners;
   const double longest = std::sqrt(std::max({squared_length(b - a), squared_length(c - b), squared_length(a - c)}));
   const double wanted = std::min(longest / (kProbeSpacing * limit_), static_cast<double>(kMostProbes));
@@ -157,16 +158,15 @@ bool TriangleCertificate::shows_outside(const glm::dvec3 (&corners)[3], const Fa
   for (int i = 0; i < n; ++i) {
     for (int j = i == 0; i + j <= n && j < n; ++j) {  // this skips the corners
       const glm::dvec3 p = a + static_cast<double>(i) * u + static_cast<double>(j) * v;
-      if (facing) {
-        if (is_open(p, facing)) return true;
-        continue;
-      }
       // A triangle within the limit shows that the point is inside, even if it is not the nearest.
-      if (!(distance_bound(p) <= limit_) && hierarchy_->common({&p, 1}, limit_, limit_).triangle == Hierarchy::kNone)
-        return true;
+      const PointBound near = point_bound(p);
+      if (near.distance <= limit_ && (!facing || facing->admits(near.triangle))) continue;
+      if (facing ? is_open(p, facing) : hierarchy_->common({&p, 1}, limit_, limit_).triangle == Hierarchy::kNone) {
+        return p;
+      }
     }
   }
-  return false;
+  return std::nullopt;
 }
 
 /// Returns a bound if the edges are short and the corners are known to be near.

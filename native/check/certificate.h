@@ -85,10 +85,10 @@ class TriangleCertificate {
   PointBound point_bound(const glm::dvec3& p) const;
   double distance_bound(const glm::dvec3& p) const { return point_bound(p).distance; }
 
-  /// Tells whether one of at most 42 points of the triangle is farther than limit() from all triangles that `facing`
+  /// Returns one of at most 42 points of the triangle that is farther than limit() from all triangles that `facing`
   /// admits, or from all if it is null. This takes a hundredth of the time of a proof for a large triangle, and finds
   /// most triangles that have no proof.
-  bool shows_outside(const glm::dvec3 (&corners)[3], const Facing* facing = nullptr) const;
+  std::optional<glm::dvec3> point_outside(const glm::dvec3 (&corners)[3], const Facing* facing = nullptr) const;
 
   /// The point of the reference that is nearest to p among the triangles that the grid's nodes around p name. Where the
   /// reference is far from p, it may have a nearer point; that is rare.

@@ -163,7 +163,7 @@ bool CertifiedBounds::FullTrial::shows_outside(const Change& change) {
     const std::size_t i = (failed_last_ + k) % count;
     const Coverage::Element& element = change.elements()[i];
     if (element.moved == 0 || !is_large(element)) continue;
-    if (bounds_.forward().narrowed(change.share(change.faces()[i])).shows_outside(element.corners)) {
+    if (bounds_.forward().narrowed(change.share(change.faces()[i])).point_outside(element.corners)) {
       failed_last_ = i;
       return true;
     }

@@ -104,7 +104,11 @@ double MovingMesh::distance_by(const TriangleCertificate& certificate, std::uint
     if (largest != kUnproved) {
       Facing* const rule = facing ? &*facing : nullptr;
       glm::dvec3 open(std::numeric_limits<double>::quiet_NaN());
-      largest = std::max(largest, certificate.bound_in_any_order(at, bounds, near, rule, blame ? &open : nullptr));
+      if (const std::optional<glm::dvec3> point = certificate.point_outside(at, rule)) {
+        largest = kUnproved, open = *point;
+      } else {
+        largest = std::max(largest, certificate.bound_in_any_order(at, bounds, near, rule, blame ? &open : nullptr));
+      }
       if (blame && largest == kUnproved) {
         blame->triangle = static_cast<std::uint32_t>(k);
         blame->weights = closest_point(open, at[0], at[1], at[2]).weights;

@@ -108,12 +108,12 @@ std::optional<LoopOutcome> FillingRules::refusal_of_face(const Hole& hole, const
   const double share = std::min({share_at(hole, face.x), share_at(hole, face.y), share_at(hole, face.z)});
   if (!(share > 0)) return LoopOutcome::outside;
   const TriangleCertificate certificate = certificate_->narrowed(share);
-  if (certificate.shows_outside(placed)) return LoopOutcome::outside;
+  if (certificate.point_outside(placed)) return LoopOutcome::outside;
   const TriangleCertificate::PointBound &a = hole.bounds[face.z], &b = hole.bounds[face.y], &c = hole.bounds[face.x];
   const glm::dvec3 bounds(a.distance, b.distance, c.distance);
   const glm::uvec3 no_hints(Hierarchy::kNone);
   if (facing) {
-    if (certificate.shows_outside(placed, &*facing)) return LoopOutcome::turned;
+    if (certificate.point_outside(placed, &*facing)) return LoopOutcome::turned;
     facing->set_corners({a.triangle, b.triangle, c.triangle});
   }
   glm::dvec3 open;

@@ -237,7 +237,7 @@ TEST(Certificate, ProbesFindWhatHasNoProofAndNothingElse) {
           dvec3((1 + 0.4 * std::cos(t)) * std::cos(s), (1 + 0.4 * std::cos(t)) * std::sin(s), 0.4 * std::sin(t)));
     }
     const Verdict verdict = certificate.verdict(corners, dvec3(TriangleCertificate::kUnproved));
-    const bool shows = certificate.shows_outside(corners);
+    const bool shows = certificate.point_outside(corners).has_value();
     EXPECT_FALSE(shows && verdict == Verdict::inside);
     const dvec3 middle = (corners[0] + corners[1] + corners[2]) / 3.0;
     const double distance = volume.hierarchy().nearest(middle).distance;
