@@ -168,6 +168,13 @@ def test_package_holds_what_is_here():
         shaders = {name for name in others if name.startswith("tolerance_volumes/shaders/")}
         for name in shaders:
             assert archive.read(name) == (ROOT / "shaders" / Path(name).name).read_bytes(), f"pack {name} anew"
+        notices = {name for name in others if name.startswith("tolerance_volumes/licences/")}
+        for word, library in (
+            ("Lesser", "libgmp10"),
+            ("Permission is", "libepoxy0"),
+            ("Redistribution", "libopenmesh-dev"),
+        ):
+            assert word in archive.read(f"tolerance_volumes/licences/{library}.txt").decode()
     libraries = {name for name in others if re.fullmatch(r"tolerance_volumes/bin/tolvol/(_native\.|lib).*", name)}
     modules = {name for name in libraries if "/_native." in name}
     assert {Path(name).name for name in modules} == {path.name for path in native.path.parent.glob("_native.*.so")}
@@ -177,7 +184,7 @@ def test_package_holds_what_is_here():
     # These come with every Linux for PCs that Blender runs on.
     everywhere = {"ld-linux-x86-64.so.2", "libc.so.6", "libm.so.6", "libgcc_s.so.1", "libstdc++.so.6"}
     assert needed and needed - everywhere <= {Path(name).name for name in libraries}
-    assert others - libraries - shaders == {
+    assert others - libraries - shaders - notices == {
         "tolerance_volumes/LICENSE",
         "tolerance_volumes/manual.md",
         "tolerance_volumes/bin/tolvol/__init__.py",

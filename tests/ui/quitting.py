@@ -15,7 +15,7 @@ bpy.context.preferences.view.show_splash = False
 bpy.context.preferences.view.use_save_prompt = False
 
 import addon  # noqa: E402
-import unending  # noqa: E402
+import job_time  # noqa: E402
 from addon.background import thread  # noqa: E402
 from addon.reference import snapshots  # noqa: E402
 from window import draw_finely, window_context  # noqa: E402
@@ -82,7 +82,7 @@ def leave():
 
 addon.register()
 # On a slow machine drawing may take longer than the work once. The context ends with the process.
-endless = unending.jobs()
+endless = job_time.unending()
 endless.__enter__()
 bpy.app.timers.register(start, first_interval=1.0)
 bpy.app.timers.register(leave, first_interval=1.0 + _TICK)

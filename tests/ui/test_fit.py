@@ -3,6 +3,7 @@
 
 import bpy
 
+import job_time
 import scenes
 from test_panel import assert_proved, large_monkey, stored, suzanne
 from window import centre, finished, key, reset, screenshot, status_texts, view, xdotool
@@ -11,7 +12,7 @@ from window import centre, finished, key, reset, screenshot, status_texts, view,
 def fit(ob):
     ob.modifiers.new("Decimate", "DECIMATE")
     bpy.ops.ed.undo_push(message="modifier")
-    with bpy.context.temp_override(window=view()[0], area=view()[1]):
+    with bpy.context.temp_override(window=view()[0], area=view()[1]), job_time.in_background():
         assert bpy.ops.tolvol.fit_modifier("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
 
 

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import bpy
 
-import unending
+import job_time
 from addon import job, status_bar
 from addon.background import thread
-from addon.job import run as job_run
 from scenes import world_triangles
 from test_panel import assert_proved, monkey, stored, suzanne
 from window import (
@@ -28,7 +27,7 @@ from window import (
 
 def begin():
     """Starts a decimation that goes on. Returns the number of reports before it: all later reports are of the decimation."""
-    with window_context(), unending.jobs():
+    with window_context(), job_time.unending():
         suzanne().tolvol.tolerance_percent = 0.05
         bpy.ops.ed.undo_push(message="ready")
         suzanne().location.x = 1
@@ -173,12 +172,8 @@ def adjust(**settings):
     last = bpy.context.window_manager.operators[-1]
     for name, value in settings.items():
         setattr(last.properties, name, value)
-    patience, job_run.PATIENCE = job_run.PATIENCE, 0.0  # The job goes on in the background even on a quick machine.
-    try:
-        with window_context():
-            assert bpy.ops.ed.undo_redo("EXEC_DEFAULT", True) == {"FINISHED"}  # True: with an undo step, as there
-    finally:
-        job_run.PATIENCE = patience
+    with window_context(), job_time.in_background():
+        assert bpy.ops.ed.undo_redo("EXEC_DEFAULT", True) == {"FINISHED"}  # True: with an undo step, as there
 
 
 def decimated():
@@ -215,7 +210,7 @@ def test_escape_while_adjusting_leaves_the_mesh_as_before_the_operation():
     yield from reset(monkey)
     left, _ = yield from decimated()
     said = len(reports())
-    with unending.jobs():
+    with job_time.unending():
         adjust(tolerance_percent=0.1)
     xdotool("mousemove", *centre(), "key", "Escape")
     yield from ends(said, "Decimate in Tolerance was cancelled. The mesh is as it was before that operation")
@@ -242,7 +237,7 @@ def test_adjusting_again_while_a_job_runs_begins_anew():
     yield from reset(monkey)
     left, _ = yield from decimated()
     said = len(reports())
-    with unending.jobs():
+    with job_time.unending():
         adjust(tolerance_percent=0.1)
     adjust(tolerance_percent=0.4)
     yield from finished(lambda: not job.under_way())

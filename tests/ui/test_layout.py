@@ -5,8 +5,8 @@ from pathlib import Path
 
 import bpy
 
+import job_time
 import scenes
-import unending
 from addon import job, panels
 from addon.overlay import legend
 from addon.proof import verdict
@@ -93,7 +93,7 @@ def _no_button_moves(operator, *buttons):
     before = yield from rows(*buttons)
     aside = on_screen(region("WINDOW"), 300, 300)
     screenshot(f"layout 9 before {operator}")
-    with unending.jobs() as released:
+    with job_time.unending() as released:
         yield from press(f"tolvol.{operator}")
         yield from finished(lambda: job.under_way() and job.under_way().told().share, pause=0.01)
         xdotool("mousemove", *aside)

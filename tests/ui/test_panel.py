@@ -6,9 +6,9 @@ import json
 import bpy
 import numpy as np
 
+import job_time
 import scenes
 from addon import native, reference
-from addon.job import run as job_run
 from addon.mesh import mesh_io
 from addon.overlay import legend
 from addon.panels import notes
@@ -307,11 +307,9 @@ def test_the_answer_of_check_is_seen_without_moving_the_mouse():
     yield from open_tab()
     yield from press("tolvol.set_reference")
     xdotool("mousemove", *centre())
-    before, patience = (yield from still(sidebar_pixels)), job_run.PATIENCE
-    job_run.PATIENCE = 0.0  # The job then ends in a timer even on a quick machine.
-    with window_context():
+    before = yield from still(sidebar_pixels)
+    with window_context(), job_time.in_background():
         bpy.ops.tolvol.check("INVOKE_DEFAULT")
-    job_run.PATIENCE = patience
     yield from finished(lambda: verdict.of(suzanne()) is not None)
     yield from finished(lambda: (sidebar_pixels() != before).any())
     seen = yield from still(sidebar_pixels)
