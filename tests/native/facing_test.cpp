@@ -106,6 +106,7 @@ struct Wall {
       EXPECT_TRUE(certificate->nearest_point(open, certificate->limit(), nullptr)) << "though the other side is near";
     }
     EXPECT_EQ(ordered == TriangleCertificate::kUnproved, any == TriangleCertificate::kUnproved);
+    EXPECT_EQ(certificate->point_outside(corners, admits).has_value(), any == TriangleCertificate::kUnproved);
     return ordered;
   }
 
@@ -130,6 +131,31 @@ TEST(CertifiedFacing, TheOtherSideOfAWallIsNoWitness) {
   const double bound = thin.bound(a, b, c, true);
   EXPECT_NE(bound, TriangleCertificate::kUnproved);
   EXPECT_GE(bound, 0.999 * 0.05 * thin.volume->frame().scale()) << "the distance to the witness, not to the nearest";
+}
+
+TEST(CertifiedFacing, ATriangleWithAPointOutsideHasNoProof) {
+  const Wall wall(0.08);
+  const StoredSpace space = StoredSpace(glm::dmat4(1), Storage::float64).in(wall.volume->frame());
+  shapes::Random random(3);
+  int unproved = 0, shown = 0;
+  for (int i = 0; i < 2'000; ++i) {
+    dvec3 corners[3];
+    for (dvec3& p : corners) p = space.frame({random.share(), random.share(), 0.3 * random.share() - 0.1});
+    const std::optional<dvec3> normal = sure_normal(corners[0], corners[1], corners[2], kError);
+    if (!normal) continue;
+    Facing facing(*wall.rule, *normal, kRight);
+    const dvec3 anywhere(std::numeric_limits<double>::infinity());
+    const double bound = wall.certificate->bound_in_any_order(corners, anywhere, glm::uvec3(Hierarchy::kNone), &facing);
+    const std::optional<dvec3> point = wall.certificate->point_outside(corners, &facing);
+    if (point) {
+      ASSERT_EQ(bound, TriangleCertificate::kUnproved);
+      ASSERT_TRUE(wall.certificate->is_open(*point, &facing));
+    }
+    unproved += bound == TriangleCertificate::kUnproved, shown += point.has_value();
+  }
+  EXPECT_GT(unproved, 300);
+  EXPECT_LT(unproved, 1'800);
+  EXPECT_GT(shown, 0.6 * unproved) << "the others have a corner outside, which is not looked at";
 }
 
 TEST(Facing, FindsTheNearestThatIsAdmitted) {
