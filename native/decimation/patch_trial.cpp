@@ -279,7 +279,7 @@ bool PatchTrial::boundary_holds() {
       const std::uint32_t name = patch_.vertices()[from].id;
       const glm::dvec3 &a = positions_[from].position, &b = positions_[to].position;
       if (name == kept) of_kept = static_cast<std::uint32_t>(boundary_elements_.size());
-      boundary_elements_.push_back({name, {a, b, b}, moved_[from] || moved_[to] ? kAnywhere : 0});
+      boundary_elements_.push_back({name, {a, b, b}, changed(f) ? kAnywhere : 0});
     }
   }
   const Halfedge h = change_.halfedge();

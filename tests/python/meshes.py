@@ -80,6 +80,17 @@ def spike(levels=5, width=0.15, length=2.0):
     return vertices * (1 + length * np.clip(1 - angle / width, 0, None))[:, None], triangles
 
 
+def open_star(spikes):
+    """A flat fan of triangles around a centre, four fifths of a turn, with corners at the radii 0.05 and 1 in turn."""
+    corners = 2 * spikes
+    angles = 0.8 * 2 * np.pi * np.arange(corners) / corners
+    radii = np.where(np.arange(corners) % 2, 0.05, 1.0)
+    vertices = np.zeros((corners + 1, 3))
+    vertices[1:, 0], vertices[1:, 1] = radii * np.cos(angles), radii * np.sin(angles)
+    i = np.arange(1, corners, dtype=np.int32)
+    return vertices.astype(np.float32), np.stack([np.zeros_like(i), i, i + 1], 1)
+
+
 def join(*meshes):
     vertices, triangles, offset = [], [], 0
     for v, t in meshes:
