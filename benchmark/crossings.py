@@ -4,10 +4,10 @@
 blender --background --python benchmark/crossings.py -- [MESH...] [--tolerance 1%] [--write FILE.md] [--hostile]
 
 The meshes are hollow spheres of radius 1 with thin walls, made here, and each MESH. Each is decimated at five tolerances
-within 2 % of the one asked for, in turns on one thread, because a small change of the tolerance changes the count by
-chance. The triangles left and the processor times are means, the crossing pairs are the most of the five. Every result
-is judged both ways by tolvol.directed_hausdorff. The script fails if a result has more crossing pairs with crossings kept
-out than its mesh.
+within 2 % of the one asked for, because a small change of the tolerance changes the count by chance. Runs with crossings
+kept out and allowed take turns, on one thread. The table has the means of the triangles left and of the processor times,
+and the most crossing pairs of the five. Every result is judged both ways by tolvol.directed_hausdorff. The script fails if
+a result has more crossing pairs with crossings kept out than its mesh.
 """
 
 import statistics
@@ -53,7 +53,7 @@ def pairs(vertices, triangles):
 
 
 def run(vertices, triangles, tolerance, effort):
-    """Returns (mean of triangles left, most crossing pairs, mean of processor seconds) with crossings kept out and allowed."""
+    """Returns two tuples (mean of triangles left, most crossing pairs, mean of processor seconds): kept out and allowed."""
     runs = {"keep_out": [], "allow": []}
     for share in AROUND:
         volume = tolvol.ToleranceVolume(vertices, triangles, share * tolerance, threads=1)

@@ -158,12 +158,9 @@ std::optional<glm::dvec3> TriangleCertificate::point_outside(const glm::dvec3 (&
   for (int i = 0; i < n; ++i) {
     for (int j = i == 0; i + j <= n && j < n; ++j) {  // this skips the corners
       const glm::dvec3 p = a + static_cast<double>(i) * u + static_cast<double>(j) * v;
-      // A triangle within the limit shows that the point is inside, even if it is not the nearest.
       const PointBound near = point_bound(p);
-      if (near.distance <= limit_ && (!facing || facing->admits(near.triangle))) continue;
-      if (facing ? is_open(p, facing) : hierarchy_->common({&p, 1}, limit_, limit_).triangle == Hierarchy::kNone) {
-        return p;
-      }
+      const bool is_near = near.distance <= limit_ && (!facing || facing->admits(near.triangle));
+      if (!is_near && is_open(p, facing)) return p;
     }
   }
   return std::nullopt;

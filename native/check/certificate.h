@@ -85,8 +85,8 @@ class TriangleCertificate {
   PointBound point_bound(const glm::dvec3& p) const;
   double distance_bound(const glm::dvec3& p) const { return point_bound(p).distance; }
 
-  /// Returns one of at most 42 points of the triangle that is farther than limit() from all triangles that `facing`
-  /// admits, or from all if it is null. This takes a hundredth of the time of a proof for a large triangle, and finds
+  /// Returns one of at most 42 points of the triangle, none of them a corner, that is_open(), so that the triangle has
+  /// no bound; or none if no point is. This takes a hundredth of the time of a proof for a large triangle, and finds
   /// most triangles that have no proof.
   std::optional<glm::dvec3> point_outside(const glm::dvec3 (&corners)[3], const Facing* facing = nullptr) const;
 

@@ -91,6 +91,8 @@ class BoundedMesh {
   /// Whether the vertex has copies, or an edge that lies on edges of other sheets, so that a change there may change
   /// them, too.
   bool joined(std::uint32_t vertex) const { return joined_[vertex] != 0; }
+  /// Whether a boundary edge may be one that was cut, which is no boundary of the surface.
+  bool is_cut(std::uint32_t from, std::uint32_t to) const { return joined(from) && joined(to); }
   /// The vertex and its copies: vertices of the kernel that are alive and at one place. Valid until the next change of
   /// one of them.
   std::span<const std::uint32_t> copies(std::uint32_t vertex) const {

@@ -236,7 +236,7 @@ void CertifiedBounds::FullTrial::gather_replaced_faces(const Change& change) {
   for (const Coverage::Removed& r : change.removed()) add(r.id);
 }
 
-/// Gathers the boundary edges as a collapse would leave them.
+/// Gathers the boundary edges as a collapse would leave them. Edges that were cut are none: they cover nothing.
 void CertifiedBounds::FullTrial::gather_boundary(const Change& change) {
   boundary_elements_.clear(), boundary_removed_.clear();
   if (!bounds_.bounds_boundaries()) return;
@@ -250,13 +250,15 @@ void CertifiedBounds::FullTrial::gather_boundary(const Change& change) {
   const std::uint32_t a = mesh.from(previous), s = mesh.from(edge), t = mesh.to(edge), c = mesh.to(next);
   const glm::dvec3 &p = change.position().position, &pa = mesh.position(a), &pc = mesh.position(c);
   const double moved_s = glm::length(mesh.position(s) - p), moved_t = glm::length(mesh.position(t) - p);
-  boundary_elements_.push_back({a, {pa, p, p}, moved_s});
+  if (!mesh.is_cut(a, s)) boundary_elements_.push_back({a, {pa, p, p}, moved_s});
+  const auto place = static_cast<std::uint32_t>(boundary_elements_.size());
   if (change.vertex() == t) {
-    boundary_elements_.push_back({t, {p, pc, pc}, moved_t});
-    boundary_removed_.push_back({s, 1, std::max(moved_s, moved_t)});
+    // The edge a -> t is no cut edge, because s vanishes.
+    if (!mesh.is_cut(t, c)) boundary_elements_.push_back({t, {p, pc, pc}, moved_t});
+    boundary_removed_.push_back({s, 0, std::max(moved_s, moved_t)});
   } else {
     boundary_elements_.push_back({s, {p, pc, pc}, std::max(moved_s, moved_t)});
-    boundary_removed_.push_back({t, 1, moved_t});
+    boundary_removed_.push_back({t, place, moved_t});
   }
 }
 

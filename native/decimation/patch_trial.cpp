@@ -264,31 +264,39 @@ void PatchTrial::add_open_point(std::uint32_t face, const glm::dvec3& open) {
   learnt_ = true;
 }
 
-/// Whether the boundary edges of the patch keep the bounds of boundaries, if there are any.
+/// Whether the boundary edges of the patch keep the bounds of boundaries, if there are any. Edges that were cut are
+/// none: they cover nothing.
 bool PatchTrial::boundary_holds() {
   boundary_elements_.clear(), boundary_removed_.clear();
   if (!bounds_.bounds_boundaries()) return true;
-  const std::uint32_t kept = *change_.vertex();
-  std::optional<std::uint32_t> of_kept;
+  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
+  const Halfedge h = change_.halfedge();
+  // The boundary runs s -> t, and t or s vanishes into the other one. What covered the edge that goes is then covered
+  // by the edge behind s, or by the one before t.
+  const bool start_vanishes = connectivity.is_boundary(h);
+  const bool is_along = start_vanishes || connectivity.is_boundary(connectivity.opposite_halfedge_handle(h));
+  if (!is_along && mesh_.on_boundary(vanished_)) return false;
+  std::optional<std::uint32_t> successor;
   for (std::uint32_t f = 0; f < patch_.faces().size(); ++f) {
     const Patch::Face& face = patch_.faces()[f];
     for (int k = 0; k < 3; ++k) {
       if (!face.boundary[k]) continue;
       // The boundary runs against the face, and its edges have the names of their first vertices.
       const std::uint32_t from = face.corners[(k + 1) % 3], to = face.corners[k];
-      const std::uint32_t name = patch_.vertices()[from].id;
+      const std::uint32_t name = patch_.vertices()[from].id, end = patch_.vertices()[to].id;
+      if (mesh_.is_cut(name, end)) continue;
       const glm::dvec3 &a = positions_[from].position, &b = positions_[to].position;
-      if (name == kept) of_kept = static_cast<std::uint32_t>(boundary_elements_.size());
-      boundary_elements_.push_back({name, {a, b, b}, changed(f) ? kAnywhere : 0});
+      if ((start_vanishes ? end : name) == *change_.vertex()) {
+        successor = static_cast<std::uint32_t>(boundary_elements_.size());
+      }
+      const Halfedge before = connectivity.find_halfedge(BoundedMesh::handle(name), BoundedMesh::handle(end));
+      const bool was_there = before.is_valid() && connectivity.is_boundary(before);
+      boundary_elements_.push_back({name, {a, b, b}, moved_[from] || moved_[to] || !was_there ? kAnywhere : 0});
     }
   }
-  const Halfedge h = change_.halfedge();
-  const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
-  if (connectivity.is_boundary(h) || connectivity.is_boundary(connectivity.opposite_halfedge_handle(h))) {
-    if (!of_kept) return false;
-    boundary_removed_.push_back({vanished_, *of_kept, kAnywhere});
-  } else if (mesh_.on_boundary(vanished_)) {
-    return false;
+  if (is_along) {
+    if (!successor) return false;
+    boundary_removed_.push_back({vanished_, *successor, kAnywhere});
   }
   if (boundary_elements_.empty()) return true;
   const glm::dvec3 unknown(kAnywhere);

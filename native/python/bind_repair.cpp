@@ -95,7 +95,7 @@ outcome : "closed", or the reason why the loop is left open:
     - "degenerate": the triangles would be segments
 
     If several of "outside", "turned" and "crossing" apply, it is the one that refused most of the triangles and edges
-    that were tried. The last two are named only if none of these three applies.
+    that the last search tried. The last two are named only if none of these three applies.
 vertex : the vertex at which the loop begins, an index
 corners : the number of its edges
 perimeter : its length in world units

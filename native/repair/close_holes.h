@@ -63,7 +63,7 @@ struct HoleClosingResult {
 /// neither degenerate nor crossing any other face, so that no edge gets more than two triangles. A loop is filled as a
 /// whole or not at all, in the orientation of its rim. Of the triangulations whose triangles keep these bounds one by
 /// one it takes the least (repair/least_triangulation.h). Where these cross a face, the next search goes around that
-/// face, and where two of them cross each other, or lie on one edge, it goes without one of them: 32 searches at most,
+/// face, and where two of them cross each other, or lie on one edge, it goes without one of them: 40 searches at most,
 /// and 8 in a loop of more than 200 corners. A loop of which 50,000 triangles were refused is given up. Loops are
 /// filled as if they were alone; then each whose faces are in conflict with those of a loop of lower number is filled
 /// anew around those, if possible.
@@ -71,10 +71,9 @@ struct HoleClosingResult {
 /// No vertex moves and none is added, and every input triangle keeps its number. Because the input stays, the reference
 /// is as near to the result as it is to the input. Throws InvalidInput for a bad mesh, and where the stored type cannot
 /// hold the tolerance; Cancelled. 1 us a triangle. A search for the filling of a loop of n corners takes about
-/// 5 ns * n^3 / 6. It takes n certificates where the first triangulations that are found keep the bounds, which are
-/// asked about only then in a loop of at most 200 corners. Else it takes n^2 / 2, but n^3 / 6 where nearly all
-/// triangles are refused although their edges are admitted, as around an island in a hole. No triangle is certified
-/// twice.
+/// 5 ns * n^3 / 6. In a loop of at most 200 corners a triangulation is found first and its n - 2 triangles are proved
+/// afterwards; mostly one such search is enough. Otherwise, and in a longer loop, a search takes n^2 / 2 certificates,
+/// but n^3 / 6 where nearly all triangles are refused although their edges are admitted, as around an island in a hole.
 HoleClosingResult close_holes(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                               const StoredSpace& space, const ToleranceVolume& volume,
                               const CloseHolesOptions& options = {});

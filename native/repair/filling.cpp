@@ -11,15 +11,16 @@
 namespace tolvol {
 namespace {
 
-/// A loop is searched for a filling at most so many times, a long one less often. After each search but the last, faces
-/// that are in the way are gone around, and one of two triangles that cross, or that lie on one edge, is left out.
+/// A loop is searched for a filling at most so many times, a long one less often, and a guess that is refused does not
+/// count. After each search but the last, faces that are in the way are gone around, and one of two triangles that
+/// cross, or that lie on one edge, is left out.
 constexpr int kMostTries = 32, kMostTriesOfLong = 8;
 /// A loop with more corners than this is long.
 constexpr std::size_t kLong = 200;
-/// So many triangulations of a loop that is not long are guessed: found without the rules, which are then asked about
-/// its triangles. Where a guess keeps the rules, which is usual, they are asked about each of its triangles, and not
-/// about each that these were chosen from, of which there are n / 2 times as many. A long loop is often the border of
-/// an open surface, most of whose triangles are refused: to find a guess takes longer then than to ask.
+/// So many triangulations of a loop that is not long may be refused as guesses. A guess is found before its triangles
+/// are proved. Where it keeps the rules, which is usual, its n - 2 triangles are all that need a proof; a search that
+/// asks the rules as it goes proves n / 2 times as many. A long loop is often the border of an open surface, most of
+/// whose triangles are refused: to find a guess takes longer there than to ask.
 constexpr int kMostGuesses = 8;
 /// A loop is given up after so many of its triangles were refused, in all searches together.
 constexpr std::size_t kMostRefused = 50000;
@@ -32,18 +33,18 @@ constexpr std::size_t kMostObstacles = 64;
 LoopOutcome Filling::run() {
   TriangulationRules rules{[this](std::uint32_t i, std::uint32_t j) { return admits_edge(i, j); },
                            [this](const glm::uvec3& face) { return admits(face); }};
-  const bool is_long = hole_.at.size() > kLong;
-  const int most_tries = is_long ? kMostTriesOfLong : kMostTries;
-  int guesses = is_long ? 0 : kMostGuesses;
+  const int most_tries = is_long() ? kMostTriesOfLong : kMostTries;
+  int guesses_left = is_long() ? 0 : kMostGuesses;
   for (int tries = 0; tries < most_tries;) {
-    guesses_ = guesses > 0;
+    is_guessing_ = guesses_left > 0;
+    refused_.fill(0);
     hole_.faces = least_triangulation(hole_.at, rules);
     if (hole_.faces.empty() || gives_up()) break;
     std::sort(hole_.faces.begin(), hole_.faces.end(), [](const glm::uvec3& a, const glm::uvec3& b) {
       return std::array{a.x, a.y, a.z} < std::array{b.x, b.y, b.z};
     });
-    if (guesses_ && !keeps_rules()) {
-      --guesses;
+    if (is_guessing_ && !prove_guess()) {
+      --guesses_left;
       continue;
     }
     ++tries;
@@ -53,6 +54,8 @@ LoopOutcome Filling::run() {
   hole_.faces.clear();
   return reason();
 }
+
+bool Filling::is_long() const { return hole_.at.size() > kLong; }
 
 LoopOutcome Filling::reason() const {
   // Across a corner of one triangle there is an edge already, and a rim that has points on a straight line makes
@@ -74,9 +77,9 @@ bool Filling::admits_edge(std::uint32_t i, std::uint32_t j) {
   if (left_out_edges_.contains({i, j}) || (earlier_ && earlier_->has_edge(rules_.edge_of(hole_, i, j)))) {
     return refuse(LoopOutcome::non_manifold);
   }
-  const auto [known, is_new] = of_edges_.try_emplace({i, j});
-  if (is_new) known->second = rules_.refusal_of_edge(hole_, i, j);
-  return !known->second || refuse(*known->second);
+  const std::optional<LoopOutcome> refusal =
+      answer(of_edges_, number(i, j), [&] { return rules_.refusal_of_edge(hole_, i, j); });
+  return !refusal || refuse(*refusal);
 }
 
 bool Filling::admits(const glm::uvec3& face) {
@@ -87,10 +90,9 @@ bool Filling::admits(const glm::uvec3& face) {
 }
 
 std::optional<LoopOutcome> Filling::refusal_of(const glm::uvec3& face) {
-  const Key key = key_of(face);
-  if (left_out_.contains(key)) return LoopOutcome::crossing;
-  if (guesses_) {
-    const auto known = of_faces_.find(key);
+  if (left_out_.contains({face.x, face.y, face.z})) return LoopOutcome::crossing;
+  if (is_guessing_) {
+    const auto known = of_faces_.find(number(face));
     if (known != of_faces_.end() && known->second) return known->second;
   } else if (const std::optional<LoopOutcome> refusal = refusal_by_rules(face)) {
     return refusal;
@@ -99,17 +101,27 @@ std::optional<LoopOutcome> Filling::refusal_of(const glm::uvec3& face) {
   return std::nullopt;
 }
 
-/// Asks the rules once about each triangle, whatever the number of searches.
 std::optional<LoopOutcome> Filling::refusal_by_rules(const glm::uvec3& face) {
-  const auto [known, is_new] = of_faces_.try_emplace(key_of(face));
-  if (is_new) known->second = rules_.refusal_of_face(hole_, face);
-  return known->second;
+  return answer(of_faces_, number(face), [&] { return rules_.refusal_of_face(hole_, face); });
 }
 
-/// Whether all triangles of a guess keep the rules. Those that do not are left out from now on.
-bool Filling::keeps_rules() {
-  return std::ranges::count_if(hole_.faces,
-                               [&](const glm::uvec3& face) { return refusal_by_rules(face).has_value(); }) == 0;
+/// Returns ask(), or what it has returned before for this number. Of a long loop the answers would take too much
+/// memory.
+template <class Ask>
+std::optional<LoopOutcome> Filling::answer(Answers& answers, std::uint64_t number, Ask&& ask) {
+  if (is_long()) return ask();
+  const auto known = answers.find(number);
+  return known != answers.end() ? known->second : answers.emplace(number, ask()).first->second;
+}
+
+/// Whether all triangles of a guess keep the rules. Searches refuse those that do not from now on.
+bool Filling::prove_guess() {
+  bool keeps = true;
+  for (const glm::uvec3& face : hole_.faces) {
+    poll();
+    keeps = !refusal_by_rules(face) && keeps;
+  }
+  return keeps;
 }
 
 /// Calls visit(corners) for the faces of the input, and of the fillings that the hole has to keep apart from, whose
@@ -173,7 +185,7 @@ bool Filling::is_sound() {
     for (std::size_t b = 0; b < a && sound; ++b) {
       if (!meet(boxes[a], boxes[b]) || !faces_cross(corners[a], corners[b])) continue;
       sound = false;
-      left_out_.insert(key_of(hole_.faces[a]));
+      left_out_.insert({hole_.faces[a].x, hole_.faces[a].y, hole_.faces[a].z});
     }
   }
   if (!sound) refuse(left_out_.empty() ? LoopOutcome::non_manifold : LoopOutcome::crossing);

@@ -6,9 +6,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
-#include <map>
 #include <optional>
 #include <set>
+#include <unordered_map>
 #include <vector>
 
 #include "repair/earlier_fillings.h"
@@ -35,11 +35,13 @@ class Filling {
     Box box;
   };
 
-  using Key = std::array<std::uint32_t, 3>;
-  static Key key_of(const glm::uvec3& face) { return {face.x, face.y, face.z}; }
+  using Answers = std::unordered_map<std::uint64_t, std::optional<LoopOutcome>>;  ///< by number()
 
+  std::uint64_t number(std::uint64_t i, std::uint64_t j) const { return i * hole_.at.size() + j; }
+  std::uint64_t number(const glm::uvec3& face) const { return number(number(face.x, face.y), face.z); }
   /// Whether the hole has one triangulation only.
   bool is_triangle() const { return hole_.at.size() == 3; }
+  bool is_long() const;
   LoopOutcome reason() const;
   bool refuse(LoopOutcome reason);
   bool gives_up() const;
@@ -47,7 +49,9 @@ class Filling {
   bool admits(const glm::uvec3& face);
   std::optional<LoopOutcome> refusal_of(const glm::uvec3& face);
   std::optional<LoopOutcome> refusal_by_rules(const glm::uvec3& face);
-  bool keeps_rules();
+  template <class Ask>
+  std::optional<LoopOutcome> answer(Answers& answers, std::uint64_t number, Ask&& ask);
+  bool prove_guess();
   template <class Visit>
   void for_each_near(const Corners& stored, Visit&& visit) const;
   bool goes_around(const Corners& stored) const;
@@ -59,12 +63,11 @@ class Filling {
   const EarlierFillings* earlier_;
   std::size_t refused_triangles_ = 0;
   std::vector<Obstacle> obstacles_;  ///< faces that an earlier try crossed
-  bool guesses_ = true;  ///< whether triangulations are found without asking the rules about their triangles
-  std::map<Key, std::optional<LoopOutcome>> of_faces_;  ///< what refuses the triangles that the rules were asked about
-  std::map<std::array<std::uint32_t, 2>, std::optional<LoopOutcome>> of_edges_;
-  std::set<Key> left_out_;
+  bool is_guessing_ = true;          ///< whether the present search leaves the rules of triangles for later
+  Answers of_faces_, of_edges_;      ///< what refuses the triangles and edges that the rules were asked about
+  std::set<std::array<std::uint32_t, 3>> left_out_;
   std::set<std::array<std::uint32_t, 2>> left_out_edges_;
-  std::array<std::size_t, kLoopOutcomeNames.size()> refused_{};  ///< for each outcome
+  std::array<std::size_t, kLoopOutcomeNames.size()> refused_{};  ///< for each outcome, in the present search
 };
 
 }  // namespace tolvol

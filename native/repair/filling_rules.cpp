@@ -108,20 +108,20 @@ std::optional<LoopOutcome> FillingRules::refusal_of_face(const Hole& hole, const
   const double share = std::min({share_at(hole, face.x), share_at(hole, face.y), share_at(hole, face.z)});
   if (!(share > 0)) return LoopOutcome::outside;
   const TriangleCertificate certificate = certificate_->narrowed(share);
-  if (certificate.point_outside(placed)) return LoopOutcome::outside;
+  Facing* const rule = facing ? &*facing : nullptr;
+  // The rule refuses where triangles of the reference are near the point, but none that the rule admits.
+  const auto reason_at = [&](const glm::dvec3& p) {
+    return rule && certificate.is_open(p, rule) && !certificate.is_open(p, nullptr) ? LoopOutcome::turned
+                                                                                    : LoopOutcome::outside;
+  };
+  if (const std::optional<glm::dvec3> point = certificate.point_outside(placed, rule)) return reason_at(*point);
   const TriangleCertificate::PointBound &a = hole.bounds[face.z], &b = hole.bounds[face.y], &c = hole.bounds[face.x];
   const glm::dvec3 bounds(a.distance, b.distance, c.distance);
   const glm::uvec3 no_hints(Hierarchy::kNone);
-  if (facing) {
-    if (certificate.point_outside(placed, &*facing)) return LoopOutcome::turned;
-    facing->set_corners({a.triangle, b.triangle, c.triangle});
-  }
+  if (rule) rule->set_corners({a.triangle, b.triangle, c.triangle});
   glm::dvec3 open;
-  if (certificate.bound_in_any_order(placed, bounds, no_hints, facing ? &*facing : nullptr, &open) ==
-      TriangleCertificate::kUnproved) {
-    // It is the rule that refuses where triangles of the reference are near the point, but none that the rule admits.
-    const bool is_turned = facing && certificate.is_open(open, &*facing) && !certificate.is_open(open, nullptr);
-    return is_turned ? LoopOutcome::turned : LoopOutcome::outside;
+  if (certificate.bound_in_any_order(placed, bounds, no_hints, rule, &open) == TriangleCertificate::kUnproved) {
+    return reason_at(open);
   }
   return std::nullopt;
 }

@@ -9,8 +9,8 @@
 namespace tolvol {
 
 /// If several of `outside`, `turned` and `crossing` keep a loop open, the outcome is the one that refused most of the
-/// faces and edges that were tried, and of equals the first. `non_manifold` and `degenerate` are outcomes only of loops
-/// that none of these three keeps open.
+/// faces and edges that the last search tried, and of equals the first. `non_manifold` and `degenerate` are outcomes
+/// only of loops that none of these three keeps open.
 enum class LoopOutcome : std::uint8_t {
   closed,
   not_a_loop,    ///< the open edges end at triangles of the other orientation or at an edge of more than two triangles

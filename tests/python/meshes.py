@@ -91,6 +91,27 @@ def open_star(spikes):
     return vertices.astype(np.float32), np.stack([np.zeros_like(i), i, i + 1], 1)
 
 
+def flap_along_a_hairpin():
+    """A plate, flat but for one vertex, and a narrow flap on it along a line that goes forth and, 0.05 beside that, back: three
+    faces meet at each edge of the line. Returns (vertices, triangles, is_of_plate), the last a bool for each vertex."""
+    x, y = (-1.0, 0.0, 1.0, 2.0), (-1.0, 0.0, 0.025, 0.05, 1.05)
+    grid = np.array([(a, b, 0.0) for a in x for b in y])
+    at = np.arange(len(grid)).reshape(len(x), len(y))
+    grid[at[1, 2], 2] = -0.02
+    triangles = []
+    for i in range(len(x) - 1):
+        for j in range(len(y) - 1):
+            a, b, c, d = at[i, j], at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]
+            triangles += [(a, b, d), (b, c, d)] if j == 1 else [(a, b, c), (a, c, d)]
+    line = at[[1, 2, 2, 2, 1], [1, 1, 2, 3, 3]]
+    top = grid[line] + [(0, 0.02, 0.01), (-0.02, 0.02, 0.01), (-0.02, 0, 0.01), (-0.02, -0.02, 0.01), (0, -0.02, 0.01)]
+    for k in range(len(line) - 1):
+        above = len(grid) + k
+        triangles += [(line[k], line[k + 1], above + 1), (line[k], above + 1, above)]
+    vertices = np.concatenate([grid, top]).astype(np.float32)
+    return vertices, np.array(triangles, np.int32), np.arange(len(vertices)) < len(grid)
+
+
 def join(*meshes):
     vertices, triangles, offset = [], [], 0
     for v, t in meshes:

@@ -76,6 +76,15 @@ def test_one_sided_keeps_a_boundary_whose_vertices_stay_where_they_are(effort, p
             vertices, triangles, tolerance, two_sided=False, effort=effort, placement=placement, crossings="allow"
         )
         assert_boundaries_alike(vertices, triangles, result, tolerance)
+        assert len(result.triangles) < 0.8 * len(triangles)
+
+
+@pytest.mark.parametrize("effort", ["fast", "thorough"])
+def test_one_sided_takes_no_edge_of_three_faces_for_a_boundary(effort):
+    vertices, triangles, locked = meshes.flap_along_a_hairpin()
+    result = decimate(vertices, triangles, 0.06, two_sided=False, effort=effort, locked=locked)
+    assert_boundaries_alike(vertices, triangles, result, 0.06)
+    assert len(result.triangles) < len(triangles)
 
 
 @pytest.mark.parametrize("target", [5000, 1001, 400])

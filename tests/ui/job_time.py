@@ -19,7 +19,8 @@ def _repeated(work, released):
 
 @contextlib.contextmanager
 def unending():
-    """Each job that begins while the context lasts repeats its work until it is cancelled, or the list given has an item."""
+    """Each job that begins while the context lasts repeats its work until it is cancelled, or until the caller
+    adds an item to the list that it gets."""
     original, released = thread.Job._run, []
     thread.Job._run = lambda job, work: original(job, _repeated(work, released))
     try:
