@@ -18,8 +18,9 @@ namespace tolvol {
 class BoundaryBounds {
  public:
   /// `limit` is the distance that collapses must keep; an edge nearer than `provable` counts as near at the start.
-  /// `boundary_is_of_reference` says that every open edge of the mesh is an open edge of the reference. Then these are
-  /// the boundary of the reference: its other open edges were closed and count no more.
+  /// `boundary_is_of_reference` says that every open edge of the mesh is an open edge of the reference, or a piece of
+  /// one. Then these are the boundary of the reference: its other open edges were closed and count no more. An open edge
+  /// that lies on edges of other triangles is no boundary, of the mesh or of the reference.
   BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh, std::span<const glm::dvec3> positions,
                  bool boundary_is_of_reference, double limit, double provable, Team& team);
   BoundaryBounds(const BoundaryBounds&) = delete;

@@ -91,7 +91,9 @@ class BoundedMesh {
   /// Whether the vertex has copies, or an edge that lies on edges of other sheets, so that a change there may change
   /// them, too.
   bool joined(std::uint32_t vertex) const { return joined_[vertex] != 0; }
-  /// Whether a boundary edge may be one that was cut, which is no boundary of the surface.
+  /// Whether a boundary edge of the kernel may be one that was cut, or lie on edges of other sheets, so that it is no
+  /// boundary of the surface. It is also true for some edges that are; their ends are pinned wherever boundaries are
+  /// bounded, so that to leave these edges out breaks no bound.
   bool is_cut(std::uint32_t from, std::uint32_t to) const { return joined(from) && joined(to); }
   /// The vertex and its copies: vertices of the kernel that are alive and at one place. Valid until the next change of
   /// one of them.

@@ -133,7 +133,7 @@ class CertifiedBounds::FullTrial final : public VertexTrial {
   bool face_is_inside(const Change& change, std::size_t i);
   double turn(const Change& change, std::size_t i, const Facing& facing) const;
   void gather_replaced_faces(const Change& change);
-  void gather_boundary(const Change& change);
+  bool gather_boundary(const Change& change);
   bool boundary_is_inside(const Change& change);
 
   ReplacedFaces replaced_faces_;
@@ -236,34 +236,37 @@ void CertifiedBounds::FullTrial::gather_replaced_faces(const Change& change) {
   for (const Coverage::Removed& r : change.removed()) add(r.id);
 }
 
-/// Gathers the boundary edges as a collapse would leave them. Edges that were cut are none: they cover nothing.
-void CertifiedBounds::FullTrial::gather_boundary(const Change& change) {
+/// Gathers the boundary edges as a collapse would leave them. Edges that were cut are none: they cover nothing. Returns
+/// false if a new edge might lie on those of other sheets, so that it would be no boundary either.
+bool CertifiedBounds::FullTrial::gather_boundary(const Change& change) {
   boundary_elements_.clear(), boundary_removed_.clear();
-  if (!bounds_.bounds_boundaries()) return;
+  if (!bounds_.bounds_boundaries()) return true;
   const BoundedMesh& mesh = change.mesh();
   const OpenMesh::TriConnectivity& connectivity = mesh.connectivity();
   BoundedMesh::Halfedge edge = change.halfedge();
   if (!connectivity.is_boundary(edge)) edge = connectivity.opposite_halfedge_handle(edge);
-  if (!connectivity.is_boundary(edge)) return;
+  if (!connectivity.is_boundary(edge)) return true;
   // The boundary runs a -> s -> t -> c; s and t merge into one.
   const auto previous = connectivity.prev_halfedge_handle(edge), next = connectivity.next_halfedge_handle(edge);
   const std::uint32_t a = mesh.from(previous), s = mesh.from(edge), t = mesh.to(edge), c = mesh.to(next);
   const glm::dvec3 &p = change.position().position, &pa = mesh.position(a), &pc = mesh.position(c);
   const double moved_s = glm::length(mesh.position(s) - p), moved_t = glm::length(mesh.position(t) - p);
-  if (!mesh.is_cut(a, s)) boundary_elements_.push_back({a, {pa, p, p}, moved_s});
-  const auto place = static_cast<std::uint32_t>(boundary_elements_.size());
   if (change.vertex() == t) {
-    // The edge a -> t is no cut edge, because s vanishes.
+    if (mesh.is_cut(a, t)) return false;
+    boundary_elements_.push_back({a, {pa, p, p}, moved_s});
     if (!mesh.is_cut(t, c)) boundary_elements_.push_back({t, {p, pc, pc}, moved_t});
     boundary_removed_.push_back({s, 0, std::max(moved_s, moved_t)});
   } else {
+    if (mesh.is_cut(s, c)) return false;
     boundary_elements_.push_back({s, {p, pc, pc}, std::max(moved_s, moved_t)});
-    boundary_removed_.push_back({t, place, moved_t});
+    if (!mesh.is_cut(a, s)) boundary_elements_.push_back({a, {pa, p, p}, moved_s});
+    boundary_removed_.push_back({t, 0, moved_t});
   }
+  return true;
 }
 
 bool CertifiedBounds::FullTrial::boundary_is_inside(const Change& change) {
-  gather_boundary(change);
+  if (!gather_boundary(change)) return false;
   if (boundary_elements_.empty()) return true;
   const Directions& directions = bounds_.directions_;
   const glm::dvec3 unknown(std::numeric_limits<double>::infinity());

@@ -271,8 +271,8 @@ bool PatchTrial::boundary_holds() {
   if (!bounds_.bounds_boundaries()) return true;
   const OpenMesh::TriConnectivity& connectivity = mesh_.connectivity();
   const Halfedge h = change_.halfedge();
-  // The boundary runs s -> t, and t or s vanishes into the other one. What covered the edge that goes is then covered
-  // by the edge behind s, or by the one before t.
+  // The boundary runs s -> t, and one vanishes into the other. The pieces of the edge that goes become those of the
+  // boundary edge that ends in t, if s vanishes, or else of the one that begins in s.
   const bool start_vanishes = connectivity.is_boundary(h);
   const bool is_along = start_vanishes || connectivity.is_boundary(connectivity.opposite_halfedge_handle(h));
   if (!is_along && mesh_.on_boundary(vanished_)) return false;

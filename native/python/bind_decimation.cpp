@@ -225,7 +225,9 @@ volume : ToleranceVolume or None
 placement : {"optimal", "subset"}
     "optimal" leaves the fewest triangles. With "subset" every vertex of the result is an original one, bit for bit.
 two_sided : bool
-    Whether the reference, too, is kept within the tolerance of the result.
+    Whether the reference, too, is kept within the tolerance of the result. If not, parts of it may be lost, but the
+    boundary of the result and that of the reference are within the tolerance of each other. An open edge that lies on
+    edges of other triangles is no boundary.
 target_triangles : int, optional
     Stop at this many triangles, if the tolerance permits so few. None goes on to as few as it permits.
 locked : (n,) bool array, optional

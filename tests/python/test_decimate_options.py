@@ -87,6 +87,18 @@ def test_one_sided_takes_no_edge_of_three_faces_for_a_boundary(effort):
     assert len(result.triangles) < len(triangles)
 
 
+@pytest.mark.parametrize("effort", ["fast", "thorough"])
+def test_one_sided_keeps_an_ear_on_an_edge_of_another_sheet(effort):
+    """Without the ear the edge below it would be no boundary, because a triangle with its own vertices ends there, too."""
+    corners = [(0, 0, 0), (4, 0, 0), (2, -3, 0), (2, 0.45, 0), (0, 0, 0), (4, 0, 0), (2, 0, 3)]
+    vertices, triangles = np.array(corners, np.float32), np.array([(0, 2, 1), (0, 1, 3), (4, 5, 6)], np.int32)
+    options = {"effort": effort, "crossings": "allow", "max_normal_angle": 180}
+    assert len(decimate(vertices, triangles, 0.5, two_sided=False, **options).triangles) == 3
+    alone = decimate(vertices, triangles[:2], 0.5, two_sided=False, **options)
+    assert len(alone.triangles) == 1
+    assert_boundaries_alike(vertices, triangles[:2], alone, 0.5)
+
+
 @pytest.mark.parametrize("target", [5000, 1001, 400])
 def test_target_triangles(target):
     vertices, triangles = TORUS
