@@ -19,8 +19,8 @@ class BoundaryBounds {
  public:
   /// `limit` is the distance that collapses must keep; an edge nearer than `provable` counts as near at the start.
   /// `boundary_is_of_reference` says that every open edge of the mesh is an open edge of the reference, or a piece of
-  /// one. Then these are the boundary of the reference: its other open edges were closed and count no more. An open edge
-  /// that lies on edges of other triangles is no boundary, of the mesh or of the reference.
+  /// one. Then these are the boundary of the reference: its other open edges were closed and count no more. An open
+  /// edge that lies on edges of other triangles is no boundary, of the mesh or of the reference.
   BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh, std::span<const glm::dvec3> positions,
                  bool boundary_is_of_reference, double limit, double provable, Team& team);
   BoundaryBounds(const BoundaryBounds&) = delete;
@@ -32,6 +32,9 @@ class BoundaryBounds {
   Coverage& backward() { return *backward_; }
   /// Vertices of the mesh at boundary edges for which the promise does not hold at the start, to be held in place.
   const std::vector<std::uint32_t>& uncertified() const { return uncertified_; }
+  /// Vertices of the mesh at edges that are open in the manifold and no boundary, or lie on other edges, to be held in
+  /// place.
+  const std::vector<std::uint32_t>& strange() const { return strange_; }
 
  private:
   TriangleMesh reference_;  // It holds boundary edges as degenerate triangles (a, b, b).
@@ -40,7 +43,7 @@ class BoundaryBounds {
   std::optional<Hierarchy> hierarchy_;
   std::optional<TriangleCertificate> forward_;
   std::optional<Coverage> backward_;
-  std::vector<std::uint32_t> uncertified_;
+  std::vector<std::uint32_t> uncertified_, strange_;
 };
 
 }  // namespace tolvol

@@ -218,6 +218,7 @@ void DecimationInput::pin_boundary() {
   for (std::uint32_t v = 0; v < cut_.cause.size(); ++v) {
     if (cut_.cause[v] == CutCause::non_manifold) pin(v, "non-manifold");
   }
+  for (const std::uint32_t v : boundary_->strange()) pin(v, "non-manifold");
 }
 
 /// Finds how the triangles that are none of the reference face it. Returns for each triangle of the manifold whether it
@@ -368,6 +369,9 @@ BoundedMeshInput DecimationInput::take_mesh() {
     for (const std::uint32_t slot : slots) input.shares.push_back(shares[slot]);
   }
   for (const CutCause cause : cut_.cause) input.joined.push_back(cause == CutCause::non_manifold);
+  if (boundary_ && boundary_->any()) {
+    for (const std::uint32_t v : boundary_->strange()) input.joined[v] = true;
+  }
   input.slots = slots;
   if (!wedges_.empty()) {
     // Labels name wedges at one input vertex; vertices welded from several hold those of all of them.

@@ -51,9 +51,14 @@ def test_two_sided_keeps_what_one_sided_may_lose():
     assert any(lost)
 
 
+def boundary(vertices, triangles):
+    """The edges of one triangle, by position."""
+    places, number = np.unique(vertices, axis=0, return_inverse=True)
+    return places, meshes.boundary_segments(places, number.reshape(-1)[triangles])
+
+
 def assert_boundaries_alike(vertices, triangles, result, tolerance):
-    rim = vertices, meshes.boundary_segments(vertices, triangles)
-    kept = result.vertices, meshes.boundary_segments(result.vertices, result.triangles)
+    rim, kept = boundary(vertices, triangles), boundary(result.vertices, result.triangles)
     assert tolvol.directed_hausdorff(*kept, *rim, bound=tolerance).upper <= tolerance
     assert tolvol.directed_hausdorff(*rim, *kept, bound=tolerance).upper <= tolerance
 
@@ -97,6 +102,16 @@ def test_one_sided_keeps_an_ear_on_an_edge_of_another_sheet(effort):
     alone = decimate(vertices, triangles[:2], 0.5, two_sided=False, **options)
     assert len(alone.triangles) == 1
     assert_boundaries_alike(vertices, triangles[:2], alone, 0.5)
+
+
+def test_one_sided_makes_no_boundary_where_two_sheets_have_an_edge_each():
+    """The sheets are joined along the edge 1 3, and the inner edges 1 2 and 5 6 lie on each other: a boundary there is none."""
+    corners = [(0.5, 0.25, -0.03), (1, 0, 0), (1, 0.25, 0.25), (1.5, 0, 0.16)]
+    corners += [(0.5, 0, 0.02), *corners[1:], (1.5, 0.25, 0.02)]
+    vertices = np.array(corners, np.float32)
+    triangles = np.array([(1, 2, 0), (1, 3, 2), (4, 5, 6), (5, 7, 8), (5, 8, 6)], np.int32)
+    result = decimate(vertices, triangles, 0.3, two_sided=False)
+    assert_boundaries_alike(vertices, triangles, result, 0.3)
 
 
 @pytest.mark.parametrize("target", [5000, 1001, 400])
