@@ -109,10 +109,9 @@ std::optional<LoopOutcome> FillingRules::refusal_of_face(const Hole& hole, const
   if (!(share > 0)) return LoopOutcome::outside;
   const TriangleCertificate certificate = certificate_->narrowed(share);
   Facing* const rule = facing ? &*facing : nullptr;
-  // The rule refuses where triangles of the reference are near the point, but none that the rule admits.
+  // Where triangles of the reference are near the point that has no witness, the rule does not admit them.
   const auto reason_at = [&](const glm::dvec3& p) {
-    return rule && certificate.is_open(p, rule) && !certificate.is_open(p, nullptr) ? LoopOutcome::turned
-                                                                                    : LoopOutcome::outside;
+    return rule && !certificate.is_open(p, nullptr) ? LoopOutcome::turned : LoopOutcome::outside;
   };
   if (const std::optional<glm::dvec3> point = certificate.point_outside(placed, rule)) return reason_at(*point);
   const TriangleCertificate::PointBound &a = hole.bounds[face.z], &b = hole.bounds[face.y], &c = hole.bounds[face.x];
