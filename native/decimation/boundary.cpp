@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "decimation/boundary.h"
 
+#include <algorithm>
+#include <iterator>
 #include <limits>
 #include <numeric>
-#include <unordered_map>
 #include <unordered_set>
+#include <utility>
 
 #include "base/call.h"
 #include "topology/sides.h"
@@ -14,50 +16,28 @@ namespace {
 
 struct Boundary {
   std::vector<glm::uvec2> edges;       ///< in the direction of their triangle
-  std::vector<std::uint32_t> strange;  ///< ends of other open edges of the manifold, and of edges that lie on others
+  std::vector<std::uint32_t> strange;  ///< ends of the edges that lie on others
 };
 
-std::uint64_t directed(const glm::uvec2& e) { return (static_cast<std::uint64_t>(e.x) << 32) | e.y; }
-
-/// The edges of a cut mesh that have one triangle, by position. The manifold has other open edges: those that were cut,
-/// and those in which a sheet with vertices of its own ends on edges of other triangles.
-Boundary boundary_of(const CutMesh& cut) {
-  const auto place = [&](const glm::uvec2& e) { return pair_key(cut.copies_of[e.x], cut.copies_of[e.y]); };
-  const auto edge = [&](std::size_t t, int k) {
-    return glm::uvec2(cut.triangles[t][k], cut.triangles[t][(k + 1) % 3]);
-  };
-  std::unordered_map<std::uint64_t, std::uint32_t> triangles_at;
-  for (const glm::uvec2& e : cut.boundary) triangles_at.emplace(place(e), 0);
+/// The open edges of a cut mesh, without those that lie on others by position: where an edge was cut, and where a sheet
+/// with vertices of its own ends on other triangles. Where a sheet loses a triangle at an edge that lies on another, it
+/// gets a boundary that the surface has not.
+Boundary boundary_of(const CutMesh& cut, Team& team) {
   Boundary boundary;
-  if (triangles_at.empty()) return boundary;
-  for (std::size_t t = 0; t < cut.triangles.size(); ++t) {
-    poll_at(t);
-    for (int k = 0; k < 3; ++k) {
-      const auto found = triangles_at.find(place(edge(t, k)));
-      if (found != triangles_at.end()) ++found->second;
-    }
-  }
-  std::unordered_set<std::uint64_t> kept;
-  for (const glm::uvec2& e : cut.boundary) {
-    if (triangles_at.at(place(e)) > 1) continue;
-    boundary.edges.push_back(e);
-    kept.insert(directed(e));
-  }
-  // Where a sheet loses a triangle at an edge that lies on one of another sheet, it has a boundary that the surface has
-  // not: one end of such an edge at least has copies.
-  std::unordered_map<std::uint64_t, glm::uvec2> first_at;
-  for (std::size_t side = 0; side < cut.mates.size(); ++side) {
-    poll_at(side);
-    const glm::uvec2 e = edge(side / 3, static_cast<int>(side % 3));
-    if (cut.mates[side] == CutMesh::kNone && !kept.contains(directed(e))) {
-      boundary.strange.insert(boundary.strange.end(), {e.x, e.y});
-    }
-    if (cut.cause[e.x] == CutCause::none && cut.cause[e.y] == CutCause::none) continue;
-    const glm::uvec2 other = first_at.try_emplace(place(e), e).first->second;
-    if (pair_key(other.x, other.y) != pair_key(e.x, e.y)) {
-      boundary.strange.insert(boundary.strange.end(), {e.x, e.y, other.x, other.y});
-    }
-  }
+  if (cut.boundary.empty()) return boundary;
+  const auto vertex = [&](Side corner) { return cut.triangles[corner / 3][static_cast<int>(corner % 3)]; };
+  const auto place = [&](Side corner) { return cut.copies_of[vertex(corner)]; };
+  std::vector<Side> sides(cut.mates.size());
+  std::iota(sides.begin(), sides.end(), 0u);
+  std::unordered_set<std::uint64_t> shared;
+  by_ends(sides, cut.copies_of.size(), team, place, [&](const std::vector<Side>& alike) {
+    if (alike.size() == 1 || (alike.size() == 2 && cut.mates[alike[0]] == alike[1])) return;
+    shared.insert(pair_key(place(alike[0]), place(next_corner(alike[0]))));
+    for (const Side s : alike) boundary.strange.insert(boundary.strange.end(), {vertex(s), vertex(next_corner(s))});
+  });
+  std::ranges::copy_if(cut.boundary, std::back_inserter(boundary.edges), [&](const glm::uvec2& e) {
+    return !shared.contains(pair_key(cut.copies_of[e.x], cut.copies_of[e.y]));
+  });
   return boundary;
 }
 
@@ -66,9 +46,9 @@ Boundary boundary_of(const CutMesh& cut) {
 BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mesh,
                                std::span<const glm::dvec3> positions, bool boundary_is_of_reference, double limit,
                                double provable, Team& team) {
-  const auto [boundary, strange] = boundary_of(mesh);
+  auto [boundary, strange] = boundary_of(mesh, team);
   if (boundary.empty()) return;
-  strange_ = strange;
+  strange_ = std::move(strange);
   if (boundary_is_of_reference) {
     reference_.vertices.assign(positions.begin(), positions.end());
     for (const glm::uvec2& e : boundary) reference_.triangles.emplace_back(e.x, e.y, e.y);
@@ -76,7 +56,7 @@ BoundaryBounds::BoundaryBounds(const ToleranceVolume& volume, const CutMesh& mes
     const TriangleMesh& whole = volume.reference();
     const CutMesh cut = cut_to_manifold(whole.vertices, whole.triangles, team);
     reference_.vertices = whole.vertices;
-    for (const glm::uvec2& e : boundary_of(cut).edges) {
+    for (const glm::uvec2& e : boundary_of(cut, team).edges) {
       const std::uint32_t a = cut.vertex_input[e.x], b = cut.vertex_input[e.y];
       reference_.triangles.emplace_back(a, b, b);
     }

@@ -32,8 +32,7 @@ class BoundaryBounds {
   Coverage& backward() { return *backward_; }
   /// Vertices of the mesh at boundary edges for which the promise does not hold at the start, to be held in place.
   const std::vector<std::uint32_t>& uncertified() const { return uncertified_; }
-  /// Vertices of the mesh at edges that are open in the manifold and no boundary, or lie on other edges, to be held in
-  /// place.
+  /// Vertices of the mesh at edges that lie on others, to be held in place.
   const std::vector<std::uint32_t>& strange() const { return strange_; }
 
  private:
