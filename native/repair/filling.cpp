@@ -39,7 +39,13 @@ LoopOutcome Filling::run() {
     is_guessing_ = guesses_left > 0;
     refused_.fill(0);
     hole_.faces = least_triangulation(hole_.at, rules);
-    if (hole_.faces.empty() || gives_up()) break;
+    if (gives_up()) break;
+    if (hole_.faces.empty()) {
+      if (!is_guessing_ || tries > 0) break;
+      // No triangulation keeps the rules. A search that asks them as it goes tells which of them refuses most.
+      guesses_left = 0;
+      continue;
+    }
     std::sort(hole_.faces.begin(), hole_.faces.end(), [](const glm::uvec3& a, const glm::uvec3& b) {
       return std::array{a.x, a.y, a.z} < std::array{b.x, b.y, b.z};
     });

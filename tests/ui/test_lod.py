@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """LOD Chain by mouse and keyboard: the levels, one undo step, and Esc in the middle of a chain."""
 
-import re
-
 import bpy
 
+import job_time
 import scenes
 from addon import job, panels
 from panels_open import unfolded
@@ -35,7 +34,8 @@ def test_levels_by_mouse_and_one_ctrl_z():
     said = status_texts()
     with unfolded(panels.TOLVOL_PT_lod):
         yield from open_tab()
-        yield from press("tolvol.make_lods")
+        with job_time.in_background():
+            yield from press("tolvol.make_lods")
         yield from finished(lambda: len(levels()) == 3 and not job.under_way())
         yield from scroll_down()
         xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
@@ -44,7 +44,7 @@ def test_levels_by_mouse_and_one_ctrl_z():
     assert stored() == before
     for name, percent in zip(levels(), (0.1, 0.5, 2)):
         assert_proved(bpy.data.objects[name], reference, percent)
-    assert any(re.match("Level [123] of 3: ", text) for text in said), said
+    assert any(text.startswith("Level 1 of 3: ") for text in said), said
     xdotool("mousemove", *centre())
     yield
     key("ctrl+z")
