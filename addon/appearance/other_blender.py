@@ -10,7 +10,6 @@ import json
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import bpy
@@ -83,7 +82,7 @@ def run(command_line, folder, doing, progress):
         while process.poll() is None:
             if progress.cancelled:
                 raise native.module.Cancelled("cancelled")
-            time.sleep(_LOOK)
+            native.module.pause(_LOOK)
     finally:
         if process.poll() is None:
             process.kill()

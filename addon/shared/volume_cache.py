@@ -15,7 +15,7 @@ class VolumeCache:
         self._most_bytes = most_bytes
         self._volumes = OrderedDict()
         self._being_built = set()
-        self._changed = threading.Condition()  # its lock guards both collections
+        self._lock = threading.Lock()  # guards both collections
 
     def get(self, key, build, progress=None):
         """Returns the volume with this key, and calls build() to make it if the cache does not hold it.
@@ -23,33 +23,34 @@ class VolumeCache:
         If another thread is building the volume, the call waits for it, and builds the volume itself if the other thread
         fails. Raises Cancelled.
         """
-        with self._changed:
-            while key in self._being_built:
-                if progress is not None and progress.cancelled:
-                    raise package.module.Cancelled("cancelled")
-                self._changed.wait(_LOOK)
-            if key in self._volumes:
-                self._volumes.move_to_end(key)
-                return self._volumes[key]
-            self._being_built.add(key)
+        while True:
+            with self._lock:
+                if key in self._volumes:
+                    self._volumes.move_to_end(key)
+                    return self._volumes[key]
+                if key not in self._being_built:
+                    self._being_built.add(key)
+                    break
+            if progress is not None and progress.cancelled:
+                raise package.module.Cancelled("cancelled")
+            package.module.pause(_LOOK)  # Jobs run meanwhile.
         volume = None
         try:
             volume = build()
         finally:
-            with self._changed:
+            with self._lock:
                 self._being_built.remove(key)
                 if volume is not None:
                     self._keep(key, volume)
-                self._changed.notify_all()
         return volume
 
     def built(self, key):
         """Returns the volume with this key, or None if the cache does not hold it. It never waits: panels may call it."""
-        with self._changed:
+        with self._lock:
             return self._volumes.get(key)
 
     def clear(self):
-        with self._changed:
+        with self._lock:
             self._volumes.clear()
 
     def _keep(self, key, volume):

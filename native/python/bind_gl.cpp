@@ -4,6 +4,7 @@
 #endif
 #include "base/errors.h"
 #include "python/module.h"
+#include "python/worker.h"
 
 namespace tolvol::python {
 namespace {
@@ -12,12 +13,12 @@ namespace py = pybind11;
 
 #ifdef TOLVOL_GL
 std::string renderer() {
-  const py::gil_scoped_release release;
+  const WithoutPython released;
   return gl::renderer().name();
 }
 
 void shutdown() {
-  const py::gil_scoped_release release;
+  const WithoutPython released;
   gl::shutdown();
 }
 #else

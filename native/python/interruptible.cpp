@@ -19,11 +19,10 @@ bool on_main_thread() {
 
 Interruptible::Interruptible(const Progress* progress)
     : call_(progress, on_main_thread() ? std::function<bool()>([this] { return handle_signals(); }) : nullptr),
-      released_(PyEval_SaveThread()) {}
+      released_(std::in_place) {}
 
-// pybind11's guard does the same with code that may throw.
 Interruptible::~Interruptible() {
-  PyEval_RestoreThread(released_);
+  released_.reset();
   if (type_) PyErr_Restore(type_, value_, traceback_);
 }
 

@@ -5,8 +5,10 @@
 #include <pybind11/pybind11.h>
 
 #include <chrono>
+#include <optional>
 
 #include "base/call.h"
+#include "python/worker.h"
 
 namespace tolvol::python {
 
@@ -24,7 +26,7 @@ class Interruptible {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   PyObject *type_ = nullptr, *value_ = nullptr, *traceback_ = nullptr;
   Call call_;
-  PyThreadState* const released_;  ///< comes last, so that nothing fails while the GIL is not held
+  std::optional<WithoutPython> released_;  ///< comes last, so that nothing fails while the GIL is not held
 };
 
 }  // namespace tolvol::python

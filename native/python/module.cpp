@@ -43,6 +43,7 @@ PYBIND11_MODULE(_native, module) {
   module.attr("__version__") = TOLVOL_VERSION;
   tolvol::python::bind_errors(module);
   tolvol::python::bind_progress(module);
+  tolvol::python::bind_worker(module);
   tolvol::python::bind_gl(module);
   tolvol::python::bind_volume(module);
   tolvol::python::bind_display(module);

@@ -8,6 +8,7 @@ namespace tolvol::python {
 
 void bind_errors(pybind11::module_& module);
 void bind_progress(pybind11::module_& module);
+void bind_worker(pybind11::module_& module);
 void bind_gl(pybind11::module_& module);
 void bind_volume(pybind11::module_& module);
 void bind_display(pybind11::module_& module);

@@ -123,8 +123,8 @@ def test_jobs_end_before_a_file_is_loaded_or_a_step_undone(monkeypatch, happens,
 def stubborn(progress):
     """Work that ends only after it is cancelled and, like native code, some time later."""
     while not progress.cancelled:
-        pass
-    threading.Event().wait(0.2)
+        native.module.pause(0.001)
+    native.module.pause(0.2)
 
 
 def test_jobs_are_waited_for_when_blender_ends():
@@ -134,11 +134,30 @@ def test_jobs_are_waited_for_when_blender_ends():
     assert running.done()
 
 
+def test_operators_get_a_context_from_python_while_jobs_run():
+    """Beside ordinary threads that run Python code, Blender 3.4 crashes here (native/python/worker.h tells why)."""
+    ob = torus()
+
+    def work(progress):
+        while not progress.cancelled:
+            [str(number) * 3 for number in range(1000)]
+            native.module.pause(0.0)
+
+    jobs = [thread.Job(work, native.module.Progress()) for _ in range(2)]
+    for _ in range(100):
+        assert not any(job.done() for job in jobs)
+        with bpy.context.temp_override(active_object=ob, selected_objects=[ob]):
+            for _ in range(20):
+                bpy.ops.object.shade_smooth()
+    thread.end_all()
+
+
 def test_what_the_overlay_had_begun_ends_though_another_file_was_opened(monkeypatch):
-    began, ended = threading.Event(), []
-    queue.later(("it",), 0, lambda: lambda _progress: began.set(), lambda *outcome: ended.append(outcome))
+    began, ended = [], []
+    queue.later(("it",), 0, lambda: lambda _progress: began.append(1), lambda *outcome: ended.append(outcome))
     queue._tick()
-    assert began.wait(60)
+    while not began:
+        native.module.pause(0.01)
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     assert bpy.app.timers.is_registered(queue._tick)
     while not ended:
@@ -244,7 +263,13 @@ class Modal(job.JobOperator):
 def waiting():
     """(a job that ends when `go` is set, go)"""
     go = threading.Event()
-    operator = Modal(lambda _progress: go.wait(60))
+
+    def wait(_progress):
+        while not go.is_set():
+            native.module.pause(0.001)
+        return True
+
+    operator = Modal(wait)
     operator._run.advance()
     interruptions.runs.append(operator._run)
     yield operator, go

@@ -3,6 +3,7 @@
 
 import contextlib
 
+from addon import native
 from addon.background import thread
 from addon.job import run
 
@@ -13,6 +14,7 @@ def _repeated(work, released):
             outcome = work(progress)
             if released or progress.cancelled:
                 return outcome
+            native.module.pause(0.0)  # Blender works on.
 
     return again
 

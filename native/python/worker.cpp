@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "python/worker.h"
+
+#include <algorithm>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+namespace tolvol::python {
+namespace {
+
+namespace py = pybind11;
+using Seconds = std::chrono::duration<double>;
+
+/// Who looks whether a worker has ended, without waiting, lets workers run for so long if they want to. It is less than
+/// what an eye sees, and enough for what workers do in Python.
+constexpr Seconds kGlance(0.01);
+
+/// Signals are looked for once in this time.
+constexpr Seconds kBetweenLooks(0.05);
+
+/// Decides when workers may run Python code.
+class Turns {
+ public:
+  /// A worker waits here before it runs Python code.
+  void take() {
+    std::unique_lock lock(mutex_);
+    ++waiting_;
+    changed_.wait(lock, [this] { return givers_ > 0; });
+    --waiting_;
+    ++taken_;
+    changed_.notify_all();
+  }
+
+  /// A worker says that it runs no more Python code for now.
+  void end() {
+    end([] {});
+  }
+  template <class Also>
+  void end(const Also& also) {
+    const std::lock_guard lock(mutex_);
+    --taken_;
+    also();
+    changed_.notify_all();
+  }
+
+  /// Lets workers run Python code for the given time or until `done`, and returns once none does. Returns `done`.
+  template <class Done>
+  bool give(Seconds time, const Done& done) {
+    std::unique_lock lock(mutex_);
+    const auto start = std::chrono::steady_clock::now();
+    const auto after = [&](Seconds some) {
+      return start + std::chrono::duration_cast<std::chrono::steady_clock::duration>(some);
+    };
+    ++givers_;
+    changed_.notify_all();
+    changed_.wait_until(lock, after(time), done);
+    changed_.wait_until(lock, after(std::max(time, kGlance)), [&] { return done() || (waiting_ == 0 && taken_ == 0); });
+    --givers_;
+    changed_.wait(lock, [this] { return taken_ == 0 || givers_ > 0; });
+    return done();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  int waiting_ = 0, taken_ = 0;  ///< workers
+  int givers_ = 0;               ///< threads that let workers run
+};
+
+/// It lives on at the end of the process, when workers may still wait for their turn.
+Turns& turns() {
+  static Turns* const turns = new Turns;
+  return *turns;
+}
+
+thread_local bool is_worker = false;
+
+}  // namespace
+
+struct Worker::State {
+  py::object work;
+  bool done = false;  ///< guarded by the mutex of the turns
+};
+
+Worker::Worker(py::object work) : state_(std::make_shared<State>()) {
+  state_->work = std::move(work);
+  std::thread([state = state_] {
+    is_worker = true;
+    turns().take();
+    {
+      const py::gil_scoped_acquire acquire;
+      try {
+        state->work();
+      } catch (py::error_already_set& error) {
+        error.discard_as_unraisable("a worker");
+      }
+      state->work = {};
+    }
+    turns().end([&] { state->done = true; });
+  }).detach();
+}
+
+bool Worker::done(Seconds time) {
+  const WithoutPython released;
+  return turns().give(time, [this] { return state_->done; });
+}
+
+void Worker::join() {
+  while (!done(kBetweenLooks)) {
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  }
+}
+
+WithoutPython::WithoutPython() : released_(PyEval_SaveThread()) {
+  if (is_worker) turns().end();
+}
+
+WithoutPython::~WithoutPython() {
+  if (is_worker) turns().take();
+  PyEval_RestoreThread(released_);
+}
+
+void pause(Seconds time) {
+  const WithoutPython released;
+  if (is_worker) {
+    std::this_thread::sleep_for(time);
+  } else {
+    turns().give(time, [] { return false; });
+  }
+}
+
+}  // namespace tolvol::python
