@@ -24,7 +24,7 @@ _MOST_CURVES = 16
 
 @dataclass(frozen=True)
 class Known:
-    """What is known about an object: as it was when it had this token."""
+    """What is known about an object as it was when it had this token."""
 
     token: tuple
     task: Task | None  # None if Decimate would refuse the settings

@@ -2,12 +2,11 @@
 """Gives a mesh the look of its reference: normals, and a normal map."""
 
 import bpy
-from bpy.props import IntProperty
 
 from .. import preferences
 from ..appearance import baking, materials, normals, other_blender
 from ..job import JobOperator
-from ..operation_settings import bake_settings
+from ..operation_settings import bake_settings, threads_setting
 from ..reference import snapshots, tolerances
 from ..shared.errors import Refused
 from . import settings as shared
@@ -59,7 +58,7 @@ tolerance, in a second Blender without a window. Without a UV map, Smart UV Proj
     bl_options = {"REGISTER", "UNDO"}
 
     __annotations__ = bake_settings({"SKIP_SAVE"})
-    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+    threads: threads_setting()
 
     @classmethod
     def poll(cls, context):

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import bpy
 import numpy as np
-from bpy.props import IntProperty
 
 from .. import native, preferences
 from ..job import JobOperator
 from ..mesh import mesh_io
+from ..operation_settings import threads_setting
 from ..proof import statistics
 from ..reference import measurements, snapshots, tolerances
 from ..shared.proof import measure, report
@@ -23,7 +23,7 @@ from .staying import show_selected
 class Comparison(JobOperator):
     """Prepares both surfaces. The thread calls compare(surface, reference, tolerance, threads, progress)."""
 
-    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+    threads: threads_setting()
 
     @classmethod
     def poll(cls, context):

@@ -5,11 +5,11 @@ import functools
 
 import bpy
 import numpy as np
-from bpy.props import IntProperty
 
 from .. import native, preferences
 from ..job import JobOperator
 from ..mesh import mesh_io
+from ..operation_settings import threads_setting
 from ..reference import snapshots
 from ..shared.proof import solidity
 from .blocked import allowed, object_blocked
@@ -24,7 +24,7 @@ corners and edges that they share"""
     bl_label = "Select Crossing Faces"
     bl_options = {"REGISTER", "UNDO"}
 
-    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+    threads: threads_setting()
 
     @classmethod
     def poll(cls, context):

@@ -4,14 +4,14 @@
 import contextlib
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty
 
 from .. import preferences
 from ..job import JobOperator
 from ..mesh import transfer
-from ..operation_settings import PROTECTED, decimate_settings
+from ..operation_settings import PROTECTED, decimate_settings, threads_setting
 from ..proof import verdict
-from ..properties import PLACEMENTS, automatic_placement, tolerance_settings
+from ..properties import automatic_placement, placement_setting, tolerance_settings
 from ..reference import snapshots, tolerances
 from ..shared.errors import Refused
 from ..shared.proof import report
@@ -83,13 +83,7 @@ object. An object without a reference gets one first, as by Set Reference"""
     # A setting that is not given is taken from the object. SKIP_SAVE keeps Blender from taking it from the last run,
     # which may have been on another object.
     __annotations__ = tolerance_settings({"SKIP_SAVE"}) | decimate_settings({"SKIP_SAVE"})
-    placement: EnumProperty(
-        name="Placement",
-        description="How the positions of the remaining vertices are chosen",
-        items=PLACEMENTS,
-        options={"SKIP_SAVE"},
-        update=_choose_placement,
-    )
+    placement: placement_setting(options={"SKIP_SAVE"}, update=_choose_placement)
     own_placements: BoolProperty(
         description="No placement was chosen: the placement depends on the UV maps of each mesh",
         options={"HIDDEN", "SKIP_SAVE"},
@@ -103,7 +97,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         ),
         options={"SKIP_SAVE"},
     )
-    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+    threads: threads_setting()
 
     @classmethod
     def poll(cls, context):

@@ -14,7 +14,7 @@ from ..shared.surface import to_world
 def options(settings, placement, threads):
     """Returns the options of the native decimate() for `settings` with the properties of decimate_settings().
 
-    placement: an identifier of properties.PLACEMENTS.
+    placement: an identifier of PLACEMENTS in properties/choices.py.
     """
     return {
         "placement": placement.lower(),

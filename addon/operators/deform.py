@@ -3,13 +3,14 @@
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty, IntProperty, StringProperty
+from bpy.props import StringProperty
 
 from .. import native, preferences
 from ..job import JobOperator
 from ..mesh import mesh_io
+from ..operation_settings import threads_setting
 from ..proof import kept_warnings
-from ..properties import DEFORM_MODES
+from ..properties import deform_mode_setting
 from ..shared.errors import Refused
 from .blocked import allowed, decimate_blocked
 from .motion import Motion
@@ -31,13 +32,8 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
         description="The lattice object. If none is given, the one of the panel is used, or else the selected one",
         options={"SKIP_SAVE"},
     )
-    mode: EnumProperty(
-        name="Beyond",
-        description="How to treat a deformation that would leave the tolerance",
-        items=DEFORM_MODES,
-        options={"SKIP_SAVE"},
-    )
-    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+    mode: deform_mode_setting(options={"SKIP_SAVE"})
+    threads: threads_setting()
 
     @classmethod
     def poll(cls, context):

@@ -6,13 +6,12 @@ import contextlib
 import math
 
 import bpy
-from bpy.props import IntProperty
 
 from .. import preferences
 from ..files.gltf_extras import GEOMETRIC_ERROR
 from ..job import JobOperator
 from ..mesh import transfer
-from ..operation_settings import lod_settings
+from ..operation_settings import lod_settings, threads_setting
 from ..properties import automatic_placement
 from ..reference import originals, snapshots, tolerances
 from ..shared.decimation import seen_as
@@ -56,7 +55,7 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
     bl_options = {"REGISTER", "UNDO"}
 
     __annotations__ = lod_settings({"SKIP_SAVE"})
-    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+    threads: threads_setting()
 
     @classmethod
     def poll(cls, context):

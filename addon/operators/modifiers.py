@@ -7,14 +7,14 @@ applied with the setting that leaves the fewest triangles within the tolerance, 
 
 import bpy
 import numpy as np
-from bpy.props import FloatProperty, IntProperty, StringProperty
+from bpy.props import FloatProperty, StringProperty
 
 from .. import native, preferences
 from ..job import JobOperator
 from ..mesh import mesh_io
 from ..mesh.evaluation import Evaluation, same_faces
 from ..mesh.mesh_io import column
-from ..operation_settings import modifier_settings
+from ..operation_settings import modifier_settings, threads_setting
 from ..proof import kept_warnings, last_run
 from ..properties import automatic_placement
 from ..reference import measurements, snapshots, tolerances
@@ -110,7 +110,7 @@ moves as far as the tolerance permits. An object without a reference gets one fi
         description="The name of the modifier. If none is given, the first modifier that can be applied is used",
         options={"SKIP_SAVE"},
     )
-    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+    threads: threads_setting()
 
     def draw(self, context):
         self.layout.use_property_split = True
@@ -186,7 +186,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         precision=5,
         options={"SKIP_SAVE"},
     )
-    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+    threads: threads_setting()
 
     def targets(self, context):
         self._found = []  # (number of triangles, value) of each value at which no sample is beyond the tolerance

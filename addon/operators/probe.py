@@ -4,12 +4,13 @@
 import functools
 
 import bpy
-from bpy.props import BoolProperty, FloatVectorProperty, IntProperty
+from bpy.props import BoolProperty, FloatVectorProperty
 from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
 from .. import native, preferences, status_bar
 from ..background import Job
 from ..job import JobOperator
+from ..operation_settings import threads_setting
 from ..proof import labels, probing
 from ..reference import measurements, snapshots, tolerances
 from ..shared.errors import Refused
@@ -216,7 +217,7 @@ def _contains(part, x, y):
 class _Measuring(JobOperator):
     """Makes the probes of an object in a thread, then calls read(context, {on_reference: Probe})."""
 
-    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+    threads: threads_setting()
 
     def prepare(self, context):
         context.view_layer.update()
@@ -256,7 +257,7 @@ class TOLVOL_OT_add_label(_Measuring, bpy.types.Operator):
         return [self.on_reference]
 
     def read(self, context, probes):
-        reading = probes[self.on_reference].near(self.position)
+        reading = probes[self.on_reference].nearest_to(self.position)
         labels.add(self.ob, reading)
         self.say({"INFO"}, ", ".join(described(context, self.ob, reading)))
 
@@ -285,7 +286,7 @@ to them"""
         ob, count = self.ob, 0
         for label in ob.tolvol.labels:
             if not labels.current(ob, label):
-                labels.write(ob, label, probes[label.on_reference].near(labels.reading(ob, label).position))
+                labels.write(ob, label, probes[label.on_reference].nearest_to(labels.reading(ob, label).position))
                 count += 1
         labels.notify()
         self.say({"INFO"}, f"Measured again at {count} label{'s' * (count != 1)}")

@@ -3,10 +3,11 @@
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, IntProperty
+from bpy.props import BoolProperty
 
 from .. import preferences
 from ..job import JobOperator
+from ..operation_settings import threads_setting
 from ..reference import snapshots, tolerances
 from ..shared import volumes
 from .blocked import allowed, reference_blocked
@@ -53,7 +54,7 @@ another reference is set, a menu asks whether to replace it"""
     bl_label = "Set Reference"
     bl_options = {"REGISTER", "UNDO"}
 
-    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+    threads: threads_setting()
     replace: BoolProperty(
         name="Replace",
         description="Replace the present reference without asking",

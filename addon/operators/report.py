@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from .. import native, preferences
 from ..job import JobOperator
+from ..operation_settings import threads_setting
 from ..proof import labels, last_run
 from ..reference import snapshots, tolerances
 from ..shared.errors import Refused
@@ -100,7 +101,7 @@ a table (.csv) or all numbers (.json)"""
         items=_FORMATS,
         options={"SKIP_SAVE"},
     )
-    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+    threads: threads_setting()
 
     _browsing = False
     _named_for = ""  # the format that the file's name has an ending for

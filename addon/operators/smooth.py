@@ -3,12 +3,11 @@
 
 import bpy
 import numpy as np
-from bpy.props import IntProperty
 
 from .. import native, preferences
 from ..job import JobOperator
 from ..mesh import mesh_io, protect
-from ..operation_settings import smooth_settings
+from ..operation_settings import smooth_settings, threads_setting
 from ..proof import kept_warnings
 from ..shared.errors import Refused
 from . import settings as shared
@@ -35,7 +34,7 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
     bl_options = {"REGISTER", "UNDO"}
 
     __annotations__ = smooth_settings({"SKIP_SAVE"})
-    threads: IntProperty(options={"HIDDEN", "SKIP_SAVE"}, min=0)
+    threads: threads_setting()
 
     @classmethod
     def poll(cls, context):

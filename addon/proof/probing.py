@@ -96,7 +96,7 @@ class Probe:
             return None
         return self._read(face, lambda a, b, c: _on_ray(origin, direction, a, b, c))
 
-    def near(self, position):
+    def nearest_to(self, position):
         """Returns the Reading at the point of the surface that is nearest to a point in the world (3,)."""
         at = to_world(np.asarray(position, np.float64)[None], self._inverse)[0]
         _, _, face, _ = self._faces.find_nearest(Vector(at))

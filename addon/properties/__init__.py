@@ -6,7 +6,13 @@ Settings that belong to one operation are declared in operation_settings.py.
 
 import bpy
 
-from .choices import DEFORM_MODES, PLACEMENTS, TOLERANCE_UNITS, automatic_placement, tolerance_settings
+from .choices import (
+    TOLERANCE_UNITS,
+    automatic_placement,
+    deform_mode_setting,
+    placement_setting,
+    tolerance_settings,
+)
 from .measured import TOLVOL_PG_label, TOLVOL_PG_measurement
 from .object import (
     TOLVOL_PG_bake,
@@ -18,10 +24,10 @@ from .object import (
 )
 
 __all__ = [
-    "DEFORM_MODES",
-    "PLACEMENTS",
     "TOLERANCE_UNITS",
     "automatic_placement",
+    "deform_mode_setting",
+    "placement_setting",
     "register",
     "tolerance_settings",
     "unregister",

@@ -81,6 +81,26 @@ DEFORM_MODES = (
 )
 
 
+def placement_setting(**more):
+    """Returns the property of the placement. more: further arguments of EnumProperty."""
+    return EnumProperty(
+        name="Placement",
+        description="How the positions of the remaining vertices are chosen",
+        items=PLACEMENTS,
+        **more,
+    )
+
+
+def deform_mode_setting(**more):
+    """Returns the property of what happens beyond the tolerance. more: further arguments of EnumProperty."""
+    return EnumProperty(
+        name="Beyond",
+        description="How to treat a deformation that would leave the tolerance",
+        items=DEFORM_MODES,
+        **more,
+    )
+
+
 def automatic_placement(mesh):
     """Returns the placement until one is chosen: the one that keeps UVs exactly, if the mesh has UV maps."""
     return "SUBSET" if isinstance(mesh, bpy.types.Mesh) and mesh.uv_layers else "OPTIMAL"

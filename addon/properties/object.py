@@ -17,7 +17,7 @@ from .. import preferences
 from ..operation_settings import bake_settings, decimate_settings, lod_settings, modifier_settings, smooth_settings
 from ..redraw import redraw_views
 from ..reference import measurements, snapshots, tolerances
-from .choices import DEFORM_MODES, PLACEMENTS, automatic_placement, tolerance_settings
+from .choices import PLACEMENTS, automatic_placement, deform_mode_setting, placement_setting, tolerance_settings
 from .measured import TOLVOL_PG_label, TOLVOL_PG_measurement
 from .overlay import ShowDeviation, changed
 
@@ -143,13 +143,7 @@ class TOLVOL_PG_settings(ShowDeviation, bpy.types.PropertyGroup):
         poll=lambda settings, ob: ob.type == "MESH" and ob != settings.id_data,
         update=changed,
     )
-    placement: EnumProperty(
-        name="Placement",
-        description="How the positions of the remaining vertices are chosen",
-        items=PLACEMENTS,
-        get=_get_placement,
-        set=_set_placement,
-    )
+    placement: placement_setting(get=_get_placement, set=_set_placement)
     placement_choice: IntProperty(default=-1, description="The placement that was chosen. It is -1 if none was chosen")
     lattice: PointerProperty(
         name="Lattice",
@@ -157,11 +151,7 @@ class TOLVOL_PG_settings(ShowDeviation, bpy.types.PropertyGroup):
         type=bpy.types.Object,
         poll=lambda _settings, ob: ob.type == "LATTICE",
     )
-    deform_mode: EnumProperty(
-        name="Beyond",
-        description="How to treat a deformation that would leave the tolerance",
-        items=DEFORM_MODES,
-    )
+    deform_mode: deform_mode_setting()
 
     snapshot: PointerProperty(type=bpy.types.Mesh, description="The reference as it was set. It is never changed")
     original: PointerProperty(

@@ -29,7 +29,7 @@ class Progress {
     fraction_.store(0, std::memory_order_relaxed);
     stage_.store(stage, std::memory_order_relaxed);
   }
-  /// Is cheap enough to be called every few thousand steps. Throws Cancelled once cancel() was called.
+  /// This is cheap enough to be called every few thousand steps. Throws Cancelled once cancel() was called.
   void update(double fraction) {
     fraction_.store(fraction, std::memory_order_relaxed);
     if (cancelled()) throw Cancelled();

@@ -19,7 +19,7 @@ namespace {
 
 /// Bounds the rounding of the dot product of two unit vectors and of their lengths.
 constexpr double kRounding = 32 * kUnitRoundoff;
-/// Both normals may be wrong.
+/// The angle between two sure normals may be wrong by at most this, because each of them may be wrong.
 constexpr double kBothNormals = 2.001 * kSureNormal;
 /// A smaller difference to the least angle that can be proved of a face does not matter.
 constexpr double kNearEnough = std::numbers::pi / 180;

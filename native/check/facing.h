@@ -61,7 +61,7 @@ struct FacingRule {
   std::vector<Box> below_;  ///< holds the sure normals below each node; empty before bound_normals()
 };
 
-/// As the least dot product with a normal: any that is more than 0.
+/// Given as the least dot product with a normal, this admits every product above 0.
 inline constexpr double kSameSide = std::numeric_limits<double>::denorm_min();
 
 /// How one face keeps the rule, for as long as there is the face.

@@ -196,16 +196,19 @@ class BoundedMesh {
   std::vector<glm::dvec3> positions_, stored_;
   std::vector<bool> pinned_, seam_;
   std::vector<std::atomic<std::uint32_t>> faces_around_;  ///< Regions share the vertices between them.
-  std::vector<std::uint8_t> left_original_;               ///< Threads would share bits.
+  std::vector<std::uint8_t> left_original_;               ///< Threads would write to one byte of a vector<bool>.
   std::vector<double> shares_;
-  std::vector<std::uint8_t> joined_;  ///< Threads would share bits.
+  std::vector<std::uint8_t> joined_;  ///< Threads would write to one byte of a vector<bool>.
   std::vector<std::uint32_t> slots_;
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>>
       copies_;  ///< By slot, where a slot has several vertices.
   std::vector<glm::uvec3> wedges_, corner_source_;
   mutable std::vector<std::uint32_t> merged_into_;
-  std::vector<Occupied> occupied_;          ///< The places of vertices, if these are kept apart: in each region.
-  std::vector<std::uint32_t> occupied_by_;  ///< For each vertex: which of these a change of it asks.
+  /// If vertices are kept apart: the places of the vertices in the cell of each region, or of all in one element.
+  std::vector<Occupied> occupied_;
+  /// For each vertex: the index in occupied_ of the places that a change of it must not meet. A vertex of no region has
+  /// none.
+  std::vector<std::uint32_t> occupied_by_;
   std::atomic<std::size_t> triangle_count_ = 0;
 };
 

@@ -16,14 +16,14 @@
 namespace tolvol {
 namespace {
 
-// The loop looks at one edge for so many triangles to find edges to try at once, because collapses come in each other's
-// way, and at no more than the second number.
+// To find edges that can be tried at once, the loop looks at one edge for every kTrianglesPerAttempt triangles, but at
+// no more than kMostAttempts edges. Collapses of more edges would come in each other's way.
 constexpr std::size_t kTrianglesPerAttempt = 12, kMostAttempts = 64;
-/// Tries are rationed at a vertex with more faces around it.
+/// Tries are rationed at a vertex with more faces around it than this.
 constexpr std::uint32_t kCrowded = 24;
-/// The number of faces and of parts of the reference's pieces that the tries at such a vertex may look at.
+/// The tries at such a vertex may look at this many faces and parts of the reference's pieces together.
 constexpr std::uint64_t kCrowdBudget = 1 << 15;
-/// Costs are renewed late at a vertex with more faces around it.
+/// Costs are renewed late at a vertex with more faces around it than this.
 constexpr std::uint32_t kGreatMany = 512;
 
 }  // namespace

@@ -114,7 +114,7 @@ class CollapseLoop {
   /// For each vertex, the last batch of tries in which a face around it could change before its turn.
   std::vector<std::uint32_t> reserved_;
   std::vector<Box> reserved_boxes_;  ///< The boxes of space, in the last batch, in which a face could change so.
-  std::vector<std::uint32_t> batch_of_end_;  ///< And the last batch with an edge that ends there.
+  std::vector<std::uint32_t> batch_of_end_;  ///< For each vertex, the last batch with an edge that ends there.
   /// Whether an end of an edge of the last batch has a great many neighbours, which are then not noted.
   bool crowd_in_batch_ = false;
   std::uint32_t batches_ = 0;        ///< The number of batches so far.

@@ -20,7 +20,7 @@ class CollapseQueue {
     std::uint32_t edge;
   };
 
-  /// `stamps` has one number for each edge, which all queues share that the edge was ever in.
+  /// `stamps` has a number for each edge. All queues that an edge was ever in share it.
   explicit CollapseQueue(std::span<std::uint32_t> stamps);
 
   /// Replaces the edge's former entry. Costs are finite.

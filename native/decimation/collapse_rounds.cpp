@@ -21,20 +21,20 @@
 namespace tolvol {
 namespace {
 
-/// The number of vertices that a region has at most.
+/// A region has at most this many vertices.
 constexpr std::size_t kMostVertices = 4096;
-/// The mesh is cut into at least so many regions, which as many threads can share.
+/// A mesh that is cut has at least this many regions, which as many threads can share.
 constexpr std::size_t kLeastRegions = 12;
-/// A mesh of fewer vertices is not cut, because the rims would be much of it.
+/// A mesh with fewer vertices than this is not cut, because the rims would be much of it.
 constexpr std::size_t kLeastVertices = 1024;
-/// The share of the edges that are cheap enough to be collapsed in a round.
+/// A round collapses edges up to the cost below which this share of the edges lies that may be collapsed.
 constexpr double kRoundShare = 0.9;
-/// After a round that removes a smaller share of the triangles there is no other round.
+/// After a round that removes a smaller share of the triangles than this there is no other round.
 constexpr double kLeastGain = 0.1;
-/// After a round that takes back a larger share of the regions each collapse is proved at once.
+/// After a round that takes back a larger share of the regions than this each collapse is proved at once.
 constexpr double kMostTakenBack = 0.25;
-/// A cost, in the fourth power of the tolerance, which has the costs' unit. Up to this cost hardly a collapse is
-/// refused, and rounds on trust go at least so far.
+/// Up to this cost hardly a collapse is refused, so rounds on trust go at least this far. The unit of costs is the
+/// fourth power of a length; this is a multiple of the fourth power of the tolerance.
 constexpr double kTrustedCost = 1;
 
 class Rounds {

@@ -30,10 +30,11 @@ struct DecimationOptions {
   /// (topology/new_crossings.h). Ignored without a volume and where a baseline decides.
   Crossings crossings = Crossings::keep_out;
   /// In degrees, more than 0 and at most 180: every point of a face has a witness within the tolerance whose normal is
-  /// within this angle of the face's (check/facing.h). 180 keeps no angle. Ignored as above.
+  /// within this angle of the face's (check/facing.h). 180 keeps no angle. Ignored without
+  /// a volume and where a baseline decides.
   double max_normal_angle = 90;
-  double max_seconds = 0;            ///< It stops then with what is proved; 0 is no limit.
-  std::size_t target_triangles = 0;  ///< It stops at so many; 0 is as few as the tolerance allows.
+  double max_seconds = 0;            ///< Decimation stops after this time with what is proved; 0 means no limit.
+  std::size_t target_triangles = 0;  ///< Decimation stops at this number; 0 means as few as the tolerance allows.
   /// For each input vertex, or empty: it neither moves nor vanishes, and an edge between two such vertices stays.
   std::span<const bool> locked = {};
   /// For each input vertex, or empty: the share of the tolerance, 0 to 1, that the new faces around it may use.
@@ -42,9 +43,9 @@ struct DecimationOptions {
   std::span<const std::uint32_t> wedges = {};  ///< For each input corner, or empty: see wedge_labels().
   /// Only faces whose corners are strictly inside this box of stored positions change, and their corners stay strictly
   /// inside. All others stand still and are not certified. Faces of the reference that the input does not cover are no
-  /// error: what may cover a part of what is left of them stands still. So boxes without a common inner point, each
-  /// with all faces that meet it and all of the reference within the tolerance of it, may be decimated at once
-  /// (docs/architecture.md). Needs two_sided.
+  /// error. If a piece of such a face may be covered in part, the input faces within the tolerance of this piece stand
+  /// still. So boxes without a common inner point, each with all faces that meet it and all of the reference within the
+  /// tolerance of it, may be decimated at once (docs/architecture.md). Needs two_sided.
   std::optional<Box> cell = {};
   RingCheck* baseline =
       nullptr;           ///< For comparisons: it decides in place of the certificates, and nothing is promised.
@@ -66,7 +67,8 @@ struct DecimationResult {
   std::vector<std::uint32_t> vertex_source;    ///< For each result vertex: the input vertex that it continues.
   std::vector<std::uint32_t> triangle_source;  ///< For each result triangle: the input triangle that it continues.
   std::vector<glm::uvec3> source_triangle;  ///< For each result corner: the input triangle whose attributes it takes.
-  std::vector<glm::dmat3> source_weights;   ///< And the barycentric weights there, a column for each corner.
+  /// For each result corner: its barycentric weights in source_triangle. A matrix has a column for each corner.
+  std::vector<glm::dmat3> source_weights;
   bool stopped_at_target = false;
   bool stopped_at_time = false;
   bool stopped_on_request = false;  ///< By Progress::finish().

@@ -113,8 +113,8 @@ class DecimationInput {
 
   std::span<const glm::dvec3> vertices_;
   std::span<const glm::uvec3> input_triangles_;
-  std::span<const glm::uvec3> triangles_;  ///< of joined_, or those of the input
-  std::span<const std::uint32_t> wedges_;  ///< of the same
+  std::span<const glm::uvec3> triangles_;  ///< The triangles of joined_, if there are any, or those of the input.
+  std::span<const std::uint32_t> wedges_;  ///< The wedges of triangles_.
   const ToleranceVolume* volume_;
   const DecimationOptions& options_;
   StoredSpace space_;

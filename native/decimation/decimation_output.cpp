@@ -35,7 +35,7 @@ class Output {
       if (chosen[same] == kNone) chosen[same] = same_.find(copy) == same ? copy : survivor;
       return chosen[same];
     };
-    // This is corner k of a result triangle, in the order of the triangle that it continues.
+    // Returns the vertex at corner k of a result triangle, in the corner order of the input triangle that it continues.
     const auto corner = [&](std::uint32_t input, std::uint32_t t, int k) {
       return slot(t == kNone ? cut_.input_vertex[input_.triangles()[input][k]]
                              : mesh_.triangle(t)[input_.own_corner(t, k)]);

@@ -55,9 +55,9 @@ class DeferredProof {
   std::vector<std::uint32_t>& places_;
   const BoundedMesh::Saved saved_;
   const CertifiedBounds::Saved saved_bounds_;
-  std::vector<Quadric> quadrics_;          ///< For each vertex, as it was.
-  std::vector<std::uint32_t> origins_;     ///< For each face, the state of the input faces that it stands for.
-  std::vector<std::uint8_t> changed_;      ///< For each face, whether it has changed.
+  std::vector<Quadric> quadrics_;       ///< For each vertex of the region, its quadric before the collapses on trust.
+  std::vector<std::uint32_t> origins_;  ///< For each face, the state of the input faces that it stands for.
+  std::vector<std::uint8_t> changed_;   ///< For each face, whether it has changed.
   std::vector<std::uint32_t> successors_;  ///< For each face, the place of the face that took it over, or its own.
   std::vector<std::uint32_t> alive_;       ///< The places of the faces that are left.
   std::vector<std::uint32_t> rank_;        ///< For each place of a face that is left, where it stands among them.

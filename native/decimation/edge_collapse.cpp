@@ -16,8 +16,8 @@ namespace {
 constexpr double kBoundaryWeight = 10;
 /// A minimiser is trusted within so many edge lengths of the edge's middle.
 constexpr double kReach = 2;
-/// The fit takes so many steps before a collapse is refused. It gives up before a step if the deviation, as a multiple
-/// of the tolerance, is beyond the number, because hardly one collapse in fifty still succeeds then.
+/// The fit takes at most as many steps as there are numbers here. It gives up in step i if the deviation before the
+/// step is beyond number i, in tolerances, because from there hardly one collapse in fifty succeeds.
 constexpr double kGiveUpAbove[] = {1.4, 1.2, 1.12};
 /// The weight of the fourth power of an edge's length, which has the quadrics' unit. It lets short edges go first where
 /// many collapses cost nothing, as on a plate. Without it one vertex would sweep along a row and leave needles behind.

@@ -33,7 +33,7 @@ bool Patch::gather(const Change& collapse, int rings, bool boundary_free) {
   return true;
 }
 
-/// Finds the vertices whose faces are taken. Returns whether they are not too many.
+/// Finds the vertices whose faces are taken. Returns false if there are too many.
 bool Patch::gather_core(const Change& collapse, int rings) {
   core_.clear();
   const auto add = [&](std::uint32_t v) {

@@ -12,11 +12,11 @@ namespace {
 constexpr double kVertexWeight = 0.05, kEdgeWeight = 0.03, kFaceWeight = 0.05;
 /// A search that looks around looks at all faces if a deviation is beyond this share of the tolerance.
 constexpr double kLookEverywhereAbove = 0.98;
-/// The search for the nearest face crosses so many edges at most.
+/// The search for the nearest face crosses at most this many edges or corners.
 constexpr int kMostCrossings = 16;
-/// The squared deviation of a face's point that is too far from the reference to see it.
+/// A point of a face that finds no triangle of the reference counts with this squared deviation.
 constexpr double kFarSquare = 4;
-/// A triangle that the rule of facing admits is looked for within so many tolerances.
+/// A triangle that the rule of facing admits is looked for within this many tolerances.
 constexpr double kAdmittedReach = 3;
 
 /// The point of a triangle that is nearest to p, after C. Ericson, Real-Time Collision Detection, 2005, 5.1.5. A weight

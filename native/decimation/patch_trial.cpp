@@ -15,17 +15,17 @@ constexpr double kAnywhere = std::numeric_limits<double>::infinity();
 
 /// The number of steps that fit the vertex of a collapse alone.
 constexpr int kStepsOfPrice = 8;
-/// The number of steps by the lower power, then by the higher one, and after the certificates have named points.
+/// The numbers of steps by the lower power, by the higher power, and after each refusal of the certificates.
 constexpr int kStepsOfSum = 14, kStepsOfLargest = 16, kStepsAfterRefusal = 10;
-/// Hardly ever does the higher power lead to success from a larger deviation, over the tolerance.
+/// From a larger deviation than this, in tolerances, the higher power hardly ever leads to success.
 constexpr double kWorthGoingOn = 1.25;
-/// The certificates are asked so many times.
+/// The certificates are asked at most this often.
 constexpr int kMostRefusals = 12;
-/// So many points of the pieces of one face are looked at after a refusal, and so many of them are held from then on,
-/// each with this weight.
+/// After a refusal at most kLookedAt parts without a witness are looked at for each face. Points of at most kHeld of
+/// them are held from then on. Each point that is held has the weight kHeldWeight.
 constexpr std::size_t kLookedAt = 24, kHeld = 4;
 constexpr double kHeldWeight = 0.05;
-/// A face that has no proof is looked at in so many points along an edge.
+/// A face that has no proof is looked at in the points of a grid that divides each edge into this many parts.
 constexpr int kFacePoints = 24;
 
 }  // namespace

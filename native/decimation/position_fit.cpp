@@ -17,7 +17,7 @@
 namespace tolvol {
 namespace {
 
-/// One piece stands for so many of an element. More samples lead to no fewer triangles.
+/// Every kStride-th piece of an element is sampled. More samples lead to no fewer triangles.
 constexpr std::size_t kStride = 24;
 /// The number of samples between two polls.
 constexpr std::size_t kBetweenPolls = 256;

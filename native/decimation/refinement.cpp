@@ -13,21 +13,22 @@
 namespace tolvol {
 namespace {
 
-/// Vertices less than so many edges away from a collapse move with it, in one round after another.
+/// In the first rounds the vertices less than 2 edges away from a collapse move with it, in later rounds those less
+/// than 3 and in the last rounds those less than 4 edges away.
 constexpr int kRings[] = {2, 3, 4};
-/// A round ends after so many failures, or this share of the edges if that is more. A success makes up for some of
-/// them.
+/// A round ends after kMostFailures failures, or as many as this share of its edges if that is more. A success makes up
+/// for kMadeUpFor failures.
 constexpr std::size_t kMostFailures = 40, kMadeUpFor = 25;
 constexpr double kMostFailuresShare = 0.125;
-/// Of more edges than this in a round each is tried quickly only.
+/// If a round has more edges than this, each of them gets only a quick try.
 constexpr std::size_t kMany = 320;
 /// An edge is not tried if the deviation with its vertex alone moved is beyond so many tolerances.
 constexpr double kMostLargest = 1.7;
 /// The number of steps that are tried at once, for each thread. More would often be in vain, because one before them
 /// succeeds near by.
 constexpr std::size_t kAhead = 2;
-/// An edge is not tried with more vertices moving if the deviation that it came to before is beyond so many tolerances;
-/// and edges that were not tried yet come before those that came to this one.
+/// An edge is not tried with more vertices moving if it came to a deviation of more than kMostReached tolerances
+/// before. Edges that were not tried yet stand in the order as if they had come to kUntried tolerances.
 constexpr double kMostReached = 1.2, kUntried = 1.1;
 
 }  // namespace

@@ -38,11 +38,11 @@ class Regions {
   void for_each_meeting(const Box& box, Visit&& visit) const;
 
  private:
-  /// Of the tree of cuts. The cut is across `axis` at `at`; the parts are the nodes `below` and `below + 1`.
+  /// A node of the tree of cuts. The cut is across `axis` at `at`; the parts are the nodes `below` and `below + 1`.
   struct Node {
     int axis = 0;
     double at = 0;
-    std::uint32_t below = kNone;  ///< kNone: the node is not cut, it is `region`
+    std::uint32_t below = kNone;  ///< If this is kNone, the node is not cut and is the region `region`.
     std::uint32_t region = kNone;
   };
 

@@ -20,31 +20,32 @@ namespace {
 
 /// The powers of the energy after the first one, PatchDeviations::kPower.
 constexpr int kLargestPower = 24, kFinalPower = 96;
-/// The last power is used from a smaller deviation than this, over the tolerance, and for so many steps.
+/// The last power is used if the deviation is less than kNearlyEnough tolerances, and for at most kFinalSteps steps.
 constexpr double kNearlyEnough = 1.06;
 constexpr int kFinalSteps = 20;
 /// The largest deviation, over the tolerance, from which a success may still come before the first, second, ... step.
 /// Of 621 successes 97 in 100 kept to it.
 constexpr double kGiveUpAbove[] = {9, 2.1, 2.1, 2.1, 2.1, 1.33, 1.33, 1.33, 1.33, 1.26, 1.26, 1.26, 1.26, 1.17};
-/// The same for try_lower_largest(), with the first power and with the last one. Of 250 successes 97 in 100 kept to
-/// it.
+/// The same limits for try_lower_largest(): the first list for kLargestPower, the second for kFinalPower. Of 250
+/// successes 97 in 100 kept to them.
 constexpr double kGiveUpAgainAbove[] = {1.35, 1.35, 1.2, 1.2, 1.15, 1.15, 1.09, 1.09, 1.05, 1.05};
 constexpr double kGiveUpAtLastAbove[] = {1.06, 1.06, 1.03, 1.03, 1.03, 1.01, 1.01, 1.01, 1.01, 1.01,
                                          1.01, 1.01, 1.01, 1.01, 1.01, 1.01, 1.01, 1.01, 1.01, 1.01};
 /// Damping of the first step, and its factors after a step that lowered the energy and one that did not.
 constexpr double kDamping = 1e-2, kLessDamping = 0.5, kMoreDamping = 5, kMostDamping = 1e4;
-/// The factor of the first step, and the factors of this factor after a success and a failure.
+/// A step is made longer by the factor kOverstep at first. A success multiplies the factor by kLonger, a failure by
+/// kShorter.
 constexpr double kOverstep = 1.5, kLonger = 1.15, kShorter = 0.6;
 /// A vertex moves at most by this share of its shortest edge in one step.
 constexpr double kMostMove = 0.3;
 /// A normal turns by less than the angle of the first cosine in one step, and the normals at an edge do not come to
 /// differ by more than the angle of the second.
 constexpr double kTurnCosine = 0.3, kEdgeCosine = -0.8;
-/// Vertices whose faces turn too far go half the way so many times, and then not at all.
+/// Vertices whose faces turn too far go half the way at most kMostHalvings - 1 times, and then back.
 constexpr int kMostHalvings = 4;
-/// Edges are flipped before one step in so many.
+/// Edges are flipped before one step in kFlipEvery.
 constexpr int kFlipEvery = 4;
-/// One step in so many looks around for nearer faces.
+/// One step in kLookAroundEvery looks around for nearer faces.
 constexpr int kLookAroundEvery = 3;
 
 /// The cosine of the angle between two normals; 1 where one has no direction.

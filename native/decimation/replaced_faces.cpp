@@ -27,7 +27,7 @@ constexpr double kWorthCutting = 0.25;
 constexpr double kFloor = 0.1;
 /// The number of parts that a search looks at before it gives up.
 constexpr std::size_t kMostParts = 512;
-/// A list of so many faces is not worth shortening.
+/// A list of no more faces than this is not worth shortening.
 constexpr std::size_t kFew = 8;
 
 }  // namespace

@@ -51,9 +51,9 @@ class ReplacedFaces {
   std::vector<WitnessTriangle> faces_;
   std::vector<Outline> outlines_;                   ///< Of the faces; empty until they are needed.
   std::vector<std::optional<glm::dvec3>> normals_;  ///< Of the faces that keep the rule of facing.
-  std::vector<double> angles_;                      ///< For each face: between it and its witnesses at most.
-  std::vector<double> turned_;                      ///< The same between the triangle and the face's witnesses.
-  double farthest_ = 0;                             ///< The largest of the faces' distances.
+  std::vector<double> angles_;                      ///< For each face: the largest angle between it and its witnesses.
+  std::vector<double> turned_;  ///< For each face: the largest angle between the triangle and the face's witnesses.
+  double farthest_ = 0;         ///< The largest of the faces' distances.
   std::vector<Part> parts_;
   std::vector<std::uint32_t> near_;  ///< The lists, one after the other.
   std::vector<List> lists_;          ///< Indexed by Part::of: the faces that may be near the part, ascending.

@@ -116,7 +116,7 @@ std::size_t separate(const Corners& face, const Corners& other, const Sheet& she
   const double length = glm::length(across);
   if (!(length > 0)) return measured;
   glm::dvec3 normal = across / length;
-  // Few faces near each other overlap, and this is found in less time than the side.
+  // The overlap is computed first, because it costs less than the side, and few faces near each other overlap.
   Overlap overlap(face, other, normal);
   if (overlap.empty()) return measured;
 

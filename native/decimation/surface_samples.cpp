@@ -14,7 +14,7 @@ namespace {
 
 /// A face has about so many samples, if its pieces have as many points.
 constexpr std::size_t kSamples = 36;
-/// So many pieces of a face are looked at.
+/// At most this many pieces of a face are looked at.
 constexpr std::size_t kMostPieces = 300;
 /// A face's samples weigh 1 together, unless there are fewer than this.
 constexpr std::size_t kLeastSamples = 5;

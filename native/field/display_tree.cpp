@@ -16,7 +16,9 @@ namespace tolvol {
 namespace {
 
 constexpr std::size_t kLeaf = 4;  // a leaf has at most this many triangles
-constexpr double kTie = 2e-6;     // is in frame lengths, and the same in surface_distance.glsl
+// Distances count as equal if they differ by less than this length in the frame. surface_distance.glsl has the same
+// number.
+constexpr double kTie = 2e-6;
 constexpr double kTiny = 1e-30;
 constexpr double kSamples = 1 << 16;
 // These steps spread the samples of a triangle, or the first samples of neighbouring triangles, evenly [M. Roberts, The

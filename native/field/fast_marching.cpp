@@ -53,7 +53,7 @@ class Front {
   }
 
   void march(double stop, Progress* progress) {
-    constexpr std::size_t kBetween = 1 << 12;  // is the number of nodes from one look at the progress to the next
+    constexpr std::size_t kBetween = 1 << 12;  // After this many entries of the heap the march updates its progress.
     float reached = 0;
     for (std::size_t count = 1; !heap_.empty() && !(static_cast<double>(reached) > stop); ++count) {
       std::pop_heap(heap_.begin(), heap_.end(), std::greater());

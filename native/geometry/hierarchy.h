@@ -89,7 +89,8 @@ class Hierarchy {
  private:
   static constexpr int kWidth = OrientedBoxes::kWidth;
   static constexpr std::uint32_t kTriangle = 0x80000000u;  // This bit marks a child as a place in the sorted order.
-  // Points farther out than so many half sizes are compared in double, or moved towards the centre (hierarchy.cpp).
+  // Points farther out than kFloatReach half sizes are compared in double. Points farther out than kReach half sizes
+  // are moved towards the centre (hierarchy.cpp).
   static constexpr double kFloatReach = 64, kReach = 134217728;
 
   struct alignas(32) Node {
@@ -160,7 +161,8 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
   std::uint32_t best = kNone;
   ClosestPoint closest{glm::dvec3(0), glm::dvec3(0), std::numeric_limits<double>::infinity()};
   const double reach = beyond_reach ? closest.distance_squared : radius * scale_;
-  double bound = reach * reach * (1 + 1e-12);  // is a little larger; the end compares the distance
+  // The bound is a little larger than the radius. The end of the search compares the distance with the radius itself.
+  double bound = reach * reach * (1 + 1e-12);
   // Most searches look at fewer triangles than this, and would gain nothing by comparing with their planes.
   constexpr unsigned kFew = 16;
   unsigned tried = 0;
@@ -275,7 +277,7 @@ std::size_t Hierarchy::walk_in(const std::array<glm::dvec3, Count>& points, doub
   std::array<Entry, 7 * 96 + kWidth> stack;
   int height = 0;
   stack[height++] = {Real(0), 0};
-  constexpr unsigned kBetweenPolls = 1024;  // is in nodes; nearly all searches visit fewer
+  constexpr unsigned kBetweenPolls = 1024;  // A search polls after this many nodes. Nearly all searches visit fewer.
   std::size_t visited = 0;
   while (height > 0) {
     if (++visited % kBetweenPolls == 0) poll();

@@ -28,7 +28,7 @@ struct Key {
   std::uint32_t slice = 0;  // counts from the one farthest from the hub
 };
 
-/// A corner that so many triangles share is a hub.
+/// A corner that at least this many triangles share is a hub.
 constexpr std::uint32_t kHub = 64;
 constexpr float kTaper = 8;
 /// Widens the boxes of slices, in local coordinates.
@@ -73,7 +73,7 @@ struct FloatBox {
   }
 };
 
-/// By so much a side of a box is moved outwards (hierarchy.cpp).
+/// Returns the length by which a side of a box at x is moved outwards (hierarchy.cpp).
 float spread(float x) { return std::abs(x) * 2.4e-7f + 1e-37f; }
 
 }  // namespace

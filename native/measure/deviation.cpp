@@ -24,8 +24,8 @@
 namespace tolvol {
 namespace {
 
-// A bound over a piece is a linear function. It enters the distributions by its values on so many equal shares, as many
-// as DistanceBounds has quarters.
+// A bound over a piece is a linear function. It enters the distributions by its values on kSlices equal shares of the
+// piece, as many as DistanceBounds has quarters.
 constexpr int kSlices = 4;
 // Rounding changes a share by at most so much.
 constexpr double kShareRounding = 32 * kUnitRoundoff;

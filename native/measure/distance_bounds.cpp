@@ -47,7 +47,8 @@ constexpr double kShort = 1e-4;
 constexpr double kSharp = 1e-5;
 // A piece that is nowhere farther from b than this, in the frame, touches b within rounding.
 constexpr double kTouching = 4 * kUnitRoundoff;
-constexpr double kRounding = 64 * kUnitRoundoff;  // is in frame lengths, and derived above
+// This is a length in the frame. Its derivation is above.
+constexpr double kRounding = 64 * kUnitRoundoff;
 
 using Corners = std::array<dvec3, 3>;
 

@@ -39,7 +39,7 @@ class Distribution {
   double percentile(double percent, double share_error = 0) const;
 
  private:
-  // The parts are sorted only within the one of so many bins where a percentile is.
+  // The parts are counted in this many bins. They are sorted only within the bin in which a percentile is.
   static constexpr std::size_t kBins = 4096;
 
   std::size_t bin_of(double value) const;

@@ -49,21 +49,23 @@ namespace {
 using glm::dvec3;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kGap = 0.001;                       // is the width over `upper` at which an interval is narrow
-constexpr double kUpperMargin = 23 * kUnitRoundoff;  // is derived above, like the next constant
+constexpr double kGap = 0.001;  // An interval is narrow if its width is at most this share of `upper`.
+// The derivation of this constant and of the next is above.
+constexpr double kUpperMargin = 23 * kUnitRoundoff;
 constexpr double kLowerMargin = 27 * kUnitRoundoff;
 // The search ends at an interval or a piece shorter than this, in frame lengths, because it is within rounding.
 constexpr double kNoise = 256 * kUnitRoundoff;
 // A piece whose middle corner is nearer than this, in frame lengths, to the segment between the other two counts as
 // that segment. Its error grows by twice as much, which is more than the rounding of the distance.
 constexpr double kFlat = 8 * kUnitRoundoff;
-// A piece is split so often with regard to one triangle of b alone.
+// About this many splits on the way to a piece have regard to one triangle of b alone; later ones also to a second.
 constexpr int kSplitsWithOneTriangle = 8;
 // This many triangles give a first lower bound.
 constexpr std::size_t kSeeds = 4096;
 // The multiples of this prime modulo a smaller number visit each number below that once, in jumps.
 constexpr std::size_t kSpread = 1'000'003;
-// This many pieces see the same lower bound, and this many of them are handed to a thread at once.
+// In the first pass kChunk pieces see the same lower bound, and a thread takes kBlock of them at once. Later kBatch
+// pieces see the same lower bound, and a thread takes kSmallBlock of them at once.
 constexpr std::size_t kChunk = 16384, kBlock = 64, kBatch = 512, kSmallBlock = 8;
 // The budget, in pieces. An edge of b that crosses a triangle of a costs a few pieces, so that a subdivided copy needs
 // about ten for each of its triangles. A piece costs 1 us and, while it waits, 100 bytes.
@@ -72,7 +74,8 @@ constexpr std::size_t kPieces = 4'000'000, kPiecesPerTriangle = 16;
 // less, for as many pieces again. Nearly all searches end before, those between a surface and its subdivided copy among
 // them. Needles that lie on one another would need a million pieces to show that nothing but rounding is between them.
 constexpr std::size_t kPatience = 20'000, kPatiencePerTriangle = 12;
-constexpr double kLargestBound = 1e-3;  // in frame lengths
+// If the bound is larger than this, in frame lengths, growth() counts with this in its place.
+constexpr double kLargestBound = 1e-3;
 
 struct Piece {
   std::array<dvec3, 3> corner;
@@ -82,10 +85,10 @@ struct Piece {
   std::uint32_t near = Hierarchy::kNone;  // is the triangle of b that gives `upper`; before that it is a guess
 };
 
-/// Is a piece that waits to be split. Pieces are not moved while the queue is put in order.
+/// A piece that waits to be split. Pieces are not moved while the queue is put in order.
 struct Waiting {
   double upper;
-  std::uint32_t place;  // of the piece in the store
+  std::uint32_t place;  // The piece is at this place of `store_`.
 
   bool operator<(const Waiting& other) const { return upper < other.upper; }
 };
@@ -385,7 +388,7 @@ class Search {
   Hierarchy hierarchy_;
   double bound_;
   const HausdorffOptions& options_;
-  const std::size_t patience_;  // in pieces
+  const std::size_t patience_;  // After this many pieces the search accepts a wider interval.
   std::vector<Waiting> queue_;  // is a heap with the largest upper bound in front
   std::vector<Piece> store_;    // holds the pieces of the queue, at places that are not in `free_`
   std::vector<std::uint32_t> free_;

@@ -20,13 +20,14 @@ namespace {
 
 using glm::dvec3;
 
-// There are at most so many pieces for each triangle, or a sixth more than at first if that is more.
+// There are at most this many pieces for each triangle, or a sixth more pieces than at first if that is more.
 constexpr std::size_t kBudgetPerTriangle = 4;
 // Pieces are cut until the range of the mean is no wider than this share of the largest distance.
 constexpr double kEnough = 0.001;
-// Cutting ends when there is room for so small a part of the budget: each round looks at all pieces.
+// Cutting ends when there is room to cut fewer pieces than the budget over kLeastRoom, because each round looks at all
+// pieces.
 constexpr std::size_t kLeastRoom = 64;
-// The progress is looked at after so many pieces.
+// The progress is updated after this many pieces.
 constexpr std::size_t kChunk = 4096;
 // A thread takes so many pieces at once.
 constexpr std::size_t kBlock = 64;

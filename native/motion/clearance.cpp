@@ -23,7 +23,8 @@ constexpr double kRounding = 8 * 0x1p-53;
 /// What products that are too small for double precision lose.
 constexpr double kSmallest = 1e-300;
 constexpr std::size_t kBlock = 64;
-/// A vertex that leaves its room at once would do so again: it gets none for so many calls.
+/// A vertex that leaves its room at once would do so again. It gets a room again at the kRest-th call of renew(),
+/// counted from the call that finds it gone.
 constexpr std::uint8_t kRest = 8;
 /// A vertex with more faces than this gets no room, because its fan is looked at pair by pair.
 constexpr std::size_t kMostFaces = 32;

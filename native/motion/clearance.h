@@ -57,7 +57,7 @@ class Clearance {
   MovingMesh& mesh_;
   std::vector<glm::dvec3> anchor_;
   std::vector<double> room_;
-  std::vector<double> reach_;                   // Is room_, or what renew() will make of it at most.
+  std::vector<double> reach_;                   // This is room_, or the most that renew() will make of it.
   std::vector<std::atomic<double>> face_room_;  // Scratch: what a face leaves to its corners, infinite between calls.
   std::vector<std::uint32_t> renewed_;          // For each face: the last call of renew() for one of its corners.
   std::vector<std::uint32_t> since_;            // For each vertex: the last call of renew() for it.

@@ -22,8 +22,8 @@ constexpr const char* kAxisNames[3] = {"u", "v", "w"};
 /// rounding of their float32 coordinates, and must not be torn there.
 constexpr double kSlack = 0x1p-18;
 
-/// Knots closer than this share of the range count as equal, because a division by their difference would be by almost
-/// nothing.
+/// Knots that are not equal and closer than this share of the range are refused, because dividing by their difference
+/// would be inaccurate.
 constexpr double kKnotGap = 1e-9;
 
 /// The most steps of the search. Newton's method takes four; halving alone would end after as many as a double has

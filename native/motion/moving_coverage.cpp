@@ -15,8 +15,8 @@ constexpr double kInflate = 0x1p-50;
 constexpr std::size_t kBlock = 1024;
 /// A triangulation of a quad has this many triangles.
 constexpr std::size_t kOfQuad = 2;
-/// Motion divides pieces and seldom unites them. tidy() acts once there are so many times as many as at first, and so
-/// many more.
+/// Motion divides pieces and seldom unites them. tidy() acts once there are kGrowth times as many pieces as at first
+/// and kMorePieces more.
 constexpr std::size_t kGrowth = 2, kMorePieces = 1000;
 
 }  // namespace

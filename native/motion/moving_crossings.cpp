@@ -15,9 +15,9 @@ namespace {
 
 /// The number of faces that a thread takes at a time, for work of about 1 us each.
 constexpr std::size_t kBlock = 64;
-/// A face is looked at no further once it crosses so many others anew: all of them have to go back anyway.
+/// A face is looked at no further once it crosses this many others anew: all of them have to go back anyway.
 constexpr std::size_t kEnough = 16;
-/// The tree is built anew when its boxes have become so many times as large.
+/// The tree is built anew when its boxes have become more than this many times as large.
 constexpr double kWorn = 2;
 
 }  // namespace

@@ -22,7 +22,7 @@ namespace tolvol {
 /// It holds what is known of the faces of the state, and beside it of those on trial.
 class MovingFacing {
  public:
-  /// A face is at most so many triangles: a quad is four, in both of its triangulations.
+  /// A face has at most this many triangles: a quad has four, two in each of its triangulations.
   static constexpr std::size_t kMost = 4;
 
   struct Anchor {
@@ -31,13 +31,14 @@ class MovingFacing {
   };
   /// What is known of a face in one position.
   struct Known {
-    /// The corners may go so far before the face could exceed its angle; less than 0 if it may do so already.
+    /// The face cannot exceed its angle until a corner has gone this far. This is less than 0 if it may exceed the
+    /// angle already.
     double room = std::numeric_limits<double>::infinity();
     bool is_renewed = false;  ///< Whether there are new anchors.
     std::array<Anchor, kMost> anchors;
   };
 
-  /// Is about faces of `corners` (3 or 4) vertices each.
+  /// Each face has `corners` vertices, 3 or 4.
   MovingFacing(FacingRule rule, std::size_t faces, int corners);
 
   const FacingRule& rule() const { return rule_; }
@@ -75,7 +76,7 @@ class MovingFacing {
   double room_to_turn(const glm::dvec3 (&corners)[3], double angle) const;
 
   FacingRule rule_;
-  std::size_t count_;            // of the triangles of a face
+  std::size_t count_;            // The number of triangles of a face.
   std::vector<FaceRule> rules_;  // For each triangle of each face, as the anchors are.
   std::vector<Anchor> anchors_, trial_;
   std::vector<double> room_, trial_room_;  // For each face.

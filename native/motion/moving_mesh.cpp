@@ -172,7 +172,7 @@ void MovingMesh::measure(std::span<const std::uint32_t> faces, Progress* progres
   for (const std::uint32_t f : faces) {
     for (const std::uint32_t v : corners_of(f)) {
       if (trial_[v].bound.distance != kUnknown) continue;
-      trial_[v].bound.distance = kFar;  // once each
+      trial_[v].bound.distance = kFar;  // so that each vertex is added once
       unknown.push_back(v);
     }
   }

@@ -64,8 +64,8 @@ class MovingMesh {
   /// The face that refused a vertex last, and where. It is asked first when the vertex is tried again, because most
   /// often it refuses there, too: then one point of one face was looked at.
   struct Blame {
-    std::uint32_t place = 0;     ///< of the face in the vertex's ring
-    std::uint32_t triangle = 0;  ///< its number in the face
+    std::uint32_t place = 0;     ///< The face is at this place of the vertex's ring.
+    std::uint32_t triangle = 0;  ///< The number of the triangle in the face.
     /// A point of the triangle around which no witness was found, by the weights of the corners; NaN if none is known.
     glm::dvec3 weights{std::numeric_limits<double>::quiet_NaN()};
   };
@@ -126,13 +126,13 @@ class MovingMesh {
   std::span<const std::uint32_t> ring(std::uint32_t vertex) const {
     return std::span(ring_).subspan(ring_start_[vertex], ring_start_[vertex + 1] - ring_start_[vertex]);
   }
-  /// Each once.
+  /// Returns each face around these vertices once.
   std::vector<std::uint32_t> faces_around(std::span<const std::uint32_t> vertices);
 
  private:
   struct VertexState {
     glm::dvec3 at;
-    PointBound bound;  ///< Its distance is kFar far beyond the tolerance.
+    PointBound bound;  ///< The distance is kFar if the vertex is far beyond the tolerance.
   };
 
   /// No point of the reference is within the tolerance of any place nearer to `at` than `margin`.
@@ -141,7 +141,7 @@ class MovingMesh {
     double margin = 0;
   };
 
-  // Taken for upper bounds, this and kUnknown prove nothing.
+  // Neither kFar nor kUnknown proves anything when it is taken for an upper bound.
   static constexpr double kFar = std::numeric_limits<double>::max();
   static constexpr double kUnproved = TriangleCertificate::kUnproved;
 
@@ -188,7 +188,7 @@ class MovingMesh {
   std::vector<double> reach_, trial_reach_;  // For each face: no point of it is farther from the reference.
   std::optional<MovingFacing> facing_;       // None if no angle is kept.
   double max_normal_angle_ = 180;            // In degrees.
-  std::vector<std::uint32_t> part_;          // For each face: its connected part; empty where nobody has to ask.
+  std::vector<std::uint32_t> part_;  // For each face: its connected part; empty if no part can need its other side.
   std::vector<std::uint32_t> exceeding_;
   std::vector<std::uint64_t> seen_;  // For each face: in which call faces_around() met it last.
   std::uint64_t now_ = 0;            // The number of these calls.

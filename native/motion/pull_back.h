@@ -143,7 +143,7 @@ class PullBack {
   void retreat(Held& held, Mode mode, double least);
 
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
-  /// In the end no factor can rise by this.
+  /// When step (3) of pull_back.cpp ends in Mode::pull_back, no factor alone can rise by this much.
   static constexpr double kRise = 1.0 / 64;
   /// A factor shrinks to this share in each round in which a face of the vertex fails.
   static constexpr double kShrink = 0.5;
@@ -152,7 +152,8 @@ class PullBack {
   std::unique_ptr<MovingCoverage> coverage_;    // Null if only the forward direction is kept.
   std::unique_ptr<MovingCrossings> crossings_;  // Null if faces may cross.
   std::vector<std::uint32_t> held_index_;       // For each vertex: its place among the held ones, or kNone.
-  /// For each vertex: the next one that was at its place at the start, all around. Empty if there are none.
+  /// For each vertex: the next of the vertices that were at its place at the start. They form a ring; that of a vertex
+  /// without twins is the vertex itself. Empty if no two vertices were at one place.
   std::vector<std::uint32_t> next_twin_;
   std::vector<std::uint64_t> twin_seen_;  // For each vertex: in which turn of hold_twins() it was looked at.
   std::uint64_t twin_turn_ = 0;           // The number of these turns.

@@ -12,15 +12,15 @@
 namespace tolvol {
 namespace {
 
-/// The share of the provable distance at which vertices are put first, because parts of a quarter of the tolerance
-/// prove a face there.
+/// Vertices are first put at this share of the provable distance, because there parts of a quarter of the tolerance
+/// prove a face.
 constexpr double kComfort = 0.97;
 /// In Mode::settle, a vertex that has reached this share of the provable distance stays there, unless it is still
 /// inside after a further way of the share kLast of the same distance.
 constexpr double kSettled = 0.965, kLast = 0.04;
-/// The number of tries to find where a vertex leaves the volume; a plane takes one.
+/// A search for the place where a vertex leaves the volume takes at most this many tries. At a plane it takes one.
 constexpr int kLeavingTries = 8;
-/// The search ends within this share of the provable distance.
+/// This search ends within this share of the provable distance.
 constexpr double kClose = 0.002;
 /// The number of vertices that a thread takes at a time, for work of a few us each.
 constexpr std::size_t kBlock = 32;
@@ -46,7 +46,8 @@ PullBack::Along PullBack::leaving_point(const Held& held, double target, Along i
   return inner;
 }
 
-/// A place on the way, and the distance there, however far it is.
+/// Returns the place at this factor of the vertex's way, and its distance from the reference, without a limit of
+/// distance.
 PullBack::Along PullBack::along(const Held& held, double factor, std::uint32_t hint) const {
   const glm::dvec3 at = mesh_.space().frame(stored_at(held, factor));
   if (hint == Hierarchy::kNone) hint = mesh_.volume().grid().triangle_near(at);

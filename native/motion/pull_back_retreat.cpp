@@ -20,9 +20,9 @@ namespace {
 /// Where the reference would lose a witness or faces would cross, a factor shrinks by this share first, then by twice
 /// the share each time, and after half of it by kShrink.
 constexpr double kRetreat = 1.0 / 16;
-/// Where vertices went back for crossings so many times and faces still cross, they go all the way back, together with
-/// more and more rings of vertices around them: far from where they were, faces that stay in the way of others meet
-/// them one after the other.
+/// Where vertices went back for crossings this many times and faces still cross, they go all the way back, together
+/// with more and more rings of vertices around them: far from where they were, faces that stay in the way of others
+/// meet them one after the other.
 constexpr std::size_t kPatience = 64;
 
 }  // namespace

@@ -77,7 +77,7 @@ Camera framing(std::span<const glm::dvec3> world, std::span<const glm::uvec3> tr
     const double z = p.z - how.margin;
     distance = std::max({distance, (std::abs(p.x) + how.margin) / right - z, (std::abs(p.y) + how.margin) / above - z});
   }
-  // The eye would be within a flat mesh that is seen edge on.
+  // Without this the eye would lie within a flat mesh that is seen edge on.
   const glm::dvec3 extent = box.upper - box.lower;
   distance = std::max({distance, extent.x, extent.y, extent.z});
   if (!(distance > 0)) distance = 1;

@@ -10,8 +10,10 @@
 namespace tolvol {
 namespace {
 
-constexpr GLsizei kDrawnAtOnce = 3 << 15;  // is the number of corners between two polls
-constexpr double kReach = 1e9;  // is in nodes; beyond it products of float32 matrices overflow before clipping
+constexpr GLsizei kDrawnAtOnce = 3 << 15;  // This many corners are drawn between two polls.
+// A mesh is refused if a vertex is farther than this from the grid's origin, in spacings of its nodes, because products
+// of float32 matrices would overflow before clipping.
+constexpr double kReach = 1e9;
 
 /// Leaves room for a mesh of about the same size, so that a mesh that changes every frame is not allotted anew.
 void write_into(gl::Buffer& buffer, std::size_t bytes, const void* data) {

@@ -14,7 +14,7 @@ namespace tolvol {
 
 class PictureField {
  public:
-  /// Is in grid nodes per tolerance, if GL and the memory budget of grids allow that many.
+  /// The picture's field has this many grid nodes per tolerance, if GL and the memory budget of grids allow that many.
   static constexpr double kPrecision = 4;
 
   /// The arguments and the cost are those of DisplayGrid. A cell whose distances contradict their signs is shown

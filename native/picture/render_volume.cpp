@@ -14,8 +14,8 @@ namespace {
 
 // A tile has so many samples along each axis. A call can be cancelled between tiles.
 constexpr int kTile = 256;
-// The field far from the surface has so many nodes along the longest side of its box: more cost more to fill than they
-// save in steps.
+// The field far from the surface has this many nodes along the longest side of its box: more nodes cost more time to
+// fill than they save in steps.
 constexpr int kFarNodes = 40;
 
 glm::vec4 plane_in_nodes(const VolumeRenderer::Cut& cut, const Frame& frame, const PictureField& field) {

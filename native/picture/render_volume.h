@@ -34,7 +34,7 @@ class VolumeRenderer {
 
  private:
   const PictureField* field_;
-  double far_spacing_ = 0;  // is in nodes
+  double far_spacing_ = 0;  // The spacing of the field far from the surface, in spacings of `field_`.
   Canvas canvas_;
   MeshBuffers mesh_;
   gl::VertexArray no_vertices_;

@@ -262,11 +262,12 @@ max_normal_angle : float, optional
 cell : ((float, float, float), (float, float, float)), optional
     The lower and upper corner of a box in local coordinates, which may be infinite. Only faces whose corners are
     strictly inside change, and their corners stay strictly inside. All others stand still and are not certified. Faces
-    of the reference that the mesh does not cover are no error: what may cover a part of what is left of them stands
-    still. So the cells of a large mesh, which have no inner point in common, may be decimated at once, each with all
-    faces whose bounding box meets the cell, and with all faces of the reference whose bounding box is within the
-    tolerance of it: the results together are within the tolerance of the whole reference, and it is of them, if it was
-    before; and no new faces cross. Needs two_sided.
+    of the reference that the mesh does not cover are no error. If a piece of such a face may be covered in part, the
+    faces of the mesh within the tolerance of this piece stand still. So the cells of a large mesh, which have no inner
+    point in common, may be decimated at once, each with all faces whose bounding box meets the cell, and with all faces
+    of the reference whose bounding box is within the tolerance of it. The results together are then within the
+    tolerance of the whole reference. The reference is within the tolerance of the results if it was within the
+    tolerance of the large mesh. No new faces cross. Needs two_sided.
 max_seconds : float, optional
     Stop after this time with what is proved by then, which depends on the speed of the machine. The time does not cut
     short the preparation, in which the mesh is set up and the input is certified: about 0.7 us a triangle, and 2 us if

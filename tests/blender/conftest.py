@@ -2,6 +2,7 @@
 import hashlib
 import os
 
+import bpy
 import numpy as np
 import pytest
 
@@ -64,3 +65,12 @@ def gl():
 def scan(tmp_path):
     """A file with a rough torus."""
     return save(tmp_path / "scan.ply", ("scan", *torus_arrays()))
+
+
+@pytest.fixture
+def chosen_preferences():
+    """Preferences that the user has chosen for the installed add-on."""
+    installed = bpy.context.preferences.addons.new()
+    installed.module = addon.__name__
+    yield installed.preferences
+    bpy.context.preferences.addons.remove(installed)

@@ -80,6 +80,18 @@ def sheet(name="sheet", matrix=None, **options):
     return add_object(name, *sheet_arrays(**options), matrix)
 
 
+def moved_up(share=0.25, height=0.1):
+    """Makes a flat sheet its own reference and then lifts the vertices beyond x = 1 - 2 share."""
+    ob = sheet(count=20, bumps=0.0)
+    bpy.ops.tolvol.set_reference()
+    for vertex in ob.data.vertices:
+        if vertex.co.x > 1 - 2 * share - 1e-6:
+            vertex.co.z += height
+    ob.data.update()
+    activate(ob)
+    return ob
+
+
 def plates_with_t_junctions():
     """Returns an object of two plates side by side, one with twice as many vertices along the line where they meet, x = 0."""
     vertices, quads = [], []
@@ -97,6 +109,11 @@ def world_triangles(ob):
     bpy.context.view_layer.update()
     arrays = mesh_io.read_mesh(ob.data)
     return to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world)), arrays.triangles
+
+
+def stored(ob):
+    """Returns the bytes of all coordinates and triangles."""
+    return [array.tobytes() for array in (*world_triangles(ob), mesh_io.column(ob.data.vertices, "co", 3))]
 
 
 def sampled_distance(surface, other, samples=20_000, seed=7):

@@ -244,7 +244,7 @@ class Context:
 
 
 class Modal(job.JobOperator):
-    """An operator without Blender's part of it."""
+    """A JobOperator without the base class of Blender."""
 
     bl_label = "Modal"
 

@@ -116,7 +116,7 @@ def test_the_nearest_point_is_read_where_no_ray_is_given():
     ob = lifted()
     found = probe(ob)
     for position, nearest in (((0.31, 0.2, 3), (0.31, 0.2)), ((5, 0.2, 0), (1, 0.2)), ((5, -7, 0), (1, -1))):
-        assert found.near(position).position == pytest.approx((*nearest, 0.1), abs=1e-6)
+        assert found.nearest_to(position).position == pytest.approx((*nearest, 0.1), abs=1e-6)
 
 
 def test_the_share_of_the_tolerance_is_the_least_weight_of_the_face():
@@ -124,15 +124,15 @@ def test_the_share_of_the_tolerance_is_the_least_weight_of_the_face():
     group = ob.vertex_groups.new(name="soft")
     group.add(range(9), 1.0, "REPLACE")
     group.add([0], 0.25, "REPLACE")
-    assert probe(ob).near((-0.9, -0.9, 0)).share == 1
+    assert probe(ob).nearest_to((-0.9, -0.9, 0)).share == 1
     ob.tolvol.vertex_group = "soft"
-    assert probe(ob).near((-0.9, -0.9, 0)).share == 0.25 and probe(ob).near((0.9, 0.9, 0)).share == 1
-    said = operators.described(bpy.context, ob, probe(ob).near((-0.9, -0.9, 0)))
+    assert probe(ob).nearest_to((-0.9, -0.9, 0)).share == 0.25 and probe(ob).near((0.9, 0.9, 0)).share == 1
+    said = operators.described(bpy.context, ob, probe(ob).nearest_to((-0.9, -0.9, 0)))
     assert said[2] == "Decimate may use 25 % of it here, by the group of Protect"
     ob.tolvol.invert_vertex_group = True
-    assert probe(ob).near((-0.9, -0.9, 0)).share == 0
+    assert probe(ob).nearest_to((-0.9, -0.9, 0)).share == 0
     ob.tolvol.vertex_group = "gone"
-    assert probe(ob).near((-0.9, -0.9, 0)).share == 1
+    assert probe(ob).nearest_to((-0.9, -0.9, 0)).share == 1
 
 
 def test_readings_are_said_with_side_share_and_tolerance():
@@ -324,7 +324,7 @@ def test_the_worst_point_reads_the_largest_distance():
     ob.data.vertices[500].co.z += 0.3
     changed(ob)
     assert bpy.ops.tolvol.check() == {"FINISHED"}
-    found, reading = verdict.of(ob).forward, probe(ob).near(ob.data.vertices[500].co)
+    found, reading = verdict.of(ob).forward, probe(ob).nearest_to(ob.data.vertices[500].co)
     assert found.lower <= reading.distance <= found.upper
 
 

@@ -187,7 +187,7 @@ def test_page_holds_the_pictures():
         deviation.deviation_page.page(run, [Picture("of A <left>", PNG, 0.05, True), Picture("of B", PNG, 0.05)])
     )
     assert len(page.images) == 2 and "of A <left>" in page.text
-    # Each has a legend: with both signs, and without.
+    # The first picture has a legend with both signs, the second one without signs.
     assert page.text.count("−0.05") == 1 and page.text.count("0.025") == 1 and page.text.count("farther away") == 2
 
 

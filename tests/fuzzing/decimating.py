@@ -156,6 +156,24 @@ def _judge_cell(result, vertices, triangles, cell):
         raise Finding("cell", "a face has left the cell")
 
 
+def _consists_of(edge, vertices, place, edges):
+    """Whether a segment between two vertices consists of edges, given by the places of their ends.
+
+    Where T-junctions were joined, a locked edge is divided by the vertices that lay on it.
+    """
+    a, b = vertices[edge].astype(np.float64)
+    way, from_a = b - a, vertices - a
+    length = np.linalg.norm(way)
+    if length == 0:
+        return True
+    along = from_a @ way / length**2
+    rounding = 8 * np.finfo(vertices.dtype).eps * np.abs(vertices).max()
+    on_edge = np.linalg.norm(from_a - along[:, None] * way, axis=1) <= rounding
+    between = np.flatnonzero(on_edge & (along > 0) & (along < 1))
+    chain = place[[edge[0], *between[np.argsort(along[between])], edge[1]]].tolist()
+    return all(p == q or tuple(sorted((p, q))) in edges for p, q in zip(chain, chain[1:]))
+
+
 def _judge_locked(result, vertices, triangles, locked):
     used = np.zeros(len(vertices), bool)
     used[triangles] = True
@@ -172,7 +190,7 @@ def _judge_locked(result, vertices, triangles, locked):
     if lost:
         place = np.unique(result.vertices + 0.0, axis=0, return_inverse=True)[1]
         by_place = {tuple(sorted(edge)) for edge in place[there].tolist()}
-        lost = [edge for edge in lost if tuple(sorted(place[edge].tolist())) not in by_place]
+        lost = [edge for edge in lost if not _consists_of(edge, result.vertices, place, by_place)]
     if lost:
         a, b = result.vertices[lost[0]]
         raise Finding("locked edge", f"{len(lost)} edges between locked vertices are gone, {a} to {b}")

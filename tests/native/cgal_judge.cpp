@@ -57,6 +57,9 @@ int main(int count, char** arguments) {
     const tolvol::TriangleMesh a = triangles(static_cast<std::size_t>(head[0]));
     const tolvol::TriangleMesh b = triangles(static_cast<std::size_t>(head[1]));
     std::printf("%.17g\n", tolvol::distance_by_cgal(a, b, head[2]));
+  } catch (const std::invalid_argument& error) {
+    std::fprintf(stderr, "cgal_judge: %s\n", error.what());
+    return 2;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "cgal_judge: %s\n", error.what());
     return 1;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The faces that cross, by CGAL: the independent judge.
+/// Finds faces that cross by CGAL's self_intersections, and judges pairs by exact intersections. It shares CGAL's
+/// predicates with topology/faces_cross.cpp, and no code of this project but its types.
 #pragma once
 
 #include <cstdint>

@@ -339,8 +339,8 @@ TEST(Deviation, EndsByItsStepsWhereNeedlesCrowd) {
   moved = fan;
   for (dvec3& p : moved.vertices) p += dvec3(normal(random), normal(random), normal(random));
   const double percentiles[] = {50, 100};
-  const std::size_t wanted = 4 * kSome, pieces = wanted + wanted / 6,
-                    first = wanted + 2 * n;  // at most; about how many there are at first
+  // There are at most `first` pieces at first, and at most `pieces` in the end.
+  const std::size_t wanted = 4 * kSome, pieces = wanted + wanted / 6, first = wanted + 2 * n;
   for (const auto& [a, b] : {std::pair{fan, moved}, {moved, fan}}) {
     Deviation before{};
     const HausdorffInterval largest = hausdorff(a, b);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The largest distance of a point of one mesh from another, by CGAL: a judge that shares nothing with this project.
+/// The largest distance of a point of one mesh from another, by CGAL. It shares no code with hausdorff() but the type
+/// of meshes.
 #pragma once
 
 #include "geometry/triangle_mesh.h"

@@ -383,7 +383,7 @@ TEST(Hausdorff, BoundDecides) {
   const TriangleMesh plate = shapes::grid(9);
   const TriangleMesh above = shapes::squares(13, [](const dvec3& p) { return p + dvec3(0, 0, 0.1); });
   expect_contains(measured(plate, above, {.bound = 0.1}), 0.1);
-  // Nor here, where the pieces around the farthest point would have to shrink to nothing.
+  // The bound is the distance itself here, too: the pieces around the farthest point would have to shrink to nothing.
   const TriangleMesh a{{{0, 0, 0}, {1, 0, 0}, {0.5, std::sqrt(0.75), 0}}, {{0, 1, 2}}};
   const TriangleMesh corners{a.vertices, {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}}};
   const HausdorffInterval sharp = measured(a, corners, {.bound = 1 / std::sqrt(3.0)});

@@ -273,7 +273,7 @@ TEST(Hierarchy, OneTriangleAndAPoint) {
   EXPECT_EQ(Hierarchy(mesh).nearest({3, 4, 0}).distance, 5);
 }
 
-// Neither deep recursion nor a quadratic blow-up: many triangles in one place, alone and among as many others.
+// Many equal triangles, alone and among as many others, cause neither deep recursion nor quadratic time.
 TEST(Hierarchy, HeapsOfEqualTriangles) {
   const int count = many(300000);
   TriangleMesh mesh;
@@ -321,8 +321,8 @@ TEST(Hierarchy, AnyScaleAndAnyPlace) {
   }
 }
 
-// As far as doubles go; the tree must not be searched as a whole, and no infinity may come out where the answer is
-// finite.
+// The points are up to 1e300 away, nearly as far as doubles reach. The tree must not be searched as a whole, and no
+// infinity may come out where the answer is finite.
 TEST(Hierarchy, PointsFarAway) {
   const TriangleMesh mesh = soup(12, 20000);
   const Hierarchy hierarchy(mesh);

@@ -51,7 +51,7 @@ double bernstein(unsigned i, unsigned n, double u) {
          std::pow(1 - u, n - i);
 }
 
-/// The recursion, with the last interval closed.
+/// Evaluates a basis function by the recursion of Cox and de Boor. The last interval is closed.
 double cox_de_boor(const std::vector<double>& knots, unsigned i, unsigned degree, double u) {
   if (degree == 0) {
     return (knots[i] <= u && u < knots[i + 1]) || (u == knots.back() && knots[i] < u && knots[i + 1] == u) ? 1 : 0;

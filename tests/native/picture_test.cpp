@@ -164,7 +164,8 @@ TEST_F(Picture, TheBorderOfTheStripesIsWhereTheToleranceIs) {
 }
 
 TEST_F(Picture, BeyondTheBorderOfAnOpenReferenceNothingSeemsNear) {
-  // Upright beside the border, across the plane that the reference lies in: there its sides change without a surface.
+  // The square stands upright beside the border and crosses the plane of the reference: there the sign changes without
+  // a surface.
   const TriangleMesh beside = square(std::numbers::pi / 2, {1 + 1.2 * kEpsilon, 0, 0});
   const Camera from_the_right{{100, 0, 0}, {0, 0, 0}, {0, 0, 1}, 1};
   const Image image = draw(beside, square(), {.resolution = resolution(100, 100)}, from_the_right);

@@ -116,7 +116,7 @@ inline TriangleMesh sphere(unsigned n, double radius = 1) {
   return mesh;
 }
 
-/// The other way round.
+/// Returns the mesh with each triangle turned over.
 inline TriangleMesh turned(TriangleMesh mesh) {
   for (glm::uvec3& t : mesh.triangles) std::swap(t.y, t.z);
   return mesh;

@@ -272,7 +272,9 @@ def test_original_vertices_keep_their_bits_under_a_matrix(seed):
 def test_a_coarse_grid_costs_few_triangles():
     """The grid is coarse where parts are small for the size of the whole."""
     vertices, triangles = TORUS
-    fine, coarse = (decimate(vertices, triangles, TOLERANCE, precision=p) for p in (1, 1 / 64))
+    volumes = [tolvol.ToleranceVolume(vertices, triangles, TOLERANCE, precision=p) for p in (1, 1 / 64)]
+    assert volumes[1].memory < 0.75 * volumes[0].memory
+    fine, coarse = (tolvol.decimate(vertices, triangles, volume) for volume in volumes)
     assert len(coarse.triangles) <= 1.25 * len(fine.triangles)
 
 

@@ -100,7 +100,7 @@ class Cells:
         descend(self._root, np.arange(len(points)))
         return found
 
-    def near(self, points, length):
+    def count_near(self, points, length):
         """Returns how many points are within a length of each cell along each axis, (count,): those that the grown box holds."""
         counts = np.zeros(len(self.boxes), np.int64)
 

@@ -69,7 +69,7 @@ class Plan:
         limit, least = min(finest * count, len(self.points)), math.inf
         while True:
             cells = Cells(self.points, count, turn)
-            largest = self._triangles(cells.near(self.points, self._tolerance))
+            largest = self._triangles(cells.count_near(self.points, self._tolerance))
             if largest <= wanted:
                 return cells, largest
             least = min(least, largest)
