@@ -16,9 +16,9 @@ _at_work = []  # Only the main thread uses this list.
 class Job:
     """Runs work(progress) in a thread from now on. progress: a tolvol.Progress, by which the work can be cancelled.
 
-    Python code of the work runs only while Blender's main thread is in done() or outcome(), or in a timer of this file. Calls
-    of the native module run at any time. Work that waits for something calls native.module.pause(), because the main thread
-    waits for its Python code.
+    Python code of the work runs only while Blender's main thread waits in this file or in native.module.pause(). Calls of the
+    native module run at any time. Work that waits for something calls native.module.pause(), because the main thread waits for
+    its Python code.
     """
 
     def __init__(self, work, progress):
@@ -52,12 +52,13 @@ class Job:
 
 
 def at_work():
-    """Returns the jobs whose threads run."""
+    """Returns the jobs whose threads run. It lets them run their Python code, for about 0.01 s each."""
     return [job for job in _at_work if not job.done()]
 
 
 def _tick():
-    return _TICK if at_work() else None
+    _at_work[:] = at_work()
+    return _TICK if _at_work else None
 
 
 def end_all():
@@ -67,3 +68,5 @@ def end_all():
     for job in _at_work:
         job.done(None)
     _at_work.clear()
+    if bpy.app.timers.is_registered(_tick):
+        bpy.app.timers.unregister(_tick)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A cache of the tolerance volumes that were used last. Threads of jobs use it while the main thread draws panels."""
+"""A cache of the tolerance volumes that were used last. Several threads may use it."""
 
 import threading
 from collections import OrderedDict

@@ -144,7 +144,7 @@ class Search {
         patience_(kPatience + kPatiencePerTriangle * (a.triangles.size() + b.triangles.size())) {}
 
   void run() {
-    const std::size_t budget = kPieces + kPiecesPerTriangle * a_.triangles.size();
+    const std::size_t budget = kPieces + kPiecesPerTriangle * (a_.triangles.size() + b_.triangles.size());
     seed();
     first_pass();
     while (!queue_.empty() && queue_.front().upper > cutoff() && lower_ <= bound_ && pieces_ < budget) refine();

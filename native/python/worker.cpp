@@ -13,12 +13,15 @@ namespace {
 namespace py = pybind11;
 using Seconds = std::chrono::duration<double>;
 
-/// Who looks whether a worker has ended, without waiting, lets workers run for so long if they want to. It is less than
-/// what an eye sees, and enough for what workers do in Python.
+/// A thread that waits for less than this lets workers run for this time, if they want to.
 constexpr Seconds kGlance(0.01);
+/// Nobody waits longer than this.
+constexpr Seconds kLongest(1e9);
 
 /// Signals are looked for once in this time.
 constexpr Seconds kBetweenLooks(0.05);
+
+thread_local bool is_worker = false;
 
 /// Decides when workers may run Python code.
 class Turns {
@@ -45,10 +48,15 @@ class Turns {
     changed_.notify_all();
   }
 
-  /// Lets workers run Python code for the given time or until `done`, and returns once none does. Returns `done`.
+  /// Waits for the given time or until `done`, and lets workers run Python code meanwhile, unless this thread is a
+  /// worker itself. Returns `done`, once no worker runs Python code.
   template <class Done>
   bool give(Seconds time, const Done& done) {
     std::unique_lock lock(mutex_);
+    if (is_worker) {
+      changed_.wait_for(lock, time, done);
+      return done();
+    }
     const auto start = std::chrono::steady_clock::now();
     const auto after = [&](Seconds some) {
       return start + std::chrono::duration_cast<std::chrono::steady_clock::duration>(some);
@@ -75,7 +83,18 @@ Turns& turns() {
   return *turns;
 }
 
-thread_local bool is_worker = false;
+/// Waits for `done` in short times, and looks for signals between them. Needs the GIL.
+template <class Done>
+bool wait_for(Seconds time, const Done& done) {
+  for (Seconds left = std::clamp(time, Seconds(0), kLongest);; left -= kBetweenLooks) {
+    {
+      const WithoutPython released;
+      if (turns().give(std::min(left, kBetweenLooks), done)) return true;
+    }
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (left <= kBetweenLooks) return false;
+  }
+}
 
 }  // namespace
 
@@ -103,14 +122,11 @@ Worker::Worker(py::object work) : state_(std::make_shared<State>()) {
 }
 
 bool Worker::done(Seconds time) {
-  const WithoutPython released;
-  return turns().give(time, [this] { return state_->done; });
+  return wait_for(time, [this] { return state_->done; });
 }
 
 void Worker::join() {
-  while (!done(kBetweenLooks)) {
-    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-  }
+  while (!done(kLongest)) continue;
 }
 
 WithoutPython::WithoutPython() : released_(PyEval_SaveThread()) {
@@ -123,12 +139,7 @@ WithoutPython::~WithoutPython() {
 }
 
 void pause(Seconds time) {
-  const WithoutPython released;
-  if (is_worker) {
-    std::this_thread::sleep_for(time);
-  } else {
-    turns().give(time, [] { return false; });
-  }
+  wait_for(time, [] { return false; });
 }
 
 }  // namespace tolvol::python

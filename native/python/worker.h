@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// A Worker runs a function of Python in a thread of its own. Python code of workers runs only while a thread that is
-/// no worker waits for it, and while that thread is outside of Python; calls into this module run at any time.
+/// no worker waits for it; calls into this module run at any time. A program should have one such thread: if several
+/// wait, one of them may go on while workers run for another one.
 ///
 /// The reason is Blender: an operator that Python calls with a context of its own (Context.temp_override) reads this
 /// context without the GIL whenever any thread has the GIL (PyC_IsInterpreterActive() with Python 3.11 or older), so
@@ -18,9 +19,10 @@ class Worker {
  public:
   /// Starts a thread that calls `work`. Needs the GIL.
   explicit Worker(pybind11::object work);
-  /// Lets workers run until this one has ended, or for the given time. Returns whether this one has ended.
+  /// Lets workers run until this one has ended, or for the given time. Returns whether this one has ended. Signal
+  /// handlers may raise exceptions meanwhile, as in join() and pause().
   bool done(std::chrono::duration<double> time);
-  /// Waits until this worker has ended. Signal handlers may raise exceptions meanwhile.
+  /// Waits until this worker has ended.
   void join();
 
  private:

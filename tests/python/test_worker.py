@@ -126,6 +126,41 @@ def test_a_worker_may_wait_for_another_one():
     assert made == [1, 2] and first.done()
 
 
+def test_a_worker_that_waits_lets_no_other_one_run():
+    made = []
+    first = tolvol.Worker(lambda: made.append(1))
+    second = tolvol.Worker(first.join)
+    third = tolvol.Worker(lambda: first.done(0.1))
+    sleep_without_workers()
+    assert not made
+    second.join()
+    third.join()
+    assert made == [1]
+
+
+@pytest.mark.parametrize("seconds", [-1.0, -float("inf")])
+def test_a_time_that_is_over_is_no_time(seconds):
+    release = []
+
+    def work():
+        while not release:
+            tolvol.pause(0.0)
+
+    worker = tolvol.Worker(work)
+    assert not worker.done(seconds)
+    tolvol.pause(seconds)
+    release.append(1)
+    assert worker.done(float("inf"))
+
+
+def test_a_time_that_is_no_number_is_refused():
+    worker = tolvol.Worker(lambda: None)
+    for call in (worker.done, tolvol.pause):
+        with pytest.raises(tolvol.InvalidInput, match="seconds"):
+            call(float("nan"))
+    worker.join()
+
+
 def test_an_exception_is_told_and_ends_the_worker(monkeypatch):
     told = []
     monkeypatch.setattr(sys, "unraisablehook", lambda about: told.append(about.exc_type))
@@ -174,10 +209,10 @@ def test_a_signal_ends_waiting():
             tolvol.pause(0.001)
 
     worker = tolvol.Worker(work)
-    timer = threading.Timer(0.1, _thread.interrupt_main, [signal.SIGINT])
-    timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        worker.join()
+    for wait in (worker.join, lambda: worker.done(WITHIN), lambda: tolvol.pause(WITHIN)):
+        threading.Timer(0.1, _thread.interrupt_main, [signal.SIGINT]).start()
+        with pytest.raises(KeyboardInterrupt):
+            wait()
     release.append(1)
     worker.join()
 

@@ -16,8 +16,8 @@ _lock = threading.Lock()  # jobs measure in threads
 _kept = OrderedDict()
 
 
-def key_of(kind, *content):
-    """Returns a key that is equal for the same kind of measurement of equal content: arrays, numbers and None."""
+def key_of(kind, content):
+    """Returns a key that is equal for the same kind of measurement of equal content: arrays, numbers and None, one by one."""
     digest = hashlib.blake2b(kind.encode(), digest_size=16)
     for part in content:
         if isinstance(part, np.ndarray):

@@ -61,14 +61,19 @@ def take_over(surface, same, other, rows):
 def _content(surface):
     """Returns a value that is equal for surfaces of equal triangles in equal order, however their vertices are numbered."""
     vertices, triangles = surface
-    # A part at a time, because the corners of all triangles would need several times the memory of the surface.
-    parts = range(0, len(triangles), _HASHED_AT_ONCE)
-    return known.key_of("corners", *(vertices[triangles[first : first + _HASHED_AT_ONCE]] for first in parts))
+
+    def parts():
+        """Yields a part at a time, because the corners of all triangles would need several times the memory of the surface."""
+        for first in range(0, len(triangles), _HASHED_AT_ONCE):
+            yield vertices[triangles[first : first + _HASHED_AT_ONCE]]
+            package.module.pause(0.0)  # In Blender the window is drawn between two parts.
+
+    return known.key_of("corners", parts())
 
 
 def _key(from_content, to_content):
     """Returns the key of the largest distance, whatever tolerance it is compared with."""
-    return known.key_of("largest", from_content, to_content)
+    return known.key_of("largest", (from_content, to_content))
 
 
 def sampled_distance(points, to_surface, threads=None, progress=None):

@@ -55,7 +55,7 @@ def facts(surface, threads=None, progress=None, again=True):
     again: whether to look even if they were found before in this session (known.py).
     """
     arrays = surface.arrays
-    key = known.key_of("solidity", arrays.vertices, arrays.triangles, surface.matrix)
+    key = known.key_of("solidity", (arrays.vertices, arrays.triangles, surface.matrix))
     if not again and (kept := known.get(key)) is not None:
         return dict(kept)
     found = package.module.solidity(
