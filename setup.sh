@@ -8,7 +8,7 @@
 set -eu
 cd "$(dirname "$0")"
 
-packages="cmake ninja-build pkg-config g++ python3-dev pybind11-dev python3-numpy python3-matplotlib libopenmesh-dev libglm-dev libcgal-dev libepoxy-dev libgtest-dev
+packages="cmake ninja-build cmark-gfm pkg-config g++ python3-dev pybind11-dev python3-numpy python3-matplotlib libopenmesh-dev libglm-dev libcgal-dev libepoxy-dev libgtest-dev
   libegl1 libgl1 libgl1-mesa-dri blender"
 targets=extension
 tests=""

@@ -25,9 +25,9 @@ PERCENT = {
 
 
 def manual():
-    """Returns the path of the manual: in the package it is beside the add-on's files, in a checkout in docs/."""
+    """Returns the path of the manual: in the package a page beside the add-on's files, in a checkout the file in docs/."""
     folder = Path(__file__).resolve().parent
-    packed = folder / "manual.md"
+    packed = folder / "manual.html"
     return packed if packed.is_file() else folder.parent / "docs" / "manual.md"
 
 

@@ -175,3 +175,4 @@ class Run:
         interruptions.runs.remove(self)
         context.window_manager.event_timer_remove(self._timer)
         status_bar.clear()
+        redraw_sidebars()

@@ -19,12 +19,19 @@ from .motion import Motion
 _WOULD = {"leaving": "leave the tolerance", "turning": "turn away from the reference", "crossing": "cross others"}
 
 
+def _permitted(share):
+    """Returns what can be done about the whole deformation. A share below 0.1 % would be shown as none."""
+    if share < 0.001:
+        return "Hardly any of the way is permitted: "
+    return f"{100 * share:.1f} % of the way is permitted: choose As Far as Permitted, or "
+
+
 class TOLVOL_OT_deform(JobOperator, bpy.types.Operator):
     """Deform the mesh by a lattice, as a B-spline of degree 3, within the tolerance of the reference. Vertices outside \
 the lattice stay. An object without a reference gets one first, as by Set Reference"""
 
     bl_idname = "tolvol.deform"
-    bl_label = "Lattice Deform in Tolerance"
+    bl_label = "Deform in Tolerance"
     bl_options = {"REGISTER", "UNDO"}
 
     lattice: StringProperty(
@@ -80,8 +87,7 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
             why, count = stopped
             raise Refused(
                 f"Blocked: {count:,} faces of {ob.name} would {_WOULD[why]}. "
-                f"{100 * run['permitted_fraction']:.1f} % of the way is permitted: choose As Far as Permitted, "
-                "or choose Pull Back to hold back only the vertices of these faces"
+                f"{_permitted(run['permitted_fraction'])}choose Pull Back to hold back only the vertices of these faces"
             )
         if not run["moved"]:
             why = (

@@ -218,7 +218,8 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         warnings = _crossings(name, certified["solidity"])
         if plain is not None and plain < trial.left:
             warnings.append(
-                f"Decimate leaves fewer triangles within this tolerance: {plain:,}, and {name} {trial.left:,}"
+                f"The button Decimate leaves fewer triangles within this tolerance: {plain:,}, and the modifier {name} "
+                f"{trial.left:,}"
             )
         self._write(context, trial, mesh, certified, warnings)
         for warning in warnings:

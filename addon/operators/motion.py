@@ -132,7 +132,7 @@ class Motion:
         word = Verdict.certified(certified, self.tolerance, self.two_sided).word
         return (
             f"{word}: {', '.join(remarks)}, tolerance {100 * self.tolerance / self.size:.4g} % = {self.tolerance:.3g}, "
-            f"result within {forward} (certified), reference within {backward}"
+            f"result within {forward}, reference within {backward} (certified)"
         )
 
     def moved(self, vertices, wished):

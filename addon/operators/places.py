@@ -82,7 +82,7 @@ class TOLVOL_OT_next_place(bpy.types.Operator):
     """Bring the next of the marked places into view, in the order of their distances"""
 
     bl_idname = "tolvol.next_place"
-    bl_label = "Next Place"
+    bl_label = "Go to Place"
 
     back: BoolProperty(name="Back", description="Go to the previous place", options={"SKIP_SAVE"})
 

@@ -187,9 +187,10 @@ def test_package_holds_what_is_here():
     # These come with every Linux for PCs that Blender runs on.
     everywhere = {"ld-linux-x86-64.so.2", "libc.so.6", "libm.so.6", "libgcc_s.so.1", "libstdc++.so.6"}
     assert needed and needed - everywhere <= {Path(name).name for name in libraries}
-    assert others - libraries - shaders - notices == {
+    pictures = {f"tolerance_volumes/pictures/{name}.png" for name in ("guard", "overlay", "panel")}
+    assert others - libraries - shaders - notices - pictures == {
         "tolerance_volumes/LICENSE",
-        "tolerance_volumes/manual.md",
+        "tolerance_volumes/manual.html",
         "tolerance_volumes/bin/tolvol/__init__.py",
     }
 
@@ -206,8 +207,12 @@ ok()
 """,
         tmp_path,
     )
-    packed = tmp_path / "tolerance_volumes" / "manual.md"
-    assert f"manual at {packed}" in out and packed.read_text().startswith("# Manual\n")
+    packed = tmp_path / "tolerance_volumes" / "manual.html"
+    assert f"manual at {packed}" in out
+    page = packed.read_text()
+    assert "<h1>Manual</h1>" in page and "<table>" in page
+    pictures = re.findall(r'<img src="([^"]*)"', page)
+    assert len(pictures) >= 3 and all((packed.parent / picture).is_file() for picture in pictures)
     assert preferences.manual() == ROOT / "docs" / "manual.md"
 
 

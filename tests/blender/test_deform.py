@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lattice Deform in Tolerance: reading Blender's lattice, the promise on the stored mesh, and bad input."""
+"""Deform in Tolerance: reading Blender's lattice, the promise on the stored mesh, and bad input."""
 
 import bpy
 import numpy as np

@@ -320,7 +320,8 @@ def test_says_if_decimate_would_leave_fewer_triangles():
     ob.data = before
     bpy.ops.tolvol.decimate()
     plain = len(world_triangles(ob)[1])
-    assert warning == f"Decimate leaves fewer triangles within this tolerance: {plain:,}, and DECIMATE {fitted:,}"
+    said = "The button Decimate leaves fewer triangles within this tolerance"
+    assert warning == f"{said}: {plain:,}, and the modifier DECIMATE {fitted:,}"
     assert plain < fitted
 
 

@@ -193,8 +193,8 @@ def test_page_holds_the_pictures():
 
 def test_proved_bounds_are_rounded_outwards():
     rounded = deviation.deviation_page._rounded
-    assert rounded(0.123401, True) == "0.1235" and rounded(0.123499, False) == "0.1234"
-    assert rounded(-0.123401, False) == "-0.1235" and rounded(-0.123499, True) == "-0.1234"
+    assert rounded(0.1234011, True) == "0.123402" and rounded(0.1234019, False) == "0.123401"
+    assert rounded(-0.1234011, False) == "-0.123402" and rounded(-0.1234019, True) == "-0.123401"
     # The rounding of 0.1 to float32 does not count as an excess.
     assert float(rounded(float(np.float32(0.1)), True)) == 0.1
     assert float(rounded(0.0, True)) == 0 and float(rounded(1.23e-15, True)) == 1.23e-15

@@ -137,9 +137,9 @@ def test_report_names_file_date_objects_tolerance_and_version(tmp_path):
         assert text in page, text
     ob.tolvol.tolerance_mode, ob.tolvol.tolerance_percent, ob.tolvol.keep = "PERCENT", 0.2, "ONE"
     page = Page(saved(tmp_path, "r.html")).text
-    assert "0.2 % of size = 0.005657 m, one way" in page
+    assert "0.2 % of size = 0.00565685 m, one way" in page
     rows = {row["quantity"]: row["value"] for row in csv.DictReader(io.StringIO(saved(tmp_path, "r.csv")))}
-    assert rows["tolerance as text"] == "0.2 % of size = 0.005657 m" and rows["blend_file"] == "part <3>.blend"
+    assert rows["tolerance as text"] == "0.2 % of size = 0.00565685 m" and rows["blend_file"] == "part <3>.blend"
 
 
 def test_reference_that_is_another_object_is_named(tmp_path):

@@ -11,7 +11,7 @@ import scenes
 from addon import native, reference
 from addon.mesh import mesh_io
 from addon.overlay import legend
-from addon.panels import notes
+from addon.panels import deviation, notes
 from addon.proof import verdict
 from addon.reference import measurements, tolerances
 from window import (
@@ -167,8 +167,14 @@ def test_escape_leaves_everything_as_it_was():
     yield from press("tolvol.decimate")
     yield from finished(lambda: any("triangles left" in text for text in said))
     screenshot("5 busy")
-    key("Escape")
-    yield 2.0
+    drawn, draw_verdict = [], deviation._draw_verdict
+    deviation._draw_verdict = lambda *about: drawn.append(about) or draw_verdict(*about)
+    try:
+        key("Escape")
+        yield 2.0
+    finally:
+        deviation._draw_verdict = draw_verdict
+    assert drawn, "the panel shows the job that has ended until the mouse moves"
     assert any(text.startswith("Decimating") and text.endswith("Esc: Cancel") for text in said)
     count = len(said)
     yield 2.0

@@ -129,7 +129,9 @@ def _way(largest, spread, polygons, bounds, edges):
             )
         ],
         "beyond": [
-            {"bound": bound, "share": share, "range": ends}
+            {"bound": bound, "share": 0.0, "range": [0.0, 0.0]}
+            if bound >= most
+            else {"bound": bound, "share": share, "range": ends}
             for bound, share, ends in zip(bounds, spread.share_beyond.tolist(), spread.share_beyond_range.tolist())
         ],
         "sides": sides

@@ -16,6 +16,9 @@ from .deviation_style import STYLE
 from .deviation_units import tolerance_text
 from .verdict import FAIL, NOT_CHECKED, PASS, Interval
 
+# The number of digits of the tolerance and of largest distances: operations use up to 99.99 % of the tolerance.
+_DIGITS = 6
+
 
 def page(document, pictures=()):
     """Returns the page of a deviation with its `a` and `b`, or of a report of several objects (see deviation.py).
@@ -113,7 +116,7 @@ def _overview(runs, others):
                 f'<a href="#object-{i}">{escape(_name(run["a"]))}</a>',
                 f'<span class="{_look(word).strip()}">{_sign(word)}{word}</span>',
                 *(f"{_rounded(run[way]['largest'][1], True)}{unit}" for way in ("forward", "backward")),
-                f"{run['tolerance']['absolute']:.4g}{unit}",
+                f"{run['tolerance']['absolute']:.{_DIGITS}g}{unit}",
                 *(_share_beyond(run, way) for way in ("forward", "backward")),
                 *(f"{run[key]['triangles']:,}" for key in ("a", "b")),
             )
@@ -169,7 +172,7 @@ def _counts(run, mesh):
     return f"{whole}: {mesh['vertices']:,} vertices, {mesh['triangles']:,} triangles{holes}"
 
 
-def _rounded(value, up, digits=4):
+def _rounded(value, up, digits=_DIGITS):
     """Returns a number as text, rounded up or down so that a proved bound does not look better than it is.
 
     A relative difference of 1e-7, the rounding of float32, is ignored.
@@ -180,7 +183,7 @@ def _rounded(value, up, digits=4):
 
 
 def _between(ends, scale=1.0):
-    return f"{_rounded(scale * ends[0], False, 3)} to&nbsp;{_rounded(scale * ends[1], True, 3)}"
+    return f"{_rounded(scale * ends[0], False, 5)} to&nbsp;{_rounded(scale * ends[1], True, 5)}"
 
 
 def _unit(run):

@@ -76,5 +76,5 @@ def tolerance_text(run):
     """Returns the tolerance of a deviation in percent and as a length, the one first that was given."""
     tolerance = run["tolerance"]
     unit = f" {run['unit']}" if run["unit"] else ""
-    texts = [f"{tolerance['percent']:.4g} % of size", f"{tolerance['absolute']:.4g}{unit}"]
+    texts = [f"{tolerance['percent']:.4g} % of size", f"{tolerance['absolute']:.6g}{unit}"]
     return " = ".join(texts if tolerance["given_in"] == "percent" else texts[::-1])
