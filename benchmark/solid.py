@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 JUDGE = Path(__file__).resolve().parents[1] / "build/release/tests/native/tolvol_cgal_judge"
-REFUSED = 1  # the exit code of the judge for a mesh that is no oriented manifold
+REFUSED = 2  # the exit code of the judge for what is no oriented manifold
 
 
 def crossings_by_cgal(vertices, triangles):

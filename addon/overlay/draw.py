@@ -176,7 +176,13 @@ def legend_of_one(context, shown):
     if not all(drawn[other].what.present for other in together):
         below = "Colours of before the last change"
     word = verdict.together(verdict.word(other) for other in together)
-    legend.draw(context, heading, below, word, scale, counted, drawn[ob].palette)
+    legend.draw(context, heading, below, word, judged(together), scale, counted, drawn[ob].palette)
+
+
+def judged(objects):
+    """Returns what the verdict of these objects is of, as text, or "" if it is of what is coloured."""
+    names = [name for ob in objects if ob.mode != "SCULPT" for name in measurements.on_top(ob)]
+    return f"without {' and '.join(dict.fromkeys(names))}" if names else ""
 
 
 def note(ob):

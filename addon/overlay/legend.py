@@ -93,11 +93,11 @@ def width_of(text):
     return blf.dimensions(_FONT, text)[0]
 
 
-def draw(context, heading, note, word, colours, shares, palette):
+def draw(context, heading, note, word, of, colours, shares, palette):
     """Draws the legend.
 
     note: the lowest line.
-    word: the verdict, in large letters on top.
+    word: the verdict, in large letters on top; of: what the verdict is of, beside it, if it is not of what is coloured.
     colours: the Scale.
     shares: the Shares, or None while they are not known.
 
@@ -117,7 +117,7 @@ def draw(context, heading, note, word, colours, shares, palette):
         share_width = max(width_of(text) for text in [*texts, "88.8 %"])
         columns = bins_width + bar_width + label_width + share_width + 2 * gap
         width = max(columns, width_of(heading), width_of(note)) + 2 * gap
-        width = max(width, page.width(word, _LARGE) + _MARK * scale + 3 * gap)
+        width = max(width, page.width(word, _LARGE) + _MARK * scale + 3 * gap + (width_of(of) + gap if of else 0))
         height = 3 * row + _WORD * scale + bar_height + 4 * gap
         place = _place(context, width, height, scale)
         if place is not None or len(rows) * _BAND_ROW <= _BAR[1]:
@@ -149,6 +149,7 @@ def draw(context, heading, note, word, colours, shares, palette):
     at, mark = top - row - _WORD * scale / 2, _MARK * scale
     page.rectangle(left + gap, at - mark / 2, mark, mark, shaders.FLAT, (*_COLOURS[word], 1))
     page.text(left + mark + 2 * gap, at, word, points=_LARGE)
+    page.text(left + mark + 3 * gap + page.width(word, _LARGE), at, of, faint=True)
 
 
 def _draw_histogram(page, x, y, width, height, histogram):

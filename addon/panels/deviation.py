@@ -4,6 +4,7 @@
 import bpy
 
 from .. import job, measuring, overlay
+from ..operators.original import TOLVOL_OT_show_original, shown
 from ..operators.probe import TOLVOL_OT_probe, tolerance_of
 from ..overlay import reasons
 from ..proof import labels, probing, statistics, verdict
@@ -37,7 +38,9 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         layout.operator("tolvol.select_crossing")
         layout.operator("tolvol.save_report", text="Save Report...")
         row = layout.row(align=True)
-        row.prop(context.window_manager, "tolvol_show_original", toggle=True)
+        hold = row.row(align=True)
+        hold.enabled = shown() or TOLVOL_OT_show_original.poll(context)
+        hold.prop(context.window_manager, "tolvol_show_original", toggle=True)
         row.operator("tolvol.restore_original", text="", icon="LOOP_BACK")
         row.operator("tolvol.new_original", text="", icon="DUPLICATE")
 

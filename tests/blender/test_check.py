@@ -161,12 +161,13 @@ def test_large_percentages_have_all_their_digits():
 
 def test_legend_says_what_no_proof_covers():
     ob = torus()
-    assert draw.note(ob) == "Colours not proved"
+    assert draw.note(ob) == "Colours not proved" and draw.judged([ob]) == ""
     ob.modifiers.new("wave", "WAVE")
     ob.shape_key_add()
     assert draw.note(ob) == "Colours with its modifiers and shape keys, not proved"
+    assert draw.judged([ob]) == "without modifiers and shape keys"
     bpy.ops.object.mode_set(mode="SCULPT")
-    assert draw.note(ob) == "Colours without its modifiers, not proved"
+    assert draw.note(ob) == "Colours without its modifiers, not proved" and draw.judged([ob]) == ""
 
 
 def test_drawing_that_was_refused_is_asked_for_again_once_it_is_turned_on_anew(chosen_preferences):

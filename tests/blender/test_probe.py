@@ -126,7 +126,7 @@ def test_the_share_of_the_tolerance_is_the_least_weight_of_the_face():
     group.add([0], 0.25, "REPLACE")
     assert probe(ob).nearest_to((-0.9, -0.9, 0)).share == 1
     ob.tolvol.vertex_group = "soft"
-    assert probe(ob).nearest_to((-0.9, -0.9, 0)).share == 0.25 and probe(ob).near((0.9, 0.9, 0)).share == 1
+    assert probe(ob).nearest_to((-0.9, -0.9, 0)).share == 0.25 and probe(ob).nearest_to((0.9, 0.9, 0)).share == 1
     said = operators.described(bpy.context, ob, probe(ob).nearest_to((-0.9, -0.9, 0)))
     assert said[2] == "Decimate may use 25 % of it here, by the group of Protect"
     ob.tolvol.invert_vertex_group = True

@@ -326,7 +326,7 @@ def test_cells_know_how_many_points_are_near_them():
     points = np.random.default_rng(1).normal(size=(3000, 3))
     cells = Cells(points, 12, 1)
     expected = [box.grown(0.2).holds(points).sum() for box in cells.boxes]
-    assert cells.near(points, 0.2).tolist() == expected and min(expected) > 3000 / 12
+    assert cells.count_near(points, 0.2).tolist() == expected and min(expected) > 3000 / 12
 
 
 def test_hopelessly_little_memory_for_many_triangles_is_refused_after_few_tries(tmp_path, monkeypatch):

@@ -11,6 +11,7 @@ import shutil
 import stat
 import tempfile
 import threading
+import time
 from pathlib import Path
 
 from ..errors import NotWritten, Refused
@@ -19,6 +20,8 @@ from ..errors import NotWritten, Refused
 # the process ends only after the last move.
 _lock = threading.RLock()
 _folders = set()
+
+_TRIES = 50  # The end of the process tries so often to remove a folder, 0.01 s apart.
 
 
 class Target:
@@ -216,4 +219,9 @@ def remove_all():
     """Removes all temporary folders and keeps the lock, so that nothing more is made or moved: for the end of the process."""
     _lock.acquire()
     for folder in _folders:
-        shutil.rmtree(folder, ignore_errors=True)
+        # Another thread may be writing a file there, so that the folder is not empty at once.
+        for _ in range(_TRIES):
+            shutil.rmtree(folder, ignore_errors=True)
+            if not folder.exists():
+                break
+            time.sleep(0.01)

@@ -130,7 +130,7 @@ def _way(largest, spread, polygons, bounds, edges):
         ],
         "beyond": [
             {"bound": bound, "share": 0.0, "range": [0.0, 0.0]}
-            if bound >= most
+            if largest.within(bound)
             else {"bound": bound, "share": share, "range": ends}
             for bound, share, ends in zip(bounds, spread.share_beyond.tolist(), spread.share_beyond_range.tolist())
         ],
