@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <optional>
-
 #include <cmath>
 
 #include "base/errors.h"

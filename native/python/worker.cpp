@@ -36,15 +36,11 @@ class Turns {
     changed_.notify_all();
   }
 
-  /// A worker says that it runs no more Python code for now.
-  void end() {
-    end([] {});
-  }
-  template <class Also>
-  void end(const Also& also) {
+  /// A worker says that it runs no more Python code for now, or none at all if it gives its `done`.
+  void end(bool* done = nullptr) {
     const std::lock_guard lock(mutex_);
     --taken_;
-    also();
+    if (done) *done = true;
     changed_.notify_all();
   }
 
@@ -117,7 +113,7 @@ Worker::Worker(py::object work) : state_(std::make_shared<State>()) {
       }
       state->work = {};
     }
-    turns().end([&] { state->done = true; });
+    turns().end(&state->done);
   }).detach();
 }
 

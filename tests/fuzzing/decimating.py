@@ -163,10 +163,7 @@ def _consists_of(edge, vertices, place, edges):
     """
     a, b = vertices[edge].astype(np.float64)
     way, from_a = b - a, vertices - a
-    length = np.linalg.norm(way)
-    if length == 0:
-        return True
-    along = from_a @ way / length**2
+    along = from_a @ way / (way @ way)
     rounding = 8 * np.finfo(vertices.dtype).eps * np.abs(vertices).max()
     on_edge = np.linalg.norm(from_a - along[:, None] * way, axis=1) <= rounding
     between = np.flatnonzero(on_edge & (along > 0) & (along < 1))
@@ -190,6 +187,9 @@ def _judge_locked(result, vertices, triangles, locked):
     if lost:
         place = np.unique(result.vertices + 0.0, axis=0, return_inverse=True)[1]
         by_place = {tuple(sorted(edge)) for edge in place[there].tolist()}
+        lost = [edge for edge in lost if tuple(sorted(place[edge].tolist())) not in by_place]
+        lost = [edge for edge in lost if place[edge[0]] != place[edge[1]]]  # A face that is a segment is dropped.
+    if lost and judge.joins_t_junctions(result):
         lost = [edge for edge in lost if not _consists_of(edge, result.vertices, place, by_place)]
     if lost:
         a, b = result.vertices[lost[0]]

@@ -13,11 +13,8 @@ from ..numbers import NO_BREAK
 from . import report, solidity
 from .deviation_drawings import LEAST_BAR, histogram, legend
 from .deviation_style import STYLE
-from .deviation_units import tolerance_text
+from .deviation_units import DIGITS, tolerance_text
 from .verdict import FAIL, NOT_CHECKED, PASS, Interval
-
-# The number of digits of the tolerance and of largest distances: operations use up to 99.99 % of the tolerance.
-_DIGITS = 6
 
 
 def page(document, pictures=()):
@@ -116,7 +113,7 @@ def _overview(runs, others):
                 f'<a href="#object-{i}">{escape(_name(run["a"]))}</a>',
                 f'<span class="{_look(word).strip()}">{_sign(word)}{word}</span>',
                 *(f"{_rounded(run[way]['largest'][1], True)}{unit}" for way in ("forward", "backward")),
-                f"{run['tolerance']['absolute']:.{_DIGITS}g}{unit}",
+                f"{run['tolerance']['absolute']:.{DIGITS}g}{unit}",
                 *(_share_beyond(run, way) for way in ("forward", "backward")),
                 *(f"{run[key]['triangles']:,}" for key in ("a", "b")),
             )
@@ -172,7 +169,7 @@ def _counts(run, mesh):
     return f"{whole}: {mesh['vertices']:,} vertices, {mesh['triangles']:,} triangles{holes}"
 
 
-def _rounded(value, up, digits=_DIGITS):
+def _rounded(value, up, digits=DIGITS):
     """Returns a number as text, rounded up or down so that a proved bound does not look better than it is.
 
     A relative difference of 1e-7, the rounding of float32, is ignored.
@@ -182,8 +179,8 @@ def _rounded(value, up, digits=_DIGITS):
     return f"{Context(prec=digits, rounding=rounding).create_decimal_from_float(value * slack):g}"
 
 
-def _between(ends, scale=1.0):
-    return f"{_rounded(scale * ends[0], False, 5)} to&nbsp;{_rounded(scale * ends[1], True, 5)}"
+def _between(ends, scale=1.0, digits=DIGITS - 1):
+    return f"{_rounded(scale * ends[0], False, digits)} to&nbsp;{_rounded(scale * ends[1], True, digits)}"
 
 
 def _unit(run):
@@ -199,7 +196,7 @@ def _length(run, value):
 
 
 def _share(value, range_):
-    return f"{100 * value:.3g}&nbsp;%", f"{_between(range_, 100)}&nbsp;%"
+    return f"{100 * value:.3g}&nbsp;%", f"{_between(range_, 100, 3)}&nbsp;%"
 
 
 def _relative(run, value):

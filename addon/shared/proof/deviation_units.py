@@ -3,6 +3,9 @@
 
 import math
 
+# The number of digits of the tolerance and of largest distances: operations use up to 99.99 % of the tolerance.
+DIGITS = 6
+
 
 def in_unit(run, factor, unit):
     """Returns a deviation with its lengths times `factor`. Intervals are rounded outwards, and the verdict stays.
@@ -76,5 +79,5 @@ def tolerance_text(run):
     """Returns the tolerance of a deviation in percent and as a length, the one first that was given."""
     tolerance = run["tolerance"]
     unit = f" {run['unit']}" if run["unit"] else ""
-    texts = [f"{tolerance['percent']:.4g} % of size", f"{tolerance['absolute']:.6g}{unit}"]
+    texts = [f"{tolerance['percent']:.4g} % of size", f"{tolerance['absolute']:.{DIGITS}g}{unit}"]
     return " = ".join(texts if tolerance["given_in"] == "percent" else texts[::-1])
