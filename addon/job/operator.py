@@ -12,6 +12,10 @@ from . import adjusting, run
 from .interruptions import runs, under_way
 
 
+def _one_step(task):
+    return (yield task.run)
+
+
 class JobOperator:
     """A base class for an Operator with prepare(context), which returns work(progress), and finish(context, outcome)."""
 
@@ -49,11 +53,12 @@ class JobOperator:
         outcome = yield self.prepare(context)
         self.finish(context, outcome)
 
-    def each(self, tasks, names=None):
-        """A generator for steps(): yields the work of one task after another, and returns the outcomes of task.run(progress).
+    def each(self, tasks, names=None, steps=_one_step):
+        """A generator for steps(): yields the work of one task after another, and returns the outcomes.
 
         With several tasks the status says which one is at work, and an error begins with its name. names: pairs of the text
-        for the status and the name, by default of the tasks' own names.
+        for the status and the name, by default of the tasks' own names. steps(task): a generator like steps(), which returns
+        the outcome; by default that of task.run(progress).
         """
         if names is None:
             names = [(f"{task.name}, {i + 1} of {len(tasks)}", task.name) for i, task in enumerate(tasks)]
@@ -62,7 +67,7 @@ class JobOperator:
             if len(tasks) > 1:
                 self.part = part
             try:
-                outcomes.append((yield task.run))
+                outcomes.append((yield from steps(task)))
             except native.module.Cancelled:
                 raise
             except (Refused, native.module.TolvolError) as error:

@@ -51,7 +51,7 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
         self.layout.prop_search(self, "lattice", bpy.data, "objects")
         self.layout.prop(self, "mode")
 
-    def prepare(self, context):
+    def steps(self, context):
         context.view_layer.update()
         ob = self.ob
         cage = self._chosen(context)
@@ -61,8 +61,8 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
         motion = Motion(ob, self.threads or preferences.threads(context))
         lattice, mode = native_lattice(cage), self.mode.lower()
 
-        def work(progress):
-            result = native.module.deform(
+        def deform(progress):
+            return native.module.deform(
                 motion.before,
                 lattice,
                 motion.faces,
@@ -74,19 +74,26 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
                 threads=motion.threads,
                 progress=progress,
             )
-            certified = motion.certify(result.vertices, progress) if result.report["moved"] else None
-            return motion, result, certified
 
-        return work
+        result = yield deform
+        run = result.report
+        self._require_motion(run)
+        vertices, certified = yield from motion.settle(result.vertices, may_hold=self.mode == "PULL_BACK")
+        motion.write(ob, vertices, certified, "deform")
+        ob.tolvol.lattice, ob.tolvol.deform_mode = bpy.data.objects[self.lattice], self.mode
+        warnings = [*run["warnings"], *_twice(ob)]
+        kept_warnings.keep(ob, warnings)
+        for warning in warnings:
+            self.say({"WARNING"}, warning)
+        self.say({"INFO"}, motion.line(_remarks(result), certified))
 
-    def finish(self, context, outcome):
-        motion, result, certified = outcome
-        ob, run = self.ob, result.report
-        stopped = _stopped(run)
+    def _require_motion(self, run):
+        """Raises Refused if the deformation moves no vertex."""
+        name, stopped = self.ob.name, _stopped(run)
         if self.mode == "BLOCKED" and stopped:
             why, count = stopped
             raise Refused(
-                f"Blocked: {count:,} faces of {ob.name} would {_WOULD[why]}. "
+                f"Blocked: {count:,} faces of {name} would {_WOULD[why]}. "
                 f"{_permitted(run['permitted_fraction'])}choose Pull Back to hold back only the vertices of these faces"
             )
         if not run["moved"]:
@@ -95,15 +102,7 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
                 if stopped
                 else "the lattice is at rest, or the mesh is outside it"
             )
-            raise Refused(f"{self.lattice} does not move {ob.name}: {why}")
-        certified = motion.settle(result.vertices, certified)
-        motion.write(ob, result.vertices, certified, "deform")
-        ob.tolvol.lattice, ob.tolvol.deform_mode = bpy.data.objects[self.lattice], self.mode
-        warnings = [*run["warnings"], *_twice(ob)]
-        kept_warnings.keep(ob, warnings)
-        for warning in warnings:
-            self.say({"WARNING"}, warning)
-        self.say({"INFO"}, motion.line(_remarks(result), certified))
+            raise Refused(f"{self.lattice} does not move {name}: {why}")
 
     def _chosen(self, context):
         selected = [ob for ob in context.selected_objects if ob.type == "LATTICE"]

@@ -5,6 +5,8 @@ A modifier that only moves vertices is applied, and each vertex stops at the tol
 applied with the setting that leaves the fewest triangles within the tolerance, which a search finds.
 """
 
+from functools import partial
+
 import bpy
 import numpy as np
 from bpy.props import FloatProperty, StringProperty
@@ -116,7 +118,7 @@ moves as far as the tolerance permits. An object without a reference gets one fi
         self.layout.use_property_split = True
         self.layout.prop(self, "result")
 
-    def prepare(self, context):
+    def steps(self, context):
         context.view_layer.update()
         ob, name = self.ob, self.chosen(fitted=False).name
         motion = Motion(ob, self.threads or preferences.threads(context))
@@ -131,19 +133,11 @@ moves as far as the tolerance permits. An object without a reference gets one fi
         if np.array_equal(wished, motion.before):
             raise Refused(f"{name} does not move {ob.name}: check its settings")
 
-        def work(progress):
-            vertices = motion.hold(wished, progress)
-            return motion, wished, vertices, motion.certify(vertices, progress)
-
-        return work
-
-    def finish(self, context, outcome):
-        motion, wished, vertices, certified = outcome
-        name = self.modifier
+        vertices = yield partial(motion.hold, wished)
         if np.array_equal(vertices, motion.before):
-            raise Refused(f"The tolerance permits no movement of {self.ob.name} by {name}: take a larger tolerance")
-        certified = motion.settle(vertices, certified)
-        shared.give(self, self.ob.tolvol.modifiers, modifier_settings())
+            raise Refused(f"The tolerance permits no movement of {ob.name} by {name}: take a larger tolerance")
+        vertices, certified = yield from motion.settle(vertices)
+        shared.give(self, ob.tolvol.modifiers, modifier_settings())
         ob = self.target(context)
         if self.result == "SHAPE_KEY":
             motion.keep_reference(ob)

@@ -2,6 +2,7 @@
 """Moves vertices of an object while its faces stay: stops them at the tolerance, certifies the result and writes it."""
 
 from dataclasses import replace
+from functools import partial
 
 import bmesh
 import numpy as np
@@ -18,6 +19,10 @@ from ..shared.proof.verdict import Interval, Verdict
 from ..shared.surface import Surface
 
 _FOUND = {"forward": "the result is {} from the reference", "backward": "the reference is {} from the result"}
+
+
+# settle() holds a mesh back at most so many times. Each time more corners stay, so that the first time is mostly enough.
+_MOST_TRIES = 8
 
 
 class Motion:
@@ -51,7 +56,6 @@ class Motion:
 
         Quads keep the tolerance in both triangulations, and crossings out of both.
         """
-        self.warnings = []
         triangles = self.surface.arrays.triangles
         held = self._constrain(wished, triangles, "error", progress)
         # A bent quad may be beyond the tolerance from the start in the triangulation that Blender does not show: its
@@ -74,15 +78,13 @@ class Motion:
         self.warnings += [text for text in held.report["warnings"] if text not in self.warnings]
         return held.vertices
 
-    def certify(self, vertices, progress, triangles=None):
+    def certify(self, vertices, triangles, progress):
         """Returns the result of certify() for the moved mesh, and "solidity", the result of solidity.compared().
 
-        Raises NotProved unless the mesh is within the tolerance.
+        Raises NotProved unless the mesh is within the tolerance and, where crossings are kept out, no more faces cross than
+        before.
         """
-        arrays = replace(self.surface.arrays, vertices=vertices)
-        if triangles is not None:
-            arrays = replace(arrays, triangles=triangles)
-        moved = Surface(arrays, self.surface.matrix)
+        moved = Surface(replace(self.surface.arrays, vertices=vertices, triangles=triangles), self.surface.matrix)
         certified = certify(moved, self.reference, self.tolerance, 0, self.threads, progress)
         for way, said in _FOUND.items() if self.two_sided else [("forward", _FOUND["forward"])]:
             found = Interval(*certified[way])
@@ -92,14 +94,32 @@ class Motion:
         facts = solidity.facts(moved, self.threads, progress)
         if self._facts_before is None:
             self._facts_before = solidity.facts(self.surface, self.threads, progress)
+        crossing, crossed = (of["crossing_pairs"] for of in (facts, self._facts_before))
+        if self.crossings == "keep_out" and crossing > crossed:
+            raise NotProved(f"{crossing:,} pairs of faces would cross, and {crossed:,} cross now")
         return certified | {"solidity": solidity.compared(self._facts_before, facts)}
 
-    def settle(self, vertices, certified):
-        """Returns `certified`, or a new result of certify() if Blender triangulates the moved faces differently."""
-        triangles = mesh_io.triangles_at(self._mesh, vertices)
-        if np.array_equal(triangles, self.surface.arrays.triangles):
-            return certified
-        return self.certify(vertices, native.module.Progress(), triangles)
+    def settle(self, vertices, may_hold=True):
+        """A generator for an operator's steps(): returns the vertices and the result of certify() for the triangles that Blender
+        shows after the motion.
+
+        Blender may cut a bent polygon otherwise after the motion. If certify() refuses the mesh then, the corners of these
+        polygons stay where they were, and hold() moves the other vertices. Raises NotProved if that does not help, or at
+        once unless `may_hold`.
+        """
+        for tries_left in reversed(range(_MOST_TRIES)):
+            triangles = mesh_io.triangles_at(self._mesh, vertices)
+            try:
+                return vertices, (yield partial(self.certify, vertices, triangles))
+            except NotProved:
+                if not may_hold or not tries_left:
+                    raise
+            wished = vertices.copy()
+            arrays = self.surface.arrays
+            cut_otherwise = arrays.polygons[(triangles != arrays.triangles).any(1)]
+            stays = triangles[np.isin(arrays.polygons, cut_otherwise)]
+            wished[stays] = self.before[stays]
+            vertices = yield partial(self.hold, wished)
 
     def write(self, ob, vertices, certified, operation):
         """Moves the vertices of `ob`, whose mesh is the one that was read or a copy of that mesh.

@@ -56,7 +56,8 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
         self._chosen = [ob for ob in self.objects if _anything_to_smooth(ob)]
         if not self._chosen:
             raise Refused(f"No vertex of {_names(self.objects)} is selected")
-        self.finish((yield from self.each([self._task(context, ob) for ob in self._chosen])))
+        tasks = [self._task(context, ob) for ob in self._chosen]
+        self.finish((yield from self.each(tasks, steps=_Task.steps)))
 
     def _task(self, context, ob):
         if reason := decimate_blocked(ob, _MODES):
@@ -80,28 +81,23 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
         return _Task(ob.name, motion, options)
 
     def finish(self, outcomes):
-        moved = [
-            (ob, *outcome)
-            for ob, outcome in zip(self._chosen, outcomes)
-            if not np.array_equal(outcome[1], outcome[0].before)
-        ]
+        moved = [(ob, *outcome) for ob, outcome in zip(self._chosen, outcomes) if outcome is not None]
         if not moved:
             names = _names(self._chosen)
             raise Refused(
                 f"Smoothing does not move any vertex of {names}: the surface is smooth, or all its vertices have to stay"
             )
         # All results are certified before the first mesh is changed.
-        proved = [motion.settle(vertices, certified) for _, motion, vertices, _, certified in moved]
-        for (ob, motion, vertices, run, _), certified in zip(moved, proved):
+        for ob, motion, vertices, certified, report in moved:
             motion.write(ob, vertices, certified, "smooth")
             shared.give(self, ob.tolvol.smooth, smooth_settings())
-            kept_warnings.keep(ob, run["warnings"])
-            self._say(motion, vertices, run, certified, f"{ob.name}: " if len(moved) > 1 else "")
+            kept_warnings.keep(ob, report["warnings"])
+            self._say(motion, vertices, certified, report, f"{ob.name}: " if len(moved) > 1 else "")
 
-    def _say(self, motion, vertices, run, certified, prefix):
-        for warning in run["warnings"]:
+    def _say(self, motion, vertices, certified, report, prefix):
+        for warning in report["warnings"]:
             self.say({"WARNING"}, prefix + warning)
-        held = max(run["held_back"], default=0)
+        held = max(report["held_back"], default=0)
         remarks = [f"{self.iterations:,} iterations", *motion.moved(vertices, vertices)]
         remarks += [f"up to {held:,} held back"] * bool(held)
         self.say({"INFO"}, prefix + motion.line(remarks, certified))
@@ -119,14 +115,21 @@ def _names(objects):
 
 
 class _Task:
-    """The work on one object in the thread."""
+    """The work on one object."""
 
     def __init__(self, name, motion, options):
         self.name = name
         self._motion = motion
         self._options = options
 
-    def run(self, progress):
+    def steps(self):
+        """A generator for the operator's steps(): returns (motion, vertices, certified, report), or None if no vertex moves."""
+        vertices, report = yield self._smooth
+        if np.array_equal(vertices, self._motion.before):
+            return None
+        return self._motion, *(yield from self._motion.settle(vertices)), report
+
+    def _smooth(self, progress):
         motion = self._motion
         smoothed = native.module.smooth(
             motion.before,
@@ -140,5 +143,4 @@ class _Task:
             **self._options,
         )
         # smooth() knows the triangulation of quads that Blender shows; hold() keeps the tolerance in both.
-        vertices = motion.hold(smoothed.vertices, progress)
-        return motion, vertices, smoothed.report, motion.certify(vertices, progress)
+        return motion.hold(smoothed.vertices, progress), smoothed.report

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/call.h"
+#include "base/parallel.h"
 #include "check/tolerance_volume.h"
 
 namespace tolvol {
@@ -34,6 +35,8 @@ constexpr std::uint32_t kMostUnited = 256;
 constexpr std::size_t kMany = 64;
 // A try polls after this many parts of pieces, each of which may look at kMany candidates.
 constexpr std::size_t kBetweenPolls = 64;
+// So many elements are placed by a thread at a time in a change of many, with about 1 us for each piece of them.
+constexpr std::size_t kElementsOfBlock = 16;
 // This bit of split_into_ marks a triangle some of which is out of reach.
 constexpr std::uint32_t kNeverWhole = 1u << 31;
 
@@ -162,20 +165,25 @@ void Coverage::points(std::uint32_t element, std::size_t stride, std::vector<glm
   }
 }
 
-bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const {
-  trial.stack_.assign(1, whole);
-  trial.budget_ = trial.budget_is_shared_ ? trial.budget_ + kBudgetOfPiece : kBudget;
-  while (!trial.stack_.empty()) {
-    if (++trial.looked_at_ % kBetweenPolls == 0) poll();
-    const Part piece = trial.stack_.back();
-    trial.stack_.pop_back();
+const Hierarchy& Coverage::Trial::hierarchy() const {
+  if (!hierarchy_) hierarchy_.emplace(mesh_of(elements_));
+  return *hierarchy_;
+}
+
+bool Coverage::place(const Part& whole, std::uint32_t first, const Trial& trial, Placing& placing) const {
+  placing.stack.assign(1, whole);
+  placing.budget = trial.of_many_ ? kBudget : placing.budget + kBudgetOfPiece;
+  while (!placing.stack.empty()) {
+    if (++placing.looked_at % kBetweenPolls == 0) poll();
+    const Part piece = placing.stack.back();
+    placing.stack.pop_back();
     const auto fail = [&] {
-      trial.failed_.push_back({piece, first});
+      placing.failed.push_back({piece, first});
       return false;
     };
-    if (!trial.stack_.empty()) {
-      if (trial.budget_ == 0) return fail();  // The search may go on with other pieces, without a budget still.
-      --trial.budget_;
+    if (!placing.stack.empty()) {
+      if (placing.budget == 0) return fail();  // The search may go on with other pieces, without a budget still.
+      --placing.budget;
     }
     const FourPoints points = with_centre(piece);
     double centre2 = std::numeric_limits<double>::infinity();
@@ -186,22 +194,19 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
       if (d2[3] < centre2) centre2 = d2[3], below = i;
       // A comparison with NaN is false, so that NaN is not covered.
       if (d2[0] <= limit2_ && d2[1] <= limit2_ && d2[2] <= limit2_) {
-        trial.candidates_[i].distance =
-            std::max(trial.candidates_[i].distance, std::sqrt(std::max({d2[0], d2[1], d2[2]})));
-        trial.moved_.push_back({piece, i});
-        trial.last_ = i;
+        placing.moved.push_back({piece, i, std::sqrt(std::max({d2[0], d2[1], d2[2]}))});
+        placing.last = i;
         return true;
       }
       return false;
     };
     // The element that took the last piece is as likely a witness as the one that follows from the change.
-    const std::uint32_t second = trial.last_;
+    const std::uint32_t second = placing.last;
     if (covered_by(first) || (second != first && covered_by(second))) continue;
     bool covered = false;
     if (trial.candidates_.size() > kMany) {
-      if (!trial.hierarchy_) trial.hierarchy_.emplace(mesh_of(trial.elements_));
       const glm::dvec3 centre(points.x[3], points.y[3], points.z[3]);
-      const Hierarchy::Nearest nearest = trial.hierarchy_->nearest(centre, limit_, below);
+      const Hierarchy::Nearest nearest = trial.hierarchy().nearest(centre, limit_, below);
       covered = nearest.triangle != Hierarchy::kNone && covered_by(nearest.triangle);
     } else {
       for (std::uint32_t i = 0; i < trial.candidates_.size() && !covered; ++i) {
@@ -212,7 +217,8 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
     if (!(centre2 <= limit2_) || longest_squared(piece) <= kFloor * kFloor * limit2_ || piece.cuts == kMostCuts) {
       return fail();
     }
-    if (!cut(piece, trial.candidates_[below].witness, kWorthCutting * limit_, trial.stack_)) split(piece, trial.stack_);
+    const WitnessTriangle& nearest = trial.candidates_[below].witness;
+    if (!cut(piece, nearest, kWorthCutting * limit_, placing.stack)) split(piece, placing.stack);
   }
   return true;
 }
@@ -220,11 +226,11 @@ bool Coverage::place(const Part& whole, std::uint32_t first, Trial& trial) const
 bool Coverage::try_change(std::span<const Element> elements, std::span<const Removed> removed, Trial& trial) const {
   trial.candidates_.clear();
   trial.removed_lists_.clear();
-  trial.moved_.clear();
-  trial.failed_.clear();
-  trial.last_ = 0;
+  trial.placing_.moved.clear();
+  trial.placing_.failed.clear();
+  trial.placing_.last = 0;
   trial.hierarchy_.reset();
-  trial.budget_ = kBudget;
+  trial.placing_.budget = kBudget;
   bool settled = true;
   for (const Element& e : elements) {
     const List& list = lists_[e.id];
@@ -262,24 +268,34 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
     }
   } clear{for_each_split};
   for_each_split([](std::uint32_t& count) { ++count; });
-  return place_all(trial, gathered);
+  return trial.of_many_ ? place_in_blocks(trial, gathered) : place_all(trial, gathered);
 }
 
-/// Places the pieces of all that is replaced. `gathered` counts them for each triangle that was split.
-bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) const {
+/// Calls call(piece) for each of these pieces, which an element loses, until it returns false, or once for a triangle
+/// of the reference if all its pieces are lost. `gathered` counts the lost ones for each triangle that was split.
+/// Returns what the last call returned.
+template <class Call>
+bool Coverage::for_each_to_place(const std::vector<Part>& pieces, bool of_many, std::vector<std::uint32_t>& gathered,
+                                 Call&& call) const {
   constexpr std::uint32_t kPlaced = 0xFFFFFFFFu;
+  return std::all_of(pieces.begin(), pieces.end(), [&](const Part& piece) {
+    if (piece.cuts == 0) return call(piece);
+    std::uint32_t& count = gathered[piece.of];
+    if (count == kPlaced) return true;
+    const bool too_many = of_many && count > kMostUnited;
+    if (too_many || count != split_into_[piece.of].load(std::memory_order_relaxed)) return call(piece);
+    count = kPlaced;
+    return call(whole(piece.of));
+  });
+}
+
+/// Places the pieces of all that is replaced.
+bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) const {
+  Placing& placing = trial.placing_;
   const auto place_list = [&](const std::vector<Part>& pieces, std::uint32_t first) {
-    const std::size_t enough = trial.failed_.size() + std::max<std::size_t>(trial.most_failures_, 1);
-    return std::all_of(pieces.begin(), pieces.end(), [&](const Part& piece) {
-      if (piece.cuts == 0) return place(piece, first, trial) || trial.failed_.size() < enough;
-      std::uint32_t& count = gathered[piece.of];
-      if (count == kPlaced) return true;
-      const bool too_many = !trial.budget_is_shared_ && count > kMostUnited;
-      if (too_many || count != split_into_[piece.of].load(std::memory_order_relaxed)) {
-        return place(piece, first, trial) || trial.failed_.size() < enough;
-      }
-      count = kPlaced;
-      return place(whole(piece.of), first, trial) || trial.failed_.size() < enough;
+    const std::size_t enough = placing.failed.size() + std::max<std::size_t>(trial.most_failures_, 1);
+    return for_each_to_place(pieces, false, gathered, [&](const Part& piece) {
+      return place(piece, first, trial, placing) || placing.failed.size() < enough;
     });
   };
   const bool goes_on = trial.most_failures_ > 0;
@@ -296,12 +312,55 @@ bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) con
       return false;
     }
   }
-  return trial.failed_.empty();
+  return placing.failed.empty();
+}
+
+/// Does the same for many elements on several threads. A block of elements is placed as if it were alone.
+bool Coverage::place_in_blocks(Trial& trial, std::vector<std::uint32_t>& gathered) const {
+  struct Lost {
+    std::uint32_t first;  // is where a new witness is sought first
+    std::size_t begin;    // of its pieces; they end where those of the next one begin
+  };
+  std::vector<Part> pieces;
+  std::vector<Lost> lost;
+  const auto add = [&](const std::vector<Part>& list, std::uint32_t first) {
+    lost.push_back({first, pieces.size()});
+    for_each_to_place(list, true, gathered, [&](const Part& piece) {
+      pieces.push_back(piece);
+      return true;
+    });
+  };
+  for (const Trial::RemovedList& h : trial.removed_lists_) {
+    if (!h.whole) add(lists_[h.id].pieces, h.successor);
+  }
+  for (std::uint32_t i = 0; i < trial.candidates_.size(); ++i) {
+    if (trial.candidates_[i].replaced) add(lists_[trial.candidates_[i].id].pieces, i);
+  }
+  const std::size_t count = lost.size();
+  lost.push_back({0, pieces.size()});
+  if (trial.candidates_.size() > kMany) trial.hierarchy();  // The threads only read it.
+  std::vector<Placing> placings((count + kElementsOfBlock - 1) / kElementsOfBlock);
+  parallel_for(count, kElementsOfBlock, trial.threads_, [&](std::size_t begin, std::size_t end) {
+    Placing& placing = placings[begin / kElementsOfBlock];
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::size_t enough = placing.failed.size() + std::max<std::size_t>(trial.most_failures_, 1);
+      for (std::size_t k = lost[i].begin; k < lost[i + 1].begin; ++k) {
+        if (!place(pieces[k], lost[i].first, trial, placing) && placing.failed.size() == enough) break;
+      }
+    }
+  });
+  Placing& all = trial.placing_;
+  for (const Placing& placing : placings) {
+    all.moved.insert(all.moved.end(), placing.moved.begin(), placing.moved.end());
+    all.failed.insert(all.failed.end(), placing.failed.begin(), placing.failed.end());
+    all.looked_at += placing.looked_at;
+  }
+  return all.failed.empty();
 }
 
 void Coverage::commit(const Trial& trial) {
   // Counts grow before they shrink, so that no count is ever less than the number of pieces.
-  for (const Moved& m : trial.moved_) {
+  for (const Moved& m : trial.placing_.moved) {
     if (m.piece.cuts > 0) split_into_[m.piece.of].fetch_add(1, std::memory_order_relaxed);
   }
   trial.for_each_replaced(lists_, [&](const Part& piece) {
@@ -317,7 +376,11 @@ void Coverage::commit(const Trial& trial) {
     std::vector<Part>& to = lists_[trial.candidates_[h.successor].id].pieces;
     if (h.whole) to.insert(to.end(), pieces.begin(), pieces.end());
   }
-  for (const Moved& m : trial.moved_) lists_[trial.candidates_[m.element].id].pieces.push_back(m.piece);
+  for (const Moved& m : trial.placing_.moved) {
+    List& to = lists_[trial.candidates_[m.element].id];
+    to.pieces.push_back(m.piece);
+    to.distance = std::max(to.distance, m.distance);
+  }
 }
 
 }  // namespace tolvol

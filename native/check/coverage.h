@@ -83,6 +83,7 @@ class Coverage {
     if (!lists_[element].pieces.empty()) lists_[element].distance += moved;
   }
 
+  struct Failure;
   class Trial;
   /// Tells whether all pieces of the elements of a change have witnesses among `elements`. An element that does not
   /// move keeps its pieces. Only reads: nothing changes until commit().
@@ -98,14 +99,20 @@ class Coverage {
   struct Moved {
     Part piece;
     std::uint32_t element;
+    double distance;  ///< of the piece from the element, at most
   };
 
   Part whole(std::uint32_t triangle) const;
   void find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
                          std::span<const std::uint32_t> ids, double provable, Uncovered& uncovered);
   bool may_look(std::size_t parts, bool found_beyond);
+  struct Placing;
+  template <class Call>
+  bool for_each_to_place(const std::vector<Part>& pieces, bool of_many, std::vector<std::uint32_t>& gathered,
+                         Call&& call) const;
   bool place_all(Trial& trial, std::vector<std::uint32_t>& gathered) const;
-  bool place(const Part& whole, std::uint32_t first, Trial& trial) const;
+  bool place_in_blocks(Trial& trial, std::vector<std::uint32_t>& gathered) const;
+  bool place(const Part& whole, std::uint32_t first, const Trial& trial, Placing& placing) const;
 
   const TriangleMesh* reference_;
   double limit_, limit2_;
@@ -118,33 +125,45 @@ class Coverage {
   std::vector<std::atomic<std::uint32_t>> split_into_;
 };
 
+/// A part of a piece for which a try found no witness, and the number of the element in the change at which it was
+/// sought first.
+struct Coverage::Failure {
+  Part part;
+  std::uint32_t element;
+};
+
+/// The witnesses that were found for some pieces of a change, and scratch memory.
+struct Coverage::Placing {
+  std::vector<Moved> moved;
+  std::vector<Failure> failed;
+  std::vector<Part> stack;
+  std::size_t budget = 0;     ///< is the number of pieces that this change, or this piece, may still add
+  std::size_t looked_at = 0;  ///< counts parts of pieces
+  std::uint32_t last = 0;     ///< is the candidate that took the last piece
+};
+
 /// Holds what a try found, and its scratch memory. Each thread has a trial of its own.
 class Coverage::Trial {
  public:
   /// Starts a series of tries around one place. Their results do not depend on earlier series.
-  void begin() { failed_last_ = 0, looked_at_ = 0; }
+  void begin() { failed_last_ = 0, placing_.looked_at = 0; }
   /// A refused change has one part without a witness in failed(), or, if it is asked for, several of each element.
   void look_for_failures(std::size_t of_each_element) { most_failures_ = of_each_element; }
-  /// Gives each piece the budget of a whole change: for changes of many elements, which must not depend on their
-  /// number.
-  void give_each_piece_a_budget() { budget_is_shared_ = false; }
-  /// The parts of pieces for which the last try found no witness, and the number of the element in the change that it
-  /// was sought at first.
-  struct Failure {
-    Part part;
-    std::uint32_t element;
-  };
-  std::span<const Failure> failed() const { return failed_; }
+  /// Expects changes of many elements. Each piece gets the budget of a whole change, because the result must not depend
+  /// on their number, and a try uses so many threads (0: one for each core).
+  void expect_many_elements(unsigned threads) { of_many_ = true, threads_ = threads; }
+  /// What the last try found no witness for.
+  std::span<const Failure> failed() const { return placing_.failed; }
   /// The number of parts of pieces that the series has looked at.
-  std::size_t looked_at() const { return looked_at_; }
+  std::size_t looked_at() const { return placing_.looked_at; }
 
  private:
   friend class Coverage;
   struct Candidate {
     std::uint32_t id;
     WitnessTriangle witness;
-    double distance;
-    bool replaced;  ///< tells whether its own pieces are placed anew
+    double distance;  ///< no piece that it keeps is farther
+    bool replaced;    ///< tells whether its own pieces are placed anew
   };
   struct RemovedList {
     std::uint32_t id, successor;
@@ -161,18 +180,17 @@ class Coverage::Trial {
     }
   }
 
+  /// Holds the elements, and is built when there are too many candidates to look at each.
+  const Hierarchy& hierarchy() const;
+
   std::vector<Candidate> candidates_;
   std::vector<RemovedList> removed_lists_;
-  std::vector<Moved> moved_;
-  std::vector<Failure> failed_;
-  std::size_t most_failures_ = 0;  ///< of each element, after which the search goes on; 0 ends it at the first
-  std::vector<Part> stack_;
-  std::span<const Element> elements_;   ///< are those of the change, while it is tried
-  std::optional<Hierarchy> hierarchy_;  ///< holds the elements once there are too many candidates to look at each
-  std::size_t budget_ = 0;              ///< is the number of pieces that this change, or this piece, may still add
-  bool budget_is_shared_ = true;
-  std::size_t looked_at_ = 0;
-  std::uint32_t last_ = 0;         ///< is the candidate that took the last piece
+  Placing placing_;
+  std::size_t most_failures_ = 0;      ///< of each element, after which the search goes on; 0 ends it at the first
+  std::span<const Element> elements_;  ///< are those of the change, while it is tried
+  mutable std::optional<Hierarchy> hierarchy_;
+  bool of_many_ = false;
+  unsigned threads_ = 1;
   std::uint32_t failed_last_ = 0;  ///< is the candidate whose pieces failed last; it comes first, to be refused soon
 };
 

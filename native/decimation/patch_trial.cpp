@@ -174,7 +174,7 @@ bool PatchTrial::pieces_hold() {
     glm::dvec3 point;
   };
   std::vector<Named> named;
-  for (const Coverage::Trial::Failure& failure : backward_.failed()) {
+  for (const Coverage::Failure& failure : backward_.failed()) {
     const auto& [a, b, c] = failure.part.corners;
     Named worst{failure.element, -1, {}};
     for (const glm::dvec3& p : {(a + b + c) * (1.0 / 3), a, b, c}) {

@@ -41,7 +41,7 @@ MovingCoverage::Found MovingCoverage::find_layers(Progress* progress) const {
                             {},
                             {}});
     found.layers.back().trial.look_for_failures(1);
-    found.layers.back().trial.give_each_piece_a_budget();
+    found.layers.back().trial.expect_many_elements(mesh_->threads());
     find_witnesses(found, progress);
   }
   return found;
@@ -171,7 +171,7 @@ std::vector<std::uint32_t> MovingCoverage::failing(Layer& layer, std::span<const
   layer.coverage.try_change(layer.elements, {}, layer.trial);
   std::vector<std::uint32_t> failed;
   is_worn_ = false;
-  for (const Coverage::Trial::Failure& f : layer.trial.failed()) {
+  for (const Coverage::Failure& f : layer.trial.failed()) {
     is_worn_ = is_worn_ || f.part.cuts == kMostCuts;
     failed.push_back(layer.elements[f.element].id / of_face);
   }
