@@ -7,6 +7,13 @@ volume.png shows the tolerance volume around MESH, half of it cut away. distance
 tolerance, and decimated to as many triangles by Blender's own Decimate modifier, both coloured by the distance to MESH.
 Without MESH the script takes Blender's monkey and also makes error.png, the error of distance fields against their spacing.
 error.png takes minutes and needs `sh setup.sh --tests`.
+
+Other scripts make the other pictures of docs/pictures:
+
+    demo.png                          blender_scripts/demo.sh, as out/picture.png
+    panel.png, overlay.png, guard.png TOLVOL_ALL_TESTS=1 sh tests/ui/run.sh test_pictures_for_the_documentation, in build/ui
+    other_tools.png, tolerances.png   benchmark/other_tools.py with --picture and with --curves
+    deformation.png, smoothing.png    the scripts of these names in this folder
 """
 
 import importlib.util

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """tolvol.deviation and tolvol.directed_hausdorff agree with the Hausdorff filter of MeshLab, which samples at random.
 
-Only this test needs PyMeshLab: pip install -r tests/python/extras.txt.
+Only this test needs PyMeshLab, and is skipped without it: install pytest and tests/python/extras.txt in a virtual environment.
 """
 
 import importlib.util
