@@ -132,6 +132,11 @@ _SENTENCES = {
 }
 
 
+def says_outside(error):
+    """Whether the package refused a mesh because it is not within the tolerance to begin with, in either direction."""
+    return error.code in ("input_outside", "reference_outside")
+
+
 def said(error):
     """Returns the message of a Refused or of an error of the package, with the names of settings as in Blender."""
     sentence = _SENTENCES.get(getattr(error, "code", None))

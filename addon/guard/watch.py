@@ -16,6 +16,8 @@ from ..mesh import mesh_io
 from ..reference import snapshots, tolerances
 from ..shared import volumes
 from ..shared.errors import Refused
+from ..shared.proof import solidity
+from ..shared.surface import MeshArrays
 
 # Blender waits so many seconds for a guard to be prepared. If preparing takes longer, it goes on in a thread.
 _PATIENCE = 0.4
@@ -115,6 +117,8 @@ class Preparing:
 
     # (m,) bool: the faces of the reference that may be uncovered all the same; None if that is not known.
     uncovered = None
+    # The number of pairs of triangles that cross; None if that is not known.
+    crossing = None
 
     def __init__(self, before=None):
         """before: the watch from which this one takes over, or None."""
@@ -159,7 +163,8 @@ class Watch(Preparing):
     """Guards the coordinates of one mesh. Edits that are made before the watch is ready are checked when it is ready.
 
     A watch that takes over from another one guards the mesh only if the edit of the faces, which lies between the two, kept
-    the tolerance: the mesh has to be inside, and no face of the reference may be uncovered that was covered before.
+    what the guard keeps: the mesh has to be inside, no face of the reference may be uncovered that was covered before, and
+    where crossings are kept out, no more pairs of triangles may cross than before.
     """
 
     def __init__(self, ob, positions, before=None, edits_faces=False):
@@ -171,6 +176,7 @@ class Watch(Preparing):
         self._held = np.zeros(len(positions), bool)
         self._edited_at = 0.0
         self.uncovered = before and before.uncovered
+        self.crossing = before and before.crossing
         if reason := without_faces(ob):
             self.reason = reason
             return
@@ -211,19 +217,29 @@ class Watch(Preparing):
                 uncovered = np.zeros(len(reference.arrays.triangles), bool)
                 if guard.uncovered or not two_sided:
                     uncovered = uncovered_faces(reference, positions, faces.shown, tolerance, options)
-            return guard, kept and faces.outside(built, positions, options), uncovered, remark
+            crossing = None
+            if edits_faces and crossings == "keep_out":
+                crossing = solidity.crossing_count(MeshArrays(positions, faces.shown, None, None), threads, progress)
+            return guard, kept and faces.outside(built, positions, options), uncovered, crossing, remark
 
         self.begin(work)
 
     def prepared(self, outcome):
-        guard, outside, uncovered, self.remark = outcome
-        lost = 0
+        guard, outside, uncovered, crossing, self.remark = outcome
+        lost, crossed = 0, self.crossing
         if self.uncovered is None:
             self.uncovered = uncovered
         else:
             lost = int(np.count_nonzero(uncovered & ~self.uncovered))
-        if outside or lost:
-            self.reason = outside_reason(outside) if outside else lost_reason(lost)
+        if crossing is not None:
+            self.crossing = crossing
+        if outside:
+            self.reason = outside_reason(outside)
+        elif lost:
+            self.reason = lost_reason(lost)
+        elif crossing is not None and crossed is not None and crossing > crossed:
+            now, then = solidity.pair_count(crossing), solidity.pair_count(crossed)
+            self.reason = f"Crossing pairs of faces: {now}, before the edit {then}"
         else:
             self._guard, self.on = guard, True
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Deforms a mesh by a Lattice object within the tolerance."""
 
+from functools import partial
+
 import bpy
 import numpy as np
 from bpy.props import StringProperty
@@ -61,11 +63,11 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
         motion = Motion(ob, self.threads or preferences.threads(context))
         lattice, mode = native_lattice(cage), self.mode.lower()
 
-        def deform(progress):
+        def deform(faces, progress):
             return native.module.deform(
                 motion.before,
                 lattice,
-                motion.faces,
+                faces,
                 motion.volume(progress),
                 to_world=motion.surface.matrix,
                 mode=mode,
@@ -75,7 +77,14 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
                 progress=progress,
             )
 
-        result = yield deform
+        try:
+            result = yield partial(deform, motion.faces)
+        except native.module.InvalidInput as error:
+            # A bent quad may be beyond the tolerance from the start in the triangulation that Blender does not show.
+            shown = motion.surface.arrays.triangles
+            if motion.faces is shown or not native.says_outside(error):
+                raise
+            result = yield partial(deform, shown)
         run = result.report
         self._require_motion(run)
         vertices, certified = yield from motion.settle(result.vertices, may_hold=self.mode == "PULL_BACK")

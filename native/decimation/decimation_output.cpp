@@ -140,6 +140,7 @@ class Output {
     repair(cut_.welded, "welded", "vertices at exactly the position of another stay with it");
     repair(cut_.cut_edges, "cut", "non-manifold edges, which collapse along themselves alone");
     repair(cut_.reversed_count, "misoriented", "faces against their neighbours' orientation, kept so");
+    repair(cut_.double_sheet_faces, "double_sheet", "faces that lie exactly on another face, which they may cross");
     std::size_t unused = 0;
     for (const std::uint32_t v : cut_.input_vertex) unused += v == kNone;
     repair(unused, "unused", "vertices that no face uses are not part of the result");

@@ -192,7 +192,8 @@ seconds : the time that the call took
 stopped_by : "tolerance", "target", "time" or "request"
 method, renderer : which check was used, and what computed it
 repairs : a list of dicts with `kind`, `count` and `message`; the kind "T-junction" counts vertices that were put into the
-    edges and faces that they lie on, so that the faces that meet there go on to meet
+    edges and faces that they lie on, so that the faces that meet there go on to meet, and "double_sheet" faces,
+    other than those at a rim, that lie exactly on another face
 locked : a dict from a cause to the number of vertices that could not move
 outside : a dict of `faces`, the number of input faces that were outside and were kept, `first`, the first of them, and
     `reference_faces`, the number of reference faces that were beyond the tolerance of the input
@@ -246,7 +247,8 @@ crossings : {"keep_out", "allow"}
     Two faces cross if they meet anywhere but in the corners and edges that they share. "keep_out" makes no new
     crossing: each input face is stood for by one face of the result, and two faces of the result cross only if input
     faces that they stand for crossed. So the number of crossing pairs never rises, and a mesh without crossings stays
-    without. Sheets that lie exactly on each other are exempt from each other. It is decided exactly for the
+    without. Sheets that lie exactly on each other are exempt from each other: pairs of their faces may become more, and
+    the repair "double_sheet" counts these faces. It is decided exactly for the
     coordinates of the result as they are returned, and is ignored without a volume. "allow" takes a tenth to a quarter
     less time, and leaves fewer triangles of walls that are thinner than twice the tolerance.
 max_normal_angle : float, optional

@@ -93,9 +93,10 @@ outcome : "closed", or the reason why the loop is left open:
     - "crossing": the triangles would cross others
     - "non_manifold": an edge would be one of more than two triangles
     - "degenerate": the triangles would be segments
+    - "given_up": the search ended at one of its limits, so that there may be a filling
 
     If several of "outside", "turned" and "crossing" apply, it is the one that refused most of the triangles and edges
-    that the last search tried. The last two are named only if none of these three applies.
+    that the last search tried. "non_manifold" and "degenerate" are named only if none of these three applies.
 vertex : the vertex at which the loop begins, an index
 corners : the number of its edges
 perimeter : its length in world units

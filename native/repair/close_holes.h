@@ -64,9 +64,9 @@ struct HoleClosingResult {
 /// whole or not at all, in the orientation of its rim. Of the triangulations whose triangles keep these bounds one by
 /// one it takes the least (repair/least_triangulation.h). Where these cross a face, the next search goes around that
 /// face, and where two of them cross each other, or lie on one edge, it goes without one of them: 40 searches at most,
-/// and 8 in a loop of more than 200 corners. A loop of which 50,000 triangles were refused is given up. Loops are
-/// filled as if they were alone; then each whose faces are in conflict with those of a loop of lower number is filled
-/// anew around those, if possible.
+/// and 8 in a loop of more than 200 corners. After these, or once 50,000 triangles were refused, a loop is given up.
+/// Loops are filled as if they were alone; then each whose faces are in conflict with those of a loop of lower number
+/// is filled anew around those, if possible.
 ///
 /// No vertex moves and none is added, and every input triangle keeps its number. Because the input stays, the reference
 /// is as near to the result as it is to the input. Throws InvalidInput for a bad mesh, and where the stored type cannot

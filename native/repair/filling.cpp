@@ -35,11 +35,11 @@ LoopOutcome Filling::run() {
                            [this](const glm::uvec3& face) { return admits(face); }};
   const int most_tries = is_long() ? kMostTriesOfLong : kMostTries;
   int guesses_left = is_long() ? 0 : kMostGuesses;
-  for (int tries = 0; tries < most_tries;) {
+  for (int tries = 0;;) {
     is_guessing_ = guesses_left > 0;
     refused_.fill(0);
     hole_.faces = least_triangulation(hole_.at, rules);
-    if (gives_up()) break;
+    if (gives_up()) return give_up();
     if (hole_.faces.empty()) {
       if (!is_guessing_ || tries > 0) break;
       // No triangulation keeps the rules. A search that asks them as it goes tells which of them refuses most.
@@ -53,12 +53,17 @@ LoopOutcome Filling::run() {
       --guesses_left;
       continue;
     }
-    ++tries;
     if (is_clear() && is_sound()) return LoopOutcome::closed;
     if (is_triangle()) break;
+    if (++tries == most_tries) return give_up();
   }
   hole_.faces.clear();
   return reason();
+}
+
+LoopOutcome Filling::give_up() {
+  hole_.faces.clear();
+  return LoopOutcome::given_up;
 }
 
 bool Filling::is_long() const { return hole_.at.size() > kLong; }

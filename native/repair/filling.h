@@ -43,6 +43,7 @@ class Filling {
   bool is_triangle() const { return hole_.at.size() == 3; }
   bool is_long() const;
   LoopOutcome reason() const;
+  LoopOutcome give_up();
   bool refuse(LoopOutcome reason);
   bool gives_up() const;
   bool admits_edge(std::uint32_t i, std::uint32_t j);

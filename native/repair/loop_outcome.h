@@ -21,10 +21,11 @@ enum class LoopOutcome : std::uint8_t {
   crossing,      ///< the faces would cross others
   non_manifold,  ///< an edge would be one of more than two triangles
   degenerate,    ///< the faces would be segments
+  given_up,      ///< the search ended at one of its limits (repair/filling.cpp): there may be a filling
 };
 
-inline constexpr std::array kLoopOutcomeNames = {"closed", "not_a_loop", "too_long",     "perimeter", "outside",
-                                                 "turned", "crossing",   "non_manifold", "degenerate"};
+inline constexpr std::array kLoopOutcomeNames = {"closed", "not_a_loop", "too_long",     "perimeter",  "outside",
+                                                 "turned", "crossing",   "non_manifold", "degenerate", "given_up"};
 inline const char* name_of(LoopOutcome outcome) { return kLoopOutcomeNames[static_cast<std::size_t>(outcome)]; }
 
 }  // namespace tolvol

@@ -345,11 +345,28 @@ class Cutter {
         several[at] = true;
       }
     }
+    count_double_sheet_faces(several);
     const std::vector<bool> is_apart = find_double_sheets(several);
     for (std::uint32_t v = 0; v < cut_.copies_of.size(); ++v) {
       const std::uint32_t at = weld_[cut_.vertex_input[v]];
       if (several[at] && !is_apart[at] && cut_.cause[v] == CutCause::none) cut_.cause[v] = CutCause::non_manifold;
       cut_.copies_of[v] = cut_.cause[v] == CutCause::none ? v : first[at];
+    }
+  }
+
+  /// Counts the triangles with the places of another, of those with several vertices at the place of a corner.
+  void count_double_sheet_faces(const std::vector<bool>& several) {
+    std::vector<std::array<std::uint32_t, 3>> faces;
+    for (Side s = 0; s < mate_.size(); s += 3) {
+      std::array<std::uint32_t, 3> face = {welded(s), welded(s + 1), welded(s + 2)};
+      if (!std::ranges::any_of(face, [&](std::uint32_t at) { return several[at]; })) continue;
+      std::ranges::sort(face);
+      faces.push_back(face);
+    }
+    std::ranges::sort(faces);
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      const bool as_before = i > 0 && faces[i] == faces[i - 1];
+      cut_.double_sheet_faces += as_before || (i + 1 < faces.size() && faces[i] == faces[i + 1]);
     }
   }
 

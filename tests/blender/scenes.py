@@ -3,7 +3,7 @@
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
 from mathutils.bvhtree import BVHTree
 
 from addon.mesh import mesh_io
@@ -89,6 +89,20 @@ def moved_up(share=0.25, height=0.1):
             vertex.co.z += height
     ob.data.update()
     activate(ob)
+    return ob
+
+
+def cage(name="cage", points=(4, 4, 4), size=(2.8, 2.8, 1.0), matrix=None, interpolation="KEY_BSPLINE"):
+    """Adds a lattice object around the torus. The torus stays the active object."""
+    active = bpy.context.view_layer.objects.active
+    data = bpy.data.lattices.new(name)
+    data.points_u, data.points_v, data.points_w = points
+    data.interpolation_type_u = data.interpolation_type_v = data.interpolation_type_w = interpolation
+    # Blender sets the points of a lattice 1 apart.
+    scale = [length / max(count - 1, 1) for length, count in zip(size, points)]
+    ob = link(bpy.data.objects.new(name, data), (matrix or Matrix()) @ Matrix.Diagonal((*scale, 1)))
+    if active is not None:
+        activate(active)
     return ob
 
 

@@ -12,23 +12,17 @@ from addon.operators.deform import native_lattice
 from addon.proof import verdict
 from addon.reference import measurements
 from addon.shared.surface import to_world
-from scenes import activate, add_object, assert_within, link, sheet, torus, world_triangles
+from scenes import (
+    add_object,
+    assert_within,
+    cage,
+    plates_with_t_junctions,
+    sheet,
+    torus,
+    world_triangles,
+)
 
 PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, 2, 0.5, 1))
-
-
-def cage(name="cage", points=(4, 4, 4), size=(2.8, 2.8, 1.0), matrix=None, interpolation="KEY_BSPLINE"):
-    """Adds a lattice object around the torus. The torus stays the active object."""
-    active = bpy.context.view_layer.objects.active
-    data = bpy.data.lattices.new(name)
-    data.points_u, data.points_v, data.points_w = points
-    data.interpolation_type_u = data.interpolation_type_v = data.interpolation_type_w = interpolation
-    # Blender sets the points of a lattice 1 apart.
-    scale = [length / max(count - 1, 1) for length, count in zip(size, points)]
-    ob = link(bpy.data.objects.new(name, data), (matrix or Matrix()) @ Matrix.Diagonal((*scale, 1)))
-    if active is not None:
-        activate(active)
-    return ob
 
 
 def lift(ob, height, above=-1.0, below=1.0):
@@ -182,6 +176,21 @@ def test_a_corner_stops_before_its_face_would_turn_over():
     bpy.ops.tolvol.deform(lattice="cage", mode="FARTHEST")
     x, y, _ = coordinates(ob)[1]
     assert 0.49 < y < x < 0.51
+
+
+def test_plates_that_meet_in_t_junctions_go_on_to_meet():
+    ob = plates_with_t_junctions()
+    ob.tolvol.tolerance_percent = 10
+    before = coordinates(ob)
+    lattice = cage(points=(5, 5, 2), size=(3, 3, 1))
+    rng = np.random.default_rng(1)
+    for point in lattice.data.points:
+        point.co_deform.z += rng.uniform(-0.1, 0.1)
+    bpy.ops.tolvol.deform(lattice="cage", mode="PULL_BACK")
+    after = coordinates(ob)
+    on_line = before[:, 0] == 0
+    assert np.array_equal(after[on_line], before[on_line])
+    assert (after != before).any(1).sum() > 0.5 * len(before)
 
 
 def test_again_and_again_it_does_not_drift():

@@ -418,6 +418,24 @@ def test_a_hole_is_put_back_unless_one_way_is_asked_for(keep, many_corners):
     assert not on and text.endswith("faces of the reference are no longer within the tolerance of the mesh")
 
 
+@pytest.mark.parametrize("keeps_out", (False, True))
+def test_an_edit_of_faces_that_makes_faces_cross_is_put_back_if_crossings_are_kept_out(keeps_out):
+    ob = sheet(count=10, bumps=0.0)
+    ob.tolvol.guard.crossings = keeps_out
+    guarded(ob, "editing", mode="EDIT")
+    edited = bmesh.from_edit_mesh(ob.data)
+    corners = [edited.verts.new(co) for co in ((0.02, 0.03, -0.005), (0.07, 0.03, -0.005), (0.05, 0.04, 0.005))]
+    edited.faces.new(corners)
+    bmesh.update_edit_mesh(ob.data)
+    bpy.context.view_layer.update()
+    text, on = state(ob)["editing"]
+    if not keeps_out:
+        assert on and guard.edit.outside() is None
+        return
+    assert not on and text == "Crossing pairs of faces: 1, before the edit 0"
+    assert guard.edit.outside() == ob
+
+
 @pytest.mark.parametrize("keep", ("BOTH", "ONE"))
 def test_a_mesh_of_which_all_faces_were_deleted_is_put_back(keep):
     ob = sheet(count=10, bumps=0.0)

@@ -72,6 +72,20 @@ def test_every_setting_counts_and_those_not_given_are_the_objects_own():
     assert np.array_equal(coordinates(ob), smoothed(iterations=3))
 
 
+def test_one_way_smooths_farther():
+    def kept(keep):
+        ob = torus(noise=0.02)
+        ob.tolvol.tolerance_percent, ob.tolvol.keep = 0.5, keep
+        reference = world_triangles(ob)
+        tolerance = 0.005 * native.module.diagonal(*reference)
+        bpy.ops.tolvol.smooth(iterations=20, method="LAPLACIAN")
+        judged = native.module.hausdorff(*world_triangles(ob), *reference)
+        assert judged.forward.upper <= tolerance
+        return judged.backward.lower > tolerance
+
+    assert kept("ONE") and not kept("BOTH")
+
+
 def test_boundary_stays_or_is_smoothed_along_itself():
     before = coordinates(sheet(bumps=0.2))
     rim = (np.abs(before[:, :2]) == 1).any(1)

@@ -143,8 +143,10 @@ def test_the_command_requires(tmp_path):
     whole = save(tmp_path / "whole.ply", ("torus", vertices, faces))
     holed = save(tmp_path / "holed.ply", ("torus", vertices, faces[1:]))
     words = "closed,manifold,oriented,uncrossed"
-    code, out, err = command("report.py", whole, holed, "--require", words)
+    page = tmp_path / "whole.html"
+    code, out, err = command("report.py", whole, holed, "--require", words, "--report", page)
     assert (code, err) == (0, "") and "A: closed, manifold, no crossings: printable" in out
+    assert "closed, manifold, no crossings: printable" in page.read_text()
     reports = [tmp_path / f"report{extension}" for extension in (".json", ".html", ".csv")]
     asked = [part for path in reports for part in ("--report", path)]
     code, out, err = command("report.py", holed, whole, "--require", words, *asked)

@@ -21,6 +21,7 @@ REASONS = {
     "crossing",
     "non_manifold",
     "degenerate",
+    "given_up",
 }
 
 

@@ -3,6 +3,7 @@
 // where crossings are allowed. Results are judged by CGAL, and by measure/hausdorff.h for the distance.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -217,6 +218,9 @@ TEST(DecimationCrossings, DoubleSheetsStillCollapse) {
   const DecimationResult r = run(c);
   EXPECT_LT(r.triangles.size(), 200u);
   expect_within(c, r);
+  const auto counted = std::ranges::find(r.repairs, "double_sheet", &Repair::kind);
+  ASSERT_NE(counted, r.repairs.end());
+  EXPECT_GE(counted->count, c.mesh.triangles.size() - 8);  // At a corner of a sheet a face has no corner inside.
 }
 
 // Faces that no manifold holds are in the way like any others.

@@ -27,6 +27,7 @@ _LEFT_OPEN = {
     "crossing": "with faces that would cross others",
     "non_manifold": "with edges that would have three faces",
     "degenerate": "with faces that would have no area",
+    "given_up": "given up after a long search",
     "unselected": "at unselected faces",
 }
 
