@@ -12,7 +12,7 @@
 #include <optional>
 
 #include "check/coverage.h"
-#include "decimation/ring_check.h"
+#include "check/ring_check.h"
 
 namespace tolvol::baselines {
 

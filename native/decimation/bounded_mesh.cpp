@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/call.h"
+#include "decimation/certified_bounds.h"
 #include "decimation/change.h"
 #include "decimation/regions.h"
 #include "topology/connectivity.h"
@@ -13,6 +14,7 @@ namespace tolvol {
 
 BoundedMesh::BoundedMesh(BoundedMeshInput input, Bounds* bounds, Team& team)
     : bounds_(bounds),
+      certified_(dynamic_cast<CertifiedBounds*>(bounds)),
       subset_(input.subset),
       store_(std::move(input.store)),
       cell_(input.cell),

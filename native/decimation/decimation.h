@@ -12,8 +12,8 @@
 
 #include "check/facing.h"
 #include "check/outside.h"
+#include "check/ring_check.h"
 #include "check/tolerance_volume.h"
-#include "decimation/ring_check.h"
 
 namespace tolvol {
 

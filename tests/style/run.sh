@@ -65,7 +65,7 @@ EOF
 }
 
 clang_format() {
-  find native benchmark examples tests/native \( -name '*.h' -o -name '*.hh' -o -name '*.cpp' \) -print0 |
+  find native benchmark examples tests \( -name '*.h' -o -name '*.hh' -o -name '*.cpp' \) -print0 |
     xargs -0 clang-format --dry-run -Werror
 }
 
