@@ -165,14 +165,14 @@ class BoundedMesh {
       Halfedge halfedge;
       Kernel::Halfedge kernel;
     };
-    struct Anchor {  ///< The halfedge by which the kernel finds the others of a vertex.
+    struct Outgoing {  ///< The halfedge by which the kernel finds the others of a vertex.
       Vertex vertex;
       Halfedge halfedge;
     };
     std::vector<OfVertex> vertices;
     std::vector<OfFace> faces;
     std::vector<OfHalfedge> halfedges;
-    std::vector<Anchor> anchors;
+    std::vector<Outgoing> outgoing;
   };
   Saved save(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces) const;
   /// Takes back all changes since save(), of which each was one of the saved faces and moved saved vertices alone.

@@ -335,7 +335,7 @@ bool PatchTrial::keep_sheets_apart() {
   const double reach = bounds_.forward().limit();
   std::vector<Separation> separations;
   deviations_.drop_separations();
-  for (const std::uint32_t id : around_->near(crossings_)) {
+  for (const std::uint32_t id : around_->faces_near(crossings_)) {
     poll();
     if (id >= mesh_.connectivity().n_faces()) continue;  // It never changes, and the frame does not have it.
     const Corners other = corners(id);
