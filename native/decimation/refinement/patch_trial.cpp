@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "decimation/patch_trial.h"
+#include "decimation/refinement/patch_trial.h"
 
 #include <algorithm>
 #include <cassert>
 #include <limits>
 
 #include "base/call.h"
-#include "decimation/separation.h"
+#include "decimation/refinement/separation.h"
 
 namespace tolvol {
 namespace {
