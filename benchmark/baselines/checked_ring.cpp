@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "baselines/checked_ring.h"
 
-#include "decimation/change.h"
+#include "check/changed_faces.h"
 
 namespace tolvol::baselines {
 
@@ -10,7 +10,7 @@ void CheckedRing::begin(const TriangleMesh&, const StoredSpace& space) { space_ 
 class CheckedRing::Asking final : public Trial {
  public:
   explicit Asking(const CheckedRing& ring) : ring_(ring) {}
-  bool accepts(const Change& change) override {
+  bool accepts(const ChangedFaces& change) override {
     points_.clear();
     indices_.clear();
     groups_.clear();
@@ -26,7 +26,7 @@ class CheckedRing::Asking final : public Trial {
         ring_.check_->check_groups({points_, *ring_.space_, indices_}, groups_, {.threads = 1});
     return verdicts.empty() || verdicts.front() == Verdict::inside;
   }
-  void commit(const Change&) override {}
+  void commit(const ChangedFaces&) override {}
 
  private:
   const CheckedRing& ring_;

@@ -5,8 +5,8 @@
 #include <memory>
 #include <optional>
 
+#include "check/ring_check.h"
 #include "check/tolerance_check.h"
-#include "decimation/ring_check.h"
 
 namespace tolvol::baselines {
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "decimation/change.h"
+#include "check/changed_faces.h"
 
 namespace tolvol::baselines {
 namespace {
@@ -92,12 +92,12 @@ bool permits(const PermissionGrid& grid, const glm::dvec3 (&corners)[3]) {
 class PermissionRing::Asking final : public Trial {
  public:
   explicit Asking(const PermissionGrid& grid) : grid_(grid) {}
-  bool accepts(const Change& change) override {
+  bool accepts(const ChangedFaces& change) override {
     return std::ranges::all_of(change.elements(), [&](const Coverage::Element& face) {
       return face.moved == 0 || permits(grid_, face.corners);
     });
   }
-  void commit(const Change&) override {}
+  void commit(const ChangedFaces&) override {}
 
  private:
   const PermissionGrid& grid_;

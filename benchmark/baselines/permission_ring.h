@@ -4,7 +4,7 @@
 #pragma once
 
 #include "baselines/permission_grid.h"
-#include "decimation/ring_check.h"
+#include "check/ring_check.h"
 
 namespace tolvol::baselines {
 

@@ -4,7 +4,7 @@
 // each time and keeps it with its nearest face; this is the same decision, faster.
 #include "baselines/vertex_samples.h"
 
-#include "decimation/change.h"
+#include "check/changed_faces.h"
 
 namespace tolvol::baselines {
 
@@ -26,10 +26,10 @@ class VertexSamples::Asking final : public Trial {
  public:
   explicit Asking(Coverage& samples) : samples_(samples) {}
   void begin() override { trial_.begin(); }
-  bool accepts(const Change& change) override {
+  bool accepts(const ChangedFaces& change) override {
     return samples_.try_change(change.elements(), change.removed(), trial_);
   }
-  void commit(const Change&) override { samples_.commit(trial_); }
+  void commit(const ChangedFaces&) override { samples_.commit(trial_); }
 
  private:
   Coverage& samples_;

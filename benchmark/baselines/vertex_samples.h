@@ -4,21 +4,22 @@
 /// collapse must find a new one for those of the faces it changes. The rest of the reference, and the result's own
 /// points, may be farther: the triangles between the vertices are never looked at.
 ///
-/// As the paper has it, it runs with half-edge collapses (DecimationOptions::Placement::subset) and keeps the removed
-/// vertices alone; here surviving ones have a face, too, which costs nothing (their distance is 0) and lets them move.
+/// In the paper the method runs with half-edge collapses (DecimationOptions::Placement::subset), and only the removed
+/// vertices have a face. Here the surviving ones have a face, too. This costs nothing, because their distance is 0, and
+/// lets them move.
 #pragma once
 
 #include <memory>
 #include <optional>
 
 #include "check/coverage.h"
-#include "decimation/ring_check.h"
+#include "check/ring_check.h"
 
 namespace tolvol::baselines {
 
 class VertexSamples final : public RingCheck {
  public:
-  /// `tolerance` in the frame.
+  /// `tolerance` is a length in the frame.
   explicit VertexSamples(double tolerance) : tolerance_(tolerance) {}
 
   void begin(const TriangleMesh& mesh, const StoredSpace& space) override;
@@ -29,7 +30,7 @@ class VertexSamples final : public RingCheck {
   class Asking;
 
   double tolerance_;
-  TriangleMesh points_;  // a triangle for each vertex, all of its corners there
+  TriangleMesh points_;  // It has a triangle for each vertex, with all corners there.
   std::optional<Coverage> samples_;
 };
 

@@ -91,7 +91,8 @@ float OcclusionQuery::bound(double mapping_error) const {
                rounding = kUnit * (16 * h * largest + 32 * volume().frame_tolerance());
   const double bound = volume().provable(mapping_error) - h / std::sqrt(3.0) - kInterpolationLoss * h - rounding;
   if (!(bound > 0)) {
-    constexpr int kGood = 4;  // at this precision, in nodes per tolerance, 1.44 h are about a third of the tolerance
+    // At this precision, in nodes per tolerance, 1.44 h are about a third of the tolerance.
+    constexpr int kGood = 4;
     std::ostringstream text;
     text << "the method occlusion_query needs a finer grid: at a precision of " << volume().precision()
          << " what its samples stand for is larger than the tolerance; take precision=" << kGood;

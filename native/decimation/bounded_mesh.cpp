@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "base/call.h"
+#include "decimation/certified_bounds.h"
 #include "decimation/change.h"
 #include "decimation/regions.h"
 #include "topology/connectivity.h"
@@ -13,6 +14,7 @@ namespace tolvol {
 
 BoundedMesh::BoundedMesh(BoundedMeshInput input, Bounds* bounds, Team& team)
     : bounds_(bounds),
+      certified_(dynamic_cast<CertifiedBounds*>(bounds)),
       subset_(input.subset),
       store_(std::move(input.store)),
       cell_(input.cell),
@@ -215,7 +217,7 @@ BoundedMesh::Saved BoundedMesh::save(std::span<const std::uint32_t> vertices,
       const Vertex start = mesh_.from_vertex_handle(h);
       const Halfedge opposite = mesh_.opposite_halfedge_handle(h);
       saved.halfedges.push_back({h, mesh_.halfedge(h)});
-      saved.anchors.push_back({start, mesh_.halfedge_handle(start)});
+      saved.outgoing.push_back({start, mesh_.halfedge_handle(start)});
       if (mesh_.is_boundary(opposite)) saved.halfedges.push_back({opposite, mesh_.halfedge(opposite)});
     }
   }
@@ -232,7 +234,7 @@ void BoundedMesh::restore(const Saved& saved) {
     mesh_.set_next_halfedge_handle(s.halfedge, mesh_.next_halfedge_handle(s.halfedge));
     mesh_.set_next_halfedge_handle(mesh_.prev_halfedge_handle(s.halfedge), s.halfedge);
   }
-  for (const Saved::Anchor& s : saved.anchors) mesh_.set_halfedge_handle(s.vertex, s.halfedge);
+  for (const Saved::Outgoing& s : saved.outgoing) mesh_.set_halfedge_handle(s.vertex, s.halfedge);
   for (const Saved::OfFace& s : saved.faces) {
     if (alive(s.face)) {
       count_around(triangles_[s.face], -1);

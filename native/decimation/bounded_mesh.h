@@ -5,7 +5,6 @@
 
 #include <OpenMesh/Core/Mesh/TriConnectivity.hh>
 #include <atomic>
-#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <glm/glm.hpp>
@@ -15,22 +14,17 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "decimation/bounds.h"
+#include "check/bounds.h"
 #include "decimation/occupied.h"
+#include "geometry/frame.h"
+#include "geometry/triangle_mesh.h"
 #include "topology/new_crossings.h"
 
 namespace tolvol {
 
+class CertifiedBounds;
 class Change;
 class Regions;
-
-/// A position as it is stored, and the same position in the frame, which is mapped from the stored one.
-struct VertexPosition {
-  glm::dvec3 stored, position;
-
-  /// Whether the stored type can hold it.
-  bool is_finite() const { return std::isfinite(glm::dot(position, glm::dvec3(1))); }
-};
 
 struct BoundedMeshInput {
   std::vector<glm::uvec3> triangles;      ///< An oriented manifold with boundary.
@@ -62,13 +56,16 @@ class BoundedMesh {
 
   const OpenMesh::TriConnectivity& connectivity() const { return mesh_; }
   Bounds* bounds() const { return bounds_; }
-  CertifiedBounds* certified() const { return bounds_ ? bounds_->certified() : nullptr; }
+  /// The certificates, if they decide. Only then can a proof be put off, or a position be fitted to the reference.
+  CertifiedBounds* certified() const { return certified_; }
   std::size_t triangle_count() const { return triangle_count_; }
   bool alive(std::uint32_t triangle) const { return !mesh_.status(face(triangle)).deleted(); }
   /// The vertex that a vertex was merged into (itself when it survives).
   std::uint32_t survivor(std::uint32_t vertex) const;
   const glm::uvec3& triangle(std::uint32_t triangle) const { return triangles_[triangle]; }
-  /// The triangles, those that are gone among them, and the stored positions. Valid as long as the mesh.
+  // The triangles, those that are gone among them, and the positions in the frame, or as they are stored. Valid as
+  // long as the mesh.
+  MeshView frame_mesh() const { return {triangles_, positions_}; }
   MeshView stored_mesh() const { return {triangles_, stored_}; }
   const glm::dvec3& position(std::uint32_t vertex) const { return positions_[vertex]; }
   const glm::dvec3& stored(std::uint32_t vertex) const { return stored_[vertex]; }
@@ -80,6 +77,8 @@ class BoundedMesh {
   bool left_original(std::uint32_t vertex) const { return left_original_[vertex] != 0; }
   /// The share of the forward bound that new faces around the vertex may use.
   double share(std::uint32_t vertex) const { return shares_.empty() ? 1 : shares_[vertex]; }
+  /// The same for all vertices; empty if it is 1 for each. Valid as long as the mesh.
+  std::span<const double> shares() const { return shares_; }
   /// How many faces have the vertex as a corner.
   std::uint32_t faces_around(std::uint32_t vertex) const {
     return faces_around_[vertex].load(std::memory_order_relaxed);
@@ -166,14 +165,14 @@ class BoundedMesh {
       Halfedge halfedge;
       Kernel::Halfedge kernel;
     };
-    struct Anchor {  ///< The halfedge by which the kernel finds the others of a vertex.
+    struct Outgoing {  ///< The halfedge by which the kernel finds the others of a vertex.
       Vertex vertex;
       Halfedge halfedge;
     };
     std::vector<OfVertex> vertices;
     std::vector<OfFace> faces;
     std::vector<OfHalfedge> halfedges;
-    std::vector<Anchor> anchors;
+    std::vector<Outgoing> outgoing;
   };
   Saved save(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces) const;
   /// Takes back all changes since save(), of which each was one of the saved faces and moved saved vertices alone.
@@ -189,6 +188,7 @@ class BoundedMesh {
 
   OpenMesh::TriConnectivity mesh_;
   Bounds* bounds_;
+  CertifiedBounds* certified_;
   bool subset_;
   std::function<VertexPosition(const glm::dvec3&)> store_;
   Box cell_;

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "base/call.h"
-#include "decimation/change.h"
+#include "check/changed_faces.h"
 #include "decimation/replaced_faces.h"
 
 namespace tolvol {
@@ -67,20 +67,20 @@ void CertifiedBounds::restore(const Saved& saved, std::span<const std::uint32_t>
 class CertifiedBounds::VertexTrial : public Trial {
  public:
   explicit VertexTrial(CertifiedBounds& bounds) : bounds_(bounds) {}
-  bool accepts(const Change& change) override { return vertex_is_inside(change) && seems_to_face(change); }
-  void commit(const Change& change) override {
+  bool accepts(const ChangedFaces& change) override { return vertex_is_inside(change) && seems_to_face(change); }
+  void commit(const ChangedFaces& change) override {
     for (const std::uint32_t v : change.carried()) bounds_.note(v, vertex_bound_);
     for (const std::uint32_t v : change.moved_along()) bounds_.note(v, vertex_bound_);
     if (const auto v = change.vertex()) bounds_.note(*v, vertex_bound_);
   }
 
  protected:
-  bool vertex_is_inside(const Change& change) {
+  bool vertex_is_inside(const ChangedFaces& change) {
     vertex_bound_ = bounds_.forward().point_bound(change.position().position);
     return vertex_bound_.distance <= change.share() * bounds_.forward().limit();
   }
 
-  bool seems_to_face(const Change& change) const;
+  bool seems_to_face(const ChangedFaces& change) const;
 
   CertifiedBounds& bounds_;
   PointBound vertex_bound_;  ///< An upper bound on the vertex's distance to the reference.
@@ -88,14 +88,14 @@ class CertifiedBounds::VertexTrial : public Trial {
 
 /// Whether each face is admitted by a triangle that bounds one of its corners. The proof of a whole region fails with
 /// one face that is turned too far, and then all of the region is done again: asking here makes this rare.
-bool CertifiedBounds::VertexTrial::seems_to_face(const Change& change) const {
+bool CertifiedBounds::VertexTrial::seems_to_face(const ChangedFaces& change) const {
   for (std::size_t i = 0; i < change.elements().size(); ++i) {
     const Coverage::Element& element = change.elements()[i];
     if (element.moved == 0) continue;
     std::optional<Facing> facing;
     if (!bounds_.start(element.id, element.corners, facing)) return false;
     if (!facing) continue;
-    const Change::Face& face = change.faces()[i];
+    const ChangedFaces::Face& face = change.faces()[i];
     const auto is_admitted = [&](int k) {
       const std::uint32_t below = (k == face.corner ? vertex_bound_ : bounds_.vertex_bound(face.vertices[k])).triangle;
       return below != Hierarchy::kNone && facing->admits(below);
@@ -110,16 +110,18 @@ class CertifiedBounds::FullTrial final : public VertexTrial {
  public:
   using VertexTrial::VertexTrial;
   void begin() override { failed_last_ = 0, backward_.begin(), boundary_backward_.begin(); }
-  bool accepts(const Change& change) override {
+  bool accepts(const ChangedFaces& change) override {
     Coverage* const backward = bounds_.backward();
     return (!change.vertex() || vertex_is_inside(change)) && !shows_outside(change) &&
            (!backward || backward->try_change(change.elements(), change.removed(), backward_)) &&
            faces_are_inside(change) && boundary_is_inside(change);
   }
-  void commit(const Change& change) override {
+  void commit(const ChangedFaces& change) override {
     VertexTrial::commit(change);
     if (Coverage* const backward = bounds_.backward()) backward->commit(backward_);
-    if (!boundary_elements_.empty()) bounds_.directions_.boundary_backward->commit(boundary_backward_);
+    if (Coverage* const boundary = bounds_.boundary_backward(); boundary && !change.boundary().elements.empty()) {
+      boundary->commit(boundary_backward_);
+    }
     for (std::size_t i = 0; i < face_bounds_.size(); ++i) {
       bounds_.note_face(change.elements()[i].id, face_bounds_[i]);
     }
@@ -128,17 +130,14 @@ class CertifiedBounds::FullTrial final : public VertexTrial {
 
  private:
   bool is_large(const Coverage::Element& e) const;
-  bool shows_outside(const Change& change);
-  bool faces_are_inside(const Change& change);
-  bool face_is_inside(const Change& change, std::size_t i);
-  double turn(const Change& change, std::size_t i, const Facing& facing) const;
-  void gather_replaced_faces(const Change& change);
-  bool gather_boundary(const Change& change);
-  bool boundary_is_inside(const Change& change);
+  bool shows_outside(const ChangedFaces& change);
+  bool faces_are_inside(const ChangedFaces& change);
+  bool face_is_inside(const ChangedFaces& change, std::size_t i);
+  double turn(const ChangedFaces& change, std::size_t i, const Facing& facing) const;
+  void gather_replaced_faces(const ChangedFaces& change);
+  bool boundary_is_inside(const ChangedFaces& change);
 
   ReplacedFaces replaced_faces_;
-  std::vector<Coverage::Element> boundary_elements_;
-  std::vector<Coverage::Removed> boundary_removed_;
   Coverage::Trial backward_, boundary_backward_;
   std::vector<FaceBound> face_bounds_;  ///< For each face of the change.
   /// The face that failed last: of another try at the same place it is the likeliest to fail.
@@ -157,7 +156,7 @@ bool CertifiedBounds::FullTrial::is_large(const Coverage::Element& e) const {
 }
 
 /// Whether a point of a large face is outside. It is asked before anything is proved in vain.
-bool CertifiedBounds::FullTrial::shows_outside(const Change& change) {
+bool CertifiedBounds::FullTrial::shows_outside(const ChangedFaces& change) {
   const std::size_t count = change.elements().size();
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t i = (failed_last_ + k) % count;
@@ -171,7 +170,7 @@ bool CertifiedBounds::FullTrial::shows_outside(const Change& change) {
   return false;
 }
 
-bool CertifiedBounds::FullTrial::faces_are_inside(const Change& change) {
+bool CertifiedBounds::FullTrial::faces_are_inside(const ChangedFaces& change) {
   const std::size_t count = change.elements().size();
   replaced_faces_.clear();
   face_bounds_.resize(count);
@@ -185,9 +184,9 @@ bool CertifiedBounds::FullTrial::faces_are_inside(const Change& change) {
   return true;
 }
 
-bool CertifiedBounds::FullTrial::face_is_inside(const Change& change, std::size_t i) {
+bool CertifiedBounds::FullTrial::face_is_inside(const ChangedFaces& change, std::size_t i) {
   const Coverage::Element& element = change.elements()[i];
-  const Change::Face& face = change.faces()[i];
+  const ChangedFaces::Face& face = change.faces()[i];
   FaceBound& bound = face_bounds_[i];
   bound = bounds_.face_bound(element.id);
   if (element.moved == 0) return true;
@@ -214,7 +213,7 @@ bool CertifiedBounds::FullTrial::face_is_inside(const Change& change, std::size_
 }
 
 /// By how much a change turns a face at most.
-double CertifiedBounds::FullTrial::turn(const Change& change, std::size_t i, const Facing& facing) const {
+double CertifiedBounds::FullTrial::turn(const ChangedFaces& change, std::size_t i, const Facing& facing) const {
   const Coverage::Element& element = change.elements()[i];
   glm::dvec3 before[3] = {element.corners[0], element.corners[1], element.corners[2]};
   before[change.faces()[i].corner] = change.faces()[i].before;
@@ -223,11 +222,10 @@ double CertifiedBounds::FullTrial::turn(const Change& change, std::size_t i, con
   return known ? angle_bound(glm::dot(was->normal(), facing.normal())) : std::numbers::pi;
 }
 
-void CertifiedBounds::FullTrial::gather_replaced_faces(const Change& change) {
-  const BoundedMesh& mesh = change.mesh();
+void CertifiedBounds::FullTrial::gather_replaced_faces(const ChangedFaces& change) {
   const auto add = [&](std::uint32_t id) {
-    const glm::uvec3& t = mesh.triangle(id);
-    const glm::dvec3 corners[3] = {mesh.position(t.x), mesh.position(t.y), mesh.position(t.z)};
+    const auto [a, b, c] = change.before().corners(id);
+    const glm::dvec3 corners[3] = {a, b, c};
     std::optional<Facing> facing;
     bounds_.start(id, corners, facing);
     replaced_faces_.add(corners, bounds_.face_bound(id), facing ? std::optional(facing->normal()) : std::nullopt);
@@ -236,45 +234,18 @@ void CertifiedBounds::FullTrial::gather_replaced_faces(const Change& change) {
   for (const Coverage::Removed& r : change.removed()) add(r.id);
 }
 
-/// Gathers the boundary edges as a collapse would leave them. Edges that were cut are none: they cover nothing. Returns
-/// false if a new edge might lie on those of other sheets, so that it would be no boundary either.
-bool CertifiedBounds::FullTrial::gather_boundary(const Change& change) {
-  boundary_elements_.clear(), boundary_removed_.clear();
+bool CertifiedBounds::FullTrial::boundary_is_inside(const ChangedFaces& change) {
   if (!bounds_.bounds_boundaries()) return true;
-  const BoundedMesh& mesh = change.mesh();
-  const OpenMesh::TriConnectivity& connectivity = mesh.connectivity();
-  BoundedMesh::Halfedge edge = change.halfedge();
-  if (!connectivity.is_boundary(edge)) edge = connectivity.opposite_halfedge_handle(edge);
-  if (!connectivity.is_boundary(edge)) return true;
-  // The boundary runs a -> s -> t -> c; s and t merge into one.
-  const auto previous = connectivity.prev_halfedge_handle(edge), next = connectivity.next_halfedge_handle(edge);
-  const std::uint32_t a = mesh.from(previous), s = mesh.from(edge), t = mesh.to(edge), c = mesh.to(next);
-  const glm::dvec3 &p = change.position().position, &pa = mesh.position(a), &pc = mesh.position(c);
-  const double moved_s = glm::length(mesh.position(s) - p), moved_t = glm::length(mesh.position(t) - p);
-  if (change.vertex() == t) {
-    if (mesh.is_cut(a, t)) return false;
-    boundary_elements_.push_back({a, {pa, p, p}, moved_s});
-    if (!mesh.is_cut(t, c)) boundary_elements_.push_back({t, {p, pc, pc}, moved_t});
-    boundary_removed_.push_back({s, 0, std::max(moved_s, moved_t)});
-  } else {
-    if (mesh.is_cut(s, c)) return false;
-    boundary_elements_.push_back({s, {p, pc, pc}, std::max(moved_s, moved_t)});
-    if (!mesh.is_cut(a, s)) boundary_elements_.push_back({a, {pa, p, p}, moved_s});
-    boundary_removed_.push_back({t, 0, moved_t});
-  }
-  return true;
-}
-
-bool CertifiedBounds::FullTrial::boundary_is_inside(const Change& change) {
-  if (!gather_boundary(change)) return false;
-  if (boundary_elements_.empty()) return true;
+  const ChangedFaces::Boundary& boundary = change.boundary();
+  if (boundary.lies_on_others) return false;
+  if (boundary.elements.empty()) return true;
   const Directions& directions = bounds_.directions_;
   const glm::dvec3 unknown(std::numeric_limits<double>::infinity());
-  for (const Coverage::Element& e : boundary_elements_) {
+  for (const Coverage::Element& e : boundary.elements) {
     if (e.moved > 0 && directions.boundary_forward->bound(e.corners, unknown) == TriangleCertificate::kUnproved)
       return false;
   }
-  return directions.boundary_backward->try_change(boundary_elements_, boundary_removed_, boundary_backward_);
+  return directions.boundary_backward->try_change(boundary.elements, boundary.removed, boundary_backward_);
 }
 
 }  // namespace tolvol

@@ -13,12 +13,12 @@
 #include <span>
 #include <vector>
 
+#include "check/bounds.h"
 #include "check/certificate.h"
 #include "check/coverage.h"
 #include "check/facing.h"
-#include "decimation/bounds.h"
 #include "decimation/face_bound.h"
-#include "topology/faces_cross.h"
+#include "geometry/triangle_mesh.h"
 
 namespace tolvol {
 
@@ -40,7 +40,6 @@ class CertifiedBounds final : public Bounds {
   std::unique_ptr<Trial> trial() override;
   /// A trial that asks only where the vertex is: a DeferredProof has to prove the rest.
   std::unique_ptr<Trial> trial_on_trust();
-  CertifiedBounds* certified() override { return this; }
 
   const TriangleCertificate& forward() const { return directions_.forward; }
   /// Null if only the forward direction is asked for.

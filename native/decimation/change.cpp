@@ -43,20 +43,22 @@ bool turns_too_far(const glm::dvec3& before, const glm::dvec3& after) {
 
 bool Change::meets_another() const {
   if (kind_ == Kind::flip) return false;
-  const std::uint32_t other = kind_ == Kind::collapse ? mesh_->from(halfedge_) : vertex_;
-  return mesh_->meets_another(position_, vertex_, other);
+  const std::uint32_t other = kind_ == Kind::collapse ? mesh_->from(halfedge_) : *vertex_;
+  return mesh_->meets_another(position_, *vertex_, other);
 }
 
 void Change::clear(Kind kind, const VertexPosition& target) {
-  kind_ = kind, position_ = target, share_ = 1;
+  kind_ = kind, vertex_.reset(), position_ = target, share_ = 1;
   collapses_.clear(), carried_.clear(), moved_along_.clear();
   elements_.clear(), faces_.clear(), removed_.clear(), vanishing_.clear(), new_wedges_.clear();
+  boundary_.elements.clear(), boundary_.removed.clear(), boundary_.lies_on_others = false;
 }
 
 bool Change::prepare_collapse(Halfedge h, const VertexPosition& target) {
   clear(Kind::collapse, target);
-  halfedge_ = h, vertex_ = mesh_->to(h);
-  share_ = std::min(mesh_->share(vertex_), mesh_->share(mesh_->from(h)));
+  const std::uint32_t kept = mesh_->to(h);
+  halfedge_ = h, vertex_ = kept;
+  share_ = std::min(mesh_->share(kept), mesh_->share(mesh_->from(h)));
   collapses_.assign(1, h);
   if (mesh_->joined(mesh_->from(h)) && !gather_copies(h)) return false;
   for (const Halfedge each : collapses_) {
@@ -67,9 +69,9 @@ bool Change::prepare_collapse(Halfedge h, const VertexPosition& target) {
     if (!link_condition(each) || !gather(each, target.position)) return false;
     if (mesh_->has_wedges() && !wedges_fit(each)) return false;
   }
-  if (target.position != mesh_->position(vertex_)) {
-    std::ranges::copy_if(mesh_->copies(vertex_), std::back_inserter(moved_along_),
-                         [&](std::uint32_t copy) { return copy != vertex_; });
+  if (target.position != mesh_->position(kept)) {
+    std::ranges::copy_if(mesh_->copies(kept), std::back_inserter(moved_along_),
+                         [&](std::uint32_t copy) { return copy != kept; });
   }
   for (const std::uint32_t v : carried_) gather_side(v, target.position);
   for (const std::uint32_t copy : moved_along_) {
@@ -84,6 +86,7 @@ bool Change::prepare_collapse(Halfedge h, const VertexPosition& target) {
       if (face.vertices[face.corner] == mesh_->from(each)) face.vertices[face.corner] = mesh_->to(each);
     }
   }
+  gather_boundary();
   return true;
 }
 
@@ -259,7 +262,7 @@ bool Change::gather_copies(Halfedge h) {
   for (const std::uint32_t copy : mesh_->copies(mesh_->from(h))) {
     const auto v = BoundedMesh::handle(copy);
     std::size_t edges = 0;
-    for (const std::uint32_t end : mesh_->copies(vertex_)) {
+    for (const std::uint32_t end : mesh_->copies(*vertex_)) {
       const Halfedge edge = mesh.find_halfedge(v, BoundedMesh::handle(end));
       if (!edge.is_valid()) continue;
       if (edges++ > 0) return false;
@@ -281,6 +284,7 @@ bool Change::gather_copies(Halfedge h) {
 /// The link condition of the result, in which copies are one vertex: a vertex next to both ends is next to the edge,
 /// no face comes to lie on another, and none has two corners at one place.
 bool Change::slots_fit() {
+  const std::uint32_t kept = *vertex_;
   const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
   apexes_.clear();
   for (const Halfedge edge : collapses_) {
@@ -292,7 +296,7 @@ bool Change::slots_fit() {
     return std::find(apexes_.begin(), apexes_.end(), slot) != apexes_.end();
   };
   around_.clear();
-  for (const std::uint32_t copy : mesh_->copies(vertex_)) {
+  for (const std::uint32_t copy : mesh_->copies(kept)) {
     for (const auto v : mesh.vv_range(BoundedMesh::handle(copy))) {
       around_.push_back(mesh_->slot(static_cast<std::uint32_t>(v.idx())));
     }
@@ -300,7 +304,7 @@ bool Change::slots_fit() {
   std::sort(around_.begin(), around_.end());
   // Whether a face joins the kept vertex with vertices of these two slots already.
   const auto has_face = [&](std::uint32_t a, std::uint32_t b) {
-    return std::ranges::any_of(mesh_->copies(vertex_), [&](std::uint32_t copy) {
+    return std::ranges::any_of(mesh_->copies(kept), [&](std::uint32_t copy) {
       return std::ranges::any_of(mesh.vf_range(BoundedMesh::handle(copy)), [&](const auto& f) {
         const glm::uvec3& t = mesh_->triangle(static_cast<std::uint32_t>(f.idx()));
         const auto has = [&](std::uint32_t slot) {
@@ -314,8 +318,8 @@ bool Change::slots_fit() {
     if (!face.moves) continue;
     const std::uint32_t a = mesh_->slot(face.vertices[(face.corner + 1) % 3]),
                         b = mesh_->slot(face.vertices[(face.corner + 2) % 3]);
-    if (mesh_->slot(face.vertices[face.corner]) == mesh_->slot(vertex_)) continue;
-    if (a == b || a == mesh_->slot(vertex_) || b == mesh_->slot(vertex_)) return false;
+    if (mesh_->slot(face.vertices[face.corner]) == mesh_->slot(kept)) continue;
+    if (a == b || a == mesh_->slot(kept) || b == mesh_->slot(kept)) return false;
     if (is_apex(a) && is_apex(b) && has_face(a, b)) return false;
     for (const std::uint32_t slot : {a, b}) {
       if (!is_apex(slot) && std::binary_search(around_.begin(), around_.end(), slot)) return false;
@@ -335,10 +339,29 @@ bool Change::folds_over() const {
   return false;
 }
 
-double Change::share(const Face& face) const {
-  double least = share_;
-  for (const std::uint32_t v : face.vertices) least = std::min(least, mesh_->share(v));
-  return least;
+/// Gathers the boundary edges as the collapse would leave them. Edges that were cut are none: they cover nothing.
+void Change::gather_boundary() {
+  const OpenMesh::TriConnectivity& connectivity = mesh_->connectivity();
+  Halfedge edge = halfedge_;
+  if (!connectivity.is_boundary(edge)) edge = connectivity.opposite_halfedge_handle(edge);
+  if (!connectivity.is_boundary(edge)) return;
+  // The boundary runs a -> s -> t -> c; s and t merge into one.
+  const auto previous = connectivity.prev_halfedge_handle(edge), next = connectivity.next_halfedge_handle(edge);
+  const std::uint32_t a = mesh_->from(previous), s = mesh_->from(edge), t = mesh_->to(edge), c = mesh_->to(next);
+  const glm::dvec3 &p = position_.position, &pa = mesh_->position(a), &pc = mesh_->position(c);
+  const double moved_s = glm::length(mesh_->position(s) - p), moved_t = glm::length(mesh_->position(t) - p);
+  auto& [elements, removed, lies_on_others] = boundary_;
+  if (vertex_ == t) {
+    lies_on_others = mesh_->is_cut(a, t);
+    elements.push_back({a, {pa, p, p}, moved_s});
+    if (!mesh_->is_cut(t, c)) elements.push_back({t, {p, pc, pc}, moved_t});
+    removed.push_back({s, 0, std::max(moved_s, moved_t)});
+  } else {
+    lies_on_others = mesh_->is_cut(s, c);
+    elements.push_back({s, {p, pc, pc}, std::max(moved_s, moved_t)});
+    if (!mesh_->is_cut(a, s)) elements.push_back({a, {pa, p, p}, moved_s});
+    removed.push_back({t, 0, moved_t});
+  }
 }
 
 }  // namespace tolvol

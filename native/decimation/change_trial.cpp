@@ -26,7 +26,7 @@ bool ChangeTrial::prepare_collapse(Halfedge h, const VertexPosition& target) {
 
 ChangeTrial::Outcome ChangeTrial::try_collapse(Halfedge h, const VertexPosition& target) {
   if (!change_.mesh().may_hold(target)) return Outcome::refused;
-  if (around_ && !around_->reach(target)) return Outcome::impossible;
+  if (around_ && !around_->may_put(target)) return Outcome::impossible;
   return prepare_collapse(h, target) ? check() : Outcome::impossible;
 }
 

@@ -8,8 +8,8 @@
 #include <glm/glm.hpp>
 #include <memory>
 
+#include "check/bounds.h"
 #include "decimation/bounded_mesh.h"
-#include "decimation/bounds.h"
 #include "decimation/change.h"
 #include "decimation/surroundings.h"
 

@@ -10,7 +10,7 @@
 #include "decimation/collapse_rounds.h"
 #include "decimation/decimation_input.h"
 #include "decimation/decimation_output.h"
-#include "decimation/refinement.h"
+#include "decimation/refinement/refinement.h"
 
 namespace tolvol {
 namespace {

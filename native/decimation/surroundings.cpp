@@ -69,7 +69,7 @@ bool Surroundings::allow(const Change& change, Trial& trial) const {
   return allow(trial);
 }
 
-std::vector<std::uint32_t> Surroundings::near(const Trial& trial) const {
+std::vector<std::uint32_t> Surroundings::faces_near(const Trial& trial) const {
   Box all;
   std::vector<std::uint32_t> found, replaced;
   for (const NewCrossings::Face& face : trial.faces) all.add(box_of(face.corners)), replaced.push_back(face.id);

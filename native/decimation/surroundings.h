@@ -24,7 +24,7 @@ class Surroundings {
   Surroundings(const BoundedMesh& mesh, NewCrossings& crossings, std::vector<std::uint32_t> faces, const Box& cell);
 
   /// Whether a change may put a vertex there.
-  bool reach(const VertexPosition& target) const { return strictly_inside(target.stored, cell_); }
+  bool may_put(const VertexPosition& target) const { return strictly_inside(target.stored, cell_); }
 
   /// The corners of a face as it is now.
   Corners corners(std::uint32_t face) const { return crossings_.corners(face); }
@@ -45,7 +45,7 @@ class Surroundings {
   bool allow(Trial& trial) const { return crossings_.none(near_, trial.faces, trial.removed, trial.crossings); }
   /// The faces, in rising order, that the change may cross which the trial was asked about last, and that stay as they
   /// are.
-  std::vector<std::uint32_t> near(const Trial& trial) const;
+  std::vector<std::uint32_t> faces_near(const Trial& trial) const;
   /// Whether none of some faces that were changed on trust, as they are now, crosses others anew or is degenerate.
   bool allow(std::span<const std::uint32_t> changed) const { return crossings_.none(near_, changed); }
   /// Follows a change, which `trial` was asked about last, before it is carried out on the mesh. Returns a box around

@@ -169,7 +169,7 @@ TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid
       const float my = py - t.middle.y, mz = pz - t.middle.z, to_middle = my * my + mz * mz;
       const std::size_t row = grid.index(0, y, z);
       for (int next = xbegin; next <= xend; next += kLanes) {
-        const int x = std::min(next, grid.pitch - kLanes);  // so that no vector runs into the next row
+        const int x = std::min(next, grid.pitch - kLanes);  // No vector may run into the next row.
         const Floats px = (first.x + static_cast<float>(x) * hf) + lane;
         Floats old;
         __builtin_memcpy(&old, &grid.distance[row + x], sizeof old);

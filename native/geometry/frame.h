@@ -4,6 +4,7 @@
 /// about 1, so that neither a far origin nor a tiny or huge scale costs accuracy.
 #pragma once
 
+#include <cmath>
 #include <glm/glm.hpp>
 #include <span>
 #include <vector>
@@ -88,6 +89,14 @@ class StoredSpace {
   glm::dvec3 anchor_{0};         ///< The stored position of the frame's centre, rounded.
   glm::dvec3 anchor_offset_{0};  ///< From the frame's centre to the anchor in the world, rounded only once.
   double anchor_error_ = 0;      ///< How far a coordinate of the offset may be off before it was rounded.
+};
+
+/// A position as it is stored, and the same position in the frame, which is mapped from the stored one.
+struct VertexPosition {
+  glm::dvec3 stored, position;
+
+  /// Whether the stored type can hold it.
+  bool is_finite() const { return std::isfinite(glm::dot(position, glm::dvec3(1))); }
 };
 
 /// Returns the length that 100 % stands for, in world units: the longest of the four diagonals of the local bounding

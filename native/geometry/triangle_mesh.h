@@ -2,6 +2,7 @@
 /// A triangle mesh as plain arrays, and the conditions that must hold before anything is computed from one.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <limits>
@@ -13,6 +14,19 @@ namespace tolvol {
 struct TriangleMesh {
   std::vector<glm::dvec3> vertices;
   std::vector<glm::uvec3> triangles;
+};
+
+using Corners = std::array<glm::dvec3, 3>;
+
+/// Triangles and positions that someone else holds.
+struct MeshView {
+  std::span<const glm::uvec3> triangles;
+  std::span<const glm::dvec3> vertices;
+
+  Corners corners(std::uint32_t triangle) const {
+    const glm::uvec3& t = triangles[triangle];
+    return {vertices[t.x], vertices[t.y], vertices[t.z]};
+  }
 };
 
 /// An axis-aligned box. It is empty until a point is added.

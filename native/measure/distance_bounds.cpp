@@ -50,8 +50,6 @@ constexpr double kTouching = 4 * kUnitRoundoff;
 // This is a length in the frame. Its derivation is above.
 constexpr double kRounding = 64 * kUnitRoundoff;
 
-using Corners = std::array<dvec3, 3>;
-
 dvec3 direction(const dvec3& v) {
   const double length = glm::length(v);
   return length < 1e-150 ? dvec3(0) : v / length;  // the square of a shorter vector has lost its bits

@@ -81,8 +81,9 @@ struct Piece {
   std::array<dvec3, 3> corner;
   double error = 0;
   double upper = 0;
-  std::uint32_t triangle = 0;             // is a triangle of a
-  std::uint32_t near = Hierarchy::kNone;  // is the triangle of b that gives `upper`; before that it is a guess
+  std::uint32_t triangle = 0;  // This is a triangle of a.
+  // This triangle of b gives `upper`. Until one is looked for, it is a guess.
+  std::uint32_t nearest = Hierarchy::kNone;
 };
 
 /// A piece that waits to be split. Pieces are not moved while the queue is put in order.
@@ -219,10 +220,10 @@ class Search {
         for (std::size_t i = begin; i < end; ++i) {
           pieces[i].triangle = std::uint32_t(chunk + i);
           pieces[i].corner = corners(a_, pieces[i].triangle);
-          pieces[i].near = hint;
+          pieces[i].nearest = hint;
           Sampled sampled;
           samples[i] = evaluate(pieces[i], sampled);
-          hint = pieces[i].near;
+          hint = pieces[i].nearest;
         }
       });
       learn(samples);
@@ -282,24 +283,24 @@ class Search {
   Sample evaluate(Piece& piece, Sampled& sampled) const {
     const double margin = kUpperMargin + piece.error, enough = cutoff() - margin;
     if (enough >= 0) {
-      const Hierarchy::Common common = hierarchy_.common(piece.corner, enough, enough, piece.near);
+      const Hierarchy::Common common = hierarchy_.common(piece.corner, enough, enough, piece.nearest);
       if (common.triangle != Hierarchy::kNone) {
-        piece.near = common.triangle;
+        piece.nearest = common.triangle;
         piece.upper = common.distance + margin;
         return {};
       }
     }
     const dvec3 middle = (piece.corner[0] + piece.corner[1] + piece.corner[2]) / 3.0;
-    const Hierarchy::Nearest nearest = hierarchy_.nearest(middle, kInfinity, piece.near);
-    piece.near = nearest.triangle;
+    const Hierarchy::Nearest nearest = hierarchy_.nearest(middle, kInfinity, piece.nearest);
+    piece.nearest = nearest.triangle;
     piece.upper = 0;
     Sample best{nearest.distance, middle, piece.error, piece.triangle};
-    const std::array<dvec3, 3> t = corners(b_, piece.near);
+    const std::array<dvec3, 3> t = corners(b_, piece.nearest);
     for (const dvec3& corner : piece.corner) {
       const double distance = std::sqrt(closest_point(corner, t[0], t[1], t[2]).distance_squared);
       piece.upper = std::max(piece.upper, distance + margin);
       if (!sampled.add(corner) || distance <= std::max(lower_, best.distance)) continue;
-      best.improve({far_from(corner, piece.near).distance, corner, piece.error, piece.triangle});
+      best.improve({far_from(corner, piece.nearest).distance, corner, piece.error, piece.triangle});
     }
     return best;
   }
@@ -358,24 +359,24 @@ class Search {
     return piece;
   }
 
-  /// Returns the triangle nearest to the corner of a piece that is farthest from piece.near. This takes as long as a
+  /// Returns the triangle nearest to the corner of a piece that is farthest from piece.nearest. This takes as long as a
   /// split, and most pieces end without it, so that it is found only after some splits.
-  std::uint32_t other_near(const Piece& piece) const {
-    if (piece.error < kSplitsWithOneTriangle * kSplitError) return piece.near;
-    const std::array<dvec3, 3> t = corners(b_, piece.near);
+  std::uint32_t other_nearest(const Piece& piece) const {
+    if (piece.error < kSplitsWithOneTriangle * kSplitError) return piece.nearest;
+    const std::array<dvec3, 3> t = corners(b_, piece.nearest);
     const dvec3* farthest = nullptr;
     double most = -1;
     for (const dvec3& corner : piece.corner) {
       const double squared = closest_point(corner, t[0], t[1], t[2]).distance_squared;
       if (squared > most) most = squared, farthest = &corner;
     }
-    return hierarchy_.nearest(*farthest, kInfinity, piece.near).triangle;
+    return hierarchy_.nearest(*farthest, kInfinity, piece.nearest).triangle;
   }
 
   /// Returns no part if the piece is too small.
   Children split(const Piece& whole) const {
     const Piece piece = flattened(whole);
-    const Parts parts = tolvol::split(piece.corner, corners(b_, piece.near), corners(b_, other_near(piece)));
+    const Parts parts = tolvol::split(piece.corner, corners(b_, piece.nearest), corners(b_, other_nearest(piece)));
     Children children{{piece, piece, piece}, parts.count};
     for (int i = 0; i < parts.count; ++i) {
       children.piece[i].corner = parts.corners[i];

@@ -62,30 +62,30 @@ MovingMesh::PointBound MovingMesh::bound_at(std::uint32_t vertex, const glm::dve
   return found;
 }
 
-MovingMesh::Reach MovingMesh::reach_by_motion(std::uint32_t face) const {
+MovingMesh::FaceBound MovingMesh::bound_by_motion(std::uint32_t face) const {
   double step = 0;
   for (const std::uint32_t v : corners_of(face)) step = std::max(step, step_[v]);
-  Reach reach;
+  FaceBound bound;
   if (step == 0) {
-    reach.distance = reach_[face];
-    if (facing_) reach.facing.room = facing_->room(face);
-    return reach;
+    bound.distance = distance_[face];
+    if (facing_) bound.facing.room = facing_->room(face);
+    return bound;
   }
-  const double distance = (reach_[face] + step) * (1 + kInflate);
-  if (!(distance <= kEasy * limit_)) return reach;
+  const double distance = (distance_[face] + step) * (1 + kInflate);
+  if (!(distance <= kEasy * limit_)) return bound;
   if (facing_) {
-    reach.facing.room = facing_->room(face) - step;
-    if (!(reach.facing.room > 0)) {
-      reach.facing.room = std::numeric_limits<double>::infinity();
+    bound.facing.room = facing_->room(face) - step;
+    if (!(bound.facing.room > 0)) {
+      bound.facing.room = std::numeric_limits<double>::infinity();
       for_triangles(face, [&](std::size_t k, const TriangleCorners& at, const auto&) {
-        facing_->follow(face, k, at, reach.facing.room);
-        return reach.facing.room >= 0;
+        facing_->follow(face, k, at, bound.facing.room);
+        return bound.facing.room >= 0;
       });
-      if (reach.facing.room < 0) return reach;
+      if (bound.facing.room < 0) return bound;
     }
   }
-  reach.distance = distance;
-  return reach;
+  bound.distance = distance;
+  return bound;
 }
 
 /// The largest distance of any triangle that the face may consist of.
@@ -95,11 +95,11 @@ double MovingMesh::distance_by(const TriangleCertificate& certificate, std::uint
   known.room = std::numeric_limits<double>::infinity();
   for_triangles(face, [&](std::size_t k, const TriangleCorners& at, const PointBound* const(&of)[3]) {
     const glm::dvec3 bounds(of[0]->distance, of[1]->distance, of[2]->distance);
-    const glm::uvec3 near(of[0]->triangle, of[1]->triangle, of[2]->triangle);
+    const glm::uvec3 hints(of[0]->triangle, of[1]->triangle, of[2]->triangle);
     std::optional<Facing> facing;
     if (facing_) {
       if (!facing_->start(face, k, at, facing)) largest = kUnproved;
-      if (facing) facing->set_corners(near);
+      if (facing) facing->set_corners(hints);
     }
     if (largest != kUnproved) {
       Facing* const rule = facing ? &*facing : nullptr;
@@ -107,7 +107,7 @@ double MovingMesh::distance_by(const TriangleCertificate& certificate, std::uint
       if (const std::optional<glm::dvec3> point = certificate.point_outside(at, rule)) {
         largest = kUnproved, open = *point;
       } else {
-        largest = std::max(largest, certificate.bound_in_any_order(at, bounds, near, rule, blame ? &open : nullptr));
+        largest = std::max(largest, certificate.bound_in_any_order(at, bounds, hints, rule, blame ? &open : nullptr));
       }
       if (blame && largest == kUnproved) {
         blame->triangle = static_cast<std::uint32_t>(k);
@@ -120,17 +120,17 @@ double MovingMesh::distance_by(const TriangleCertificate& certificate, std::uint
   return largest;
 }
 
-MovingMesh::Reach MovingMesh::reach_by_certificate(std::uint32_t face, Blame* blame) const {
-  Reach reach;
+MovingMesh::FaceBound MovingMesh::bound_by_certificate(std::uint32_t face, Blame* blame) const {
+  FaceBound bound;
   for (const std::uint32_t v : corners_of(face)) {
-    if (trial_[v].bound.distance > limit_) return reach;
+    if (trial_[v].bound.distance > limit_) return bound;
   }
   // The first question is the one that Certificate asks, so that it proves the face again; then comes the headroom.
   for (const TriangleCertificate& certificate : certificates_) {
-    reach.distance = distance_by(certificate, face, reach.facing, blame);
-    if (reach.distance <= limit_ || reach.distance == kUnproved) break;
+    bound.distance = distance_by(certificate, face, bound.facing, blame);
+    if (bound.distance <= limit_ || bound.distance == kUnproved) break;
   }
-  return reach;
+  return bound;
 }
 
 /// Whether no proof of the face is possible on trial, because the point that was open last is open there, too.
@@ -149,21 +149,21 @@ bool MovingMesh::refuses_again(std::uint32_t face, const Blame& blame) const {
 }
 
 /// What is known on trial of a face that is to blame for the last refusal.
-MovingMesh::Reach MovingMesh::reach_of_blamed(std::uint32_t face, Blame& blame) const {
-  const Reach reach = reach_by_motion(face);
-  if (reach.distance != kUnproved) return reach;
+MovingMesh::FaceBound MovingMesh::bound_of_blamed(std::uint32_t face, Blame& blame) const {
+  const FaceBound bound = bound_by_motion(face);
+  if (bound.distance != kUnproved) return bound;
   if (refuses_again(face, blame)) return {};
-  return reach_by_certificate(face, &blame);
+  return bound_by_certificate(face, &blame);
 }
 
-void MovingMesh::set_trial_reach(std::uint32_t face, const Reach& reach) {
-  trial_reach_[face] = reach.distance;
-  if (facing_) facing_->set_trial(face, reach.facing);
+void MovingMesh::set_trial_bound(std::uint32_t face, const FaceBound& bound) {
+  trial_distance_[face] = bound.distance;
+  if (facing_) facing_->set_trial(face, bound.facing);
 }
 
 /// Makes what is known of a face on trial the state.
 void MovingMesh::accept(std::uint32_t face) {
-  reach_[face] = trial_reach_[face];
+  distance_[face] = trial_distance_[face];
   if (facing_) facing_->accept(face);
 }
 
@@ -185,13 +185,13 @@ void MovingMesh::measure(std::span<const std::uint32_t> faces, Progress* progres
   });
 }
 
-/// Writes trial_reach_ of all these faces.
+/// Writes trial_distance_ of all these faces.
 std::vector<std::uint32_t> MovingMesh::failing(std::span<const std::uint32_t> faces, Progress* progress) {
   if (progress) progress->update(progress->fraction());
   std::vector<std::uint32_t> open = select(faces.size(), threads_, [&](std::size_t i) {
-    const Reach reach = reach_by_motion(faces[i]);
-    set_trial_reach(faces[i], reach);
-    return reach.distance == kUnproved;
+    const FaceBound bound = bound_by_motion(faces[i]);
+    set_trial_bound(faces[i], bound);
+    return bound.distance == kUnproved;
   });
   for (std::uint32_t& i : open) i = faces[i];
   measure(open, progress);
@@ -199,9 +199,9 @@ std::vector<std::uint32_t> MovingMesh::failing(std::span<const std::uint32_t> fa
   parallel_for(open.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(progress->fraction());
     for (std::size_t i = begin; i < end; ++i) {
-      const Reach reach = reach_by_certificate(open[i]);
-      set_trial_reach(open[i], reach);
-      failed[i] = reach.distance == kUnproved;
+      const FaceBound bound = bound_by_certificate(open[i]);
+      set_trial_bound(open[i], bound);
+      failed[i] = bound.distance == kUnproved;
     }
   });
   return chosen(open, failed);
@@ -243,19 +243,19 @@ bool MovingMesh::try_alone(std::uint32_t vertex, const glm::dvec3& at, Blame& bl
   if (there.distance > limit_) return false;
   set_trial(vertex, {at, there});
   const auto faces = ring(vertex);
-  thread_local std::vector<Reach> reach;
-  reach.resize(faces.size());
+  thread_local std::vector<FaceBound> bounds;
+  bounds.resize(faces.size());
   const std::size_t first = blame.place;
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const std::size_t place = (i + first) % faces.size();
     Blame other{static_cast<std::uint32_t>(place)};
-    reach[place] = reach_of_blamed(faces[place], i == 0 ? blame : other);
-    if (reach[place].distance != kUnproved) continue;
+    bounds[place] = bound_of_blamed(faces[place], i == 0 ? blame : other);
+    if (bounds[place].distance != kUnproved) continue;
     if (i > 0) blame = other;
     trial_[vertex] = from, step_[vertex] = step;
     return false;
   }
-  for (std::size_t i = 0; i < faces.size(); ++i) set_trial_reach(faces[i], reach[i]);
+  for (std::size_t i = 0; i < faces.size(); ++i) set_trial_bound(faces[i], bounds[i]);
   return true;
 }
 

@@ -148,19 +148,19 @@ class MovingMesh {
   void make_rings(std::size_t vertex_count);
   void set_trial(std::uint32_t vertex, const VertexState& state);
   /// What is known of all points of a face.
-  struct Reach {
+  struct FaceBound {
     double distance = kUnproved;
     MovingFacing::Known facing;
   };
   using TriangleCorners = glm::dvec3[3];
-  Reach reach_by_motion(std::uint32_t face) const;
-  Reach reach_by_certificate(std::uint32_t face, Blame* blame = nullptr) const;
+  FaceBound bound_by_motion(std::uint32_t face) const;
+  FaceBound bound_by_certificate(std::uint32_t face, Blame* blame = nullptr) const;
   double distance_by(const TriangleCertificate& certificate, std::uint32_t face, MovingFacing::Known& facing,
                      Blame* blame) const;
   bool refuses_again(std::uint32_t face, const Blame& blame) const;
-  Reach reach_of_blamed(std::uint32_t face, Blame& blame) const;
+  FaceBound bound_of_blamed(std::uint32_t face, Blame& blame) const;
   bool is_inside(std::uint32_t face) const;
-  void set_trial_reach(std::uint32_t face, const Reach& reach);
+  void set_trial_bound(std::uint32_t face, const FaceBound& bound);
   void accept(std::uint32_t face);
   bool is_plainly_oriented(std::span<const std::uint32_t> place) const;
   void start_facing(FacingRule rule, std::span<const std::uint32_t> place);
@@ -185,9 +185,9 @@ class MovingMesh {
   std::vector<double> step_;
   // For each vertex the last refusal of each Aim; empty unless refusals are remembered.
   std::vector<std::array<Refusal, 2>> refusals_;
-  std::vector<double> reach_, trial_reach_;  // For each face: no point of it is farther from the reference.
-  std::optional<MovingFacing> facing_;       // None if no angle is kept.
-  double max_normal_angle_ = 180;            // In degrees.
+  std::vector<double> distance_, trial_distance_;  // For each face: no point of it is farther from the reference.
+  std::optional<MovingFacing> facing_;             // None if no angle is kept.
+  double max_normal_angle_ = 180;                  // In degrees.
   std::vector<std::uint32_t> part_;  // For each face: its connected part; empty if no part can need its other side.
   std::vector<std::uint32_t> exceeding_;
   std::vector<std::uint64_t> seen_;  // For each face: in which call faces_around() met it last.

@@ -141,19 +141,19 @@ std::vector<std::uint32_t> MovingMesh::compare_sides(std::vector<std::uint32_t> 
 /// Gives a face of the state that failed the limit that it can keep. Returns whether it exceeds the angle of the rule.
 bool MovingMesh::limit_angle(std::uint32_t face) {
   bool exceeds = false;
-  Reach reach{provable_, {}};
+  FaceBound bound{provable_, {}};
   for_triangles(face, [&](std::size_t k, const TriangleCorners& at, const PointBound* const(&known)[3]) {
     FaceRule& rule = facing_->of(face, k);
     const glm::dvec3 bounds(known[0]->distance, known[1]->distance, known[2]->distance);
-    const glm::uvec3 near(known[0]->triangle, known[1]->triangle, known[2]->triangle);
+    const glm::uvec3 hints(known[0]->triangle, known[1]->triangle, known[2]->triangle);
     std::optional<Facing> facing, proved;
     const auto prove = [&](double limit) -> std::optional<double> {
       rule.limit = limit;
       facing.reset();
       facing_->start(face, k, at, facing);
       if (!facing) return 0;
-      facing->set_corners(near);
-      if (certificates_.front().verdict(at, bounds, near, &*facing) != Verdict::inside) return {};
+      facing->set_corners(hints);
+      if (certificates_.front().verdict(at, bounds, hints, &*facing) != Verdict::inside) return {};
       proved = facing;
       return facing->angle();
     };
@@ -161,14 +161,14 @@ bool MovingMesh::limit_angle(std::uint32_t face) {
       exceeds = true;
       rule.limit = least_limit(facing_->rule().angle, prove);
     }
-    facing_->renew(face, k, at, proved, reach.facing);
+    facing_->renew(face, k, at, proved, bound.facing);
     return true;
   });
-  reach_[face] = provable_;
-  const Reach found = reach_by_certificate(face);
-  if (found.distance != kUnproved) reach = found;
-  reach.facing.room = found.distance == kUnproved ? 0 : found.facing.room;
-  set_trial_reach(face, reach);
+  distance_[face] = provable_;
+  const FaceBound found = bound_by_certificate(face);
+  if (found.distance != kUnproved) bound = found;
+  bound.facing.room = found.distance == kUnproved ? 0 : found.facing.room;
+  set_trial_bound(face, bound);
   accept(face);
   return exceeds;
 }

@@ -90,8 +90,8 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, double m
   step_.assign(stored.size(), 0);
   frozen_.assign(stored.size(), false), any_frozen_ = false;
   const std::size_t count = faces_.size() / corners_;
-  reach_.assign(count, 0);
-  trial_reach_.assign(count, 0);
+  distance_.assign(count, 0);
+  trial_distance_.assign(count, 0);
   facing_.reset(), exceeding_.clear();
   max_normal_angle_ = max_normal_angle;
   std::optional<FacingRule> rule;
@@ -129,11 +129,11 @@ std::vector<std::uint32_t> MovingMesh::uncertified(std::span<const std::uint32_t
   parallel_for(faces.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(static_cast<double>(begin) / static_cast<double>(faces.size()));
     for (std::size_t i = begin; i < end; ++i) {
-      Reach reach = reach_by_certificate(faces[i]);
-      fails[i] = reach.distance == kUnproved;
+      FaceBound bound = bound_by_certificate(faces[i]);
+      fails[i] = bound.distance == kUnproved;
       // Beyond the state as it is, nothing is known of such a face.
-      if (fails[i]) reach.distance = provable_;
-      set_trial_reach(faces[i], reach);
+      if (fails[i]) bound.distance = provable_;
+      set_trial_bound(faces[i], bound);
       accept(faces[i]);
     }
   });
@@ -145,8 +145,8 @@ bool MovingMesh::is_inside(std::uint32_t face) const {
   bool inside = true;
   for_triangles(face, [&](std::size_t, const TriangleCorners& at, const PointBound* const(&known)[3]) {
     const glm::dvec3 bounds(known[0]->distance, known[1]->distance, known[2]->distance);
-    const glm::uvec3 near(known[0]->triangle, known[1]->triangle, known[2]->triangle);
-    return inside = certificates_.front().verdict(at, bounds, near) == Verdict::inside;
+    const glm::uvec3 hints(known[0]->triangle, known[1]->triangle, known[2]->triangle);
+    return inside = certificates_.front().verdict(at, bounds, hints) == Verdict::inside;
   });
   return inside;
 }

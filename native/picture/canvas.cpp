@@ -71,7 +71,7 @@ gl::Texture transfer_texture(Transfer transfer) {
 Image Canvas::draw(const Resolution& r, int tile, const std::function<void(const glm::vec2&)>& draw,
                    Progress* progress) {
   require(r);
-  const int pixels = std::max(1, tile / r.samples);  // is the side of a tile
+  const int pixels = std::max(1, tile / r.samples);  // This is the side of a tile.
   const glm::ivec2 side = glm::min(glm::ivec2(pixels), r.size), tiles = (r.size + side - 1) / side;
   Image image{r.size.x, r.size.y,
               std::vector<std::uint8_t>(std::size_t{4} * static_cast<std::size_t>(r.size.x) *

@@ -18,7 +18,8 @@ enum class Transfer { signed_distance, magnitude };
 /// matplotlib 1.5, 2015].
 std::vector<glm::u8vec3> transfer_colours(Transfer transfer, std::size_t count);
 
-inline constexpr std::size_t kTransferColours = 256;  ///< is the number that pictures and legends use
+/// Pictures and legends use this number of colours.
+inline constexpr std::size_t kTransferColours = 256;
 
 /// A place out of tolerance is marked by stripes of these two colours, which no colour map has.
 inline constexpr glm::u8vec3 kOutsideColour{236, 0, 140}, kOutsideStripe{84, 0, 62};

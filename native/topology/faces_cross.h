@@ -2,27 +2,9 @@
 /// Whether two triangles cross: an exact answer for the coordinates as they are stored.
 #pragma once
 
-#include <array>
-#include <cstdint>
-#include <glm/glm.hpp>
-#include <span>
-
 #include "geometry/triangle_mesh.h"
 
 namespace tolvol {
-
-using Corners = std::array<glm::dvec3, 3>;
-
-/// Triangles and positions that someone else holds.
-struct MeshView {
-  std::span<const glm::uvec3> triangles;
-  std::span<const glm::dvec3> vertices;
-
-  Corners corners(std::uint32_t triangle) const {
-    const glm::uvec3& t = triangles[triangle];
-    return {vertices[t.x], vertices[t.y], vertices[t.z]};
-  }
-};
 
 Box box_of(const Corners& corners);
 

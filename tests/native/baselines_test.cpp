@@ -9,8 +9,8 @@
 #include "baselines/checked_ring.h"
 #include "baselines/permission_ring.h"
 #include "baselines/vertex_samples.h"
+#include "check/changed_faces.h"
 #include "check/methods.h"
-#include "decimation/change.h"
 #include "decimation/decimation.h"
 #include "many.h"
 #include "measure/hausdorff.h"
@@ -48,12 +48,12 @@ struct Fixed final : RingCheck {
   void begin(const TriangleMesh& mesh, const StoredSpace&) override { triangles = mesh.triangles.size(); }
   struct Asking final : Trial {
     explicit Asking(Fixed& fixed) : fixed(fixed) {}
-    bool accepts(const Change& change) override {
+    bool accepts(const ChangedFaces& change) override {
       for (const Coverage::Element& face : change.elements()) EXPECT_LT(face.id, fixed.triangles);
       for (const Coverage::Removed& face : change.removed()) EXPECT_LT(face.id, fixed.triangles);
       return ++fixed.questions, fixed.answer;
     }
-    void commit(const Change&) override { ++fixed.commits; }
+    void commit(const ChangedFaces&) override { ++fixed.commits; }
     Fixed& fixed;
   };
   std::unique_ptr<Trial> trial() override { return std::make_unique<Asking>(*this); }

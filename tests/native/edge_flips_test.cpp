@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "decimation/edge_flips.h"
+#include "decimation/refinement/edge_flips.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "decimation/patch.h"
+#include "decimation/refinement/patch.h"
 
 #include <gtest/gtest.h>
 

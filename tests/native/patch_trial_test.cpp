@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "decimation/patch_trial.h"
+#include "decimation/refinement/patch_trial.h"
 
 #include <gtest/gtest.h>
 

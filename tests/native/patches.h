@@ -10,9 +10,9 @@
 
 #include "certified_mesh.h"
 #include "decimation/change.h"
-#include "decimation/patch.h"
-#include "decimation/patch_deviations.h"
-#include "decimation/surface_samples.h"
+#include "decimation/refinement/patch.h"
+#include "decimation/refinement/patch_deviations.h"
+#include "decimation/refinement/surface_samples.h"
 
 namespace tolvol::patches {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "decimation/refinement.h"
+#include "decimation/refinement/refinement.h"
 
 #include <gtest/gtest.h>
 

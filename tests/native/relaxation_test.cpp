@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "decimation/relaxation.h"
+#include "decimation/refinement/relaxation.h"
 
 #include <gtest/gtest.h>
 

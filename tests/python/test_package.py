@@ -29,30 +29,36 @@ def caching(folder):
     return {**os.environ, "CCACHE_BASEDIR": str(folder), "CCACHE_NOHASHDIR": "1"}
 
 
-@pytest.fixture(scope="module")
-def programs(tmp_path_factory):
-    """Builds the programs from a copy of examples/, which does not know this source tree."""
-    folder = tmp_path_factory.mktemp("package")
-    environment = caching(tmp_path_factory.getbasetemp())
-    run("cmake", "--install", BUILD, "--prefix", folder / "installed")
-    for source in (ROOT / "examples").iterdir():
-        os.makedirs(folder / "examples", exist_ok=True)
-        (folder / "examples" / source.name).write_text(source.read_text())
-    prefix = f"-DCMAKE_PREFIX_PATH={folder / 'installed'}"
+def build(sources, folder, installed, environment):
+    """Builds the programs of a folder from a copy of it, which does not know this source tree. Returns where they are."""
+    shutil.copytree(sources, folder / "sources")
     run(
         "cmake",
         "-G",
         "Ninja",
         "-S",
-        folder / "examples",
+        folder / "sources",
         "-B",
         folder / "build",
-        prefix,
+        f"-DCMAKE_PREFIX_PATH={installed}",
         "-DCMAKE_CXX_FLAGS=-Wall -Werror",
         f"-DCMAKE_CXX_COMPILER_LAUNCHER={';'.join(LAUNCHER)}",
     )
     run("cmake", "--build", folder / "build", env=environment)
     return folder / "build"
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    prefix = tmp_path_factory.mktemp("package") / "installed"
+    run("cmake", "--install", BUILD, "--prefix", prefix)
+    return prefix
+
+
+@pytest.fixture(scope="module")
+def programs(tmp_path_factory, installed):
+    environment = caching(tmp_path_factory.getbasetemp())
+    return build(ROOT / "examples", tmp_path_factory.mktemp("examples"), installed, environment)
 
 
 def write_off(path, vertices, triangles):
@@ -108,15 +114,23 @@ def test_hausdorff_prints_the_interval(programs, tmp_path):
     assert [float(word) for word in printed.split()] == [expected.lower, expected.upper]
 
 
+def test_a_program_decides_by_a_check_of_its_own(tmp_path, tmp_path_factory, installed):
+    environment = caching(tmp_path_factory.getbasetemp())
+    program = build(ROOT / "tests/python/own_check", tmp_path, installed, environment) / "own_check"
+    assert run(program, -1) == "200 100\n", "it refuses everything"
+    left, on_the_right = map(int, run(program, 0.5).split())
+    assert left < 150 and on_the_right == 100, "it decides about each change"
+
+
 @pytest.mark.parametrize("name", ["decimate", "decimate_with_openmesh", "constrain", "hausdorff"])
 def test_programs_fail_without_their_files(programs, tmp_path, name):
     run(programs / name, tmp_path / "none.off", tmp_path / "out.off", *[0.1] * (name != "hausdorff"), ok=False)
     run(programs / name, ok=False)
 
 
-def test_headers_stand_alone(programs, tmp_path, tmp_path_factory):
+def test_headers_stand_alone(installed, tmp_path, tmp_path_factory):
     """Each installed header compiles alone, with only the installed package."""
-    include = programs.parent / "installed" / "include"
+    include = installed / "include"
     headers = sorted(path.relative_to(include) for path in include.rglob("*.h*"))
     assert Path("tolvol/check/certificate.h") in headers and Path("tolvol/openmesh/ModToleranceT.hh") in headers
     source = tmp_path / "header.cpp"

@@ -15,8 +15,8 @@
 #include "base/parallel.h"
 #include "base/progress.h"
 #include "decimation/bounded_mesh.h"
-#include "decimation/patch_trial.h"
-#include "decimation/surface_samples.h"
+#include "decimation/refinement/patch_trial.h"
+#include "decimation/refinement/surface_samples.h"
 #include "decimation/tries_ahead.h"
 
 namespace tolvol {

@@ -14,10 +14,10 @@
 #include "decimation/bounded_mesh.h"
 #include "decimation/certified_bounds.h"
 #include "decimation/change.h"
-#include "decimation/patch.h"
-#include "decimation/patch_deviations.h"
-#include "decimation/relaxation.h"
-#include "decimation/surface_samples.h"
+#include "decimation/refinement/patch.h"
+#include "decimation/refinement/patch_deviations.h"
+#include "decimation/refinement/relaxation.h"
+#include "decimation/refinement/surface_samples.h"
 #include "decimation/surroundings.h"
 
 namespace tolvol {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "decimation/separation.h"
+#include "decimation/refinement/separation.h"
 
 #include <algorithm>
 #include <cmath>

@@ -2,7 +2,7 @@
 // To alternate collapses, flips and moves of vertices is an idea of H. Hoppe et al., "Mesh optimization", 1993. Here
 // the certificates of both directions decide which steps are allowed, and not an energy; and what moves is a whole
 // neighbourhood at once, because a vertex alone soon finds no room at irregular valences.
-#include "decimation/refinement.h"
+#include "decimation/refinement/refinement.h"
 
 #include <algorithm>
 #include <limits>

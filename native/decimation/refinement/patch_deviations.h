@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "decimation/certified_bounds.h"
-#include "decimation/patch.h"
-#include "decimation/separation.h"
-#include "decimation/surface_samples.h"
+#include "decimation/refinement/patch.h"
+#include "decimation/refinement/separation.h"
+#include "decimation/refinement/surface_samples.h"
 
 namespace tolvol {
 

@@ -9,10 +9,10 @@
 #include <span>
 #include <vector>
 
-#include "decimation/damped_system.h"
-#include "decimation/edge_flips.h"
-#include "decimation/patch.h"
-#include "decimation/patch_deviations.h"
+#include "decimation/refinement/damped_system.h"
+#include "decimation/refinement/edge_flips.h"
+#include "decimation/refinement/patch.h"
+#include "decimation/refinement/patch_deviations.h"
 
 namespace tolvol {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "decimation/patch_deviations.h"
+#include "decimation/refinement/patch_deviations.h"
 
 #include <algorithm>
 #include <cmath>

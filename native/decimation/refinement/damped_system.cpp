@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "decimation/damped_system.h"
+#include "decimation/refinement/damped_system.h"
 
 #include <cmath>
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "decimation/patch.h"
-#include "decimation/patch_deviations.h"
+#include "decimation/refinement/patch.h"
+#include "decimation/refinement/patch_deviations.h"
 
 namespace tolvol {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "decimation/surface_samples.h"
+#include "decimation/refinement/surface_samples.h"
 
 #include <algorithm>
 #include <array>

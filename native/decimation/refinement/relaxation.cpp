@@ -5,7 +5,7 @@
 // p (p-1) w d^(p-2) b_i b_j u u^T is the leading part of the second derivative. The steps are those of K. Levenberg and
 // D. Marquardt. A Newton step lowers a deviation to (p-2) / (p-1) of itself alone, so that steps are made longer as
 // long as they succeed. A large p approaches the minimax fit.
-#include "decimation/relaxation.h"
+#include "decimation/refinement/relaxation.h"
 
 #include <algorithm>
 #include <cmath>

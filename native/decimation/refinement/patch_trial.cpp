@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "decimation/patch_trial.h"
+#include "decimation/refinement/patch_trial.h"
 
 #include <algorithm>
 #include <cassert>
 #include <limits>
 
 #include "base/call.h"
-#include "decimation/separation.h"
+#include "decimation/refinement/separation.h"
 
 namespace tolvol {
 namespace {
@@ -335,7 +335,7 @@ bool PatchTrial::keep_sheets_apart() {
   const double reach = bounds_.forward().limit();
   std::vector<Separation> separations;
   deviations_.drop_separations();
-  for (const std::uint32_t id : around_->near(crossings_)) {
+  for (const std::uint32_t id : around_->faces_near(crossings_)) {
     poll();
     if (id >= mesh_.connectivity().n_faces()) continue;  // It never changes, and the frame does not have it.
     const Corners other = corners(id);

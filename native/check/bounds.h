@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 /// What the changes of a mesh must keep: whether the faces that a change leaves may take the place of those that there
-/// are. CertifiedBounds proves it; a RingCheck has another method decide.
+/// are. The certificates of a decimation prove it; a RingCheck has another method decide.
 #pragma once
 
 #include <cstddef>
@@ -8,8 +8,7 @@
 
 namespace tolvol {
 
-class CertifiedBounds;
-class Change;
+class ChangedFaces;
 
 class Bounds {
  public:
@@ -23,17 +22,14 @@ class Bounds {
     /// Starts a series of questions around one place. What is answered depends on nothing before.
     virtual void begin() {}
     /// Whether the change, which is possible, keeps the bounds. Only reads.
-    virtual bool accepts(const Change& change) = 0;
+    virtual bool accepts(const ChangedFaces& change) = 0;
     /// Notes that the change, which was accepted last, is about to be carried out. The mesh is still as it was then.
-    virtual void commit(const Change& change) = 0;
+    virtual void commit(const ChangedFaces& change) = 0;
     /// How many parts of pieces the series of questions has looked at.
     virtual std::size_t looked_at() const { return 0; }
   };
   /// Makes a trial for one thread. The trial keeps a reference to the bounds.
   virtual std::unique_ptr<Trial> trial() = 0;
-
-  /// The certificates, if they decide. Only then can a proof be put off, or a position be fitted to the reference.
-  virtual CertifiedBounds* certified() { return nullptr; }
 };
 
 }  // namespace tolvol

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "decimation/bounds.h"
+#include "check/bounds.h"
 #include "geometry/frame.h"
 #include "geometry/triangle_mesh.h"
 
