@@ -202,6 +202,12 @@ def test_a_little_more_than_the_tolerance_is_not_shown_as_a_percent_more():
     assert report.percent(1.005, 1) == "100.50 %"
 
 
+def test_tiny_percentages_are_bounds_without_an_exponent():
+    assert report.percent(1.41e-15, 1) == report.percent(0.999e-6, 1) == "<0.0001 %"
+    assert report.percent(1.001e-6, 1) == "0.000101 %" and report.percent(0, 1) == "0 %"
+    assert report.all_digits(1.41e-15, 1) == "1.41e-13 %"  # in the line that programs read
+
+
 def test_large_percentages_have_all_their_digits():
     assert report.percent(30.391, 1) == "3,040 %" and report.percent(9.998, 1) == "1,000 %"
     assert report.percent(9.98, 1) == "998 %"
