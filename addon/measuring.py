@@ -24,6 +24,7 @@ _REST = 0.25
 
 _reading = False  # while a mesh is read, which Blender counts as a change of its geometry
 _changes = {}  # name of an object -> (how often it changed, the time of the last change)
+_failures = {}  # name of an object -> why its mesh cannot be measured as it is now
 
 
 def wanted(ob):
@@ -37,10 +38,16 @@ def wanted(ob):
     return settings.show_deviation or (settings.guard.editing if ob.mode == "EDIT" else settings.guard.sculpting)
 
 
+def failure(ob):
+    """Returns why the mesh of `ob` could not be measured as it is now, or None. It is quick enough to be called while drawing."""
+    return _failures.get(ob.name)
+
+
 def note(ob):
     """Notes that the mesh of `ob` may have changed: it is measured once it rests."""
     name = ob.name
     measurements.outdate(name)
+    _failures.pop(name, None)
     _changes[name] = _changes.get(name, (0, 0))[0] + 1, time.monotonic()
     queue.cancel(("measuring", name))
     _request(name)
@@ -61,12 +68,12 @@ def _prepare(name):
         return None
     _read(ob)
     if not ob.data.polygons:
-        return None
+        return _fail(name, f"{name} has no faces")
     try:
         surface, reference = snapshots.surface_of(ob), snapshots.reference_of(ob)
-    except Refused:
-        return None
-    tolerance = tolerances.tolerance_length(ob.tolvol, reference.size())
+        tolerance = tolerances.required(ob, reference.size())
+    except Refused as error:
+        return _fail(name, str(error))
     threads = preferences.threads(bpy.context)
 
     def compare(progress):
@@ -76,6 +83,12 @@ def _prepare(name):
         return surface, certified, tolerance
 
     return compare
+
+
+def _fail(name, reason):
+    """Keeps why the mesh of an object cannot be measured, for the panel."""
+    _failures[name] = reason
+    redraw_views()
 
 
 def _read(ob):
@@ -97,7 +110,9 @@ def _finish(name, at, outcome, error):
         return
     if _changes[name] != at:
         _request(name)
-    elif error is None:
+    elif error is not None:
+        _fail(name, native.said(error) or "The memory is not enough to measure the mesh")
+    else:
         measurements.remember_passing(ob, *outcome)
     redraw_views()
 
@@ -122,8 +137,9 @@ def refresh():
 
 @persistent
 def _forget(*_):
-    measurements.forget_passing()
+    measurements.forget_kept()
     _changes.clear()
+    _failures.clear()
 
 
 def register():

@@ -240,8 +240,11 @@ def modifier_settings(options=frozenset()):
     }
 
 
-def lod_settings(options=frozenset()):
-    """Returns the settings of a chain of levels of detail. Each vector has a number for each of the most levels."""
+def lod_settings(options=frozenset(), in_length=None):
+    """Returns the settings of a chain of levels of detail. Each vector has a number for each of the most levels.
+
+    in_length: further arguments for this property.
+    """
     return {
         "by": EnumProperty(
             name="By",
@@ -278,6 +281,7 @@ def lod_settings(options=frozenset()):
             name="Lengths",
             description="Give the tolerances as lengths in the world, and not in percent of the reference's size",
             options=set(options),
+            **(in_length or {}),
         ),
         "percentages": FloatVectorProperty(
             name="Tolerances",

@@ -39,7 +39,7 @@ def _state(ob, module):
     if watch is None:
         return None, None
     if watch.on:
-        return watch.said() or "Within the tolerance", True
+        return watch.said() or f"Guarding {'both ways' if watch.two_sided else 'one way'}", True
     return (watch.reason, False) if watch.reason else ("The guard is being prepared", None)
 
 

@@ -115,6 +115,7 @@ class Preparing:
     followed: whether it takes over from a watch that was on, for the same mesh with other faces.
     """
 
+    two_sided = False  # whether it keeps the reference within the tolerance of the mesh, too
     # (m,) bool: the faces of the reference that may be uncovered all the same; None if that is not known.
     uncovered = None
     # The number of pairs of triangles that cross; None if that is not known.
@@ -189,7 +190,7 @@ class Watch(Preparing):
 
         both = ob.tolvol.keep == "BOTH"
         # A larger polygon stands for triangles that are not all there, so that they cannot be witnesses.
-        two_sided = both and not faces.larger
+        self.two_sided = two_sided = both and not faces.larger
         keeps_out = ob.tolvol.guard.crossings
         # The triangles that it stands for cross each other as well.
         crossings = "keep_out" if keeps_out and not faces.larger else "allow"

@@ -17,7 +17,8 @@ def _one_step(task):
 
 
 class JobOperator:
-    """A base class for an Operator with prepare(context), which returns work(progress), and finish(context, outcome)."""
+    """A base class for an Operator with prepare(context), which returns work(progress), and finish(context, outcome),
+    which may return the operator's result, as steps() may."""
 
     # Adjust Last Operation works on the same objects again, although another object may be active by then.
     worked_on: StringProperty(
@@ -49,9 +50,9 @@ class JobOperator:
 
     def steps(self, context):
         """A generator in the main thread: yields work(progress) and is sent its outcome. It may change Blender's data only
-        after the last yield."""
+        after the last yield. It returns the operator's result, or None for FINISHED: CANCELLED makes no undo step."""
         outcome = yield self.prepare(context)
-        self.finish(context, outcome)
+        return self.finish(context, outcome)
 
     def each(self, tasks, names=None, steps=_one_step):
         """A generator for steps(): yields the work of one task after another, and returns the outcomes.

@@ -53,8 +53,8 @@ class Run:
         """Starts the next work. Returns the operator's result if there is no more work, else None."""
         try:
             self._job = Job(self._next_work(), self.progress)
-        except StopIteration:
-            return {"FINISHED"}
+        except StopIteration as end:
+            return end.value or {"FINISHED"}
         except native.module.Cancelled:
             left = "It has changed nothing" if self.voice is self.operator else _AS_BEFORE
             self.voice.report({"INFO"}, f"{self.label} was cancelled. {left}")

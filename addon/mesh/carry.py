@@ -52,17 +52,17 @@ class Carry:
         self._weights[used] = result.source_weights.reshape(-1, 3)[first]
         kept = source.vertices[result.vertex_source]
         self._moved = np.flatnonzero((kept.view(np.uint32) != result.vertices.view(np.uint32)).any(1))
-        self._points = _attributes(mesh, "POINT") if len(self._moved) else {}
+        self._points = attributes(mesh, "POINT") if len(self._moved) else {}
         self._keys = [column(key.data, "co", 3) for key in mesh.shape_keys.key_blocks] if mesh.shape_keys else []
         self._corners = {
-            name: values for name, (values, kind) in _attributes(mesh, "CORNER").items() if kind[2] is np.float32
+            name: values for name, (values, kind) in attributes(mesh, "CORNER").items() if kind[2] is np.float32
         }
         # Before 3.5 Blender does not list UV maps among the attributes.
         self._uvs = [column(layer.data, "uv", 2) for layer in mesh.uv_layers]
-        self._normals = _custom_normals(mesh)
+        self._normals = custom_normals(mesh)
         self._edges = column(mesh.edges, "vertices", 2, np.int32)
-        self._marks = _edge_marks(mesh)
-        self._edge_attributes = _attributes(mesh, "EDGE")
+        self._marks = edge_marks(mesh)
+        self._edge_attributes = attributes(mesh, "EDGE")
 
     def blend_groups(self, built):
         """Interpolates the vertex groups of the vertices that moved, in the BMesh before its vertices are merged."""
@@ -233,7 +233,7 @@ def fans(mesh):
             return labels
 
 
-def _attributes(mesh, domain):
+def attributes(mesh, domain):
     """Returns {name: (values, (property, width, array type))} for the attributes of one domain that an array can hold."""
     found = {}
     uv_maps = {layer.name for layer in mesh.uv_layers}
@@ -245,7 +245,7 @@ def _attributes(mesh, domain):
     return found
 
 
-def _edge_marks(mesh):
+def edge_marks(mesh):
     known = bpy.types.MeshEdge.bl_rna.properties.keys()
     marks = {name: column(mesh.edges, name, 1, kind) for name, kind in _EDGE_MARKS.items() if name in known}
     # Only marks that are used are written: writing creases or bevel weights would add their layer to a mesh without it.
@@ -295,7 +295,7 @@ class _AutoSmooth:
             self._mesh.use_auto_smooth = self._before
 
 
-def _custom_normals(mesh):
+def custom_normals(mesh):
     """Returns the custom normals, (corners, 3), or None if the mesh has none."""
     if not mesh.has_custom_normals:
         return None

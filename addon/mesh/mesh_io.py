@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads Blender's meshes as arrays (stored coordinates and the triangles that Blender shows) and writes arrays to them."""
 
+from dataclasses import replace
+
 import bmesh
 import bpy
 import numpy as np
@@ -46,6 +48,16 @@ def whole_quads(mesh, arrays):
     quads = column(mesh.loops, "vertex_index", 1, np.int32)[corners]
     others = arrays.triangles[~quad[arrays.polygons]]
     return np.concatenate([quads, others[:, [0, 1, 2, 2]]])
+
+
+def both_triangulations(mesh, arrays):
+    """Returns the arrays of a mesh with the triangles of its quads along either diagonal."""
+    faces = whole_quads(mesh, arrays)
+    if faces is arrays.triangles:
+        return arrays
+    ways = np.concatenate([faces[:, corners] for corners in ([0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3])])
+    proper = (ways[:, 0] != ways[:, 1]) & (ways[:, 1] != ways[:, 2])
+    return replace(arrays, triangles=ways[proper])
 
 
 def following_corners(mesh):

@@ -7,6 +7,7 @@ from .. import preferences
 from ..appearance import baking, materials, normals, other_blender
 from ..job import JobOperator
 from ..operation_settings import bake_settings, threads_setting
+from ..proof import kept_warnings
 from ..reference import snapshots, tolerances
 from ..shared.errors import Refused
 from . import settings as shared
@@ -100,8 +101,7 @@ tolerance, in a second Blender without a window. Without a UV map, Smart UV Proj
         if made:
             mesh.uv_layers.new().data.foreach_set("uv", baked.uvs)
         uv_map = mesh.uv_layers.active.name
-        for warning in materials.show(ob, image, uv_map):
-            self.say({"WARNING"}, warning)
+        warnings = materials.show(ob, image, uv_map)
         for earlier in before:
             if earlier.users == 0:
                 bpy.data.images.remove(earlier)
@@ -109,11 +109,13 @@ tolerance, in a second Blender without a window. Without a UV map, Smart UV Proj
         shared.give(self, ob.tolvol.bake, bake_settings())
         if baked.missed:
             share = 100 * baked.missed / baked.covered
-            self.say(
-                {"WARNING"},
+            warnings.append(
                 f"{share:.2g} % of the pixels have no point of the reference in front of them, as at open borders: there the "
-                "normal map changes nothing",
+                "normal map changes nothing"
             )
+        kept_warnings.keep(ob, warnings)
+        for warning in warnings:
+            self.say({"WARNING"}, warning)
         uvs = f"Smart UV Project made the UV map {uv_map}" if made else f"by the UV map {uv_map}"
         size = image.size[0]
         self.say({"INFO"}, f"{image.name}: {size} x {size} pixels, packed into the file; {uvs}")

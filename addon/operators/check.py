@@ -49,12 +49,12 @@ class Comparison(JobOperator):
             found = replace(found, share_outside=float(spread.share_beyond[0]))
         return found
 
-    def remember(self, surface, found):
-        """Stores the Verdict, which every part of the interface then shows."""
+    def remember(self, surface, found, measured=""):
+        """Stores the Verdict, which every part of the interface then shows. measured: statistics as text."""
         certified = {
             name: (way.lower, way.upper) for name, way in (("forward", found.forward), ("backward", found.backward))
         }
-        measurements.remember(self.ob, surface, certified, found.tolerance, found.share_outside)
+        measurements.remember(self.ob, surface, certified, found.tolerance, found.share_outside, measured)
 
 
 class TOLVOL_OT_check(Comparison, bpy.types.Operator):
@@ -63,7 +63,7 @@ the share of the mesh that is beyond the tolerance"""
 
     bl_idname = "tolvol.check"
     bl_label = "Check"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER"}
 
     def compare(self, surface, reference, tolerance, threads, progress):
         return surface, self.judge(surface, reference, tolerance, threads, progress)
@@ -81,7 +81,7 @@ from the mesh to the reference and from the reference to the mesh"""
 
     bl_idname = "tolvol.measure_statistics"
     bl_label = "Measure Statistics"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER"}
 
     def compare(self, surface, reference, tolerance, threads, progress):
         found = self.judge(surface, reference, tolerance, threads, progress)
@@ -89,8 +89,7 @@ from the mesh to the reference and from the reference to the mesh"""
 
     def finish(self, context, outcome):
         surface, found, measured = outcome
-        self.remember(surface, found)
-        statistics.keep(self.ob, measured)
+        self.remember(surface, found, statistics.as_text(measured))
         self.say({"INFO" if found.passed else "WARNING"}, said(found))
 
 
@@ -128,7 +127,8 @@ reference, and bring them into view"""
         faces[surface.arrays.polygons[triangles]] = True
         if not faces.any():
             self.say({"INFO" if found.passed else "WARNING"}, f"No face of the mesh is outside. {said(found)}")
-            return
+            return {"CANCELLED"}
         mesh_io.select_faces(mesh, faces)
         show_selected(context, self.ob, (False, False, True))
         self.say({"WARNING"}, f"{found.word}: {faces.sum():,} of {len(faces):,} faces are outside")
+        return {"FINISHED"}

@@ -55,8 +55,9 @@ corners and edges that they share"""
         faces[polygons] = True
         if not faces.any():
             self.say({"INFO"}, "No faces cross")
-            return
+            return {"CANCELLED"}
         mesh_io.select_faces(mesh, faces)
         show_selected(context, self.ob, (False, False, True))
         at_least = "at least " if more else ""
         self.say({"WARNING"}, f"{at_least}{faces.sum():,} of {len(faces):,} faces cross others")
+        return {"FINISHED"}

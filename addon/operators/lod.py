@@ -12,11 +12,13 @@ from ..files.gltf_extras import GEOMETRIC_ERROR
 from ..job import JobOperator
 from ..mesh import transfer
 from ..operation_settings import lod_settings, threads_setting
+from ..proof import verdict
 from ..properties import automatic_placement
 from ..reference import originals, snapshots, tolerances
 from ..shared.decimation import seen_as
 from ..shared.errors import Refused
 from ..shared.numbers import shortest, three_digits
+from ..shared.proof import report
 from ..units import length, typed
 from . import decimation
 from . import settings as shared
@@ -75,6 +77,8 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
         ob = self.ob
         reference = snapshots.reference_of(ob)
         limits = self._limits(context, reference.size())
+        if self.by == "TOLERANCE":  # Choosing the other unit in Adjust Last Operation then keeps the tolerances.
+            tolerances.convert_levels(self, reference.size(), "PERCENT" if self.in_length else "LENGTH")
         with _original(ob) as original:
             settings = ob.tolvol
             chosen = settings.placement_choice >= 0
@@ -135,9 +139,10 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
         shared.give(self, ob.tolvol.lod, lod_settings())
         collection = bpy.data.collections.new(f"{ob.name}_LODs")
         context.scene.collection.children.link(collection)
-        for i, (mesh, layout, outcome) in enumerate(zip(meshes, layouts, outcomes)):
-            run = outcome[3]
+        levels, runs = [], [run for _, _, _, run in outcomes]
+        for i, (mesh, layout, outcome, run) in enumerate(zip(meshes, layouts, outcomes, runs)):
             level = ob.copy()
+            levels.append(level)
             level.name = mesh.name = f"{ob.name}_LOD{i + 1}"
             level.data = mesh
             collection.objects.link(level)
@@ -147,6 +152,11 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             context.view_layer.update()
             decimation.keep(self, level, outcome, layout, f"{level.name}: ")
         ob.tolvol.lods = collection
+        before, after = runs[0]["input"]["triangles"], [f"{run['output']['triangles']:,}" for run in runs]
+        passed = sum(verdict.word(level) == verdict.PASS for level in levels)
+        seconds = report.duration(sum(sum(run["seconds"].values()) for run in runs))
+        counts = f"{before:,} -> {', '.join(after)} triangles, {passed} of {len(levels)} {verdict.PASS}"
+        self.say({"INFO"}, f"{len(levels)} levels of {ob.name}: {counts}, {seconds}")
 
     def _set(self, settings, level, tolerance):
         """Sets the copied settings of a level."""

@@ -184,6 +184,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
 
     def targets(self, context):
         self._found = []  # (number of triangles, value) of each value at which no sample is beyond the tolerance
+        self._none_fewer = False  # whether there are such values at which the modifier removes no triangle
         return super().targets(context)
 
     def draw(self, _context):
@@ -200,8 +201,15 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         parameter = trial.parameter(modifier)
         with Evaluation(ob, name) as evaluation:
             # Adjust Last Operation passes the value that was found, or one that the user typed: no search is needed.
-            values = [self.value] if self.value else (yield from self._search(evaluation, parameter, trial))
-            self.value, mesh, certified = yield from self._proved(evaluation, parameter, trial, values)
+            if self.value:
+                found = [(0, self.value)]
+            else:
+                yield from self._search(evaluation, parameter, trial)
+                found = sorted(self._found)
+            proved = yield from self._proved(evaluation, parameter, trial, found)
+            if proved is None:
+                yield from self._refuse(context, name, parameter, trial)
+            self.value, mesh, certified = proved
         try:
             plain = None if self.progress.finishing else (yield from self._plain(context, trial))
             settings = self.ob.tolvol.modifiers
@@ -224,7 +232,8 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         return bool(self._found) and not self.progress.finishing
 
     def _search(self, evaluation, parameter, trial):
-        """Returns the values at which no sample was beyond the tolerance, the one with the fewest triangles first."""
+        """Finds the values at which no sample is beyond the tolerance. Remesh makes new faces, which may be wanted even if they
+        are more than before; a value at which another modifier removes no triangle is left out."""
         name, triangles = evaluation.modifier.name, len(trial.surface.arrays.triangles)
         search, deviation = fit.search(parameter.first, parameter.last, fit.most_values(triangles)), None
         while not self.progress.finishing:
@@ -233,32 +242,57 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             except StopIteration:
                 break
             self.part, self.doing = f"Fitting {name}", f"{parameter.label} {value:.4g}"
-            self.count = f"{min(self._found)[0]:,} triangles so far" if self._found else ""
             setattr(evaluation.modifier, parameter.name, value)
             arrays = mesh_io.read_mesh(evaluation.mesh())
             deviation = yield trial.measured(arrays)
-            if deviation <= 1:
+            if deviation > 1:
+                continue
+            if len(arrays.triangles) < triangles or evaluation.modifier.type == "REMESH":
                 self._found.append((len(arrays.triangles), value))
-        return [value for _, value in sorted(self._found)]
+                self.count = f"{min(self._found)[0]:,} triangles so far"
+            else:
+                self._none_fewer = True
 
-    def _proved(self, evaluation, parameter, trial, values):
-        """Returns (value, mesh, the result of certified()) for the first of the values whose mesh is proved to be within."""
+    def _refuse(self, context, name, parameter, trial):
+        """Raises Refused, because no value leaves fewer triangles within the tolerance."""
+        ob, before = self.ob, len(trial.surface.arrays.triangles)
+        why, remedy = "", "Take a larger tolerance"
+        self.part, self.doing = f"Fitting {name}", "Comparing the quads"
+        if (yield trial.measured(mesh_io.both_triangulations(ob.data, trial.surface.arrays))) > 1:
+            why = ": the modifier may cut bent quads along the other diagonal, which takes them beyond the tolerance"
+        plain = yield from self._plain(context, trial)
+        if plain is not None and plain < before:
+            remedy += f", or press Decimate, which leaves {plain:,}"
+        raise Refused(
+            f"No {parameter.label} of {name} leaves fewer than the {before:,} triangles of {ob.name} within the "
+            f"tolerance{why}. {remedy}"
+        )
+
+    def _proved(self, evaluation, parameter, trial, found):
+        """Returns (value, mesh, the result of certified()) for the first of the values whose mesh is proved to be within.
+
+        It returns None if there is none, but a value at which the modifier removes no triangle.
+        found: (number of triangles, or 0 if it is not known, value) of each, the one with the fewest triangles first.
+        """
         name = evaluation.modifier.name
-        for i, value in enumerate(values):
-            self.part, self.doing, self.count = f"Proving {name}", f"{parameter.label} {value:.4g}", ""
+        for i, (triangles, value) in enumerate(found):
+            self.part, self.doing = f"Proving {name}", f"{parameter.label} {value:.4g}"
+            self.count = f"{triangles:,} triangles" if triangles else ""
             setattr(evaluation.modifier, parameter.name, value)
             mesh = evaluation.new_mesh()
             try:
                 return value, mesh, (yield trial.certified(mesh_io.read_mesh(mesh)))
             except BaseException as error:
                 bpy.data.meshes.remove(mesh)
-                if not isinstance(error, NotProved) or i + 1 == len(values):
+                if not isinstance(error, NotProved) or i + 1 == len(found) and not self._none_fewer:
                     raise
+        if self._none_fewer:
+            return None
         raise Refused(f"No {parameter.label} of {name} keeps {self.ob.name} within the tolerance both ways")
 
     def _plain(self, context, trial):
         """Returns how many triangles Decimate would leave with its default settings."""
-        self.part, self.doing, self.count = "", "Comparing with Decimate", ""
+        self.part, self.doing = "", "Comparing with Decimate"
         settings = self.ob.tolvol
         options = decimation.options(settings, automatic_placement(self.ob.data), trial.threads)
         options |= {"two_sided": True, "effort": "fast", "target_triangles": None, "max_seconds": None}

@@ -146,17 +146,24 @@ class Motion:
         if ob.tolvol.snapshot is None:
             snapshots.set_reference(ob, self.reference)
 
+    def verdict(self, certified):
+        """Returns the Verdict of the result of certify()."""
+        return Verdict.certified(certified, self.tolerance, self.two_sided)
+
     def line(self, remarks, certified):
         """Returns the outcome as one line of text."""
         forward, backward = (report.percent(certified[way][1], self.size) for way in ("forward", "backward"))
-        word = Verdict.certified(certified, self.tolerance, self.two_sided).word
         return (
-            f"{word}: {', '.join(remarks)}, tolerance {100 * self.tolerance / self.size:.4g} % = {self.tolerance:.3g}, "
+            f"{self.verdict(certified).word}: {', '.join(remarks)}, "
+            f"tolerance {100 * self.tolerance / self.size:.4g} % = {self.tolerance:.3g}, "
             f"result within {forward}, reference within {backward} (certified)"
         )
 
+    def count_moved(self, vertices):
+        return int((vertices != self.before).any(1).sum())
+
     def moved(self, vertices, wished):
         """Returns remarks for line(): how many vertices moved, and how many of them were held back."""
-        count = int((vertices != self.before).any(1).sum())
+        count = self.count_moved(vertices)
         held = int((vertices != wished).any(1).sum())
         return [f"{count:,} of {len(vertices):,} vertices moved", *([f"{held:,} held back"] if held else [])]

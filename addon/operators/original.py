@@ -216,9 +216,10 @@ normals. The present mesh and all edits of it are discarded, after a question"""
 def _ask(context, operator, ob):
     """Opens a menu that says what is lost and what comes back. Only the entry of this menu restores the original."""
 
+    kept = ", ".join(originals.data_names(ob.tolvol.original))
+    data = f", with its {kept}" if kept else ""
+
     def draw(menu, _context):
-        kept = ", ".join(originals.data_names(ob.tolvol.original))
-        data = f", with its {kept}" if kept else ""
         faces = len(ob.tolvol.original.polygons)
         menu.layout.label(
             text=f"The present mesh of {len(ob.data.polygons):,} faces and all edits of it are discarded."

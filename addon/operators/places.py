@@ -64,7 +64,7 @@ and bring the one with the largest distance into view"""
 
     bl_idname = "tolvol.worst_point"
     bl_label = "Worst Point"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER"}
 
     def compare(self, surface, reference, tolerance, threads, progress):
         found = self.judge(surface, reference, tolerance, threads, progress)

@@ -4,7 +4,7 @@
 import math
 
 import bpy
-from bpy.props import EnumProperty, FloatProperty
+from bpy.props import EnumProperty, FloatProperty, StringProperty
 
 from ..properties import TOLERANCE_UNITS
 from ..reference import measurements, tolerances
@@ -36,6 +36,10 @@ files, a tolerance of 0.05 in file units is 0.05 mm, which Blender shows as 5 cm
         min=1e-12,
         precision=5,
     )
+    # Adjust Last Operation changes one property at a time: after another unit was chosen, the value is still in this one.
+    mode_before: StringProperty(
+        description="The unit of the value. It is empty until the tolerance was set", options={"HIDDEN", "SKIP_SAVE"}
+    )
 
     @classmethod
     def poll(cls, context):
@@ -43,7 +47,11 @@ files, a tolerance of 0.05 in file units is 0.05 mm, which Blender shows as 5 cm
         return allowed(cls, object_blocked(ob) if ob is None or ob.mode == "OBJECT" else None)
 
     def execute(self, context):
-        settings = context.active_object.tolvol
+        ob = context.active_object
+        settings, size = ob.tolvol, measurements.shown_size(ob)
+        if self.mode_before not in ("", self.mode) and size:
+            self.value = tolerances.converted(self.value, size, self.mode)
+        self.mode_before = self.mode
         settings.tolerance_mode = self.mode
         setattr(settings, "tolerance_percent" if self.mode == "PERCENT" else "tolerance_length", self.value)
         return {"FINISHED"}

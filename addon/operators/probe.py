@@ -45,15 +45,23 @@ def described(context, ob, reading):
     return lines
 
 
-def _what(ob):
+def reads_reference(context, ob):
+    """Whether the reference is read and not the mesh: where it is coloured, it is drawn over everything else in the view."""
+    settings = ob.tolvol
+    return preferences.use_gl(context) and settings.show_deviation and settings.deviation_surface == "REFERENCE"
+
+
+def what(context, ob):
     """Names the surface that is read."""
+    if reads_reference(context, ob):
+        return f"Reference of {ob.name}"
     on_top = measurements.on_top(ob)
     return f"Base mesh of {ob.name}, without its {' and '.join(on_top)}" if on_top else ob.name
 
 
 class TOLVOL_OT_probe(bpy.types.Operator):
-    """Show the exact distance from the reference, its side and the tolerance at the point under the mouse. A click leaves a \
-label there. Esc, or another click on this button, ends it"""
+    """Show the exact distance, its side and the tolerance at the point under the mouse: a point of the reference if the \
+reference is coloured, else of the mesh. A click leaves a label there. Esc, or another click on this button, ends it"""
 
     bl_idname = "tolvol.probe"
     bl_label = "Probe"
@@ -137,14 +145,15 @@ label there. Esc, or another click on this button, ends it"""
                 )
             if reading is not None:
                 lines = described(context, ob, reading)
-            status = f"{_what(ob)}: {', '.join(lines) or 'no point under the mouse'}    {_KEYS}"
+            status = f"{what(context, ob)}: {', '.join(lines) or 'no point under the mouse'}    {_KEYS}"
         else:
             lines, status = ["Preparing"], "Preparing    Esc: End"
         self._show(area, region, lines, reading, status)
         return reading
 
     def _ready(self, context, ob):
-        """Whether the probe reads the object as it is now. Else it is being made in a thread."""
+        """Whether the probe reads the object, or its reference, as it is now. Else it is being made in a thread."""
+        on_reference = reads_reference(context, ob)
         if self._job is not None:
             if not self._job.done():
                 return False
@@ -152,10 +161,10 @@ label there. Esc, or another click on this button, ends it"""
             found = job.outcome()
             if self._source.fits(ob):
                 self._probe = probing.Probe(self._source, found, ob)
-        if self._probe is not None and self._source.fits(ob):
+        if self._probe is not None and self._source.fits(ob) and self._source.on_reference == on_reference:
             return True
         self._probe = None
-        self._source = probing.Source(ob, False)
+        self._source = probing.Source(ob, on_reference)
         self._job = Job(functools.partial(self._source.look_up, preferences.threads(context)), native.module.Progress())
         return False
 

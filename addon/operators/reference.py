@@ -8,7 +8,7 @@ from bpy.props import BoolProperty
 from .. import preferences
 from ..job import JobOperator
 from ..operation_settings import threads_setting
-from ..reference import snapshots, tolerances
+from ..reference import originals, snapshots, tolerances
 from ..shared import volumes
 from .blocked import allowed, reference_blocked
 
@@ -22,33 +22,49 @@ def replace_label(ob):
 
 
 def loses_something(ob):
-    """Whether setting the reference discards a snapshot that differs from the new one."""
+    """Whether the reference, or the original with its data, is no longer what setting the reference would keep."""
     if ob.tolvol.snapshot is None:
         return False
-    surface = snapshots.surface_of(snapshots.source_object(ob))
+    source = snapshots.source_object(ob)
+    if source is None or source.type != "MESH":
+        return True
+    source.update_from_editmode()
+    surface = snapshots.surface_of(source)
     same_place = (
         surface.matrix.astype(np.float32).tobytes() == snapshots.reference_matrix(ob).astype(np.float32).tobytes()
     )
-    return not same_place or surface.arrays.fingerprint() != ob.tolvol.snapshot_fingerprint
+    if not same_place or surface.arrays.fingerprint() != ob.tolvol.snapshot_fingerprint:
+        return True
+    original = ob.tolvol.original
+    return original is not None and not originals.same_data(source.data, original)
 
 
-def _ask(context, operator, ob):
-    """Opens a menu that says what would be lost. Only the entry of this menu replaces the reference."""
+def _lost(ob):
+    """Returns sentences about what is discarded with the reference."""
+    settings = ob.tolvol
+    lines = [f"The present reference of {len(settings.snapshot.polygons):,} triangles is discarded."]
+    if settings.original is not None:
+        kept = ", ".join(originals.data_names(settings.original))
+        lines.append(f"The original is discarded, too{f', with its {kept}' if kept else ''}.")
+    return lines
+
+
+def _ask(context, title, lines, draw_entry):
+    """Opens a menu that says what would be lost. draw_entry(layout) draws the entry that does it all the same."""
 
     def draw(menu, _context):
-        count = len(ob.tolvol.snapshot.polygons)
-        menu.layout.label(text=f"The present reference of {count:,} triangles is discarded.")
-        menu.layout.label(text="The deviation is then measured from the new reference only.")
+        for line in lines:
+            menu.layout.label(text=line)
         menu.layout.separator()
         menu.layout.operator_context = "INVOKE_DEFAULT"
-        menu.layout.operator(operator.bl_idname, text=replace_label(ob), icon="ERROR").replace = True
+        draw_entry(menu.layout)
 
-    context.window_manager.popup_menu(draw, title=f"Replace the reference of {ob.name}?", icon="QUESTION")
+    context.window_manager.popup_menu(draw, title=title, icon="QUESTION")
 
 
 class TOLVOL_OT_set_reference(JobOperator, bpy.types.Operator):
-    """Take a snapshot of the reference, to which the tolerance refers from now on, and build the tolerance volume. If \
-another reference is set, a menu asks whether to replace it"""
+    """Take a snapshot of the reference, to which the tolerance refers from now on. It replaces a reference that is set, and \
+the original with its UV maps, materials and other data. If these differ from the new ones, a menu asks first"""
 
     bl_idname = "tolvol.set_reference"
     bl_label = "Set Reference"
@@ -70,7 +86,11 @@ another reference is set, a menu asks whether to replace it"""
         if self.replace or not loses_something(ob):
             return super().invoke(context, event)
 
-        _ask(context, self, ob)
+        def draw_entry(layout):
+            layout.operator(self.bl_idname, text=replace_label(ob), icon="ERROR").replace = True
+
+        lines = [*_lost(ob), "The deviation is then measured from the new reference only."]
+        _ask(context, f"Replace the reference of {ob.name}?", lines, draw_entry)
         return {"CANCELLED"}
 
     def prepare(self, context):
@@ -92,16 +112,34 @@ another reference is set, a menu asks whether to replace it"""
 
 
 class TOLVOL_OT_clear_reference(bpy.types.Operator):
-    """Remove the reference. The mesh stays as it is"""
+    """Remove the reference, and the original with its UV maps, materials and other data. If these differ from those of the \
+mesh, a menu asks first. The mesh stays as it is"""
 
     bl_idname = "tolvol.clear_reference"
     bl_label = "Clear Reference"
     bl_options = {"REGISTER", "UNDO"}
 
+    sure: BoolProperty(
+        name="Sure",
+        description="Remove the reference and the original without asking",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+
     @classmethod
     def poll(cls, context):
         ob = context.active_object
         return ob is not None and ob.type == "MESH" and ob.library is None and ob.tolvol.snapshot is not None
+
+    def invoke(self, context, _event):
+        ob = context.active_object
+        if self.sure or not loses_something(ob):
+            return self.execute(context)
+
+        def draw_entry(layout):
+            layout.operator(self.bl_idname, text="Remove the Reference", icon="ERROR").sure = True
+
+        _ask(context, f"Remove the reference of {ob.name}?", _lost(ob), draw_entry)
+        return {"CANCELLED"}
 
     def execute(self, context):
         snapshots.clear_reference(context.active_object)

@@ -13,7 +13,7 @@ from .. import native, preferences
 from ..job import JobOperator
 from ..operation_settings import threads_setting
 from ..proof import labels, last_run
-from ..reference import snapshots, tolerances
+from ..reference import measurements, snapshots, tolerances
 from ..shared.errors import Refused
 from ..shared.files import safe_files
 from ..shared.proof import deviation, deviation_pictures, deviation_units
@@ -70,7 +70,7 @@ class _Task:
         )
         name, factor = self.unit
         pictures = self._pictures(run, factor, progress) if self.drawn else []
-        return deviation_units.in_unit(run | self.about, factor, name), pictures
+        return run, deviation_units.in_unit(run | self.about, factor, name), pictures
 
     def _pictures(self, run, factor, progress):
         names = [self.about[key]["name"] for key in ("a", "b")]
@@ -161,13 +161,14 @@ a table (.csv) or all numbers (.json)"""
         context.view_layer.update()
         self._prepare_file()
         blocked = {ob.name: reason for ob in self.objects if (reason := check_blocked(ob))}
-        tasks = [self._task(context, ob) for ob in self.objects if ob.name not in blocked]
+        measured = [ob for ob in self.objects if ob.name not in blocked]
+        tasks = [self._task(context, ob) for ob in measured]
         about = {
             "date": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
             "blend_file": Path(bpy.data.filepath).name or None,
         }
         outcomes = yield from self.each(tasks)
-        runs, pictures = [run for run, _ in outcomes], [drawn for _, drawn in outcomes]
+        runs, pictures = [run for _, run, _ in outcomes], [drawn for _, _, drawn in outcomes]
         if len(self.objects) == 1:
             document, pictures = runs[0] | about, pictures[0]
         else:
@@ -176,6 +177,10 @@ a table (.csv) or all numbers (.json)"""
         with safe_files.Staged() as staged:
             staged.write(self._target, deviation.content(document, self._target.name, pictures))
             staged.publish()
+        for ob, task, (run, _, _) in zip(measured, tasks, outcomes):
+            certified = {way: run[way]["largest"] for way in ("forward", "backward")}
+            share = next(entry["share"] for entry in run["forward"]["beyond"] if entry["bound"] == task.tolerance)
+            measurements.remember(ob, task.surface, certified, task.tolerance, share)
         self.say({"INFO"}, f"{document['verdict']}: saved {self._target.name}")
 
     def _prepare_file(self):

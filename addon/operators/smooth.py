@@ -10,6 +10,7 @@ from ..mesh import mesh_io, protect
 from ..operation_settings import smooth_settings, threads_setting
 from ..proof import kept_warnings
 from ..shared.errors import Refused
+from ..shared.proof.verdict import PASS
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
 from .motion import Motion
@@ -93,6 +94,16 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
             shared.give(self, ob.tolvol.smooth, smooth_settings())
             kept_warnings.keep(ob, report["warnings"])
             self._say(motion, vertices, certified, report, f"{ob.name}: " if len(moved) > 1 else "")
+
+        if len(moved) > 1:
+            self._report_totals(moved)
+
+    def _report_totals(self, moved):
+        count = sum(motion.count_moved(vertices) for _, motion, vertices, _, _ in moved)
+        vertices = sum(len(vertices) for _, _, vertices, _, _ in moved)
+        passed = sum(motion.verdict(certified).passed for _, motion, _, certified, _ in moved)
+        counts = f"{count:,} of {vertices:,} vertices moved, {passed} of {len(moved)} {PASS}"
+        self.say({"INFO"}, f"{len(moved)} objects: {counts}")
 
     def _say(self, motion, vertices, certified, report, prefix):
         for warning in report["warnings"]:

@@ -29,7 +29,7 @@ keeps these vertices, because the corners of all the islands end there"""
         chosen = protect.where_islands_meet(mesh_io.read_mesh(mesh), mesh_io.corner_uvs(mesh))
         if not chosen.any():
             self.report({"INFO"}, "Three or more UV islands meet nowhere")
-            return {"FINISHED"}
+            return {"CANCELLED"}
         mesh_io.select_vertices(mesh, chosen)
         show_selected(context, context.active_object, (True, False, False))
         self.report({"INFO"}, f"{np.count_nonzero(chosen):,} of {len(chosen):,} vertices selected")

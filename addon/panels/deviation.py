@@ -8,6 +8,7 @@ from ..operators.original import TOLVOL_OT_show_original, shown
 from ..operators.probe import TOLVOL_OT_probe, tolerance_of
 from ..overlay import reasons
 from ..proof import labels, probing, statistics, verdict
+from ..reference import snapshots
 from ..shared.proof import report
 from ..units import length
 from .layout import GHOST, GREEN, GREY, RED, SubPanel, active, fitting, is_narrow, right, text_lines, wrapped
@@ -91,10 +92,13 @@ def _row(context, column, name, *texts):
 
 def _why_not_checked(ob):
     if measuring.wanted(ob):
-        return "Being measured"
+        return measuring.failure(ob) or "Being measured"
     if ob.mode != "OBJECT":
         return "Switch to Object Mode"
-    return "Press Check to measure it" if ob.tolvol.snapshot else "Set the reference first"
+    if ob.tolvol.snapshot is None:
+        return "Set the reference first"
+    stale = snapshots.stale_reason(ob)
+    return f"The reference is out of date: {stale}" if stale else "Press Check to measure it"
 
 
 class TOLVOL_PT_objects(SubPanel, bpy.types.Panel):

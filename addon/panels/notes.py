@@ -4,6 +4,8 @@
 It is the last panel, so that its sentences, which come and go when an operation ends, move no button of another panel.
 """
 
+import datetime
+
 import bpy
 
 from ..overlay import reasons
@@ -35,6 +37,8 @@ def notes(context, ob):
     found = verdict.of(ob)
     if found is not None and found.kind != verdict.WITHIN:
         lines.append((found.line(), AMBER if found.passed else RED))
+    if when := _measured_at(ob):
+        lines.append((when, "TIME"))
     if on_top := measurements.on_top(ob):
         lines.append((f"The proof is for the base mesh, without its {' and '.join(on_top)}", "INFO"))
     if ob.tolvol.show_deviation and (reason := reasons.off()):
@@ -46,6 +50,17 @@ def notes(context, ob):
     if others := [f"{count:,} by {cause}" for cause, count in staying.items() if cause not in known]:
         lines.append((f"Vertices that had to stay: {', '.join(others)}", "INFO"))
     return lines, staying.get(ISLANDS, 0)
+
+
+def _measured_at(ob):
+    """Returns when the mesh was measured as it is now, or None if it was not, or if an earlier version has measured it."""
+    measured = measurements.measurement_of(ob)
+    try:
+        time = datetime.datetime.fromisoformat(measured.time if measured else "").astimezone()
+    except ValueError:
+        return None
+    day = "" if time.date() == datetime.date.today() else f" on {time:%Y-%m-%d}"
+    return f"Measured at {time:%H:%M}{day}"
 
 
 def _of_last_run(context, ob):

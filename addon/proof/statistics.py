@@ -24,9 +24,9 @@ def measure(surface, reference, threads=None, progress=None):
     return found
 
 
-def keep(ob, found):
-    """Stores the result of measure() with the measurement of `ob`, which has to be of the same state."""
-    ob.tolvol.measurement.statistics = json.dumps(found)
+def as_text(found):
+    """Returns the result of measure() as the text that is kept with a measurement."""
+    return json.dumps(found)
 
 
 def of(ob):

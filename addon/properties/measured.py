@@ -48,6 +48,7 @@ class TOLVOL_PG_measurement(bpy.types.PropertyGroup):
         "statistics": StringProperty(
             description="Mean and the like of this state, as JSON. It is empty if not measured"
         ),
+        "time": StringProperty(description="When the mesh was measured: local time with its offset, ISO 8601"),
     } | {f"{name}_digits": StringProperty(description=text) for name, text in _LENGTHS.items()}
 
     tolerance, size = _double("tolerance_digits"), _double("size_digits")

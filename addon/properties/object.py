@@ -73,8 +73,16 @@ class TOLVOL_PG_modifiers(bpy.types.PropertyGroup):
     __annotations__ = modifier_settings()
 
 
+def _levels_unit_changed(settings, _context):
+    size = measurements.shown_size(settings.id_data)
+    if settings.in_length != settings.in_length_before and size:
+        tolerances.convert_levels(settings, size, "LENGTH" if settings.in_length else "PERCENT")
+    settings.in_length_before = settings.in_length
+
+
 class TOLVOL_PG_lod(bpy.types.PropertyGroup):
-    __annotations__ = lod_settings()
+    __annotations__ = lod_settings(in_length={"update": _levels_unit_changed})
+    in_length_before: BoolProperty(description="Whether the tolerances were lengths before the last change of the unit")
 
 
 class TOLVOL_PG_bake(bpy.types.PropertyGroup):

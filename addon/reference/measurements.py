@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps the last measurement of an object and tells whether it is still valid. Caches the numbers that panels show.
+"""Keeps the measurements of objects and tells whether they are still valid. Caches the numbers that panels show.
 
-What an operator measures is stored with the object. What is measured in Edit and Sculpt Mode, without an operator and thus
-without an undo step, is kept in memory alone.
+What an operator measures is stored with the object, so that the file has it. What was measured in this session is kept in
+memory, too: an undo step that is older than a measurement does not hold it, and what is measured in Edit and Sculpt Mode
+is not stored with the object at all, because that would need an undo step.
 """
 
-from dataclasses import dataclass
+import datetime
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from .. import native
 from ..mesh import mesh_io
 from ..redraw import redraw_views
-from . import snapshots
+from . import snapshots, tolerances
 
 # Cache of numbers that panels show: (object, "size" or "fingerprint", ...) -> value. It is cleared when any mesh changes.
 _shown = {}
@@ -23,73 +25,81 @@ _shown = {}
 _RIGID = 1e-5
 
 
-def remember(ob, surface, certified, tolerance, share_outside=0.0):
-    """Stores the certified distances of `surface`, the object's mesh as it is now, and redraws the panels."""
-    measurement = ob.tolvol.measurement
-    # An operator that has just written the mesh reports before Blender tells of the change: what is shown counts from now.
-    measurement.fingerprint = _shown[_fingerprint_key(ob)] = surface.arrays.fingerprint()
-    measurement.matrix = surface.matrix.ravel()
-    measurement.tolerance, measurement.size = tolerance, snapshots.snapshot_size(ob)
-    measurement.forward_lower, measurement.forward = certified["forward"]
-    measurement.backward_lower, measurement.backward = certified["backward"]
-    measurement.share_outside = share_outside
-    measurement.statistics = ""
-    redraw_views()
-
-
 @dataclass(frozen=True)
-class Passing:
-    """A measurement that is kept in memory, with the same names as the one that is stored with an object."""
+class Measurement:
+    """The certified distances of one state of a mesh, with the same names as those that are stored with an object."""
 
     fingerprint: str
     matrix: tuple
     tolerance: float
     size: float
-    forward_lower: float
-    forward: float
-    backward_lower: float
-    backward: float
-    reference: tuple  # about_reference() of the object
-    complete: bool = True
+    forward_lower: float = 0.0
+    forward: float = 0.0
+    backward_lower: float = 0.0
+    backward: float = 0.0
     share_outside: float = 0.0
     statistics: str = ""
+    time: str = ""
 
 
-_passing = {}  # name of an object -> Passing
-_present = set()  # the names of those whose mesh has not changed since it was measured
+_MOST_KEPT = 256
+_kept = {}  # the result of _key() -> Measurement, the last one at the end
+_present = {}  # name of an object -> the fingerprint of its mesh, which has not changed since in Edit or Sculpt Mode
+
+
+def remember(ob, surface, certified, tolerance, share_outside=0.0, statistics=""):
+    """Stores the certified distances of `surface`, the object's mesh as it is now, and redraws the panels.
+
+    statistics: as text; those of the same state that are known already stay.
+    """
+    # An operator that has just written the mesh reports before Blender tells of the change: what is shown counts from now.
+    _shown[_fingerprint_key(ob)] = surface.arrays.fingerprint()
+    before = measurement_of(ob)
+    statistics = statistics or (before.statistics if before else "")
+    measured = _keep(ob, surface, certified, tolerance, share_outside, statistics)
+    for field in fields(measured):
+        setattr(ob.tolvol.measurement, field.name, getattr(measured, field.name))
+    redraw_views()
 
 
 def remember_passing(ob, surface, certified, tolerance):
     """Keeps the certified distances of the object's mesh as it is now in Edit or Sculpt Mode."""
-    lengths = *certified["forward"], *certified["backward"]
-    place = tuple(surface.matrix.ravel())
-    about = surface.arrays.fingerprint(), place, tolerance, snapshots.snapshot_size(ob), *lengths
-    _passing[ob.name] = Passing(*about, about_reference(ob))
-    _present.add(ob.name)
+    _present[ob.name] = _keep(ob, surface, certified, tolerance).fingerprint
+
+
+def _keep(ob, surface, certified, tolerance, share_outside=0.0, statistics=""):
+    measured = Measurement(
+        surface.arrays.fingerprint(),
+        tuple(surface.matrix.ravel()),
+        tolerance,
+        snapshots.snapshot_size(ob),
+        *certified["forward"],
+        *certified["backward"],
+        share_outside,
+        statistics,
+        datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
+    )
+    key = _key(ob, measured.fingerprint)
+    _kept.pop(key, None)
+    _kept[key] = measured
+    if len(_kept) > _MOST_KEPT:
+        del _kept[next(iter(_kept))]
+    return measured
+
+
+def _key(ob, fingerprint):
+    """Returns a value that is equal for equal meshes of an object with equal references at the same place."""
+    return ob.name, fingerprint, ob.tolvol.snapshot_fingerprint, tuple(ob.tolvol.snapshot_matrix)
 
 
 def outdate(name):
     """Notes that the mesh of an object has changed in Edit or Sculpt Mode."""
-    _present.discard(name)
+    _present.pop(name, None)
 
 
-def is_present(ob):
-    """Whether the mesh has been measured as it is now in Edit or Sculpt Mode."""
-    return ob.name in _present
-
-
-def about_reference(ob):
-    """Returns a value that is equal for equal references at the same place."""
-    return ob.tolvol.snapshot_fingerprint, tuple(ob.tolvol.snapshot_matrix)
-
-
-def _passing_of(ob):
-    found = _passing.get(ob.name)
-    if found is None or ob.tolvol.snapshot is None or found.reference != about_reference(ob):
-        return None
+def _kept_of(ob):
     # In Object Mode the fingerprint tells whether it is still the same mesh. In the other modes Python does not see changes.
-    true = found.fingerprint == shown_fingerprint(ob) if ob.mode == "OBJECT" else is_present(ob)
-    return found if true else None
+    return _kept.get(_key(ob, shown_fingerprint(ob) if ob.mode == "OBJECT" else _present.get(ob.name)))
 
 
 def _stored_of(ob):
@@ -97,17 +107,34 @@ def _stored_of(ob):
     return found if ob.mode == "OBJECT" and found.complete and found.fingerprint == shown_fingerprint(ob) else None
 
 
-def measurement_of(ob):
-    """Returns the last measurement, or None if the mesh, its place or the reference has changed since then."""
-    measurement = _stored_of(ob) or _passing_of(ob)
-    if measurement is None or snapshots.is_damaged(ob):
+def _unchanged_of(ob):
+    """Returns the Measurement of a mesh that is its own reference, as it was when the reference was set: no distance."""
+    settings = ob.tolvol
+    if settings.snapshot_kind != "SELF" or ob.mode != "OBJECT":
         return None
+    if shown_fingerprint(ob) != settings.snapshot_fingerprint:
+        return None
+    size = snapshots.snapshot_size(ob)
+    place = tuple(mesh_io.matrix_array(ob.matrix_world).ravel())
+    return Measurement(settings.snapshot_fingerprint, place, tolerances.tolerance_length(settings, size), size)
+
+
+def measurement_of(ob):
+    """Returns what is known of the mesh as it is now, or None if mesh, place or reference have changed since it was measured."""
+    if ob.tolvol.snapshot is None or snapshots.stale_reason(ob):
+        return None
+    known = (find(ob) for find in (_kept_of, _stored_of, _unchanged_of))
+    return next((found for found in known if found is not None and _holds(ob, found)), None)
+
+
+def _holds(ob, measurement):
+    """Whether a measurement of this mesh and its reference is sound, and true at the present place."""
     lengths = measurement.tolerance, measurement.size, 1 + measurement.forward, 1 + measurement.backward
     if not all(map(snapshots.sound, lengths)):
-        return None  # The file is damaged.
+        return False  # The file is damaged.
     before, now = snapshots.stored_matrix(measurement.matrix), mesh_io.matrix_array(ob.matrix_world)
     moves_along = ob.tolvol.snapshot_kind == "SELF" and same_shape(before, now)
-    return measurement if moves_along or np.array_equal(before, now) else None
+    return moves_along or np.array_equal(before, now)
 
 
 def same_shape(matrix, other):
@@ -154,6 +181,6 @@ def forget():
     _shown.clear()
 
 
-def forget_passing():
-    _passing.clear()
+def forget_kept():
+    _kept.clear()
     _present.clear()

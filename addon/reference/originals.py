@@ -6,6 +6,9 @@ Object.tolvol points to: a copy that Blender saves with the file. Neither is eve
 earlier version has no original, and then only its shape is known.
 """
 
+import numpy as np
+
+from ..mesh import carry
 from ..mesh.mesh_io import column
 
 
@@ -37,5 +40,50 @@ def data_names(mesh):
         "materials": mesh.materials,
         "shape keys": mesh.shape_keys,
         "custom normals": mesh.has_custom_normals,
+        "vertex groups": any(vertex.groups for vertex in mesh.vertices),
     }
     return [name for name, present in layers.items() if present]
+
+
+def _uv_maps(mesh):
+    return [(layer.name, column(layer.data, "uv", 2).tobytes()) for layer in mesh.uv_layers]
+
+
+def _materials(mesh):
+    return list(mesh.materials), column(mesh.polygons, "material_index", 1, np.int32).tobytes()
+
+
+def _marks(mesh):
+    smooth = column(mesh.polygons, "use_smooth", 1, bool).tobytes()
+    return smooth, {name: values.tobytes() for name, values in carry.edge_marks(mesh).items()}
+
+
+def _attributes(mesh):
+    return {
+        (domain, name): values.tobytes()
+        for domain in ("POINT", "EDGE", "FACE", "CORNER")
+        for name, (values, _) in carry.attributes(mesh, domain).items()
+    }
+
+
+def _shape_keys(mesh):
+    keys = mesh.shape_keys.key_blocks if mesh.shape_keys else ()
+    return [(key.name, column(key.data, "co", 3).tobytes()) for key in keys]
+
+
+def _custom_normals(mesh):
+    normals = carry.custom_normals(mesh)
+    return None if normals is None else normals.tobytes()
+
+
+def _weights(mesh):
+    return [[(group.group, group.weight) for group in vertex.groups] for vertex in mesh.vertices]
+
+
+_DATA = (_uv_maps, _materials, _marks, _attributes, _shape_keys, _custom_normals, _weights)
+
+
+def same_data(mesh, other):
+    """Whether two meshes of the same shape have the same UV maps, materials, marks, attributes, shape keys, custom normals and
+    weights of vertex groups. About a second for a million vertices."""
+    return all(read(mesh) == read(other) for read in _DATA)

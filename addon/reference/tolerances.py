@@ -14,6 +14,8 @@ from . import snapshots
 # A converted number with at most so many digits but for this relative rounding error is meant to be the number of these
 # digits.
 _DIGITS, _ROUNDING = 12, 1e-15
+# The same for a number that was rounded to float32.
+_SINGLE_DIGITS, _SINGLE_ROUNDING = 6, 1.5e-7
 
 
 def tolerance_length(settings, size):
@@ -51,6 +53,21 @@ def _chosen(settings, name):
     if np.float32(converted) == np.float32(value):
         return converted
     return typed(value, bpy.context.scene.unit_settings) if name == "tolerance_length" else shortest(value)
+
+
+def converted(value, size, mode):
+    """Returns the value of a tolerance in the unit `mode` that is the same length as `value`, a float32, in the other unit."""
+    units = bpy.context.scene.unit_settings
+    found = shortest(value) / 100 * size if mode == "LENGTH" else 100 * typed(value, units) / size
+    # A number that is converted to the other unit and back has to be the typed number again, without rounding errors.
+    decimal = float(f"{found:.{_SINGLE_DIGITS}g}")
+    return decimal if math.isclose(decimal, found, rel_tol=_SINGLE_ROUNDING) else found
+
+
+def convert_levels(settings, size, mode):
+    """Sets the tolerances of levels of detail in the unit `mode` to the same lengths as in the other unit."""
+    names = ("percentages", "lengths") if mode == "LENGTH" else ("lengths", "percentages")
+    setattr(settings, names[1], [converted(value, size, mode) for value in getattr(settings, names[0])])
 
 
 def convert_tolerance(settings, size, mode):

@@ -15,6 +15,7 @@ from addon import native
 from addon.appearance import bake_process, baking, normals, other_blender
 from addon.mesh.carry import corner_normals
 from addon.mesh.mesh_io import column
+from addon.proof import kept_warnings
 from addon.shared.errors import Refused
 from scenes import activate, add_object, sheet, torus
 
@@ -245,6 +246,21 @@ def test_uv_maps_are_kept_and_a_second_bake_replaces_the_first():
     assert len(ob.data.materials[0].node_tree.nodes) == count
     assert [tuple(image.size) for image in bpy.data.images] == [(128, 128)]
     assert (ob.tolvol.bake.image_size, ob.tolvol.bake.shade) == (128, False)
+
+
+def test_the_warnings_of_a_bake_stay_until_the_next_operation():
+    ob = ball()
+    material = bpy.data.materials.new("steel")
+    material.use_nodes = True
+    nodes = material.node_tree.nodes
+    normal = nodes.new("ShaderNodeNormalMap")
+    material.node_tree.links.new(normal.outputs["Normal"], nodes["Principled BSDF"].inputs["Normal"])
+    ob.data.materials.append(material)
+    decimate(ob)
+    assert bake(image_size=64) == {"FINISHED"}
+    assert kept_warnings.of(ob)[0] == ["The normal map of the material steel was replaced in the copy for Sphere"]
+    decimate(ob, 2)
+    assert kept_warnings.of(ob)[0] == []
 
 
 def test_an_image_of_the_user_with_the_same_name_stays():

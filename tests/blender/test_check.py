@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Check, Select Outside and what is known of a mesh by them."""
 
+import datetime
+
 import bpy
 import numpy as np
 import pytest
@@ -9,7 +11,8 @@ from addon import overlay
 from addon.mesh import mesh_io
 from addon.operators import blocked
 from addon.overlay import draw, reasons
-from addon.proof import verdict
+from addon.panels import notes
+from addon.proof import statistics, verdict
 from addon.reference import measurements, tolerances
 from addon.shared.proof import report
 from scenes import activate, moved_up, sheet, torus
@@ -62,6 +65,7 @@ def test_measurement_is_dropped_when_mesh_place_or_reference_change():
     assert measurements.measurement_of(ob) is None
     bpy.ops.tolvol.check()
     assert measurements.measurement_of(ob) is not None
+    other.data.vertices[5].co.z += 0.01
     bpy.ops.tolvol.set_reference()
     assert measurements.measurement_of(ob) is None
 
@@ -126,6 +130,51 @@ def test_verdicts_agree_about_what_float32_cannot_tell_from_the_tolerance():
     assert ob.mode == "OBJECT"
 
 
+@pytest.mark.parametrize("measure", ("check", "measure_statistics", "worst_point", "save_report"))
+def test_what_was_measured_is_no_undo_step_and_stays_known(measure, tmp_path):
+    def lift():
+        ob = bpy.data.objects["sheet"]
+        ob.data.vertices[0].co.z += 0.01
+        ob.data.update()
+        bpy.ops.ed.undo_push(message="lift")
+
+    moved_up()
+    bpy.ops.ed.undo_push(message="start")
+    lift()
+    operator = getattr(bpy.ops.tolvol, measure)
+    options = {"filepath": str(tmp_path / "r.json")} if measure == "save_report" else {}
+    assert operator("EXEC_DEFAULT", True, **options) == {"FINISHED"}
+    found = verdict.of(bpy.data.objects["sheet"])
+    assert found.share_outside > 0
+    lift()
+    assert verdict.of(bpy.data.objects["sheet"]) is None
+    bpy.ops.ed.undo()
+    ob = bpy.data.objects["sheet"]
+    assert verdict.of(ob) == found
+    assert (statistics.of(ob) is not None) == (measure == "measure_statistics")
+    height = ob.data.vertices[0].co.z
+    bpy.ops.ed.undo()
+    assert bpy.data.objects["sheet"].data.vertices[0].co.z < height, "the measurement was no step"
+
+
+def test_notes_say_when_the_mesh_was_measured():
+    ob = moved_up()
+
+    def when():
+        return [line for line, _ in notes.notes(bpy.context, ob)[0] if line.startswith("Measured")]
+
+    assert when() == []
+    before = datetime.datetime.now()
+    assert bpy.ops.tolvol.check() == {"FINISHED"}
+    assert when() in ([f"Measured at {time:%H:%M}"] for time in (before, datetime.datetime.now()))
+    measurements.forget_kept()  # as when the file is opened
+    ob.tolvol.measurement.time = datetime.datetime(2024, 2, 3, 4, 5).astimezone().isoformat()
+    assert when() == ["Measured at 04:05 on 2024-02-03"]
+    for time in ("", "yesterday"):
+        ob.tolvol.measurement.time = time
+        assert when() == []
+
+
 def test_exactly_at_the_tolerance_is_not_called_beyond():
     ob = lifted_exactly(0.25)
     ob.tolvol.tolerance_length = 0.25
@@ -139,8 +188,8 @@ def test_exactly_at_the_tolerance_is_not_called_beyond():
 
 def test_a_measurement_that_cannot_be_read_is_none():
     ob = torus()
-    bpy.ops.tolvol.set_reference()
-    bpy.ops.tolvol.check()
+    bpy.ops.tolvol.decimate()
+    measurements.forget_kept()  # as when the file is opened
     assert verdict.of(ob).kind == verdict.WITHIN
     ob.tolvol.measurement.forward_digits = "much"
     assert verdict.of(ob) is None
@@ -151,6 +200,12 @@ def test_a_measurement_that_cannot_be_read_is_none():
 def test_a_little_more_than_the_tolerance_is_not_shown_as_a_percent_more():
     assert report.percent(1 + 4.75e-8, 1) == "100.0000048 %"
     assert report.percent(1.005, 1) == "100.50 %"
+
+
+def test_tiny_percentages_are_bounds_without_an_exponent():
+    assert report.percent(1.41e-15, 1) == report.percent(0.999e-6, 1) == "<0.0001 %"
+    assert report.percent(1.001e-6, 1) == "0.000101 %" and report.percent(0, 1) == "0 %"
+    assert report.all_digits(1.41e-15, 1) == "1.41e-13 %"  # in the line that programs read
 
 
 def test_large_percentages_have_all_their_digits():

@@ -9,6 +9,7 @@ from mathutils import Matrix
 
 from addon import guard, native
 from addon.mesh import mesh_io
+from addon.proof import verdict
 from addon.shared.surface import to_world
 from scenes import activate, add_object, plates_with_t_junctions, sheet, sheet_arrays, world_triangles
 
@@ -203,7 +204,7 @@ def test_parts_of_the_reference_that_are_beyond_the_tolerance_are_named():
     assert state(ob)["sculpting"] == (said, True)
     ob.tolvol.keep = "ONE"
     updated(ob)
-    assert state(ob)["sculpting"] == ("Within the tolerance", True)
+    assert state(ob)["sculpting"] == ("Guarding one way", True)
 
 
 def test_what_holds_t_junctions_together_stays_and_the_guard_says_so():
@@ -375,7 +376,7 @@ def test_new_faces_that_are_inside_are_guarded_on():
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.mesh.subdivide(number_cuts=1)
     bpy.context.view_layer.update()
-    assert state(ob)["editing"] == ("Within the tolerance", True)
+    assert state(ob)["editing"] == ("Guarding both ways", True)
     assert len(edit(ob, lambda co: (co.x, co.y, 1))) == 441
     lower, upper = judged(ob, reference)
     assert 0.95 < lower and upper <= 1
@@ -493,6 +494,23 @@ def evaluated(ob, reference):
     vertices = to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world))
     found = native.module.directed_hausdorff(vertices, arrays.triangles, *reference, bound=TOLERANCE)
     return found.lower / TOLERANCE, found.upper / TOLERANCE
+
+
+def test_the_lattice_guard_does_not_say_that_a_mesh_with_a_hole_is_within():
+    ob = sheet(count=20)
+    guarded(ob, mode="OBJECT")
+    edited = bmesh.new()
+    edited.from_mesh(ob.data)
+    bmesh.ops.delete(edited, geom=edited.faces[100:200], context="FACES")
+    edited.to_mesh(ob.data)
+    edited.free()
+    caged(ob)
+    ob.tolvol.guard.lattice = True
+    updated(ob)
+    assert bpy.ops.tolvol.check() == {"FINISHED"} and verdict.word(ob) == verdict.FAIL
+    assert state(ob)["lattice"] == ("Guarding one way", True)
+    ob.tolvol.keep = "ONE"
+    assert verdict.word(ob) == verdict.PASS and verdict.of(ob).ways.startswith("one way")
 
 
 @pytest.mark.parametrize("matrix", [Matrix(), PLACED], ids=["local", "placed"])

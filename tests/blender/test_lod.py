@@ -50,7 +50,7 @@ def fresh_count(**options):
 
 
 @pytest.mark.parametrize("matrix", [Matrix(), PLACED], ids=["local", "placed"])
-def test_each_level_is_proved_against_the_original_and_is_what_decimate_leaves(matrix):
+def test_each_level_is_proved_against_the_original_and_is_what_decimate_leaves(matrix, capfd):
     ob = torus(matrix=matrix)
     reference, before = world_triangles(ob), column(ob.data.vertices, "co", 3).tobytes()
     size = snapshots.surface_of(ob).size()
@@ -68,6 +68,8 @@ def test_each_level_is_proved_against_the_original_and_is_what_decimate_leaves(m
         assert verdict.of(level).kind == verdict.WITHIN and level.tolvol.tolerance_percent == pytest.approx(percent)
     counts = [len(level.data.polygons) for level in levels]
     assert counts == sorted(counts, reverse=True) and counts[0] > 3 * counts[2]
+    left = ", ".join(f"{count:,}" for count in counts)
+    assert f"Info: 3 levels of torus: 2,304 -> {left} triangles, 3 of 3 PASS, " in capfd.readouterr().out
     activate(ob)
     assert counts == [fresh_count(tolerance_percent=percent) for percent in (0.3, 1, 3)]
 
@@ -129,6 +131,29 @@ def test_by_lengths_and_the_settings_of_decimate():
         assert {tuple(row) for row in column(level.data.vertices, "co", 3).tolist()} <= before
         assert verdict.of(level).tolerance == limit and verdict.of(level).two_sided
         assert len(level.data.polygons) < 900
+
+
+def test_another_unit_of_the_levels_keeps_their_tolerances():
+    ob = torus()
+    lod, size = ob.tolvol.lod, snapshots.surface_of(ob).size()
+    percentages = list(lod.percentages)
+    lod.in_length = True
+    assert list(lod.lengths) == pytest.approx([percent / 100 * size for percent in percentages], rel=1e-6)
+    lod.lengths[0] = 0.002 * size
+    lod.in_length = True  # It is no change.
+    assert lod.lengths[0] == pytest.approx(0.002 * size, rel=1e-6)
+    lod.in_length = False
+    assert [f"{percent:.6g}" for percent in lod.percentages] == [
+        "0.2",
+        *(f"{percent:g}" for percent in percentages[1:]),
+    ]
+    # Adjust Last Operation finds both in the properties of the operator, and the panel in those of the object.
+    assert bpy.ops.tolvol.make_lods("EXEC_DEFAULT", True, levels=2, percentages=padded(1, 3)) == {"FINISHED"}
+    lod = bpy.context.active_object.tolvol.lod
+    for settings in (bpy.context.window_manager.operators[-1].properties, lod):
+        assert list(settings.lengths)[:2] == pytest.approx([0.01 * size, 0.03 * size], rel=1e-6)
+    make(levels=2, in_length=True, lengths=padded(0.02 * size, 0.04 * size))
+    assert list(lod.percentages)[:2] == pytest.approx([2, 4], rel=1e-6) and lod.in_length
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from scenes import sheet
 def _nothing_left():
     yield
     queue.stop()
-    measurements.forget_passing()
+    measurements.forget_kept()
 
 
 def in_mode(mode, **settings):
@@ -85,8 +85,9 @@ def test_a_change_of_the_mesh_tolerance_or_reference_counts():
     ob.data.vertices[200].co.z = 0.05
     ob.data.update()
     bpy.context.view_layer.update()
+    assert verdict.of(ob).largest > 0.04
     assert bpy.ops.tolvol.set_reference(replace=True) == {"FINISHED"}
-    assert verdict.word(ob) == NOT_CHECKED
+    assert verdict.of(ob).largest == 0, "it is its own reference now"
 
 
 def test_a_mesh_that_changes_meanwhile_is_measured_again():
@@ -98,6 +99,34 @@ def test_a_mesh_that_changes_meanwhile_is_measured_again():
     assert queue._running is None or queue._running[2].progress.cancelled
     measured()
     assert verdict.word(ob) == FAIL
+
+
+def test_a_mesh_that_cannot_be_measured_has_a_reason():
+    ob = in_mode("EDIT")
+    measured()
+    edited = bmesh.from_edit_mesh(ob.data)
+    bmesh.ops.delete(edited, geom=edited.verts[:], context="VERTS")
+    bmesh.update_edit_mesh(ob.data)
+    measuring.note(ob)
+    assert deviation._why_not_checked(ob) == "Being measured"
+    measured()
+    assert verdict.word(ob) == NOT_CHECKED and deviation._why_not_checked(ob) == "sheet has no faces"
+
+
+def test_a_measurement_that_fails_has_a_reason_until_the_mesh_changes(monkeypatch):
+    def fail(*_arguments):
+        raise MemoryError
+
+    monkeypatch.setattr(measuring.measure, "both_ways", fail)
+    ob = in_mode("EDIT")
+    measured()
+    reason = "The memory is not enough to measure the mesh"
+    assert verdict.word(ob) == NOT_CHECKED and deviation._why_not_checked(ob) == reason
+    monkeypatch.undo()
+    measuring.note(ob)
+    assert deviation._why_not_checked(ob) == "Being measured"
+    measured()
+    assert verdict.word(ob) == PASS
 
 
 @pytest.mark.parametrize("share", (0.9e-6, 1.1e-6))

@@ -14,6 +14,7 @@ from addon.mesh.mesh_io import column
 from addon.operators import fit, modifiers
 from addon.proof import kept_warnings, verdict
 from addon.reference import snapshots
+from addon.shared.errors import NotProved
 from addon.shared.surface import to_world
 from scenes import activate, add_object, link, plates_with_t_junctions, torus, world_triangles
 
@@ -285,11 +286,28 @@ def test_a_search_ends_where_nothing_is_within():
 def test_a_mesh_of_which_only_the_proof_shows_that_it_is_beyond_is_passed_over(monkeypatch):
     ob = modified("DECIMATE")
     reference, tolerance = world_triangles(ob), 0.01 * snapshots.surface_of(ob).size()
-    # The samples are made to see no deviation of any mesh with so many points, so that the proof alone decides.
-    monkeypatch.setattr(modifiers.measure, "sampled_distance", lambda points, *_: 0.0 if len(points) > 500 else 9.0)
+    tried, certified = [], modifiers._Trial.certified
+
+    def beyond(_progress):
+        raise NotProved("beyond")
+
+    def first_is_beyond(trial, arrays):
+        tried.append(len(arrays.triangles))
+        return beyond if len(tried) == 1 else certified(trial, arrays)
+
+    monkeypatch.setattr(modifiers._Trial, "certified", first_is_beyond)
     bpy.ops.tolvol.fit_modifier()
+    assert tried[0] <= tried[1] <= tried[-1] == len(world_triangles(ob)[1]) < len(reference[1])
     for pair in ((world_triangles(ob), reference), (reference, world_triangles(ob))):
         assert native.module.directed_hausdorff(*pair[0], *pair[1], bound=tolerance).upper <= tolerance
+
+
+def test_a_fit_of_which_no_value_is_proved_changes_nothing(monkeypatch):
+    ob = modified("DECIMATE")
+    monkeypatch.setattr(modifiers.measure, "sampled_distance", lambda points, *_: 0.0 if len(points) > 500 else 9.0)
+    none = "No Ratio of DECIMATE leaves fewer than the 1,024 triangles of DECIMATE within the tolerance"
+    refused(f"{none}. Take a larger tolerance, or press Decimate, which leaves 168$", bpy.ops.tolvol.fit_modifier)
+    assert ob.tolvol.snapshot is None
 
 
 def test_a_search_that_is_ended_keeps_the_best_so_far(monkeypatch):
@@ -323,6 +341,43 @@ def test_says_if_decimate_would_leave_fewer_triangles():
     said = "The button Decimate leaves fewer triangles within this tolerance"
     assert warning == f"{said}: {plain:,}, and the modifier DECIMATE {fitted:,}"
     assert plain < fitted
+
+
+def test_a_fit_that_leaves_no_triangle_fewer_changes_nothing_and_says_why():
+    ob = torus()
+    ob.modifiers.new("fewer", "DECIMATE")
+    ob.tolvol.tolerance_percent = 1e-3
+    none = "No Ratio of fewer leaves fewer than the 2,304 triangles of torus within the tolerance"
+    quads = ": the modifier may cut bent quads along the other diagonal, which takes them beyond the tolerance"
+    refused(f"{none}{quads}. Take a larger tolerance$", bpy.ops.tolvol.fit_modifier)
+    ob.tolvol.tolerance_percent = 0.2
+    refused(
+        f"{none}{quads}. Take a larger tolerance, or press Decimate, which leaves 850$", bpy.ops.tolvol.fit_modifier
+    )
+    ob.modifiers.new("triangles", "TRIANGULATE").quad_method = "FIXED"
+    bpy.ops.object.modifier_apply(modifier="triangles")
+    ob.tolvol.tolerance_percent = 1e-3
+    refused(f"{none}. Take a larger tolerance$", bpy.ops.tolvol.fit_modifier)
+    ob.tolvol.tolerance_percent = 0.2
+    assert bpy.ops.tolvol.fit_modifier() == {"FINISHED"}, "no quad is cut any more"
+    assert len(ob.data.polygons) < 2304 and not ob.modifiers
+
+
+def test_the_fewest_triangles_are_told_until_the_fit_ends(monkeypatch):
+    told, advance = [], Run.advance
+
+    def noted(run):
+        told.append((run.operator.doing, run.operator.count))
+        return advance(run)
+
+    monkeypatch.setattr(Run, "advance", noted)
+    ob = modified("DECIMATE")
+    bpy.ops.tolvol.fit_modifier()
+    count = f"{len(world_triangles(ob)[1]):,} triangles"
+    first = next(i for i, (_, said) in enumerate(told) if said)
+    assert all(said for _, said in told[first:]) and told[-1] == ("Comparing with Decimate", count)
+    searching = [said for doing, said in told[first:] if doing != "Comparing with Decimate"]
+    assert searching[0].endswith(" triangles so far") and searching[-1] == count
 
 
 def test_a_value_that_is_given_is_certified_and_not_searched_for():

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The original is kept with all its data, comes back in one step, and is let go with the reference."""
 
+from functools import partial
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
@@ -8,7 +11,7 @@ from mathutils import Matrix
 
 from addon.mesh import mesh_io, transfer
 from addon.mesh.mesh_io import column
-from addon.operators import original
+from addon.operators import original, reference
 from addon.reference import originals
 from scenes import activate, sheet, torus
 
@@ -110,6 +113,85 @@ def test_a_new_reference_lets_the_old_original_go():
     ob.data.update()
     assert bpy.ops.tolvol.set_reference(replace=True) == {"FINISHED"}
     assert len(bpy.data.meshes) == 3 and ob.tolvol.original.vertices[0].co == ob.data.vertices[0].co
+
+
+def add_uv_map(mesh):
+    mesh.uv_layers.new(name="another")
+
+
+def change_uvs(mesh):
+    mesh.uv_layers[0].data[5].uv.x += 0.5
+
+
+def change_material(mesh):
+    mesh.polygons[3].material_index = 1 - mesh.polygons[3].material_index
+
+
+def remove_material(mesh):
+    mesh.materials.pop()
+
+
+def change_attribute(mesh):
+    mesh.attributes["heat"].data[7].value = 3
+
+
+def change_weight(mesh):
+    mesh.vertices[2].groups[0].weight = 0.75
+
+
+def change_shape_key(mesh):
+    mesh.shape_keys.key_blocks["up"].data[4].co.z += 0.5
+
+
+def mark_seam(mesh):
+    mesh.edges[9].use_seam = True
+
+
+def shade_smooth(mesh):
+    mesh.polygons[0].use_smooth = not mesh.polygons[0].use_smooth
+
+
+def set_normals(mesh):
+    if bpy.app.version < (4, 1):
+        mesh.use_auto_smooth = True
+    mesh.normals_split_custom_set([(0, 0.6, 0.8)] * len(mesh.loops))
+
+
+@pytest.mark.parametrize(
+    "change",
+    (
+        *(add_uv_map, change_uvs, change_material, remove_material, change_attribute, change_weight, change_shape_key),
+        *(mark_seam, shade_smooth, set_normals),
+    ),
+)
+def test_an_original_with_other_data_is_not_discarded_without_a_question(change, monkeypatch):
+    ob = rich()
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    assert not reference.loses_something(ob)
+    mesh_io.select_faces(ob.data, np.arange(len(ob.data.polygons)) < 5)
+    assert not reference.loses_something(ob), "a selection is no data"
+    change(ob.data)
+    assert reference.loses_something(ob)
+    asked = []
+    monkeypatch.setattr(reference, "_ask", lambda _context, title, lines, _draw: asked.append((title, lines)))
+    # Blender without a window calls no invoke().
+    button = SimpleNamespace(sure=False, replace=False)
+    for operator in (reference.TOLVOL_OT_set_reference, reference.TOLVOL_OT_clear_reference):
+        assert operator.invoke(button, bpy.context, None) == {"CANCELLED"} and ob.tolvol.original is not None
+    assert [title for title, _ in asked] == ["Replace the reference of sheet?", "Remove the reference of sheet?"]
+    lost = "The original is discarded, too, with its UV maps, materials, shape keys, vertex groups."
+    assert all(lines[1] == lost for _, lines in asked)
+
+
+def test_a_reference_like_the_mesh_is_removed_without_a_question():
+    ob = rich()
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    button = SimpleNamespace(sure=False)
+    button.execute = partial(reference.TOLVOL_OT_clear_reference.execute, button)
+    assert reference.TOLVOL_OT_clear_reference.invoke(button, bpy.context, None) == {"FINISHED"}
+    assert ob.tolvol.snapshot is None and ob.tolvol.original is None
+    assert bpy.ops.tolvol.decimate(tolerance_percent=3) == {"FINISHED"}
+    assert reference.loses_something(ob), "the original is not the mesh"
 
 
 def smooth(_ob):

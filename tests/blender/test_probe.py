@@ -146,6 +146,21 @@ def test_readings_are_said_with_side_share_and_tolerance():
     assert said == ["6.25 cm outside, 125 % of the tolerance", "Tolerance 5 cm: beyond"]
 
 
+def test_the_reference_is_read_where_it_is_coloured(chosen_preferences):
+    ob = lifted()
+    assert not operators.reads_reference(bpy.context, ob) and operators.what(bpy.context, ob) == "sheet"
+    ob.tolvol.deviation_surface = "REFERENCE"
+    assert operators.reads_reference(bpy.context, ob)
+    assert operators.what(bpy.context, ob) == "Reference of sheet"
+    reading = probe(ob, True).along((0.3, -0.2, 5), (0, 0, -1))
+    assert reading.position[2] == 0 and "on the reference, " in operators.described(bpy.context, ob, reading)[0]
+    ob.tolvol.show_deviation = False
+    assert not operators.reads_reference(bpy.context, ob)
+    ob.tolvol.show_deviation = True
+    chosen_preferences.use_gl = False
+    assert not operators.reads_reference(bpy.context, ob), "nothing is coloured"
+
+
 def move(ob):
     ob.location.x = 1
 
@@ -332,7 +347,7 @@ def test_what_is_on_top_is_not_read():
     ob = lifted()
     ob.modifiers.new("up", "DISPLACE")
     assert probe(changed(ob)).along((0, 0, 5), (0, 0, -1)).distance == float(np.float32(0.1))
-    assert operators._what(ob) == "Base mesh of sheet, without its modifiers"
+    assert operators.what(bpy.context, ob) == "Base mesh of sheet, without its modifiers"
     assert measurements.on_top(ob) == ["modifiers"]
 
 

@@ -202,6 +202,7 @@ def test_several_objects_are_one_report(tmp_path):
     run = saved(tmp_path)
     assert [entry["a"]["name"] for entry in run["objects"]] == [ob.name, good.name] and run["not_measured"] == []
     assert [entry["verdict"] for entry in run["objects"]] == ["FAIL", "PASS"] and run["verdict"] == "FAIL"
+    assert [verdict.word(one) for one in (ob, good)] == ["FAIL", "PASS"], "the panel says the same"
     assert "date" in run and all(entry["forward"]["samples"] for entry in run["objects"])
     page = Page(saved(tmp_path, "r.html"))
     assert page.tags.count("section") == 2 and page.tags.count("article") == 4 and "Deviation of 2 objects" in page.text

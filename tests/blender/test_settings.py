@@ -129,6 +129,21 @@ def test_presets_for_printers_are_millimetres_of_the_scene_or_of_the_file(system
     assert f"shown as {units.length(bpy.context, 0.05)}".replace("\u00a0", " ") in text
 
 
+def test_adjusting_the_unit_of_a_preset_converts_its_value():
+    ob = torus()
+    size = measurements.shown_size(ob)
+    assert bpy.ops.tolvol.set_tolerance(mode="PERCENT", value=0.2) == {"FINISHED"}
+    # Adjust Last Operation keeps what the operator has stored in its properties, and changes the unit.
+    assert bpy.ops.tolvol.set_tolerance(mode="LENGTH", value=0.2, mode_before="PERCENT") == {"FINISHED"}
+    assert ob.tolvol.tolerance_mode == "LENGTH"
+    length = ob.tolvol.tolerance_length
+    assert length == pytest.approx(0.002 * size, rel=1e-6)
+    assert bpy.ops.tolvol.set_tolerance(mode="PERCENT", value=length, mode_before="LENGTH") == {"FINISHED"}
+    assert tolerances.tolerance_length(ob.tolvol, size) == 0.002 * size, "the number that was typed"
+    assert bpy.ops.tolvol.set_tolerance(mode="PERCENT", value=0.3, mode_before="PERCENT") == {"FINISHED"}
+    assert ob.tolvol.tolerance_percent == pytest.approx(0.3)
+
+
 def test_every_setting_has_a_tooltip():
     groups = [cls for cls in bpy.types.PropertyGroup.__subclasses__() if cls.__name__.startswith("TOLVOL_PG")]
     assert len(groups) >= 5

@@ -176,8 +176,14 @@ def test_reports_say_shells_area_and_volume(tmp_path):
     ]
     holed = save(tmp_path / "holed.ply", ("holed", CUBE[0], CUBE[1][1:]))
     code, out, _ = command("report.py", holed, one, "--report", page)
-    assert code == 0 and "A: shells 1 (B: 1), area 5 (B: 24, -79.2 %), volume none (B: 8)\n" in out
-    assert "<td>Area</td>" in page.read_text() and "<td>none</td>" in page.read_text()
+    assert code == 0 and "A: shells 1 (B: 1), area 5 (B: 24, -79.2 %), volume not closed (B: 8)\n" in out
+    assert "<td>Area</td>" in page.read_text() and "<td>not closed</td>" in page.read_text()
+    code, out, _ = command("report.py", holed, holed, "--report", page)
+    assert code == 0 and "A: shells 1 (B: 1), area 5 (B: 5" in out and "volume" not in out
+    assert "<td>Area</td>" in page.read_text() and "<td>Volume" not in page.read_text()
+    turned = save(tmp_path / "turned.ply", ("turned", CUBE[0], [CUBE[1][0][::-1], *CUBE[1][1:]]))
+    code, out, _ = command("report.py", turned, one)
+    assert code == 0 and "volume not oriented (B: 8)\n" in out
 
 
 def test_select_crossing_faces():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from addon.proof import statistics, verdict
+from addon.reference import measurements
 from scenes import sheet, torus
 
 pytestmark = pytest.mark.usefixtures("measured_once")
@@ -48,6 +49,8 @@ def test_they_go_with_the_state_that_was_measured():
         bpy.ops.tolvol.check() == {"FINISHED"} and statistics.of(ob) is None
     )  # Check measures the largest distance alone.
     assert bpy.ops.tolvol.measure_statistics() == {"FINISHED"} and statistics.of(ob)
+    measurements.forget_kept()  # as when the file is opened
+    assert statistics.of(ob)
     ob.tolvol.measurement.statistics = '{"forward": 3}'
     assert statistics.of(ob) is None, "damaged"
 

@@ -87,7 +87,7 @@ def test_check_report_and_select_outside_say_the_same(tolerance, word, tmp_path,
     ob.data.update()
     bpy.context.view_layer.update()
     assert verdict.word(ob) == NOT_CHECKED  # What is known is about another state of the mesh.
-    assert bpy.ops.tolvol.select_outside() == {"FINISHED"}
+    assert bpy.ops.tolvol.select_outside() == {"FINISHED" if word == FAIL else "CANCELLED"}
     assert word in capfd.readouterr().out
     if word == FAIL:
         assert ob.mode == "EDIT" and verdict.word(ob) == NOT_CHECKED
@@ -117,8 +117,46 @@ def test_one_way_is_enough_only_if_it_was_asked_for(tmp_path, capfd):
     ob.tolvol.keep = "BOTH"
     assert verdict.word(ob) == FAIL
     capfd.readouterr()
-    assert bpy.ops.tolvol.select_outside() == {"FINISHED"}
+    assert bpy.ops.tolvol.select_outside() == {"CANCELLED"}
     assert "No face of the mesh is outside. FAIL" in capfd.readouterr().out and ob.mode == "OBJECT"
+
+
+def test_against_a_reference_that_is_out_of_date_nothing_is_known(tmp_path):
+    other, ob = torus("other"), torus()
+    assert bpy.ops.tolvol.decimate() == {"FINISHED"} and verdict.word(ob) == PASS
+    ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", other
+    assert verdict.of(ob) is None and deviation.verdicts([ob]) == [("torus", NOT_CHECKED, None)]
+    assert deviation._why_not_checked(ob) == "The reference is out of date: another kind of reference was chosen"
+    good = torus("good")
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    ob.select_set(True)
+    assert bpy.ops.tolvol.save_report(filepath=str(tmp_path / "r.json")) == {"FINISHED"}
+    document = json.loads((tmp_path / "r.json").read_text())
+    assert [run["a"]["name"] for run in document["objects"]] == [good.name] and document["verdict"] == NOT_CHECKED
+    [unknown] = document["not_measured"]
+    assert unknown["name"] == "torus" and unknown["reason"].startswith("The reference is out of date: another kind of")
+    ob.tolvol.reference_kind = "SELF"
+    assert verdict.word(ob) == PASS, "the previous reference was chosen again"
+
+
+def test_a_mesh_that_is_its_own_reference_needs_no_measurement():
+    ob = torus()
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    assert verdict.word(ob) == PASS and verdict.of(ob).forward.upper == verdict.of(ob).backward.upper == 0
+    assert bpy.ops.tolvol.decimate() == {"FINISHED"} and verdict.of(ob).largest > 0
+    assert bpy.ops.tolvol.restore_original() == {"FINISHED"}
+    assert verdict.word(ob) == PASS and verdict.of(ob).largest == 0
+    ob.data.vertices[0].co.z += 1e-3
+    ob.data.update()
+    bpy.context.view_layer.update()
+    assert verdict.word(ob) == NOT_CHECKED
+    # Another object's mesh lies at its own place.
+    scan = torus("scan")
+    scan.location.x = 1
+    same = torus("same")
+    same.tolvol.reference_kind, same.tolvol.reference_object = "OBJECT", scan
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    assert verdict.word(same) == NOT_CHECKED
 
 
 def test_operations_begin_their_message_with_the_word(capfd):
@@ -168,6 +206,8 @@ def test_the_list_of_the_selected_objects_has_their_verdicts_and_what_fails_firs
     for ob in objects[1:]:
         bpy.context.view_layer.objects.active = ob
         assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    objects[3].data.vertices[0].co.z += 1
+    objects[3].data.update()
     for ob in objects[:3]:
         bpy.context.view_layer.objects.active = ob
         assert bpy.ops.tolvol.check() == {"FINISHED"}

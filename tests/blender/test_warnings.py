@@ -87,6 +87,6 @@ def test_without_uv_maps_there_is_nothing_to_select():
         bpy.ops.tolvol.select_staying()
     ob.data.uv_layers.new(name="map")
     ob.data.uv_layers[0].data.foreach_set("uv", np.zeros(2 * len(ob.data.loops), np.float32))
-    assert bpy.ops.tolvol.select_staying() == {"FINISHED"} and ob.mode == "OBJECT"
+    assert bpy.ops.tolvol.select_staying() == {"CANCELLED"} and ob.mode == "OBJECT"
     activate(ob)
     assert staying.TOLVOL_OT_select_staying.poll(bpy.context)

@@ -100,6 +100,15 @@ def test_the_probe_reads_under_the_mouse_and_leaves_labels():
     the_ball().tolvol.tolerance_percent = 5
     xdotool("mousemove", left[0] + 2, left[1])
     yield from finished(lambda: reads(True) and "beyond" not in probing.hover().lines[1])
+    # Where the reference is coloured, it is what the mouse points at.
+    the_ball().tolvol.deviation_surface = "REFERENCE"
+    xdotool("mousemove", *left)
+    yield from finished(lambda: probing.hover().lines and "on the reference" in probing.hover().lines[0])
+    assert TOLVOL_OT_probe._running._said.startswith("Reference of ball: ")
+    screenshot("probe 4 on the reference")
+    click(*left)
+    yield from finished(lambda: len(the_ball().tolvol.labels) == 3)
+    assert the_ball().tolvol.labels[2].on_reference
     key("Escape")
     yield from finished(lambda: not TOLVOL_OT_probe.running())
     assert probing.hover() is None

@@ -247,3 +247,25 @@ def test_adjusting_again_while_a_job_runs_begins_anew():
     with window_context():
         bpy.ops.ed.undo()
     assert suzanne().tolvol.snapshot is None and len(suzanne().data.polygons) > 3 * left
+
+
+def test_check_is_repeated_with_progress_and_leaves_the_decimation_to_be_adjusted():
+    yield from reset(monkey)
+    left, _ = yield from decimated()
+    with window_context():
+        bpy.ops.tolvol.check("INVOKE_DEFAULT", True)
+    yield from finished(lambda: not job.under_way())
+    said = len(reports())
+    with window_context(), job_time.in_background():
+        bpy.ops.screen.repeat_last("EXEC_DEFAULT", True)
+    assert job.under_way()
+    yield from ends(said, "PASS: within the tolerance both ways")
+    decimation = [last for last in bpy.context.window_manager.operators if last.name == "Decimate in Tolerance"][-1]
+    decimation.properties.tolerance_percent = 0.1
+    with window_context(), job_time.in_background():
+        assert bpy.ops.ed.undo_redo("EXEC_DEFAULT", True) == {"FINISHED"}
+    yield from finished(lambda: not job.under_way())
+    assert left < len(suzanne().data.polygons) < 3 * left
+    with window_context():
+        bpy.ops.ed.undo()
+    assert suzanne().tolvol.snapshot is None and len(suzanne().data.polygons) > 3 * left

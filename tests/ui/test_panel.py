@@ -291,6 +291,7 @@ def test_a_damaged_file_breaks_no_panel():
     try:
         suzanne().tolvol.last_run = suzanne().tolvol.last_run[:100]
         suzanne().tolvol.measurement.forward = float("nan")
+        measurements.forget_kept()
         view()[1].tag_redraw()
         yield from finished(lambda: any("damaged" in text for text in said))
         suzanne().tolvol.snapshot.clear_geometry()

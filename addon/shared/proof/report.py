@@ -86,7 +86,7 @@ def proved(run):
 
 
 def line(run, seconds=None):
-    """Returns a run as one line of text. Every percentage is of the reference's size."""
+    """Returns a run as one line of text, which programs may read. Every percentage is of the reference's size."""
     size = 100 * run["tolerance"]["absolute"] / run["tolerance"]["percent"]
     seconds = sum(run["seconds"].values()) if seconds is None else seconds
     normals = ""
@@ -98,7 +98,7 @@ def line(run, seconds=None):
     return (
         f"{counts(run)}, "
         f"tolerance {run['tolerance']['percent']:.4g} % = {run['tolerance']['absolute']:.3g}, "
-        f"result within {percent(run['forward'][1], size)}, reference within {percent(run['backward'][1], size)}"
+        f"result within {all_digits(run['forward'][1], size)}, reference within {all_digits(run['backward'][1], size)}"
         f"{normals} ({'certified' if proved(run) else 'not proved'}), {duration(seconds)}"
     )
 
@@ -164,7 +164,16 @@ def intervals(run):
     return f"the result is {forward} of the size from the reference, the reference {backward} from the result"
 
 
+# A smaller percentage is hardly more than rounding, and Python would write it with an exponent.
+_LEAST_PERCENT = 0.0001
+
+
 def percent(value, whole):
+    """Returns `value` in percent of `whole` for people to read, like all_digits() but without the digits of tiny values."""
+    return f"<{_LEAST_PERCENT} %" if 0 < 100 * value / whole < _LEAST_PERCENT else all_digits(value, whole)
+
+
+def all_digits(value, whole):
     """Returns `value` in percent of `whole` with three digits, rounded up: a proved bound must not look smaller than it is."""
     share = 100 * value / whole
     if share <= 0:

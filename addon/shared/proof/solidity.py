@@ -119,13 +119,19 @@ def summary(compared, as_area, as_volume):
 
 
 def measures(of_a, of_b, changes):
-    """Returns rows (name, A's, B's, change of A against B) of shells, area and volume as text; "none": no volume."""
+    """Returns rows (name, A's, B's, change of A against B) of shells, area and volume as text.
 
-    def rounded(value):
-        return "none" if value is None else f"{value:.4g}"
+    Where only one of them has a volume, the other says why it has none. Where none has, the row is left out.
+    """
 
-    of_each = [(f"{found['shells']:,}", rounded(found["area"]), rounded(found["volume"])) for found in (of_a, of_b)]
-    return list(zip(("shells", "area", "volume"), *of_each, _changes(of_a, of_b, changes)))
+    def volume(found):
+        if found["volume"] is None:
+            return "not oriented" if found["closed"] else "not closed"
+        return f"{found['volume']:.4g}"
+
+    of_each = [(f"{found['shells']:,}", f"{found['area']:.4g}", volume(found)) for found in (of_a, of_b)]
+    rows = list(zip(("shells", "area", "volume"), *of_each, _changes(of_a, of_b, changes)))
+    return rows if any(found["volume"] is not None for found in (of_a, of_b)) else rows[:2]
 
 
 def measures_line(of_a, of_b, changes):
