@@ -226,13 +226,15 @@ ways, and apply the modifier to the base mesh. An object without a reference get
     def _search(self, evaluation, parameter, trial):
         """Returns the values at which no sample was beyond the tolerance, the one with the fewest triangles first."""
         name, triangles = evaluation.modifier.name, len(trial.surface.arrays.triangles)
-        search, deviation = fit.search(parameter.first, parameter.last, fit.most_values(triangles)), None
+        most, tried = fit.most_values(triangles), 0
+        search, deviation = fit.search(parameter.first, parameter.last, most), None
         while not self.progress.finishing:
             try:
                 value = search.send(deviation)
             except StopIteration:
                 break
             self.part, self.doing = f"Fitting {name}", f"{parameter.label} {value:.4g}"
+            self.share, tried = min(tried / most, 1), tried + 1
             self.count = f"{min(self._found)[0]:,} triangles so far" if self._found else ""
             setattr(evaluation.modifier, parameter.name, value)
             arrays = mesh_io.read_mesh(evaluation.mesh())
@@ -245,7 +247,8 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         """Returns (value, mesh, the result of certified()) for the first of the values whose mesh is proved to be within."""
         name = evaluation.modifier.name
         for i, value in enumerate(values):
-            self.part, self.doing, self.count = f"Proving {name}", f"{parameter.label} {value:.4g}", ""
+            self.part, self.doing = f"Proving {name}", f"{parameter.label} {value:.4g}"
+            self.share, self.count = 0.0, ""
             setattr(evaluation.modifier, parameter.name, value)
             mesh = evaluation.new_mesh()
             try:
@@ -258,7 +261,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
 
     def _plain(self, context, trial):
         """Returns how many triangles Decimate would leave with its default settings."""
-        self.part, self.doing, self.count = "", "Comparing with Decimate", ""
+        self.part, self.doing, self.share, self.count = "", "Comparing with Decimate", 0.0, ""
         settings = self.ob.tolvol
         options = decimation.options(settings, automatic_placement(self.ob.data), trial.threads)
         options |= {"two_sided": True, "effort": "fast", "target_triangles": None, "max_seconds": None}

@@ -10,7 +10,7 @@ from ..job import JobOperator
 from ..operation_settings import threads_setting
 from ..reference import snapshots, tolerances
 from ..shared import volumes
-from .blocked import allowed, reference_blocked
+from .blocked import allowed, reference_blocked, settings_blocked
 
 
 def replace_label(ob):
@@ -101,7 +101,7 @@ class TOLVOL_OT_clear_reference(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         ob = context.active_object
-        return ob is not None and ob.type == "MESH" and ob.library is None and ob.tolvol.snapshot is not None
+        return allowed(cls, settings_blocked(ob) or (None if ob.tolvol.snapshot else "No reference is set"))
 
     def execute(self, context):
         snapshots.clear_reference(context.active_object)

@@ -255,25 +255,25 @@ def press(operator, across=0.33):
     place = yield from find(operator, across)
     scrolled = place is None
     if scrolled:
-        yield from scroll(_UP)
+        yield from scroll(UP)
         place = yield from find(operator, across)
     # The sidebar may be several times as high as the window.
-    for _ in range(_PAGES):
+    for _ in range(PAGES):
         if place is None:
-            yield from scroll(_DOWN, _PAGE)
+            yield from scroll(DOWN, _PAGE)
             place = yield from find(operator, across)
     assert place is not None, f"no button for {operator}"
     xdotool("click", 1)
     yield 0.3
     if scrolled and _view_areas():  # A file browser may fill the window now.
-        yield from scroll(_UP)
+        yield from scroll(UP)
 
 
-_UP, _DOWN = 4, 5  # X counts the two directions of the wheel as these buttons of the mouse.
-_PAGE, _PAGES = 6, 6  # Steps of the wheel after which a part of the sidebar is still seen, and how often that is done.
+UP, DOWN = 4, 5  # X counts the two directions of the wheel as these buttons of the mouse.
+_PAGE, PAGES = 6, 6  # Steps of the wheel after which a part of the sidebar is still seen, and how often that is done.
 
 
-def scroll(button=_UP, steps=30):
+def scroll(button=UP, steps=30):
     """Turns the wheel over the sidebar. After 30 steps it no longer scrolls."""
     sidebar = region("UI")
     middle = on_screen(sidebar, sidebar.width // 2, sidebar.height // 2)
@@ -282,7 +282,7 @@ def scroll(button=_UP, steps=30):
 
 
 def scroll_down():
-    yield from scroll(_DOWN)
+    yield from scroll(DOWN)
 
 
 def end_operators():
