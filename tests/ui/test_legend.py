@@ -128,6 +128,54 @@ def test_range_and_bands_of_the_colours():
     assert overlay.shows(the_ramp())
 
 
+def drag_legend(place, across, up):
+    """Drags the legend of a region by so many pixels."""
+    first = legend.box(place)
+    grip = on_screen(place, int(first[0]) + 20, place.height - int(first[1]) - 20)
+    # Blender has to see the mouse over the legend before the button goes down.
+    for by in (0, 1):
+        yield from sent("mousemove", grip[0] + by, grip[1])
+    xdotool("mousedown", 1)
+    for step in range(5):
+        yield 0.2
+        xdotool("mousemove", grip[0] + 1 + across * step // 4, grip[1] - up * step // 4)
+    yield 0.2
+    xdotool("mouseup", 1)
+    yield from finished(lambda: abs(legend.box(place)[0] - first[0] - across) < 10)
+    assert abs(legend.box(place)[1] - first[1] - up) < 10
+
+
+def test_each_view_has_its_own_place_for_the_legend():
+    yield from reset(ramp)
+    window, area = view()
+    area.spaces[0].show_region_ui, area.spaces[0].show_gizmo = False, True
+    with bpy.context.temp_override(window=window, area=area, region=region("WINDOW")):
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
+    areas = [area for area in window.screen.areas if area.type == "VIEW_3D"]
+    one, other = (next(region for region in area.regions if region.type == "WINDOW") for area in areas)
+    try:
+        yield from finished(lambda: legend.box(one) is not None and legend.box(other) is not None)
+        yield 0.5
+        before = legend.box(one), legend.box(other)
+        yield from drag_legend(other, -100, 160)
+        assert legend.box(one) == before[0]
+        moved = legend.box(other)
+        yield from drag_legend(one, -50, 80)
+        screenshot("legend 11 two views")
+        assert legend.box(other) == moved
+        legend.forget_moved()
+        for part in areas:
+            part.tag_redraw()
+        yield from finished(lambda: (legend.box(one), legend.box(other)) == before)
+    finally:
+        legend.forget_moved()
+        with bpy.context.temp_override(window=window, area=areas[1], region=areas[1].regions[0]):
+            bpy.ops.screen.area_close()
+        yield from finished(lambda: hasattr(bpy.context, "object"))
+    view()[1].spaces[0].region_3d.view_perspective = "PERSP"
+    view()[1].spaces[0].overlay.show_cursor = view()[1].spaces[0].overlay.show_object_origins = True
+
+
 def test_the_legend_is_dragged_and_is_one_for_selected_objects():
     yield from reset(ramp)
     said, stop = labels_of_the_legend()
@@ -136,19 +184,7 @@ def test_the_legend_is_dragged_and_is_one_for_selected_objects():
         view()[1].spaces[0].show_gizmo = True
         place = region("WINDOW")
         yield from finished(lambda: "Outside" in said and legend.box(place) is not None)
-        first = legend.box(place)
-        grip = on_screen(place, int(first[0]) + 20, place.height - int(first[1]) - 20)
-        # Blender has to see the mouse over the legend before the button goes down.
-        for by in (0, 1):
-            yield from sent("mousemove", grip[0] + by, grip[1])
-        xdotool("mousedown", 1)
-        for step in range(5):
-            yield 0.2
-            xdotool("mousemove", grip[0] + 1 - 50 * step, grip[1] - 40 * step)
-        yield 0.2
-        xdotool("mouseup", 1)
-        yield from finished(lambda: abs(legend.box(place)[0] - first[0] + 200) < 10)
-        assert abs(legend.box(place)[1] - first[1] - 160) < 10
+        yield from drag_legend(place, -200, 160)
         screenshot("legend 9 dragged")
         # It stays in the view, and each view has its own place for it.
         with window_context():
