@@ -159,7 +159,8 @@ def dark():
 def drag_sidebar(by):
     """Moves the left edge of the sidebar by so many pixels."""
     before = region("UI").width
-    x, y = on_screen(region("UI"), 7, 300)  # The edge is drawn beside the region's own.
+    # The edge is drawn beside the region's own.
+    x, y = on_screen(region("UI"), int(7 * bpy.context.preferences.system.ui_scale), 300)
     for step in (("mousemove", x - 40, y), ("mousemove", x, y), ("mousedown", 1), ("mousemove", x + by // 2, y)):
         xdotool(*step)
         yield 0.3
