@@ -43,7 +43,7 @@ def tell(operator, progress, clock):
     if operator.doing:
         stage, share, count = operator.doing, operator.share, operator.count
     else:
-        stage, share = progress.stage.capitalize(), progress.fraction
+        stage, share = progress.stage.capitalize() or "Preparing", progress.fraction
         # In these two stages the count is the number of triangles left.
         counts = progress.count and progress.stage in {"decimating", "refining"}
         count = f"{progress.count:,} triangles left" if counts else ""

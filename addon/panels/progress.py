@@ -30,7 +30,7 @@ def draw_progress(context, box, told):
 def in_a_row(context, told):
     """Returns in few words what is at work, and how far it is."""
     name, far = _name(told), told.stage if told.share is None else f"{told.share:.0%}"
-    return fitting(context, f"{name}: {far}", far) if far else name
+    return fitting(context, f"{name}: {far}", far)
 
 
 def _name(told):

@@ -322,6 +322,9 @@ def test_the_panel_is_told_stage_count_part_and_time_left(waiting, monkeypatch):
     operator._run.progress = progress = Progress()
     operator.improving = lambda: False
     operator.part = "torus, 2 of 3"
+    progress.stage = ""  # as before the first stage
+    assert operator._run.told().stage == "Preparing"
+    progress.stage = "decimating"
     assert operator._run.told() == progress_text.Told("Modal", "torus, 2 of 3", "Decimating", None, "", "", "Cancel")
     now[0] += 10
     progress.fraction, progress.count = 0.25, 12_400

@@ -68,13 +68,6 @@ def test_the_line_of_a_running_job_says_how_far_it_is(told, width, text):
     assert progress.in_a_row(sidebar(width), told) == text
 
 
-class WithBar(Layout):
-    """A layout of Blender 4.0 or later."""
-
-    def progress(self, **options):
-        self.shown.append(("progress", (), options))
-
-
 def test_a_running_job_has_four_rows_and_a_bar_where_blender_has_one(monkeypatch):
     for bar in (False, True):
         monkeypatch.setattr(progress, "_HAS_BAR", bar)
