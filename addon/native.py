@@ -81,6 +81,11 @@ def _folders_for_copies():
     yield _FOLDER
 
 
+def known_folders():
+    """Returns the folders that `reason` may name."""
+    return [*_folders(), *_folders_for_copies()]
+
+
 def _load_copy(files, name, parent):
     """Loads a copy of the files as the package `name`."""
     # The loaded copy needs no file any more, so the folder is removed. Windows cannot remove a loaded file: it stays there.

@@ -132,7 +132,8 @@ def decimate_settings(options=frozenset()):
         ),
         "largest_perimeter": FloatProperty(
             name="Largest Perimeter",
-            description="Leave holes open whose rim is longer than this length. 0 means no limit",
+            description="Leave holes open whose rim is longer than this length. 0 means no limit. It takes effect while "
+            "Holes: Close is ticked under Decimate",
             min=0,
             soft_max=10,
             step=1,

@@ -9,6 +9,7 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty
 
 from . import native
 from .reference import built, snapshots
+from .wrapping import text_lines
 
 # The tolerance of an object for which no other was chosen, in percent of the size.
 TOLERANCE = 0.2
@@ -59,17 +60,18 @@ class TOLVOL_AP_preferences(bpy.types.AddonPreferences):
     def draw(self, context):
         self.layout.use_property_split = True
         self.layout.operator("wm.url_open", text="Manual", icon="HELP").url = manual().as_uri()
+        self.layout.operator("tolvol.copy_problem_report", icon="COPYDOWN")
         if native.module is None:
-            self.layout.label(text=native.reason, icon="ERROR")
+            text_lines(context, self.layout, native.reason, "ERROR")
             return
-        self.layout.label(text=f"Compiled module {native.module.__version__}, {native.path}")
+        text_lines(context, self.layout, f"Compiled module {native.module.__version__}, {native.path}", "NONE")
         self.layout.prop(self, "tolerance")
         self.layout.prop(self, "threads")
         self.layout.prop(self, "use_gl")
         if text := _volume(context.active_object):
-            self.layout.label(text=text, icon="INFO")
+            text_lines(context, self.layout, text, "INFO")
         if not bpy.app.background:  # Without a window Blender crashes when it is asked for the renderer.
-            self.layout.label(text=f"3D views are drawn by {gpu.platform.renderer_get()}", icon="INFO")
+            text_lines(context, self.layout, f"3D views are drawn by {gpu.platform.renderer_get()}", "INFO")
 
 
 def _volume(ob):

@@ -25,8 +25,10 @@ class JobOperator:
         description="The names of the objects that the operator worked on, as JSON", options={"HIDDEN", "SKIP_SAVE"}
     )
 
-    # Texts for the status bar and the panel. If `doing` is set, it and `count` replace the native stage and its count.
+    # Texts for the status bar and the panel. If `doing` is set, it, `share` and `count` replace the native stage, the share
+    # of it that is done, and its count.
     doing = ""
+    share = 0.0
     count = ""
     part = ""  # which part of the work is under way, such as "Level 2 of 3", if there are several
 
@@ -116,5 +118,5 @@ class JobOperator:
         named = [bpy.data.objects.get(name) for name in json.loads(self.worked_on or "[]")] if again else []
         self.objects = named if named and all(named) else self.targets(context)
         self.worked_on = json.dumps([ob.name for ob in self.objects])
-        self.doing, self.count, self.part = "", "", ""
+        self.doing, self.share, self.count, self.part = "", 0.0, "", ""
         self._run = run.Run(self, context)

@@ -15,11 +15,11 @@ class Clock:
         self._stage = None
         self._began = 0.0
 
-    def seconds_left(self, progress):
-        """Returns the seconds, or None as long as too little of the stage is done."""
-        if progress.stage != self._stage or progress.fraction == 0:
-            self._stage, self._began = progress.stage, time.monotonic()
-        took, share = time.monotonic() - self._began, progress.fraction
+    def seconds_left(self, stage, share):
+        """Returns the seconds, or None as long as too little of the stage is done. share: of the stage that is done."""
+        if stage != self._stage or share == 0:
+            self._stage, self._began = stage, time.monotonic()
+        took = time.monotonic() - self._began
         return took * (1 - share) / share if took >= _KNOWN_AFTER and share >= _KNOWN_SHARE else None
 
 
@@ -38,23 +38,25 @@ class Told:
 
 def tell(operator, progress, clock):
     """Returns the Told of an operator."""
-    left = clock.seconds_left(progress)
     if progress.cancelled:
         return stopping(operator.bl_label, operator.part)
-    title, part = operator.bl_label, operator.part
-    escape = "Keep Present Result" if operator.improving() else "Cancel"
     if operator.doing:
-        return Told(title, part, operator.doing, None, "", operator.count, escape)
-    # In these two stages the count is the number of triangles left.
-    counts = progress.count and progress.stage in {"decimating", "refining"}
+        stage, share, count = operator.doing, operator.share, operator.count
+    else:
+        stage, share = progress.stage.capitalize() or "Preparing", progress.fraction
+        # In these two stages the count is the number of triangles left.
+        counts = progress.count and progress.stage in {"decimating", "refining"}
+        count = f"{progress.count:,} triangles left" if counts else ""
+    # An operator that says what it is doing says so for each of its steps, which are one stage together.
+    left = clock.seconds_left(operator.part if operator.doing else progress.stage, share)
     return Told(
-        title,
-        part,
-        progress.stage.capitalize(),
-        progress.fraction or None,
+        operator.bl_label,
+        operator.part,
+        stage,
+        share or None,
         f"{_duration(left)} left" if left is not None else "",
-        f"{progress.count:,} triangles left" if counts else "",
-        escape,
+        count,
+        "Keep Present Result" if operator.improving() else "Cancel",
     )
 
 
@@ -68,7 +70,7 @@ def status_line(told):
     if not told.escape:
         return told.stage
     part = f"{told.part}: " if told.part else ""
-    share = f" {told.share:.0%}" if told.share else ""
+    share = f" ({told.share:.0%})" if told.share else ""
     count = f", {told.count}" if told.count else ""
     return f"{part}{told.stage}{share}{count}    Esc: {told.escape}"
 

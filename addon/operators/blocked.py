@@ -7,14 +7,21 @@ from ..reference import snapshots
 _OBJECT_MODE = {"OBJECT"}
 
 
-def object_blocked(ob, modes=_OBJECT_MODE):
-    """Why no operator can run on `ob` now, or None. modes: Blender's modes in which the operator can run."""
+def settings_blocked(ob):
+    """Why the settings of `ob` cannot be changed, or None."""
     if native.module is None:
         return native.reason
     if ob is None or ob.type != "MESH":
         return "Select a mesh object"
     if ob.library is not None or ob.override_library is not None:
         return f"{ob.name} is linked from another file: Object > Relations > Make Local > All"
+    return None
+
+
+def object_blocked(ob, modes=_OBJECT_MODE):
+    """Why no operator can run on `ob` now, or None. modes: Blender's modes in which the operator can run."""
+    if reason := settings_blocked(ob):
+        return reason
     if not ob.matrix_world.determinant():
         return f"{ob.name} has no extent along an axis: Object > Clear > Scale"
     if ob.mode not in modes:

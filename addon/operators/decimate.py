@@ -29,9 +29,8 @@ def draw_decimate_settings(layout, settings):
     column.prop(settings, "placement", expand=True)
     row = layout.row(heading="Stop At", align=True)
     row.prop(settings, "use_target", text="")
-    sub = row.row()
-    sub.active = settings.use_target
-    sub.prop(settings, "target_triangles", text="")
+    if settings.use_target:
+        row.prop(settings, "target_triangles", text="")
     layout.row(heading="Holes").prop(settings, "close_holes", text="Close")
 
 

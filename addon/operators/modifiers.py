@@ -235,13 +235,15 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         """Finds the values at which no sample is beyond the tolerance. Remesh makes new faces, which may be wanted even if they
         are more than before; a value at which another modifier removes no triangle is left out."""
         name, triangles = evaluation.modifier.name, len(trial.surface.arrays.triangles)
-        search, deviation = fit.search(parameter.first, parameter.last, fit.most_values(triangles)), None
+        most, tried = fit.most_values(triangles), 0
+        search, deviation = fit.search(parameter.first, parameter.last, most), None
         while not self.progress.finishing:
             try:
                 value = search.send(deviation)
             except StopIteration:
                 break
             self.part, self.doing = f"Fitting {name}", f"{parameter.label} {value:.4g}"
+            self.share, tried = min(tried / most, 1), tried + 1
             setattr(evaluation.modifier, parameter.name, value)
             arrays = mesh_io.read_mesh(evaluation.mesh())
             deviation = yield trial.measured(arrays)
@@ -277,7 +279,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         name = evaluation.modifier.name
         for i, (triangles, value) in enumerate(found):
             self.part, self.doing = f"Proving {name}", f"{parameter.label} {value:.4g}"
-            self.count = f"{triangles:,} triangles" if triangles else ""
+            self.share, self.count = 0.0, f"{triangles:,} triangles" if triangles else ""
             setattr(evaluation.modifier, parameter.name, value)
             mesh = evaluation.new_mesh()
             try:
@@ -292,7 +294,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
 
     def _plain(self, context, trial):
         """Returns how many triangles Decimate would leave with its default settings."""
-        self.part, self.doing = "", "Comparing with Decimate"
+        self.part, self.doing, self.share = "", "Comparing with Decimate", 0.0
         settings = self.ob.tolvol
         options = decimation.options(settings, automatic_placement(self.ob.data), trial.threads)
         options |= {"two_sided": True, "effort": "fast", "target_triangles": None, "max_seconds": None}

@@ -10,7 +10,7 @@ from ..job import JobOperator
 from ..operation_settings import threads_setting
 from ..reference import originals, snapshots, tolerances
 from ..shared import volumes
-from .blocked import allowed, reference_blocked
+from .blocked import allowed, reference_blocked, settings_blocked
 
 
 def replace_label(ob):
@@ -128,7 +128,7 @@ mesh, a menu asks first. The mesh stays as it is"""
     @classmethod
     def poll(cls, context):
         ob = context.active_object
-        return ob is not None and ob.type == "MESH" and ob.library is None and ob.tolvol.snapshot is not None
+        return allowed(cls, settings_blocked(ob) or (None if ob.tolvol.snapshot else "No reference is set"))
 
     def invoke(self, context, _event):
         ob = context.active_object

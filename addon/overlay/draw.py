@@ -162,7 +162,7 @@ def legend_of_one(context, shown):
     ob = context.active_object if context.active_object in objects else objects[0]
     of_reference = "the reference of " if coloured.is_reference(ob) else ""
     if ob in missing:
-        legend.draw_note(context, f"Deviation of {of_reference}{ob.name}: {missing[ob]}. {verdict.word(ob)}")
+        legend.draw_note(context, f"Deviation of {of_reference}{ob.name}: {missing[ob]}", verdict.word(ob))
         return
     together = [other for other in drawn if other.select_get()] if ob.select_get() else [ob]
     scale = drawn[ob].scale

@@ -12,7 +12,7 @@ from . import legend, markers, reasons, shaders
 from .view_drawing import ViewDrawing
 
 # Pixels at an interface scale of 1.
-_DOT, _BESIDE, _ROW, _MARGIN = 6, 14, 17, 6
+_DOT, _BESIDE = 6, 14
 
 
 def refresh():
@@ -42,7 +42,10 @@ def _draw_labels(context, page, ob):
     if ob is None or ob.type != "MESH" or not ob.tolvol.labels or not ob.visible_in_viewport_get(context.space_data):
         return
     settings = ob.tolvol
-    for i, label in enumerate(settings.labels):
+    taken = [box for box in (legend.box(context.region), markers.box(context.region)) if box]
+    # The chosen label comes first, so that the others make room for it.
+    for i in sorted(range(len(settings.labels)), key=lambda i: i != settings.label_index):
+        label = settings.labels[i]
         found, true = labels.reading(ob, label), labels.current(ob, label)
         spot = location_3d_to_region_2d(context.region, context.region_data, found.position)
         if spot is None:
@@ -56,7 +59,12 @@ def _draw_labels(context, page, ob):
             share = report.percent(found.distance, tolerance_of(ob))
             lines = [f"{i + 1}: {distance_text(context, found)}, {share}"]
         _dot(page, *spot)
-        markers.beside(page, context, *spot, lines, _BESIDE * page.scale, faint=not true)
+        # Where the lines have no room, the number alone is drawn, and where that has none, the dot.
+        for box in (markers.Box(page, lines), markers.Box(page, [f"{i + 1}"])):
+            if place := box.beside(context, *spot, _BESIDE * page.scale, taken):
+                box.draw(place, faint=not true)
+                taken.append(place)
+                break
 
 
 def _draw_hover(context, page, hover):
@@ -66,7 +74,8 @@ def _draw_hover(context, page, hover):
         spot = location_3d_to_region_2d(context.region, context.region_data, hover.position)
         if spot is not None:
             _dot(page, *spot)
-    markers.beside(page, context, *hover.mouse, hover.lines, 2 * _BESIDE * page.scale)
+    box = markers.Box(page, hover.lines)
+    box.draw(box.beside(context, *hover.mouse, 2 * _BESIDE * page.scale))
 
 
 def _dot(page, x, y):

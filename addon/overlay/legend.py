@@ -198,14 +198,16 @@ def _draw_word(context, page, word):
         page.text(x + mark + gap, y, word, points=_LARGE)
 
 
-def draw_note(context, text):
-    """Draws one line of text in place of the legend."""
+def draw_note(context, text, word):
+    """Draws one line of text and the verdict in place of the legend, or where they have no room, the verdict alone."""
     page = Page(context)
-    gap = _GAP * page.scale
-    width, height = width_of(text) + 2 * gap, _ROW * page.scale + gap
+    gap, line = _GAP * page.scale, f"{text}. {word}"
+    width, height = width_of(line) + 2 * gap, _ROW * page.scale + gap
     if place := _corner(context, width, height, _MARGIN * page.scale):
         _paper(context, page, *place, width, height)
-        page.text(place[0] + gap, place[1] + height / 2, text)
+        page.text(place[0] + gap, place[1] + height / 2, line)
+    else:
+        _draw_word(context, page, word)
 
 
 def _label(context, value, signed):

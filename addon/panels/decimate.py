@@ -2,7 +2,7 @@
 import bpy
 
 from ..operators.decimate import draw_advanced_settings, draw_decimate_settings, draw_protect_settings, targets
-from .layout import SubPanel, active, say_blocked
+from .layout import SubPanel, active
 
 
 class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
@@ -16,7 +16,6 @@ class TOLVOL_PT_decimate(SubPanel, bpy.types.Panel):
         draw_decimate_settings(layout, ob.tolvol)
         count = len(targets(context))
         layout.operator("tolvol.decimate", text=f"Decimate {count} Objects" if count > 1 else "Decimate")
-        say_blocked(context, layout, ob)
 
 
 class TOLVOL_PT_protect(SubPanel, bpy.types.Panel):

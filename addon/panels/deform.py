@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from .layout import SubPanel, active, say_blocked
+from .layout import SubPanel, active
 
 
 class TOLVOL_PT_deform(SubPanel, bpy.types.Panel):
@@ -16,4 +16,3 @@ class TOLVOL_PT_deform(SubPanel, bpy.types.Panel):
         layout.prop(settings, "lattice")
         layout.prop(settings, "deform_mode")
         layout.operator("tolvol.deform", text="Deform")
-        say_blocked(context, layout, active(context))

@@ -4,14 +4,15 @@
 import bpy
 
 from .. import job, measuring, overlay
+from ..operators import blocked
 from ..operators.original import TOLVOL_OT_show_original, shown
 from ..operators.probe import TOLVOL_OT_probe, tolerance_of
 from ..overlay import reasons
 from ..proof import labels, probing, statistics, verdict
-from ..reference import snapshots
 from ..shared.proof import report
 from ..units import length
-from .layout import GHOST, GREEN, GREY, RED, SubPanel, active, fitting, is_narrow, right, text_lines, wrapped
+from ..wrapping import fitting, text_lines, wrapped
+from .layout import GHOST, GREEN, GREY, RED, SubPanel, active, is_narrow, right
 from .progress import draw_progress
 
 
@@ -39,9 +40,10 @@ class TOLVOL_PT_deviation(SubPanel, bpy.types.Panel):
         layout.operator("tolvol.select_crossing")
         layout.operator("tolvol.save_report", text="Save Report...")
         row = layout.row(align=True)
-        hold = row.row(align=True)
-        hold.enabled = shown() or TOLVOL_OT_show_original.poll(context)
-        hold.prop(context.window_manager, "tolvol_show_original", toggle=True)
+        if shown() or TOLVOL_OT_show_original.poll(context):
+            row.prop(context.window_manager, "tolvol_show_original", toggle=True)
+        else:
+            row.operator("tolvol.show_original")  # It is greyed, and its tooltip says why. That of a property cannot.
         row.operator("tolvol.restore_original", text="", icon="LOOP_BACK")
         row.operator("tolvol.new_original", text="", icon="DUPLICATE")
 
@@ -54,7 +56,7 @@ def _draw_verdict(context, box, ob, found):
     column = box.column(align=True)
     if found is None:
         row.label(text=verdict.NOT_CHECKED, icon=GREY)
-        for line in (*wrapped(context, _why_not_checked(ob)), "", "")[:3]:
+        for line in (*wrapped(context, _why_not_checked(ob), most=3), "", "")[:3]:
             column.label(text=line)
         return
     row.label(text=found.word if narrow else f"{found.word}  {found.ways}", icon=GREEN if found.passed else RED)
@@ -72,8 +74,8 @@ def _distance(context, value, tolerance):
 
 
 def _both(size, share):
-    """Returns two numbers as texts for a row. The last one has only the second number."""
-    return [f"{size}  {share}", f"{size} {share}", share]
+    """Returns a length and its share of the tolerance as texts for a row. The last one has only the share."""
+    return [f"{size}  {share} of tolerance", f"{size}  {share}", f"{size} {share}", share]
 
 
 def _share(value, tolerance):
@@ -93,12 +95,7 @@ def _row(context, column, name, *texts):
 def _why_not_checked(ob):
     if measuring.wanted(ob):
         return measuring.failure(ob) or "Being measured"
-    if ob.mode != "OBJECT":
-        return "Switch to Object Mode"
-    if ob.tolvol.snapshot is None:
-        return "Set the reference first"
-    stale = snapshots.stale_reason(ob)
-    return f"The reference is out of date: {stale}" if stale else "Press Check to measure it"
+    return blocked.check_blocked(ob) or "Press Check to measure it"
 
 
 class TOLVOL_PT_objects(SubPanel, bpy.types.Panel):
@@ -159,10 +156,9 @@ class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
         ob = active(context)
         column = self.layout.column()
         column.active = ob.tolvol.show_deviation
-        unsigned = reasons.unsigned(ob)
         column.row().prop(ob.tolvol, "deviation_surface", expand=True)
         row = column.row()
-        row.enabled = not unsigned
+        row.enabled = not reasons.unsigned(ob)
         row.prop(ob.tolvol, "deviation_kind", expand=True)
         column.prop(ob.tolvol, "deviation_opacity")
         legend = column.column()
@@ -176,12 +172,11 @@ class TOLVOL_PT_show_deviation(SubPanel, bpy.types.Panel):
         count = row.row()
         count.active = ob.tolvol.use_bands
         count.prop(ob.tolvol, "band_count", text="")
-        if reason := reasons.hidden(ob) or unsigned:
-            text_lines(context, column, reason, "INFO")
 
 
 # As in the legend.
 _SIGNS = {probing.OUTSIDE: "+", probing.INSIDE: "\u2212"}
+_BESIDE_ICON = 0.5  # the part of the sidebar that an icon and the buttons leave to the text of a label
 
 
 class TOLVOL_UL_labels(bpy.types.UIList):
@@ -189,31 +184,35 @@ class TOLVOL_UL_labels(bpy.types.UIList):
 
     def draw_item(self, context, layout, settings, label, _icon, _active, _name, index):
         ob = settings.id_data
-        true, narrow = labels.current(ob, label), is_narrow(context)
-        # An icon leaves no room for the share. The 3D view shows it at the label.
-        icon = "NONE" if narrow else "ERROR" if not true else GHOST if label.on_reference else "NONE"
-        alone = icon != "NONE" or narrow
-        row = layout.row() if alone else layout.split(factor=0.64)
+        true = labels.current(ob, label)
+        icon = "ERROR" if not true else GHOST if label.on_reference else "NONE"
+        text = f"{index + 1}:  {_SIGNS.get(label.side, '')}{length(context, label.distance)}"
+        # A narrow sidebar and an icon leave no room for the share, and both together only for the number. The 3D view shows
+        # the rest at the label.
+        if icon != "NONE":
+            row, text = layout.row(), fitting(context, text, f"{index + 1}", share=_BESIDE_ICON)
+        else:
+            row = layout.row() if is_narrow(context) else layout.split(factor=0.64)
         row.active = true
-        row.label(text=f"{index + 1}:  {_SIGNS.get(label.side, '')}{length(context, label.distance)}", icon=icon)
-        if not alone:
+        row.label(text=text, icon=icon)
+        if icon == "NONE" and not is_narrow(context):
             right(row, report.percent(label.distance, tolerance_of(ob)))
 
 
 class TOLVOL_PT_labels(SubPanel, bpy.types.Panel):
-    """The labels that the probe has left."""
+    """The labels that the probe has left. It is there before the first one, so that no panel below moves then."""
 
     bl_label = "Labels"
     bl_parent_id = "TOLVOL_PT_deviation"
 
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and len(active(context).tolvol.labels) > 0
+    def draw_header_preset(self, context):
+        if not active(context).tolvol.labels:
+            self.layout.label(text="No labels")
 
     def draw(self, context):
         ob = active(context)
         row = self.layout.row()
-        row.template_list("TOLVOL_UL_labels", "", ob.tolvol, "labels", ob.tolvol, "label_index", rows=3, maxrows=8)
+        row.template_list("TOLVOL_UL_labels", "", ob.tolvol, "labels", ob.tolvol, "label_index", rows=3, maxrows=3)
         column = row.column(align=True)
         column.operator("tolvol.remove_label", text="", icon="REMOVE").everything = False
         column.operator("tolvol.remove_label", text="", icon="X").everything = True
@@ -238,5 +237,5 @@ class TOLVOL_PT_statistics(SubPanel, bpy.types.Panel):
                 texts = ["\u2013"]
                 if found:
                     size = length(context, found[way][key])
-                    texts = [*_both(size, report.percent(found[way][key], tolerance_of(ob)))[:2], size]
+                    texts = [*_both(size, report.percent(found[way][key], tolerance_of(ob)))[:-1], size]
                 _row(context, column, name, *texts)

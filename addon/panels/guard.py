@@ -4,12 +4,13 @@
 import bpy
 
 from .. import guard
-from .layout import AMBER, GREEN, GREY, SubPanel, active, text_lines
+from ..wrapping import text_lines
+from .layout import AMBER, GREEN, GREY, SubPanel, active
 
 _WHERE = {
-    "sculpting": "The guard takes effect in Sculpt Mode",
-    "editing": "The guard takes effect in Edit Mode",
-    "lattice": "The guard takes effect while the mesh is in Object Mode",
+    "sculpting": "The guard of sculpting takes effect in Sculpt Mode",
+    "editing": "The guard of editing takes effect in Edit Mode",
+    "lattice": "The guard of the lattice takes effect while the mesh is in Object Mode",
 }
 
 
@@ -21,14 +22,14 @@ class TOLVOL_PT_guard(SubPanel, bpy.types.Panel):
         layout = self.layout
         ob = active(context)
         settings = ob.tolvol.guard
-        states = {setting: state for setting, *state in guard.states(ob)}
         for setting in guard.MODULES:
             layout.prop(settings, setting)
             if setting == "editing":
                 row = layout.row()
                 row.active = settings.sculpting or settings.editing
                 row.prop(settings, "crossings")
-            if setting in states:
-                text, on = states[setting]
-                icon = GREEN if on else GREY if on is None else AMBER
-                text_lines(context, layout, text or _WHERE[setting], icon)
+        # The sentences are below all buttons, so that they move none.
+        for setting, text, on in guard.states(ob):
+            icon = GREEN if on else GREY if on is None else AMBER
+            name = settings.bl_rna.properties[setting].name
+            text_lines(context, layout, f"{name}: {text}" if text else _WHERE[setting], icon)

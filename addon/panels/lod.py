@@ -2,10 +2,9 @@
 import bpy
 
 from ..files.gltf_extras import GEOMETRIC_ERROR
-from ..operators.blocked import object_blocked, surface_blocked
 from ..operators.lod import draw_lod_settings
 from ..units import length
-from .layout import SubPanel, active, right, text_lines
+from .layout import SubPanel, active, right
 
 
 class TOLVOL_PT_lod(SubPanel, bpy.types.Panel):
@@ -21,8 +20,6 @@ class TOLVOL_PT_lod(SubPanel, bpy.types.Panel):
         ob = active(context)
         draw_lod_settings(layout, ob.tolvol.lod)
         layout.operator("tolvol.make_lods")
-        if (reason := surface_blocked(ob)) and not object_blocked(ob):
-            text_lines(context, layout, reason, "ERROR")
         # Each level has its row before it is made, so that no panel below moves.
         column, made = layout.column(align=True), ob.tolvol.lods.objects[:] if ob.tolvol.lods else []
         for i in range(max(ob.tolvol.lod.levels, len(made))):

@@ -2,7 +2,8 @@
 import bpy
 
 from ..operators.modifiers import FITTED, modifier_blocked
-from .layout import SubPanel, active, say_blocked, text_lines
+from ..wrapping import text_lines
+from .layout import SubPanel, active
 
 
 class TOLVOL_PT_modifiers(SubPanel, bpy.types.Panel):
@@ -20,15 +21,16 @@ class TOLVOL_PT_modifiers(SubPanel, bpy.types.Panel):
         column.use_property_decorate = False
         column.prop(ob.tolvol.modifiers, "result")
         icons = bpy.types.Modifier.bl_rna.properties["type"].enum_items
+        reasons = {modifier.name: modifier_blocked(ob, modifier) for modifier in ob.modifiers}
         for modifier in ob.modifiers:
-            reason = modifier_blocked(ob, modifier)
             row = layout.split(factor=0.68)
             row.label(text=modifier.name, icon=icons[modifier.type].icon)
             button = row.row()
-            button.enabled = not reason
+            button.enabled = not reasons[modifier.name]
             fits = modifier.type in FITTED
             name, text = ("fit_modifier", "Fit") if fits else ("apply_modifier", "Apply")
             button.operator(f"tolvol.{name}", text=text).modifier = modifier.name
+        # The sentences are below all buttons, so that they move none.
+        for name, reason in reasons.items():
             if reason:
-                text_lines(context, layout, reason, "BLANK1")
-        say_blocked(context, layout, ob)
+                text_lines(context, layout, f"{name}: {reason}", "INFO")

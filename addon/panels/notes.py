@@ -8,11 +8,13 @@ import datetime
 
 import bpy
 
+from ..operators import blocked
 from ..overlay import reasons
 from ..proof import kept_warnings, last_run, verdict
-from ..reference import measurements
+from ..reference import measurements, snapshots
 from ..shared.decimation import ISLANDS
-from .layout import AMBER, RED, SubPanel, active, text_lines
+from ..wrapping import text_lines
+from .layout import AMBER, RED, SubPanel, active
 
 
 class TOLVOL_PT_notes(SubPanel, bpy.types.Panel):
@@ -34,6 +36,8 @@ class TOLVOL_PT_notes(SubPanel, bpy.types.Panel):
 def notes(context, ob):
     """Returns [(sentence, icon)], and the number of vertices that had to stay because UV islands meet there."""
     lines = []
+    if reason := in_the_way(ob):
+        lines.append((reason, "ERROR"))
     found = verdict.of(ob)
     if found is not None and found.kind != verdict.WITHIN:
         lines.append((found.line(), AMBER if found.passed else RED))
@@ -41,8 +45,8 @@ def notes(context, ob):
         lines.append((when, "TIME"))
     if on_top := measurements.on_top(ob):
         lines.append((f"The proof is for the base mesh, without its {' and '.join(on_top)}", "INFO"))
-    if ob.tolvol.show_deviation and (reason := reasons.off()):
-        lines.append((f"The deviation is not shown: {reason}", "INFO"))
+    if reason := _about_colours(ob):
+        lines.append((reason, "INFO"))
     lines += _of_last_run(context, ob)
     warnings, staying = kept_warnings.of(ob)
     lines += [(warning, "ERROR") for warning in warnings]
@@ -61,6 +65,24 @@ def _measured_at(ob):
         return None
     day = "" if time.date() == datetime.date.today() else f" on {time:%Y-%m-%d}"
     return f"Measured at {time:%H:%M}{day}"
+
+
+def in_the_way(ob):
+    """Why the mesh cannot be changed within the tolerance, or None. Outside Object Mode only the reference can be a reason."""
+    if ob.mode == "OBJECT":
+        return blocked.decimate_blocked(ob)
+    return snapshots.reference_missing(ob) if ob.tolvol.snapshot else None
+
+
+def _about_colours(ob):
+    """Why the deviation is not shown as the settings demand, or None. A missing reference is said by in_the_way()."""
+    if not ob.tolvol.show_deviation:
+        return None
+    if reason := reasons.off():
+        return f"The deviation is not shown: {reason}"
+    if snapshots.reference_missing(ob):
+        return None
+    return reasons.hidden(ob) or reasons.unsigned(ob)
 
 
 def _of_last_run(context, ob):

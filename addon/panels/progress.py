@@ -3,7 +3,9 @@
 
 import bpy
 
-from .layout import fitting
+from ..wrapping import fitting
+
+_HAS_BAR = hasattr(bpy.types.UILayout, "progress")  # from Blender 4.0 on
 
 
 def draw_progress(context, box, told):
@@ -15,9 +17,9 @@ def draw_progress(context, box, told):
     if told.share is None:
         column.label(text=told.stage)
     else:
-        done = f"{told.stage} {told.share:.0%}"
+        done = f"{told.stage} ({told.share:.0%})"
         text = fitting(context, *([f"{done}, {told.left}"] if told.left else []), done)
-        if hasattr(bpy.types.UILayout, "progress"):  # from Blender 4.0 on
+        if _HAS_BAR:
             column.progress(factor=told.share, text=text)
         else:
             column.label(text=text)
@@ -26,10 +28,9 @@ def draw_progress(context, box, told):
 
 
 def in_a_row(context, told):
-    """Returns in few words what is at work."""
-    name = _name(told)
-    share = [f"{name}, {told.share:.0%}"] if told.share is not None else []
-    return fitting(context, *share, name)
+    """Returns in few words what is at work, and how far it is."""
+    name, far = _name(told), told.stage if told.share is None else f"{told.share:.0%}"
+    return fitting(context, f"{name}: {far}", far)
 
 
 def _name(told):

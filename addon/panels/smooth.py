@@ -2,7 +2,7 @@
 import bpy
 
 from ..operators.smooth import draw_smooth_settings
-from .layout import SubPanel, active, say_blocked
+from .layout import SubPanel, active
 
 
 class TOLVOL_PT_smooth(SubPanel, bpy.types.Panel):
@@ -16,4 +16,3 @@ class TOLVOL_PT_smooth(SubPanel, bpy.types.Panel):
         ob = active(context)
         draw_smooth_settings(layout, ob.tolvol.smooth, ob)
         layout.operator("tolvol.smooth", text="Smooth")
-        say_blocked(context, layout, ob)

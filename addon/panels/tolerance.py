@@ -5,10 +5,12 @@ import bpy
 
 from .. import estimate, job, native
 from ..operators import blocked
-from ..reference import measurements, snapshots, tolerances
+from ..reference import measurements, tolerances
 from ..shared.numbers import NO_BREAK
 from ..units import length
-from .layout import AMBER, GREEN, GREY, RED, Panel, active, fitting, is_narrow, right, text_lines
+from ..wrapping import fitting, text_lines, wrapped
+from .layout import AMBER, GREEN, GREY, RED, Panel, active, is_narrow, right
+from .notes import in_the_way
 from .progress import in_a_row
 
 _DIGITS = 3  # of an estimated number of triangles
@@ -81,16 +83,12 @@ def _estimated(context):
 
 
 def _status(context, layout, ob):
-    """Shows the state of the reference as text, with a coloured icon."""
-    settings = ob.tolvol
-    reason = blocked.object_blocked(ob)
-    if reason and ob.mode == "OBJECT":
-        text_lines(context, layout, reason, RED)
-        return
-    if settings.snapshot is None:
-        why = None if reason else blocked.reference_blocked(ob)
-        text_lines(context, layout, why or "No reference set", GREY)
-    elif stale := snapshots.stale_reason(ob):
-        text_lines(context, layout, f"The reference is out of date: {stale}", AMBER)
+    """Shows in one line what is in the way, or the reference, so that no panel below moves. Notes has the whole sentence."""
+    snapshot = ob.tolvol.snapshot
+    if reason := in_the_way(ob):
+        icon = RED if blocked.object_blocked(ob, {ob.mode}) else AMBER
+        layout.label(text=wrapped(context, reason, most=1)[0], icon=icon)
+    elif snapshot is None:
+        layout.label(text="No reference set", icon=GREY)
     else:
-        text_lines(context, layout, f"{len(settings.snapshot.polygons):,} triangles", GREEN)
+        layout.label(text=f"{len(snapshot.polygons):,} triangles", icon=GREEN)

@@ -322,17 +322,42 @@ def test_the_panel_is_told_stage_count_part_and_time_left(waiting, monkeypatch):
     operator._run.progress = progress = Progress()
     operator.improving = lambda: False
     operator.part = "torus, 2 of 3"
+    progress.stage = ""  # as before the first stage
+    assert operator._run.told().stage == "Preparing"
+    progress.stage = "decimating"
     assert operator._run.told() == progress_text.Told("Modal", "torus, 2 of 3", "Decimating", None, "", "", "Cancel")
     now[0] += 10
     progress.fraction, progress.count = 0.25, 12_400
     told = operator._run.told()
     assert (told.share, told.left, told.count) == (0.25, "30 s left", "12,400 triangles left")
-    assert progress_text.status_line(told) == ("torus, 2 of 3: Decimating 25%, 12,400 triangles left    Esc: Cancel")
+    assert progress_text.status_line(told) == ("torus, 2 of 3: Decimating (25%), 12,400 triangles left    Esc: Cancel")
     progress.stage, progress.fraction = "measuring", 0.5
     told = operator._run.told()
     assert (told.stage, told.left, told.count) == ("Measuring", "", "")  # A new stage has just begun.
     now[0] += 200
     assert operator._run.told().left == "3 min left"
+
+
+def test_an_operator_that_says_what_it_does_says_how_far_it_is_over_all_its_steps(waiting, monkeypatch):
+    operator, _ = waiting
+    now = [100.0]
+    monkeypatch.setattr(progress_text.time, "monotonic", lambda: now[0])
+    operator._run.progress = progress = Progress()
+    progress.fraction = 0.9  # of the native stage, which is one of many
+    operator.improving = lambda: True
+    operator.part, operator.doing, operator.share, operator.count = "Fitting Decimate", "Ratio 0.1", 0.0, ""
+    assert operator._run.told().share is None and operator._run.told().left == ""
+    now[0] += 10
+    operator.doing, operator.share, operator.count, progress.stage = (
+        "Ratio 0.12",
+        0.25,
+        "900 triangles so far",
+        "sampling",
+    )
+    told = operator._run.told()
+    assert (told.stage, told.share, told.left) == ("Ratio 0.12", 0.25, "30 s left")
+    text = "Fitting Decimate: Ratio 0.12 (25%), 900 triangles so far    Esc: Keep Present Result"
+    assert progress_text.status_line(told) == text
 
 
 def test_a_batch_names_each_object_and_reports_totals(monkeypatch, capfd):

@@ -330,6 +330,23 @@ def test_a_search_that_is_ended_keeps_the_best_so_far(monkeypatch):
     assert not any("Decimate leaves" in warning for warning in kept_warnings.of(ob)[0])
 
 
+def test_a_search_says_how_many_of_its_values_are_tried(monkeypatch):
+    modified("DECIMATE")
+    told, work = [], Run._next_work
+
+    def next_work(self):
+        found = work(self)
+        told.append((self.operator.part, self.operator.share))
+        return found
+
+    monkeypatch.setattr(Run, "_next_work", next_work)
+    assert bpy.ops.tolvol.fit_modifier() == {"FINISHED"}
+    most = fit.most_values(1024)
+    searching = [share for part, share in told if part == "Fitting DECIMATE"]
+    assert searching == [i / most for i in range(len(searching))] and len(searching) > 5
+    assert {share for part, share in told if part != "Fitting DECIMATE"} == {0.0}
+
+
 def test_says_if_decimate_would_leave_fewer_triangles():
     ob = modified("DECIMATE")
     before = ob.data.copy()

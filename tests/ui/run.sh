@@ -15,7 +15,7 @@ mkdir -p "$out"
 rm -f "$out"/*.png "$out/display"
 
 # Xvfb chooses a free display and tells its number.
-Xvfb -displayfd 3 -screen 0 1280x800x24 +extension GLX 3>"$out/display" 2>"$out/xvfb.log" &
+Xvfb -displayfd 3 -screen 0 1280x1024x24 +extension GLX 3>"$out/display" 2>"$out/xvfb.log" &
 server=$!
 trap 'kill $server 2>/dev/null || true' EXIT INT TERM
 tries=0
@@ -27,7 +27,7 @@ done
 
 code=0
 DISPLAY=":$(cat "$out/display")" LIBGL_ALWAYS_SOFTWARE=1 timeout 3000 \
-  blender --factory-startup --window-geometry 0 54 1060 746 --python-exit-code 5 --python tests/ui/run.py -- "$@" \
+  blender --factory-startup --window-geometry 0 278 1060 746 --python-exit-code 5 --python tests/ui/run.py -- "$@" \
   >"$out/blender.log" 2>&1 || code=$?
 # An exception in the draw function of a panel appears only in Blender's output.
 if grep -q Traceback "$out/blender.log"; then

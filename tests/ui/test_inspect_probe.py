@@ -10,7 +10,9 @@ import numpy as np
 import scenes
 from addon import overlay, status_bar
 from addon.operators.probe import TOLVOL_OT_probe
+from addon.overlay import legend, markers
 from addon.proof import labels, probing
+from addon.proof import places as worst_places
 from test_layout import dark, drag_sidebar, light
 from window import (
     click,
@@ -22,6 +24,7 @@ from window import (
     region,
     reset,
     screenshot,
+    scroll_down,
     view,
     window_context,
     xdotool,
@@ -127,11 +130,55 @@ def test_the_table_of_labels_in_the_sidebar():
     bpy.ops.ed.undo_push(message="edit")
     yield 1.0
     screenshot("probe 4 out of date")
+    yield from drag_sidebar(60)
+    yield from scroll_down()
+    xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
+    yield 0.5
+    screenshot("probe 4 out of date and narrow")
+    yield from drag_sidebar(-60)
     yield from press("tolvol.renew_labels", across=0.775)
     yield from finished(lambda: all(labels.current(the_ball(), label) for label in the_ball().tolvol.labels))
     yield 0.5
     key("ctrl+z")
     yield from finished(lambda: not any(labels.current(the_ball(), label) for label in the_ball().tolvol.labels))
+
+
+def test_labels_lie_beside_each_other_the_worst_point_and_the_legend():
+    yield from reset(ball)
+    with window_context():
+        bpy.ops.tolvol.worst_point()
+    (worst, *_), _, _ = worst_places.shown(the_ball())
+    for i in range(12):
+        bpy.ops.tolvol.add_label(position=np.array(worst.position) + (0, 0, 0.02 * i))
+    boxes, draw = {}, markers.Box.draw
+    markers.Box.draw = lambda box, place, faint=False: boxes.update({place: box._lines}) or draw(box, place, faint)
+    try:
+        place = region("WINDOW")
+        yield from finished(lambda: legend.box(place) and markers.box(place))
+        yield 1.0
+        boxes.clear()
+        view()[1].tag_redraw()
+        yield from finished(lambda: len(boxes) > 4)
+        yield 0.5
+        screenshot("probe 9 many labels")
+        assert markers.box(place) in boxes and "of the tolerance" in boxes[markers.box(place)][0]
+        drawn = [legend.box(place), *boxes]
+        assert not [(one, other) for i, one in enumerate(drawn) for other in drawn[:i] if markers._overlap(one, other)]
+        with window_context():
+            legend.move(bpy.context, *markers.box(place)[:2])
+        boxes.clear()
+        view()[1].tag_redraw()
+        yield from finished(lambda: boxes)
+        yield 0.5
+        view()[1].tag_redraw()
+        boxes.clear()
+        yield from finished(lambda: boxes)
+        screenshot("probe 10 legend in the middle")
+        drawn = [legend.box(place), *boxes]
+        assert not [(one, other) for i, one in enumerate(drawn) for other in drawn[:i] if markers._overlap(one, other)]
+    finally:
+        markers.Box.draw = draw
+        legend.forget_moved()
 
 
 def test_the_probe_in_themes_widths_scales_and_quad_view():

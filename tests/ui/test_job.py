@@ -88,6 +88,55 @@ def test_the_view_is_turned_while_a_job_runs():
     assert rotation() != before and suzanne().tolvol.snapshot is None
 
 
+def drag(button, start, end):
+    """Drags the mouse over the view, as slowly as Blender needs to see that it is a drag."""
+    xdotool("mousemove", *start, "sleep", "0.2", "mousedown", button)
+    for step in range(1, 6):
+        yield 0.1
+        xdotool("mousemove", *(a + (b - a) * step // 5 for a, b in zip(start, end)))
+    yield 0.1
+    xdotool("mouseup", button)
+
+
+def test_the_mouse_turns_and_zooms_the_view_and_moves_another_object_while_a_job_runs():
+    yield from reset(monkey)
+    bpy.ops.mesh.primitive_cube_add(location=(0, 4, 0))
+    cube = bpy.context.object
+    bpy.context.view_layer.objects.active = suzanne()
+    cube.select_set(False)
+    suzanne().select_set(True)
+    camera = view()[1].spaces[0].region_3d
+    x, y = centre()
+    begin()
+    before = rotation()
+    yield from drag(2, (x, y), (x + 120, y + 60))
+    yield from finished(lambda: rotation() != before)
+    assert job.under_way()
+    distance = camera.view_distance
+    xdotool("mousemove", x, y, "click", 4, "sleep", "0.1", "click", 4)
+    yield from finished(lambda: camera.view_distance < distance)
+    assert job.under_way()
+    # Another object is chosen and moved by keys and mouse.
+    suzanne().select_set(False)
+    cube.select_set(True)
+    bpy.context.view_layer.objects.active = cube
+    xdotool("mousemove", x, y, "sleep", "0.2", "key", "g")
+    for step in range(1, 5):
+        yield 0.2
+        xdotool("mousemove", x + 30 * step, y)
+    yield from finished(lambda: tuple(cube.location) != (0, 4, 0))
+    xdotool("click", 1)
+    yield 0.5
+    moved = tuple(cube.location)
+    xdotool("mousemove", x, y)
+    yield 0.5
+    assert tuple(cube.location) == moved != (0, 4, 0) and job.under_way()
+    screenshot("job 3 another object moved")
+    xdotool("key", "Escape")
+    yield from finished(lambda: not job.under_way())
+    assert tuple(cube.location) == moved and suzanne().tolvol.snapshot is None
+
+
 def status_bar_pixels():
     return pixels()[-18:, :600]
 

@@ -11,15 +11,19 @@ from panels_open import unfolded
 from test_layout import dark, drag_sidebar, light
 from test_show_deviation import striped, surface
 from window import (
+    click_property,
     finished,
     on_screen,
     open_tab,
+    pixels,
     press,
     region,
     reset,
+    resize,
     screenshot,
     scroll_down,
     sent,
+    still,
     view,
     window_context,
     xdotool,
@@ -128,6 +132,130 @@ def test_range_and_bands_of_the_colours():
     assert overlay.shows(the_ramp())
 
 
+def choose(name, letter):
+    """Chooses the value of a property from its menu, in which Blender underlines a letter of each value."""
+    yield from click_property(name, across=0.66)
+    yield 0.5
+    xdotool("key", letter)
+
+
+def bar_pixels():
+    """Returns the picture of the legend."""
+    left, bottom, width, height = map(int, legend.box(region("WINDOW")))
+    x, y = on_screen(region("WINDOW"), left, region("WINDOW").height - bottom - height)
+    return pixels()[y : y + height, x : x + width]
+
+
+def test_the_settings_of_the_colours_are_clicked():
+    usual = view()[0].width, view()[0].height
+    said, stop = labels_of_the_legend()
+    try:
+        light()
+        yield from reset(ramp)
+        with unfolded(panels.TOLVOL_PT_show_deviation):
+            yield from open_tab()
+            yield from settings_clicked(said, 1)
+        yield from resize(1280, 1024)
+        bpy.context.preferences.view.ui_scale = 2
+        yield from reset(ramp)
+        with unfolded(panels.TOLVOL_PT_show_deviation):
+            yield from open_tab()
+            yield from drag_sidebar(80)  # so that the legend has room
+            yield from settings_clicked(said, 2)
+            yield from drag_sidebar(-80)
+    finally:
+        stop()
+        bpy.context.preferences.view.ui_scale = 1
+        dark()
+    yield from resize(*usual)
+    space = view()[1].spaces[0]
+    space.region_3d.view_perspective = "PERSP"
+    space.show_gizmo = space.overlay.show_cursor = space.overlay.show_object_origins = True
+
+
+def settings_clicked(said, scale):
+    """Clicks surface, range, palette and bands in the sidebar, and looks what the legend becomes each time."""
+    settings, place = the_ramp().tolvol, region("WINDOW")
+    yield from finished(lambda: legend.box(place) is not None)
+    for kind, across, heading in (
+        ("REFERENCE", 0.7, "Deviation of the reference of ramp"),
+        ("MESH", 0.25, "Deviation of ramp"),
+    ):
+        said.clear()
+        yield from click_property("deviation_surface", across)
+        yield from finished(lambda kind=kind: settings.deviation_surface == kind)
+        yield from finished(lambda heading=heading: heading in said)
+    yield from finished(lambda: "+10 cm" in said and any(text.endswith(" %") for text in said))
+    said.clear()
+    yield from choose("deviation_range", "f")  # Fixed
+    yield from finished(lambda: settings.deviation_range == "FIXED" and "+1 cm" in said)
+    xdotool("mousemove", *on_screen(place, 120, 300))
+    before = yield from still(bar_pixels)
+    screenshot(f"legend 12 range clicked at {scale}")
+    yield from choose("deviation_palette", "g")  # Green to Red
+    yield from finished(lambda: settings.deviation_palette != "SAFE")
+    xdotool("mousemove", *on_screen(place, 120, 300))
+    after = yield from still(bar_pixels)
+    assert after.shape == before.shape and (after != before).any(2).sum() > 1000 * scale**2
+    said.clear()
+    yield from click_property("use_bands", across=0.4)
+    yield from finished(lambda: settings.use_bands)
+    xdotool("mousemove", *on_screen(place, 120, 300))
+    said.clear()
+    view()[1].tag_redraw()
+    yield from finished(lambda: sum(text.endswith(" %") for text in said) == 10)
+    yield from still(bar_pixels)
+    screenshot(f"legend 13 bands clicked at {scale}")
+
+
+def drag_legend(place, across, up):
+    """Drags the legend of a region by so many pixels."""
+    first = legend.box(place)
+    grip = on_screen(place, int(first[0]) + 20, place.height - int(first[1]) - 20)
+    # Blender has to see the mouse over the legend before the button goes down.
+    for by in (0, 1):
+        yield from sent("mousemove", grip[0] + by, grip[1])
+    xdotool("mousedown", 1)
+    for step in range(5):
+        yield 0.2
+        xdotool("mousemove", grip[0] + 1 + across * step // 4, grip[1] - up * step // 4)
+    yield 0.2
+    xdotool("mouseup", 1)
+    yield from finished(lambda: abs(legend.box(place)[0] - first[0] - across) < 10)
+    assert abs(legend.box(place)[1] - first[1] - up) < 10
+
+
+def test_each_view_has_its_own_place_for_the_legend():
+    yield from reset(ramp)
+    window, area = view()
+    area.spaces[0].show_region_ui, area.spaces[0].show_gizmo = False, True
+    with bpy.context.temp_override(window=window, area=area, region=region("WINDOW")):
+        bpy.ops.screen.area_split(direction="VERTICAL", factor=0.5)
+    areas = [area for area in window.screen.areas if area.type == "VIEW_3D"]
+    one, other = (next(region for region in area.regions if region.type == "WINDOW") for area in areas)
+    try:
+        yield from finished(lambda: legend.box(one) is not None and legend.box(other) is not None)
+        yield 0.5
+        before = legend.box(one), legend.box(other)
+        yield from drag_legend(other, -100, 160)
+        assert legend.box(one) == before[0]
+        moved = legend.box(other)
+        yield from drag_legend(one, -50, 80)
+        screenshot("legend 11 two views")
+        assert legend.box(other) == moved
+        legend.forget_moved()
+        for part in areas:
+            part.tag_redraw()
+        yield from finished(lambda: (legend.box(one), legend.box(other)) == before)
+    finally:
+        legend.forget_moved()
+        with bpy.context.temp_override(window=window, area=areas[1], region=areas[1].regions[0]):
+            bpy.ops.screen.area_close()
+        yield from finished(lambda: hasattr(bpy.context, "object"))
+    view()[1].spaces[0].region_3d.view_perspective = "PERSP"
+    view()[1].spaces[0].overlay.show_cursor = view()[1].spaces[0].overlay.show_object_origins = True
+
+
 def test_the_legend_is_dragged_and_is_one_for_selected_objects():
     yield from reset(ramp)
     said, stop = labels_of_the_legend()
@@ -136,19 +264,7 @@ def test_the_legend_is_dragged_and_is_one_for_selected_objects():
         view()[1].spaces[0].show_gizmo = True
         place = region("WINDOW")
         yield from finished(lambda: "Outside" in said and legend.box(place) is not None)
-        first = legend.box(place)
-        grip = on_screen(place, int(first[0]) + 20, place.height - int(first[1]) - 20)
-        # Blender has to see the mouse over the legend before the button goes down.
-        for by in (0, 1):
-            yield from sent("mousemove", grip[0] + by, grip[1])
-        xdotool("mousedown", 1)
-        for step in range(5):
-            yield 0.2
-            xdotool("mousemove", grip[0] + 1 - 50 * step, grip[1] - 40 * step)
-        yield 0.2
-        xdotool("mouseup", 1)
-        yield from finished(lambda: abs(legend.box(place)[0] - first[0] + 200) < 10)
-        assert abs(legend.box(place)[1] - first[1] - 160) < 10
+        yield from drag_legend(place, -200, 160)
         screenshot("legend 9 dragged")
         # It stays in the view, and each view has its own place for it.
         with window_context():

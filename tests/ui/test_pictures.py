@@ -9,11 +9,12 @@ import os
 
 import bpy
 import numpy as np
+from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 from mathutils import Euler, Vector
 
 from addon import guard
 from addon.panels.guard import TOLVOL_PT_guard
-from addon.proof import verdict
+from addon.proof import places, verdict
 from addon.reference import measurements
 from panels_open import alone
 from test_show_deviation import counted, sides, solid_monkey, stroke, surface, the_object, to_mode
@@ -73,10 +74,15 @@ def test_pictures_for_the_documentation():
     yield from draw(*_SNOUT)
     xdotool("keyup", "ctrl")
     yield from settled()
-    picture("overlay")
-    assert min(sides()) > 300 and magenta() > 300
     bpy.context.tool_settings.sculpt.show_brush = True
     to_mode("OBJECT")
+    bpy.ops.tolvol.add_label(position=seen_at(*_SNOUT[1]))
+    begin("worst_point")
+    yield from finished(lambda: places.shown(the_object())[0])
+    from_the_front()  # Worst Point has brought its place into the middle of the view.
+    yield from settled()
+    picture("overlay")
+    assert min(sides()) > 300 and magenta() > 300
 
     yield from reset(make)
     from_the_front()
@@ -104,6 +110,14 @@ def from_the_front():
 def begin(operator):
     with window_context():
         getattr(bpy.ops.tolvol, operator)("INVOKE_DEFAULT")
+
+
+def seen_at(x, y):
+    """Returns the point of the mesh that is seen at a place of the view. x, y: as shares of the view's width and height."""
+    place, camera = region("WINDOW"), view()[1].spaces[0].region_3d
+    at = x * place.width, (1 - y) * place.height
+    ray = region_2d_to_origin_3d(place, camera, at), region_2d_to_vector_3d(place, camera, at)
+    return bpy.context.scene.ray_cast(bpy.context.evaluated_depsgraph_get(), *ray)[1]
 
 
 def draw(*ends):

@@ -50,7 +50,7 @@ class TOLVOL_TEST_OT_mark(bpy.types.Operator):
 
 
 _MARK = "Pause"  # a key that Blender does not use
-_STUCK = 120  # seconds after which Blender counts as stuck
+_STUCK = 20  # seconds after which Blender counts as stuck
 
 
 def sent(*events):
@@ -198,6 +198,7 @@ def find_hold():
 
 
 _last_seen = {}
+_EDGE = 26  # pixels above the lower edge of the sidebar, where clicks may not reach a button that is cut off there
 
 
 def _copied_in_sidebar(keys, across=0.33):
@@ -218,7 +219,8 @@ def _copied_in_sidebar(keys, across=0.33):
 def _down_the_sidebar(keys, across, step=8):
     """The events come so quickly that Blender draws few times meanwhile."""
     sidebar, events = region("UI"), []
-    places = [on_screen(sidebar, int(sidebar.width * across), y) for y in range(30, sidebar.height - 5, step)]
+    edge = int(_EDGE * bpy.context.preferences.system.ui_scale)
+    places = [on_screen(sidebar, int(sidebar.width * across), y) for y in range(30, sidebar.height - edge, step)]
     for x, y in places:
         if events:
             events += "key", "--delay", 0, _MARK
@@ -252,28 +254,41 @@ def _find(wanted, keys, across):
 
 def press(operator, across=0.33):
     """Clicks the button of an operator in the sidebar. If necessary, it scrolls the sidebar, and back up after that."""
-    place = yield from find(operator, across)
-    scrolled = place is None
-    if scrolled:
-        yield from scroll(_UP)
-        place = yield from find(operator, across)
-    # The sidebar may be several times as high as the window.
-    for _ in range(_PAGES):
-        if place is None:
-            yield from scroll(_DOWN, _PAGE)
-            place = yield from find(operator, across)
-    assert place is not None, f"no button for {operator}"
+    scrolled = yield from _scrolled_to(f"bpy.ops.{operator}", "ctrl+c", across)
     xdotool("click", 1)
     yield 0.3
     if scrolled and _view_areas():  # A file browser may fill the window now.
-        yield from scroll(_UP)
+        yield from scroll(UP)
 
 
-_UP, _DOWN = 4, 5  # X counts the two directions of the wheel as these buttons of the mouse.
-_PAGE, _PAGES = 6, 6  # Steps of the wheel after which a part of the sidebar is still seen, and how often that is done.
+def click_property(name, across):
+    """Clicks the field or the button of a property of Object.tolvol in the sidebar. If necessary, it scrolls the sidebar."""
+    yield from _scrolled_to(f".tolvol.{name}", "ctrl+shift+alt+c", across)
+    xdotool("click", 1)
+    yield 0.3
 
 
-def scroll(button=_UP, steps=30):
+def _scrolled_to(wanted, keys, across):
+    """Moves the mouse onto what _find() finds, and scrolls the sidebar if necessary. Returns whether it has scrolled."""
+    place = yield from _find(wanted, keys, across)
+    scrolled = place is None
+    if scrolled:
+        yield from scroll(UP)
+        place = yield from _find(wanted, keys, across)
+    # The sidebar may be several times as high as the window.
+    for _ in range(PAGES):
+        if place is None:
+            yield from scroll(DOWN, _PAGE)
+            place = yield from _find(wanted, keys, across)
+    assert place is not None, f"no button for {wanted}"
+    return scrolled
+
+
+UP, DOWN = 4, 5  # X counts the two directions of the wheel as these buttons of the mouse.
+_PAGE, PAGES = 6, 6  # Steps of the wheel after which a part of the sidebar is still seen, and how often that is done.
+
+
+def scroll(button=UP, steps=30):
     """Turns the wheel over the sidebar. After 30 steps it no longer scrolls."""
     sidebar = region("UI")
     middle = on_screen(sidebar, sidebar.width // 2, sidebar.height // 2)
@@ -282,7 +297,7 @@ def scroll(button=_UP, steps=30):
 
 
 def scroll_down():
-    yield from scroll(_DOWN)
+    yield from scroll(DOWN)
 
 
 def end_operators():

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Chooses, breaks and shortens text so that it fits the region that is drawn: the sidebar, or the preferences."""
+
+import re
+
+import blf
+
+_FONT = 0  # Blender's own
+# Pixels of the region's width that tabs, margins and the icon take from the text of a label.
+_BESIDE_TEXT = 85
+# Pixels that tabs and margins take from the width of a box, and that a label takes from its text.
+_BESIDE_BOX, _BESIDE_LABEL = 64, 4
+# A line may end after a space, and after a part of a path.
+_PIECES = re.compile(r"[^ /\\]+[ /\\]*|[ /\\]+")
+
+
+def _room(context):
+    """Sets the font of the panels. Returns how many pixels a text may be wide."""
+    scale = context.preferences.system.ui_scale
+    blf.size(_FONT, context.preferences.ui_styles[0].widget.points * scale)
+    return max(context.region.width, 100) - _BESIDE_TEXT * scale
+
+
+def _width(text):
+    return blf.dimensions(_FONT, text)[0]
+
+
+def fitting(context, *texts, share=None):
+    """Returns the first of the texts that fits the region, or the last.
+
+    share: the part of a box's width that is for the text, if a name stands beside it.
+    """
+    room = _room(context)
+    if share is not None:
+        scale = context.preferences.system.ui_scale
+        room = share * (max(context.region.width, 100) - _BESIDE_BOX * scale) - _BESIDE_LABEL * scale
+    return next((text for text in texts if _width(text) <= room), texts[-1])
+
+
+def wrapped(context, text, most=None):
+    """Returns the text as lines that fit the region. most: so many lines at most; the last one then ends in an ellipsis."""
+    room, lines = _room(context), [""]
+    for piece in _PIECES.findall(text):
+        if lines[-1] and _width((lines[-1] + piece).rstrip()) > room:
+            lines.append("")
+        if len(lines) - 1 == most:
+            lines = lines[:most]
+            lines[-1] = _shortened(lines[-1], room)
+            break
+        lines[-1] += piece
+    return [line.rstrip() for line in lines]
+
+
+def _shortened(line, room):
+    """Returns as many words of a line as fit with an ellipsis behind them, at least one."""
+    words = line.split()
+    while len(words) > 1 and _width(" ".join(words) + "\u2026") > room:
+        words.pop()
+    return " ".join(words) + "\u2026"
+
+
+def text_lines(context, layout, text, icon):
+    """Draws a label, broken into lines that fit the region."""
+    column = layout.column(align=True)
+    for i, line in enumerate(wrapped(context, text)):
+        column.label(text=line, icon="BLANK1" if i and icon != "NONE" else icon)

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the legend, the labels and the box of the worst point draw in a 3D view, without a window."""
+
+from types import SimpleNamespace
+
+import bpy
+import pytest
+
+from addon.overlay import labels, legend, markers, shaders
+from addon.overlay.scale import Scale
+from addon.overlay.shares import Shares
+from addon.proof.verdict import FAIL, PASS
+from drawn import sidebar
+from scenes import torus
+
+
+class Page:
+    """Takes what would be drawn. All letters are equally wide."""
+
+    scale, ink, paper = 1.0, (1, 1, 1), (0, 0, 0, 1)
+
+    def __init__(self, *_):
+        self.rectangles, self.texts = [], []
+
+    def rectangle(self, x, y, width, height, kind, colour=(0, 0, 0, 0), bands=0):
+        self.rectangles.append((x, y, width, height, kind, tuple(colour)))
+
+    def text(self, x, y, text, faint=False, points=11):
+        self.texts.append(text)
+
+    def width(self, text, points=11):
+        return 0.6 * points * len(text)
+
+
+def view(width=800, height=600):
+    """A context of a 3D view in which no other region lies."""
+    context = sidebar()
+    context.region = SimpleNamespace(
+        type="WINDOW", alignment="NONE", width=width, height=height, x=0, y=0, as_pointer=lambda: 1
+    )
+    context.area = SimpleNamespace(regions=[context.region])
+    context.space_data = SimpleNamespace(as_pointer=lambda: 2)
+    context.region_data = None
+    return context
+
+
+@pytest.fixture
+def page(monkeypatch):
+    """The page on which everything is drawn."""
+    drawn = Page()
+    monkeypatch.setattr(legend, "Page", lambda *_: drawn)
+    monkeypatch.setattr(legend, "width_of", drawn.width)
+    monkeypatch.setattr(markers.gpu.state, "blend_set", lambda _: None)
+    yield drawn
+    legend.free()
+    markers.end()
+
+
+# The legend ----------------------------------------------------------------------------------------------------------
+
+
+def draw_legend(context, histogram):
+    scale = Scale(0.01, True, 0.01, 0)
+    shares = Shares([0.25] * scale.counted, 0.0, histogram, 1.0)
+    legend.draw(context, "Deviation of torus", "Colours not proved", PASS, "", scale, shares, "SAFE")
+
+
+def test_the_histogram_has_a_bar_for_each_bin_at_its_height(page):
+    histogram = [0.0, 0.5, 0.25, 0.0, 1e-9, 0.1]
+    draw_legend(view(), histogram)
+    x, y, _, height = next(drawn for drawn in page.rectangles if drawn[4] == shaders.BAR)[:4]
+    bars = [drawn for drawn in page.rectangles if drawn[5] == (*page.ink, 0.5)]
+    assert [bar[1] for bar in bars] == pytest.approx([y + i * height / 6 for i in (1, 2, 4, 5)])
+    assert all(bar[3] == pytest.approx(height / 6) for bar in bars)
+    # They grow to the left from the bar of colours, and the smallest one is a pixel long.
+    assert all(bar[0] + bar[2] == pytest.approx(x - 2) for bar in bars)
+    longest = legend._BINS_WIDTH - 2
+    assert [bar[2] for bar in bars] == pytest.approx([longest, longest / 2, 1, longest / 5])
+
+
+def test_a_note_without_room_is_the_word_alone(page):
+    legend.draw_note(view(), "Deviation of torus: the field is being computed", FAIL)
+    assert page.texts == [f"Deviation of torus: the field is being computed. {FAIL}"]
+    page.texts.clear()
+    legend.draw_note(view(width=220), "Deviation of torus: the field is being computed", FAIL)
+    assert page.texts == [FAIL]
+    left, bottom, width, height = legend.box(view(width=220).region)
+    assert left >= 0 and left + width <= 220 and bottom >= 0
+
+
+# Labels --------------------------------------------------------------------------------------------------------------
+
+
+def overlaps(boxes):
+    return [(a, b) for i, a in enumerate(boxes) for b in boxes[:i] if markers._overlap(a, b)]
+
+
+def test_a_box_lies_lower_where_others_are_and_stays_in_the_view(page):
+    box = markers.Box(page, ["a line", "another line"])
+    width, height = box.size
+    assert box.beside(view(), 100, 300, 10) == (110, 300 - height / 2, width, height)
+    assert box.beside(view(), 790, 300, 10)[0] == 780 - width
+    assert box.beside(view(), 100, 599, 10)[1] == 600 - height and box.beside(view(), 100, 0, 10)[1] == 0
+    others = [(100, 290, 50, 20), (100, 290 - height, 500, 30), (0, 0, 50, 500)]
+    placed = box.beside(view(), 100, 300, 10, others)
+    assert placed[1] < 290 - height - height and not overlaps([placed, *others[:2]])
+    assert box.beside(view(), 100, 300, 10, [(0, 5, 800, 500)]) is None
+
+
+class InView:
+    """An object that is seen in a view, although Blender has none."""
+
+    def __init__(self, ob):
+        self._ob = ob
+
+    def __getattr__(self, name):
+        return getattr(self._ob, name)
+
+    def visible_in_viewport_get(self, _space):
+        return True
+
+
+def drawn_labels(page, monkeypatch, ob, *others):
+    """Returns the boxes and the first lines of the labels of `ob`, all at one place, beside two other boxes."""
+    monkeypatch.setattr(labels, "location_3d_to_region_2d", lambda *_: (300, 250))
+    for part, other in zip((legend, markers), others):
+        monkeypatch.setattr(part, "box", lambda _region, other=other: other)
+    boxes, firsts = [], []
+    monkeypatch.setattr(
+        markers.Box, "draw", lambda box, place, faint=False: (boxes.append(place), firsts.append(box._lines[0]))
+    )
+    labels._draw_labels(view(), page, InView(ob))
+    assert overlaps([*boxes, *filter(None, others)]) == []
+    return boxes, firsts
+
+
+def test_labels_lie_neither_over_each_other_nor_over_the_legend_nor_over_the_worst_point(page, monkeypatch):
+    ob = torus()
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    for i in range(12):
+        assert bpy.ops.tolvol.add_label(position=(1.25, 0, 0.001 * i)) == {"FINISHED"}
+    ob.tolvol.label_index = 5
+    boxes, firsts = drawn_labels(page, monkeypatch, ob, (250, 20, 550, 100), (320, 185, 250, 40))
+    # The chosen label is whole and beside its place, and the others follow below the worst point while there is room.
+    assert "of the tolerance" in firsts[0] and [first.split(":")[0] for first in firsts] == ["6", "1", "2"]
+    assert boxes[0][1] == 250 - 21 and all(120 <= box[1] < 185 for box in boxes[1:])
+    # Where the lines have no room, but the number has, it is drawn alone.
+    boxes, firsts = drawn_labels(page, monkeypatch, ob, (350, 0, 450, 600), None)
+    assert firsts[:4] == ["6", "1", "2", "3"] and all(box[0] + box[2] <= 350 for box in boxes)
