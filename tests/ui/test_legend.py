@@ -177,6 +177,7 @@ def settings_clicked(said, scale):
     """Clicks surface, range, palette and bands in the sidebar, and looks what the legend becomes each time."""
     settings, place = the_ramp().tolvol, region("WINDOW")
     yield from finished(lambda: legend.box(place) is not None)
+    yield from scroll_down()  # At the edge of the sidebar a click does not reach a button that is cut off.
     for kind, across, heading in (
         ("REFERENCE", 0.7, "Deviation of the reference of ramp"),
         ("MESH", 0.25, "Deviation of ramp"),
@@ -198,6 +199,7 @@ def settings_clicked(said, scale):
     after = yield from still(bar_pixels)
     assert after.shape == before.shape and (after != before).any(2).sum() > 1000 * scale**2
     said.clear()
+    yield from scroll_down()  # The limit has pushed the bands to the edge.
     yield from click_property("use_bands", across=0.4)
     yield from finished(lambda: settings.use_bands)
     xdotool("mousemove", *on_screen(place, 120, 300))

@@ -50,7 +50,7 @@ class TOLVOL_TEST_OT_mark(bpy.types.Operator):
 
 
 _MARK = "Pause"  # a key that Blender does not use
-_STUCK = 20  # seconds after which Blender counts as stuck
+_STUCK = 120  # seconds after which Blender counts as stuck
 
 
 def sent(*events):
@@ -198,7 +198,6 @@ def find_hold():
 
 
 _last_seen = {}
-_EDGE = 26  # pixels above the lower edge of the sidebar, where clicks may not reach a button that is cut off there
 
 
 def _copied_in_sidebar(keys, across=0.33):
@@ -219,8 +218,7 @@ def _copied_in_sidebar(keys, across=0.33):
 def _down_the_sidebar(keys, across, step=8):
     """The events come so quickly that Blender draws few times meanwhile."""
     sidebar, events = region("UI"), []
-    edge = int(_EDGE * bpy.context.preferences.system.ui_scale)
-    places = [on_screen(sidebar, int(sidebar.width * across), y) for y in range(30, sidebar.height - edge, step)]
+    places = [on_screen(sidebar, int(sidebar.width * across), y) for y in range(30, sidebar.height - 5, step)]
     for x, y in places:
         if events:
             events += "key", "--delay", 0, _MARK
