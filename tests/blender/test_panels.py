@@ -171,6 +171,9 @@ def test_not_checked_says_what_is_in_the_way_of_check():
     ob = torus()
     assert why_not_checked() == "Set the reference first"
     with_reference(ob)
+    ob.data.vertices[0].co.x += 0.001
+    ob.data.update()
+    bpy.context.view_layer.update()
     assert why_not_checked() == "Press Check to measure it"
     ob.data.clear_geometry()
     assert why_not_checked() == "torus has no faces" and not bpy.ops.tolvol.check.poll()

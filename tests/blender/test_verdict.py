@@ -126,10 +126,8 @@ def test_against_a_reference_that_is_out_of_date_nothing_is_known(tmp_path):
     assert bpy.ops.tolvol.decimate() == {"FINISHED"} and verdict.word(ob) == PASS
     ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", other
     assert verdict.of(ob) is None and deviation.verdicts([ob]) == [("torus", NOT_CHECKED, None)]
-    assert (
-        deviation._why_not_checked(ob)
-        == "The reference is out of date: another kind of reference was chosen. Replace the reference, or choose the previous one again"
-    )
+    why = "another kind of reference was chosen. Replace the reference, or choose the previous one again"
+    assert deviation._why_not_checked(ob) == f"The reference is out of date: {why}"
     good = torus("good")
     assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
     ob.select_set(True)
