@@ -124,7 +124,10 @@ def _note_changes(_scene, depsgraph):
     for update in depsgraph.updates:
         ob = update.id.original
         # A sculpt stroke is not counted as a change of the geometry, a change of the selection in Edit Mode neither.
-        if isinstance(ob, bpy.types.Object) and (update.is_updated_geometry or ob.mode == "SCULPT") and wanted(ob):
+        if not isinstance(ob, bpy.types.Object) or not (update.is_updated_geometry or ob.mode == "SCULPT"):
+            continue
+        measurements.outdate(ob.name)
+        if wanted(ob):
             note(ob)
 
 

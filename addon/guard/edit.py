@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Guard Editing: moved vertices stop at the tolerance, and an edit of the faces that leaves the tolerance, on either side, is
-undone."""
+"""Guard Editing: moved vertices stop at the tolerance, and an edit of the faces that leaves the tolerance, on either side, or
+that makes faces cross where crossings are kept out, is undone."""
 
 import bmesh
 import bpy
@@ -58,8 +58,7 @@ def rest(ob):
 
 
 def outside():
-    """Returns an object that an edit of its faces took out of the tolerance, or its reference out of that of the mesh, or None.
-    The operator may still be running."""
+    """Returns an object of which an edit of its faces broke what the guard keeps, or None. The operator may still be running."""
     for name, current in watches:
         if current.followed and not current.on and not current.preparing:
             return bpy.data.objects.get(name)

@@ -17,10 +17,10 @@ _sent_for = None  # (watch, last operator) for which the last mouse move was sen
 
 
 class TOLVOL_OT_guard_undo(bpy.types.Operator):
-    """Undo an edit that left the tolerance"""
+    """Undo an edit that broke what the guard keeps"""
 
     bl_idname = "tolvol.guard_undo"
-    bl_label = "Undo Edit Beyond Tolerance"
+    bl_label = "Undo Guarded Edit"
     bl_options = {"INTERNAL"}
 
     @classmethod
@@ -28,10 +28,10 @@ class TOLVOL_OT_guard_undo(bpy.types.Operator):
         return edit.outside() is not None and bpy.ops.ed.undo.poll()
 
     def invoke(self, context, _event):
-        name, operators = edit.outside().name, context.window_manager.operators
+        ob, operators = edit.outside(), context.window_manager.operators
         label = operators[-1].name if operators else "The last step"
         edit.undo()
-        status_bar.say(f"{label} was undone: {name} would leave the tolerance")
+        status_bar.say(f"{label} was undone: {ob.name} would {edit.watches.shown(ob).would}")
         return {"FINISHED", "PASS_THROUGH"}
 
 

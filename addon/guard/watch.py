@@ -115,6 +115,7 @@ class Preparing:
     followed: whether it takes over from a watch that was on, for the same mesh with other faces.
     """
 
+    would = "leave the tolerance"  # what the mesh would do if an edit that is refused were kept
     two_sided = False  # whether it keeps the reference within the tolerance of the mesh, too
     # (m,) bool: the faces of the reference that may be uncovered all the same; None if that is not known.
     uncovered = None
@@ -227,22 +228,24 @@ class Watch(Preparing):
 
     def prepared(self, outcome):
         guard, outside, uncovered, crossing, self.remark = outcome
-        lost, crossed = 0, self.crossing
+        lost = 0
         if self.uncovered is None:
             self.uncovered = uncovered
         else:
             lost = int(np.count_nonzero(uncovered & ~self.uncovered))
-        if crossing is not None:
-            self.crossing = crossing
+        crossed = crossing if self.crossing is None else self.crossing
         if outside:
             self.reason = outside_reason(outside)
         elif lost:
             self.reason = lost_reason(lost)
-        elif crossing is not None and crossed is not None and crossing > crossed:
+        elif crossing is not None and crossing > crossed:
             now, then = solidity.pair_count(crossing), solidity.pair_count(crossed)
             self.reason = f"Crossing pairs of faces: {now}, before the edit {then}"
+            self.would = "have more crossing faces"
         else:
             self._guard, self.on = guard, True
+            crossed = crossing
+        self.crossing = crossed
 
     @property
     def held_back(self):

@@ -88,13 +88,18 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
         run = result.report
         self._require_motion(run)
         vertices, certified = yield from motion.settle(result.vertices, may_hold=self.mode == "PULL_BACK")
+        if np.array_equal(vertices, motion.before):
+            raise Refused(f"{self.lattice} does not move {ob.name}: the tolerance permits no movement")
         motion.write(ob, vertices, certified, "deform")
         ob.tolvol.lattice, ob.tolvol.deform_mode = bpy.data.objects[self.lattice], self.mode
         warnings = [*run["warnings"], *_twice(ob)]
         kept_warnings.keep(ob, warnings)
         for warning in warnings:
             self.say({"WARNING"}, warning)
-        self.say({"INFO"}, motion.line(_remarks(result), certified))
+        remarks = [*motion.moved(vertices, vertices), *_remarks(run)]
+        if bent := int((vertices != result.vertices).any(1).sum()):
+            remarks.append(f"{bent:,} held back because Blender would cut their faces otherwise")
+        self.say({"INFO"}, motion.line(remarks, certified))
 
     def _require_motion(self, run):
         """Raises Refused if the deformation moves no vertex."""
@@ -159,9 +164,8 @@ def _twice(ob):
             )
 
 
-def _remarks(result):
-    run = result.report
-    remarks = [f"{run['moved']:,} of {len(result.vertices):,} vertices moved"]
+def _remarks(run):
+    remarks = []
     if _stopped(run):
         if run["permitted_fraction"] is None:
             remarks.append(f"{run['held_back']:,} held back")

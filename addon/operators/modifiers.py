@@ -133,10 +133,9 @@ moves as far as the tolerance permits. An object without a reference gets one fi
         if np.array_equal(wished, motion.before):
             raise Refused(f"{name} does not move {ob.name}: check its settings")
 
-        vertices = yield partial(motion.hold, wished)
+        vertices, certified = yield from motion.settle((yield partial(motion.hold, wished)))
         if np.array_equal(vertices, motion.before):
             raise Refused(f"The tolerance permits no movement of {ob.name} by {name}: take a larger tolerance")
-        vertices, certified = yield from motion.settle(vertices)
         shared.give(self, ob.tolvol.modifiers, modifier_settings())
         ob = self.target(context)
         if self.result == "SHAPE_KEY":
@@ -182,17 +181,14 @@ ways, and apply the modifier to the base mesh. An object without a reference get
     )
     threads: threads_setting()
 
-    def targets(self, context):
-        self._found = []  # (number of triangles, value) of each value at which no sample is beyond the tolerance
-        self._none_fewer = False  # whether there are such values at which the modifier removes no triangle
-        return super().targets(context)
-
     def draw(self, _context):
         self.layout.use_property_split = True
         self.layout.prop(self, "value")
         self.layout.prop(self, "result")
 
     def steps(self, context):
+        self._found = []  # (number of triangles, value) of each value at which no sample is beyond the tolerance
+        self._none_fewer = False  # whether there are such values at which the modifier removes no triangle
         context.view_layer.update()
         ob, modifier = self.ob, self.chosen(fitted=True)
         if self.result == "SHAPE_KEY":
@@ -259,7 +255,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         """Raises Refused, because no value leaves fewer triangles within the tolerance."""
         ob, before = self.ob, len(trial.surface.arrays.triangles)
         why, remedy = "", "Take a larger tolerance"
-        self.part, self.doing = f"Fitting {name}", "Comparing the quads"
+        self.part, self.doing, self.share, self.count = f"Fitting {name}", "Comparing the quads", 0.0, ""
         if (yield trial.measured(mesh_io.both_triangulations(ob.data, trial.surface.arrays))) > 1:
             why = ": the modifier may cut bent quads along the other diagonal, which takes them beyond the tolerance"
         plain = yield from self._plain(context, trial)

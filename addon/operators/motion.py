@@ -81,8 +81,8 @@ class Motion:
     def certify(self, vertices, triangles, progress):
         """Returns the result of certify() for the moved mesh, and "solidity", the result of solidity.compared().
 
-        Raises NotProved unless the mesh is within the tolerance and, where crossings are kept out, no more faces cross than
-        before.
+        Raises NotProved unless the mesh is within the tolerance and, where crossings are kept out, no polygons cross that did
+        not cross before.
         """
         moved = Surface(replace(self.surface.arrays, vertices=vertices, triangles=triangles), self.surface.matrix)
         certified = certify(moved, self.reference, self.tolerance, 0, self.threads, progress)
@@ -94,10 +94,18 @@ class Motion:
         facts = solidity.facts(moved, self.threads, progress)
         if self._facts_before is None:
             self._facts_before = solidity.facts(self.surface, self.threads, progress)
-        crossing, crossed = (of["crossing_pairs"] for of in (facts, self._facts_before))
-        if self.crossings == "keep_out" and crossing > crossed:
-            raise NotProved(f"{crossing:,} pairs of faces would cross, and {crossed:,} cross now")
+        if self.crossings == "keep_out" and not facts["uncrossed"]:
+            new = self._crossing(moved, progress) - self._crossing(self.surface, progress)
+            if new:
+                raise NotProved(f"{len(new):,} pairs of faces would cross that do not cross now")
         return certified | {"solidity": solidity.compared(self._facts_before, facts)}
+
+    def _crossing(self, surface, progress):
+        """Returns the pairs of polygons of which triangles cross, at most solidity.MOST_PAIRS of triangles, as a set."""
+        arrays = surface.arrays
+        options = {"most": solidity.MOST_PAIRS, "threads": self.threads or None, "progress": progress}
+        pairs = native.module.crossing_pairs(arrays.vertices, arrays.triangles, **options)
+        return set(map(tuple, np.sort(arrays.polygons[pairs], axis=1).tolist()))
 
     def settle(self, vertices, may_hold=True):
         """A generator for an operator's steps(): returns the vertices and the result of certify() for the triangles that Blender
@@ -111,15 +119,19 @@ class Motion:
             triangles = mesh_io.triangles_at(self._mesh, vertices)
             try:
                 return vertices, (yield partial(self.certify, vertices, triangles))
-            except NotProved:
+            except NotProved as error:
                 if not may_hold or not tries_left:
                     raise
+                refusal = error
             wished = vertices.copy()
             arrays = self.surface.arrays
             cut_otherwise = arrays.polygons[(triangles != arrays.triangles).any(1)]
             stays = triangles[np.isin(arrays.polygons, cut_otherwise)]
             wished[stays] = self.before[stays]
-            vertices = yield partial(self.hold, wished)
+            held = yield partial(self.hold, wished)
+            if np.array_equal(held, vertices):
+                raise refusal
+            vertices = held
 
     def write(self, ob, vertices, certified, operation):
         """Moves the vertices of `ob`, whose mesh is the one that was read or a copy of that mesh.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Puts what a report of a problem needs into the clipboard. It holds no path, and no name that the user has given."""
+"""Puts what a report of a problem needs into the clipboard. It holds no path, and no name that is
+in the file."""
 
 import os
 import platform
@@ -23,7 +24,7 @@ _PATHS = re.compile(r"[^\s'\"();,]*[/\\][^\s'\"():;,]*")
 
 class TOLVOL_OT_copy_problem_report(bpy.types.Operator):
     """Copy the versions of add-on, module, Blender, system and graphics driver, the processor, and the kept warnings of the \
-active object to the clipboard, as text for a report of a problem. Paths and names are left out"""
+active object to the clipboard, as text for a report of a problem. Paths and the names in the file are left out"""
 
     bl_idname = "tolvol.copy_problem_report"
     bl_label = "Copy Problem Report"

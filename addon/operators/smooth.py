@@ -135,10 +135,10 @@ class _Task:
 
     def steps(self):
         """A generator for the operator's steps(): returns (motion, vertices, certified, report), or None if no vertex moves."""
+        motion = self._motion
         vertices, report = yield self._smooth
-        if np.array_equal(vertices, self._motion.before):
-            return None
-        return self._motion, *(yield from self._motion.settle(vertices)), report
+        vertices, certified = yield from motion.settle(vertices)
+        return None if np.array_equal(vertices, motion.before) else (motion, vertices, certified, report)
 
     def _smooth(self, progress):
         motion = self._motion

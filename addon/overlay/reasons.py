@@ -39,9 +39,11 @@ def hidden(ob):
 
 def unsigned(ob):
     """Why only the magnitude is shown although the settings demand the sign, or None."""
+    if ob.tolvol.deviation_kind != "SIGNED":
+        return None
     if ob.tolvol.deviation_surface == "REFERENCE":
         return "Only the magnitude is shown on the reference"
     found = field.at_hand(ob)
-    if ob.tolvol.deviation_kind == "SIGNED" and found is not None and not found.tree.closed:
+    if found is not None and not found.tree.closed:
         return "Only the magnitude is shown: the reference is open, so it has no inside"
     return None

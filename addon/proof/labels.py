@@ -32,14 +32,7 @@ def write(ob, label, reading):
     label.distance = reading.distance
     label.fingerprint = measurements.shown_fingerprint(ob)
     label.matrix = mesh_io.matrix_array(ob.matrix_world).ravel()
-    label.reference = _reference_of(ob)
-
-
-def _reference_of(ob):
-    """Returns a text that is equal for equal references at the same place, or, if it moves with the object, at any place."""
-    settings = ob.tolvol
-    place = "" if settings.snapshot_kind == "SELF" else snapshots.reference_matrix(ob).tobytes().hex()
-    return f"{settings.snapshot_kind} {settings.snapshot_fingerprint} {place}"
+    label.reference = measurements.about_reference(ob)
 
 
 def current(ob, label):
@@ -49,7 +42,7 @@ def current(ob, label):
     """
     if ob.mode != "OBJECT" or ob.tolvol.snapshot is None or snapshots.stale_reason(ob):
         return False
-    if label.fingerprint != measurements.shown_fingerprint(ob) or label.reference != _reference_of(ob):
+    if label.fingerprint != measurements.shown_fingerprint(ob) or label.reference != measurements.about_reference(ob):
         return False
     if not snapshots.sound(1 + label.distance):
         return False  # The file is damaged.

@@ -105,7 +105,7 @@ class TOLVOL_PG_guard(bpy.types.PropertyGroup):
     crossings: BoolProperty(
         name="Keep Crossings Out",
         description="While sculpting and editing, also stop vertices where faces would cross that did not cross when the "
-        "guard began. Faces with more than four corners are not kept from crossing",
+        "guard began, and undo edits that make more faces cross. A mesh with faces of more than four corners is exempt",
     )
     lattice: BoolProperty(
         name="Lattice",

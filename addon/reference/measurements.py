@@ -50,12 +50,10 @@ _present = {}  # name of an object -> the fingerprint of its mesh, which has not
 def remember(ob, surface, certified, tolerance, share_outside=0.0, statistics=""):
     """Stores the certified distances of `surface`, the object's mesh as it is now, and redraws the panels.
 
-    statistics: as text; those of the same state that are known already stay.
+    statistics: as text; those of the same state that are known already stay, and so does its share outside.
     """
     # An operator that has just written the mesh reports before Blender tells of the change: what is shown counts from now.
     _shown[_fingerprint_key(ob)] = surface.arrays.fingerprint()
-    before = measurement_of(ob)
-    statistics = statistics or (before.statistics if before else "")
     measured = _keep(ob, surface, certified, tolerance, share_outside, statistics)
     for field in fields(measured):
         setattr(ob.tolvol.measurement, field.name, getattr(measured, field.name))
@@ -68,8 +66,16 @@ def remember_passing(ob, surface, certified, tolerance):
 
 
 def _keep(ob, surface, certified, tolerance, share_outside=0.0, statistics=""):
+    fingerprint = surface.arrays.fingerprint()
+    key = _key(ob, fingerprint)
+    known = (_kept.pop(key, None), ob.tolvol.measurement)
+    same = [each for each in known if each and each.fingerprint == fingerprint and _holds(ob, each)]
+    if same and not statistics:
+        statistics = same[0].statistics
+    if same and not share_outside and same[0].tolerance == tolerance:
+        share_outside = same[0].share_outside
     measured = Measurement(
-        surface.arrays.fingerprint(),
+        fingerprint,
         tuple(surface.matrix.ravel()),
         tolerance,
         snapshots.snapshot_size(ob),
@@ -79,8 +85,6 @@ def _keep(ob, surface, certified, tolerance, share_outside=0.0, statistics=""):
         statistics,
         datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
     )
-    key = _key(ob, measured.fingerprint)
-    _kept.pop(key, None)
     _kept[key] = measured
     if len(_kept) > _MOST_KEPT:
         del _kept[next(iter(_kept))]
@@ -88,8 +92,15 @@ def _keep(ob, surface, certified, tolerance, share_outside=0.0, statistics=""):
 
 
 def _key(ob, fingerprint):
-    """Returns a value that is equal for equal meshes of an object with equal references at the same place."""
-    return ob.name, fingerprint, ob.tolvol.snapshot_fingerprint, tuple(ob.tolvol.snapshot_matrix)
+    """Returns a value that is equal for equal meshes of an object with equal references."""
+    return ob.name, fingerprint, about_reference(ob)
+
+
+def about_reference(ob):
+    """Returns a text that is equal for equal references at the same place, or, if it moves with the object, at any place."""
+    settings = ob.tolvol
+    place = "" if settings.snapshot_kind == "SELF" else snapshots.reference_matrix(ob).tobytes().hex()
+    return f"{settings.snapshot_kind} {settings.snapshot_fingerprint} {place}"
 
 
 def outdate(name):
@@ -98,8 +109,8 @@ def outdate(name):
 
 
 def _kept_of(ob):
-    # In Object Mode the fingerprint tells whether it is still the same mesh. In the other modes Python does not see changes.
-    return _kept.get(_key(ob, shown_fingerprint(ob) if ob.mode == "OBJECT" else _present.get(ob.name)))
+    # In most modes the fingerprint tells whether it is still the same mesh. In Edit and Sculpt Mode Python does not see changes.
+    return _kept.get(_key(ob, _present.get(ob.name) if ob.mode in {"EDIT", "SCULPT"} else shown_fingerprint(ob)))
 
 
 def _stored_of(ob):

@@ -192,8 +192,8 @@ seconds : the time that the call took
 stopped_by : "tolerance", "target", "time" or "request"
 method, renderer : which check was used, and what computed it
 repairs : a list of dicts with `kind`, `count` and `message`; the kind "T-junction" counts vertices that were put into the
-    edges and faces that they lie on, so that the faces that meet there go on to meet, and "double_sheet" faces,
-    other than those at a rim, that lie exactly on another face
+    edges and faces that they lie on, so that the faces that meet there go on to meet, and "double_sheet" faces that lie
+    exactly on another face
 locked : a dict from a cause to the number of vertices that could not move
 outside : a dict of `faces`, the number of input faces that were outside and were kept, `first`, the first of them, and
     `reference_faces`, the number of reference faces that were beyond the tolerance of the input

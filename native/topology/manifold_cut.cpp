@@ -287,6 +287,7 @@ class Cutter {
     add_aside_vertices();
     join_slots();
     tie_copies();
+    count_double_sheet_faces();
   }
 
   /// Triangles set aside need vertices that outlive the decimation. These are tied vertices of the manifold if there
@@ -345,7 +346,6 @@ class Cutter {
         several[at] = true;
       }
     }
-    count_double_sheet_faces(several);
     const std::vector<bool> is_apart = find_double_sheets(several);
     for (std::uint32_t v = 0; v < cut_.copies_of.size(); ++v) {
       const std::uint32_t at = weld_[cut_.vertex_input[v]];
@@ -354,20 +354,25 @@ class Cutter {
     }
   }
 
-  /// Counts the triangles with the places of another, of those with several vertices at the place of a corner.
-  void count_double_sheet_faces(const std::vector<bool>& several) {
-    std::vector<std::array<std::uint32_t, 3>> faces;
+  /// Counts the triangles at the places of another. One on the vertices of another was dropped as its duplicate.
+  void count_double_sheet_faces() {
+    if (!renamed_) return;
+    std::vector<Side> sides;  // has for each triangle the side between its two lowest places
     for (Side s = 0; s < mate_.size(); s += 3) {
-      std::array<std::uint32_t, 3> face = {welded(s), welded(s + 1), welded(s + 2)};
-      if (!std::ranges::any_of(face, [&](std::uint32_t at) { return several[at]; })) continue;
-      std::ranges::sort(face);
-      faces.push_back(face);
+      const Side highest = std::max({s, s + 1, s + 2}, [&](Side a, Side b) { return welded(a) < welded(b); });
+      sides.push_back(next_corner(highest));
     }
-    std::ranges::sort(faces);
-    for (std::size_t i = 0; i < faces.size(); ++i) {
-      const bool as_before = i > 0 && faces[i] == faces[i - 1];
-      cut_.double_sheet_faces += as_before || (i + 1 < faces.size() && faces[i] == faces[i + 1]);
-    }
+    const auto end_of = [&](Side corner) { return welded(corner); };
+    std::vector<std::uint32_t> third;  // is the third place of each
+    by_ends(sides, weld_.size(), team_, end_of, [&](const std::vector<Side>& alike) {
+      third.clear();
+      for (const Side s : alike) third.push_back(welded(previous_corner(s)));
+      std::ranges::sort(third);
+      for (std::size_t i = 0; i < third.size(); ++i) {
+        const bool as_before = i > 0 && third[i] == third[i - 1];
+        cut_.double_sheet_faces += as_before || (i + 1 < third.size() && third[i] == third[i + 1]);
+      }
+    });
   }
 
   /// Tells for each weld representative at which there are several vertices whether sheets lie on each other there,

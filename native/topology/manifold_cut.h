@@ -39,7 +39,7 @@ struct CutMesh {
   std::size_t welded = 0;              ///< counts input vertices that were joined to another at exactly their position
   std::size_t cut_edges = 0;           ///< counts cut edges of more than two triangles or without a fitting orientation
   std::size_t reversed_count = 0;      ///< counts triangles against their neighbours, as they are in the result
-  std::size_t double_sheet_faces = 0;  ///< counts triangles, but at the rims of sheets, that lie exactly on another one
+  std::size_t double_sheet_faces = 0;  ///< counts triangles at exactly the positions of another one
 
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 };

@@ -435,6 +435,9 @@ def test_an_edit_of_faces_that_makes_faces_cross_is_put_back_if_crossings_are_ke
         return
     assert not on and text == "Crossing pairs of faces: 1, before the edit 0"
     assert guard.edit.outside() == ob
+    # A further edit does not make it right.
+    remove_faces(ob, lambda co: co.x > 0.9 and co.y > 0.9, "DISSOLVE")
+    assert guard.edit.outside() == ob and state(ob)["editing"][0] == text
 
 
 @pytest.mark.parametrize("keep", ("BOTH", "ONE"))

@@ -157,3 +157,24 @@ def test_what_is_sculpted_outside_of_the_stored_mesh_is_not_measured():
     assert measuring.wanted(ob)
     ob.modifiers.new("multires", "MULTIRES")
     assert not measuring.wanted(ob)
+
+
+def test_a_change_in_another_mode_outdates_what_was_measured_in_edit_mode():
+    ob = in_mode("EDIT")
+    measured()
+    assert verdict.word(ob) == PASS
+    bpy.ops.object.mode_set(mode="OBJECT")
+    ob.data.vertices[0].co.z += 1
+    ob.data.update()
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    assert verdict.word(ob) == NOT_CHECKED
+
+
+def test_measuring_by_itself_keeps_the_statistics_of_the_same_mesh():
+    ob = in_mode("OBJECT")
+    bpy.ops.tolvol.measure_statistics()
+    known = measurements.measurement_of(ob).statistics
+    bpy.ops.object.mode_set(mode="EDIT")
+    measuring.note(ob)
+    measured()
+    assert known and measurements.measurement_of(ob).statistics == known

@@ -255,3 +255,19 @@ def test_nothing_else_compares_a_distance_with_the_tolerance():
             if ordered and about and not any(name == other and part in text for other, part in _OTHERS):
                 found.add((name, text))
     assert not found
+
+
+def test_a_measurement_against_the_own_reference_says_nothing_about_another_with_the_same_shape():
+    ob = torus("scan")
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    copy = ob.copy()
+    copy.data = ob.data.copy()
+    bpy.context.collection.objects.link(copy)
+    ob.location.x += 1
+    bpy.context.view_layer.update()
+    assert bpy.ops.tolvol.decimate() == {"FINISHED"} and verdict.word(ob) == PASS
+    ob.tolvol.reference_kind, ob.tolvol.reference_object = "OBJECT", copy
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    assert verdict.word(ob) == NOT_CHECKED
+    bpy.ops.tolvol.check()
+    assert verdict.word(ob) == FAIL
