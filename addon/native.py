@@ -133,7 +133,7 @@ _SENTENCES = {
     "input_outside": "{count:,} faces are not within the tolerance of the reference, the first is face {first}; take a "
     "larger tolerance or set the reference anew. Select Outside shows these faces",
     "reference_outside": "{count:,} faces of the reference are not within the tolerance of the mesh, the first is face "
-    "{first}; take a larger tolerance, set the reference anew, or set Keep to One Way",
+    "{first}; take a larger tolerance, tick Close if the mesh has holes, set the reference anew, or set Keep to One Way",
 }
 
 

@@ -112,8 +112,8 @@ the original with its UV maps, materials and other data. If these differ from th
 
 
 class TOLVOL_OT_clear_reference(bpy.types.Operator):
-    """Remove the reference, and the original with its UV maps, materials and other data. If these differ from those of the \
-mesh, a menu asks first. The mesh stays as it is"""
+    """Remove the reference, and the original with its UV maps, materials and other data. A menu asks first if the object \
+that the reference was taken from no longer has the same. The mesh stays as it is"""
 
     bl_idname = "tolvol.clear_reference"
     bl_label = "Clear Reference"

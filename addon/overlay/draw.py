@@ -174,7 +174,7 @@ def legend_of_one(context, shown):
         if any(drawn[other].scale.tolerance != scale.tolerance for other in together):
             scale = replace(scale, tolerance=scale.reach)  # There is no one tolerance to be marked.
     if not all(drawn[other].what.present for other in together):
-        below = "Colours of before the last change"
+        below, counted = "Colours of before the last change", None
     word = verdict.together(verdict.word(other) for other in together)
     legend.draw(context, heading, below, word, judged(together), scale, counted, drawn[ob].palette)
 

@@ -91,13 +91,11 @@ class Surface(Triangles):
         if not recut and np.array_equal(co, self.vertices):
             return
         if recut:
-            mesh.calc_loop_triangles()
-            self.triangles = self.all_triangles = mesh_io.column(mesh.loop_triangles, "vertices", 3, np.int32)
+            triangles = mesh_io.loop_triangles(mesh)
+            self.triangles = self.all_triangles = mesh_io.column(triangles, "vertices", 3, np.int32)
             if hides:
                 hidden = mesh_io.column(mesh.polygons, "hide", 1, bool)
-                self.triangles = self.triangles[
-                    ~hidden[mesh_io.column(mesh.loop_triangles, "polygon_index", 1, np.int32)]
-                ]
+                self.triangles = self.triangles[~hidden[mesh_io.column(triangles, "polygon_index", 1, np.int32)]]
             self._polygons = len(mesh.polygons)
             self._recut = False
             self._buffers.clear()

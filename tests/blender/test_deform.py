@@ -145,14 +145,14 @@ def test_pulled_back_only_the_vertices_there_are_held():
 
 
 def test_quads_that_blender_cuts_along_their_other_diagonal_stay_within():
-    """Blender triangulates a quad along its other diagonal as soon as the fold along the first exceeds 90 degrees."""
-    ob = add_object("tent", [(-1, 0, 0.5), (0, -1, -0.4), (1, 0, 0.5), (0, 1, -0.4)], [(0, 1, 2, 3)])
+    """Blender triangulates a quad along its other diagonal as soon as it is concave as seen along its normal."""
+    ob = add_object("kite", [(-1, 0, 0), (0, -1, 0), (1, 0, 0), (0, -0.3, 0.5)], [(0, 1, 2, 3)])
     ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 1.2
     ob.tolvol.keep = "ONE"
     before = world_triangles(ob)
     lattice = cage(points=(2, 2, 2), size=(2, 2, 2))
     for point in lattice.data.points:
-        point.co_deform.y *= 0.8
+        point.co_deform.z *= 0.8
     bpy.ops.tolvol.deform(lattice="cage")
     stored = world_triangles(ob)
     assert not np.array_equal(stored[1], before[1])
