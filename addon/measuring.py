@@ -22,7 +22,7 @@ _MODES = {"EDIT", "SCULPT"}
 # A mesh rests if it has not changed for so many seconds.
 _REST = 0.25
 
-_reading = False  # while a mesh is read, which Blender counts as a change of its geometry
+_read_now = None  # the mesh that is read, which Blender counts as a change of its geometry
 _changes = {}  # name of an object -> (how often it changed, the time of the last change)
 _failures = {}  # name of an object -> why its mesh cannot be measured as it is now
 
@@ -93,15 +93,16 @@ def _fail(name, reason):
 
 def _read(ob):
     """Brings the stored mesh up to date with the edited one."""
-    global _reading
+    global _read_now
     if ob.mode != "EDIT":
         return
-    _reading = True
+    bpy.context.view_layer.update()  # what has changed before counts
+    _read_now = ob.data
     try:
         ob.update_from_editmode()
         bpy.context.view_layer.update()
     finally:
-        _reading = False
+        _read_now = None
 
 
 def _finish(name, at, outcome, error):
@@ -119,12 +120,12 @@ def _finish(name, at, outcome, error):
 
 @persistent
 def _note_changes(_scene, depsgraph):
-    if _reading:
-        return
     for update in depsgraph.updates:
         ob = update.id.original
         # A sculpt stroke is not counted as a change of the geometry, a change of the selection in Edit Mode neither.
         if not isinstance(ob, bpy.types.Object) or not (update.is_updated_geometry or ob.mode == "SCULPT"):
+            continue
+        if ob.data == _read_now:
             continue
         measurements.outdate(ob.name)
         if wanted(ob):

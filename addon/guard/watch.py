@@ -16,8 +16,6 @@ from ..mesh import mesh_io
 from ..reference import snapshots, tolerances
 from ..shared import volumes
 from ..shared.errors import Refused
-from ..shared.proof import solidity
-from ..shared.surface import MeshArrays
 
 # Blender waits so many seconds for a guard to be prepared. If preparing takes longer, it goes on in a thread.
 _PATIENCE = 0.4
@@ -26,6 +24,8 @@ _PATIENCE = 0.4
 _MOST_CORNERS = 64
 # After so many seconds without an edit the next edit counts as another stroke.
 _STROKE_GAP = 0.5
+# So many pairs of triangles that cross are found at most, those of the triangulations of one quad included.
+_MOST_PAIRS = 20_000_000
 # A stroke counts as over so many seconds after vertices were last held back in it.
 REST = 0.3
 
@@ -101,6 +101,17 @@ class Faces:
             faces = np.ascontiguousarray(faces[:, :3])
         return cls(int(np.count_nonzero(sizes > 4)), faces, np.concatenate(polygons), arrays.triangles, arrays.polygons)
 
+    def crossing_count(self, positions, threads, progress):
+        """Returns how many pairs of polygons cross in any of their triangulations. The mesh has no larger polygons."""
+        cuts = [[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]] if self.faces.shape[1] == 4 else [[0, 1, 2]]
+        triangles, polygons = self.faces[:, cuts].reshape(-1, 3), np.repeat(self.polygons, len(cuts))
+        whole = (np.sort(triangles, axis=1)[:, :-1] != np.sort(triangles, axis=1)[:, 1:]).all(1)
+        pairs = native.module.crossing_pairs(
+            positions, np.ascontiguousarray(triangles[whole]), most=_MOST_PAIRS, threads=threads, progress=progress
+        )
+        pairs = np.sort(polygons[whole][pairs], axis=1)
+        return len(np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0))
+
     def outside(self, built, positions, options):
         """Returns how many polygons are outside in the triangulation that Blender shows. options: of a check."""
         verdict = built.check(positions, self.shown, **options).verdicts
@@ -119,8 +130,6 @@ class Preparing:
     two_sided = False  # whether it keeps the reference within the tolerance of the mesh, too
     # (m,) bool: the faces of the reference that may be uncovered all the same; None if that is not known.
     uncovered = None
-    # The number of pairs of triangles that cross; None if that is not known.
-    crossing = None
 
     def __init__(self, before=None):
         """before: the watch from which this one takes over, or None."""
@@ -166,7 +175,7 @@ class Watch(Preparing):
 
     A watch that takes over from another one guards the mesh only if the edit of the faces, which lies between the two, kept
     what the guard keeps: the mesh has to be inside, no face of the reference may be uncovered that was covered before, and
-    where crossings are kept out, no more pairs of triangles may cross than before.
+    where crossings are kept out, no more pairs of polygons may cross than before, in any of their triangulations.
     """
 
     def __init__(self, ob, positions, before=None, edits_faces=False):
@@ -178,12 +187,12 @@ class Watch(Preparing):
         self._held = np.zeros(len(positions), bool)
         self._edited_at = 0.0
         self.uncovered = before and before.uncovered
-        self.crossing = before and before.crossing
+        self._faces, self._accepted = None, before and before.accepted
         if reason := without_faces(ob):
             self.reason = reason
             return
         try:
-            faces = Faces.of(ob.data)
+            self._faces = faces = Faces.of(ob.data)
             reference, tolerance, matrix, threads = needed(ob)
         except (Refused, native.module.TolvolError) as error:
             self.reason = str(error)
@@ -192,7 +201,7 @@ class Watch(Preparing):
         both = ob.tolvol.keep == "BOTH"
         # A larger polygon stands for triangles that are not all there, so that they cannot be witnesses.
         self.two_sided = two_sided = both and not faces.larger
-        keeps_out = ob.tolvol.guard.crossings
+        keeps_out, accepted = ob.tolvol.guard.crossings, self._accepted
         # The triangles that it stands for cross each other as well.
         crossings = "keep_out" if keeps_out and not faces.larger else "allow"
         # Where the polygon is concave, some of these triangles are turned over.
@@ -220,8 +229,8 @@ class Watch(Preparing):
                 if guard.uncovered or not two_sided:
                     uncovered = uncovered_faces(reference, positions, faces.shown, tolerance, options)
             crossing = None
-            if edits_faces and crossings == "keep_out":
-                crossing = solidity.crossing_count(MeshArrays(positions, faces.shown, None, None), threads, progress)
+            if accepted is not None and crossings == "keep_out":
+                crossing = [of.crossing_count(at, threads, progress) for of, at in (accepted, (faces, positions))]
             return guard, kept and faces.outside(built, positions, options), uncovered, crossing, remark
 
         self.begin(work)
@@ -233,19 +242,20 @@ class Watch(Preparing):
             self.uncovered = uncovered
         else:
             lost = int(np.count_nonzero(uncovered & ~self.uncovered))
-        crossed = crossing if self.crossing is None else self.crossing
         if outside:
             self.reason = outside_reason(outside)
         elif lost:
             self.reason = lost_reason(lost)
-        elif crossing is not None and crossing > crossed:
-            now, then = solidity.pair_count(crossing), solidity.pair_count(crossed)
-            self.reason = f"Crossing pairs of faces: {now}, before the edit {then}"
+        elif crossing is not None and crossing[1] > crossing[0]:
+            self.reason = "Crossing pairs of faces: {1:,}, before the edit {0:,}".format(*crossing)
             self.would = "have more crossing faces"
         else:
             self._guard, self.on = guard, True
-            crossed = crossing
-        self.crossing = crossed
+
+    @property
+    def accepted(self):
+        """The faces and positions of the last state that the guard keeps, or of the one before a refused edit, or None."""
+        return (self._faces, self._last) if self.on else self._accepted
 
     @property
     def held_back(self):

@@ -21,8 +21,8 @@ _shown = {}
 
 
 # An object counts as scaled if the lengths of its axes or the angles between them change by more than this, relatively.
-# The rounding of float32 rotations adds up to a tenth of it.
-_RIGID = 1e-5
+# The rounding of float32 rotations adds up to half of it.
+_RIGID = 1e-6
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,8 @@ class Measurement:
 
 _MOST_KEPT = 256
 _kept = {}  # the result of _key() -> Measurement, the last one at the end
-_present = {}  # name of an object -> the fingerprint of its mesh, which has not changed since in Edit or Sculpt Mode
+# Name of an object -> (its pointer, the fingerprint of its mesh, which has not changed since in Edit or Sculpt Mode).
+_present = {}
 
 
 def remember(ob, surface, certified, tolerance, share_outside=0.0, statistics=""):
@@ -62,7 +63,7 @@ def remember(ob, surface, certified, tolerance, share_outside=0.0, statistics=""
 
 def remember_passing(ob, surface, certified, tolerance):
     """Keeps the certified distances of the object's mesh as it is now in Edit or Sculpt Mode."""
-    _present[ob.name] = _keep(ob, surface, certified, tolerance).fingerprint
+    _present[ob.name] = ob.as_pointer(), _keep(ob, surface, certified, tolerance).fingerprint
 
 
 def _keep(ob, surface, certified, tolerance, share_outside=0.0, statistics=""):
@@ -110,7 +111,10 @@ def outdate(name):
 
 def _kept_of(ob):
     # In most modes the fingerprint tells whether it is still the same mesh. In Edit and Sculpt Mode Python does not see changes.
-    return _kept.get(_key(ob, _present.get(ob.name) if ob.mode in {"EDIT", "SCULPT"} else shown_fingerprint(ob)))
+    if ob.mode not in {"EDIT", "SCULPT"}:
+        return _kept.get(_key(ob, shown_fingerprint(ob)))
+    pointer, fingerprint = _present.get(ob.name, (None, None))
+    return _kept.get(_key(ob, fingerprint)) if pointer == ob.as_pointer() else None
 
 
 def _stored_of(ob):
@@ -144,14 +148,20 @@ def _holds(ob, measurement):
     if not all(map(snapshots.sound, lengths)):
         return False  # The file is damaged.
     before, now = snapshots.stored_matrix(measurement.matrix), mesh_io.matrix_array(ob.matrix_world)
-    moves_along = ob.tolvol.snapshot_kind == "SELF" and same_shape(before, now)
-    return moves_along or np.array_equal(before, now)
+    if np.array_equal(before, now):
+        return True
+    if ob.tolvol.snapshot_kind != "SELF" or not same_shape(before, now):
+        return False
+    # The distances of a mesh that was turned with its reference may have changed by rounding.
+    limit = measurement.tolerance
+    return not any(abs(end - limit) <= _RIGID * limit for end in (measurement.forward, measurement.backward))
 
 
 def same_shape(matrix, other):
     """Whether two matrices to the world differ only by a rigid motion, so that lengths are the same."""
     metric, metric_other = (m[:3, :3].T @ m[:3, :3] for m in (matrix, other))
-    return np.abs(metric - metric_other).max() <= _RIGID * np.abs(metric).max()
+    lengths = np.sqrt(metric.diagonal())
+    return bool((np.abs(metric - metric_other) <= _RIGID * np.outer(lengths, lengths)).all())
 
 
 def on_top(ob):
@@ -177,9 +187,10 @@ def shown_size(ob):
 
 
 def shown_fingerprint(ob):
-    """Returns the fingerprint of the object's mesh, for drawing: it is computed only after a change."""
+    """Returns the fingerprint of the object's mesh, for drawing: it is computed only after a change. Blender does not tell of
+    changes of an object that no view shows."""
     key = _fingerprint_key(ob)
-    if key not in _shown:
+    if key not in _shown or not ob.visible_get():
         _shown[key] = mesh_io.read_mesh(ob.data).fingerprint()
     return _shown[key]
 

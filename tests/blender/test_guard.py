@@ -440,6 +440,29 @@ def test_an_edit_of_faces_that_makes_faces_cross_is_put_back_if_crossings_are_ke
     assert guard.edit.outside() == ob and state(ob)["editing"][0] == text
 
 
+def test_what_crosses_is_counted_just_before_the_edit():
+    ob = sheet(count=10, bumps=0.0)
+    edited = bmesh.new()
+    edited.from_mesh(ob.data)
+    through = ((0.02, 0.03, -0.005), (0.07, 0.03, -0.005), (0.05, 0.04, 0.005))
+    edited.faces.new([edited.verts.new(co) for co in through])
+    edited.to_mesh(ob.data)
+    edited.free()
+    ob.tolvol.guard.crossings = True
+    guarded(ob, "editing", mode="EDIT")
+    edited = bmesh.from_edit_mesh(ob.data)
+    edited.verts.ensure_lookup_table()
+    edited.verts[-1].co.z = -0.005  # Now no faces cross.
+    bmesh.update_edit_mesh(ob.data)
+    bpy.context.view_layer.update()
+    assert state(ob)["editing"][1]
+    edited = bmesh.from_edit_mesh(ob.data)
+    edited.faces.new([edited.verts.new(np.add(co, (0.4, 0.4, 0))) for co in through])
+    bmesh.update_edit_mesh(ob.data)
+    bpy.context.view_layer.update()
+    assert state(ob)["editing"] == ("Crossing pairs of faces: 1, before the edit 0", False)
+
+
 @pytest.mark.parametrize("keep", ("BOTH", "ONE"))
 def test_a_mesh_of_which_all_faces_were_deleted_is_put_back(keep):
     ob = sheet(count=10, bumps=0.0)

@@ -178,3 +178,42 @@ def test_measuring_by_itself_keeps_the_statistics_of_the_same_mesh():
     measuring.note(ob)
     measured()
     assert known and measurements.measurement_of(ob).statistics == known
+
+
+def test_a_name_that_passes_to_another_object_takes_no_measurement_along():
+    one, other = in_mode("EDIT"), sheet("other", count=20, bumps=0.0)
+    measured()
+    assert verdict.word(one) == PASS
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    for vertex in other.data.vertices:
+        vertex.co.z += 1
+    other.data.update()
+    name, one.name = one.name, "gone"
+    other.name = name
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert other.mode == "EDIT" and verdict.word(other) == NOT_CHECKED
+
+
+def test_what_changes_while_another_mesh_is_read_counts():
+    one = in_mode("EDIT")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    other = sheet("other", count=20, bumps=0.0)
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    for ob in (one, other):
+        ob.select_set(True)
+    bpy.ops.object.mode_set(mode="EDIT")
+    handlers = bpy.app.handlers.depsgraph_update_post
+    handlers.append(measuring._note_changes)
+    try:
+        measuring.note(one), measuring.note(other)
+        measured()
+        assert verdict.word(other) == PASS
+        edited = bmesh.from_edit_mesh(other.data)
+        for vertex in edited.verts:
+            vertex.co.z += 1
+        bmesh.update_edit_mesh(other.data)
+        measuring._read(one)
+        assert verdict.word(other) == NOT_CHECKED
+    finally:
+        handlers.remove(measuring._note_changes)

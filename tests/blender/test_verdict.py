@@ -271,3 +271,35 @@ def test_a_measurement_against_the_own_reference_says_nothing_about_another_with
     assert verdict.word(ob) == NOT_CHECKED
     bpy.ops.tolvol.check()
     assert verdict.word(ob) == FAIL
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_an_object_that_is_stretched_along_any_axis_is_not_checked(axis):
+    ob = sheet(count=6, bumps=0.0)
+    ob.scale = (1000, 1, 1)
+    bpy.context.view_layer.update()
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.05
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    for vertex in ob.data.vertices:
+        vertex.co.z += 0.04
+    ob.data.update()
+    bpy.ops.tolvol.check()
+    assert verdict.word(ob) == PASS
+    ob.rotation_euler.z = 1
+    bpy.context.view_layer.update()
+    assert verdict.word(ob) == PASS
+    ob.scale[axis] *= 1.3
+    bpy.context.view_layer.update()
+    assert verdict.word(ob) == NOT_CHECKED
+
+
+def test_a_change_of_an_object_that_no_view_shows_counts():
+    ob = torus()
+    assert bpy.ops.tolvol.decimate() == {"FINISHED"} and verdict.word(ob) == PASS
+    ob.hide_viewport = True
+    bpy.context.view_layer.update()
+    for vertex in ob.data.vertices:
+        vertex.co.z += 1
+    ob.data.update()
+    bpy.context.view_layer.update()
+    assert verdict.word(ob) == NOT_CHECKED

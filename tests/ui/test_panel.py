@@ -313,8 +313,12 @@ def test_the_answer_of_check_is_seen_without_moving_the_mouse():
     yield from reset(monkey)
     yield from open_tab()
     yield from press("tolvol.set_reference")
+    yield from finished(lambda: suzanne().tolvol.snapshot is not None)
+    suzanne().data.vertices[0].co.z += 0.001
+    suzanne().data.update()
     xdotool("mousemove", *centre())
     before = yield from still(sidebar_pixels)
+    assert verdict.of(suzanne()) is None
     with window_context(), job_time.in_background():
         bpy.ops.tolvol.check("INVOKE_DEFAULT")
     yield from finished(lambda: verdict.of(suzanne()) is not None)
