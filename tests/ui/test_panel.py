@@ -9,6 +9,7 @@ import numpy as np
 import job_time
 import scenes
 from addon import native, reference
+from addon.background import queue
 from addon.mesh import mesh_io
 from addon.overlay import legend
 from addon.panels import deviation, notes
@@ -317,6 +318,8 @@ def test_the_answer_of_check_is_seen_without_moving_the_mouse():
     suzanne().data.vertices[0].co.z += 0.001
     suzanne().data.update()
     xdotool("mousemove", *centre())
+    yield 0.5
+    yield from finished(lambda: not queue._waiting and queue._running is None)  # the estimate
     before = yield from still(sidebar_pixels)
     assert verdict.of(suzanne()) is None
     with window_context(), job_time.in_background():
