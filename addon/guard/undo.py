@@ -30,8 +30,9 @@ class TOLVOL_OT_guard_undo(bpy.types.Operator):
     def invoke(self, context, _event):
         ob, operators = edit.outside(), context.window_manager.operators
         label = operators[-1].name if operators else "The last step"
-        edit.undo()
-        status_bar.say(f"{label} was undone: {ob.name} would {edit.watches.shown(ob).would}")
+        said = f"{label} was undone: {ob.name} would {edit.watches.shown(ob).would}"
+        edit.undo()  # After it there may be another watch, and another object in Blender's memory.
+        status_bar.say(said)
         return {"FINISHED", "PASS_THROUGH"}
 
 

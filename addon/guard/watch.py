@@ -16,6 +16,8 @@ from ..mesh import mesh_io
 from ..reference import snapshots, tolerances
 from ..shared import volumes
 from ..shared.errors import Refused
+from ..shared.proof import solidity
+from ..shared.surface import MeshArrays
 
 # Blender waits so many seconds for a guard to be prepared. If preparing takes longer, it goes on in a thread.
 _PATIENCE = 0.4
@@ -103,13 +105,9 @@ class Faces:
 
     def crossing_count(self, positions, threads, progress):
         """Returns how many pairs of polygons cross in any of their triangulations. The mesh has no larger polygons."""
-        cuts = [[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]] if self.faces.shape[1] == 4 else [[0, 1, 2]]
-        triangles, polygons = self.faces[:, cuts].reshape(-1, 3), np.repeat(self.polygons, len(cuts))
-        whole = (np.sort(triangles, axis=1)[:, :-1] != np.sort(triangles, axis=1)[:, 1:]).all(1)
-        pairs = native.module.crossing_pairs(
-            positions, np.ascontiguousarray(triangles[whole]), most=_MOST_PAIRS, threads=threads, progress=progress
-        )
-        pairs = np.sort(polygons[whole][pairs], axis=1)
+        triangles, of_face = mesh_io.cut_both_ways(self.faces)
+        found = solidity.crossing_pairs(MeshArrays(positions, triangles, None, None), threads, progress, _MOST_PAIRS)
+        pairs = np.sort(self.polygons[of_face][found], axis=1)
         return len(np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0))
 
     def outside(self, built, positions, options):

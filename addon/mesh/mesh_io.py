@@ -61,12 +61,20 @@ def whole_quads(mesh, arrays):
 
 def both_triangulations(mesh, arrays):
     """Returns the arrays of a mesh with the triangles of its quads along either diagonal."""
-    faces = whole_quads(mesh, arrays)
-    if faces is arrays.triangles:
-        return arrays
-    ways = np.concatenate([faces[:, corners] for corners in ([0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3])])
-    proper = (ways[:, 0] != ways[:, 1]) & (ways[:, 1] != ways[:, 2])
-    return replace(arrays, triangles=ways[proper])
+    return replace(arrays, triangles=cut_both_ways(whole_quads(mesh, arrays))[0])
+
+
+def cut_both_ways(faces):
+    """Returns the triangles of faces, of quads those along either diagonal: (k, 3), and the face of each, (k,).
+
+    faces: (m, 3) or (m, 4), where a triangle repeats its last corner.
+    """
+    of_face = np.arange(len(faces))
+    if faces.shape[1] == 3:
+        return faces, of_face
+    quads = np.flatnonzero(faces[:, 2] != faces[:, 3])
+    others = [faces[quads][:, corners] for corners in ([0, 2, 3], [0, 1, 3], [1, 2, 3])]
+    return np.concatenate([faces[:, :3], *others]), np.concatenate([of_face, quads, quads, quads])
 
 
 def following_corners(mesh):

@@ -6,7 +6,7 @@ import functools
 import bpy
 import numpy as np
 
-from .. import native, preferences
+from .. import preferences
 from ..job import JobOperator
 from ..mesh import mesh_io
 from ..operation_settings import threads_setting
@@ -41,9 +41,7 @@ corners and edges that they share"""
 
     @staticmethod
     def find(arrays, threads, progress):
-        pairs = native.module.crossing_pairs(
-            arrays.vertices, arrays.triangles, most=solidity.MOST_PAIRS, threads=threads or None, progress=progress
-        )
+        pairs = solidity.crossing_pairs(arrays, threads, progress)
         polygons = arrays.polygons[pairs]
         # A face that is not flat is several triangles, which are not compared with each other.
         return polygons[polygons[:, 0] != polygons[:, 1]], len(pairs) >= solidity.MOST_PAIRS

@@ -102,10 +102,8 @@ class Motion:
 
     def _crossing(self, surface, progress):
         """Returns the pairs of polygons of which triangles cross, at most solidity.MOST_PAIRS of triangles, as a set."""
-        arrays = surface.arrays
-        options = {"most": solidity.MOST_PAIRS, "threads": self.threads or None, "progress": progress}
-        pairs = native.module.crossing_pairs(arrays.vertices, arrays.triangles, **options)
-        return set(map(tuple, np.sort(arrays.polygons[pairs], axis=1).tolist()))
+        polygons = surface.arrays.polygons[solidity.crossing_pairs(surface.arrays, self.threads, progress)]
+        return set(map(tuple, np.sort(polygons, axis=1).tolist()))
 
     def settle(self, vertices, may_hold=True):
         """A generator for an operator's steps(): returns the vertices and the result of certify() for the triangles that Blender

@@ -14,6 +14,7 @@ from mathutils import Matrix
 from .. import status_bar
 from ..proof import last_run
 from ..reference import originals, snapshots
+from .asking import ask
 from .blocked import allowed, mesh_blocked, object_blocked
 
 _SHOWN_IN = {"OBJECT", "SCULPT"}
@@ -196,7 +197,17 @@ normals. The present mesh and all edits of it are discarded, after a question"""
     def invoke(self, context, _event):
         if self.sure:
             return self.execute(context)
-        _ask(context, self, context.active_object)
+        ob = context.active_object
+        original = ob.tolvol.original
+        lines = [
+            f"The present mesh of {len(ob.data.polygons):,} faces and all edits of it are discarded.",
+            f"The original of {len(original.polygons):,} faces comes back{originals.with_its_data(original)}.",
+        ]
+
+        def draw_entry(layout):
+            layout.operator(self.bl_idname, text="Restore Original", icon="LOOP_BACK").sure = True
+
+        ask(context, f"Restore the original of {ob.name}?", lines, draw_entry)
         return {"CANCELLED"}
 
     def execute(self, context):
@@ -211,25 +222,6 @@ normals. The present mesh and all edits of it are discarded, after a question"""
         snapshots.notify()
         self.report({"INFO"}, f"{ob.name} is the original again: {len(mesh.polygons):,} faces")
         return {"FINISHED"}
-
-
-def _ask(context, operator, ob):
-    """Opens a menu that says what is lost and what comes back. Only the entry of this menu restores the original."""
-
-    kept = ", ".join(originals.data_names(ob.tolvol.original))
-    data = f", with its {kept}" if kept else ""
-
-    def draw(menu, _context):
-        faces = len(ob.tolvol.original.polygons)
-        menu.layout.label(
-            text=f"The present mesh of {len(ob.data.polygons):,} faces and all edits of it are discarded."
-        )
-        menu.layout.label(text=f"The original of {faces:,} faces comes back{data}.")
-        menu.layout.separator()
-        menu.layout.operator_context = "INVOKE_DEFAULT"
-        menu.layout.operator(operator.bl_idname, text="Restore Original", icon="LOOP_BACK").sure = True
-
-    context.window_manager.popup_menu(draw, title=f"Restore the original of {ob.name}?", icon="QUESTION")
 
 
 class TOLVOL_OT_new_original(bpy.types.Operator):

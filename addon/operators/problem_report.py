@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Puts what a report of a problem needs into the clipboard. It holds no path, and no name that is
-in the file."""
+"""Puts what a report of a problem needs into the clipboard. It holds no path, and no name from the file."""
 
 import os
 import platform

@@ -10,6 +10,7 @@ from ..job import JobOperator
 from ..operation_settings import threads_setting
 from ..reference import originals, snapshots, tolerances
 from ..shared import volumes
+from .asking import ask
 from .blocked import allowed, reference_blocked, settings_blocked
 
 
@@ -44,22 +45,8 @@ def _lost(ob):
     settings = ob.tolvol
     lines = [f"The present reference of {len(settings.snapshot.polygons):,} triangles is discarded."]
     if settings.original is not None:
-        kept = ", ".join(originals.data_names(settings.original))
-        lines.append(f"The original is discarded, too{f', with its {kept}' if kept else ''}.")
+        lines.append(f"The original is discarded, too{originals.with_its_data(settings.original)}.")
     return lines
-
-
-def _ask(context, title, lines, draw_entry):
-    """Opens a menu that says what would be lost. draw_entry(layout) draws the entry that does it all the same."""
-
-    def draw(menu, _context):
-        for line in lines:
-            menu.layout.label(text=line)
-        menu.layout.separator()
-        menu.layout.operator_context = "INVOKE_DEFAULT"
-        draw_entry(menu.layout)
-
-    context.window_manager.popup_menu(draw, title=title, icon="QUESTION")
 
 
 class TOLVOL_OT_set_reference(JobOperator, bpy.types.Operator):
@@ -90,7 +77,7 @@ the original with its UV maps, materials and other data. If these differ from th
             layout.operator(self.bl_idname, text=replace_label(ob), icon="ERROR").replace = True
 
         lines = [*_lost(ob), "The deviation is then measured from the new reference only."]
-        _ask(context, f"Replace the reference of {ob.name}?", lines, draw_entry)
+        ask(context, f"Replace the reference of {ob.name}?", lines, draw_entry)
         return {"CANCELLED"}
 
     def prepare(self, context):
@@ -138,7 +125,7 @@ that the reference was taken from no longer has the same. The mesh stays as it i
         def draw_entry(layout):
             layout.operator(self.bl_idname, text="Remove the Reference", icon="ERROR").sure = True
 
-        _ask(context, f"Remove the reference of {ob.name}?", _lost(ob), draw_entry)
+        ask(context, f"Remove the reference of {ob.name}?", _lost(ob), draw_entry)
         return {"CANCELLED"}
 
     def execute(self, context):

@@ -45,6 +45,12 @@ def data_names(mesh):
     return [name for name, present in layers.items() if present]
 
 
+def with_its_data(mesh):
+    """Returns the end of a sentence about a mesh: what data it has, or "" if it has none but its faces."""
+    kept = ", ".join(data_names(mesh))
+    return f", with its {kept}" if kept else ""
+
+
 def _uv_maps(mesh):
     return [(layer.name, column(layer.data, "uv", 2).tobytes()) for layer in mesh.uv_layers]
 

@@ -35,7 +35,7 @@ constexpr std::uint32_t kMostUnited = 256;
 constexpr std::size_t kMany = 64;
 // A try polls after this many parts of pieces, each of which may look at kMany candidates.
 constexpr std::size_t kBetweenPolls = 64;
-// So many elements are placed by a thread at a time in a change of many, with about 1 us for each piece of them.
+// In a change of many elements a thread takes this many at a time. A piece takes about 1 us.
 constexpr std::size_t kElementsOfBlock = 16;
 // This bit of split_into_ marks a triangle some of which is out of reach.
 constexpr std::uint32_t kNeverWhole = 1u << 31;
@@ -271,9 +271,9 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   return trial.of_many_ ? place_in_blocks(trial, gathered) : place_all(trial, gathered);
 }
 
-/// Calls call(piece) for each of these pieces, which an element loses, until it returns false, or once for a triangle
-/// of the reference if all its pieces are lost. `gathered` counts the lost ones for each triangle that was split.
-/// Returns what the last call returned.
+/// Calls call() for what has to be placed in place of these pieces, which an element loses: each piece, or the whole
+/// triangle of the reference once, if all its pieces are lost. `gathered` counts the lost pieces for each triangle that
+/// was split. The first call that returns false is the last one. Returns whether every call returned true.
 template <class Call>
 bool Coverage::for_each_to_place(const std::vector<Part>& pieces, bool of_many, std::vector<std::uint32_t>& gathered,
                                  Call&& call) const {
@@ -315,7 +315,8 @@ bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) con
   return placing.failed.empty();
 }
 
-/// Does the same for many elements on several threads. A block of elements is placed as if it were alone.
+/// Does the same for many elements on several threads, and finds a failure of each element that has one. Each block of
+/// elements is placed as if it were alone.
 bool Coverage::place_in_blocks(Trial& trial, std::vector<std::uint32_t>& gathered) const {
   struct Lost {
     std::uint32_t first;  // is where a new witness is sought first
@@ -341,19 +342,22 @@ bool Coverage::place_in_blocks(Trial& trial, std::vector<std::uint32_t>& gathere
   if (trial.candidates_.size() > kMany) trial.hierarchy();  // The threads only read it.
   std::vector<Placing> placings((count + kElementsOfBlock - 1) / kElementsOfBlock);
   parallel_for(count, kElementsOfBlock, trial.threads_, [&](std::size_t begin, std::size_t end) {
-    Placing& placing = placings[begin / kElementsOfBlock];
+    Placing placing;
     for (std::size_t i = begin; i < end; ++i) {
       const std::size_t enough = placing.failed.size() + std::max<std::size_t>(trial.most_failures_, 1);
       for (std::size_t k = lost[i].begin; k < lost[i + 1].begin; ++k) {
         if (!place(pieces[k], lost[i].first, trial, placing) && placing.failed.size() == enough) break;
       }
     }
+    placing.stack = {};
+    placings[begin / kElementsOfBlock] = std::move(placing);
   });
   Placing& all = trial.placing_;
-  for (const Placing& placing : placings) {
+  for (Placing& placing : placings) {
     all.moved.insert(all.moved.end(), placing.moved.begin(), placing.moved.end());
     all.failed.insert(all.failed.end(), placing.failed.begin(), placing.failed.end());
     all.looked_at += placing.looked_at;
+    placing = {};
   }
   return all.failed.empty();
 }

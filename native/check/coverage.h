@@ -149,8 +149,9 @@ class Coverage::Trial {
   void begin() { failed_last_ = 0, placing_.looked_at = 0; }
   /// A refused change has one part without a witness in failed(), or, if it is asked for, several of each element.
   void look_for_failures(std::size_t of_each_element) { most_failures_ = of_each_element; }
-  /// Expects changes of many elements. Each piece gets the budget of a whole change, because the result must not depend
-  /// on their number, and a try uses so many threads (0: one for each core).
+  /// Expects changes of many elements: a try uses this many threads (0: one for each core), each piece has the budget
+  /// of a whole change, so that the result does not depend on the number of elements, and a refused change has a
+  /// failure of each element that has one.
   void expect_many_elements(unsigned threads) { of_many_ = true, threads_ = threads; }
   /// What the last try found no witness for.
   std::span<const Failure> failed() const { return placing_.failed; }

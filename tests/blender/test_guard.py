@@ -419,14 +419,20 @@ def test_a_hole_is_put_back_unless_one_way_is_asked_for(keep, many_corners):
     assert not on and text.endswith("faces of the reference are no longer within the tolerance of the mesh")
 
 
+_THROUGH = (
+    (0.02, 0.03, -0.005),
+    (0.07, 0.03, -0.005),
+    (0.05, 0.04, 0.005),
+)  # the corners of a triangle through the sheet
+
+
 @pytest.mark.parametrize("keeps_out", (False, True))
 def test_an_edit_of_faces_that_makes_faces_cross_is_put_back_if_crossings_are_kept_out(keeps_out):
     ob = sheet(count=10, bumps=0.0)
     ob.tolvol.guard.crossings = keeps_out
     guarded(ob, "editing", mode="EDIT")
     edited = bmesh.from_edit_mesh(ob.data)
-    corners = [edited.verts.new(co) for co in ((0.02, 0.03, -0.005), (0.07, 0.03, -0.005), (0.05, 0.04, 0.005))]
-    edited.faces.new(corners)
+    edited.faces.new([edited.verts.new(co) for co in _THROUGH])
     bmesh.update_edit_mesh(ob.data)
     bpy.context.view_layer.update()
     text, on = state(ob)["editing"]
@@ -444,8 +450,7 @@ def test_what_crosses_is_counted_just_before_the_edit():
     ob = sheet(count=10, bumps=0.0)
     edited = bmesh.new()
     edited.from_mesh(ob.data)
-    through = ((0.02, 0.03, -0.005), (0.07, 0.03, -0.005), (0.05, 0.04, 0.005))
-    edited.faces.new([edited.verts.new(co) for co in through])
+    edited.faces.new([edited.verts.new(co) for co in _THROUGH])
     edited.to_mesh(ob.data)
     edited.free()
     ob.tolvol.guard.crossings = True
@@ -457,7 +462,7 @@ def test_what_crosses_is_counted_just_before_the_edit():
     bpy.context.view_layer.update()
     assert state(ob)["editing"][1]
     edited = bmesh.from_edit_mesh(ob.data)
-    edited.faces.new([edited.verts.new(np.add(co, (0.4, 0.4, 0))) for co in through])
+    edited.faces.new([edited.verts.new(np.add(co, (0.4, 0.4, 0))) for co in _THROUGH])
     bmesh.update_edit_mesh(ob.data)
     bpy.context.view_layer.update()
     assert state(ob)["editing"] == ("Crossing pairs of faces: 1, before the edit 0", False)

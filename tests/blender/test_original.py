@@ -173,7 +173,7 @@ def test_an_original_with_other_data_is_not_discarded_without_a_question(change,
     change(ob.data)
     assert reference.loses_something(ob)
     asked = []
-    monkeypatch.setattr(reference, "_ask", lambda _context, title, lines, _draw: asked.append((title, lines)))
+    monkeypatch.setattr(reference, "ask", lambda _context, title, lines, _draw: asked.append((title, lines)))
     # Blender without a window calls no invoke().
     button = SimpleNamespace(sure=False, replace=False)
     for operator in (reference.TOLVOL_OT_set_reference, reference.TOLVOL_OT_clear_reference):

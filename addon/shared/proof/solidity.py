@@ -20,6 +20,8 @@ bounds a cavity if it looks inwards, and its volume is taken off; whether shells
 All but the last two are exact. tolvol.solidity() finds all but the crossings.
 """
 
+import numpy as np
+
 from .. import package
 from ..numbers import NO_BREAK
 from . import known
@@ -30,17 +32,15 @@ MOST_PAIRS = 1_000_000
 REQUIREMENTS = ("closed", "manifold", "oriented", "uncrossed")
 
 
-def crossing_count(arrays, threads=None, progress=None):
-    """Returns the number of pairs of triangles of a MeshArrays that cross each other, at most MOST_PAIRS.
+def crossing_pairs(arrays, threads=None, progress=None, most=None):
+    """Returns (k, 2): the pairs of triangles of a MeshArrays that cross each other, at most `most` or MOST_PAIRS.
 
-    It is exact for the coordinates as they are stored. About 2 us for each triangle.
+    They are exact for the coordinates as they are stored. About 2 us for each triangle.
     """
     if not len(arrays.triangles):
-        return 0
-    return len(
-        package.module.crossing_pairs(
-            arrays.vertices, arrays.triangles, most=MOST_PAIRS, threads=threads or None, progress=progress
-        )
+        return np.empty((0, 2), np.int32)
+    return package.module.crossing_pairs(
+        arrays.vertices, arrays.triangles, most=most or MOST_PAIRS, threads=threads or None, progress=progress
     )
 
 
@@ -61,7 +61,7 @@ def facts(surface, threads=None, progress=None, again=True):
     found = package.module.solidity(
         arrays.vertices, arrays.triangles, to_world=surface.matrix, threads=threads or None, progress=progress
     )
-    pairs = crossing_count(arrays, threads, progress)
+    pairs = len(crossing_pairs(arrays, threads, progress))
     found |= {"uncrossed": pairs == 0, "crossing_pairs": pairs}
     known.keep(key, dict(found))
     return found
