@@ -3,6 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <set>
+#include <utility>
+#include <vector>
+
 #include "patches.h"
 
 namespace {
@@ -27,6 +32,31 @@ TEST(EdgeFlips, BringEdgesAlongARidge) {
       EXPECT_GT(f.patch.normal(face).z, 0) << "nothing folds over";
     }
   }
+}
+
+TEST(EdgeFlips, FlipEachEdgeNearAVertexOnce) {
+  std::set<std::pair<std::uint32_t, std::uint32_t>> flipped;
+  int place = 0;
+  for (;; ++place) {
+    patches::Ridge f(false);
+    const std::uint32_t vertex = f.patch.find_vertex(*f.change.vertex());
+    const std::vector<std::uint32_t> around = f.patch.vertices()[vertex].faces;
+    if (!EdgeFlips::flip_near(f.deviations, vertex, place)) {
+      EXPECT_TRUE(f.patch.flips().empty()) << "a place beyond the last edge changes nothing";
+      break;
+    }
+    ASSERT_EQ(f.patch.flips().size(), 1u);
+    const auto [a, b] = f.patch.flips()[0];
+    flipped.insert(std::minmax(a, b));
+    int changed = 0;
+    for (const std::uint32_t face : around) changed += f.patch.faces()[face].changed;
+    EXPECT_GT(changed, 0) << "one of the two faces was around the vertex";
+    for (std::uint32_t face = 0; face < f.patch.faces().size(); ++face) {
+      EXPECT_GE(f.patch.normal(face).z, 0) << "nothing folds over";
+    }
+  }
+  EXPECT_EQ(flipped.size(), static_cast<std::size_t>(place));
+  EXPECT_GT(place, 3);
 }
 
 }  // namespace

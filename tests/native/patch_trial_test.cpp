@@ -55,7 +55,7 @@ TEST(PatchTrial, WhatItFindsPossibleKeepsBothDirections) {
         if (!price) continue;
         ++tried;
         const std::size_t before = c.mesh->triangle_count();
-        if (!trial.try_collapse(*price, 2 + i % 3, i % 2 == 0)) {
+        if (!trial.try_collapse(*price, {2 + i % 3, i % 5 == 0, i % 2 == 0})) {
           EXPECT_EQ(c.mesh->triangle_count(), before);
           continue;
         }
@@ -76,6 +76,26 @@ TEST(PatchTrial, WhatItFindsPossibleKeepsBothDirections) {
   EXPECT_GT(judged, 4);
 }
 
+TEST(PatchTrial, ManyStartsSucceedWhereOneFails) {
+  int one = 0, many_starts = 0;
+  for (const Hostile& h : hostile(1)) {
+    CertifiedMesh c(h.mesh, h.mesh.vertices, h.tolerance);
+    SurfaceSamples samples(*c.mesh, c.team);
+    PatchTrial trial(*c.mesh, samples, nullptr);
+    for (std::uint32_t e = 0; e < c.mesh->connectivity().n_edges(); e += 3) {
+      const std::optional<PatchTrial::Price> price = trial.price(BoundedMesh::edge(e));
+      if (!price) continue;
+      const bool possible = trial.try_collapse(*price, {2, false, false});
+      const double reached = trial.reached();
+      const bool possible_with_many = trial.try_collapse(*price, {2, true, false});
+      EXPECT_GE(possible_with_many, possible);
+      EXPECT_TRUE(possible || trial.reached() == reached) << "it is that of the first start";
+      one += possible, many_starts += possible_with_many;
+    }
+  }
+  EXPECT_GT(many_starts, one);
+}
+
 TEST(PatchTrial, MovesNoVertexThatHasToStay) {
   const TriangleMesh sphere = shapes::sphere(10);
   std::vector<bool> pinned(sphere.vertices.size(), false);
@@ -87,7 +107,7 @@ TEST(PatchTrial, MovesNoVertexThatHasToStay) {
   for (std::uint32_t e = 0; e < c.mesh->connectivity().n_edges(); ++e) {
     if (c.mesh->connectivity().status(BoundedMesh::edge(e)).deleted()) continue;
     const std::optional<PatchTrial::Price> price = trial.price(BoundedMesh::edge(e));
-    if (!price || !trial.try_collapse(*price, 2, false)) continue;
+    if (!price || !trial.try_collapse(*price, {2, false, false})) continue;
     trial.carry_out(*c.mesh);
     ++possible;
   }

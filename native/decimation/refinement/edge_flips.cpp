@@ -72,4 +72,22 @@ bool EdgeFlips::flip(PatchDeviations& deviations) {
   return any;
 }
 
+bool EdgeFlips::flip_near(PatchDeviations& deviations, std::uint32_t vertex, int place) {
+  Patch& patch = deviations.patch();
+  const std::vector<std::uint32_t>& around = patch.vertices()[vertex].faces;
+  for (const std::uint32_t f : around) {
+    for (int k = 0; k < 3; ++k) {
+      Patch::Flipped flipped;
+      const std::uint32_t other = patch.faces()[f].across[k];
+      if (other == Patch::kNone || !patch.can_flip(f, k, flipped) || folds(patch, flipped)) continue;
+      const bool was_seen = other < f && std::ranges::find(around, other) != around.end();
+      if (was_seen || place-- > 0) continue;
+      patch.flip(flipped);
+      deviations.renew_after_flips();
+      return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace tolvol

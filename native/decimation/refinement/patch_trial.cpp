@@ -25,6 +25,9 @@ constexpr int kMostRefusals = 12;
 /// them are held from then on. Each point that is held has the weight kHeldWeight.
 constexpr std::size_t kLookedAt = 24, kHeld = 4;
 constexpr double kHeldWeight = 0.05;
+/// A try that came to at most so many tolerances is a near miss. At most kMostFlippedFirst edges are flipped first.
+constexpr double kNearMiss = 1.2;
+constexpr int kMostFlippedFirst = 20;
 /// A face that has no proof is looked at in the points of a grid that divides each edge into this many parts.
 constexpr int kFacePoints = 24;
 
@@ -76,11 +79,23 @@ std::optional<PatchTrial::Price> PatchTrial::price(BoundedMesh::Edge edge) {
   return best;
 }
 
-bool PatchTrial::try_collapse(const Price& price, int rings, bool quick) {
+bool PatchTrial::try_collapse(const Price& price, const Effort& effort) {
   crossings_.crossings.begin();
   met_another_ = false;
   vanished_ = mesh_.from(price.halfedge);
-  if (!prepare(price.halfedge, price.position, rings) || !relax()) return false;
+  reached_ = kAnywhere;
+  for (int start = 0; prepare(price.halfedge, price.position, effort.rings); ++start) {
+    const std::uint32_t kept = patch_.find_vertex(*change_.vertex());
+    if (start > 0 && !EdgeFlips::flip_near(deviations_, kept, start - 1)) return false;
+    if (relax_and_certify(effort.quick)) return true;
+    if (start == 0) reached_ = deviations_.state().largest;
+    if (!effort.many_starts || reached_ > kNearMiss || start == kMostFlippedFirst) return false;
+  }
+  return false;
+}
+
+bool PatchTrial::relax_and_certify(bool quick) {
+  if (!relax()) return false;
   for (int refusals = 0; refusals < kMostRefusals; ++refusals) {
     learnt_ = false;
     if (certify()) return true;

@@ -40,27 +40,35 @@ class PatchTrial {
   /// The least of the prices of an edge; none where it cannot collapse. About 0.1 ms.
   std::optional<Price> price(BoundedMesh::Edge edge);
 
-  /// Whether an edge can collapse if the vertices that are less than `rings` edges away from it move as well. A `quick`
-  /// try gives up earlier after a refusal, and misses about one success in thirty.
-  bool try_collapse(const Price& price, int rings, bool quick);
+  /// How much a try may take.
+  struct Effort {
+    int rings;         ///< The vertices that are less than so many edges away from the collapse move as well.
+    bool many_starts;  ///< Whether a near miss is tried again with an edge near by flipped first, each edge in turn.
+                       ///< The relaxation may come to another minimum from there.
+    bool quick;        ///< Whether it gives up earlier after a refusal, and misses about one success in thirty.
+  };
+  /// Whether an edge can collapse.
+  bool try_collapse(const Price& price, const Effort& effort);
   /// Carries out what was found possible. Returns a box of stored positions around all that it changes, which is empty
   /// where crossings were not looked for.
   Box carry_out(BoundedMesh& mesh);
 
-  /// The largest deviation that the last try came to, over the tolerance.
-  double reached() const { return deviations_.state().largest; }
+  /// The largest deviation, over the tolerance, that the last try came to from its first start; infinite if it had
+  /// none.
+  double reached() const { return reached_; }
   /// The patch of the last try.
   const Patch& patch() const { return patch_; }
   /// The vertex that the last try would remove, and the faces.
   std::uint32_t vanished() const { return vanished_; }
   std::span<const Coverage::Removed> removed() const { return removed_; }
-  /// What the series of tries found of crossings depends on no face outside this box of stored positions.
+  /// What the last try found of crossings depends on no face outside this box of stored positions.
   const Box& read() const { return crossings_.crossings.read(); }
-  /// Whether a try was refused because another vertex is where one of its vertices would be.
+  /// Whether a start of the last try was refused because another vertex is where one of its vertices would be.
   bool met_another() const { return met_another_; }
 
  private:
   bool prepare(Halfedge h, const glm::dvec3& position, int rings);
+  bool relax_and_certify(bool quick);
   bool relax();
   bool certify();
   void round_positions();
@@ -86,6 +94,7 @@ class PatchTrial {
   PatchDeviations deviations_;
   Relaxation relaxation_;
   std::uint32_t vanished_ = 0;
+  double reached_ = 0;
   std::vector<VertexPosition> positions_;  ///< For each vertex of the patch.
   std::vector<bool> moved_;                ///< For each vertex of the patch: whether it leaves its place in the mesh.
   std::vector<CertifiedBounds::PointBound> vertex_bounds_;

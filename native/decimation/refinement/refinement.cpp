@@ -13,15 +13,22 @@
 namespace tolvol {
 namespace {
 
-/// In the first rounds the vertices less than 2 edges away from a collapse move with it, in later rounds those less
-/// than 3 and in the last rounds those less than 4 edges away.
-constexpr int kRings[] = {2, 3, 4};
 /// A round ends after kMostFailures failures, or as many as this share of its edges if that is more. A success makes up
 /// for kMadeUpFor failures.
 constexpr std::size_t kMostFailures = 40, kMadeUpFor = 25;
 constexpr double kMostFailuresShare = 0.125;
 /// If a round has more edges than this, each of them gets only a quick try.
 constexpr std::size_t kMany = 320;
+constexpr std::size_t kAnyNumber = std::numeric_limits<std::size_t>::max();
+/// The rounds, in order. A round is repeated until it removes nothing. Many starts take ten times as long, and are
+/// worth it only where all else has failed; with three rings, seconds for each hundred edges. A round that would have
+/// more edges than `most_edges` is left out.
+constexpr struct {
+  int rings;
+  bool many_starts;
+  std::size_t most_edges;
+} kRounds[] = {
+    {2, false, kAnyNumber}, {3, false, kAnyNumber}, {4, false, kAnyNumber}, {2, true, kAnyNumber}, {3, true, kMany}};
 /// An edge is not tried if the deviation with its vertex alone moved is beyond so many tolerances.
 constexpr double kMostLargest = 1.7;
 /// The number of steps that are tried at once, for each thread. More would often be in vain, because one before them
@@ -65,12 +72,12 @@ Refinement::Refinement(BoundedMesh& mesh, NewCrossings* crossings, Team& team)
 
 void Refinement::run(std::size_t target, Progress* progress) {
   if (progress) progress->begin("refining");
-  for (const int rings : kRings) {
-    rings_ = rings;
+  for (const auto& [rings, many_starts, most_edges] : kRounds) {
+    effort_.rings = rings, effort_.many_starts = many_starts;
     std::ranges::fill(tried_, 0);
     for (std::size_t before = 0; before != mesh_.triangle_count();) {
       before = mesh_.triangle_count();
-      if (!round(target, progress)) return;
+      if (!round(most_edges, target, progress)) return;
     }
   }
 }
@@ -111,12 +118,13 @@ std::vector<std::uint32_t> Refinement::order() const {
 }
 
 /// Tries the edges in the order of their prices, and returns whether more triangles than the target are left.
-bool Refinement::round(std::size_t target, Progress* progress) {
+bool Refinement::round(std::size_t most_edges, std::size_t target, Progress* progress) {
   find_prices();
   const std::vector<std::uint32_t> steps = order();
+  if (steps.size() > most_edges) return true;
   ahead_.drop_all();
   Patience patience(steps.size());
-  quick_ = steps.size() > kMany;
+  effort_.quick = steps.size() > kMany;
   for (std::size_t place = 0; place < steps.size() && !patience.is_over(); ++place) {
     poll();
     if (progress) {
@@ -161,7 +169,7 @@ void Refinement::attempt(std::uint32_t edge, Attempt& a) const {
   const std::optional<PatchTrial::Price> price =
       touched(edge) > priced_[edge] ? a.trial.price(BoundedMesh::edge(edge)) : prices_[edge];
   a.reached = std::numeric_limits<double>::infinity();
-  a.possible = price && price->largest <= kMostLargest && a.trial.try_collapse(*price, rings_, quick_);
+  a.possible = price && price->largest <= kMostLargest && a.trial.try_collapse(*price, effort_);
   if (price && price->largest <= kMostLargest) a.reached = a.trial.reached();
   for (const Patch::Vertex& v : a.trial.patch().vertices()) a.read.push_back(v.id);
 }

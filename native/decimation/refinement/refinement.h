@@ -61,7 +61,7 @@ class Refinement {
 
   void find_prices();
   std::vector<std::uint32_t> order() const;
-  bool round(std::size_t target, Progress* progress);
+  bool round(std::size_t most_edges, std::size_t target, Progress* progress);
   bool wanted(std::uint32_t edge) const;
   Attempt& tried(std::span<const std::uint32_t> steps, std::size_t place);
   void attempt(std::uint32_t edge, Attempt& a) const;
@@ -76,8 +76,7 @@ class Refinement {
   std::optional<Surroundings> around_;
   TriesAhead ahead_;
   std::vector<Attempt> attempts_;  ///< For each slot of ahead_.
-  int rings_ = 0;                  ///< How far from a collapse vertices move.
-  bool quick_ = false;             ///< Whether tries give up early, because there are many.
+  PatchTrial::Effort effort_{};
   // A step that failed is not tried again until a face around it has changed. The times are those of ahead_.
   std::vector<std::uint64_t> touched_;         ///< For each vertex: when a face around it changed last.
   std::vector<std::uint64_t> tried_, priced_;  ///< For each edge: when it was tried and when its price was found last.
