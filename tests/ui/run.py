@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs the tests of this folder in Blender's own event loop and ends Blender with an exit code that tells whether they pass.
 
-A test is a generator: wherever it yields, Blender gets time to handle the events of the mouse and the keyboard.
+A test is a generator. Where it yields nothing, Blender handles all events of the mouse and the keyboard that were sent, and
+draws. Where it yields a number, Blender goes on for so many seconds.
 """
 
 import importlib
@@ -18,14 +19,14 @@ sys.dont_write_bytecode = True
 sys.path[:0] = [str(FOLDER), str(FOLDER.parents[1]), str(FOLDER.parent / "blender")]
 # This works only before the first window is drawn.
 bpy.context.preferences.view.show_splash = False
+# A tooltip comes after a time, and the next click would only close it.
+bpy.context.preferences.view.show_tooltips = False
 
 import addon  # noqa: E402
 import window  # noqa: E402
 from addon import native  # noqa: E402
 
 window.draw_finely(False)
-
-_SETTLE = 0.3  # seconds that Blender needs to handle an event and to draw again
 
 
 class Run:
@@ -43,6 +44,7 @@ class Run:
         self.started = time.time()
         self.used = time.process_time()
         self.current = window.close_other_areas()
+        self.handling = iter(())
         self.between = True  # whether no test runs, but this preparation or what ends the work of a failed test
 
     def step(self):
@@ -53,8 +55,13 @@ class Run:
                     self.end()
                 print(f"{self.waiting[0].__name__} ...", flush=True)
                 self.current = self.waiting.pop(0)()
-            pause = next(self.current)
-            return _SETTLE if pause is None else pause
+            pause = next(self.handling, None)
+            if pause is None:
+                pause = next(self.current)
+            if pause is None:
+                self.handling = window.handled()
+                pause = next(self.handling)
+            return pause
         except StopIteration:
             if self.between:
                 self.between = False
@@ -68,9 +75,9 @@ class Run:
             self.between = not self.between
             if self.between:
                 self.current = window.end_operators()
-                return _SETTLE
+                return 0.0
         self.current = None
-        return _SETTLE
+        return 0.0
 
     def end(self):
         counts = f"{self.failed} failed, {self.passed} passed" if self.failed else f"{self.passed} passed"

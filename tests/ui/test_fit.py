@@ -6,7 +6,7 @@ import bpy
 import job_time
 import scenes
 from test_panel import assert_proved, large_monkey, stored, suzanne
-from window import centre, finished, key, reset, screenshot, status_texts, view, xdotool
+from window import at_rest, centre, finished, key, reset, screenshot, status_texts, view, xdotool
 
 
 def fit(ob):
@@ -48,7 +48,7 @@ def test_fitted_in_a_window_and_undone_by_one_ctrl_z():
     reference = scenes.world_triangles(ob)
     fit(ob)
     yield from finished(lambda: not bpy.data.objects["torus"].modifiers)
-    yield 0.5
+    yield
     ob = bpy.data.objects["torus"]
     assert len(ob.data.polygons) < 500
     assert_proved(ob, reference, 1)
@@ -56,6 +56,6 @@ def test_fitted_in_a_window_and_undone_by_one_ctrl_z():
     xdotool("mousemove", *centre())
     yield
     key("ctrl+z")
-    yield 1.0
+    yield from at_rest()
     ob = bpy.data.objects["torus"]
     assert len(ob.data.polygons) == 1152 and len(ob.modifiers) == 1 and ob.tolvol.snapshot is None

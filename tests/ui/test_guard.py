@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The guards, with Blender's own tools in a real window."""
 
-import subprocess
-
 import bpy
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
@@ -15,8 +13,8 @@ from addon.panels.guard import TOLVOL_PT_guard
 from addon.shared.surface import to_world
 from panels_open import alone
 from window import (
+    at_rest,
     centre,
-    click,
     find_setting,
     finished,
     key,
@@ -69,13 +67,15 @@ def forward(reference):
 
 def stroke(*points):
     """Drags the mouse with the left button along these places."""
-    steps = ["mousemove", *points[0], "sleep", 0.2, "mousedown", 1]
+    xdotool("mousemove", *points[0])
+    yield
+    xdotool("mousedown", 1)
     for point in points[1:]:
-        steps += ["mousemove", *point, "sleep", 0.05]
-    hand = subprocess.Popen(["xdotool", *map(str, steps), "mouseup", "1"])
-    while hand.poll() is None:
-        yield 0.1
-    yield 0.5
+        yield
+        xdotool("mousemove", *point)
+    yield
+    xdotool("mouseup", 1)
+    yield
 
 
 def across(length=200, steps=12):
@@ -89,7 +89,7 @@ def switch(setting):
         screenshot(f"guard without {setting}")
         raise AssertionError(f"no switch {setting}")
     xdotool("click", 1)
-    yield 0.3
+    yield
 
 
 def undone_and_redone(read, *steps):
@@ -107,7 +107,7 @@ def test_guard_sculpting_by_mouse():
         yield from open_tab()
         yield from switch("sculpting")
         mode("SCULPT")
-        yield 0.5
+        yield
         assert np.array_equal(coordinates(), before)
         bpy.context.tool_settings.sculpt.brush.strength = 1.0
         yield from stroke(*across())
@@ -124,7 +124,7 @@ def test_guard_sculpting_by_mouse():
     undo, redo = "ctrl+z", "ctrl+shift+z"
     yield from undone_and_redone(coordinates, (undo, after), (undo, before), (redo, after), (redo, again))
     mode("OBJECT")
-    yield 0.3
+    yield
     assert guard.sculpt.watches.shown(ob()) is None
 
 
@@ -134,7 +134,7 @@ def test_guard_other_brushes():
     reference = scenes.world_triangles(ob())
     ob().tolvol.guard.sculpting = True
     mode("SCULPT")
-    yield 0.5
+    yield
     bpy.context.tool_settings.unified_paint_settings.size = 60
     for name in ("Grab", "Snake Hook", "Pose", "Cloth", "Inflate/Deflate", "Smooth"):
         bpy.context.tool_settings.sculpt.brush = bpy.data.brushes[name]
@@ -143,7 +143,7 @@ def test_guard_other_brushes():
         way = [ob().data.vertices[60 * 31 + 10 + 4 * i].co[:] for i in range(10)]
         with window_context():
             bpy.ops.sculpt.brush_stroke("EXEC_DEFAULT", True, stroke=[_sample(i, at) for i, at in enumerate(way)])
-        yield 0.4
+        yield
         assert not np.array_equal(coordinates(), before), name
         assert forward(reference) <= 1, name
     assert forward(reference) > 0.95
@@ -168,14 +168,15 @@ def grab(far, slowly=False):
     """Presses G, moves the mouse up the screen by so many pixels, and clicks."""
     x, y = centre()
     xdotool("mousemove", x, y)
-    yield 0.3
+    yield
     key("g")
-    yield 0.3
+    yield
     for share in (0.2, 0.5, 0.8, 1) if slowly else (1,):
         xdotool("mousemove", x + int(share * far / 8), y - int(share * far))
-        yield 0.1 if slowly else 0.0
-    click(x + far // 8, y - far)
-    yield 0.8
+        if slowly:
+            yield
+    xdotool("mousemove", x + far // 8, y - far, "click", 1)
+    yield
 
 
 def test_guard_editing_by_keys():
@@ -186,7 +187,7 @@ def test_guard_editing_by_keys():
     mode("EDIT")
     with window_context():
         bpy.ops.mesh.select_all("EXEC_DEFAULT", True, action="SELECT")
-    yield 0.5
+    yield
     states = [coordinates()]
     for far, slowly in ((60, True), (-60, False)):
         yield from grab(far, slowly)
@@ -202,25 +203,25 @@ def test_guard_editing_by_keys():
         bpy.ops.mesh.solidify("EXEC_DEFAULT", True, thickness=0.5)
         bpy.ops.transform.translate("INVOKE_DEFAULT", True)
     xdotool("mousemove_relative", 0, -30)
-    yield 0.5
+    yield
     assert len(coordinates()) > len(states[2])
     xdotool("click", 1)
-    yield 0.5
+    yield
     for _ in range(2):
         for step in (5, -5):
             xdotool("mousemove_relative", "--", step, 0)
-            yield 0.4
+            yield
         yield from finished(lambda: np.array_equal(coordinates(), states[2]))
         screenshot("guard 3 solidify undone")
         key("ctrl+shift+z")
-        yield 1.5
+        yield from at_rest()
     xdotool("mousemove_relative", 5, 0)
     yield from finished(lambda: np.array_equal(coordinates(), states[2]))
     # The faces of an extrusion are inside at first, and then move as far as the tolerance permits.
     key("e")
-    yield 0.3
+    yield
     xdotool("mousemove_relative", 0, 100)
-    yield 0.3
+    yield
     xdotool("click", 1)
     yield from finished(lambda: len(coordinates()) == 2 * len(states[0]) and forward(reference) <= 1)
     mode("OBJECT")
@@ -233,7 +234,7 @@ def test_guard_undoes_an_edit_of_the_faces_while_the_mouse_rests():
     mode("EDIT")
     with window_context():
         bpy.ops.mesh.select_all("EXEC_DEFAULT", True, action="SELECT")
-    yield 1.0
+    yield from at_rest()
     before = coordinates()
     with window_context():
         bpy.ops.mesh.solidify("EXEC_DEFAULT", True, thickness=0.5)
@@ -243,7 +244,7 @@ def test_guard_undoes_an_edit_of_the_faces_while_the_mouse_rests():
     with window_context():
         bpy.ops.mesh.solidify("EXEC_DEFAULT", True, thickness=0.5)
         bpy.ops.transform.translate("INVOKE_DEFAULT", True)
-    yield 2.0
+    yield from at_rest()
     assert len(coordinates()) > len(before)
     key("Return")
     yield from finished(lambda: np.array_equal(coordinates(), before))
@@ -280,7 +281,7 @@ def test_guard_lattice_by_keys():
     mode("EDIT")
     with window_context():
         bpy.ops.lattice.select_all("EXEC_DEFAULT", True, action="SELECT")
-    yield 0.5
+    yield
     states = [points()]
     for far, slowly in ((60, True), (-80, False)):
         yield from grab(far, slowly)

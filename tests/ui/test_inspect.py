@@ -11,8 +11,10 @@ from addon.mesh import mesh_io
 from addon.overlay import markers
 from addon.panels import notes
 from addon.proof import kept_warnings, places
+from test_job import status_bar_pixels
 from test_warnings import islands
 from window import (
+    at_rest,
     finished,
     on_screen,
     open_tab,
@@ -64,7 +66,7 @@ def test_worst_point_next_and_previous_by_mouse():
     plain = white_near_the_middle()
     yield from press("tolvol.worst_point", across=0.25)
     yield from finished(lambda: places.shown(the_ball())[0])
-    yield 1.0
+    yield from at_rest()
     screenshot("worst point")
     found, _, _ = places.shown(the_ball())
     assert len(found) == 4 and found[0].distance.lower > 0.19 and found[0].position[1] > 0
@@ -74,18 +76,18 @@ def test_worst_point_next_and_previous_by_mouse():
     for at, across in ((1, 0.684), (2, 0.684), (1, 0.59)):
         yield from press("tolvol.next_place", across=across)
         yield from finished(lambda at=at: places.shown(the_ball())[1] == at)
-        yield 0.5
+        yield
         screenshot(f"worst point {at + 1}")
         assert in_the_middle(found[at].position)
     yield from press("tolvol.clear_places", across=0.775)
     yield from finished(lambda: not places.any_shown())
-    yield 1.0
+    yield from at_rest()
     assert not markers._drawing and white_near_the_middle() < plain + 20
     # Select Outside brings the selected faces into view, too: all of them are at two ends of the ball.
     view()[1].spaces[0].region_3d.view_distance = 50
     yield from press("tolvol.select_outside", across=0.7)
     yield from finished(lambda: the_ball().mode == "EDIT")
-    yield 1.0
+    yield from at_rest()
     screenshot("select outside frames")
     assert view()[1].spaces[0].region_3d.view_distance < 10
     with window_context():
@@ -98,18 +100,22 @@ def test_warnings_stay_in_the_panel_and_select_their_vertices():
     said, text_lines = [], notes.text_lines
     notes.text_lines = lambda context, where, text, icon: said.append(text) or text_lines(context, where, text, icon)
     ob = bpy.data.objects["sheet"]
+    xdotool("mousemove", 5, 5)
+    yield from at_rest()
+    plain = status_bar_pixels()
     yield from press("tolvol.decimate")
     yield from finished(lambda: ob.tolvol.warnings)
     (warning,), _ = kept_warnings.of(ob)
     yield from finished(lambda: warning in said)
-    yield 6.0  # The status bar has forgotten the message by now.
+    xdotool("mousemove", 5, 5)
+    yield from finished(lambda: (status_bar_pixels() == plain).all())  # It has forgotten the message.
     said.clear()
     view()[1].tag_redraw()
     yield from finished(lambda: warning in said)
     notes.text_lines = text_lines
     yield from press("tolvol.select_staying")
     yield from finished(lambda: ob.mode == "EDIT")
-    yield 0.5
+    yield
     screenshot("staying vertices")
     ob.update_from_editmode()
     assert warning.startswith("841 of 961 vertices")

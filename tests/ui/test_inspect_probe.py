@@ -15,6 +15,7 @@ from addon.proof import labels, probing
 from addon.proof import places as worst_places
 from test_layout import dark, drag_sidebar, light
 from window import (
+    at_rest,
     click,
     finished,
     key,
@@ -57,13 +58,13 @@ def test_the_probe_reads_under_the_mouse_and_leaves_labels():
     yield from reset(ball)
     yield from open_tab()
     view()[1].spaces[0].region_3d.view_rotation = (0.7071, 0.7071, 0, 0)  # from the front
-    yield 0.5
+    yield
     left, right = places()
     yield from press("tolvol.probe", across=0.5)
     yield from finished(TOLVOL_OT_probe.running)
     xdotool("mousemove", *left)
     yield from finished(lambda: reads(True))
-    yield 0.5
+    yield
     screenshot("probe 1 beyond")
     lines = [line.replace("\u00a0", " ") for line in probing.hover().lines]
     assert lines == ["4.99 cm outside, 721 % of the tolerance", "Tolerance 6.93 mm: beyond"]
@@ -76,20 +77,20 @@ def test_the_probe_reads_under_the_mouse_and_leaves_labels():
     yield from finished(status_bar.showing)
     # The view can be turned meanwhile: what is under the mouse is then read without a move.
     xdotool("click", 4)
-    yield 0.5
+    yield
     xdotool("mousemove", *right)
     yield from finished(lambda: reads(False))
     screenshot("probe 2 within")
-    click(*left)
+    yield from click(*left)
     yield from finished(lambda: len(the_ball().tolvol.labels) == 1)
-    click(*right)
+    yield from click(*right)
     yield from finished(lambda: len(the_ball().tolvol.labels) == 2)
     xdotool("mousemove", *on_screen(region("WINDOW"), 200, 600))  # beside the ball
     yield from finished(lambda: not probing.hover().lines)
-    yield 0.5
+    yield
     screenshot("probe 3 two labels")
-    click(*on_screen(region("WINDOW"), 200, 600))
-    yield 0.5
+    yield from click(*on_screen(region("WINDOW"), 200, 600))
+    yield
     first, second = the_ball().tolvol.labels
     assert first.side == "outside" and 0.045 < first.distance < 0.0501 and second.distance < 1e-6
     assert np.linalg.norm(first.place) > 1.04 and labels.current(the_ball(), first)
@@ -109,7 +110,7 @@ def test_the_probe_reads_under_the_mouse_and_leaves_labels():
     yield from finished(lambda: probing.hover().lines and "on the reference" in probing.hover().lines[0])
     assert TOLVOL_OT_probe._running._said.startswith("Reference of ball: ")
     screenshot("probe 4 on the reference")
-    click(*left)
+    yield from click(*left)
     yield from finished(lambda: len(the_ball().tolvol.labels) == 3)
     assert the_ball().tolvol.labels[2].on_reference
     key("Escape")
@@ -128,17 +129,17 @@ def test_the_table_of_labels_in_the_sidebar():
     the_ball().data.vertices[0].co.z += 0.01
     the_ball().data.update()
     bpy.ops.ed.undo_push(message="edit")
-    yield 1.0
+    yield from at_rest()
     screenshot("probe 4 out of date")
     yield from drag_sidebar(60)
     yield from scroll_down()
     xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
-    yield 0.5
+    yield
     screenshot("probe 4 out of date and narrow")
     yield from drag_sidebar(-60)
     yield from press("tolvol.renew_labels", across=0.775)
     yield from finished(lambda: all(labels.current(the_ball(), label) for label in the_ball().tolvol.labels))
-    yield 0.5
+    yield
     key("ctrl+z")
     yield from finished(lambda: not any(labels.current(the_ball(), label) for label in the_ball().tolvol.labels))
 
@@ -155,11 +156,11 @@ def test_labels_lie_beside_each_other_the_worst_point_and_the_legend():
     try:
         place = region("WINDOW")
         yield from finished(lambda: legend.box(place) and markers.box(place))
-        yield 1.0
+        yield from at_rest()
         boxes.clear()
         view()[1].tag_redraw()
         yield from finished(lambda: len(boxes) > 4)
-        yield 0.5
+        yield
         screenshot("probe 9 many labels")
         assert markers.box(place) in boxes and "of the tolerance" in boxes[markers.box(place)][0]
         drawn = [legend.box(place), *boxes]
@@ -169,7 +170,7 @@ def test_labels_lie_beside_each_other_the_worst_point_and_the_legend():
         boxes.clear()
         view()[1].tag_redraw()
         yield from finished(lambda: boxes)
-        yield 0.5
+        yield
         view()[1].tag_redraw()
         boxes.clear()
         yield from finished(lambda: boxes)
@@ -192,7 +193,7 @@ def test_the_probe_in_themes_widths_scales_and_quad_view():
         yield from press("tolvol.probe", across=0.5)
         xdotool("mousemove", *left)
         yield from finished(lambda: probing.hover() and probing.hover().lines)
-        yield 1.0
+        yield from at_rest()
         screenshot("probe 5 light and narrow")
         key("Escape")
         yield from finished(lambda: not TOLVOL_OT_probe.running())
@@ -200,14 +201,14 @@ def test_the_probe_in_themes_widths_scales_and_quad_view():
         dark()
         with window_context():
             bpy.ops.screen.region_quadview()
-        yield 1.0
+        yield from at_rest()
         yield from press("tolvol.probe", across=0.5)
         seen = set()
         for share in ((0.25, 0.25), (0.72, 0.25), (0.25, 0.75), (0.72, 0.75)):
             area = view()[1]
             place = area.x + int(share[0] * area.width), view()[0].height - area.y - int(share[1] * area.height)
             xdotool("mousemove", *place)
-            yield 1.0
+            yield from at_rest()
             if probing.hover().lines:
                 seen.add(probing.hover().region)
         screenshot("probe 6 quad view")
@@ -217,19 +218,19 @@ def test_the_probe_in_themes_widths_scales_and_quad_view():
         with window_context():
             bpy.ops.screen.region_quadview()
         bpy.context.preferences.view.ui_scale = 2
-        yield 3.0
+        yield from at_rest()
         with window_context():
             bpy.ops.tolvol.probe("INVOKE_DEFAULT")
         xdotool("mousemove", *left)
         yield from finished(lambda: probing.hover() and probing.hover().lines)
-        yield 1.0
+        yield from at_rest()
         screenshot("probe 7 twice as large")
         key("Escape")
         yield from finished(lambda: not TOLVOL_OT_probe.running())
     finally:
         bpy.context.preferences.view.ui_scale = 1
         dark()
-    yield 1.0
+    yield from at_rest()
 
 
 def test_the_probe_ends_when_its_object_or_file_does():
@@ -246,7 +247,7 @@ def test_the_probe_ends_when_its_object_or_file_does():
     yield from finished(lambda: probing.hover().lines)
     # Keys that would change the mesh do nothing meanwhile.
     xdotool("key", "Tab")
-    yield 0.5
+    yield
     assert the_ball().mode == "OBJECT"
     the_ball().data.vertices[0].co.z += 0.01
     the_ball().data.update()
@@ -265,7 +266,7 @@ def test_the_probe_ends_when_its_object_or_file_does():
         with window_context():
             bpy.ops.wm.open_mainfile(filepath=path)
     yield from finished(lambda: not TOLVOL_OT_probe.running())
-    yield 1.0
+    yield from at_rest()
     assert probing.hover() is None and len(the_ball().tolvol.labels) == 1
     assert labels.current(the_ball(), the_ball().tolvol.labels[0]) and overlay.labels._drawing
     screenshot("probe 8 file opened")

@@ -12,8 +12,10 @@ from addon.background import thread
 from scenes import world_triangles
 from test_panel import assert_proved, monkey, stored, suzanne
 from window import (
+    at_rest,
     centre,
     finished,
+    key,
     open_tab,
     pixels,
     reset,
@@ -54,7 +56,7 @@ def reports():
 
 def ends(said, text):
     yield from finished(lambda: not job.under_way())
-    yield 0.5
+    yield
     assert any(text in line for line in reports()[said:]), reports()[said:]
 
 
@@ -90,11 +92,13 @@ def test_the_view_is_turned_while_a_job_runs():
 
 def drag(button, start, end):
     """Drags the mouse over the view, as slowly as Blender needs to see that it is a drag."""
-    xdotool("mousemove", *start, "sleep", "0.2", "mousedown", button)
+    xdotool("mousemove", *start)
+    yield
+    xdotool("mousedown", button)
     for step in range(1, 6):
-        yield 0.1
+        yield
         xdotool("mousemove", *(a + (b - a) * step // 5 for a, b in zip(start, end)))
-    yield 0.1
+    yield
     xdotool("mouseup", button)
 
 
@@ -113,23 +117,25 @@ def test_the_mouse_turns_and_zooms_the_view_and_moves_another_object_while_a_job
     yield from finished(lambda: rotation() != before)
     assert job.under_way()
     distance = camera.view_distance
-    xdotool("mousemove", x, y, "click", 4, "sleep", "0.1", "click", 4)
+    xdotool("mousemove", x, y, "click", 4)
     yield from finished(lambda: camera.view_distance < distance)
     assert job.under_way()
     # Another object is chosen and moved by keys and mouse.
     suzanne().select_set(False)
     cube.select_set(True)
     bpy.context.view_layer.objects.active = cube
-    xdotool("mousemove", x, y, "sleep", "0.2", "key", "g")
+    xdotool("mousemove", x, y)
+    yield
+    key("g")
     for step in range(1, 5):
-        yield 0.2
+        yield
         xdotool("mousemove", x + 30 * step, y)
     yield from finished(lambda: tuple(cube.location) != (0, 4, 0))
     xdotool("click", 1)
-    yield 0.5
+    yield
     moved = tuple(cube.location)
     xdotool("mousemove", x, y)
-    yield 0.5
+    yield
     assert tuple(cube.location) == moved != (0, 4, 0) and job.under_way()
     screenshot("job 3 another object moved")
     xdotool("key", "Escape")
@@ -148,7 +154,7 @@ def test_no_workspace_keeps_the_text_of_a_job():
     workspaces = [bpy.data.workspaces["Scripting"], window.workspace]
     for workspace in workspaces:
         window.workspace = workspace
-        yield 1.0
+        yield from at_rest()
         plain[workspace] = status_bar_pixels()
     begin()
     for workspace in workspaces[::-1]:
@@ -160,7 +166,7 @@ def test_no_workspace_keeps_the_text_of_a_job():
     yield from finished(lambda: (status_bar_pixels() == plain[window.workspace]).all(), pause=1.0)
     for workspace in workspaces:
         window.workspace = workspace
-        yield 1.0
+        yield from at_rest()
         screenshot(f"job 2 {workspace.name}")
         assert (status_bar_pixels() == plain[workspace]).all()
 
@@ -206,7 +212,7 @@ def test_opening_a_file_ends_a_job():
                 bpy.ops.wm.open_mainfile(filepath=path)
             # Soon the estimate may be at work.
             assert not job.under_way() and not thread.at_work()
-            yield 1.0
+            yield from at_rest()
         finally:
             status_bar.say = say
     assert shown == ["Decimate in Tolerance was stopped, because another file was opened. It has changed nothing"]
@@ -291,7 +297,7 @@ def test_adjusting_again_while_a_job_runs_begins_anew():
     adjust(tolerance_percent=0.4)
     yield from finished(lambda: not job.under_way())
     assert len(suzanne().data.polygons) < left
-    yield 0.5
+    yield
     assert not any("stopped" in line for line in reports()[said:])
     with window_context():
         bpy.ops.ed.undo()

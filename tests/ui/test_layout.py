@@ -15,6 +15,7 @@ from test_panel import monkey
 from window import (
     DOWN,
     PAGES,
+    at_rest,
     find,
     finished,
     on_screen,
@@ -52,7 +53,7 @@ def test_the_first_screen_has_everything_and_buttons_stay_where_they_are():
     aside = on_screen(region("WINDOW"), 300, 300)
     first = yield from rows()
     xdotool("mousemove", *aside)
-    yield 0.5
+    yield
     screenshot("layout 1 first screen")
     assert torus().tolvol.snapshot is None and verdict.word(torus()) == verdict.NOT_CHECKED
     yield from press("tolvol.decimate")
@@ -61,22 +62,22 @@ def test_the_first_screen_has_everything_and_buttons_stay_where_they_are():
     torus().modifiers.new("wave", "WAVE")
     torus().data.vertices[0].co.z += 1
     torus().data.update()
-    yield 0.5
+    yield
     assert (yield from rows()) == first
     yield from press("tolvol.check")
     yield from finished(lambda: verdict.word(torus()) == verdict.FAIL)
-    yield 1.0
+    yield from at_rest()
     assert (yield from rows()) == first
     xdotool("mousemove", *aside)
-    yield 0.5
+    yield
     screenshot("layout 2 failed")
     for mode in ("EDIT", "SCULPT"):
         with window_context():
             bpy.ops.object.mode_set(mode=mode)
-        yield 0.5
+        yield
         assert (yield from rows()) == first
         xdotool("mousemove", *aside)
-        yield 0.5
+        yield
         screenshot(f"layout 3 {mode.lower()}")
     with window_context():
         bpy.ops.object.mode_set(mode="OBJECT")
@@ -102,14 +103,14 @@ def _no_button_moves(operator, *buttons):
         yield from press(f"tolvol.{operator}")
         yield from finished(lambda: job.under_way() and job.under_way().told().share, pause=0.01)
         xdotool("mousemove", *aside)
-        yield 0.3
+        yield
         screenshot(f"layout 9 during {operator}")
         assert (yield from rows(*buttons)) == before and job.under_way()
         released.append(True)
     yield from finished(lambda: not job.under_way())
     assert (yield from rows(*buttons)) == before
     xdotool("mousemove", *aside)
-    yield 0.5
+    yield
     screenshot(f"layout 9 after {operator}")
 
 
@@ -130,7 +131,7 @@ def test_no_button_moves_when_sentences_and_labels_come_and_go():
                     yield from scroll(DOWN, steps=3)
             above, below = yield from rows("tolvol.save_report", "tolvol.smooth")
             xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
-            yield 0.5
+            yield
             screenshot(f"layout 10 {name}")
             return *heights, below - above
 
@@ -165,11 +166,11 @@ def drag_sidebar(by):
     x, y = on_screen(region("UI"), int(7 * bpy.context.preferences.system.ui_scale), 300)
     for step in (("mousemove", x - 40, y), ("mousemove", x, y), ("mousedown", 1), ("mousemove", x + by // 2, y)):
         xdotool(*step)
-        yield 0.3
+        yield
     xdotool("mousemove", x + by, y)
-    yield 0.3
+    yield
     xdotool("mouseup", 1)
-    yield 0.5
+    yield
     assert abs(before - region("UI").width - by) < 20, (before, region("UI").width, by)
 
 
@@ -190,37 +191,37 @@ def test_themes_widths_and_scales():
         xdotool("mousemove", *aside)
         light()
         yield from finished(lambda: drawn)
-        yield 1.0
+        yield from at_rest()
         screenshot("layout 4 light")
         assert set(drawn) == {"legend"}
         yield from drag_sidebar(60)
         xdotool("mousemove", *aside)
-        yield 1.0
+        yield from at_rest()
         screenshot("layout 5 narrow")
         yield from drag_sidebar(-260)
         xdotool("mousemove", *aside)
-        yield 1.0
+        yield from at_rest()
         screenshot("layout 6 wide")
         yield from drag_sidebar(200)
         dark()
         with window_context():
             bpy.ops.screen.region_quadview()
         drawn.clear()
-        yield 1.0
+        yield from at_rest()
         screenshot("layout 7 quad view")
         assert set(drawn) == {"word"}
         with window_context():
             bpy.ops.screen.region_quadview()
         bpy.context.preferences.view.ui_scale = 2
-        yield 3.0
+        yield from at_rest()
         drawn.clear()
         view()[1].tag_redraw()
-        yield 1.0
+        yield from at_rest()
         screenshot("layout 8 twice as large")
         assert set(drawn) == {"word"}
     finally:
         bpy.context.preferences.view.ui_scale = 1
         legend.Page.rectangle, legend._draw_word = whole, word
         dark()
-    yield 1.0
+    yield from at_rest()
     view()[1].tag_redraw()

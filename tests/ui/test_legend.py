@@ -11,6 +11,7 @@ from panels_open import unfolded
 from test_layout import dark, drag_sidebar, light
 from test_show_deviation import striped, surface
 from window import (
+    at_rest,
     click_property,
     finished,
     on_screen,
@@ -80,17 +81,17 @@ def test_range_and_bands_of_the_colours():
         yield from finished(lambda: striped() > 10_000)
         view()[1].tag_redraw()
         yield from finished(lambda: "+10 cm" in said and "\u221210 cm" in said)
-        yield 1.0
+        yield from at_rest()
         screenshot("legend 1 tolerance")
         # Each band within the tolerance has one colour: a quarter of the ramp has the upper half of them.
         settings.use_bands, settings.band_count = True, 10
         yield from finished(lambda: 5 <= colours() <= 7)
-        yield 1.0
+        yield from at_rest()
         screenshot("legend 2 ten bands")
         said.clear()
         settings.deviation_range = "AUTOMATIC"
         yield from finished(lambda: "+40 cm" in said)
-        yield 1.0
+        yield from at_rest()
         screenshot("legend 3 automatic")
         assert "+10 cm (tolerance)" in said and "\u221210 cm (tolerance)" in said
         assert striped() > 10_000, "beyond the tolerance every colour is striped"
@@ -98,22 +99,22 @@ def test_range_and_bands_of_the_colours():
         said.clear()
         settings.deviation_range, settings.deviation_limit = "FIXED", 0.05
         yield from finished(lambda: "+5 cm" in said)
-        yield 1.0
+        yield from at_rest()
         screenshot("legend 4 fixed")
         settings.use_bands, settings.band_count = True, 20
         said.clear()
         yield from finished(lambda: sum(text.endswith(" %") for text in said) >= 21)
-        yield 1.0
+        yield from at_rest()
         light()
-        yield 1.0
+        yield from at_rest()
         screenshot("legend 5 twenty bands, light")
         # Where twenty rows have no room, the bar has its usual height and no shares.
         bpy.context.preferences.view.ui_scale = 1.3
-        yield 2.0
+        yield from at_rest()
         said.clear()
         view()[1].tag_redraw()
         yield from finished(lambda: "+5 cm" in said or "NOT CHECKED" in said)
-        yield 0.5
+        yield
         screenshot("legend 6 larger")
         assert sum(text.endswith(" %") for text in said) <= 1 < len(said)
     finally:
@@ -122,7 +123,7 @@ def test_range_and_bands_of_the_colours():
         dark()
     with window_context():
         bpy.ops.screen.region_quadview()
-    yield 1.5
+    yield from at_rest()
     screenshot("legend 7 quad view")
     with window_context():
         bpy.ops.screen.region_quadview()
@@ -135,7 +136,7 @@ def test_range_and_bands_of_the_colours():
 def choose(name, letter):
     """Chooses the value of a property from its menu, in which Blender underlines a letter of each value."""
     yield from click_property(name, across=0.66)
-    yield 0.5
+    yield
     xdotool("key", letter)
 
 
@@ -219,9 +220,9 @@ def drag_legend(place, across, up):
         yield from sent("mousemove", grip[0] + by, grip[1])
     xdotool("mousedown", 1)
     for step in range(5):
-        yield 0.2
+        yield
         xdotool("mousemove", grip[0] + 1 + across * step // 4, grip[1] - up * step // 4)
-    yield 0.2
+    yield
     xdotool("mouseup", 1)
     yield from finished(lambda: abs(legend.box(place)[0] - first[0] - across) < 10)
     assert abs(legend.box(place)[1] - first[1] - up) < 10
@@ -237,7 +238,7 @@ def test_each_view_has_its_own_place_for_the_legend():
     one, other = (next(region for region in area.regions if region.type == "WINDOW") for area in areas)
     try:
         yield from finished(lambda: legend.box(one) is not None and legend.box(other) is not None)
-        yield 0.5
+        yield
         before = legend.box(one), legend.box(other)
         yield from drag_legend(other, -100, 160)
         assert legend.box(one) == before[0]
@@ -284,7 +285,7 @@ def test_the_legend_is_dragged_and_is_one_for_selected_objects():
         said.clear()
         yield from finished(lambda: "Deviation of 2 objects" in said and "+30 cm" in said)
         yield from finished(lambda: any(text.endswith(" %") for text in said))
-        yield 1.0
+        yield from at_rest()
         screenshot("legend 10 two objects")
         other.select_set(False)
         said.clear()
@@ -305,7 +306,7 @@ def test_statistics_are_unfolded_and_measured():
         for width in (60, -60):
             yield from scroll_down()
             xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
-            yield 1.0
+            yield from at_rest()
             screenshot(f"legend 8 statistics {width}")
             yield from drag_sidebar(width)
     assert statistics.of(the_ramp())["forward"]["mean"] > 0.02

@@ -9,6 +9,7 @@ from addon import job, panels
 from panels_open import unfolded
 from test_panel import assert_proved, monkey, stored, suzanne
 from window import (
+    at_rest,
     centre,
     finished,
     key,
@@ -41,7 +42,7 @@ def test_levels_by_mouse_and_one_ctrl_z():
         yield from finished(lambda: len(levels()) == 3 and not job.under_way())
         yield from scroll_down()
         xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
-        yield 1.0
+        yield from at_rest()
         screenshot("lod 1 made")
     assert stored() == before
     for name, percent in zip(levels(), (0.1, 0.5, 2)):

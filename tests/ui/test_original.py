@@ -8,10 +8,12 @@ import scenes
 from addon.mesh import mesh_io
 from addon.operators import decimate, original
 from window import (
+    at_rest,
     centre,
     find_hold,
     finished,
     key,
+    move_onto,
     on_screen,
     open_tab,
     pixels,
@@ -81,10 +83,10 @@ def test_the_button_of_decimate_counts_the_same_objects_while_the_original_is_sh
     for selected, count in ((False, 1), (True, 2)):
         other.select_set(selected)
         xdotool("mousemove", *on_screen(region("WINDOW"), 200, 600))
-        yield 0.5
+        yield
         xdotool("keydown", "y")
         yield from finished(original.shown)
-        yield 1.0
+        yield from at_rest()
         screenshot(f"original shown beside {count - 1} other objects")
         with window_context():
             targets = decimate.targets(bpy.context)
@@ -97,25 +99,26 @@ def test_the_original_is_shown_while_its_button_is_held_and_asks_before_it_comes
     yield from decimated()
     count = len(torus().data.polygons)
     place = yield from find_hold()
-    xdotool("mousemove", *place, "sleep", "0.3", "mousedown", 1)
+    yield from move_onto(*place)
+    xdotool("mousedown", 1)
     yield from finished(original.shown)
-    yield 1.0
+    yield from at_rest()
     screenshot("original button held")
     assert torus().hide_get()
     xdotool("mouseup", 1)
     yield from finished(lambda: not original.shown())
-    yield 0.5
+    yield
     assert not torus().hide_get() and torus().select_get()
     # Holding it was no step: one Ctrl Z undoes the decimation.
     yield from press("tolvol.restore_original", across=0.69)
-    yield 1.0
+    yield from at_rest()
     screenshot("restore asks")
     assert len(torus().data.polygons) == count
     key("Escape")
-    yield 0.5
+    yield
     assert len(torus().data.polygons) == count
     yield from press("tolvol.restore_original", across=0.69)
-    yield 0.5
+    yield
     key("Down")
     key("Return")
     yield from finished(lambda: len(torus().data.polygons) == 48 * 24)
@@ -123,7 +126,7 @@ def test_the_original_is_shown_while_its_button_is_held_and_asks_before_it_comes
     yield from scroll()
     assert mesh_io.read_mesh(torus().data).fingerprint() == torus().tolvol.snapshot_fingerprint
     xdotool("mousemove", *centre())
-    yield 0.5
+    yield
     key("ctrl+z")
     yield from finished(lambda: len(torus().data.polygons) == count)
     key("ctrl+z")

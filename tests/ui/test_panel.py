@@ -16,6 +16,7 @@ from addon.panels import deviation, notes
 from addon.proof import verdict
 from addon.reference import measurements, tolerances
 from window import (
+    at_rest,
     centre,
     click,
     find,
@@ -76,7 +77,7 @@ def test_decimate_by_mouse_and_undo_by_one_ctrl_z():
     reference, before = scenes.world_triangles(suzanne()), stored()
     yield from press("tolvol.decimate")
     yield from finished(lambda: len(suzanne().data.polygons) < 3000)
-    yield 1.0
+    yield from at_rest()
     screenshot("2 decimated")
     assert len(reference[1]) == TRIANGLES and suzanne().tolvol.snapshot is not None
     assert suzanne().tolvol.tolerance_percent == np.float32(0.2)
@@ -85,11 +86,11 @@ def test_decimate_by_mouse_and_undo_by_one_ctrl_z():
     xdotool("mousemove", *centre())
     yield
     key("ctrl+z")
-    yield 1.0
+    yield from at_rest()
     assert stored() == before and suzanne().tolvol.snapshot is None
     screenshot("3 undone")
     key("ctrl+shift+z")
-    yield 1.0
+    yield from at_rest()
     assert stored() == after and suzanne().tolvol.snapshot is not None
 
 
@@ -101,21 +102,22 @@ def test_tolerance_from_the_presets_and_decimation_by_menu_search():
     sidebar = region("UI")
     x, _ = on_screen(sidebar, sidebar.width - 47, 0)  # the menu beside the tolerance
     xdotool("mousemove", *centre())
-    yield 0.6  # After so many seconds no tooltip is in the way.
-    xdotool("mousemove", x, y, "sleep", "0.1", "mousedown", 1, "sleep", "0.1", "mouseup", 1)
-    yield 1.0
+    yield
+    yield from click(x, y)
+    yield from at_rest()
     screenshot("presets")
     for _ in range(7):  # the last of the presets
-        xdotool("key", "Down", "sleep", "0.1")
+        key("Down")
+        yield
     key("Return")
     yield from finished(lambda: ob.tolvol.tolerance_mode == "LENGTH")
     assert tolerances.tolerance_length(ob.tolvol, 1) == 0.05
     xdotool("mousemove", *centre())
     yield
     key("F3")
-    yield 0.5
+    yield
     xdotool("type", "decimate in tol")
-    yield 0.5
+    yield
     screenshot("menu search")
     key("Return")
     yield from finished(lambda: len(ob.data.polygons) < 500)
@@ -128,22 +130,22 @@ def test_adjust_last_operation():
     reference = scenes.world_triangles(suzanne())
     yield from press("tolvol.decimate")
     yield from finished(lambda: len(suzanne().data.polygons) < 3000)
-    yield 1.0
+    yield from at_rest()
     first = len(suzanne().data.polygons)
     hud = region("HUD")
-    click(*on_screen(hud, 60, hud.height - 12))  # The panel is closed at first, so only its header is there.
+    yield from click(*on_screen(hud, 60, hud.height - 12))  # The panel is closed at first, so only its header is there.
     yield from finished(lambda: region("HUD").height > 200)
-    yield 1.0
+    yield from at_rest()
     hud = region("HUD")
     xdotool("mousemove", *on_screen(hud, hud.width * 2 // 3, 50))
-    yield 1.0
+    yield from at_rest()
     # Return over a field starts typing. A double click would do so too, but a busy machine may take it for two clicks.
     key("Return")
-    yield 1.0
+    yield from at_rest()
     xdotool("key", "ctrl+a", "type", "3")
     key("Return")
     yield from finished(lambda: len(suzanne().data.polygons) < first)
-    yield 1.0
+    yield from at_rest()
     screenshot("4 adjusted")
     assert suzanne().tolvol.tolerance_percent == 3
     # The reference is the first mesh and not the first result.
@@ -152,7 +154,7 @@ def test_adjust_last_operation():
     xdotool("mousemove", *centre())
     yield
     key("ctrl+z")
-    yield 1.0
+    yield from at_rest()
     assert len(scenes.world_triangles(suzanne())[1]) == TRIANGLES
 
 
@@ -162,7 +164,7 @@ def test_escape_leaves_everything_as_it_was():
     with bpy.context.temp_override(window=view()[0], area=view()[1], object=suzanne()):
         suzanne().modifiers.new("more", "SUBSURF").levels = 1  # The decimation becomes slow enough to be stopped.
         bpy.ops.object.modifier_apply(modifier="more")
-    yield 0.5
+    yield
     before = stored()
     said = status_texts()
     yield from press("tolvol.decimate")
@@ -172,13 +174,13 @@ def test_escape_leaves_everything_as_it_was():
     deviation._draw_verdict = lambda *about: drawn.append(about) or draw_verdict(*about)
     try:
         key("Escape")
-        yield 2.0
+        yield from at_rest()
     finally:
         deviation._draw_verdict = draw_verdict
     assert drawn, "the panel shows the job that has ended until the mouse moves"
     assert any(text.startswith("Decimating") and text.endswith("Esc: Cancel") for text in said)
     count = len(said)
-    yield 2.0
+    yield from at_rest()
     assert len(said) == count  # No job goes on.
     assert stored() == before and suzanne().tolvol.snapshot is None and not suzanne().tolvol.last_run
     screenshot("6 stopped")
@@ -213,10 +215,10 @@ def test_reference_check_and_select_outside():
     co[lifted, 2] += np.float32(0.1)
     suzanne().data.vertices.foreach_set("co", co.ravel())
     suzanne().data.update()
-    yield 0.5
+    yield
     yield from press("tolvol.check")
     yield from finished(lambda: measurements.measurement_of(suzanne()) is not None)
-    yield 1.0
+    yield from at_rest()
     screenshot("8 checked")
     # The word of the legend is the one of the panel.
     words, draw = [], legend.draw
@@ -238,7 +240,7 @@ def test_reference_check_and_select_outside():
     )
     yield from press("tolvol.select_outside", across=0.7)
     yield from finished(lambda: suzanne().mode == "EDIT")
-    yield 0.5
+    yield
     screenshot("9 outside selected")
     assert (yield from find("tolvol.check")) is not None  # greyed
     screenshot("10 edit mode")
@@ -253,20 +255,20 @@ def test_what_is_in_the_way_is_said():
     yield from open_tab()
     yield from press("tolvol.set_reference")
     suzanne().tolvol.reference_kind = "OBJECT"
-    yield 0.5
+    yield
     screenshot("11 another reference")
     before = stored()
     yield from press("tolvol.decimate")  # greyed
-    yield 1.0
+    yield from at_rest()
     assert stored() == before
     xdotool("mousemove", *centre())
     suzanne().tolvol.reference_kind = "SELF"
     suzanne().modifiers.new("on top", "WAVE")
     twin = suzanne().copy()
     bpy.context.collection.objects.link(twin)
-    yield 0.5
+    yield
     view()[1].tag_redraw()
-    yield 0.5
+    yield
     screenshot("12 two users")
     bpy.data.objects.remove(twin)
     # A running count would need the module, which is never removed while Blender runs.
@@ -274,11 +276,11 @@ def test_what_is_in_the_way_is_said():
     found = native.module
     native.module, native.reason = None, "The package tolvol is missing: install the add-on's zip"
     view()[1].tag_redraw()
-    yield 0.5
+    yield
     screenshot("13 no module")
     native.module, native.reason = found, None
     view()[1].tag_redraw()
-    yield 0.5
+    yield
 
 
 def test_a_damaged_file_breaks_no_panel():
@@ -286,7 +288,7 @@ def test_a_damaged_file_breaks_no_panel():
     yield from open_tab()
     yield from press("tolvol.decimate")
     yield from finished(lambda: suzanne().tolvol.last_run)
-    yield 1.0
+    yield from at_rest()
     said, text_lines = [], notes.text_lines
     notes.text_lines = lambda context, layout, text, icon: said.append(text) or text_lines(context, layout, text, icon)
     try:
@@ -298,7 +300,7 @@ def test_a_damaged_file_breaks_no_panel():
         suzanne().tolvol.snapshot.clear_geometry()
         reference.forget_all()
         view()[1].tag_redraw()
-        yield 1.0
+        yield from at_rest()
         screenshot("damaged")
     finally:
         notes.text_lines = text_lines
@@ -318,7 +320,7 @@ def test_the_answer_of_check_is_seen_without_moving_the_mouse():
     suzanne().data.vertices[0].co.z += 0.001
     suzanne().data.update()
     xdotool("mousemove", *centre())
-    yield 0.5
+    yield
     yield from finished(lambda: not queue._waiting and queue._running is None)  # the estimate
     before = yield from still(sidebar_pixels)
     assert verdict.of(suzanne()) is None
@@ -329,7 +331,7 @@ def test_the_answer_of_check_is_seen_without_moving_the_mouse():
     seen = yield from still(sidebar_pixels)
     screenshot("14 checked without the mouse")
     view()[1].tag_redraw()
-    yield 1.0
+    yield from at_rest()
     assert (seen == (yield from still(sidebar_pixels))).all()
 
 
@@ -341,20 +343,20 @@ def test_what_replaces_the_original_asks():
     yield from finished(lambda: len(ob.data.polygons) < 500)
     original = ob.tolvol.snapshot_fingerprint
     ob.scale = (1.5, 1.5, 1.5)
-    yield 0.5
+    yield
     assert len(ob.tolvol.snapshot.polygons) == 2304
     screenshot("15 scaled")
     yield from press("tolvol.set_reference")
-    yield 1.0
+    yield from at_rest()
     screenshot("16 asked")
     assert ob.tolvol.snapshot_fingerprint == original
     xdotool("mousemove", *centre())
     yield
     key("Escape")
-    yield 0.5
+    yield
     assert ob.tolvol.snapshot_fingerprint == original
     yield from press("tolvol.set_reference")
-    yield 0.5
+    yield
     key("Down")
     key("Return")
     yield from finished(lambda: ob.tolvol.snapshot_fingerprint != original)
@@ -372,13 +374,13 @@ def test_a_length_typed_in_millimetres():
     yield from open_tab()
     place = yield from find_property("tolerance_length", 0.6)
     xdotool("mousemove", *place)
-    yield 0.6
+    yield
     key("Return")
-    yield 0.5
+    yield
     xdotool("key", "ctrl+a", "type", "0.5mm")
     key("Return")
     yield from finished(lambda: abs(ob.tolvol.tolerance_length - 0.5) < 1e-3)
-    yield 0.5
+    yield
     screenshot("17 typed")
     assert tolerances.tolerance_length(ob.tolvol, 1) == 0.5, ob.tolvol.tolerance_length
     units.scale_length, units.length_unit = 1.0, "METERS"

@@ -62,7 +62,7 @@ def test_pictures_for_the_documentation():
         yield from draw(*_FOREHEAD)
         yield from finished(lambda: sides()[0] > 300)
         yield from finished(lambda: verdict.word(the_object()) == verdict.PASS and counted() is not None, pause=0.05)
-        yield 0.3
+        yield
         picture("guard")
     assert magenta() == 0
     assert [text.startswith("Held back") for _, text, _ in guard.states(the_object())] == [True]

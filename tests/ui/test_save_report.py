@@ -10,7 +10,7 @@ import bpy
 
 from addon.operators.report import TOLVOL_OT_save_report
 from test_panel import monkey, suzanne
-from window import finished, key, open_tab, press, reset, screenshot, xdotool
+from window import at_rest, finished, key, open_tab, press, reset, screenshot, xdotool
 
 
 @contextlib.contextmanager
@@ -38,17 +38,17 @@ def test_save_report_by_mouse():
     yield from open_tab()
     yield from press("tolvol.decimate")
     yield from finished(lambda: len(suzanne().data.polygons) < 3000)
-    yield 1.0
+    yield from at_rest()
     with folder_to_save_in() as folder:
         yield from press("tolvol.save_report", across=0.7)
-        yield 1.0
+        yield from at_rest()
         screenshot("14 file browser")
         xdotool("mousemove", 640, 400)
         yield
         key("Return")
         saved = folder / "Suzanne deviation.html"
         yield from finished(saved.is_file)
-        yield 1.0
+        yield from at_rest()
         screenshot("15 saved")
         assert "Suzanne from its reference" in saved.read_text()
 
@@ -60,7 +60,7 @@ def test_escape_in_the_file_browser_of_save_report():
     TOLVOL_OT_save_report.cancel = lambda operator, context: ended.append(cancel(operator, context))
     try:
         yield from press("tolvol.save_report", across=0.7)
-        yield 1.0
+        yield from at_rest()
         xdotool("mousemove", 640, 400)
         yield
         key("Escape")
@@ -82,9 +82,9 @@ def choose_next_format():
     before, height = operator.format, bpy.context.window_manager.windows[0].height
     for y in range(4, side.height, 12):
         xdotool("mousemove", side.x + side.width * 3 // 4, height - side.y - side.height + y)
-        yield 0.5
+        yield
         xdotool("keydown", "ctrl", "click", 5, "keyup", "ctrl")
-        yield 0.5
+        yield
         if operator.format != before:
             return
     raise AssertionError("no choice of format")
@@ -95,11 +95,11 @@ def test_format_is_chosen_in_the_file_browser():
     yield from monkey_with_reference()
     with folder_to_save_in() as folder:
         yield from press("tolvol.save_report", across=0.7)
-        yield 1.0
+        yield from at_rest()
         area, _ = browser()
         assert area.spaces[0].params.filename == "Suzanne deviation.html"
         yield from choose_next_format()
-        yield 1.0
+        yield from at_rest()
         screenshot("16 format chosen")
         assert area.spaces[0].params.filename == "Suzanne deviation.csv"
         xdotool("mousemove", 640, 400)

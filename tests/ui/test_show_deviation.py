@@ -11,6 +11,7 @@ from addon import guard, native, overlay
 from addon.proof import verdict
 from test_panel import monkey, suzanne
 from window import (
+    at_rest,
     centre,
     click,
     find_property,
@@ -57,7 +58,7 @@ def test_a_hole_that_is_cut_is_seen_on_the_reference_and_the_guard_puts_it_back(
     whole = len(edited.faces)
     yield from finished(lambda: near() > 30_000 and verdict.word(ob) == verdict.PASS)
     assert striped() == 0
-    xdotool("key", "x", "sleep", "0.5", "key", "f")
+    yield from delete_faces()
     yield from finished(lambda: verdict.word(ob) == verdict.FAIL)
     yield from finished(lambda: striped() > 1000)
     screenshot("overlay 10 hole on the reference")
@@ -70,12 +71,19 @@ def test_a_hole_that_is_cut_is_seen_on_the_reference_and_the_guard_puts_it_back(
         ob.tolvol.guard.editing = True
         ob.update_tag()
         yield from finished(lambda: [on for _, _, on in guard.states(ob)] == [True])
-        xdotool("key", "x", "sleep", "0.5", "key", "f")
+        yield from delete_faces()
         yield from finished(lambda: undone and verdict.word(ob) == verdict.PASS)
     finally:
         guard.edit.undo = undo
     assert undone[0] < whole == len(bmesh.from_edit_mesh(ob.data).faces)
     to_mode("OBJECT")
+
+
+def delete_faces():
+    """Deletes the selected faces by the menu of X, which takes a letter only once it is there."""
+    xdotool("key", "x")
+    yield
+    xdotool("key", "f")
 
 
 def solid_monkey(voxel_size=0.04):
@@ -136,21 +144,17 @@ def test_deviation_is_shown_while_the_mesh_changes():
 
     to_mode("SCULPT")
     sculpt_by_drawing()
-    yield 0.5
+    yield
     x, y = centre()
-    drawing, during = stroke((x, y), (x + 72, y)), 0
-    for pause in drawing:
-        yield pause
-        during = max(during, striped() if pause > 0.3 else 0)
+    yield from stroke((x, y), (x + 72, y), before_it_ends=lambda: striped() > 100)
     screenshot("overlay 2 sculpted")
-    assert during > 100
     key("ctrl+z")
     yield from finished(lambda: striped() == 0)
     assert near() > 30_000
 
     to_mode("EDIT")
     xdotool("mousemove", x, y)
-    yield 0.5
+    yield
     assert near() > 3000
     xdotool("key", "--delay", 100, "s", "1", "period", "0", "5")
     yield from finished(lambda: striped() > 3000)  # The stripes appear while the stroke goes on.
@@ -162,7 +166,7 @@ def test_deviation_is_shown_while_the_mesh_changes():
     the_object().tolvol.tolerance_percent = 5
     the_object().data.vertices.foreach_set("co", (1.02 * np.array([v.co for v in the_object().data.vertices])).ravel())
     the_object().data.update()
-    yield 1.0
+    yield from at_rest()
     yield from finished(lambda: striped() == 0 and not gone())
     the_object().tolvol.tolerance_percent = 0.2
     yield from finished(lambda: striped() > 10_000)
@@ -178,7 +182,7 @@ def test_sides_of_a_closed_reference():
     to_mode("SCULPT")
     sculpt_by_drawing()
     view()[1].spaces[0].show_gizmo = False
-    yield 1.0
+    yield from at_rest()
     red, blue = sides()
     assert red < 300 and blue < 300
     x, y = on_screen(region("WINDOW"), *(size // 2 for size in (region("WINDOW").width, region("WINDOW").height)))
@@ -187,7 +191,7 @@ def test_sides_of_a_closed_reference():
     xdotool("keydown", "ctrl")
     yield from stroke((x - 80, y + 40), (x + 10, y - 20))
     xdotool("keyup", "ctrl")
-    yield 1.5
+    yield from at_rest()
     screenshot("overlay 6 both sides")
     assert sides()[1] > blue + 300
 
@@ -235,11 +239,11 @@ def test_what_deviates_by_nothing_is_drawn_as_nothing():
         space = view()[1].spaces[0]
         space.show_gizmo = space.overlay.show_object_origins = space.overlay.show_cursor = False
         yield from finished(lambda: near() > 15_000)
-        yield 1.0
+        yield from at_rest()
         screenshot(f"overlay 7 {make.__name__} untouched")
         assert striped() == 0 and far() == 0, make
         the_object().tolvol.deviation_kind = "SIGNED"
-        yield 1.0
+        yield from at_rest()
         assert striped() == 0
     # The proved result has no striped speck either.
     the_object().tolvol.tolerance_percent = 0.1
@@ -248,7 +252,7 @@ def test_what_deviates_by_nothing_is_drawn_as_nothing():
     yield from finished(lambda: len(the_object().data.polygons) < before and verdict.of(the_object()) is not None)
     xdotool("mousemove", *beside())
     yield from finished(lambda: counted() == 0.1 / 100 * the_object().tolvol.snapshot_size)
-    yield 1.0
+    yield from at_rest()
     screenshot("overlay 8 proved")
     assert verdict.of(the_object()).kind == verdict.WITHIN and striped() == 0
     the_object().tolvol.tolerance_percent = 0.05
@@ -257,15 +261,17 @@ def test_what_deviates_by_nothing_is_drawn_as_nothing():
     space.show_gizmo = space.overlay.show_object_origins = space.overlay.show_cursor = True
 
 
-def stroke(start, end, steps=8):
-    """Drags the brush over the mesh."""
-    xdotool("mousemove", *start, "sleep", "0.2", "mousedown", 1)
+def stroke(start, end, steps=8, before_it_ends=lambda: True):
+    """Drags the brush over the mesh. The stroke ends once before_it_ends() is true."""
+    xdotool("mousemove", *start)
+    yield
+    xdotool("mousedown", 1)
     for step in range(1, steps + 1):
         xdotool("mousemove", *((a + (b - a) * step // steps) for a, b in zip(start, end)))
-        yield 0.1
-    yield 0.4
+        yield
+    yield from finished(before_it_ends)
     xdotool("mouseup", 1, "mousemove", *beside())
-    yield 0.7
+    yield
 
 
 def beside():
@@ -291,7 +297,7 @@ def test_views_places_and_switches():
     space.region_3d.view_perspective = "ORTHO"
     the_object().scale.x = -1
     the_object().location.x += 0.3
-    yield 0.7
+    yield
     assert near() > 30_000, "moved and mirrored"
     the_object().scale.x *= 2
     yield from finished(lambda: near() > 40_000)
@@ -302,16 +308,16 @@ def test_views_places_and_switches():
     yield from finished(lambda: near() > 30_000)
     with window_context():
         bpy.ops.view3d.localview(frame_selected=False)
-    yield 0.7
+    yield
     assert near() > 30_000
     the_object().hide_set(True)
-    yield 0.7
+    yield
     assert gone()
     the_object().hide_set(False)
     with window_context():
         bpy.ops.view3d.localview(frame_selected=False)
     space.overlay.show_overlays = False
-    yield 0.5
+    yield
     assert gone()
     space.overlay.show_overlays = True
     space.region_3d.view_perspective = "PERSP"
@@ -319,17 +325,16 @@ def test_views_places_and_switches():
     yield from scroll_down()
     place = yield from find_property("show_deviation", across=0.2)
     assert place is not None
-    yield 0.6  # After so many seconds no tooltip is in the way.
-    click(*place)
-    yield 0.5
+    yield from click(*place)
+    yield
     screenshot("overlay 5 off")
     xdotool("mousemove", *centre())
-    yield 0.7
+    yield
     assert not the_object().tolvol.show_deviation and gone()
     assert not overlay.shows(the_object()) and not overlay._drawing
     assert not any(handler.__module__.startswith("addon.overlay") for handler in bpy.app.handlers.depsgraph_update_post)
     the_object().tolvol.show_deviation = True
     yield from finished(lambda: near() > 30_000)
     bpy.data.objects.remove(the_object())
-    yield 0.7
+    yield
     assert gone() and not overlay._drawing

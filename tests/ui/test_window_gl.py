@@ -17,14 +17,14 @@ def test_pictures_and_queries_leave_the_window_alone():
     first = native.module.render_distance(*surface, volume, size=(60, 40))
     for _ in range(3):
         view()[1].tag_redraw()
-        yield 0.2
+        yield
         assert np.array_equal(native.module.render_distance(*surface, volume, size=(60, 40)), first)
         assert (volume.check(*surface, method="occlusion_query").verdicts == 2).all()
     screenshot("gl 1 window beside pictures")
     addon.unregister()
-    yield 0.5
+    yield
     addon.register()
-    yield 0.5
+    yield
     volume = native.module.ToleranceVolume(*surface, 0.05)
     picture = native.module.render_volume(volume, size=(60, 40))
     assert 0.2 < (picture[..., 3] > 0).mean() < 1

@@ -9,6 +9,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from addon import job
+from addon.background import queue, thread
 from addon.job import progress_text
 
 # run.sh tells the folder.
@@ -20,7 +22,15 @@ def xdotool(*arguments):
 
 
 def click(x, y):
-    xdotool("mousemove", x, y, "sleep", "0.1", "click", 1)
+    yield from move_onto(x, y)
+    xdotool("click", 1)
+
+
+def move_onto(x, y):
+    """Moves the mouse onto a button. At one move of the mouse Blender leaves a button, and at the next one it enters another."""
+    for across in (0, 1):
+        xdotool("mousemove", x + across, y)
+        yield
 
 
 def key(name):
@@ -73,19 +83,39 @@ def sent(*events):
     return noted[:]
 
 
-def finished(change, seconds=_STUCK, pause=0.2):
-    """Waits until change() is true."""
-    end = time.monotonic() + seconds
+_ROUNDS = 4  # The first one is under way when the events are sent, and what the second one draws may lead to more.
+
+
+def handled():
+    """Waits until Blender has handled the events that were sent, and has drawn what they have changed.
+
+    Blender's loop takes all events, handles them, calls each timer that is due and draws what has to be drawn anew.
+    """
+    for _ in range(_ROUNDS):
+        yield 0.0
+
+
+def at_rest():
+    """Waits until the add-on has no work, in the background or in a job, and Blender has drawn what has come of it."""
+    yield  # What is drawn may ask for work.
+    while queue._waiting or queue._running or job.under_way() or thread.at_work():
+        yield from finished(lambda: not (queue._waiting or queue._running or job.under_way() or thread.at_work()))
+        yield
+
+
+def finished(change, within=_STUCK, pause=0.05):
+    """Waits until change() is true. within, pause: seconds, until it counts as failed and between two looks."""
+    end = time.monotonic() + within
     while not change():
         assert time.monotonic() < end, "nothing happened"
         yield pause
 
 
 def still(read):
-    """Waits until read() returns the same array twice, a second apart. Returns that array."""
+    """Waits until read() returns the same array twice, with all that Blender and the add-on do between. Returns that array."""
     last, now = None, read()
     while last is None or not np.array_equal(last, now):
-        yield 1.0
+        yield from at_rest()
         last, now = now, read()
     return now
 
@@ -168,8 +198,8 @@ def open_tab():
     for y in range(150, 260, 20):
         if (yield from find("tolvol.")) is not None:
             return
-        click(*on_screen(sidebar, sidebar.width - 12, y))
-        yield 0.3
+        yield from click(*on_screen(sidebar, sidebar.width - 12, y))
+        yield
     raise AssertionError("no tab Tolerance")
 
 
@@ -211,7 +241,7 @@ def _copied_in_sidebar(keys, across=0.33):
         if _last_seen.get((keys, across)) == copied:
             return copied
         _last_seen[keys, across] = copied
-        yield 0.1
+        yield
     raise AssertionError("the buttons do not come to rest")
 
 
@@ -254,7 +284,7 @@ def press(operator, across=0.33):
     """Clicks the button of an operator in the sidebar. If necessary, it scrolls the sidebar, and back up after that."""
     scrolled = yield from _scrolled_to(f"bpy.ops.{operator}", "ctrl+c", across)
     xdotool("click", 1)
-    yield 0.3
+    yield
     if scrolled and _view_areas():  # A file browser may fill the window now.
         yield from scroll(UP)
 
@@ -263,7 +293,7 @@ def click_property(name, across):
     """Clicks the field or the button of a property of Object.tolvol in the sidebar. If necessary, it scrolls the sidebar."""
     yield from _scrolled_to(f".tolvol.{name}", "ctrl+shift+alt+c", across)
     xdotool("click", 1)
-    yield 0.3
+    yield
 
 
 def _scrolled_to(wanted, keys, across):
@@ -290,8 +320,10 @@ def scroll(button=UP, steps=30):
     """Turns the wheel over the sidebar. After 30 steps it no longer scrolls."""
     sidebar = region("UI")
     middle = on_screen(sidebar, sidebar.width // 2, sidebar.height // 2)
-    xdotool("mousemove", *middle, "sleep", "0.1", "click", "--repeat", steps, "--delay", 20, button)
-    yield 0.5
+    xdotool("mousemove", *middle)
+    yield
+    xdotool("click", "--repeat", steps, "--delay", 1, button)
+    yield
 
 
 def scroll_down():
@@ -305,7 +337,8 @@ def end_operators():
     """
     for _ in range(2):
         xdotool("mouseup", 1, "mousemove", *centre(), "key", "Escape")
-        yield 1.0
+        yield from finished(lambda: not job.under_way())
+        yield
     if bpy.context.mode != "OBJECT":
         with window_context():
             bpy.ops.object.mode_set(mode="OBJECT")
@@ -322,7 +355,7 @@ def close_other_areas():
         if area.type != "VIEW_3D":
             with bpy.context.temp_override(window=window, area=area, region=area.regions[0]):
                 bpy.ops.screen.area_close()
-    yield 0.5
+    yield
     # Until Blender has drawn the window again its context is incomplete.
     yield from finished(lambda: hasattr(bpy.context, "object"))
 
@@ -333,7 +366,7 @@ def resize(width, height):
     shell = subprocess.run(["xdotool", "search", "--class", "blender"], check=True, capture_output=True, text=True)
     xdotool("windowsize", shell.stdout.split()[-1], width, height)
     yield from finished(lambda: (window.width, view()[1].width, window.height) == (width, width, height))
-    yield 0.5
+    yield
 
 
 def sculpt_by_drawing():
@@ -354,4 +387,4 @@ def reset(*make):
         function()
     bpy.ops.ed.undo_push(message="start")
     xdotool("mousemove", *centre())
-    yield 0.5
+    yield
