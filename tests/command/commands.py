@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Runs the command as a user does, and writes the files that it reads."""
 
+import contextlib
 import os
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +36,48 @@ def command(*arguments, **environment):
 def end_served():
     """Ends the process that runs commands, if there is one."""
     _served.end()
+
+
+WITHIN = 60  # seconds in which a process ends on any machine
+
+# In the middle of the command the main thread is in a native call that lasts minutes and does not handle signals.
+_HANGS = """
+import hashlib, os, tolvol
+
+def decimate(*_, **__):
+    open(os.path.join({folder!r}, str(os.getpid())), "w").close()
+    hashlib.pbkdf2_hmac("sha256", b"", b"", 2_000_000_000)
+
+tolvol.decimate = decimate
+"""
+
+
+@contextlib.contextmanager
+def hanging(folder, count, *arguments):
+    """Gives a process of the command once `count` processes, itself or its own, hang in a decimation, and their numbers.
+
+    folder: an empty one.
+    """
+    signs = folder / "signs"
+    signs.mkdir()
+    (folder / "sitecustomize.py").write_text(_HANGS.format(folder=str(signs)))
+    environment = {**ENVIRONMENT, "PYTHONPATH": f"{folder}{os.pathsep}{ENVIRONMENT['PYTHONPATH']}"}
+    process = subprocess.Popen(words(*arguments), stderr=subprocess.PIPE, text=True, env=environment)
+    try:
+        wait_until(lambda: len(list(signs.iterdir())) == count)
+        yield process, [int(sign.name) for sign in signs.iterdir()]
+    finally:
+        process.kill()
+        for sign in signs.iterdir():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(int(sign.name), signal.SIGKILL)
+
+
+def wait_until(condition):
+    deadline = time.monotonic() + WITHIN
+    while not condition():
+        assert time.monotonic() < deadline, "nothing happened"
+        time.sleep(0.01)
 
 
 def refused(done, *parts, code=2):

@@ -4,14 +4,11 @@
 import csv
 import os
 import signal
-import subprocess
-import time
 
 import numpy as np
 import pytest
 
-import meshes
-from commands import ENVIRONMENT, assert_within, command, read, refused, scan, words, write
+from commands import WITHIN, assert_within, command, hanging, read, refused, scan, wait_until
 
 
 @pytest.fixture
@@ -89,23 +86,11 @@ def test_what_makes_no_sense_is_refused_before_the_work(folder):
     refused(command("batch", folder / "in" / "*", *out), "notes.txt: unknown extension .txt")
 
 
-def test_a_signal_ends_all_processes(tmp_path):
-    vertices, triangles = meshes.torus(columns=600, rows=300, noise=0.004)
-    for name in ("a.ply", "b.ply"):
-        write(tmp_path / name, vertices.astype(np.float32), triangles)
-    asked = words("batch", tmp_path / "*.ply", "--out", tmp_path / "out", "--jobs", "2", "--tolerance", "0.05%")
-    process = subprocess.Popen([*asked, "--effort", "thorough"], stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
-
-    def children():
-        found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(process.pid)], capture_output=True, text=True).stdout
-        return [int(pid) for pid in found.split()]
-
-    began = time.monotonic()
-    while len(started := children()) < 2 and time.monotonic() - began < 30:
-        time.sleep(0.05)
-    time.sleep(1)
-    process.send_signal(signal.SIGTERM)
-    _, err = process.communicate(timeout=10)
+def test_a_signal_ends_all_processes(folder, tmp_path_factory):
+    asked = "batch", folder / "in" / "*", "--out", folder / "out", "--jobs", "2", "--tolerance", "1%"
+    with hanging(tmp_path_factory.mktemp("hanging"), 2, *asked) as (process, started):
+        process.send_signal(signal.SIGTERM)
+        _, err = process.communicate(timeout=WITHIN)
     assert process.returncode == 128 + signal.SIGTERM and err.endswith("tolvol: ended by SIGTERM\n")
-    assert len(started) == 2 and not any(os.path.exists(f"/proc/{pid}") for pid in started)
-    assert list((tmp_path / "out").iterdir()) == []
+    wait_until(lambda: not any(os.path.exists(f"/proc/{pid}") for pid in started))
+    assert list((folder / "out").iterdir()) == []

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The guards, with Blender's own tools in a real window."""
 
+from unittest import mock
+
 import bpy
 import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
@@ -202,6 +204,8 @@ def test_guard_editing_by_keys():
     with window_context():
         bpy.ops.mesh.solidify("EXEC_DEFAULT", True, thickness=0.5)
         bpy.ops.transform.translate("INVOKE_DEFAULT", True)
+    with mock.patch.object(guard.undo, "_send_move", wraps=guard.undo._send_move) as send:
+        yield from finished(lambda: send.called)
     xdotool("mousemove_relative", 0, -30)
     yield
     assert len(coordinates()) > len(states[2])
@@ -244,7 +248,9 @@ def test_guard_undoes_an_edit_of_the_faces_while_the_mouse_rests():
     with window_context():
         bpy.ops.mesh.solidify("EXEC_DEFAULT", True, thickness=0.5)
         bpy.ops.transform.translate("INVOKE_DEFAULT", True)
-    yield from at_rest()
+    with mock.patch.object(guard.undo, "_send_move", wraps=guard.undo._send_move) as send:
+        yield from finished(lambda: send.called)
+    yield  # The operator takes the mouse move that would undo the edit.
     assert len(coordinates()) > len(before)
     key("Return")
     yield from finished(lambda: np.array_equal(coordinates(), before))
