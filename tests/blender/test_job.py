@@ -124,7 +124,7 @@ def stubborn(progress):
     """Work that ends only after it is cancelled and, like native code, some time later."""
     while not progress.cancelled:
         native.module.pause(0.001)
-    native.module.pause(0.2)
+    native.module.pause(0.2)  # longer than the main thread gives a job that it only looks at
 
 
 def test_jobs_are_waited_for_when_blender_ends():

@@ -118,17 +118,26 @@ def test_a_call_that_is_cancelled_before_it_starts(call):
         CALLS[call](progress)
 
 
-def after(seconds, action):
-    timer = threading.Timer(seconds, action)
-    timer.start()
-    return timer
+def interrupted(when):
+    """Starts a thread that presses Ctrl-C as soon as when() is true."""
+
+    def interrupt():
+        while not when():
+            time.sleep(0.0005)
+        _thread.interrupt_main()
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    return thread
 
 
 def test_ctrl_c_stops_a_call():
-    timer = after(0.3, _thread.interrupt_main)
+    progress = tolvol.Progress()
+    thread = interrupted(lambda: progress.fraction > 0)
     with pytest.raises(KeyboardInterrupt):
-        tolvol.decimate(*LARGE, VOLUME, effort="thorough")
-    timer.join()
+        tolvol.decimate(*LARGE, VOLUME, effort="thorough", progress=progress)
+    thread.join()
+    assert progress.stage != "refining", "it went on"
     # The cancelled call does not affect the next one.
     assert (VOLUME.check(*LARGE).verdicts == tolvol.Verdict.INSIDE).all()
 
@@ -137,17 +146,12 @@ def test_a_handler_of_ctrl_c_may_keep_what_a_thorough_decimation_has():
     progress = tolvol.Progress()
     before = signal.signal(signal.SIGINT, lambda *_: progress.finish())
 
-    def interrupt():
-        while progress.stage != "refining":
-            time.sleep(0.001)
-        _thread.interrupt_main()
-
-    timer = after(0, interrupt)
+    thread = interrupted(lambda: progress.stage == "refining")
     try:
         result = tolvol.decimate(*SMALLER, VOLUME_OF_SMALLER, effort="thorough", progress=progress)
     finally:
         signal.signal(signal.SIGINT, before)
-    timer.join()
+    thread.join()
     assert result.report["stopped_by"] == "request"
     assert tolvol.directed_hausdorff(result.vertices, result.triangles, *SMALLER, bound=TOLERANCE).upper <= TOLERANCE
 
