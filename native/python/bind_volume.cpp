@@ -155,7 +155,7 @@ tolerance : float
 precision : float, optional
     Grid nodes per tolerance. None takes the finest of 1, 1/2, 1/4, ... whose grid fits grid_memory.
 grid_memory : int, optional
-    The most bytes that the grid takes if no precision is given. None, and any number above, is 256 MiB. Less makes proofs
+    The most bytes that the grid takes if no precision is given. None is 256 MiB, which is also the most. Less makes proofs
     slower, and no verdict wrong.
 field : {"scatter", "fast_marching"}
     What fills the grid: exact distances, or the method of the paper, which is signed, for comparison.

@@ -2,7 +2,7 @@
 """Tolerance volumes: keep a triangle mesh within a tolerance of a reference surface, proved.
 
 A ToleranceVolume holds all points within a tolerance of a reference mesh. The functions decimate, smooth, deform and
-constrain and the class Guard keep a mesh in it, and close_holes fills the holes that are smaller than the tolerance.
+constrain and the class Guard keep a mesh in it, and close_holes fills the holes that can be filled in it.
 hausdorff, directed_hausdorff and deviation measure the distances of two meshes. They share no bounds with the functions
 before, whose results they judge.
 
@@ -13,7 +13,7 @@ These conventions hold for every function:
   None is the identity. Functions without to_world take coordinates in one common space.
 - triangles is an (m, 3) integer array of indices of vertices. Functions that also take points, segments and quads call it
   faces: (m, k), with k from 1 to 4.
-- threads is the number of threads, or None for one per core. The result never depends on it.
+- threads is the number of threads, or None for one per core. Only with max_seconds does the result depend on it.
 - progress is a Progress, by which another thread follows the call and stops it, or None. Long calls release the GIL.
 - None stands for "no limit" and for "not given". All options after the first few arguments are given by name.
 - Errors are TolvolErrors. What is wrong with an argument is an InvalidInput, which is a ValueError too.
