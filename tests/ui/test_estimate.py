@@ -70,7 +70,7 @@ def test_the_number_follows_the_tolerance_while_it_is_dragged():
         screenshot("estimate 2 dragged")
         held = [(percent, answer.after) for percent, answer in answers]
         xdotool("mouseup", 1)
-        yield from at_rest()
+        yield from at_rest(beside=())
         assert len({percent for percent, _ in held}) >= 4, answers
         # As the curve gets finer, the answer for one tolerance may change: the last one counts.
         counts = [count for _, count in sorted(dict(held).items())]

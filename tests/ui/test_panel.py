@@ -9,7 +9,6 @@ import numpy as np
 import job_time
 import scenes
 from addon import native, reference
-from addon.background import queue
 from addon.mesh import mesh_io
 from addon.overlay import legend
 from addon.panels import deviation, notes
@@ -321,18 +320,17 @@ def test_the_answer_of_check_is_seen_without_moving_the_mouse():
     suzanne().data.update()
     xdotool("mousemove", *centre())
     yield
-    yield from finished(lambda: not queue._waiting and queue._running is None)  # the estimate
-    before = yield from still(sidebar_pixels)
+    before = yield from still(sidebar_pixels, beside=())  # The sidebar shows the estimate.
     assert verdict.of(suzanne()) is None
     with window_context(), job_time.in_background():
         bpy.ops.tolvol.check("INVOKE_DEFAULT")
     yield from finished(lambda: verdict.of(suzanne()) is not None)
     yield from finished(lambda: (sidebar_pixels() != before).any())
-    seen = yield from still(sidebar_pixels)
+    seen = yield from still(sidebar_pixels, beside=())
     screenshot("14 checked without the mouse")
     view()[1].tag_redraw()
     yield from at_rest()
-    assert (seen == (yield from still(sidebar_pixels))).all()
+    assert (seen == (yield from still(sidebar_pixels, beside=()))).all()
 
 
 def test_what_replaces_the_original_asks():

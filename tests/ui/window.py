@@ -95,12 +95,22 @@ def handled():
         yield 0.0
 
 
-def at_rest():
-    """Waits until the add-on has no work, in the background or in a job, and Blender has drawn what has come of it."""
+def at_rest(beside=("estimate",)):
+    """Waits until the add-on has no work, in the background or in a job, and Blender has drawn what has come of it.
+
+    beside: the kinds of tasks that may go on. An estimate takes minutes for some meshes.
+    """
     yield  # What is drawn may ask for work.
-    while queue._waiting or queue._running or job.under_way() or thread.at_work():
-        yield from finished(lambda: not (queue._waiting or queue._running or job.under_way() or thread.at_work()))
+    while _at_work(beside):
+        yield from finished(lambda: not _at_work(beside))
         yield
+
+
+def _at_work(beside):
+    about, _, running, _ = queue._running or (("",), None, None, None)
+    let = running if about[0] in beside else None
+    waits = any(about[0] not in beside for about in queue._waiting)
+    return bool(waits or running is not let or job.under_way() or any(one is not let for one in thread.at_work()))
 
 
 def finished(change, within=_STUCK, pause=0.05):
@@ -111,11 +121,11 @@ def finished(change, within=_STUCK, pause=0.05):
         yield pause
 
 
-def still(read):
-    """Waits until read() returns the same array twice, with all that Blender and the add-on do between. Returns that array."""
+def still(read, **options):
+    """Waits until read() returns the same array twice, with an at_rest() of these options between. Returns that array."""
     last, now = None, read()
     while last is None or not np.array_equal(last, now):
-        yield from at_rest()
+        yield from at_rest(**options)
         last, now = now, read()
     return now
 
