@@ -3,6 +3,7 @@
 
 import sys
 import threading
+import time
 
 import pytest
 
@@ -17,20 +18,30 @@ PATIENCE = 60  # seconds after which a thread counts as stuck
 
 @pytest.fixture
 def builds(monkeypatch):
-    """Builds volumes. Building waits for .go and then calls .end(); .begun counts the builds."""
+    """Builds volumes. Building waits for .go and then calls .end(); .begun counts the builds.
+
+    .second is set once a second thread waits for the one that builds, or builds as well.
+    """
 
     class Builds:
-        begun, go, end = 0, threading.Event(), staticmethod(lambda: None)
+        begun, go, second, end = 0, threading.Event(), threading.Event(), staticmethod(lambda: None)
 
-    build = native.module.ToleranceVolume
+    build, pause = native.module.ToleranceVolume, native.module.pause
+
+    def waits(seconds):
+        Builds.second.set()
+        pause(seconds)
 
     def built(*arguments, **options):
         Builds.begun += 1
+        if Builds.begun > 1:
+            Builds.second.set()
         assert Builds.go.wait(PATIENCE)
         Builds.end()
         return build(*arguments, **options)
 
     monkeypatch.setattr(native.module, "ToleranceVolume", built)
+    monkeypatch.setattr(native.module, "pause", waits)
     reference.forget_all()
     return Builds
 
@@ -81,7 +92,7 @@ def test_a_panel_is_drawn_while_jobs_add_and_drop_volumes(monkeypatch):
 def test_two_jobs_that_need_one_volume_build_it_once(builds):
     surface = snapshots.surface_of(torus(around=12, across=6))
     jobs = [Asking(surface, 0.1) for _ in range(2)]
-    jobs[1].join(0.3)  # The second thread now either builds or waits.
+    assert builds.second.wait(PATIENCE)
     builds.go.set()
     assert all(job.ended() for job in jobs)
     assert builds.begun == 1 and jobs[0].volume is jobs[1].volume is not None
@@ -89,8 +100,11 @@ def test_two_jobs_that_need_one_volume_build_it_once(builds):
 
 def test_a_job_that_waits_for_anothers_volume_can_be_cancelled(builds):
     surface = snapshots.surface_of(torus(around=12, across=6))
-    first, second = Asking(surface, 0.1), Asking(surface, 0.1)
-    second.join(0.3)
+    first = Asking(surface, 0.1)
+    while not builds.begun:
+        time.sleep(0.001)
+    second = Asking(surface, 0.1)
+    assert builds.second.wait(PATIENCE)
     second.progress.cancel()
     assert second.ended() and isinstance(second.error, native.module.Cancelled)
     builds.go.set()
@@ -106,7 +120,7 @@ def test_a_volume_that_failed_is_built_by_the_job_that_waited_for_it(builds):
 
     builds.end = fail_once
     jobs = [Asking(surface, 0.1) for _ in range(2)]
-    jobs[1].join(0.3)
+    assert builds.second.wait(PATIENCE)
     builds.go.set()
     assert all(job.ended() for job in jobs)
     assert sorted(type(job.error) for job in jobs if job.error) == [MemoryError]
