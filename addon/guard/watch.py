@@ -2,10 +2,10 @@
 """Watches one mesh that Blender's tools edit: keeps it within the tolerance and remembers how much was held back."""
 
 import hashlib
-import itertools
 import time
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import bpy
 import numpy as np
@@ -21,9 +21,9 @@ from ..shared.surface import MeshArrays
 
 # Blender waits so many seconds for a guard to be prepared. If preparing takes longer, it goes on in a thread.
 _PATIENCE = 0.4
-# A face with more corners is refused: all triangles between any three corners are kept inside, and for 64 corners these
-# are 41,664 triangles.
-_MOST_CORNERS = 64
+# An edit after which Blender cuts polygons otherwise, so that they would not be kept within the tolerance, goes on without
+# the corners of these polygons at most so many times. Then nothing moves.
+_MOST_TRIES = 16
 # After so many seconds without an edit the next edit counts as another stroke.
 _STROKE_GAP = 0.5
 # So many pairs of triangles that cross are found at most, those of the triangulations of one quad included.
@@ -71,43 +71,46 @@ def points_of(ob):
 
 @dataclass(frozen=True)
 class Faces:
-    """The faces that have to stay inside in every triangulation, and the triangles that Blender shows for them."""
+    """The polygons of a mesh as a guard keeps them: as the triangles that Blender shows, and quads in their other
+    triangulation as well."""
 
-    larger: int  # the number of polygons with more than four corners
-    faces: np.ndarray  # (m, 3) or (m, 4) int32
-    polygons: np.ndarray  # (m,) the polygon of each face
-    shown: np.ndarray  # (k, 3) int32 triangles
+    all: mesh_io.Polygons
+    larger: np.ndarray  # (p,) the polygons with more than three corners
+    larger_corners: mesh_io.Polygons  # of these
+    shown: np.ndarray  # (k, 3) int32: the triangles that Blender shows, those of one polygon after those of another
     shown_polygons: np.ndarray  # (k,) the polygon of each triangle
 
     @classmethod
-    def of(cls, mesh):
-        """Takes quads whole. A face with more corners stands for every triangle between any three of its corners, because
-        Blender may triangulate the face in any way."""
-        arrays = mesh_io.read_mesh(mesh)
-        starts = mesh_io.column(mesh.polygons, "loop_start", 1, np.int32)
-        sizes = mesh_io.column(mesh.polygons, "loop_total", 1, np.int32)
-        corners = mesh_io.column(mesh.loops, "vertex_index", 1, np.int32)
-        if sizes.max() > _MOST_CORNERS:
-            raise Refused(
-                f"A face has {sizes.max()} corners, too many for a guard: use Face > Triangulate Faces in Edit Mode"
-            )
-        faces, polygons = [], []
-        for size in np.unique(sizes):
-            found = np.flatnonzero(sizes == size)
-            pieces = [(0, 1, 2, 3)] if size == 4 else list(itertools.combinations(range(size), 3))
-            pieces = np.array([(*piece, piece[-1])[:4] for piece in pieces])
-            faces.append(corners[starts[found][:, None, None] + pieces].reshape(-1, 4))
-            polygons.append(np.repeat(found, len(pieces)))
-        faces = np.concatenate(faces)
-        if sizes.max() == 3:
-            faces = np.ascontiguousarray(faces[:, :3])
-        return cls(int(np.count_nonzero(sizes > 4)), faces, np.concatenate(polygons), arrays.triangles, arrays.polygons)
+    def at(cls, mesh, positions):
+        """Takes the polygons of a mesh as they would be shown if the vertices were at these positions."""
+        polygons = mesh_io.Polygons.of(mesh)
+        larger = np.flatnonzero(polygons.sizes > 3)
+        of_triangles = np.repeat(np.arange(len(polygons.sizes)), polygons.sizes - 2)
+        return cls(polygons, larger, polygons.chosen(larger), polygons.triangles_at(positions), of_triangles)
+
+    @cached_property
+    def guarded(self):
+        """The faces for a guard, (m, 3) or (m, 4) int32, and the polygon of each, (m,)."""
+        return self.all.whole_quads(self.shown)
+
+    def moved(self, before, after):
+        """Returns these faces as Blender shows them after a motion: this object itself if it cuts no polygon otherwise."""
+        moves = (before != after).any(1)
+        chosen = np.zeros(len(self.larger), bool)
+        chosen[self.larger_corners.of_corners()[moves[self.larger_corners.corners]]] = True
+        if not chosen.any():
+            return self
+        triangles = np.flatnonzero(np.isin(self.shown_polygons, self.larger[chosen]))
+        shown = self.shown.copy()
+        shown[triangles] = self.larger_corners.chosen(np.flatnonzero(chosen)).triangles_at(after)
+        return self if np.array_equal(shown, self.shown) else replace(self, shown=shown)
 
     def crossing_count(self, positions, threads, progress):
-        """Returns how many pairs of polygons cross in any of their triangulations. The mesh has no larger polygons."""
-        triangles, of_face = mesh_io.cut_both_ways(self.faces)
+        """Returns how many pairs of polygons cross in any of these triangulations."""
+        faces, polygons = self.guarded
+        triangles, of_face = mesh_io.cut_both_ways(faces)
         found = solidity.crossing_pairs(MeshArrays(positions, triangles, None, None), threads, progress, _MOST_PAIRS)
-        pairs = np.sort(self.polygons[of_face][found], axis=1)
+        pairs = np.sort(polygons[of_face][found], axis=1)
         return len(np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0))
 
     def outside(self, built, positions, options):
@@ -190,41 +193,35 @@ class Watch(Preparing):
             self.reason = reason
             return
         try:
-            self._faces = faces = Faces.of(ob.data)
+            self._faces = faces = Faces.at(ob.data, positions)
             reference, tolerance, matrix, threads = needed(ob)
         except (Refused, native.module.TolvolError) as error:
             self.reason = str(error)
             return
 
-        both = ob.tolvol.keep == "BOTH"
-        # A larger polygon stands for triangles that are not all there, so that they cannot be witnesses.
-        self.two_sided = two_sided = both and not faces.larger
-        keeps_out, accepted = ob.tolvol.guard.crossings, self._accepted
-        # The triangles that it stands for cross each other as well.
-        crossings = "keep_out" if keeps_out and not faces.larger else "allow"
-        # Where the polygon is concave, some of these triangles are turned over.
-        angle = 180 if faces.larger else None
+        self.two_sided = two_sided = ob.tolvol.keep == "BOTH"
+        crossings = "keep_out" if ob.tolvol.guard.crossings else "allow"
+        accepted = self._accepted
 
         def work(progress):
             built = volumes.native_volume(reference, tolerance, threads, progress)
             options = {"to_world": matrix, "threads": threads, "progress": progress}
-            keep = {"two_sided": two_sided, "outside": "keep", "crossings": crossings, "max_normal_angle": angle}
-            guard = native.module.Guard(positions, faces.faces, built, **keep, **options)
-            # A concave face may be inside in its present triangulation and outside in another one. The guard keeps the
-            # corners of such a face where they are.
-            kept = len(np.unique(faces.polygons[guard.outside]))
+            keep = {"two_sided": two_sided, "outside": "keep", "crossings": crossings}
+            rows, polygons = faces.guarded
+            guard = native.module.Guard(positions, rows, built, **keep, **options)
+            # A concave quad may be inside in its present triangulation and outside in the other one. The guard keeps the
+            # corners of such a quad where they are.
+            kept = len(np.unique(polygons[guard.outside]))
             if kept:
                 remark = f"{kept:,} concave faces stay where they are"
             elif guard.uncovered:
                 remark = f"{guard.uncovered:,} faces of the reference are beyond the tolerance: what is nearest stays"
             else:
                 remark = next(iter(guard.warnings), None)
-            if faces.larger:
-                remark = ". ".join(filter(None, (_not_kept(faces.larger, both, keeps_out), remark)))
             uncovered = None
-            if edits_faces and both:
+            if edits_faces and two_sided:
                 uncovered = np.zeros(len(reference.arrays.triangles), bool)
-                if guard.uncovered or not two_sided:
+                if guard.uncovered:
                     uncovered = uncovered_faces(reference, positions, faces.shown, tolerance, options)
             crossing = None
             if accepted is not None and crossings == "keep_out":
@@ -272,29 +269,46 @@ class Watch(Preparing):
             self._held[:] = False
         self._edited_at = now
         try:
-            indices, places = self._guard.constrain(positions)
+            indices = self._constrain(positions)
         except native.module.TolvolError as error:  # for example, a coordinate is not finite
             self.on, self.reason = False, str(error)
             return _NONE
         if len(indices):
-            positions[indices] = places
             self._held[indices] = True
             self.rest_at = now + REST
         self._last = positions
         return indices
+
+    def _constrain(self, positions):
+        """Moves those vertices in the array that would leave the tolerance. Returns their indices.
+
+        Blender may cut polygons otherwise after the motion. Then the guard has to go on with the triangles that Blender
+        shows now. The corners of polygons of which it cannot take these go back to where they were.
+        """
+        held = np.zeros(len(positions), bool)
+        for tries_left in reversed(range(_MOST_TRIES + 1)):
+            indices, places = self._guard.constrain(positions)
+            positions[indices], held[indices] = places, True
+            shown = self._faces.moved(self._last, positions)
+            if shown is self._faces:
+                break
+            faces, polygons = shown.guarded
+            refused = self._guard.replace_faces(faces)
+            if not len(refused):
+                self._faces = shown
+                break
+            stays = shown.all.chosen(np.unique(polygons[refused])).corners if tries_left > 1 else slice(None)
+            held[stays] |= (positions[stays] != self._last[stays]).any(1)
+            positions[stays] = self._last[stays]
+            if len(self._guard.constrain(self._last)[0]):
+                self._guard.reset(self._last)
+        return np.flatnonzero(held)
 
     def said(self):
         """Returns the message about the last stroke, or None."""
         if self._held.any():
             return f"Held back {self.held_back:,} vertices"
         return self.remark
-
-
-def _not_kept(count, both, keeps_out):
-    """Returns what a guard does not keep because of so many faces with more than four corners."""
-    lost = [*(["one way only"] if both else []), *(["crossings allowed"] if keeps_out else []), "faces may turn over"]
-    faces = "1 face has" if count == 1 else f"{count:,} faces have"
-    return f"{', '.join(lost).capitalize()}: {faces} more than four corners. Triangulate Faces helps"
 
 
 def uncovered_faces(reference, positions, triangles, tolerance, options):

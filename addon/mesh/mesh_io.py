@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads Blender's meshes as arrays (stored coordinates and the triangles that Blender shows) and writes arrays to them."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import bmesh
 import bpy
@@ -43,25 +43,68 @@ def triangle_count(mesh):
     return len(mesh.loops) - 2 * len(mesh.polygons)
 
 
-def whole_quads(mesh, arrays):
-    """Returns faces for a check of quads in both their triangulations: (m, 4), or (m, 3) if the mesh has no quads.
+@dataclass(frozen=True)
+class Polygons:
+    """The polygons of a mesh by the vertices of their corners, one polygon after the other."""
 
-    In (m, 4) a triangle repeats its last corner. A face with more than four corners is replaced by the triangles that
-    Blender shows. arrays: the arrays of the mesh.
-    """
-    sizes = column(mesh.polygons, "loop_total", 1, np.int32)
-    quad = sizes == 4
-    if not quad.any():
-        return arrays.triangles
-    corners = column(mesh.polygons, "loop_start", 1, np.int32)[quad][:, None] + np.arange(4)
-    quads = column(mesh.loops, "vertex_index", 1, np.int32)[corners]
-    others = arrays.triangles[~quad[arrays.polygons]]
-    return np.concatenate([quads, others[:, [0, 1, 2, 2]]])
+    corners: np.ndarray  # (k,) int32: the vertex of each corner
+    sizes: np.ndarray  # (p,) int32: the number of corners of each polygon
+
+    @classmethod
+    def of(cls, mesh):
+        starts, sizes = (column(mesh.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total"))
+        return cls(column(mesh.loops, "vertex_index", 1, np.int32)[_runs(starts, sizes)], sizes)
+
+    def of_corners(self):
+        """Returns (k,): the polygon of each corner."""
+        return np.repeat(np.arange(len(self.sizes)), self.sizes)
+
+    def chosen(self, polygons):
+        """Returns the polygons with these indices, ascending."""
+        starts, sizes = np.cumsum(self.sizes) - self.sizes, self.sizes[polygons]
+        return Polygons(self.corners[_runs(starts[polygons], sizes)], sizes)
+
+    def triangles_at(self, vertices):
+        """Returns (m, 3) int32: the triangles that Blender shows for the polygons when the vertices are at these
+        positions, those of one polygon after those of another. They depend on the corners of the polygon alone."""
+        used, corners = np.unique(self.corners, return_inverse=True)
+        scratch = bpy.data.meshes.new(".triangles")
+        try:
+            _add_polygons(scratch, vertices[used], Polygons(corners, self.sizes))
+            return used[column(loop_triangles(scratch), "vertices", 3, np.int32)].astype(np.int32)
+        finally:
+            # Nothing uses the datablock: it is not necessary to look for users of it everywhere.
+            bpy.data.meshes.remove(scratch, do_unlink=False)
+
+    def whole_quads(self, triangles):
+        """Returns faces for a check of quads in both their triangulations, and the polygon of each: (m, 4) or, if there are
+        no quads, (m, 3).
+
+        triangles: those of the polygons, as triangles_at() returns them. A quad begins where the diagonal does along which
+        Blender cuts it. In (m, 4) a triangle repeats its last corner. A face with more than four corners is replaced by its
+        triangles.
+        """
+        of_triangles = np.repeat(np.arange(len(self.sizes)), self.sizes - 2)
+        quad = self.sizes == 4
+        if not quad.any():
+            return triangles, of_triangles
+        quads = self.chosen(np.flatnonzero(quad)).corners.reshape(-1, 4)
+        shown = triangles[quad[of_triangles]].reshape(-1, 6)
+        otherwise = np.count_nonzero(shown == quads[:, :1], axis=1) == 1
+        quads[otherwise] = np.roll(quads[otherwise], -1, axis=1)
+        others = ~quad[of_triangles]
+        faces = np.concatenate([quads, triangles[others][:, [0, 1, 2, 2]]])
+        return faces, np.concatenate([np.flatnonzero(quad), of_triangles[others]])
+
+
+def _runs(starts, sizes):
+    """Returns the numbers from each start on, as many as its size says, one run after the other."""
+    return np.arange(sizes.sum()) + np.repeat(starts - (np.cumsum(sizes) - sizes), sizes)
 
 
 def both_triangulations(mesh, arrays):
     """Returns the arrays of a mesh with the triangles of its quads along either diagonal."""
-    return replace(arrays, triangles=cut_both_ways(whole_quads(mesh, arrays))[0])
+    return replace(arrays, triangles=cut_both_ways(Polygons.of(mesh).whole_quads(arrays.triangles)[0])[0])
 
 
 def cut_both_ways(faces):
@@ -91,9 +134,8 @@ def faces_of_corners(mesh):
     Before Blender 4.0 a face may have its corners anywhere among those of the mesh: scripts and importers choose loop_start.
     """
     begins, sizes = (column(mesh.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total"))
-    corners = np.arange(sizes.sum()) + np.repeat(begins - (np.cumsum(sizes) - sizes), sizes)
     faces = np.zeros(len(mesh.loops), np.int32)
-    faces[corners] = np.repeat(np.arange(len(sizes)), sizes)
+    faces[_runs(begins, sizes)] = np.repeat(np.arange(len(sizes)), sizes)
     return faces
 
 
@@ -163,17 +205,21 @@ def move_edited(mesh, indices, places):
 def new_mesh(name, vertices, faces):
     """Returns a new datablock that holds these coordinates, rounded to float32, and these faces, (m, k)."""
     mesh = bpy.data.meshes.new(name)
-    mesh.vertices.add(len(vertices))
-    mesh.vertices.foreach_set("co", np.ascontiguousarray(vertices, np.float32).ravel())
-    mesh.loops.add(faces.size)
-    mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(faces, np.int32).ravel())
-    mesh.polygons.add(len(faces))
-    corners = faces.shape[1]
-    mesh.polygons.foreach_set("loop_start", np.arange(0, faces.size, corners, dtype=np.int32))
-    if bpy.app.version < (4, 0):  # From 4.0 on Blender computes loop_total, and it is read-only.
-        mesh.polygons.foreach_set("loop_total", np.full(len(faces), corners, np.int32))
+    _add_polygons(mesh, vertices, Polygons(faces.ravel(), np.full(len(faces), faces.shape[1], np.int32)))
     mesh.update(calc_edges=True)
     return mesh
+
+
+def _add_polygons(mesh, vertices, polygons):
+    """Gives an empty mesh these vertices and polygons, and no edges."""
+    mesh.vertices.add(len(vertices))
+    mesh.vertices.foreach_set("co", np.ascontiguousarray(vertices, np.float32).ravel())
+    mesh.loops.add(len(polygons.corners))
+    mesh.loops.foreach_set("vertex_index", np.ascontiguousarray(polygons.corners, np.int32))
+    mesh.polygons.add(len(polygons.sizes))
+    mesh.polygons.foreach_set("loop_start", (np.cumsum(polygons.sizes) - polygons.sizes).astype(np.int32))
+    if bpy.app.version < (4, 0):  # From 4.0 on Blender computes loop_total, and it is read-only.
+        mesh.polygons.foreach_set("loop_total", np.ascontiguousarray(polygons.sizes, np.int32))
 
 
 def matrix_array(matrix):

@@ -36,7 +36,7 @@ class Motion:
         self.tolerance = tolerances.required(ob, self.size)
         self.two_sided = ob.tolvol.keep == "BOTH"
         self.crossings = ob.tolvol.crossings.lower()
-        self.faces = mesh_io.whole_quads(ob.data, self.surface.arrays)
+        self.faces, _ = mesh_io.Polygons.of(ob.data).whole_quads(self.surface.arrays.triangles)
         self.threads = threads
         self.warnings = []  # of hold()
         self._mesh = ob.data

@@ -26,6 +26,7 @@ glm::dvec3 at(std::span<const float> positions, std::size_t vertex) {
 Guard::Guard(std::span<const float> positions, std::vector<std::uint32_t> faces, int corners,
              const glm::dmat4& to_world, const ToleranceVolume& volume, const Options& options)
     : faces_(std::move(faces)),
+      corners_(corners),
       last_(positions.size()),
       options_(options),
       pull_back_(volume, StoredSpace(to_world, Storage::float32), faces_, corners, positions.size() / 3,
@@ -56,6 +57,49 @@ void Guard::reset(std::span<const float> positions, Progress* progress) {
   interrupted_ = false;
 }
 
+std::vector<std::uint32_t> Guard::replace_faces(std::vector<std::uint32_t> faces, Progress* progress) {
+  const auto corners = static_cast<std::size_t>(corners_);
+  if (faces.size() != faces_.size()) {
+    throw InvalidInput("the guard has " + std::to_string(faces_.size() / corners) + " faces, not " +
+                       std::to_string(faces.size() / corners) + "; make a new one when faces come or go");
+  }
+  require_vertices(faces, corners, vertex_count());
+  const Call call(progress);
+  resume();
+  std::vector<std::uint32_t> differing, refused;
+  for (std::uint32_t f = 0; f < faces.size() / corners; ++f) {
+    const auto first = faces.begin() + static_cast<std::ptrdiff_t>(f * corners);
+    if (std::equal(first, first + corners_, faces_.begin() + (first - faces.begin()))) continue;
+    differing.push_back(f);
+    // Such a face keeps less than others, which another face in its place must not do.
+    const auto is_in = [&](const std::vector<std::uint32_t>& found) { return std::ranges::binary_search(found, f); };
+    if (is_in(start_.outside) || is_in(start_.exceeding)) refused.push_back(f);
+  }
+  if (!refused.empty()) return refused;
+  const auto exchange = [&] {
+    for (const std::uint32_t f : differing) {
+      const auto first = static_cast<std::ptrdiff_t>(f * corners);
+      std::swap_ranges(faces.begin() + first, faces.begin() + first + corners_, faces_.begin() + first);
+    }
+  };
+  interrupted_ = true;
+  exchange();
+  try {
+    refused = pull_back_.replace_faces(differing, progress);
+  } catch (...) {
+    exchange();
+    throw;
+  }
+  if (!refused.empty()) exchange(), pull_back_.restore_faces(differing);
+  interrupted_ = false;
+  return refused;
+}
+
+/// Starts again from the state if an exception has left the rest of the guard unknown.
+void Guard::resume() {
+  if (interrupted_) begin(std::vector<float>(last_), nullptr), interrupted_ = false;
+}
+
 /// The vertices of which any bit differs from the state, ascending.
 std::vector<std::uint32_t> Guard::changed(std::span<const float> positions) const {
   const std::size_t count = vertex_count();
@@ -79,7 +123,7 @@ std::vector<std::uint32_t> Guard::changed(std::span<const float> positions) cons
 
 Guard::Correction Guard::constrain(std::span<const float> positions) {
   require_size(positions);
-  if (interrupted_) begin(std::vector<float>(last_), nullptr), interrupted_ = false;
+  resume();
   const PullBack::Moving moving = pull_back_.moving(changed(positions));
   std::vector<glm::dvec3> before, after;
   for (const std::uint32_t v : moving.vertices) before.push_back(at(last_, v)), after.push_back(at(positions, v));

@@ -2,6 +2,7 @@
 #include "motion/moving_coverage.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "base/call.h"
 #include "base/parallel.h"
@@ -126,6 +127,14 @@ std::vector<std::uint32_t> MovingCoverage::still_failing(std::span<const std::ui
   return {};
 }
 
+std::vector<std::uint32_t> MovingCoverage::failing_replaced(std::span<const std::uint32_t> faces) {
+  for (Layer& layer : layers_) {
+    std::vector<std::uint32_t> failed = failing(layer, faces, Neighbours::only_take_pieces, Chosen::are_replaced);
+    if (!failed.empty()) return failed;
+  }
+  return {};
+}
+
 /// The faces that may lose a piece.
 std::vector<std::uint32_t> MovingCoverage::unsettled(const Layer& layer, std::span<const std::uint32_t> faces) const {
   const auto of_face = static_cast<std::uint32_t>(layer.triangles.size());
@@ -146,7 +155,7 @@ std::vector<std::uint32_t> MovingCoverage::unsettled(const Layer& layer, std::sp
 
 /// Tries to find witnesses for the pieces of these faces among all faces around them.
 std::vector<std::uint32_t> MovingCoverage::failing(Layer& layer, std::span<const std::uint32_t> faces,
-                                                   Neighbours neighbours) {
+                                                   Neighbours neighbours, Chosen chosen) {
   const auto of_face = static_cast<std::uint32_t>(layer.triangles.size());
   std::vector<std::uint32_t> vertices;
   for (const std::uint32_t f : faces) {
@@ -162,9 +171,10 @@ std::vector<std::uint32_t> MovingCoverage::failing(Layer& layer, std::span<const
     for (std::uint32_t k = 0; k < of_face; ++k) {
       const auto& [a, b, c] = layer.triangles[k];
       const std::uint32_t element = of_face * f + k;
-      layer.elements.push_back({element,
-                                {mesh_->trial(corners[a]), mesh_->trial(corners[b]), mesh_->trial(corners[c])},
-                                loses ? moved(layer, element) : 0});
+      const double by =
+          chosen == Chosen::are_replaced ? std::numeric_limits<double>::infinity() : moved(layer, element);
+      layer.elements.push_back(
+          {element, {mesh_->trial(corners[a]), mesh_->trial(corners[b]), mesh_->trial(corners[c])}, loses ? by : 0});
     }
   }
   layer.trial.begin();

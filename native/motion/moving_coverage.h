@@ -32,6 +32,9 @@ class MovingCoverage {
   std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces);
   /// Takes another look at faces that failing() returned: which of them fail still? It proves nothing of other faces.
   std::vector<std::uint32_t> still_failing(std::span<const std::uint32_t> failed);
+  /// Returns faces of `faces`, whose corners are others now, whose pieces would have no witness in the state, which is
+  /// on trial; none if every piece has one. accept() makes the faces part of the state then.
+  std::vector<std::uint32_t> failing_replaced(std::span<const std::uint32_t> faces);
   /// Goes with the mesh to its trial, for which failing() found no face last. The mesh itself accepts it after this.
   void accept(std::span<const std::uint32_t> faces);
   /// Whether failing() last found a piece that had been divided so often that it could not be divided again.
@@ -55,7 +58,10 @@ class MovingCoverage {
   std::vector<std::uint32_t> unsettled(const Layer& layer, std::span<const std::uint32_t> faces) const;
   /// The faces that may lose pieces, and whether their neighbours may lose pieces as well.
   enum class Neighbours { lose_pieces, only_take_pieces };
-  std::vector<std::uint32_t> failing(Layer& layer, std::span<const std::uint32_t> faces, Neighbours neighbours);
+  /// Whether these faces carry their pieces along where they can, or lose all of them because they are other faces now.
+  enum class Chosen { move, are_replaced };
+  std::vector<std::uint32_t> failing(Layer& layer, std::span<const std::uint32_t> faces, Neighbours neighbours,
+                                     Chosen chosen = Chosen::move);
   /// Witnesses of the state, the faces of the reference that have none, and the vertices nearest to these.
   struct Found {
     std::vector<Layer> layers;

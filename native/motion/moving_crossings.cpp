@@ -110,11 +110,10 @@ bool MovingCrossings::is_due(std::uint32_t face) const {
                              [&](std::uint32_t v) { return clearance_ ? !clearance_->has(v, trial_[v]) : moves(v); });
 }
 
-bool MovingCrossings::triangles_cross_anew(std::uint32_t a, const PieceTriangle& shape_a, std::uint32_t b,
-                                           const PieceTriangle& shape_b) const {
+bool MovingCrossings::triangles_cross(std::uint32_t a, const PieceTriangle& shape_a, std::uint32_t b,
+                                      const PieceTriangle& shape_b) const {
   const Corners one = corners(trial_, a, shape_a), other = corners(trial_, b, shape_b);
-  return !surely_uncrossed(one, other) && faces_cross(one, other) &&
-         !faces_cross(corners(start_, a, shape_a), corners(start_, b, shape_b));
+  return !surely_uncrossed(one, other) && faces_cross(one, other);
 }
 
 /// Whether the face, or a triangle of it, becomes degenerate and was not so at the start.
@@ -124,18 +123,51 @@ bool MovingCrossings::degenerates(std::uint32_t face) const {
   });
 }
 
-bool MovingCrossings::cross_anew(std::uint32_t a, std::uint32_t b) const {
+/// Whether `pair` is true for a triangle of one face and a triangle of the other whose boxes meet on trial.
+template <class Pair>
+bool MovingCrossings::any_pair(std::uint32_t a, std::uint32_t b, Pair&& pair) const {
   if (corners_ == 3) {
     const PieceTriangle& whole = triangles_of(3).front();
-    return triangles_cross_anew(a, whole, b, whole);
+    return pair(whole, whole);
   }
   const std::span<const PieceTriangle> of_a = shapes(a), of_b = shapes(b);
   return std::ranges::any_of(of_a, [&](const PieceTriangle& shape_a) {
     return std::ranges::any_of(of_b, [&](const PieceTriangle& shape_b) {
-      return meet(box_of(corners(trial_, a, shape_a)), box_of(corners(trial_, b, shape_b))) &&
-             triangles_cross_anew(a, shape_a, b, shape_b);
+      return meet(box_of(corners(trial_, a, shape_a)), box_of(corners(trial_, b, shape_b))) && pair(shape_a, shape_b);
     });
   });
+}
+
+bool MovingCrossings::cross_anew(std::uint32_t a, std::uint32_t b) const {
+  return any_pair(a, b, [&](const PieceTriangle& shape_a, const PieceTriangle& shape_b) {
+    return triangles_cross(a, shape_a, b, shape_b) &&
+           !faces_cross(corners(start_, a, shape_a), corners(start_, b, shape_b));
+  });
+}
+
+void MovingCrossings::fit(std::span<const std::uint32_t> faces) {
+  if (corners_ < 3) return;
+  for (const std::uint32_t f : faces) tree_.change(f, box(f));
+}
+
+std::vector<std::uint32_t> MovingCrossings::crossing_replaced(std::span<const std::uint32_t> faces) {
+  fit(faces);
+  std::vector<std::uint32_t> result;
+  for (const std::uint32_t face : faces) {
+    poll();
+    bool crosses = std::ranges::any_of(
+        shapes(face), [&](const PieceTriangle& shape) { return is_degenerate(corners(trial_, face, shape)); });
+    const auto visit = [&](std::uint32_t other) {
+      crosses =
+          other != face && any_pair(face, other, [&](const PieceTriangle& of_face, const PieceTriangle& of_other) {
+            return triangles_cross(face, of_face, other, of_other);
+          });
+      return !crosses;
+    };
+    if (!crosses) tree_.for_each_meeting(box(face), visit);
+    if (crosses) result.push_back(face);
+  }
+  return result;
 }
 
 /// Adds to `failed` a face and the faces that it crosses anew. A pair of which both were asked about comes

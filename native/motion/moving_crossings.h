@@ -45,6 +45,13 @@ class MovingCrossings {
   /// face must be asked about after the last change to a corner. Throws Cancelled; take_back() has to follow then.
   /// About 1 us a face that moves, for a quad 5 us.
   std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Progress* progress);
+  /// Looks at these faces, whose corners are others now, in the state, which is on trial: which of them cross another
+  /// one or are degenerate, whatever was at the start?
+  std::vector<std::uint32_t> crossing_replaced(std::span<const std::uint32_t> faces);
+  /// Fits the boxes of these faces to the corners that they have now.
+  void fit(std::span<const std::uint32_t> faces);
+  /// Makes the state the start.
+  void restart() { start_ = state_; }
   /// Makes the trial of these vertices the state, for which failing() found no face last.
   void accept(std::span<const std::uint32_t> vertices);
   /// Makes the state the trial of these vertices. `faces` are all faces around them. It never throws.
@@ -60,9 +67,11 @@ class MovingCrossings {
   Box box(std::uint32_t face) const;
   bool is_due(std::uint32_t face) const;
   bool degenerates(std::uint32_t face) const;
+  bool triangles_cross(std::uint32_t a, const PieceTriangle& shape_a, std::uint32_t b,
+                       const PieceTriangle& shape_b) const;
+  template <class Pair>
+  bool any_pair(std::uint32_t a, std::uint32_t b, Pair&& pair) const;
   bool cross_anew(std::uint32_t a, std::uint32_t b) const;
-  bool triangles_cross_anew(std::uint32_t a, const PieceTriangle& shape_a, std::uint32_t b,
-                            const PieceTriangle& shape_b) const;
   void test(std::uint32_t face, std::vector<std::uint32_t>& failed) const;
   void build();
 

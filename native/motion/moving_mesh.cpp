@@ -194,17 +194,22 @@ std::vector<std::uint32_t> MovingMesh::failing(std::span<const std::uint32_t> fa
     return bound.distance == kUnproved;
   });
   for (std::uint32_t& i : open) i = faces[i];
-  measure(open, progress);
-  std::vector<std::uint8_t> failed(open.size());
-  parallel_for(open.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
+  return uncertified(open, progress);
+}
+
+/// Writes trial_distance_ of all these faces.
+std::vector<std::uint32_t> MovingMesh::uncertified(std::span<const std::uint32_t> faces, Progress* progress) {
+  measure(faces, progress);
+  std::vector<std::uint8_t> failed(faces.size());
+  parallel_for(faces.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(progress->fraction());
     for (std::size_t i = begin; i < end; ++i) {
-      const FaceBound bound = bound_by_certificate(open[i]);
-      set_trial_bound(open[i], bound);
+      const FaceBound bound = bound_by_certificate(faces[i]);
+      set_trial_bound(faces[i], bound);
       failed[i] = bound.distance == kUnproved;
     }
   });
-  return chosen(open, failed);
+  return chosen(faces, failed);
 }
 
 void MovingMesh::try_all(std::span<const std::uint32_t> vertices, std::span<const glm::dvec3> before,

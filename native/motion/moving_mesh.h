@@ -21,6 +21,9 @@
 
 namespace tolvol {
 
+/// Throws InvalidInput for the first face, of so many corners, with an index that is not below `vertex_count`.
+void require_vertices(std::span<const std::uint32_t> faces, std::size_t corners, std::size_t vertex_count);
+
 /// It holds a state, all of which is inside, and beside it a trial, which equals the state at first. Positions are in
 /// the frame.
 class MovingMesh {
@@ -51,6 +54,11 @@ class MovingMesh {
   Start start(std::span<const glm::dvec3> stored, double max_normal_angle, std::span<const std::uint32_t> place,
               Progress* progress);
 
+  /// Maps each vertex to its faces. start() does this; it has to be done again when faces have other corners.
+  void make_rings();
+  /// Certifies these faces on trial by a search alone, whatever is known of them. Returns those for which there is no
+  /// proof.
+  std::vector<std::uint32_t> uncertified(std::span<const std::uint32_t> faces, Progress* progress);
   /// Tries all these vertices at stored positions; those that may not move stay. Throws InvalidInput, changing nothing,
   /// for the first position that is not finite in the world or in the frame.
   void try_all(std::span<const std::uint32_t> vertices, std::span<const glm::dvec3> before,
@@ -145,7 +153,6 @@ class MovingMesh {
   static constexpr double kFar = std::numeric_limits<double>::max();
   static constexpr double kUnproved = TriangleCertificate::kUnproved;
 
-  void make_rings(std::size_t vertex_count);
   void set_trial(std::uint32_t vertex, const VertexState& state);
   /// What is known of all points of a face.
   struct FaceBound {
@@ -164,9 +171,9 @@ class MovingMesh {
   void accept(std::uint32_t face);
   bool is_plainly_oriented(std::span<const std::uint32_t> place) const;
   void start_facing(FacingRule rule, std::span<const std::uint32_t> place);
-  std::vector<std::uint32_t> uncertified(std::span<const std::uint32_t> faces, Progress* progress);
   std::vector<double> balance(std::span<const std::uint32_t> failing) const;
   std::vector<std::uint32_t> compare_sides(std::vector<std::uint32_t> failing, Progress* progress);
+  std::vector<std::uint32_t> take_uncertified(std::span<const std::uint32_t> faces, Progress* progress);
   bool limit_angle(std::uint32_t face);
   template <class Visit>
   void for_triangles(std::uint32_t face, Visit&& visit) const;

@@ -128,7 +128,7 @@ std::vector<std::uint32_t> MovingMesh::compare_sides(std::vector<std::uint32_t> 
     measure(faces, progress);
     // A face that is free of the rule can fail by its distance alone.
     std::erase_if(faces, [&](std::uint32_t f) { return facing_->of(f, 0).limit >= std::numbers::pi && !is_inside(f); });
-    const std::vector<std::uint32_t> still = uncertified(faces, progress);
+    const std::vector<std::uint32_t> still = take_uncertified(faces, progress);
     failing.insert(failing.end(), still.begin(), still.end());
     std::ranges::sort(failing);
   };

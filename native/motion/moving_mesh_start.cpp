@@ -17,6 +17,15 @@
 
 namespace tolvol {
 
+void require_vertices(std::span<const std::uint32_t> faces, std::size_t corners, std::size_t vertex_count) {
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    if (faces[i] < vertex_count) continue;
+    throw InvalidInput("face " + std::to_string(i / corners) + " uses vertex " + std::to_string(faces[i]) +
+                           ", but there are only " + std::to_string(vertex_count),
+                       "invalid_mesh");
+  }
+}
+
 MovingMesh::MovingMesh(const ToleranceVolume& volume, const StoredSpace& space, std::span<const std::uint32_t> faces,
                        int corners, std::size_t vertex_count, unsigned threads)
     : volume_(&volume),
@@ -26,17 +35,13 @@ MovingMesh::MovingMesh(const ToleranceVolume& volume, const StoredSpace& space, 
       threads_(threads) {
   if (corners < 1 || corners > 4) throw InvalidInput("a face must have 1 to 4 corners; triangulate larger ones");
   if (faces.size() % corners_ != 0) throw InvalidInput("the face array is not a whole number of faces");
-  for (std::size_t i = 0; i < faces.size(); ++i) {
-    if (faces[i] >= vertex_count) {
-      throw InvalidInput("face " + std::to_string(i / corners_) + " uses vertex " + std::to_string(faces[i]) +
-                             ", but there are only " + std::to_string(vertex_count),
-                         "invalid_mesh");
-    }
-  }
-  make_rings(vertex_count);
+  require_vertices(faces, corners_, vertex_count);
+  state_.resize(vertex_count);
+  make_rings();
 }
 
-void MovingMesh::make_rings(std::size_t vertex_count) {
+void MovingMesh::make_rings() {
+  const std::size_t vertex_count = state_.size();
   ring_start_.assign(vertex_count + 1, 0);
   const auto each_use = [&](auto&& use) {
     for (std::uint32_t f = 0; f < faces_.size() / corners_; ++f) {
@@ -57,6 +62,7 @@ void MovingMesh::make_rings(std::size_t vertex_count) {
 
 MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, double max_normal_angle,
                                     std::span<const std::uint32_t> place, Progress* progress) {
+  make_rings();
   std::vector<glm::dvec3> used;
   for (std::uint32_t v = 0; v < stored.size(); ++v) {
     poll_at(v);
@@ -100,7 +106,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, double m
   const std::vector<std::uint32_t> open =
       select(count, threads_, [&](std::size_t f) { return !is_own(static_cast<std::uint32_t>(f)); });
   measure(open, progress);
-  std::vector<std::uint32_t> failing = uncertified(open, progress);
+  std::vector<std::uint32_t> failing = take_uncertified(open, progress);
   std::vector<std::uint8_t> outside(failing.size());
   parallel_for(failing.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(static_cast<double>(begin) / static_cast<double>(failing.size()));
@@ -124,7 +130,7 @@ MovingMesh::Start MovingMesh::start(std::span<const glm::dvec3> stored, double m
 }
 
 /// Certifies faces of the state, and returns those for which there is no proof by a search as in any motion.
-std::vector<std::uint32_t> MovingMesh::uncertified(std::span<const std::uint32_t> faces, Progress* progress) {
+std::vector<std::uint32_t> MovingMesh::take_uncertified(std::span<const std::uint32_t> faces, Progress* progress) {
   std::vector<std::uint8_t> fails(faces.size());
   parallel_for(faces.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
     if (progress) progress->update(static_cast<double>(begin) / static_cast<double>(faces.size()));

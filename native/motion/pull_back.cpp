@@ -34,7 +34,7 @@ PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, const StartO
   if (options.together) place = weld_equal_positions(stored);
   MovingMesh::Start start = mesh_.start(stored, options.max_normal_angle, place, progress);
   if (!start.outside.empty() && options.outside == Outside::error) refuse_outside(FaceCount::of(start.outside));
-  Start result{std::move(start.outside), {}, FaceCount::of(mesh_.exceeding()), std::move(start.warnings)};
+  Start result{std::move(start.outside), {}, mesh_.exceeding(), std::move(start.warnings)};
   if (options.together) {
     link_twins(place);
     if (const auto warning = mesh_.hold_t_junctions(stored, place)) result.warnings.push_back(*warning);
@@ -48,6 +48,28 @@ PullBack::Start PullBack::start(std::span<const glm::dvec3> stored, const StartO
   result.uncovered = coverage_->uncovered();
   if (result.uncovered.faces) result.warnings.push_back(take_uncovered(result.uncovered, options.outside));
   return result;
+}
+
+std::vector<std::uint32_t> PullBack::replace_faces(std::span<const std::uint32_t> faces, Progress* progress) {
+  mesh_.make_rings();
+  std::vector<std::uint32_t> refused = mesh_.uncertified(faces, progress);
+  if (crossings_) {
+    const std::vector<std::uint32_t> crossing = crossings_->crossing_replaced(faces);
+    refused.insert(refused.end(), crossing.begin(), crossing.end());
+    std::ranges::sort(refused);
+    refused.erase(std::ranges::unique(refused).begin(), refused.end());
+  }
+  if (refused.empty() && coverage_) refused = coverage_->failing_replaced(faces);
+  if (!refused.empty()) return refused;
+  if (coverage_) coverage_->accept(faces);
+  mesh_.accept({}, faces);
+  if (crossings_) crossings_->restart();
+  return {};
+}
+
+void PullBack::restore_faces(std::span<const std::uint32_t> faces) {
+  mesh_.make_rings();
+  if (crossings_) crossings_->fit(faces);
 }
 
 PullBack::Moving PullBack::moving(std::vector<std::uint32_t> vertices) {

@@ -65,7 +65,8 @@ class PullBack {
   struct Start {
     std::vector<std::uint32_t> outside;  ///< Faces that are not proved inside, ascending. Their vertices never move.
     FaceCount uncovered;  ///< Faces of the reference that are not covered. What is nearest to them never moves.
-    FaceCount exceeding;  ///< Faces with no proof of the angle. They keep the least angle that is proved of them.
+    /// Faces with no proof of the angle, ascending. They keep the least angle that is proved of them.
+    std::vector<std::uint32_t> exceeding;
     std::vector<std::string> warnings;
   };
   /// Takes the stored positions as the state. Throws what MovingMesh::start() throws, FacesOutside as the options say,
@@ -75,6 +76,14 @@ class PullBack {
   Start start(std::span<const glm::dvec3> stored, const StartOptions& options, Progress* progress);
   bool frozen(std::uint32_t vertex) const { return mesh_.frozen(vertex); }
   std::optional<Normals> normals() const { return mesh_.normals(); }  ///< See MovingMesh.
+
+  /// Makes these faces, whose corners in the array of the constructor are others now, part of the state: a polygon is
+  /// triangulated in another way. None of them may be outside or exceeding since the start. Returns those that are not
+  /// inside, exceed their angle, cross others or would leave a part of the reference without a witness. If there are
+  /// any, the array has to be as it was before, and restore_faces() has to follow. From then on faces may cross only if
+  /// they cross now. Throws Cancelled; start() has to follow then.
+  std::vector<std::uint32_t> replace_faces(std::span<const std::uint32_t> faces, Progress* progress);
+  void restore_faces(std::span<const std::uint32_t> faces);
 
   Moving moving(std::vector<std::uint32_t> vertices);
 

@@ -120,6 +120,22 @@ void guard_reset(LockedGuard& guard, const py::object& positions, Progress* prog
   guard.native.reset(values(p), progress);
 }
 
+py::array_t<std::int32_t> guard_replace_faces(LockedGuard& guard, const py::object& faces, Progress* progress) {
+  int corners = 3;
+  std::vector<std::uint32_t> indices = to_faces(faces, "faces", corners);
+  if (corners != guard.native.corners()) {
+    throw InvalidInput("the faces of the guard have " + std::to_string(guard.native.corners()) + " corners, not " +
+                       std::to_string(corners));
+  }
+  std::vector<std::uint32_t> refused;
+  {
+    const Interruptible call(progress);
+    const std::lock_guard lock(guard.mutex);
+    refused = guard.native.replace_faces(std::move(indices), progress);
+  }
+  return from_vector<std::int32_t>(refused);
+}
+
 }  // namespace
 
 void bind_constrain(py::module_& module) {
@@ -156,8 +172,9 @@ Parameters
 before, after : (n, 3) arrays, both float32 or both float64
     Local coordinates before the motion and as they are wished.
 faces : (m, k) integer array
-    k is 1 (points), 2 (segments), 3 (triangles) or 4 (quads, which keep the tolerance in every triangulation). A
-    triangle among quads repeats a corner that is next to itself, as in (a, b, c, c).
+    k is 1 (points), 2 (segments), 3 (triangles) or 4 (quads). A triangle among quads repeats a corner that is next to
+    itself, as in (a, b, c, c). Quads keep the tolerance in every triangulation, and the reference keeps it whether all
+    quads are cut from their first corner to the third, or all along the other diagonal.
 volume : ToleranceVolume
 mode : {"pull_back", "reset"}
     "pull_back" goes so far that no single factor can rise by 1/64 alone. Two-sided, it lowers factors by at least 1/16
@@ -270,6 +287,32 @@ Cancelled
 Notes
 -----
 Cost: about 1 us a vertex and 2 us a face of the reference.)doc")
+      .def("replace_faces", &guard_replace_faces, py::arg("faces"), py::kw_only(), py::arg("progress") = py::none(),
+           R"doc(Take other faces on the same vertices, where polygons are triangulated in another way now.
+
+Parameters
+----------
+faces : integer array
+    As many faces as before, with as many corners.
+progress : Progress, optional
+
+Returns
+-------
+(k,) int32 array
+    Those of the faces that differ that the guard cannot take: which are outside, exceed max_normal_angle, cross
+    another face, unless faces may cross, or leave a part of the reference beyond the tolerance of the mesh. The guard
+    takes the faces only if there are none.
+
+Raises
+------
+InvalidInput
+    If the array is not valid. The guard keeps its faces.
+Cancelled
+    The guard keeps its faces.
+
+Notes
+-----
+Cost: about 50 ns a face, and for each face that differs as much as making a guard.)doc")
       .def_property_readonly(
           "vertex_count", [](const LockedGuard& guard) { return guard.native.vertex_count(); },
           "The number of vertices.")
@@ -281,7 +324,7 @@ Cost: about 1 us a vertex and 2 us a face of the reference.)doc")
           "The number of reference faces that were beyond the tolerance of the mesh at the start. The vertices nearest "
           "to them never move.")
       .def_property_readonly(
-          "exceeding", [](const LockedGuard& guard) { return guard.native.start().exceeding.faces; },
+          "exceeding", [](const LockedGuard& guard) { return guard.native.start().exceeding.size(); },
           "The number of faces that were not proved to keep max_normal_angle at the start. They keep the angle of "
           "the start, or a smaller one.")
       .def_property_readonly(

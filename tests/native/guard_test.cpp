@@ -267,4 +267,102 @@ TEST(Guard, ResetStartsAnew) {
   EXPECT_NEAR(s.at(100).x, good.x, 1e-6) << "from the new state";
 }
 
+/// A square that is bent along its diagonal 0-2 by `bend`, cut along that diagonal and along the other one.
+TriangleMesh square(double bend, bool is_cut_otherwise = false) {
+  TriangleMesh mesh{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, bend}}, {}};
+  mesh.triangles.assign({{0, 1, 2}, {0, 2, 3}});
+  if (is_cut_otherwise) mesh.triangles.assign({{0, 1, 3}, {1, 2, 3}});
+  return mesh;
+}
+
+std::vector<std::uint32_t> faces_of(const TriangleMesh& mesh) {
+  std::vector<std::uint32_t> faces;
+  for (const glm::uvec3& t : mesh.triangles) faces.insert(faces.end(), {t.x, t.y, t.z});
+  return faces;
+}
+
+TEST(Guard, ReplacedFacesAreKeptFromThenOn) {
+  Sculpture s(square(0));
+  Guard guard = s.guard();
+  s.mesh = square(0, true);
+  ASSERT_TRUE(guard.replace_faces(s.faces()).empty());
+  // Cut along this diagonal, a raised corner lifts the middle; cut along the other one, it does not.
+  const TriangleMesh reference = square(0);
+  s.push(1, {0, 0, 0.5}), s.push(3, {0, 0, 0.5});
+  s.correct(guard.constrain(s.positions));
+  TriangleMesh now = s.mesh;
+  for (std::size_t v = 0; v < 4; ++v) now.vertices[v] = s.at(v);
+  const double upper = std::max(hausdorff(now, reference, {kTolerance, 1, nullptr}).upper,
+                                hausdorff(reference, now, {kTolerance, 1, nullptr}).upper);
+  EXPECT_LE(upper, kTolerance);
+  EXPECT_GT(upper, 0.9 * kTolerance);
+}
+
+TEST(Guard, FacesThatAreOutsideOrLeaveTheReferenceUncoveredAreNotTaken) {
+  // The middle of the other diagonal is half of the bend above that of this one.
+  for (const bool two_sided : {false, true}) {
+    Sculpture near(square(0.8 * kTolerance)), far(square(8 * kTolerance));
+    EXPECT_TRUE(near.guard({.two_sided = two_sided}).replace_faces(faces_of(square(0, true))).empty());
+    Guard guard = far.guard({.two_sided = two_sided});
+    EXPECT_EQ(guard.replace_faces(faces_of(square(0, true))), (std::vector<std::uint32_t>{0, 1}));
+    far.push(3, {0, 0, 0.5});
+    far.correct(guard.constrain(far.positions));
+    EXPECT_LE(far.deviation(), kTolerance) << "it goes on with the faces from before";
+  }
+  // Two faces on one another cover the reference no longer, although both are inside.
+  Sculpture s(square(0));
+  const std::vector<std::uint32_t> twice{0, 1, 2, 0, 1, 2};
+  EXPECT_TRUE(s.guard({.two_sided = false}).replace_faces(twice).empty());
+  EXPECT_EQ(s.guard().replace_faces(twice), (std::vector<std::uint32_t>{1}));
+}
+
+TEST(Guard, FacesThatTurnOverOrCrossAreNotTaken) {
+  Sculpture s(square(0));
+  const std::vector<std::uint32_t> turned{0, 2, 1, 0, 2, 3};
+  EXPECT_EQ(s.guard().replace_faces(turned), (std::vector<std::uint32_t>{0}));
+  EXPECT_TRUE(s.guard({.max_normal_angle = 180}).replace_faces(turned).empty());
+  // A needle through the middle of the other diagonal, which does not reach this one.
+  TriangleMesh mesh = square(0.8 * kTolerance);
+  const double z = 0.2 * kTolerance;
+  for (const dvec3& p : {dvec3(0.45, 0.5, z), {0.55, 0.5, z}, {0.5, 0.5, 3 * z}}) mesh.vertices.push_back(p);
+  mesh.triangles.emplace_back(4, 5, 6);
+  Sculpture pierced(mesh);
+  TriangleMesh otherwise = mesh;
+  otherwise.triangles[0] = {0, 1, 3}, otherwise.triangles[1] = {1, 2, 3};
+  EXPECT_TRUE(pierced.guard().replace_faces(faces_of(otherwise)).empty());
+  Guard guard = pierced.guard({.crossings = PullBack::Crossings::keep_out});
+  EXPECT_FALSE(guard.replace_faces(faces_of(otherwise)).empty());
+  // The boxes of the faces from before are looked at again: the needle may not go down through them.
+  pierced.push(4, {0, 0, -2 * z}), pierced.push(5, {0, 0, -2 * z});
+  EXPECT_FALSE(guard.constrain(pierced.positions).vertices.empty());
+}
+
+TEST(Guard, ReplacedFacesMayCrossOnlyWhatTheyCrossThen) {
+  // At the start the other triangulation would cross the needle, but it is not there then.
+  const double h = 0.2 * kTolerance;
+  TriangleMesh mesh{{{0, 0, 0}, {1, 0, 2 * h}, {1, 1, 0}, {0, 1, 2 * h}}, {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}}};
+  for (const dvec3& p : {dvec3(0.48, 0.5, h), {0.52, 0.5, h}, {0.5, 0.5, 3 * h}}) mesh.vertices.push_back(p);
+  Sculpture s(mesh);
+  Guard guard = s.guard({.crossings = PullBack::Crossings::keep_out});
+  s.push(1, {0, 0, -2 * h}), s.push(3, {0, 0, -2 * h});
+  ASSERT_TRUE(guard.constrain(s.positions).vertices.empty());
+  ASSERT_TRUE(guard.replace_faces({0, 1, 3, 1, 2, 3, 4, 5, 6}).empty());
+  s.push(1, {0, 0, 2 * h}), s.push(3, {0, 0, 2 * h});
+  s.correct(guard.constrain(s.positions));
+  EXPECT_LT(s.at(1).z + s.at(3).z, 2 * h);
+}
+
+TEST(Guard, BadFacesKeepTheFaces) {
+  Sculpture s(square(0));
+  Guard guard = s.guard();
+  EXPECT_THROW(guard.replace_faces({0, 1, 2}), InvalidInput);
+  EXPECT_THROW(guard.replace_faces({0, 1, 2, 0, 2, 4}), InvalidInput);
+  Progress cancelled;
+  cancelled.cancel();
+  EXPECT_THROW(guard.replace_faces(faces_of(square(0, true)), &cancelled), Cancelled);
+  s.push(1, {0, 0, 0.5}), s.push(3, {0, 0, 0.5});
+  s.correct(guard.constrain(s.positions));
+  EXPECT_LE(s.deviation(), kTolerance);
+}
+
 }  // namespace

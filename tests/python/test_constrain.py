@@ -171,6 +171,25 @@ def test_guard_reset_and_outside():
     assert indices.tolist() == [100] and np.array_equal(back[0], broken[100])
 
 
+def test_guard_replaces_faces():
+    """A bent square may be cut along the other diagonal as long as that is within the tolerance."""
+    square, faces = [(0, 0, 0), (1, 0, 0), (1, 1, 0)], np.array([(0, 1, 2), (0, 2, 3)])
+    otherwise = np.array([(0, 1, 3), (1, 2, 3)])
+    for bend, refused in ((0.01, []), (0.1, [0, 1])):
+        vertices = np.array([*square, (0, 1, bend)], np.float32)
+        guard = tolvol.Guard(vertices, faces, tolvol.ToleranceVolume(vertices, faces, 0.02))
+        found = guard.replace_faces(otherwise)
+        assert found.dtype == np.int32 and found.tolist() == refused
+        assert guard.replace_faces(faces).tolist() == []
+    for wrong, message in (
+        (faces[:1], "2 faces, not 1"),
+        (faces + 2, "uses vertex 4"),
+        (faces[:, [0, 1, 2, 2]], "3 corners"),
+    ):
+        with pytest.raises(tolvol.InvalidInput, match=message):
+            guard.replace_faces(wrong)
+
+
 @pytest.mark.parametrize(
     ("positions", "message"),
     [
