@@ -86,14 +86,16 @@ def valid(run, vertices, triangles, dtype):
         raise Finding("index", f"an index of the result is out of range: {triangles.min()}, {triangles.max()}")
 
 
-def uncrossed(run, before, after, triangles):
-    """Requires of stored positions that no pair of triangles crosses after a motion that did not cross before it."""
+def uncrossed(run, before, after, triangles, after_triangles=None):
+    """Requires of stored positions that no pair of triangles crosses after a motion that did not cross before it.
 
-    def pairs(vertices):
+    after_triangles: those after it, if they are others."""
+
+    def pairs(vertices, triangles):
         return {tuple(pair) for pair in run.call("crossing_pairs", lambda: tolvol.crossing_pairs(vertices, triangles))}
 
-    now = pairs(after)
-    if now and (new := now - pairs(before)):
+    now = pairs(after, triangles if after_triangles is None else after_triangles)
+    if now and (new := now - pairs(before, triangles)):
         raise Finding("crossings", f"{len(new)} pairs of faces cross that did not before: {min(new)}")
 
 

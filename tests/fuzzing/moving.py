@@ -10,6 +10,7 @@ from .parts import (
     covers,
     draw_spline,
     faces_of,
+    flipped,
     lattice_of,
     motion_of,
     moved,
@@ -229,6 +230,8 @@ def draw_guard(rng, case):
         case.arrays["motion"] = motion_of(rng, case, case.options["moved"])
     if rng.random() < 0.3:
         case.options["resets"] = True
+    elif rng.random() < 0.4:
+        case.options["flips"] = float(rng.choice([0.02, 0.3]))
 
 
 def guard(run):
@@ -258,7 +261,7 @@ def guard(run):
         def __init__(self, threads):
             rng = np.random.default_rng(options["seed"])
             guard = begun(threads, None)
-            self.vertices = start.copy()
+            self.vertices, self.triangles = start.copy(), case.triangles
             scale = 1 if case.to_world is None else np.linalg.norm(case.to_world[:3, :3], 2)
             for edit in range(options["edits"]):
                 if options.get("resets") and edit == options["edits"] // 2:
@@ -270,23 +273,31 @@ def guard(run):
                 self.vertices[touched] += motion.astype(np.float32)
                 indices, back = self.corrections(guard, threads)
                 self.vertices[indices] = back
+                if options.get("flips"):
+                    self.flip(guard, rng, threads)
             self.again = len(self.corrections(guard, threads)[0])
             self.outside, self.uncovered = guard.outside, guard.uncovered
+
+        def flip(self, guard, rng, threads):
+            others = flipped(self.triangles, options["flips"], rng)
+            if not len(run.call("Guard.replace_faces", lambda: guard.replace_faces(others), threads)):
+                self.triangles = others
 
         def corrections(self, guard, threads):
             return run.call("Guard.constrain", lambda: guard.constrain(self.vertices), threads)
 
     run.repeated("Guard", begun, ("outside", "uncovered"))
-    result = run.repeated_in_steps("Guard", Edited, ("vertices", "outside", "uncovered"))
+    result = run.repeated_in_steps("Guard", Edited, ("vertices", "triangles", "outside", "uncovered"))
     if result.again:
         raise Finding("guard", f"{result.again} vertices go back again, though nothing was edited")
-    judges.valid(run, result.vertices, case.triangles, np.float32)
+    triangles = result.triangles
+    judges.valid(run, result.vertices, triangles, np.float32)
     kept = case.triangles[result.outside]
     if not np.array_equal(result.vertices[kept], start[kept]):
         raise Finding("outside", "a face that was outside at the start has moved")
     reference = case.world(case.vertices), case.triangles
-    within_as_pieces(run, case.world(result.vertices), np.delete(case.triangles, result.outside, axis=0), reference)
+    within_as_pieces(run, case.world(result.vertices), np.delete(triangles, result.outside, axis=0), reference)
     if options["two_sided"] and not result.uncovered:
-        covers(run, case.world(result.vertices), case.triangles, reference)
+        covers(run, case.world(result.vertices), triangles, reference)
     if options["crossings"] == "keep_out":
-        judges.uncrossed(run, start, result.vertices, case.triangles)
+        judges.uncrossed(run, start, result.vertices, case.triangles, triangles)

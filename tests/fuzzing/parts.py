@@ -84,18 +84,34 @@ def faces_of(case):
     corners, triangles = case.options["corners"], case.triangles
     if corners < 4:
         return np.ascontiguousarray(triangles[:, :corners])
+    pairs, quads = quads_of(triangles)
+    rest = np.delete(triangles, pairs.ravel(), axis=0)[:, [0, 1, 2, 0]]
+    return np.concatenate([quads, rest])
+
+
+def quads_of(triangles):
+    """Returns pairs of neighbours, (k, 2), no triangle in two of them, and the quad that each pair is, (k, 4)."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), 1)
     order = np.lexsort(edges.T)
     same = (edges[order[1:]] == edges[order[:-1]]).all(1)
-    quads, taken = [], np.zeros(len(triangles), bool)
+    pairs, quads, taken = [], [], np.zeros(len(triangles), bool)
     for first, second in zip(order[:-1][same], order[1:][same]):
         a, b = first // 3, second // 3
         if a != b and not taken[a] and not taken[b]:
             taken[a] = taken[b] = True
             x, y, z = np.roll(triangles[a], -(first % 3))
+            pairs.append([a, b])
             quads.append([x, np.roll(triangles[b], -(second % 3))[2], y, z])
-    rest = triangles[~taken][:, [0, 1, 2, 0]]
-    return np.concatenate([np.array(quads, np.int32).reshape(-1, 4), rest])
+    return np.array(pairs, np.int64).reshape(-1, 2), np.array(quads, np.int32).reshape(-1, 4)
+
+
+def flipped(triangles, share, rng):
+    """Returns the triangles with some pairs of neighbours cut along the other diagonal."""
+    pairs, quads = quads_of(triangles)
+    chosen = rng.random(len(pairs)) < share
+    result = triangles.copy()
+    result[pairs[chosen]] = quads[chosen][:, [[0, 1, 3], [1, 2, 3]]]
+    return result
 
 
 def draw_spline(rng, case):

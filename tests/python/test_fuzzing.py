@@ -102,7 +102,7 @@ def test_every_option_is_drawn_and_handed_on(monkeypatch, name):
     if name in ("decimate", "smooth", "deform"):
         wanted.add(("no volume",))
     if name == "Guard":
-        wanted.add(("reset",))
+        wanted |= {("reset",), ("replace_faces",)}
 
     def recorded(function):
         def call(*args, **more):
@@ -124,6 +124,10 @@ def test_every_option_is_drawn_and_handed_on(monkeypatch, name):
         def reset(self, *args, **more):
             wanted.discard(("reset",))
             super().reset(*args, **more)
+
+        def replace_faces(self, *args, **more):
+            wanted.discard(("replace_faces",))
+            return super().replace_faces(*args, **more)
 
     if name == "check":
         monkeypatch.setattr(tolvol, "ToleranceVolume", Volume)
