@@ -45,8 +45,8 @@ def decimate_settings(options=frozenset()):
     return {
         "keep": EnumProperty(
             name="Keep",
-            description="The directions in which the tolerance has to hold, for every operation except Fit, the lattice guard "
-            "and guards of meshes with faces of more than four corners",
+            description="The directions in which the tolerance has to hold, for every operation except Fit and the "
+            "lattice guard",
             items=(
                 (
                     "BOTH",

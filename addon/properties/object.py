@@ -94,18 +94,16 @@ class TOLVOL_PG_guard(bpy.types.PropertyGroup):
 
     sculpting: BoolProperty(
         name="Sculpting",
-        description="Stop vertices at the tolerance while a stroke goes on in Sculpt Mode. If a face has more than four corners, "
-        "the tolerance is kept one way, and faces may turn over",
+        description="Stop vertices at the tolerance while a stroke goes on in Sculpt Mode",
     )
     editing: BoolProperty(
         name="Editing",
-        description="Stop vertices at the tolerance in Edit Mode, and undo edits of the faces that leave the tolerance. If a "
-        "face has more than four corners, the tolerance is kept one way, and faces may turn over",
+        description="Stop vertices at the tolerance in Edit Mode, and undo edits of the faces that leave the tolerance",
     )
     crossings: BoolProperty(
         name="Keep Crossings Out",
         description="While sculpting and editing, also stop vertices where faces would cross that did not cross when the "
-        "guard began, and undo edits that make more faces cross. A mesh with faces of more than four corners is exempt",
+        "guard began, and undo edits that make more faces cross",
     )
     lattice: BoolProperty(
         name="Lattice",

@@ -211,15 +211,22 @@ def update(ob):
     bpy.context.view_layer.update()
 
 
-def test_a_guard_says_that_it_cannot_keep_large_faces_from_crossing():
+def test_a_guard_keeps_large_faces_from_crossing():
     angles = np.arange(12) * np.pi / 6
-    ob = add_object("plate", np.stack([np.cos(angles), np.sin(angles), 0 * angles], 1), [list(range(12))])
-    activate(ob)
-    ob.tolvol.keep = "ONE"
+    ring = np.stack([np.cos(angles), np.sin(angles), 0 * angles], 1)
+    vertices = np.concatenate([ring, ring + [0, 0, 0.01]])
+    ob = add_object("plates", vertices, [range(12), range(12, 24)])
     assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
     ob.tolvol.guard.sculpting = ob.tolvol.guard.crossings = True
     bpy.ops.object.mode_set(mode="SCULPT")
     update(ob)
     state = {kind: text for kind, text, _ in guard.states(ob)}
-    said = "Crossings allowed, faces may turn over: 1 face has more than four corners. Triangulate Faces helps"
-    assert state["sculpting"] == said
+    assert state["sculpting"] == "Guarding both ways"
+    for keeps_out in (True, False):
+        ob.tolvol.guard.crossings = keeps_out
+        update(ob)
+        wish = mesh_io.column(ob.data.vertices, "co", 3)
+        wish[0:12:3, 2] += 0.02
+        ob.data.vertices.foreach_set("co", wish.ravel())
+        update(ob)
+        assert bool(pairs(world_triangles(ob))) == (not keeps_out)
