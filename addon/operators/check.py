@@ -11,7 +11,7 @@ from .. import native, preferences
 from ..job import JobOperator
 from ..mesh import mesh_io
 from ..operation_settings import threads_setting
-from ..proof import statistics
+from ..proof import statistics, verdict
 from ..reference import measurements, snapshots, tolerances
 from ..shared.proof import measure, report
 from ..shared.proof.certify import outside
@@ -50,11 +50,13 @@ class Comparison(JobOperator):
         return found
 
     def remember(self, surface, found, measured=""):
-        """Stores the Verdict, which every part of the interface then shows. measured: statistics as text."""
+        """Stores the Verdict. Returns the one that every part of the interface then shows: more may have been known of the
+        same mesh. measured: statistics as text."""
         certified = {
             name: (way.lower, way.upper) for name, way in (("forward", found.forward), ("backward", found.backward))
         }
         measurements.remember(self.ob, surface, certified, found.tolerance, found.share_outside, measured)
+        return verdict.of(self.ob) or found
 
 
 class TOLVOL_OT_check(Comparison, bpy.types.Operator):
@@ -70,7 +72,7 @@ the share of the mesh that is beyond the tolerance"""
 
     def finish(self, context, outcome):
         surface, found = outcome
-        self.remember(surface, found)
+        found = self.remember(surface, found)
         level = "INFO" if found.kind == WITHIN else "WARNING"
         self.say({level}, said(found))
 
@@ -89,7 +91,7 @@ from the mesh to the reference and from the reference to the mesh"""
 
     def finish(self, context, outcome):
         surface, found, measured = outcome
-        self.remember(surface, found, statistics.as_text(measured))
+        found = self.remember(surface, found, statistics.as_text(measured))
         self.say({"INFO" if found.passed else "WARNING"}, said(found))
 
 
@@ -121,7 +123,7 @@ reference, and bring them into view"""
 
     def finish(self, context, outcome):
         surface, found, triangles = outcome
-        self.remember(surface, found)
+        found = self.remember(surface, found)
         mesh = self.ob.data
         faces = np.zeros(len(mesh.polygons), bool)
         faces[surface.arrays.polygons[triangles]] = True

@@ -14,6 +14,7 @@ import numpy as np
 from .. import native
 from ..mesh import mesh_io
 from ..redraw import redraw_views
+from ..shared.proof.verdict import Interval
 from . import snapshots, tolerances
 
 # Cache of numbers that panels show: (object, "size" or "fingerprint", ...) -> value. It is cleared when any mesh changes.
@@ -51,7 +52,8 @@ _present = {}
 def remember(ob, surface, certified, tolerance, share_outside=0.0, statistics=""):
     """Stores the certified distances of `surface`, the object's mesh as it is now, and redraws the panels.
 
-    statistics: as text; those of the same state that are known already stay, and so does its share outside.
+    statistics: as text; those of the same state that are known already stay, and so do its share outside and the ends of
+    the intervals that are better than the new ones.
     """
     # An operator that has just written the mesh reports before Blender tells of the change: what is shown counts from now.
     _shown[_fingerprint_key(ob)] = surface.arrays.fingerprint()
@@ -75,13 +77,21 @@ def _keep(ob, surface, certified, tolerance, share_outside=0.0, statistics=""):
         statistics = same[0].statistics
     if same and not share_outside and same[0].tolerance == tolerance:
         share_outside = same[0].share_outside
+    place = tuple(surface.matrix.ravel())
+    forward, backward = Interval(*certified["forward"]), Interval(*certified["backward"])
+    for each in same:
+        if place == tuple(each.matrix):  # Turning the object changes distances by rounding.
+            forward = forward.narrowed(Interval(each.forward_lower, each.forward))
+            backward = backward.narrowed(Interval(each.backward_lower, each.backward))
     measured = Measurement(
         fingerprint,
-        tuple(surface.matrix.ravel()),
+        place,
         tolerance,
         snapshots.snapshot_size(ob),
-        *certified["forward"],
-        *certified["backward"],
+        forward.lower,
+        forward.upper,
+        backward.lower,
+        backward.upper,
         share_outside,
         statistics,
         datetime.datetime.now().astimezone().isoformat(timespec="seconds"),

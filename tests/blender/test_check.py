@@ -2,6 +2,7 @@
 """Check, Select Outside and what is known of a mesh by them."""
 
 import datetime
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -14,7 +15,8 @@ from addon.overlay import draw, reasons
 from addon.panels import notes
 from addon.proof import statistics, verdict
 from addon.reference import measurements, tolerances
-from addon.shared.proof import report
+from addon.shared import package
+from addon.shared.proof import known, report
 from scenes import activate, moved_up, sheet, torus
 
 
@@ -231,3 +233,51 @@ def test_drawing_that_was_refused_is_asked_for_again_once_it_is_turned_on_anew(c
     assert reasons.broken
     chosen_preferences.use_gl = False
     assert not reasons.broken
+
+
+def measure_less_narrowly(monkeypatch):
+    measure = package.module.directed_hausdorff
+
+    def less_narrow(*surfaces, **options):
+        found = measure(*surfaces, **options)
+        ends = {"lower": 0.9991 * found.lower, "upper": 1.0009 * found.upper}
+        return SimpleNamespace(**ends, position=found.position, triangle=found.triangle)
+
+    monkeypatch.setattr(package.module, "directed_hausdorff", less_narrow)
+
+
+@pytest.mark.parametrize("file_was_opened_again", (False, True))
+def test_a_second_measurement_of_the_same_mesh_never_shows_less_than_the_first(
+    file_was_opened_again, monkeypatch, capfd
+):
+    ob = torus()
+    bpy.ops.tolvol.decimate(tolerance_percent=1)
+    before = verdict.of(ob)
+    if file_was_opened_again:
+        measurements.forget_kept()
+        known._kept.clear()
+    measure_less_narrowly(monkeypatch)
+    capfd.readouterr()
+    bpy.ops.tolvol.check()
+    now = verdict.of(ob)
+    for way in ("forward", "backward"):
+        first, second = getattr(before, way), getattr(now, way)
+        assert (second.lower, second.upper) == (first.lower, first.upper)
+    assert report.percent(before.largest, before.tolerance) in capfd.readouterr().out
+    # What is better than before counts, and what cannot be true of a damaged file does not.
+    monkeypatch.undo()
+    ob.tolvol.measurement.forward = ob.tolvol.measurement.forward_lower = before.forward.lower / 2
+    measurements.forget_kept()
+    bpy.ops.tolvol.check()
+    assert verdict.of(ob).forward.upper >= before.forward.lower
+
+
+def test_a_narrower_measurement_of_the_same_mesh_is_shown(monkeypatch):
+    ob = torus()
+    measure_less_narrowly(monkeypatch)
+    bpy.ops.tolvol.decimate(tolerance_percent=1)
+    monkeypatch.undo()
+    before = verdict.of(ob)
+    bpy.ops.tolvol.check()
+    now = verdict.of(ob)
+    assert now.forward.upper < before.forward.upper and now.backward.lower > before.backward.lower

@@ -37,9 +37,10 @@ def _largest(key, from_surface, to_surface, tolerance, threads, progress, again)
     interval = measured() if tolerance is None else measured(bound=tolerance)
     if tolerance is not None and not interval.within(tolerance):
         # The search ended as soon as the distance was known to be beyond, or after many pieces: the interval may be wide.
-        narrow = measured()
-        best = max(interval, narrow, key=lambda found: found.lower)
-        interval = replace(best, upper=min(interval.upper, narrow.upper))
+        interval = interval.narrowed(measured())
+    # What an operation has proved may be narrower than what a second measurement finds.
+    if earlier := known.get(key):
+        interval = interval.narrowed(earlier)
     known.keep(key, interval)
     return interval
 

@@ -6,7 +6,7 @@ Verdict, so they always agree.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..numbers import NO_BREAK, three_digits
 
@@ -41,6 +41,15 @@ class Interval:
 
     def undecided(self, tolerance):
         return not self.within(tolerance) and not self.beyond(tolerance)
+
+    def narrowed(self, other):
+        """Returns the Interval with the better one of both ends. other: what else is known about the same distance.
+
+        If both cannot be true, `other` was read from a damaged file, and the Interval stays as it is.
+        """
+        best = max(self, other, key=lambda found: found.lower)
+        upper = min(self.upper, other.upper)
+        return replace(best, upper=upper) if best.lower <= upper else self
 
 
 @dataclass(frozen=True)
