@@ -3,9 +3,14 @@
 
 Blender repeats an operator by execute() alone, which receives no events, and then stores an undo step if the operator makes
 one. If the work takes longer than PATIENCE (run.py), execute() leaves the mesh as it was and hands its run over to a
-helper: an operator that does receive events, and writes the outcome. The undo step of the helper replaces the one that
-Blender has stored, so that there is one.
+helper: an operator that does receive events. Once the outcome is there, the helper has Blender repeat the operator again,
+and this time execute() writes the outcome: so there is one undo step, and the panel of Adjust Last Operation stays.
+
+If something else has happened meanwhile, that would be undone, too. Then the helper itself writes the outcome, and its
+undo step replaces the one that Blender has stored if no other has followed. Blender closes the panel at that.
 """
+
+import functools
 
 import bpy
 
@@ -21,11 +26,31 @@ def hand_over(run):
     return {"FINISHED"}
 
 
+def _rewind(run):
+    """Has Blender undo the step of the operator of the run and repeat it, so that it writes. Returns whether it has done so."""
+    if run.something_else or not _is_last(run.operator) or not bpy.ops.ed.undo_redo.poll():
+        return False
+    run.rewinding = True
+    try:
+        bpy.ops.ed.undo_redo("EXEC_DEFAULT", True)  # True: with an undo step
+    finally:
+        run.rewinding = False
+    return run.has_written
+
+
+def _is_last(operator):
+    """Whether Adjust Last Operation would repeat this operator."""
+    adjustable = (each for each in bpy.context.window_manager.operators if {"REGISTER", "UNDO"} <= each.bl_options)
+    last = next(reversed([*adjustable]), None)
+    return last is not None and last.as_pointer() == operator.as_pointer()
+
+
 class _GoOn:
     def invoke(self, context, _event):
         global _handed_over
         self._run, _handed_over = _handed_over, None
         self._run.voice = self
+        self._run.before_writing = functools.partial(_rewind, self._run)
         return self._run.begin_modal(context, self)
 
     def modal(self, context, event):

@@ -3,6 +3,7 @@
 
 import hashlib
 
+import bpy
 import numpy as np
 
 from ..mesh import mesh_io
@@ -22,6 +23,12 @@ class Claim:
             return data in (self._ob, self._ob.data)
         except ReferenceError:  # check() finds that the object was deleted.
             return False
+
+    def renewed(self):
+        """Returns the object after an undone step that has changed nothing: Blender may have made object and mesh anew."""
+        self._ob = bpy.data.objects.get(self._name, self._ob)
+        self._mesh = self._ob.data.as_pointer(), *self._mesh[1:]
+        return self._ob
 
     def check(self, thoroughly):
         """Raises Refused unless the outcome can still be written to the object. thoroughly: compare every vertex, too."""

@@ -52,8 +52,10 @@ def _after_load(*_):
 
 @persistent
 def _after_update(_scene, depsgraph):
-    """Notes a change of a mesh that a run works on, so that the run looks whether the change concerns it."""
+    """Notes that something has changed, and whether it is a mesh that a run works on: it then looks what has changed."""
     global _edited
+    for run in runs:
+        run.something_else = True
     for update in depsgraph.updates:
         if update.is_updated_geometry and any(run.concerns(update.id.original) for run in runs):
             _edited = True

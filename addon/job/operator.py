@@ -52,8 +52,11 @@ class JobOperator:
 
     def steps(self, context):
         """A generator in the main thread: yields work(progress) and is sent its outcome. It may change Blender's data only
-        after the last yield. It returns the operator's result, or None for FINISHED: CANCELLED makes no undo step."""
+        after the last yield, which should be that of WRITE: the panel of Adjust Last Operation then stays. Blender may have
+        made its data anew meanwhile, so that the generator has to take the objects from self.objects after that. It returns
+        the operator's result, or None for FINISHED: CANCELLED makes no undo step."""
         outcome = yield self.prepare(context)
+        yield run.WRITE
         return self.finish(context, outcome)
 
     def each(self, tasks, names=None, steps=_one_step):
@@ -89,6 +92,8 @@ class JobOperator:
     def execute(self, context):
         for earlier in runs:
             if earlier.operator == self:
+                if earlier.rewinding:
+                    return earlier.write()
                 earlier.supersede()
         self._begin(context)
         ended = self._run.advance()

@@ -14,6 +14,9 @@ from .claim import Claim
 PATIENCE = 0.4
 _TICK = 0.1
 
+# steps() of an operator yields this in place of work once nothing is left to do but to change Blender's data.
+WRITE = object()
+
 # Adjust Last Operation has undone the result before it repeats the operator.
 _AS_BEFORE = "The mesh is as it was before that operation"
 
@@ -28,6 +31,11 @@ class Run:
         self.progress = native.module.Progress()
         # Why the run was stopped, as a message; "" if its operator begins anew. Its objects must not be touched then.
         self.interrupted = None
+        # Called before Blender's data is changed. Returns whether that was done in it, by write().
+        self.before_writing = lambda: False
+        self.has_written = False
+        self.rewinding = False  # whether a step is being undone for the run itself, which that does not end
+        self.something_else = False  # whether Blender has reported a change since begin_modal()
         self._mode, self._clock = context.mode, progress_text.Clock()
         self._claims = [Claim(ob) for ob in operator.objects]
         self._steps = operator.steps(context)
@@ -51,8 +59,29 @@ class Run:
 
     def advance(self):
         """Starts the next work. Returns the operator's result if there is no more work, else None."""
+        return self._told_errors(self._begin_next)
+
+    def write(self):
+        """Lets the operator change Blender's data. Returns its result."""
+        self.has_written = True
+        return self._told_errors(self._write)
+
+    def _begin_next(self):
+        self._job = Job(self._next_work(), self.progress)
+
+    def _write(self):
+        if self.rewinding:
+            self.operator.objects = [claim.renewed() for claim in self._claims]
         try:
-            self._job = Job(self._next_work(), self.progress)
+            self._check()
+        except BaseException as error:
+            self._steps.throw(error)
+        self._steps.send(None)  # It ends the steps.
+
+    def _told_errors(self, go_on):
+        """Returns what go_on() returns, or the operator's result once its steps have ended. Reports why they failed."""
+        try:
+            return go_on()
         except StopIteration as end:
             return end.value or {"FINISHED"}
         except native.module.Cancelled:
@@ -62,7 +91,6 @@ class Run:
         except (Refused, native.module.TolvolError) as error:
             self.voice.report({"ERROR"}, native.said(error))
             return {"CANCELLED"}
-        return None
 
     def go_on(self, seconds):
         """Does as many steps as the time permits. Returns the operator's result if it has ended, else None."""
@@ -78,6 +106,8 @@ class Run:
         self._timer = manager.event_timer_add(_TICK, window=context.window)
         manager.modal_handler_add(modal)
         interruptions.runs.append(self)
+        context.view_layer.update()  # What has changed before is no other change.
+        self.something_else = False
         return {"RUNNING_MODAL"}
 
     def on_event(self, context, event):
@@ -126,7 +156,7 @@ class Run:
 
     def interrupt(self, happens, left="It has changed nothing"):
         """Ends the job while the data that it began with still exists. Blender then calls on_event() or close()."""
-        if self.interrupted is None:
+        if self.interrupted is None and not self.rewinding:
             self.interrupted = f"{self.label} was stopped, because {happens}. {left}"
             self._end()
 
@@ -160,6 +190,10 @@ class Run:
         self._steps.close()
 
     def _next_work(self):
+        work = self._go_on_with_outcome()
+        return self._last_part() if work is WRITE else work
+
+    def _go_on_with_outcome(self):
         if self._job is None:
             return next(self._steps)
         try:
@@ -170,6 +204,12 @@ class Run:
         except BaseException as error:
             return self._steps.throw(error)
         return self._steps.send(outcome)
+
+    def _last_part(self):
+        """Ends the steps, and raises StopIteration as they do."""
+        if self.before_writing():
+            raise StopIteration({"CANCELLED"})  # Blender has got the result of write(), and has stored the undo step.
+        self._write()
 
     def _leave(self, context):
         interruptions.runs.remove(self)

@@ -5,7 +5,7 @@ import bpy
 
 from .. import preferences
 from ..appearance import baking, materials, normals, other_blender
-from ..job import JobOperator
+from ..job import WRITE, JobOperator
 from ..operation_settings import bake_settings, threads_setting
 from ..proof import kept_warnings
 from ..reference import snapshots, tolerances
@@ -43,8 +43,10 @@ normals of the two sides differ by more than 20 degrees are marked as sharp. The
     def steps(self, context):
         context.view_layer.update()
         # The label has no room in the panel.
-        ob, self.part, self.doing = self.ob, "Shade by Reference", _READING
-        shading = yield from normals.shading(ob)
+        self.part, self.doing = "Shade by Reference", _READING
+        shading = yield from normals.shading(self.ob)
+        yield WRITE
+        ob = self.ob
         shading.write(ob.data)
         sharp = int(shading.sharp.sum())
         self.say({"INFO"}, f"{ob.name} has the normals of its reference, {sharp:,} edges are sharp")
@@ -85,7 +87,8 @@ tolerance, in a second Blender without a window. Without a UV map, Smart UV Proj
         with other_blender.temporary_folder("bake-") as folder:
             task = baking.Task(ob, shading, tolerance, self.image_size, threads, folder)
             baked = yield task.run
-            self._write(ob, shading, baked)
+            yield WRITE
+            self._write(self.ob, shading, baked)
 
     def _write(self, ob, shading, baked):
         mesh = ob.data

@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from .. import preferences
-from ..job import JobOperator
+from ..job import WRITE, JobOperator
 from ..mesh import transfer
 from ..operation_settings import PROTECTED, decimate_settings, threads_setting
 from ..proof import verdict
@@ -128,7 +128,9 @@ object. An object without a reference gets one first, as by Set Reference"""
         # The tolerance is stored in the other unit too, so that changing the unit in Adjust Last Operation keeps it.
         other = "PERCENT" if self.tolerance_mode == "LENGTH" else "LENGTH"
         tolerances.convert_tolerance(self, tasks[0].reference.size(), other)
-        self.finish((yield from self.each(tasks)))
+        outcomes = yield from self.each(tasks)
+        yield WRITE
+        self.finish(outcomes)
 
     def _task(self, context, ob):
         surface = snapshots.surface_of(ob)

@@ -8,7 +8,7 @@ import numpy as np
 from bpy.props import StringProperty
 
 from .. import native, preferences
-from ..job import JobOperator
+from ..job import WRITE, JobOperator
 from ..mesh import mesh_io
 from ..operation_settings import threads_setting
 from ..proof import kept_warnings
@@ -90,6 +90,8 @@ the lattice stay. An object without a reference gets one first, as by Set Refere
         vertices, certified = yield from motion.settle(result.vertices, may_hold=self.mode == "PULL_BACK")
         if np.array_equal(vertices, motion.before):
             raise Refused(f"{self.lattice} does not move {ob.name}: the tolerance permits no movement")
+        yield WRITE
+        ob = self.ob
         motion.write(ob, vertices, certified, "deform")
         ob.tolvol.lattice, ob.tolvol.deform_mode = bpy.data.objects[self.lattice], self.mode
         warnings = [*run["warnings"], *_twice(ob)]

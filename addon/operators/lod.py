@@ -9,7 +9,7 @@ import bpy
 
 from .. import preferences
 from ..files.gltf_extras import GEOMETRIC_ERROR
-from ..job import JobOperator
+from ..job import WRITE, JobOperator
 from ..mesh import transfer
 from ..operation_settings import lod_settings, threads_setting
 from ..proof import verdict
@@ -71,7 +71,9 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
         context.view_layer.update()
         shared.take(self, self.ob.tolvol.lod, lod_settings())
         names = [(f"Level {i + 1} of {self.levels}", f"Level {i + 1}") for i in range(self.levels)]
-        self._write(context, (yield from self.each(self._tasks(context), names)))
+        outcomes = yield from self.each(self._tasks(context), names)
+        yield WRITE
+        self._write(context, outcomes)
 
     def _tasks(self, context):
         ob = self.ob

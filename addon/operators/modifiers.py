@@ -12,7 +12,7 @@ import numpy as np
 from bpy.props import FloatProperty, StringProperty
 
 from .. import native, preferences
-from ..job import JobOperator
+from ..job import WRITE, JobOperator
 from ..mesh import mesh_io
 from ..mesh.evaluation import Evaluation, same_faces
 from ..mesh.mesh_io import column
@@ -136,7 +136,8 @@ moves as far as the tolerance permits. An object without a reference gets one fi
         vertices, certified = yield from motion.settle((yield partial(motion.hold, wished)))
         if np.array_equal(vertices, motion.before):
             raise Refused(f"The tolerance permits no movement of {ob.name} by {name}: take a larger tolerance")
-        shared.give(self, ob.tolvol.modifiers, modifier_settings())
+        yield WRITE
+        shared.give(self, self.ob.tolvol.modifiers, modifier_settings())
         ob = self.target(context)
         if self.result == "SHAPE_KEY":
             motion.keep_reference(ob)

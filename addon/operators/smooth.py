@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 
 from .. import native, preferences
-from ..job import JobOperator
+from ..job import WRITE, JobOperator
 from ..mesh import mesh_io, protect
 from ..operation_settings import smooth_settings, threads_setting
 from ..proof import kept_warnings
@@ -54,11 +54,13 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
     def steps(self, context):
         context.view_layer.update()
         shared.take(self, self.ob.tolvol.smooth, smooth_settings())
-        self._chosen = [ob for ob in self.objects if _anything_to_smooth(ob)]
-        if not self._chosen:
+        chosen = [i for i, ob in enumerate(self.objects) if _anything_to_smooth(ob)]
+        if not chosen:
             raise Refused(f"No vertex of {_names(self.objects)} is selected")
-        tasks = [self._task(context, ob) for ob in self._chosen]
-        self.finish((yield from self.each(tasks, steps=_Task.steps)))
+        tasks = [self._task(context, self.objects[i]) for i in chosen]
+        outcomes = yield from self.each(tasks, steps=_Task.steps)
+        yield WRITE
+        self.finish([self.objects[i] for i in chosen], outcomes)
 
     def _task(self, context, ob):
         if reason := decimate_blocked(ob, _MODES):
@@ -81,10 +83,10 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
         }
         return _Task(ob.name, motion, options)
 
-    def finish(self, outcomes):
-        moved = [(ob, *outcome) for ob, outcome in zip(self._chosen, outcomes) if outcome is not None]
+    def finish(self, objects, outcomes):
+        moved = [(ob, *outcome) for ob, outcome in zip(objects, outcomes) if outcome is not None]
         if not moved:
-            names = _names(self._chosen)
+            names = _names(objects)
             raise Refused(
                 f"Smoothing does not move any vertex of {names}: the surface is smooth, or all its vertices have to stay"
             )
