@@ -10,8 +10,11 @@ from ..shared.errors import Refused
 from . import interruptions, progress_text
 from .claim import Claim
 
-# Blender waits so many seconds for a job before the status bar shows it, so that no line flashes up for a short one.
-PATIENCE = 0.4
+# Blender waits so many seconds for a job, which is about as long as a person takes for at once. A longer job goes on while
+# Blender can be used.
+PATIENCE = 0.1
+# So long after its beginning the status bar shows a job, so that no line flashes up for a short one.
+_QUIET = 0.4
 _TICK = 0.1
 
 # steps() of an operator yields this in place of work once nothing is left to do but to change Blender's data.
@@ -41,6 +44,7 @@ class Run:
         self._steps = operator.steps(context)
         self._job = None
         self._timer = None
+        self._began = time.monotonic()
 
     def told(self):
         """Returns what is known about the work, for the panel and the status bar."""
@@ -72,10 +76,10 @@ class Run:
     def _write(self):
         if self.rewinding:
             self.operator.objects = [claim.renewed() for claim in self._claims]
-        try:
-            self._check()
-        except BaseException as error:
-            self._steps.throw(error)
+            try:
+                self._check()
+            except BaseException as error:
+                self._steps.throw(error)
         self._steps.send(None)  # It ends the steps.
 
     def _told_errors(self, go_on):
@@ -142,9 +146,10 @@ class Run:
             if ended:
                 self._leave(context)
                 return ended
-        status = progress_text.status_line(self.told())
-        status_bar.show(status + (f"    Waits for {_MODES.get(self._mode, 'its mode')}" if waits else ""))
-        redraw_sidebars()
+        if waits or time.monotonic() >= self._began + _QUIET:
+            status = progress_text.status_line(self.told())
+            status_bar.show(status + (f"    Waits for {_MODES.get(self._mode, 'its mode')}" if waits else ""))
+            redraw_sidebars()
         return None
 
     def close(self, context):

@@ -28,7 +28,13 @@ def loop_triangles(mesh):
 
 
 def read_mesh(mesh):
-    """Returns the arrays of `mesh`. This takes about 60 ms for 270,000 triangles."""
+    """Returns the arrays of `mesh`. This takes about 60 ms for 270,000 triangles, and half of that if all faces are triangles."""
+    if all_triangles(mesh):
+        corners = np.arange(len(mesh.loops), dtype=np.int32).reshape(-1, 3)
+        triangles = column(mesh.loops, "vertex_index", 1, np.int32).reshape(-1, 3)
+        return MeshArrays(
+            column(mesh.vertices, "co", 3), triangles, corners, np.arange(len(mesh.polygons), dtype=np.int32)
+        )
     triangles = loop_triangles(mesh)
     return MeshArrays(
         column(mesh.vertices, "co", 3),
@@ -36,6 +42,15 @@ def read_mesh(mesh):
         column(triangles, "loops", 3, np.int32),
         column(triangles, "polygon_index", 1, np.int32),
     )
+
+
+def all_triangles(mesh):
+    """Whether face i of `mesh` is a triangle with the corners 3 i, 3 i + 1 and 3 i + 2: Blender draws it as it is stored."""
+    count = len(mesh.polygons)
+    if len(mesh.loops) != 3 * count:
+        return False
+    starts, sizes = (column(mesh.polygons, name, 1, np.int32) for name in ("loop_start", "loop_total"))
+    return bool((sizes == 3).all()) and np.array_equal(starts, np.arange(0, 3 * count, 3))
 
 
 def triangle_count(mesh):
@@ -227,11 +242,19 @@ def matrix_array(matrix):
     return np.array(matrix, dtype=np.float64)
 
 
-def loose_edges(mesh):
-    """Returns (k, 2) int32: the vertices of the edges that no face uses."""
+def edges_of_faces(mesh):
+    """Returns (m,) bool: the edges that a face uses."""
     used = np.zeros(len(mesh.edges), bool)
     used[column(mesh.loops, "edge_index", 1, np.int32)] = True
-    return column(mesh.edges, "vertices", 2, np.int32)[~used]
+    return used
+
+
+def loose_edges(mesh):
+    """Returns (k, 2) int32: the vertices of the edges that no face uses."""
+    loose = np.flatnonzero(~edges_of_faces(mesh))
+    if not len(loose):
+        return np.empty((0, 2), np.int32)
+    return column(mesh.edges, "vertices", 2, np.int32)[loose]
 
 
 def corner_uvs(mesh):

@@ -38,12 +38,16 @@ def on_edges(mesh, kinds):
     for kind in kinds:
         chosen |= _EDGES[kind](mesh)
     vertices = np.zeros(len(mesh.vertices), bool)
+    if not chosen.any():
+        return vertices
     vertices[column(mesh.edges, "vertices", 2, np.int32)[chosen]] = True
     return vertices
 
 
 def on_planes(mesh, axes):
     """Returns (n,) bool: the vertices whose coordinate along one of the axes is 0. axes: a set of "X", "Y" and "Z"."""
+    if not axes:
+        return np.zeros(len(mesh.vertices), bool)
     coordinates = np.abs(column(mesh.vertices, "co", 3))
     near = coordinates <= _ON_PLANE * coordinates.max(initial=0.0)
     return near[:, ["XYZ".index(axis) for axis in axes]].any(1)

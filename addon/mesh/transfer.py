@@ -14,7 +14,7 @@ from ..shared.errors import Refused
 from ..shared.filling import FilledArrays
 from .carry import Carry
 from .filling import add_faces
-from .mesh_io import column
+from .mesh_io import column, edges_of_faces
 
 
 class MeshMismatch(Refused):
@@ -43,7 +43,7 @@ class Writing:
         self._built = built = bmesh.new()
         try:
             built.from_mesh(mesh)
-            loose = _loose(built)
+            loose = _loose(mesh, built)
             if isinstance(source, FilledArrays):
                 add_faces(built, mesh, source)
             _triangulate(built, source)
@@ -84,8 +84,13 @@ class Layout:
         self.corners = corners
 
 
-def _loose(built):
-    return {edge for edge in built.edges if edge.is_wire}
+def _loose(mesh, built):
+    """Returns the edges of `built`, which was made of `mesh`, that no face uses."""
+    indices = np.flatnonzero(~edges_of_faces(mesh))
+    if not len(indices):
+        return set()
+    built.edges.ensure_lookup_table()
+    return {built.edges[i] for i in indices.tolist()}
 
 
 def _triangulate(built, source):

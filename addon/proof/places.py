@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import native
 from ..reference import measurements, snapshots, tolerances
 from ..shared import volumes
 from ..shared.proof import certify, measure
@@ -18,6 +19,7 @@ from ..shared.proof.verdict import Interval
 MOST = 50
 # So many vertices near to the limit are shown in each direction.
 _NEAREST = 10
+_AT_ONCE = 1 << 17  # triangles, between which other threads may go on
 
 
 @dataclass(frozen=True)
@@ -96,23 +98,29 @@ def _measured(on_reference, own, other, largest, regions, tolerance, threads, pr
 def _near(on_reference, own, other, largest, tolerance, threads, progress):
     """Returns the Places where the distance has a local maximum."""
     vertices, triangles = own.world(), own.arrays.triangles
-    used = np.unique(triangles)
+    is_used = np.zeros(len(vertices), bool)
+    is_used[triangles] = True
+    used = np.flatnonzero(is_used)
     distance = np.full(len(vertices), -np.inf)
     distance[used] = _distances(other, vertices[used], tolerance, threads, progress)
     # Of equal neighbours the one with the lowest index counts as the highest.
+    order = np.lexsort((-np.arange(len(vertices)), distance))
+    native.module.pause(0.0)  # Here and below the window is drawn: on large meshes each step takes some tenths of a second.
     rank = np.empty(len(vertices), np.int64)
-    rank[np.lexsort((-np.arange(len(vertices)), distance))] = np.arange(len(vertices))
-    highest = np.zeros(len(vertices), np.int64)
-    np.maximum.at(highest, triangles.ravel(), np.repeat(rank[triangles].max(1), 3))
-    tops = used[highest[used] == rank[used]]
+    rank[order] = np.arange(len(vertices))
+    is_top = is_used.copy()
+    for part in np.array_split(triangles, max(len(triangles) // _AT_ONCE, 1)):
+        ranks = rank[part]
+        is_top[part[ranks < ranks.max(1)[:, None]]] = False
+        native.module.pause(0.0)
+    tops = np.flatnonzero(is_top)
     tops = tops[np.argsort(-rank[tops])][:_NEAREST]
-    first = np.full(len(vertices), -1)
-    first[triangles[::-1].ravel()] = np.repeat(np.arange(len(triangles))[::-1], 3)
     places = [_place(on_reference, vertices, triangles, np.array([largest.triangle]), largest, False)]
     for top in tops.tolist():
         if distance[top] > 0 and top not in triangles[largest.triangle]:
-            exact = Interval(distance[top], distance[top], tuple(vertices[top]), int(first[top]))
-            places.append(_place(on_reference, vertices, triangles, np.array([first[top]]), exact, False))
+            triangle = np.flatnonzero((triangles == top).any(1))[0]
+            exact = Interval(distance[top], distance[top], tuple(vertices[top]), int(triangle))
+            places.append(_place(on_reference, vertices, triangles, np.array([triangle]), exact, False))
     return places
 
 
