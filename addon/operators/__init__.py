@@ -2,7 +2,7 @@
 """Registers the operators in bpy.ops.tolvol: set_tolerance, set_reference, clear_reference, show_original,
 restore_original, new_original, check, measure_statistics, select_outside, worst_point, next_place, clear_places, probe,
 add_label, renew_labels, remove_label, select_crossing, select_staying, save_report, copy_problem_report, decimate,
-make_lods, smooth, apply_modifier, fit_modifier, deform, shade_by_reference and bake_normals."""
+make_lods, show_level, smooth, apply_modifier, fit_modifier, deform, shade_by_reference and bake_normals."""
 
 import bpy
 
@@ -12,7 +12,7 @@ from .check import TOLVOL_OT_check, TOLVOL_OT_measure_statistics, TOLVOL_OT_sele
 from .crossings import TOLVOL_OT_select_crossing
 from .decimate import TOLVOL_OT_decimate
 from .deform import TOLVOL_OT_deform
-from .lod import TOLVOL_OT_make_lods
+from .lod import TOLVOL_OT_make_lods, TOLVOL_OT_show_level
 from .modifiers import TOLVOL_OT_apply_modifier, TOLVOL_OT_fit_modifier
 from .original import TOLVOL_OT_new_original, TOLVOL_OT_restore_original, TOLVOL_OT_show_original
 from .places import TOLVOL_OT_clear_places, TOLVOL_OT_next_place, TOLVOL_OT_worst_point
@@ -48,6 +48,7 @@ _CLASSES = (
     TOLVOL_OT_copy_problem_report,
     TOLVOL_OT_decimate,
     TOLVOL_OT_make_lods,
+    TOLVOL_OT_show_level,
     TOLVOL_OT_smooth,
     TOLVOL_OT_apply_modifier,
     TOLVOL_OT_fit_modifier,

@@ -6,6 +6,7 @@ import contextlib
 import math
 
 import bpy
+from bpy.props import IntProperty
 
 from .. import preferences
 from ..files.gltf_extras import GEOMETRIC_ERROR
@@ -61,7 +62,11 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
 
     @classmethod
     def poll(cls, context):
-        return allowed(cls, surface_blocked(context.active_object))
+        ob = context.active_object
+        return allowed(cls, surface_blocked(ob if ob is None else chain(ob)[0]))
+
+    def targets(self, context):
+        return chain(context.active_object)[:1]
 
     def draw(self, _context):
         self.layout.use_property_split = True
@@ -154,6 +159,7 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             context.view_layer.update()
             decimation.keep(self, level, outcome, layout, f"{level.name}: ")
         ob.tolvol.lods = collection
+        show_only(context, [ob, *levels], ob)
         before, after = runs[0]["input"]["triangles"], [f"{run['output']['triangles']:,}" for run in runs]
         passed = sum(verdict.word(level) == verdict.PASS for level in levels)
         seconds = report.duration(sum(sum(run["seconds"].values()) for run in runs))
@@ -163,13 +169,55 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
     def _set(self, settings, level, tolerance):
         """Sets the copied settings of a level."""
         settings.labels.clear()
-        settings.lods = None
+        settings.lods, settings.lod_of = None, self.ob
+        settings.show_deviation = False
         settings.keep = "BOTH"
         if self.by == "COUNT" or self.by == "TOLERANCE" and not self.in_length:
             settings.tolerance_mode = "PERCENT"
             settings.tolerance_percent = 100 * _WIDEST if self.by == "COUNT" else self.percentages[level]
         else:
             tolerances.set_length(settings, tolerance)
+
+
+class TOLVOL_OT_show_level(bpy.types.Operator):
+    """Show this one of the object and its levels, hide the others in the views and in renders, and make it the active object"""
+
+    bl_idname = "tolvol.show_level"
+    bl_label = "Show Level"
+    bl_options = {"REGISTER", "UNDO"}
+
+    level: IntProperty(name="Level", description="The number of the level. The object itself is 0", min=0)
+
+    @classmethod
+    def poll(cls, context):
+        ob = context.active_object
+        if ob is None or ob.type != "MESH" or len(chain(ob)) < 2:
+            return allowed(cls, "Make the levels first")
+        return allowed(cls, None if ob.mode == "OBJECT" else "Switch to Object Mode")
+
+    def execute(self, context):
+        shown = chain(context.active_object)
+        self.level = min(self.level, len(shown) - 1)
+        show_only(context, shown, shown[self.level])
+        return {"FINISHED"}
+
+
+def chain(ob):
+    """Returns the object of which levels are made, and the levels. `ob` is that object or one of the levels."""
+    source = ob.tolvol.lod_of or ob
+    return [source, *(source.tolvol.lods.objects if source.tolvol.lods else ())]
+
+
+def show_only(context, objects, chosen):
+    """Shows one of the objects, and hides the others. It becomes active: a panel shows nothing of a hidden object."""
+    here = context.view_layer.objects
+    for ob in objects:
+        ob.hide_render = ob != chosen
+        if ob.name in here:
+            ob.hide_set(ob != chosen)
+    if chosen.name in here:
+        chosen.select_set(True)
+        here.active = chosen
 
 
 def _source(ob):

@@ -2,7 +2,8 @@
 import bpy
 
 from ..files.gltf_extras import GEOMETRIC_ERROR
-from ..operators.lod import draw_lod_settings
+from ..mesh.mesh_io import triangle_count
+from ..operators.lod import chain, draw_lod_settings
 from ..units import length
 from .layout import SubPanel, active, right
 
@@ -17,19 +18,24 @@ class TOLVOL_PT_lod(SubPanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        ob = active(context)
-        draw_lod_settings(layout, ob.tolvol.lod)
+        made = chain(active(context))
+        settings = made[0].tolvol.lod
+        draw_lod_settings(layout, settings)
         layout.operator("tolvol.make_lods")
         # Each level has its row before it is made, so that no panel below moves.
-        column, made = layout.column(align=True), ob.tolvol.lods.objects[:] if ob.tolvol.lods else []
-        for i in range(max(ob.tolvol.lod.levels, len(made))):
+        column = layout.column(align=True)
+        for i in range(max(settings.levels + 1, len(made))):
             row = column.row()
             if i >= len(made):
-                row.label(text=f"LOD{i + 1}")
+                row.label(text=f"LOD{i}", icon="HIDE_ON")
                 right(row, "\u2013")
                 continue
             level = made[i]
-            row.label(text=level.name.removeprefix(f"{ob.name}_"))
-            right(row, f"{len(level.data.polygons):,}" if level.type == "MESH" else "")
+            button = row.row()
+            button.alignment, button.enabled = "LEFT", len(made) > 1
+            icon = "HIDE_OFF" if level.visible_get() else "HIDE_ON"
+            name = level.name.removeprefix(f"{made[0].name}_")
+            button.operator("tolvol.show_level", text=name, icon=icon, emboss=False).level = i
+            right(row, f"{triangle_count(level.data):,}" if level.type == "MESH" else "")
             error = level.get(GEOMETRIC_ERROR)
-            right(row, length(context, error) if isinstance(error, float) else "")
+            right(row, length(context, error) if isinstance(error, float) else "\u2013")

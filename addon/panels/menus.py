@@ -16,7 +16,7 @@ _IN_OBJECT_MENU = (
         "save_report",
     ),
     *("probe", "add_label", "renew_labels", "remove_label"),
-    *("decimate", "make_lods", "smooth", "apply_modifier", "fit_modifier", "deform"),
+    *("decimate", "make_lods", "show_level", "smooth", "apply_modifier", "fit_modifier", "deform"),
     *("shade_by_reference", "bake_normals"),
 )
 

@@ -186,6 +186,7 @@ class TOLVOL_PG_settings(ShowDeviation, bpy.types.PropertyGroup):
     lod: PointerProperty(type=TOLVOL_PG_lod)
     bake: PointerProperty(type=TOLVOL_PG_bake)
     lods: PointerProperty(type=bpy.types.Collection, description="The collection of the levels that were made last")
+    lod_of: PointerProperty(type=bpy.types.Object, description="The object of which this one is a level of detail")
     guard: PointerProperty(type=TOLVOL_PG_guard)
 
     measurement: PointerProperty(type=TOLVOL_PG_measurement)

@@ -263,3 +263,36 @@ def test_the_original_may_be_shared():
     levels = make(levels=2, percentages=padded(1, 2))
     assert len(levels) == 2 and ob.data == other.data and len(mesh_io.read_mesh(ob.data).triangles) == 2304
     assert not np.array_equal(mesh_io.read_mesh(levels[0].data).triangles, mesh_io.read_mesh(ob.data).triangles)
+
+
+def seen():
+    return [ob.name for ob in bpy.context.view_layer.objects if ob.visible_get()]
+
+
+def test_one_of_the_object_and_its_levels_is_shown():
+    ob = torus()
+    levels = make(levels=3, percentages=padded(0.3, 1, 3))
+    assert seen() == ["torus"] and bpy.context.selected_objects == [ob]
+    assert not any(level.tolvol.show_deviation for level in levels)
+    chain = [ob, *levels]
+    for number in (1, 3, 2, 0):
+        assert bpy.ops.tolvol.show_level(level=number) == {"FINISHED"}
+        assert seen() == [chain[number].name] and bpy.context.selected_objects == [chain[number]]
+        assert bpy.context.active_object == chain[number]
+        assert [each.hide_render for each in chain] == [i != number for i in range(4)]
+
+
+def test_levels_are_made_again_of_the_object_while_a_level_is_shown():
+    ob = torus()
+    make(levels=2, percentages=padded(0.3, 1))
+    bpy.ops.tolvol.show_level(level=1)
+    ob.tolvol.lod.levels, ob.tolvol.lod.percentages = 3, padded(0.3, 1, 2)
+    assert bpy.ops.tolvol.make_lods() == {"FINISHED"}
+    levels = list(ob.tolvol.lods.objects)
+    assert [level.name for level in levels] == ["torus_LOD1.001", "torus_LOD2.001", "torus_LOD3"]
+    assert seen() == ["torus"] and bpy.context.active_object == ob
+
+
+def test_without_levels_there_is_none_to_show():
+    torus()
+    assert not bpy.ops.tolvol.show_level.poll()

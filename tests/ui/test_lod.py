@@ -29,6 +29,10 @@ def levels():
     return [ob.name for ob in bpy.data.objects if "_LOD" in ob.name]
 
 
+def seen():
+    return [ob.name for ob in bpy.context.view_layer.objects if ob.visible_get()]
+
+
 def test_levels_by_mouse_and_one_ctrl_z():
     yield from reset(monkey)
     reference, before = scenes.world_triangles(suzanne()), stored()
@@ -44,11 +48,23 @@ def test_levels_by_mouse_and_one_ctrl_z():
         xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
         yield from at_rest()
         screenshot("lod 1 made")
+        assert seen() == ["Suzanne"]
+        yield from press("tolvol.show_level(level=3)")
+        yield from finished(lambda: seen() == ["Suzanne_LOD3"])
+        xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
+        yield
+        screenshot("lod 3 level shown")
+        yield from press("tolvol.show_level(level=0)")
+        yield from finished(lambda: seen() == ["Suzanne"])
     assert stored() == before
     for name, percent in zip(levels(), (0.1, 0.5, 2)):
         assert_proved(bpy.data.objects[name], reference, percent)
     xdotool("mousemove", *centre())
     yield
+    for _ in range(2):  # Each choice of a level is an undo step.
+        steps = seen()
+        key("ctrl+z")
+        yield from finished(lambda before=steps: seen() != before)
     key("ctrl+z")
     yield from finished(lambda: not levels())
     assert suzanne().tolvol.snapshot is None and not bpy.data.collections.get("Suzanne_LODs")
