@@ -158,8 +158,9 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             level[GEOMETRIC_ERROR] = max(run["forward"][1], run["backward"][1])
             context.view_layer.update()
             decimation.keep(self, level, outcome, layout, f"{level.name}: ")
+        known = chain(ob)  # with the levels that were made earlier, of which one may be shown
         ob.tolvol.lods = collection
-        show_only(context, [ob, *levels], ob)
+        show_only(context, [*known, *levels], ob)
         before, after = runs[0]["input"]["triangles"], [f"{run['output']['triangles']:,}" for run in runs]
         passed = sum(verdict.word(level) == verdict.PASS for level in levels)
         seconds = report.duration(sum(sum(run["seconds"].values()) for run in runs))
