@@ -60,7 +60,8 @@ def _shortened(line, room):
 
 
 def text_lines(context, layout, text, icon):
-    """Draws a label, broken into lines that fit the region."""
-    column = layout.column(align=True)
-    for i, line in enumerate(wrapped(context, text)):
+    """Draws a label, broken into lines that fit the region. Returns the number of lines."""
+    column, lines = layout.column(align=True), wrapped(context, text)
+    for i, line in enumerate(lines):
         column.label(text=line, icon="BLANK1" if i and icon != "NONE" else icon)
+    return len(lines)

@@ -5,7 +5,7 @@ import bpy
 
 from .. import guard
 from ..wrapping import text_lines
-from .layout import AMBER, GREEN, GREY, SubPanel, active
+from .layout import AMBER, GREEN, GREY, SubPanel, active, keep_height
 
 _WHERE = {
     "sculpting": "The guard of sculpting takes effect in Sculpt Mode",
@@ -29,7 +29,9 @@ class TOLVOL_PT_guard(SubPanel, bpy.types.Panel):
                 row.active = settings.sculpting or settings.editing
                 row.prop(settings, "crossings")
         # The sentences are below all buttons, so that they move none.
+        column, rows = layout.column(align=True), 0
         for setting, text, on in guard.states(ob):
             icon = GREEN if on else GREY if on is None else AMBER
             name = settings.bl_rna.properties[setting].name
-            text_lines(context, layout, f"{name}: {text}" if text else _WHERE[setting], icon)
+            rows += text_lines(context, column, f"{name}: {text}" if text else _WHERE[setting], icon)
+        keep_height(context, column, self.bl_label, rows)

@@ -32,6 +32,21 @@ class SubPanel(Panel):
         return native.module is not None and ob is not None and ob.type == "MESH"
 
 
+_most_rows = {}  # (name of a panel, width of the sidebar) -> the most rows that it has had
+
+
+def keep_height(context, column, name, rows):
+    """Fills a column of `rows` rows up to as many as the panel has had: if a sidebar that is scrolled to its end became
+    shorter, Blender would move all that is above.
+
+    column: an aligned one.
+    """
+    most = _most_rows.get((name, context.region.width), 0)
+    _most_rows[name, context.region.width] = max(most, rows)
+    for _ in range(most - rows):
+        column.label()
+
+
 def right(layout, text):
     row = layout.row()
     row.alignment = "RIGHT"

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel with the sentences about the last operation and the mesh.
 
-It is the last panel, so that its sentences, which come and go when an operation ends, move no button of another panel.
+It is the last panel and becomes no shorter, so that its sentences, which come and go when an operation ends, move no button
+of another panel.
 """
 
 import datetime
@@ -14,23 +15,19 @@ from ..proof import kept_warnings, last_run, verdict
 from ..reference import measurements, snapshots
 from ..shared.decimation import ISLANDS
 from ..wrapping import text_lines
-from .layout import AMBER, RED, SubPanel, active
+from .layout import AMBER, RED, SubPanel, active, keep_height
 
 
 class TOLVOL_PT_notes(SubPanel, bpy.types.Panel):
     bl_label = "Notes"
 
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and any(notes(context, active(context)))
-
     def draw(self, context):
-        layout = self.layout
+        column = self.layout.column(align=True)
         lines, staying = notes(context, active(context))
-        for text, icon in lines:
-            text_lines(context, layout, text, icon)
+        rows = sum([text_lines(context, column, text, icon) for text, icon in lines or [("No notes", "NONE")]])
         if staying:
-            layout.operator("tolvol.select_staying", text=f"Select {staying:,} Staying Vertices")
+            column.operator("tolvol.select_staying", text=f"Select {staying:,} Staying Vertices")
+        keep_height(context, column, self.bl_label, rows + bool(staying))
 
 
 def notes(context, ob):
