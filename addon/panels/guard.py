@@ -34,4 +34,4 @@ class TOLVOL_PT_guard(SubPanel, bpy.types.Panel):
             icon = GREEN if on else GREY if on is None else AMBER
             name = settings.bl_rna.properties[setting].name
             rows += text_lines(context, column, f"{name}: {text}" if text else _WHERE[setting], icon)
-        keep_height(context, column, self.bl_label, rows)
+        keep_height(context, column, "Guard", rows)

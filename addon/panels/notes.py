@@ -27,7 +27,7 @@ class TOLVOL_PT_notes(SubPanel, bpy.types.Panel):
         rows = sum([text_lines(context, column, text, icon) for text, icon in lines or [("No notes", "NONE")]])
         if staying:
             column.operator("tolvol.select_staying", text=f"Select {staying:,} Staying Vertices")
-        keep_height(context, column, self.bl_label, rows + bool(staying))
+        keep_height(context, column, "Notes", rows + bool(staying))
 
 
 def notes(context, ob):

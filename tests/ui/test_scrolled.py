@@ -11,6 +11,7 @@ from panels_open import unfolded
 from test_layout import rows, torus
 from window import finished, on_screen, open_tab, press, region, reset, screenshot, scroll_down, window_context, xdotool
 
+
 def test_no_button_moves_at_the_end_of_the_sidebar_when_sentences_vanish():
     yield from reset(scenes.torus)
     yield from open_tab()
