@@ -21,6 +21,16 @@ glm::dvec3 at(std::span<const float> positions, std::size_t vertex) {
   return {positions[3 * vertex], positions[3 * vertex + 1], positions[3 * vertex + 2]};
 }
 
+/// One bit for each two corners of a face: whether they are one vertex.
+template <class Corner>
+unsigned repeated(Corner first, int corners) {
+  unsigned result = 0;
+  for (int i = 0; i < corners; ++i) {
+    for (int k = 0; k < i; ++k) result = 2 * result + (first[i] == first[k]);
+  }
+  return result;
+}
+
 }  // namespace
 
 Guard::Guard(std::span<const float> positions, std::vector<std::uint32_t> faces, int corners,
@@ -69,11 +79,15 @@ std::vector<std::uint32_t> Guard::replace_faces(std::vector<std::uint32_t> faces
   std::vector<std::uint32_t> differing, refused;
   for (std::uint32_t f = 0; f < faces.size() / corners; ++f) {
     const auto first = faces.begin() + static_cast<std::ptrdiff_t>(f * corners);
-    if (std::equal(first, first + corners_, faces_.begin() + (first - faces.begin()))) continue;
+    const auto before = faces_.begin() + (first - faces.begin());
+    if (std::equal(first, first + corners_, before)) continue;
+    if (repeated(first, corners_) != repeated(before, corners_)) {
+      throw InvalidInput("face " + std::to_string(f) + " repeats other corners than before; make a new guard");
+    }
     differing.push_back(f);
     // Such a face keeps less than others, which another face in its place must not do.
     const auto is_in = [&](const std::vector<std::uint32_t>& found) { return std::ranges::binary_search(found, f); };
-    if (is_in(start_.outside) || is_in(start_.exceeding)) refused.push_back(f);
+    if (is_in(start_.outside) || is_in(start_.exceeding) || pull_back_.may_be_unsure(f)) refused.push_back(f);
   }
   if (!refused.empty()) return refused;
   const auto exchange = [&] {

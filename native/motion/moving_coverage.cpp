@@ -2,6 +2,7 @@
 #include "motion/moving_coverage.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 
 #include "base/call.h"
@@ -28,6 +29,8 @@ MovingCoverage::MovingCoverage(MovingMesh& mesh, Progress* progress) : mesh_(&me
   layers_ = std::move(found.layers);
   uncovered_ = found.uncovered;
   for (const std::uint32_t v : found.nearest) mesh_->freeze(v);
+  nearest_faces_ = std::move(found.nearest_faces);
+  std::ranges::sort(nearest_faces_);
   count_pieces();
 }
 
@@ -78,6 +81,7 @@ void MovingCoverage::find_witnesses(Found& found, Progress* progress) const {
     found.uncovered.first = std::min(*uncovered.first, found.uncovered.first.value_or(*uncovered.first));
   for (const std::uint32_t element : missing.nearest) {
     for (int k = 0; k < 3; ++k) found.nearest.push_back(elements.triangles[element][k]);
+    found.nearest_faces.push_back(element / static_cast<std::uint32_t>(layer.triangles.size()));
   }
 }
 
@@ -128,6 +132,10 @@ std::vector<std::uint32_t> MovingCoverage::still_failing(std::span<const std::ui
 }
 
 std::vector<std::uint32_t> MovingCoverage::failing_replaced(std::span<const std::uint32_t> faces) {
+  std::vector<std::uint32_t> nearest;
+  std::ranges::copy_if(faces, std::back_inserter(nearest),
+                       [&](std::uint32_t f) { return std::ranges::binary_search(nearest_faces_, f); });
+  if (!nearest.empty()) return nearest;
   for (Layer& layer : layers_) {
     std::vector<std::uint32_t> failed = failing(layer, faces, Neighbours::only_take_pieces, Chosen::are_replaced);
     if (!failed.empty()) return failed;

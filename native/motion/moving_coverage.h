@@ -33,7 +33,8 @@ class MovingCoverage {
   /// Takes another look at faces that failing() returned: which of them fail still? It proves nothing of other faces.
   std::vector<std::uint32_t> still_failing(std::span<const std::uint32_t> failed);
   /// Returns faces of `faces`, whose corners are others now, whose pieces would have no witness in the state, which is
-  /// on trial; none if every piece has one. accept() makes the faces part of the state then.
+  /// on trial, and those that have been nearest to an uncovered part of the reference since the start; none if there is
+  /// neither. accept() makes the faces part of the state then.
   std::vector<std::uint32_t> failing_replaced(std::span<const std::uint32_t> faces);
   /// Goes with the mesh to its trial, for which failing() found no face last. The mesh itself accepts it after this.
   void accept(std::span<const std::uint32_t> faces);
@@ -62,11 +63,11 @@ class MovingCoverage {
   enum class Chosen { move, are_replaced };
   std::vector<std::uint32_t> failing(Layer& layer, std::span<const std::uint32_t> faces, Neighbours neighbours,
                                      Chosen chosen = Chosen::move);
-  /// Witnesses of the state, the faces of the reference that have none, and the vertices nearest to these.
+  /// Witnesses of the state, the faces of the reference that have none, and the vertices and faces nearest to these.
   struct Found {
     std::vector<Layer> layers;
     FaceCount uncovered;
-    std::vector<std::uint32_t> nearest;
+    std::vector<std::uint32_t> nearest, nearest_faces;
   };
   Found find_layers(Progress* progress) const;
   void find_witnesses(Found& found, Progress* progress) const;
@@ -75,6 +76,7 @@ class MovingCoverage {
   MovingMesh* mesh_;
   std::vector<Layer> layers_;
   FaceCount uncovered_;
+  std::vector<std::uint32_t> nearest_faces_;  ///< Those nearest to uncovered parts of the reference, ascending.
   std::size_t pieces_ = 0, most_pieces_ = 0;
   bool is_worn_ = false;
 };

@@ -54,6 +54,8 @@ class MovingMesh {
   Start start(std::span<const glm::dvec3> stored, double max_normal_angle, std::span<const std::uint32_t> place,
               Progress* progress);
 
+  /// Whether a triangle of the face had no sure normal at the start, so that it may be without one.
+  bool may_be_unsure(std::uint32_t face) const;
   /// Maps each vertex to its faces. start() does this; it has to be done again when faces have other corners.
   void make_rings();
   /// Certifies these faces on trial by a search alone, whatever is known of them. Returns those for which there is no

@@ -92,6 +92,14 @@ void MovingMesh::start_facing(FacingRule rule, std::span<const std::uint32_t> pl
   });
 }
 
+bool MovingMesh::may_be_unsure(std::uint32_t face) const {
+  bool result = false;
+  for (std::size_t k = 0; facing_ && k < triangles_of(corners()).size(); ++k) {
+    result = result || facing_->of(face, k).may_be_unsure;
+  }
+  return result;
+}
+
 /// For each part: by how much the area of its faces that keep their angle is larger than that of the failing ones.
 std::vector<double> MovingMesh::balance(std::span<const std::uint32_t> failing) const {
   std::vector<double> result(2 * face_count(), 0);

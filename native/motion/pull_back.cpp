@@ -57,7 +57,7 @@ std::vector<std::uint32_t> PullBack::replace_faces(std::span<const std::uint32_t
     const std::vector<std::uint32_t> crossing = crossings_->crossing_replaced(faces);
     refused.insert(refused.end(), crossing.begin(), crossing.end());
     std::ranges::sort(refused);
-    refused.erase(std::ranges::unique(refused).begin(), refused.end());
+    refused.erase(std::unique(refused.begin(), refused.end()), refused.end());
   }
   if (refused.empty() && coverage_) refused = coverage_->failing_replaced(faces);
   if (!refused.empty()) return refused;

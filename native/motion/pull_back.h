@@ -75,11 +75,13 @@ class PullBack {
   /// keeping places and T-junctions together as much.
   Start start(std::span<const glm::dvec3> stored, const StartOptions& options, Progress* progress);
   bool frozen(std::uint32_t vertex) const { return mesh_.frozen(vertex); }
-  std::optional<Normals> normals() const { return mesh_.normals(); }  ///< See MovingMesh.
+  std::optional<Normals> normals() const { return mesh_.normals(); }                  ///< See MovingMesh.
+  bool may_be_unsure(std::uint32_t face) const { return mesh_.may_be_unsure(face); }  ///< See MovingMesh.
 
   /// Makes these faces, whose corners in the array of the constructor are others now, part of the state: a polygon is
-  /// triangulated in another way. None of them may be outside or exceeding since the start. Returns those that are not
-  /// inside, exceed their angle, cross others or would leave a part of the reference without a witness. If there are
+  /// triangulated in another way. None of them may be outside, exceeding or without a sure normal since the start, and
+  /// each repeats the same corners as before, if any. Returns those that are not inside, exceed their angle, cross
+  /// others, would leave a part of the reference without a witness or are nearest to an uncovered one. If there are
   /// any, the array has to be as it was before, and restore_faces() has to follow. From then on faces may cross only if
   /// they cross now. Throws Cancelled; start() has to follow then.
   std::vector<std::uint32_t> replace_faces(std::span<const std::uint32_t> faces, Progress* progress);

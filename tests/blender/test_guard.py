@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The guard of sculpting without a window: scripts move vertices like a brush. tests/ui has real brushes."""
 
+import bmesh
 import bpy
 import numpy as np
 import pytest

@@ -13,6 +13,7 @@
 #include "base/errors.h"
 #include "many.h"
 #include "measure/hausdorff.h"
+#include "polls.h"
 #include "shapes.h"
 
 namespace {
@@ -93,6 +94,30 @@ TEST(Guard, KeepsEveryDabInside) {
   }
   EXPECT_GT(corrected, 100u);
   EXPECT_GT(s.deviation(), 0.95 * kTolerance) << "it gets as far as it may";
+}
+
+TEST(Guard, ADabCostsWhatItMovesHoweverLargeTheMeshIs) {
+  for (const bool keep_out : {false, true}) {
+    std::size_t polls[2] = {}, held[2] = {}, moved = 0;
+    for (const bool large : {false, true}) {
+      TriangleMesh beside = shapes::torus(120);
+      for (dvec3& p : beside.vertices) p.x += 4;
+      Sculpture s(large ? shapes::joined(shapes::torus(40), beside) : shapes::torus(40));
+      using Crossings = PullBack::Crossings;
+      Guard guard = s.guard({.crossings = keep_out ? Crossings::keep_out : Crossings::allow, .threads = 1});
+      const std::vector<float> before = s.positions;
+      s.dab(100, 0.8, 0.06);
+      moved = 0;
+      for (std::size_t v = 0; v < s.mesh.vertices.size(); ++v) {
+        moved += std::memcmp(&before[3 * v], &s.positions[3 * v], 12) != 0;
+      }
+      polls[large] = polls_of([&] { held[large] = guard.constrain(s.positions).vertices.size(); });
+    }
+    EXPECT_EQ(held[0], held[1]);
+    EXPECT_GT(held[0], 40u);
+    EXPECT_LE(polls[0], moved);
+    EXPECT_LE(polls[1], polls[0] + polls[0] / 20) << "the mesh has ten times as many faces";
+  }
 }
 
 TEST(Guard, AgreesWithConstrainButForTheLastFourPercentAlmostEverywhere) {
@@ -350,6 +375,31 @@ TEST(Guard, ReplacedFacesMayCrossOnlyWhatTheyCrossThen) {
   s.push(1, {0, 0, 2 * h}), s.push(3, {0, 0, 2 * h});
   s.correct(guard.constrain(s.positions));
   EXPECT_LT(s.at(1).z + s.at(3).z, 2 * h);
+}
+
+TEST(Guard, FacesThatKeepLessThanOthersAreNotReplaced) {
+  // A corner that is repeated has no triangle, so that nothing is kept of one.
+  Sculpture s(square(0));
+  Guard triangle(s.positions, {0, 1, 2, 2}, 4, s.to_world, s.volume, {.two_sided = false});
+  EXPECT_THROW(triangle.replace_faces({0, 1, 2, 3}), InvalidInput);
+  EXPECT_TRUE(triangle.replace_faces({0, 1, 3, 3}).empty());
+  // One triangle of a quad with three corners in a line has no normal.
+  TriangleMesh line = square(0);
+  line.vertices[1] = {0.5, 0.5, 0};
+  Sculpture flat(line);
+  Guard quad(flat.positions, {0, 1, 2, 3}, 4, flat.to_world, flat.volume, {.two_sided = false});
+  EXPECT_EQ(quad.replace_faces({1, 2, 3, 0}), (std::vector<std::uint32_t>{0}));
+}
+
+TEST(Guard, WhatIsNearestToAnUncoveredPartIsNotReplaced) {
+  // The square has a part beside it that only the reference has.
+  TriangleMesh reference = square(0);
+  for (const dvec3& p : {dvec3(2, 0, 0), {2, 1, 0}}) reference.vertices.push_back(p);
+  reference.triangles.emplace_back(1, 4, 5), reference.triangles.emplace_back(1, 5, 2);
+  Sculpture s(reference);
+  Guard guard(s.positions, faces_of(square(0)), 3, s.to_world, s.volume, {.outside = Outside::keep});
+  ASSERT_GT(guard.start().uncovered.faces, 0u);
+  EXPECT_FALSE(guard.replace_faces(faces_of(square(0, true))).empty());
 }
 
 TEST(Guard, BadFacesKeepTheFaces) {
