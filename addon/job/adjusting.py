@@ -28,6 +28,7 @@ def hand_over(run):
 
 def _rewind(run):
     """Has Blender undo the step of the operator of the run and repeat it, so that it writes. Returns whether it has done so."""
+    bpy.context.view_layer.update()  # Blender may not have reported the last change yet.
     if run.something_else or not _is_last(run.operator) or not bpy.ops.ed.undo_redo.poll():
         return False
     run.rewinding = True

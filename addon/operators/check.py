@@ -50,13 +50,15 @@ class Comparison(JobOperator):
         return found
 
     def remember(self, surface, found, measured=""):
-        """Stores the Verdict. Returns the one that every part of the interface then shows: more may have been known of the
-        same mesh. measured: statistics as text."""
+        """Stores the Verdict. Returns the one that every part of the interface then shows, because more may have been known
+        of the same mesh; the Verdict itself if the settings are others now. measured: statistics as text."""
         certified = {
             name: (way.lower, way.upper) for name, way in (("forward", found.forward), ("backward", found.backward))
         }
         measurements.remember(self.ob, surface, certified, found.tolerance, found.share_outside, measured)
-        return verdict.of(self.ob) or found
+        shown = verdict.of(self.ob)
+        asked = found.tolerance, found.two_sided
+        return shown if shown and (shown.tolerance, shown.two_sided) == asked else found
 
 
 class TOLVOL_OT_check(Comparison, bpy.types.Operator):
@@ -126,7 +128,8 @@ reference, and bring them into view"""
         found = self.remember(surface, found)
         mesh = self.ob.data
         faces = np.zeros(len(mesh.polygons), bool)
-        faces[surface.arrays.polygons[triangles]] = True
+        if not found.forward_within:  # It may have been known to be within, where the search found no proof.
+            faces[surface.arrays.polygons[triangles]] = True
         if not faces.any():
             self.say({"INFO" if found.passed else "WARNING"}, f"No face of the mesh is outside. {said(found)}")
             return {"CANCELLED"}

@@ -105,9 +105,8 @@ def _near(on_reference, own, other, largest, tolerance, threads, progress):
     distance[used] = _distances(other, vertices[used], tolerance, threads, progress)
     # Of equal neighbours the one with the lowest index counts as the highest.
     order = np.lexsort((-np.arange(len(vertices)), distance))
-    native.module.pause(
-        0.0
-    )  # Here and below the window is drawn: on large meshes each step takes some tenths of a second.
+    # Here and below the window is drawn: on large meshes each step takes some tenths of a second.
+    native.module.pause(0.0)
     rank = np.empty(len(vertices), np.int64)
     rank[order] = np.arange(len(vertices))
     is_top = is_used.copy()

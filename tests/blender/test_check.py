@@ -2,6 +2,7 @@
 """Check, Select Outside and what is known of a mesh by them."""
 
 import datetime
+import re
 from types import SimpleNamespace
 
 import bpy
@@ -10,7 +11,7 @@ import pytest
 
 from addon import overlay
 from addon.mesh import mesh_io
-from addon.operators import blocked
+from addon.operators import blocked, check
 from addon.overlay import draw, reasons
 from addon.panels import notes
 from addon.proof import statistics, verdict
@@ -281,3 +282,37 @@ def test_a_narrower_measurement_of_the_same_mesh_is_shown(monkeypatch):
     bpy.ops.tolvol.check()
     now = verdict.of(ob)
     assert now.forward.upper < before.forward.upper and now.backward.lower > before.backward.lower
+
+
+def test_what_was_known_to_be_within_is_not_selected_as_outside(monkeypatch, capfd):
+    ob = torus()
+    ob.tolvol.keep = "ONE"
+    bpy.ops.tolvol.decimate(tolerance_percent=1)
+    before = verdict.of(ob)
+    ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", before.forward.upper * 1.00001
+    measurements.forget_kept()
+    known._kept.clear()
+    measure_less_narrowly(monkeypatch)
+    capfd.readouterr()
+    assert bpy.ops.tolvol.select_outside() == {"CANCELLED"}
+    assert "No face of the mesh is outside. PASS" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("by", [0.5, 2])
+def test_a_tolerance_that_is_changed_while_the_mesh_is_measured_is_not_that_of_the_message(by, monkeypatch, capfd):
+    ob = torus()
+    bpy.ops.tolvol.decimate(tolerance_percent=1)
+    ob.data.vertices[0].co *= 1.3
+    ob.data.update()
+    judge = check.Comparison.judge
+
+    def judge_and_change(*arguments):
+        ob.tolvol.tolerance_percent = by
+        return judge(*arguments)
+
+    monkeypatch.setattr(check.Comparison, "judge", judge_and_change)
+    capfd.readouterr()
+    bpy.ops.tolvol.check()
+    said = capfd.readouterr().out
+    share = re.search(r"FAIL: beyond the tolerance.* ([0-9.]+) % of the area is outside", said)
+    assert share and float(share[1]) > 0, said

@@ -384,10 +384,10 @@ TEST(Guard, FacesThatKeepLessThanOthersAreNotReplaced) {
   EXPECT_THROW(triangle.replace_faces({0, 1, 2, 3}), InvalidInput);
   EXPECT_TRUE(triangle.replace_faces({0, 1, 3, 3}).empty());
   // One triangle of a quad with three corners in a line has no normal.
-  TriangleMesh line = square(0);
-  line.vertices[1] = {0.5, 0.5, 0};
-  Sculpture flat(line);
-  Guard quad(flat.positions, {0, 1, 2, 3}, 4, flat.to_world, flat.volume, {.two_sided = false});
+  s.push(1, {-0.5, 0.5, 0});
+  Guard quad(s.positions, {0, 1, 2, 3}, 4, s.to_world, s.volume, {.two_sided = false});
+  s.push(1, {0.5, -0.5, 0});
+  ASSERT_TRUE(quad.constrain(s.positions).vertices.empty());
   EXPECT_EQ(quad.replace_faces({1, 2, 3, 0}), (std::vector<std::uint32_t>{0}));
 }
 
