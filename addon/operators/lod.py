@@ -158,9 +158,13 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             level[GEOMETRIC_ERROR] = max(run["forward"][1], run["backward"][1])
             context.view_layer.update()
             decimation.keep(self, level, outcome, layout, f"{level.name}: ")
-        known = chain(ob)  # with the levels that were made earlier, of which one may be shown
+        earlier = chain(ob)[1:]
+        if ob.hide_get():  # One of the earlier levels is shown in its place.
+            ob.hide_render = False
+            ob.hide_set(False)
         ob.tolvol.lods = collection
-        show_only(context, [*known, *levels], ob)
+        _hide(context, [*earlier, *levels])
+        context.view_layer.objects.active = ob
         before, after = runs[0]["input"]["triangles"], [f"{run['output']['triangles']:,}" for run in runs]
         passed = sum(verdict.word(level) == verdict.PASS for level in levels)
         seconds = report.duration(sum(sum(run["seconds"].values()) for run in runs))
@@ -197,28 +201,51 @@ class TOLVOL_OT_show_level(bpy.types.Operator):
         return allowed(cls, None if ob.mode == "OBJECT" else "Switch to Object Mode")
 
     def execute(self, context):
-        shown = chain(context.active_object)
-        self.level = min(self.level, len(shown) - 1)
-        show_only(context, shown, shown[self.level])
+        active = context.active_object
+        objects = chain(active)
+        self.level = min(self.level, len(objects) - 1)
+        chosen = objects[self.level]
+        if not _show(context, chosen):
+            self.report(
+                {"ERROR"}, f"{chosen.name} is in a collection that is hidden or excluded: show the collection first"
+            )
+            return {"CANCELLED"}
+        # A level of an earlier chain is none of the present levels.
+        _hide(context, [ob for ob in (active, *objects) if ob != chosen])
         return {"FINISHED"}
 
 
 def chain(ob):
     """Returns the object of which levels are made, and the levels. `ob` is that object or one of the levels."""
-    source = ob.tolvol.lod_of or ob
-    return [source, *(source.tolvol.lods.objects if source.tolvol.lods else ())]
+    source = ob.tolvol.lod_of
+    if source is None or not source.users_scene:  # A level keeps an object that was deleted.
+        source = ob
+    made = source.tolvol.lods.objects if source.tolvol.lods else ()
+    # A copy of the object has its collection, but the levels are not those of the copy.
+    return [source, *(each for each in made if each.tolvol.lod_of == source)]
 
 
-def show_only(context, objects, chosen):
-    """Shows one of the objects, and hides the others. It becomes active: a panel shows nothing of a hidden object."""
-    here = context.view_layer.objects
+def _show(context, ob):
+    """Shows an object in the views and in renders, and makes it active: a panel shows nothing of a hidden object. Returns
+    False, and changes nothing, if its collection hides it."""
+    if ob.name not in context.view_layer.objects:
+        return False
+    was_hidden = ob.hide_get()
+    ob.hide_set(False)
+    if not ob.visible_get():
+        ob.hide_set(was_hidden)
+        return False
+    ob.hide_render = False
+    ob.select_set(True)
+    context.view_layer.objects.active = ob
+    return True
+
+
+def _hide(context, objects):
     for ob in objects:
-        ob.hide_render = ob != chosen
-        if ob.name in here:
-            ob.hide_set(ob != chosen)
-    if chosen.name in here:
-        chosen.select_set(True)
-        here.active = chosen
+        ob.hide_render = True
+        if ob.name in context.view_layer.objects:
+            ob.hide_set(True)
 
 
 def _source(ob):

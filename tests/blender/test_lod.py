@@ -293,6 +293,59 @@ def test_levels_are_made_again_of_the_object_while_a_level_is_shown():
     assert seen() == ["torus"] and bpy.context.active_object == ob
 
 
+def test_a_chain_leaves_the_object_as_it_is_in_renders():
+    ob = torus()
+    ob.hide_render = True
+    make(levels=2, percentages=padded(0.3, 1))
+    assert ob.hide_render and all(level.hide_render for level in ob.tolvol.lods.objects)
+    assert bpy.ops.tolvol.make_lods() == {"FINISHED"}
+    assert ob.hide_render and seen() == ["torus"]
+
+
+def test_levels_whose_object_was_deleted_are_objects_of_their_own():
+    ob = torus()
+    levels = make(levels=2, percentages=padded(0.3, 1))
+    bpy.ops.tolvol.show_level(level=1)
+    with bpy.context.temp_override(selected_objects=[ob]):
+        bpy.ops.object.delete()
+    assert "torus" not in bpy.context.scene.objects
+    assert bpy.context.active_object == levels[0] and not bpy.ops.tolvol.show_level.poll()
+    assert bpy.ops.tolvol.make_lods() == {"FINISHED"}
+    assert seen() == [levels[0].name] and levels[0].tolvol.lods is not None
+
+
+@pytest.mark.parametrize("how", ["exclude", "hide_viewport"])
+def test_a_level_in_a_hidden_collection_is_not_shown_and_nothing_is_hidden(how):
+    torus()
+    make(levels=2, percentages=padded(0.3, 1))
+    layer = bpy.context.view_layer.layer_collection.children["torus_LODs"]
+    setattr(layer, how, True)
+    with pytest.raises(RuntimeError, match="show the collection first"):
+        bpy.ops.tolvol.show_level(level=1)
+    assert seen() == ["torus"]
+    setattr(layer, how, False)
+    assert bpy.ops.tolvol.show_level(level=1) == {"FINISHED"} and seen() == ["torus_LOD1"]
+
+
+def test_a_copy_of_the_object_has_no_levels():
+    ob = torus()
+    make(levels=2, percentages=padded(0.3, 1))
+    copy = ob.copy()
+    bpy.context.collection.objects.link(copy)
+    bpy.context.view_layer.objects.active = copy
+    assert not bpy.ops.tolvol.show_level.poll()
+
+
+def test_a_level_of_an_earlier_chain_is_hidden_like_the_others():
+    ob = torus()
+    earlier = make(levels=2, percentages=padded(0.3, 1))
+    assert bpy.ops.tolvol.make_lods() == {"FINISHED"}
+    earlier[0].hide_set(False)
+    bpy.context.view_layer.objects.active = earlier[0]
+    assert bpy.ops.tolvol.show_level(level=2) == {"FINISHED"}
+    assert seen() == [ob.tolvol.lods.objects[1].name]
+
+
 def test_without_levels_there_is_none_to_show():
     torus()
     assert not bpy.ops.tolvol.show_level.poll()
