@@ -59,7 +59,7 @@ def test_the_tolerance_is_dragged_again_and_again_in_the_panel_of_the_last_opera
     yield from finished(lambda: left() < TRIANGLES // 4)
     yield from finished(lambda: region("HUD").height > 10)
     hud = region("HUD")
-    click(*on_screen(hud, 60, hud.height - 12))  # The panel is closed at first, so only its header is there.
+    yield from click(*on_screen(hud, 60, hud.height - 12))  # The panel is closed at first, so only its header is there.
     yield from finished(lambda: region("HUD").height > 200)
     hud = region("HUD")
     place = on_screen(hud, hud.width // 2, 50)

@@ -10,10 +10,9 @@ from addon.operators import decimate, original
 from window import (
     at_rest,
     centre,
-    find_hold,
     finished,
     key,
-    move_onto,
+    move_onto_hold,
     on_screen,
     open_tab,
     pixels,
@@ -98,8 +97,7 @@ def test_the_button_of_decimate_counts_the_same_objects_while_the_original_is_sh
 def test_the_original_is_shown_while_its_button_is_held_and_asks_before_it_comes_back():
     yield from decimated()
     count = len(torus().data.polygons)
-    place = yield from find_hold()
-    yield from move_onto(*place)
+    yield from move_onto_hold()
     xdotool("mousedown", 1)
     yield from finished(original.shown)
     yield from at_rest()

@@ -66,16 +66,17 @@ def test_a_hole_that_is_cut_is_seen_on_the_reference_and_the_guard_puts_it_back(
     key("ctrl+z")
     yield from finished(lambda: striped() == 0 and verdict.word(ob) == verdict.PASS)
     undone, undo = [], guard.edit.undo
-    guard.edit.undo = lambda: undone.append(len(bmesh.from_edit_mesh(ob.data).faces)) or undo()
+    guard.edit.undo = lambda: undone.append(len(bmesh.from_edit_mesh(the_object().data).faces)) or undo()
+    # Undo may make the object anew.
     try:
-        ob.tolvol.guard.editing = True
-        ob.update_tag()
-        yield from finished(lambda: [on for _, _, on in guard.states(ob)] == [True])
+        the_object().tolvol.guard.editing = True
+        the_object().update_tag()
+        yield from finished(lambda: [on for _, _, on in guard.states(the_object())] == [True])
         yield from delete_faces()
-        yield from finished(lambda: undone and verdict.word(ob) == verdict.PASS)
+        yield from finished(lambda: undone and verdict.word(the_object()) == verdict.PASS)
     finally:
         guard.edit.undo = undo
-    assert undone[0] < whole == len(bmesh.from_edit_mesh(ob.data).faces)
+    assert undone[0] < whole == len(bmesh.from_edit_mesh(the_object().data).faces)
     to_mode("OBJECT")
 
 

@@ -231,10 +231,9 @@ def find_setting(path):
     return (yield from _find(path, "ctrl+shift+c", 0.33))
 
 
-def find_hold():
-    """Does the same as find() for the button that shows the original while it is held. It scrolls the sidebar down."""
-    yield from scroll_down()
-    return (yield from _find("tolvol_show_original", "ctrl+shift+alt+c", 0.33))
+def move_onto_hold():
+    """Moves the mouse onto the button that shows the original while it is held. If necessary, it scrolls the sidebar."""
+    yield from _scrolled_to("tolvol_show_original", "ctrl+shift+alt+c", 0.33)
 
 
 _last_seen = {}
