@@ -7,7 +7,8 @@ helper: an operator that does receive events. Once the outcome is there, the hel
 and this time execute() writes the outcome: so there is one undo step, and the panel of Adjust Last Operation stays.
 
 If something else has happened meanwhile, that would be undone, too. Then the helper itself writes the outcome, and its
-undo step replaces the one that Blender has stored if no other has followed. Blender closes the panel at that.
+undo step replaces the one that Blender has stored if no other has followed. Blender closes the panel at that. So it is
+after Fit, too, whose new mesh would be lost with the step that is undone.
 """
 
 import functools

@@ -101,8 +101,8 @@ def add(parser):
         "--effort",
         choices=("fast", "thorough"),
         default="fast",
-        help="thorough: a third fewer triangles in 4 to 16 times the processor time, at a tolerance of 0.1%% in 10 to 30 "
-        "times, for a small mesh in up to 50 times (default: fast)",
+        help="thorough: a third fewer triangles in 6 to 25 times the processor time, at a tolerance of 0.1%% in 25 to 50 "
+        "times, for a small mesh in up to 300 times (default: fast)",
     )
     parser.add_argument(
         "--crossings",
