@@ -159,7 +159,8 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             context.view_layer.update()
             decimation.keep(self, level, outcome, layout, f"{level.name}: ")
         earlier = chain(ob)[1:]
-        if ob.hide_get():  # One of the earlier levels is shown in its place.
+        # An earlier level that is shown in place of the object gives way to it.
+        if ob.hide_get() and any(level.visible_get() for level in earlier):
             ob.hide_render = False
             ob.hide_set(False)
         ob.tolvol.lods = collection

@@ -302,6 +302,15 @@ def test_a_chain_leaves_the_object_as_it_is_in_renders():
     assert ob.hide_render and seen() == ["torus"]
 
 
+def test_a_chain_leaves_a_hidden_object_hidden():
+    ob = torus()
+    ob.hide_render = True
+    ob.hide_set(True)
+    for _ in range(2):
+        make(levels=2, percentages=padded(0.3, 1))
+        assert ob.hide_render and ob.hide_get() and seen() == []
+
+
 def test_levels_whose_object_was_deleted_are_objects_of_their_own():
     ob = torus()
     levels = make(levels=2, percentages=padded(0.3, 1))
