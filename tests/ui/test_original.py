@@ -40,6 +40,7 @@ def decimated():
     view()[1].spaces[0].region_3d.view_distance = 5
     yield from press("tolvol.decimate")
     yield from finished(lambda: len(torus().data.polygons) < 300)
+    yield from at_rest()  # The original cannot be shown while the job ends.
 
 
 def view_pixels():

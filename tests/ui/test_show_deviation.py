@@ -64,10 +64,10 @@ def test_a_hole_that_is_cut_is_seen_on_the_reference_and_the_guard_puts_it_back(
     screenshot("overlay 10 hole on the reference")
     assert verdict.of(ob).ways == "the reference" and len(bmesh.from_edit_mesh(ob.data).faces) < whole
     key("ctrl+z")
-    yield from finished(lambda: striped() == 0 and verdict.word(ob) == verdict.PASS)
+    yield from finished(lambda: striped() == 0 and verdict.word(the_object()) == verdict.PASS)
     undone, undo = [], guard.edit.undo
-    guard.edit.undo = lambda: undone.append(len(bmesh.from_edit_mesh(the_object().data).faces)) or undo()
     # Undo may make the object anew.
+    guard.edit.undo = lambda: undone.append(len(bmesh.from_edit_mesh(the_object().data).faces)) or undo()
     try:
         the_object().tolvol.guard.editing = True
         the_object().update_tag()
