@@ -82,8 +82,7 @@ def test_the_button_of_decimate_counts_the_same_objects_while_the_original_is_sh
     scenes.activate(torus())
     for selected, count in ((False, 1), (True, 2)):
         other.select_set(selected)
-        # The panel of the last operation, which receives keys as well, is further down.
-        xdotool("mousemove", *on_screen(region("WINDOW"), 200, 200))
+        xdotool("mousemove", *on_screen(region("WINDOW"), 200, 600))
         yield
         xdotool("keydown", "y")
         yield from finished(original.shown)
