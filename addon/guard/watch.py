@@ -85,8 +85,8 @@ class Faces:
         """Takes the polygons of a mesh as they would be shown if the vertices were at these positions."""
         polygons = mesh_io.Polygons.of(mesh)
         larger = np.flatnonzero(polygons.sizes > 3)
-        of_triangles = np.repeat(np.arange(len(polygons.sizes)), polygons.sizes - 2)
-        return cls(polygons, larger, polygons.chosen(larger), polygons.triangles_at(positions), of_triangles)
+        shown = polygons.triangles_at(positions)
+        return cls(polygons, larger, polygons.chosen(larger), shown, polygons.of_triangles())
 
     @cached_property
     def guarded(self):

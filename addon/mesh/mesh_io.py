@@ -74,6 +74,10 @@ class Polygons:
         """Returns (k,): the polygon of each corner."""
         return np.repeat(np.arange(len(self.sizes)), self.sizes)
 
+    def of_triangles(self):
+        """Returns (m,): the polygon of each triangle that triangles_at() returns."""
+        return np.repeat(np.arange(len(self.sizes)), self.sizes - 2)
+
     def chosen(self, polygons):
         """Returns the polygons with these indices, ascending."""
         starts, sizes = np.cumsum(self.sizes) - self.sizes, self.sizes[polygons]
@@ -99,7 +103,7 @@ class Polygons:
         Blender cuts it. In (m, 4) a triangle repeats its last corner. A face with more than four corners is replaced by its
         triangles.
         """
-        of_triangles = np.repeat(np.arange(len(self.sizes)), self.sizes - 2)
+        of_triangles = self.of_triangles()
         quad = self.sizes == 4
         if not quad.any():
             return triangles, of_triangles

@@ -53,9 +53,11 @@ class Guard {
 
   /// Takes other faces on the same vertices, as many and with as many corners, where polygons are triangulated in
   /// another way now. Those that differ have to be inside, to keep the angle and to cross no face, and no part of the
-  /// reference may lose its last witness. Returns the faces for which this does not hold, ascending; the guard takes
-  /// the faces only if there are none. Throws InvalidInput for other faces, and Cancelled; both keep the faces. Costs
-  /// about 50 ns a face of the mesh, and as much as the constructor for the faces that differ.
+  /// reference may lose its last witness. They may not replace faces that since the start have been outside, exceeding,
+  /// without a sure normal or nearest to an uncovered part of the reference. Returns the faces for which this does not
+  /// hold, ascending; the guard takes the faces only if there are none. Throws InvalidInput for other faces, also for
+  /// one that repeats other corners than before, and Cancelled; both keep the faces. Costs about 50 ns a face of the
+  /// mesh, and as much as the constructor for the faces that differ.
   std::vector<std::uint32_t> replace_faces(std::vector<std::uint32_t> faces, Progress* progress = nullptr);
 
   std::size_t vertex_count() const { return last_.size() / 3; }

@@ -93,11 +93,11 @@ void MovingMesh::start_facing(FacingRule rule, std::span<const std::uint32_t> pl
 }
 
 bool MovingMesh::may_be_unsure(std::uint32_t face) const {
-  bool result = false;
-  for (std::size_t k = 0; facing_ && k < triangles_of(corners()).size(); ++k) {
-    result = result || facing_->of(face, k).may_be_unsure;
+  if (!facing_) return false;
+  for (std::size_t k = 0; k < triangles_of(corners()).size(); ++k) {
+    if (facing_->of(face, k).may_be_unsure) return true;
   }
-  return result;
+  return false;
 }
 
 /// For each part: by how much the area of its faces that keep their angle is larger than that of the failing ones.

@@ -293,15 +293,16 @@ Cost: about 1 us a vertex and 2 us a face of the reference.)doc")
 Parameters
 ----------
 faces : integer array
-    As many faces as before, with as many corners.
+    As many faces as before, with as many corners. Each repeats the same corners as before, if any.
 progress : Progress, optional
 
 Returns
 -------
 (k,) int32 array
     Those of the faces that differ that the guard cannot take: which are outside, exceed max_normal_angle, cross
-    another face, unless faces may cross, or leave a part of the reference beyond the tolerance of the mesh. The guard
-    takes the faces only if there are none.
+    another face, unless faces may cross, or leave a part of the reference beyond the tolerance of the mesh; and those
+    that would replace a face that since the start has been outside, beyond max_normal_angle, without area or nearest to
+    an uncovered face of the reference. The guard takes the faces only if there are none.
 
 Raises
 ------

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes meshes for the tests. A second judge samples distances with Blender's own tree of triangles, without tolvol."""
 
+import bmesh
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
@@ -54,6 +55,16 @@ def torus_arrays(around=48, across=24, noise=0.004, seed=1):
 
 def torus(name="torus", matrix=None, **options):
     return add_object(name, *torus_arrays(**options), matrix)
+
+
+def dissolve(ob, rng, share=0.2):
+    """Makes faces of many corners out of those at a share of the edges, which are chosen at random."""
+    edited = bmesh.new()
+    edited.from_mesh(ob.data)
+    edges = [edge for edge in edited.edges if rng.random() < share]
+    bmesh.ops.dissolve_edges(edited, edges=edges, use_verts=False)
+    edited.to_mesh(ob.data)
+    edited.free()
 
 
 def changed_ball(change):

@@ -3,23 +3,12 @@
 
 import os
 
-import bmesh
 import bpy
 import numpy as np
 import pytest
 
 from addon import native
-from scenes import cage, torus, world_triangles
-
-
-def dissolve(ob, rng):
-    """Makes faces of many corners out of those at a fifth of the edges."""
-    edited = bmesh.new()
-    edited.from_mesh(ob.data)
-    edges = [edge for edge in edited.edges if rng.random() < 0.2]
-    bmesh.ops.dissolve_edges(edited, edges=edges, use_verts=False)
-    edited.to_mesh(ob.data)
-    edited.free()
+from scenes import cage, dissolve, torus, world_triangles
 
 
 def smooth(ob, rng):

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The guard of sculpting without a window: scripts move vertices like a brush. tests/ui has real brushes."""
 
-import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from mathutils import Matrix
 from addon import guard, native
 from addon.mesh import mesh_io
 from addon.shared.surface import to_world
-from scenes import activate, add_object, plates_with_t_junctions, sheet, sheet_arrays, world_triangles
+from scenes import activate, add_object, dissolve, plates_with_t_junctions, sheet, sheet_arrays, world_triangles
 
 TOLERANCE = 0.02
 PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, -2, 0.5, 1))
@@ -177,16 +176,6 @@ def test_a_face_of_many_corners_keeps_both_ways(count):
     assert (after != reference[0]).any(1).all()
 
 
-def dissolved(ob, rng):
-    """Makes faces of many corners out of those at a fifth of the edges."""
-    edited = bmesh.new()
-    edited.from_mesh(ob.data)
-    edges = [edge for edge in edited.edges if rng.random() < 0.2]
-    bmesh.ops.dissolve_edges(edited, edges=edges, use_verts=False)
-    edited.to_mesh(ob.data)
-    edited.free()
-
-
 @pytest.mark.parametrize("keeps_out", [False, True])
 @pytest.mark.parametrize("bumps", [0.0, 0.05])
 def test_what_blender_draws_is_kept_however_it_cuts_faces_after_a_dab(monkeypatch, keeps_out, bumps):
@@ -210,7 +199,7 @@ def test_what_blender_draws_is_kept_however_it_cuts_faces_after_a_dab(monkeypatc
     monkeypatch.setattr(native.module, "Guard", Guard)
     rng = np.random.default_rng(1)
     ob = sheet(count=20, bumps=bumps)
-    dissolved(ob, rng)
+    dissolve(ob, rng)
     ob.tolvol.guard.crossings = keeps_out
     reference = guarded(ob, "sculpting", tolerance=0.06)
     assert state(ob)["sculpting"] == ("Guarding both ways", True)

@@ -13,7 +13,7 @@ from addon.mesh.mesh_io import column
 from addon.operators import motion
 from addon.proof import verdict
 from addon.reference import measurements
-from scenes import add_object, sheet, torus, world_triangles
+from scenes import add_object, dissolve, sheet, torus, world_triangles
 
 PLACED = Matrix.Translation((3, -2, 1)) @ Matrix.Rotation(0.7, 4, (1, 2, 3)) @ Matrix.Diagonal((1, 2, 0.5, 1))
 
@@ -137,13 +137,7 @@ def test_polygons_that_blender_would_cut_otherwise_beyond_the_tolerance_stay(noi
     def bent():
         ob = torus(around=24, across=12, noise=noise, seed=6)
         if ngons:
-            edited = bmesh.new()
-            edited.from_mesh(ob.data)
-            chosen = np.random.default_rng(1).random(len(edited.edges)) < 0.25
-            edges = [edge for edge, removed in zip(edited.edges, chosen) if removed]
-            bmesh.ops.dissolve_edges(edited, edges=edges, use_verts=False)
-            edited.to_mesh(ob.data)
-            edited.free()
+            dissolve(ob, np.random.default_rng(1), 0.25)
         ob.tolvol.tolerance_percent = 3
         return ob
 
