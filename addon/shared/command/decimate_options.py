@@ -101,7 +101,7 @@ def add(parser):
         "--effort",
         choices=("fast", "thorough"),
         default="fast",
-        help="thorough: a third fewer triangles in 6 to 25 times the processor time, at a tolerance of 0.1%% in 25 to 50 "
+        help="thorough: a third fewer triangles in 6 to 35 times the processor time, at a tolerance of 0.1%% in 20 to 45 "
         "times, for a small mesh in up to 300 times (default: fast)",
     )
     parser.add_argument(
