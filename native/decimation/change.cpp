@@ -107,7 +107,10 @@ bool Change::prepare_flip(Edge e) {
   const std::uint32_t a = mesh_->to(h), b = mesh_->to(o), c = mesh_->to(mesh.next_halfedge_handle(h)),
                       d = mesh_->to(mesh.next_halfedge_handle(o));
   if (mesh_->pinned(a) && mesh_->pinned(b)) return false;
-  if (mesh_->has_copies() && (mesh_->slot(c) == mesh_->slot(d) || mesh_->joined_by_other(c, d))) return false;
+  if (mesh_->has_copies()) {
+    if (mesh_->slot(c) == mesh_->slot(d) || mesh_->joined_by_other(c, d)) return false;
+    if (mesh_->joined(a) && mesh_->joined_by_other(a, b)) return false;  // The sheets would meet there no more.
+  }
   const std::uint32_t first = static_cast<std::uint32_t>(mesh.face_handle(h).idx()),
                       second = static_cast<std::uint32_t>(mesh.face_handle(o).idx());
   constexpr double kAnywhere = std::numeric_limits<double>::infinity();  // The change carries no point of a face along.
@@ -256,7 +259,9 @@ bool Change::wedges_fit(Halfedge h) {
 /// only touch, the other copies are carried along.
 bool Change::gather_copies(Halfedge h) {
   const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
-  const auto in_line = [&](Halfedge edge) { return mesh_->joined_by_other(mesh_->from(edge), mesh_->to(edge)); };
+  const auto in_line = [&](Halfedge edge) {
+    return mesh_->joined(mesh_->to(edge)) && mesh_->joined_by_other(mesh_->from(edge), mesh_->to(edge));
+  };
   bool line = false;
   collapses_.clear();
   for (const std::uint32_t copy : mesh_->copies(mesh_->from(h))) {
@@ -273,10 +278,7 @@ bool Change::gather_copies(Halfedge h) {
       collapses_.push_back(edge);
     }
     if (edges == 0) carried_.push_back(copy);
-    if (!mesh.is_boundary(v)) continue;
-    // The kernel keeps the outgoing halfedge of a boundary vertex on the boundary.
-    const Halfedge next = mesh.halfedge_handle(v);
-    line = line || in_line(next) || in_line(mesh.prev_halfedge_handle(next));
+    line = line || std::ranges::any_of(mesh.voh_range(v), in_line);
   }
   return !line || (carried_.empty() && in_line(h));
 }

@@ -175,7 +175,8 @@ void bind_decimation(py::module_& module) {
                     "(n,) int32: the result vertex that each input vertex was merged into, or -1 if no triangle uses "
                     "it.")
       .def_readonly("vertex_source", &Result::vertex_source,
-                    "(k,) int32: the input vertex that each result vertex continues.")
+                    "(k,) int32: the input vertex that each result vertex continues. Where sheets touch, the result "
+                    "vertex may be where another input vertex was, even with placement=\"subset\".")
       .def_readonly("triangle_source", &Result::triangle_source,
                     R"doc((l,) int32: the input triangle that each result triangle continues.
 
@@ -224,7 +225,7 @@ triangles : (m, 3) integer array
 volume : ToleranceVolume or None
     None decimates without a tolerance, for comparison. This needs target_triangles.
 placement : {"optimal", "subset"}
-    "optimal" leaves the fewest triangles. With "subset" every vertex of the result is an original one, bit for bit.
+    "optimal" leaves the fewest triangles. With "subset" every vertex of the result is where an original one was, bit for bit.
 two_sided : bool
     Whether the reference, too, is kept within the tolerance of the result. If not, parts of it may be lost, but the
     boundary of the result and that of the reference are within the tolerance of each other. An open edge that lies on

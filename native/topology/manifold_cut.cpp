@@ -22,11 +22,13 @@ namespace tolvol {
 namespace {
 
 constexpr std::uint32_t kNone = CutMesh::kNone;
+/// The cosine of the angle within which triangles at a common edge count as lying upon each other.
+constexpr double kUpon = 0.9;
 
 class Cutter {
  public:
   Cutter(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, Team& team)
-      : team_(team), input_(triangles), weld_(weld_equal_positions(vertices)) {
+      : team_(team), positions_(vertices), input_(triangles), weld_(weld_equal_positions(vertices)) {
     cut_.stand_in.resize(triangles.size());
     std::iota(cut_.stand_in.begin(), cut_.stand_in.end(), 0u);
     const std::vector<bool> used = used_vertices(vertices.size(), triangles);
@@ -375,10 +377,29 @@ class Cutter {
     });
   }
 
-  /// Tells for each weld representative at which there are several vertices whether sheets lie on each other there,
-  /// none of which ends there. Tied together, sheets with different diagonals could not be decimated at all.
+  /// The direction from a side into its triangle, at a right angle to the side. Not finite for a triangle without one.
+  glm::dvec3 inwards(Side s) const {
+    const glm::dvec3 &a = positions_[vertex(s)], &b = positions_[vertex(next_corner(s))];
+    const glm::dvec3 along = glm::normalize(b - a), to_apex = positions_[vertex(previous_corner(s))] - a;
+    return glm::normalize(to_apex - glm::dot(to_apex, along) * along);
+  }
+
+  /// Whether sheets lie upon each other on both sides of a common edge, whose sides are given: whether each triangle
+  /// there leaves the edge in nearly the same direction as one of another sheet. Sheets with different diagonals do not
+  /// lie on each other exactly.
+  bool lie_on_each_other(const std::vector<Side>& alike) const {
+    return std::ranges::all_of(alike, [&](Side s) {
+      return std::ranges::any_of(alike, [&](Side other) {
+        return other != s && other != mate_[s] && !(glm::dot(inwards(s), inwards(other)) < kUpon);
+      });
+    });
+  }
+
+  /// Tells for each weld representative at which there are several vertices whether it is inside of sheets that lie on
+  /// each other. Tied together, sheets with different diagonals could not be decimated at all. Where they end or part,
+  /// and where sheets only touch along an edge, as two boxes do, they stay together.
   std::vector<bool> find_double_sheets(const std::vector<bool>& several) const {
-    std::vector<bool> result(weld_.size(), false);
+    std::vector<bool> result(weld_.size(), false), meet(weld_.size(), false);
     std::vector<Side> sides;
     for (Side s = 0; s < mate_.size(); ++s) {
       if (several[welded(s)] && several[welded(next_corner(s))]) sides.push_back(s);
@@ -386,15 +407,18 @@ class Cutter {
     const auto end_of = [&](Side corner) { return welded(corner); };
     by_ends(sides, weld_.size(), team_, end_of, [&](const std::vector<Side>& alike) {
       if (alike.size() == 1 || (alike.size() == 2 && mate_[alike[0]] == alike[1])) return;
-      result[welded(alike[0])] = result[welded(next_corner(alike[0]))] = true;
+      std::vector<bool>& of_ends = lie_on_each_other(alike) ? result : meet;
+      of_ends[welded(alike[0])] = of_ends[welded(next_corner(alike[0]))] = true;
     });
     for (Side s = 0; s < mate_.size(); ++s) {
-      if (mate_[s] == kNone) result[welded(s)] = result[welded(next_corner(s))] = false;
+      if (mate_[s] == kNone) meet[welded(s)] = meet[welded(next_corner(s))] = true;
     }
+    for (std::size_t at = 0; at < result.size(); ++at) result[at] = result[at] && !meet[at];
     return result;
   }
 
   Team& team_;
+  std::span<const glm::dvec3> positions_;
   std::span<const glm::uvec3> input_;
   std::vector<std::uint32_t> weld_;
   bool renamed_ = false;                      // tells whether some used vertex is not its own representative

@@ -47,8 +47,9 @@ struct CutMesh {
 /// Joins triangles across edges by vertex index first and, where that leaves an edge open, by exactly equal position,
 /// so that soups and seam splits decimate without cracks. Edges of more than two triangles are cut. Vertices at exactly
 /// the same position are copies, also of sheets that merely touch: those stay several vertices, but at one place.
-/// Inside of sheets that lie on each other, edge on edge, they are no copies. O(m) expected. After A. Guéziec et al.,
-/// "Cutting and stitching: converting sets of polygons to manifold surfaces", 2001. The same on any number of threads.
+/// Inside of sheets that lie on each other, edge on edge, they are no copies; where these part they are. O(m) expected.
+/// After A. Guéziec et al., "Cutting and stitching: converting sets of polygons to manifold surfaces", 2001. The same
+/// on any number of threads.
 CutMesh cut_to_manifold(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, Team& team);
 
 }  // namespace tolvol

@@ -234,22 +234,45 @@ def _components(faces):
     return meshes.component_count(np.arange(len(edges))[:, None], side_edge.reshape(-1, 3))
 
 
+def _lie_on_each_other(places, faces):
+    """Whether faces lie upon each other somewhere: whether two of more than two faces at an edge leave it within 27 degrees.
+
+    The inside of such sheets may move apart, and with it what meets only that.
+    """
+    corners = faces[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]].reshape(-1, 3)  # an edge, and the third corner
+    _, edge, count = np.unique(np.sort(corners[:, :2], 1), axis=0, return_inverse=True, return_counts=True)
+    edge = edge.reshape(-1)
+    for same in np.split(np.argsort(edge, kind="stable"), np.cumsum(count)[:-1]):
+        if len(same) > 2:
+            a, b = places[corners[same[0], :2]]
+            along = (b - a) / np.linalg.norm(b - a)
+            to_third = places[corners[same, 2]] - a
+            away = to_third - np.outer(to_third @ along, along)
+            away /= np.linalg.norm(away, axis=1, keepdims=True)
+            if not (np.triu(away @ away.T, 1) < 0.89).all():
+                return True
+    return False
+
+
 def connected_alike(run, before, after, joins=False):
-    """Requires of the welded meshes that the result has no new edges of more than two faces, and that no component was lost
-    or joined to another one.
+    """Requires of the welded meshes that the result has no new edges of more than two faces, and that no component was lost,
+    joined to another one, or taken apart.
 
     joins: whether T-junctions were joined. Then sheets that met there may be one component and share edges.
     """
-    faces, (new_places, new_faces) = proper_faces(*before)[1], proper_faces(*after)
+    (places, faces), (new_places, new_faces) = proper_faces(*before), proper_faces(*after)
     had = (edge_counts(faces)[1] > 2).sum()
     edges, count = edge_counts(new_faces)
     if (count > 2).sum() > had and not joins:
         a, b = new_places[edges[count > 2][0]]
         raise Finding("non-manifold", f"{(count > 2).sum()} edges have more than two faces, {had} had: {a} to {b}")
     components, left = _components(faces), _components(new_faces)
-    # Where more than two faces meet, some of them may be sheets that only touch and may move apart.
+    # Of sheets that meet along an edge, a point may be left in which they meet.
     if (left < components and not joins) or (left > components and not had):
         raise Finding("components", f"{components} components became {left}")
+    parts, left = meshes.component_count(places, faces), meshes.component_count(new_places, new_faces)
+    if left > parts and not _lie_on_each_other(places, faces):
+        raise Finding("parts", f"{parts} parts, which hang together by points, became {left}")
 
 
 def rims_alike(run, before, after, tolerance):

@@ -299,12 +299,73 @@ TEST(TouchingSheets, StillMeetWhereTheyMet) {
   }
 }
 
+/// Two boxes of bumpy sides, the second moved by `offset`, each with vertices of its own where they touch.
+Case touching_boxes(unsigned n, const dvec3& offset) {
+  TriangleMesh first;
+  for (int side = 0; side < 6; ++side) {
+    TriangleMesh grid = shapes::grid(n);
+    const int axis = side / 2;
+    for (dvec3& p : grid.vertices) {
+      dvec3 q;
+      q[axis] = side % 2, q[(axis + 1) % 3] = p.x, q[(axis + 2) % 3] = side % 2 == 1 ? p.y : 1 - p.y;
+      p = q;
+    }
+    first = side == 0 ? grid : shapes::joined(first, grid);
+  }
+  const std::vector<std::uint32_t> weld = weld_equal_positions(first.vertices);
+  for (glm::uvec3& t : first.triangles) t = {weld[t.x], weld[t.y], weld[t.z]};
+  TriangleMesh second = first;
+  for (dvec3& p : second.vertices) p += offset;
+  Case c{shapes::stored(shapes::joined(first, second))};
+  for (dvec3& p : c.mesh.vertices) {
+    p += 0.01 * dvec3(std::sin(7 * p.y + 5 * p.z), std::sin(6 * p.z + 4 * p.x), std::sin(8 * p.x + 3 * p.y));
+    p = rounded_to_float32(p);
+  }
+  return c;
+}
+
+/// Judges results of all kinds by the places at which the two boxes meet.
+template <class Judge>
+void expect_boxes_to_meet(const Case& c, Judge&& judge) {
+  for (const auto placement : {Options::Placement::optimal, Options::Placement::subset}) {
+    for (const auto effort : {Options::Effort::fast, Options::Effort::thorough}) {
+      Options options;
+      options.placement = placement, options.effort = effort;
+      const DecimationResult r = run(c, options);
+      cases::expect_within(c, r);
+      EXPECT_LE(r.triangles.size(), c.mesh.triangles.size() / 4);
+      std::vector<bool> in_first;
+      for (const std::uint32_t t : r.triangle_source) in_first.push_back(t < c.mesh.triangles.size() / 2);
+      judge(meeting_places(r.vertices, r.triangles, in_first));
+    }
+  }
+}
+
+TEST(TouchingSheets, BoxesStayTogetherAlongTheEdgeInWhichTheyTouch) {
+  expect_boxes_to_meet(touching_boxes(8, {1, 1, 0}), [](const std::vector<dvec3>& places) {
+    ASSERT_GE(places.size(), 2u);
+    const auto [lower, upper] = std::ranges::minmax(places, {}, [](const dvec3& p) { return p.z; });
+    EXPECT_NEAR(upper.z - lower.z, 1, 0.05) << "the boxes have come apart at an end of the edge";
+  });
+}
+
+// The faces between the boxes lie on each other, so that only those around them stay together.
+TEST(TouchingSheets, StackedBoxesStayTogetherAroundTheFaceInWhichTheyTouch) {
+  expect_boxes_to_meet(touching_boxes(8, {0, 0, 1}), [](const std::vector<dvec3>& places) {
+    for (const dvec3& corner : {dvec3(0, 0, 1), dvec3(1, 0, 1), dvec3(0, 1, 1), dvec3(1, 1, 1)}) {
+      EXPECT_TRUE(std::ranges::any_of(places, [&](const dvec3& p) { return glm::length(p - corner) < 0.05; }));
+    }
+  });
+}
+
 /// The wall's lowest edges lie on edges of the floor, before and after, wherever these have moved.
 TEST(TouchingSheets, AWallStandsOnEdgesOfTheFloor) {
   const Case c = wall_on_a_floor(16);
-  for (const auto placement : {Options::Placement::optimal, Options::Placement::subset}) {
+  for (const auto& [placement, effort] : {std::pair{Options::Placement::optimal, Options::Effort::fast},
+                                          std::pair{Options::Placement::subset, Options::Effort::fast},
+                                          std::pair{Options::Placement::optimal, Options::Effort::thorough}}) {
     Options options;
-    options.placement = placement;
+    options.placement = placement, options.effort = effort;
     const DecimationResult r = run(c, options);
     using Place = std::tuple<double, double, double>;
     const auto place = [&](std::uint32_t v) { return Place(r.vertices[v].x, r.vertices[v].y, r.vertices[v].z); };

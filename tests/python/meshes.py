@@ -187,6 +187,37 @@ def degenerate(seed=4):
     return np.concatenate([vertices, unused]), np.concatenate([triangles, extra]).astype(np.int32)
 
 
+def degenerate_on_faces(levels=3, count=20):
+    """A sphere. On the inside of its first faces lie degenerate faces with vertices of their own: segments, then points."""
+    vertices, triangles = sphere(levels)
+    a, b, c = vertices[triangles[:count]].transpose(1, 0, 2)
+    ends = np.concatenate([(a + b + c) / 3, (a + 2 * b + c) / 4])
+    i = np.arange(count, dtype=np.int32)
+    segments = np.stack([i, i, np.where(i < count // 2, i + count, i)], 1)
+    return join((vertices, triangles), (ends, segments))
+
+
+def double_sheets():
+    """A torus. Half of its faces have a twin with the other orientation, a part of the twins with vertices of their own."""
+    vertices, triangles = torus(24, 12, noise=0.002)
+    middle = vertices[triangles].mean(1)
+    twins = triangles[:, ::-1]
+    own = twins[(middle[:, 0] > 0) & (middle[:, 1] > 0)]
+    shared = twins[(middle[:, 0] > 0) & (middle[:, 1] <= 0)]
+    return join((vertices, np.concatenate([triangles, shared])), (vertices, own))
+
+
+def touching_boxes():
+    """Three boxes: the second one touches the first along an edge, and the third touches it in a corner."""
+    boxes = []
+    for lower in ((0, 0, 0), (1, 1, 0), (-1, -1, 1)):
+        vertices, triangles = box(lower, np.add(lower, 1))
+        for _ in range(2):
+            vertices, triangles = subdivide(vertices, triangles)
+        boxes.append((vertices, triangles))
+    return join(*boxes)
+
+
 def boundary_segments(vertices, triangles):
     """Returns the edges that belong to exactly one triangle, as triangles that are segments, or (0, 3) without any."""
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), 1)

@@ -175,6 +175,8 @@ bool Patch::can_flip(std::uint32_t face, int k, Flipped& flipped) const {
   if (c == d || (vertices_[a].pinned && vertices_[b].pinned) || joined_by_edge(c, d)) return false;
   // The collapse or another flip of this patch may make an edge between copies of the two.
   if (vertices_[c].joined && vertices_[d].joined) return false;
+  // Other sheets may meet this one in the edge.
+  if (vertices_[a].joined && vertices_[b].joined) return false;
   if (first.wedges[a1] != second.wedges[a2] || first.wedges[b1] != second.wedges[b2]) return false;
   flipped = {{face, other},
              {{b, d, c}, {a, c, d}},
