@@ -3,11 +3,39 @@
 
 #include <cmath>
 
+#include "base/simd.h"
+
 namespace tolvol {
 namespace {
 
 /// The share of the mean of the diagonal, times the damping, that is added to the diagonal beside the damped diagonal.
 constexpr double kMeanShare = 0.1;
+
+/// Subtracts from column j of a matrix of n columns what the factors in the columns before it contribute, in the order
+/// of these columns. The entries of a column do not depend on each other, so that several are computed at once.
+TOLVOL_INLINE void subtract_columns_inline(double* matrix, std::size_t n, std::size_t j) {
+  double* const column = matrix + j * n;
+  std::size_t k = 0;
+  for (; k + 4 <= j; k += 4) {
+    const double *const a = matrix + k * n, *const b = a + n, *const c = b + n, *const d = c + n;
+    const double of_a = a[j], of_b = b[j], of_c = c[j], of_d = d[j];
+#pragma GCC ivdep
+    for (std::size_t i = j; i < n; ++i) {
+      column[i] = column[i] - a[i] * of_a - b[i] * of_b - c[i] * of_c - d[i] * of_d;
+    }
+  }
+  for (; k < j; ++k) {
+    const double* const a = matrix + k * n;
+    const double of_a = a[j];
+#pragma GCC ivdep
+    for (std::size_t i = j; i < n; ++i) column[i] -= a[i] * of_a;
+  }
+}
+
+void subtract_columns(double* matrix, std::size_t n, std::size_t j) { subtract_columns_inline(matrix, n, j); }
+TOLVOL_TARGET_AVX2 void subtract_columns_avx2(double* matrix, std::size_t n, std::size_t j) {
+  subtract_columns_inline(matrix, n, j);
+}
 
 }  // namespace
 
@@ -28,26 +56,21 @@ bool DampedSystem::solve(double damping) {
     d += damping * (d + kMeanShare * trace / static_cast<double>(n));
   }
   solution_ = right_;
-  for (std::size_t i = 0; i < n; ++i) {
-    double* const row = &factor_[i * n];
-    for (std::size_t j = 0; j <= i; ++j) {
-      const double* const other = &factor_[j * n];
-      double sum = row[j];
-      for (std::size_t k = 0; k < j; ++k) sum -= row[k] * other[k];
-      if (j < i) {
-        row[j] = sum / other[j];
-      } else {
-        if (!(sum > 0)) return false;
-        row[i] = std::sqrt(sum);
-      }
+  const auto subtract = simd_path() == Simd::avx2 ? subtract_columns_avx2 : subtract_columns;
+  for (std::size_t j = 0; j < n; ++j) {
+    double* const column = &factor_[j * n];
+    subtract(factor_.data(), n, j);
+    if (!(column[j] > 0)) return false;
+    column[j] = std::sqrt(column[j]);
+    solution_[j] /= column[j];
+    for (std::size_t i = j + 1; i < n; ++i) {
+      column[i] /= column[j];
+      solution_[i] -= column[i] * solution_[j];
     }
-    double sum = solution_[i];
-    for (std::size_t k = 0; k < i; ++k) sum -= row[k] * solution_[k];
-    solution_[i] = sum / row[i];
   }
   for (std::size_t i = n; i-- > 0;) {
     solution_[i] /= factor_[i * n + i];
-    for (std::size_t k = 0; k < i; ++k) solution_[k] -= factor_[i * n + k] * solution_[i];
+    for (std::size_t k = 0; k < i; ++k) solution_[k] -= factor_[k * n + i] * solution_[i];
   }
   return true;
 }

@@ -19,9 +19,9 @@ class DampedSystem {
   }
   /// Adds c * r * r^T to the block of two vertices. Only those with column <= row are read.
   void add(std::size_t row, std::size_t column, double c, const glm::dvec3& r) {
-    for (int x = 0; x < 3; ++x) {
-      double* const at = &matrix_[(3 * row + x) * right_.size() + 3 * column];
-      for (int y = 0; y < 3; ++y) at[y] += c * r[x] * r[y];
+    for (int y = 0; y < 3; ++y) {
+      double* const at = &matrix_[(3 * column + y) * right_.size() + 3 * row];
+      for (int x = 0; x < 3; ++x) at[x] += c * r[x] * r[y];
     }
   }
   /// Solves after adding the diagonal to itself `damping` times, with a share of its mean. Returns false if the matrix
@@ -33,7 +33,7 @@ class DampedSystem {
   }
 
  private:
-  std::vector<double> matrix_, factor_;  ///< Row by row, of which the lower triangle counts.
+  std::vector<double> matrix_, factor_;  ///< Column by column, of which the lower triangle counts.
   std::vector<double> right_, solution_;
 };
 
