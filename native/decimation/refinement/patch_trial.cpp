@@ -17,8 +17,9 @@ constexpr double kAnywhere = std::numeric_limits<double>::infinity();
 constexpr int kStepsOfPrice = 8;
 /// The numbers of steps by the lower power, by the higher power, and after each refusal of the certificates.
 constexpr int kStepsOfSum = 14, kStepsOfLargest = 16, kStepsAfterRefusal = 10;
-/// From a larger deviation than this, in tolerances, the higher power hardly ever leads to success.
-constexpr double kWorthGoingOn = 1.25;
+/// From a larger deviation than this, in tolerances, the higher power hardly ever leads to success from the first
+/// start, and from further ones.
+constexpr double kWorthGoingOn = 1.25, kWorthGoingOnAgain = 1.1;
 /// The certificates are asked at most this often.
 constexpr int kMostRefusals = 12;
 /// After a refusal at most kLookedAt parts without a witness are looked at for each face. Points of at most kHeld of
@@ -87,15 +88,16 @@ bool PatchTrial::try_collapse(const Price& price, const Effort& effort) {
   for (int start = 0; prepare(price.halfedge, price.position, effort.rings); ++start) {
     const std::uint32_t kept = patch_.find_vertex(*change_.vertex());
     if (start > 0 && !EdgeFlips::flip_near(deviations_, kept, start - 1)) return false;
-    if (relax_and_certify(effort.quick)) return true;
+    const bool again = start > 0;
+    if (relax_and_certify(again ? kWorthGoingOnAgain : kWorthGoingOn, effort.quick || again)) return true;
     if (start == 0) reached_ = deviations_.state().largest;
     if (!effort.many_starts || reached_ > kNearMiss || start == kMostFlippedFirst) return false;
   }
   return false;
 }
 
-bool PatchTrial::relax_and_certify(bool quick) {
-  if (!relax()) return false;
+bool PatchTrial::relax_and_certify(double worth_going_on, bool quick) {
+  if (!relax(worth_going_on)) return false;
   for (int refusals = 0; refusals < kMostRefusals; ++refusals) {
     learnt_ = false;
     if (certify()) return true;
@@ -109,9 +111,9 @@ bool PatchTrial::relax_and_certify(bool quick) {
   return false;
 }
 
-bool PatchTrial::relax() {
+bool PatchTrial::relax(double worth_going_on) {
   if (!relaxation_.lower_sum(deviations_, kStepsOfSum, true)) return false;
-  if (!deviations_.enough() && deviations_.state().largest <= kWorthGoingOn) {
+  if (!deviations_.enough() && deviations_.state().largest <= worth_going_on) {
     relaxation_.lower_largest(deviations_, kStepsOfLargest);
   }
   return deviations_.enough();

@@ -45,7 +45,8 @@ class PatchTrial {
     int rings;         ///< The vertices that are less than so many edges away from the collapse move as well.
     bool many_starts;  ///< Whether a near miss is tried again with an edge near by flipped first, each edge in turn.
                        ///< The relaxation may come to another minimum from there.
-    bool quick;        ///< Whether it gives up earlier after a refusal, and misses about one success in thirty.
+    bool quick;        ///< Whether it gives up earlier after a refusal, and misses about one success in thirty. From
+                       ///< starts after the first it always does.
   };
   /// Whether an edge can collapse.
   bool try_collapse(const Price& price, const Effort& effort);
@@ -68,8 +69,8 @@ class PatchTrial {
 
  private:
   bool prepare(Halfedge h, const glm::dvec3& position, int rings);
-  bool relax_and_certify(bool quick);
-  bool relax();
+  bool relax_and_certify(double worth_going_on, bool quick);
+  bool relax(double worth_going_on);
   bool certify();
   void round_positions();
   bool leaves_cell() const;
