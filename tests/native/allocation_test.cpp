@@ -1,23 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every operation while the n-th allocation fails, for all n of its run, for those of each place in the code, or for n
-// that grow by a share of themselves: the exception comes out, what was there before is as it was, and the next call
-// gives what it always gives.
-#include <execinfo.h>
+// Every operation while an allocation fails: the exception comes out, what was there before is as it was, and the next
+// call gives what it always gives.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <array>
-#include <atomic>
-#include <cstdlib>
 #include <functional>
-#include <map>
 #include <new>
-#include <set>
-#include <utility>
 #include <vector>
 
 #include "check/certificate.h"
 #include "decimation/decimation.h"
+#include "failing_allocations.h"
 #include "field/display_grid.h"
 #include "field/display_tree.h"
 #include "many.h"
@@ -36,57 +28,9 @@
 
 namespace {
 
-std::atomic<long> allocations_left{-1};  // the one after these fails; negative: none does
-
-using Callers = std::array<void*, 16>;
-std::vector<Callers>* recorded = nullptr;  // who allocates, one after another; null: nobody wants to know
-
-void* allocate(std::size_t size, std::size_t alignment) {
-  if (std::vector<Callers>* const record = std::exchange(recorded, nullptr)) {
-    Callers callers{};
-    backtrace(callers.data(), int(callers.size()));
-    record->push_back(callers);
-    recorded = record;
-  }
-  // Once: what is allocated while the exception is on its way succeeds.
-  if (allocations_left.load(std::memory_order_relaxed) >= 0 && allocations_left.fetch_sub(1) == 0)
-    throw std::bad_alloc();
-  size = (std::max<std::size_t>(size, 1) + alignment - 1) / alignment * alignment;
-  if (void* const memory = std::aligned_alloc(alignment, size)) return memory;
-  throw std::bad_alloc();
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) { return allocate(size, __STDCPP_DEFAULT_NEW_ALIGNMENT__); }
-void* operator new[](std::size_t size) { return allocate(size, __STDCPP_DEFAULT_NEW_ALIGNMENT__); }
-void* operator new(std::size_t size, std::align_val_t alignment) { return allocate(size, std::size_t(alignment)); }
-void* operator new[](std::size_t size, std::align_val_t alignment) { return allocate(size, std::size_t(alignment)); }
-// The sanitizers have allocators of their own for these, whose memory the functions below could not free.
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
-  try {
-    return operator new(size);
-  } catch (const std::bad_alloc&) {
-    return nullptr;
-  }
-}
-void* operator new[](std::size_t size, const std::nothrow_t& nothrow) noexcept { return operator new(size, nothrow); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::align_val_t) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
-
-namespace {
-
 using namespace tolvol;
+using namespace tolvol::allocations;
 using glm::dvec3;
-
-/// Where an operation ended, in numbers.
-using Numbers = std::vector<double>;
 
 void add(Numbers& numbers, const std::vector<dvec3>& points) {
   for (const dvec3& p : points) numbers.insert(numbers.end(), {p.x, p.y, p.z});
@@ -131,71 +75,6 @@ struct Scene {
     return numbers;
   }
 };
-
-constexpr double kLeastGrowth = kSanitized ? 0.5 : 0;
-
-/// Calls `operation` with the n-th allocation failing and then, if there was an n-th, once more: it must give what it
-/// gave at first. Returns whether there was one and all is well.
-bool survives(const std::function<Numbers()>& operation, long n, const Numbers& expected) {
-  bool failed = false;
-  allocations_left = n;
-  try {
-    operation();
-  } catch (const std::bad_alloc&) {
-    failed = true;
-  }
-  const bool reached = allocations_left.exchange(-1) < 0;
-  EXPECT_TRUE(reached || !failed) << n;
-  if (!reached) return false;
-  const bool same = operation() == expected;
-  EXPECT_TRUE(same) << "another result after allocation " << n << " failed";
-  return same;
-}
-
-/// Does so until a run has no n-th. `growth`: n grows by so much of itself, for what takes long; at least by
-/// kLeastGrowth. Returns how many allocations there were, at least.
-long fail_allocations(const std::function<Numbers()>& operation, double growth = 0) {
-  growth = std::max(growth, kLeastGrowth);
-  const Numbers expected = operation();
-  EXPECT_FALSE(expected.empty());
-  long n = 0;
-  while (survives(operation, n, expected)) n += 1 + long(growth * double(n));
-  return n;
-}
-
-/// The first, the second and the last allocation of each place: of the same line, called from the same lines.
-/// `operation` must work on one thread, in the same way each time.
-struct Places {
-  std::set<long> chosen;
-  long number = 0, allocations = 0;
-
-  explicit Places(const std::function<void()>& operation) {
-    std::vector<Callers> calls;
-    recorded = &calls;
-    operation();
-    recorded = nullptr;
-    std::map<Callers, std::vector<long>> places;
-    for (std::size_t n = 0; n < calls.size(); ++n) places[calls[n]].push_back(long(n));
-    for (const auto& [callers, at] : places) chosen.insert({at.front(), at[at.size() > 1], at.back()});
-    number = long(places.size()), allocations = long(calls.size());
-  }
-};
-
-/// Does so, on one thread, with the allocations of Places; in a full run with all of them. Returns the number of
-/// places, or of allocations.
-long fail_each_place(const std::function<Numbers()>& operation) {
-  if (kSanitized || is_full_run()) return fail_allocations(operation);
-  const Numbers expected = operation();
-  EXPECT_FALSE(expected.empty());
-  const Places places([&] { operation(); });
-  for (const long n : places.chosen) {
-    if (!survives(operation, n, expected)) {
-      ADD_FAILURE() << "allocation " << n << " of " << places.allocations;
-      break;
-    }
-  }
-  return places.number;
-}
 
 TEST(Allocation, DecimationInEveryForm) {
   const Scene scene;

@@ -65,66 +65,6 @@ TEST(Decimation, KeepsBothDirectionsOnEveryMesh) {
   }
 }
 
-TEST(Decimation, OneSidedKeepsForwardAndEveryComponent) {
-  Options options;
-  options.two_sided = false;
-  int number = 0;
-  for (const Case& c : cases::all()) {
-    SCOPED_TRACE(testing::Message() << "case " << number++);
-    const DecimationResult r = run(c, options);
-    expect_within(c, r, false);
-    EXPECT_FALSE(r.triangles.empty());
-  }
-  const Case spheres{shapes::joined(shapes::torus(10), shapes::box(3)), glm::dmat4(1), Storage::float32, 50};
-  const DecimationResult r = run(spheres, options);
-  std::set<bool> components;
-  for (const std::uint32_t source : r.triangle_source) components.insert(source < 200);
-  EXPECT_EQ(components.size(), 2u);
-}
-
-/// Boundary edges of a mesh as degenerate triangles.
-TriangleMesh outline(const TriangleMesh& mesh) {
-  std::map<std::pair<unsigned, unsigned>, int> count;
-  for (const glm::uvec3& t : mesh.triangles) {
-    for (int k = 0; k < 3; ++k) ++count[std::minmax(t[k], t[(k + 1) % 3])];
-  }
-  TriangleMesh result{mesh.vertices, {}};
-  for (const auto& [edge, uses] : count) {
-    if (uses == 1) result.triangles.emplace_back(edge.first, edge.second, edge.second);
-  }
-  return result;
-}
-
-TEST(Decimation, OneSidedKeepsTheBoundary) {
-  // One-sided, a plate could shrink to one triangle but for its outline.
-  const Case c{shapes::stored(shapes::grid(40))};
-  Options options;
-  options.two_sided = false;
-  const DecimationResult r = run(c, options);
-  const TriangleMesh before = outline(c.mesh), after = outline({r.vertices, r.triangles});
-  const double tolerance = c.tolerance();
-  EXPECT_LE(hausdorff(before, after, {.bound = tolerance, .threads = 1, .narrow = false}).upper, tolerance);
-  EXPECT_LE(hausdorff(after, before, {.bound = tolerance, .threads = 1, .narrow = false}).upper, tolerance);
-  EXPECT_LE(r.triangles.size(), 20u);
-}
-
-TEST(Decimation, TwoSidedDecides) {
-  // A spike that is thinner than the tolerance and six times as high: every lower one is within the tolerance of it,
-  // and its tip is far from them.
-  constexpr unsigned kSide = 50;
-  Case c{shapes::stored(shapes::grid(kSide)), glm::dmat4(1), Storage::float32, 2};
-  c.mesh.vertices[kSide / 2 * (kSide + 1) + kSide / 2].z = rounded_to_float32(6 * c.tolerance());
-  Options one_sided;
-  one_sided.two_sided = false;
-  const DecimationResult without = run(c, one_sided), with = run(c);
-  expect_within(c, with);
-  expect_within(c, without, false);
-  EXPECT_LT(without.triangles.size(), with.triangles.size());
-  const TriangleMesh lost = c.world(without.vertices, without.triangles),
-                     reference = c.world(c.mesh.vertices, c.mesh.triangles);
-  EXPECT_GT(hausdorff(reference, lost, {std::nullopt, 1, nullptr}).lower, 2 * c.tolerance());
-}
-
 TEST(Decimation, SubsetKeepsPositionsBitForBit) {
   const Case c{shapes::torus(40, 0.002)};
   Options options;
@@ -364,20 +304,6 @@ TEST(Decimation, CutCopiesNeverMeetInOneFaceTwice) {
   }
 }
 
-TEST(Decimation, OneSidedHoldsABoundaryThatTheReferenceDoesNotHave) {
-  const TriangleMesh closed = shapes::box(8);
-  TriangleMesh open{closed.vertices, {closed.triangles.begin(), closed.triangles.begin() + 128}};  // one side
-  const Case c{closed};
-  const auto volume = c.volume();
-  Options options;
-  options.two_sided = false;
-  const DecimationResult r = decimate(open.vertices, open.triangles, c.space(), volume.get(), options);
-  const double tolerance = c.tolerance();
-  EXPECT_LE(hausdorff(open, {r.vertices, r.triangles}, {.bound = tolerance, .threads = 1, .narrow = false}).upper,
-            tolerance);
-  EXPECT_FALSE(r.locked.empty());
-}
-
 TEST(Decimation, KeepGivesUpOnlyWhatWasNeverCovered) {
   // The mesh is the left quarter of the reference; what it covered it still covers.
   const TriangleMesh reference = shapes::grid(1);
@@ -404,52 +330,6 @@ TEST(Decimation, RoundingToFloatIsInsideTheBound) {
   const DecimationResult r = run(c);
   EXPECT_FALSE(r.warnings.empty());
   expect_within(c, r);
-}
-
-TEST(Decimation, FlatPlatesEndAtAnyTolerance) {
-  // Every collapse costs nothing here, and the tolerance is far below the triangles' size.
-  for (const double percent : {1.0, 0.05, 0.01}) {
-    const Case c{shapes::stored(shapes::grid(20)), glm::dmat4(1), Storage::float32, percent};
-    const DecimationResult r = run(c);
-    expect_within(c, r);
-    EXPECT_EQ(r.triangles.size(), 2u) << percent;
-  }
-}
-
-TEST(Decimation, LargePlatesBecomeTwoTriangles) {
-  // A face of the result lies near tens of thousands of triangles of the reference: more than a proof looks at.
-  for (const unsigned n : {across(128), across(150)}) {
-    if (kSanitized && n == across(150)) break;
-    const Case c{shapes::stored(shapes::grid(n)), glm::dmat4(1), Storage::float32, 0.03};
-    const DecimationResult r = run(c);
-    expect_within(c, r);
-    EXPECT_EQ(r.triangles.size(), 2u) << n;
-  }
-}
-
-// Where a collapse along a side has to wait, a corner must not leave its place for it.
-TEST(Decimation, LargeBoxesBecomeTwelveTriangles) {
-  TriangleMesh mesh = shapes::box(kSanitized ? 16 : 64);
-  for (glm::dvec3& v : mesh.vertices) v *= glm::dvec3(0.52, 0.95, 0.15);
-  for (const auto placement : {DecimationOptions::Placement::optimal, DecimationOptions::Placement::subset}) {
-    const Case c{shapes::stored(mesh), glm::dmat4(1), Storage::float32, 0.1};
-    DecimationOptions options;
-    options.placement = placement;
-    const DecimationResult r = run(c, options);
-    expect_within(c, r);
-    EXPECT_EQ(r.triangles.size(), 12u);
-  }
-}
-
-TEST(Decimation, RoundingToFloatDoesNotKeepAPlateInPieces) {
-  // Turned, a plate of float32 is flat up to a two-thousandth of this tolerance.
-  Case c{shapes::grid(across(128)), glm::dmat4(1), Storage::float32, 0.1};
-  const dvec3 u = glm::normalize(dvec3(1, 2, 3)), v = glm::normalize(glm::cross(u, dvec3(1, 0, -2)));
-  for (dvec3& p : c.mesh.vertices) p = dvec3(0.3, -0.2, 0.7) + p.x * u + p.y * v + p.z * glm::cross(u, v);
-  c.mesh = shapes::stored(c.mesh);
-  const DecimationResult r = run(c);
-  expect_within(c, r);
-  EXPECT_LE(r.triangles.size(), 4u);
 }
 
 TEST(Decimation, UnboundedReachesItsTarget) {

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How much work long loops take, on how many threads it is done, and how it is cancelled.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/errors.h"
+#include "base/progress.h"
+#include "holes.h"
+#include "many.h"
+#include "polls.h"
+#include "repair/close_holes.h"
+#include "shapes.h"
+#include "without.h"
+
+namespace {
+
+using namespace tolvol;
+using namespace tolvol::holes;
+
+TEST(CloseHoles, ALongBorderIsRefusedAtOnce) {
+  const unsigned n = 100000;
+  TriangleMesh mesh;
+  for (unsigned i = 0; i < n; ++i) {
+    const double a = 2 * std::numbers::pi * i / n;
+    for (const double r : {1.0, 1.01}) mesh.vertices.emplace_back(r * std::cos(a), r * std::sin(a), 0);
+  }
+  for (unsigned i = 0; i < n; ++i) {
+    const unsigned a = 2 * i, b = 2 * ((i + 1) % n);
+    mesh.triangles.emplace_back(a, a + 1, b), mesh.triangles.emplace_back(b, a + 1, b + 1);
+  }
+  const auto volume = volume_of(mesh, 0.1);
+  std::vector<LoopOutcome> found;
+  const std::size_t polls =
+      polls_of([&] { found = outcomes(close_holes(mesh.vertices, mesh.triangles, kSpace, *volume)); });
+  EXPECT_EQ(found, (Outcomes{LoopOutcome::too_long, LoopOutcome::too_long}));
+  EXPECT_LT(polls, n / 100);
+}
+
+TEST(CloseHoles, TheBorderOfALargeSheetIsRefusedSoon) {
+  // 800 corners, and a tolerance of many edges: hardly a part of the loop has a triangulation.
+  TriangleMesh mesh = shapes::grid(200);
+  const auto volume = volume_of(mesh, 0.05);
+  const std::size_t polls = polls_of([&] {
+    EXPECT_EQ(outcomes(close_holes(mesh.vertices, mesh.triangles, kSpace, *volume)), Outcomes{LoopOutcome::turned});
+  });
+  EXPECT_LT(polls, 800u * 800u);
+}
+
+TEST(CloseHoles, AWideHoleNeedsFewProofs) {
+  // 144 corners; the proof of a triangle across the hole takes thousands of parts, and only 142 triangles need one.
+  const unsigned n = 60;
+  const TriangleMesh whole = shapes::grid(n);
+  const TriangleMesh mesh = without(whole, [&](unsigned t) {
+    const unsigned row = t / 2 / n, column = t / 2 % n;
+    return row >= 12 && row < 48 && column >= 12 && column < 48;
+  });
+  const auto volume = volume_of(whole, 0.002);
+  CloseHolesOptions options;
+  options.largest_perimeter = 3;  // between those of the hole, 2.4, and of the border, 4
+  const std::size_t polls = polls_of([&] {
+    const HoleClosingResult result = close_holes(mesh.vertices, mesh.triangles, kSpace, *volume, options);
+    EXPECT_EQ(outcomes(result), (Outcomes{LoopOutcome::perimeter, LoopOutcome::closed}));
+  });
+  EXPECT_LT(polls, 18000u);
+}
+
+TEST(CloseHoles, ALoopThatMeandersIsGivenUp) {
+  // Many triangles between the corners of a long loop are within the tolerance and most of them are refused.
+  shapes::Random random(6);
+  TriangleMesh mesh = plate(24, 0.06, [](unsigned, unsigned) { return false; });
+  mesh = without(mesh, [&](unsigned) { return random.share() < 0.5; });
+  const auto volume = volume_of(mesh, 0.25);
+  HoleClosingResult result;
+  const std::size_t polls =
+      polls_of([&] { result = close_holes(mesh.vertices, mesh.triangles, kSpace, *volume, {.threads = 1}); });
+  judge(mesh, result, 0.25);
+  const auto longest = std::ranges::max_element(result.loops, {}, &HoleClosingResult::Loop::corners);
+  EXPECT_EQ(longest->corners, 270u);
+  EXPECT_EQ(longest->outcome, LoopOutcome::given_up);
+  EXPECT_LT(polls, 120000u);  // 158,376 without an end
+}
+
+TEST(CloseHoles, ManyThreadsGiveTheSameBits) {
+  shapes::Random random(8);
+  for (int round = 0; round < many(4); ++round) {
+    const TriangleMesh mesh = without(shapes::torus(40, 0.02), [&](unsigned) { return random.share() < 0.25; });
+    const auto volume = volume_of(mesh, 0.15);
+    const HoleClosingResult one = close_holes(mesh.vertices, mesh.triangles, kSpace, *volume, {.threads = 1});
+    const HoleClosingResult four = close_holes(mesh.vertices, mesh.triangles, kSpace, *volume, {.threads = 4});
+    judge(mesh, one, 0.15);
+    EXPECT_GT(one.count(LoopOutcome::closed), 50u);
+    EXPECT_EQ(one.triangles, four.triangles);
+    EXPECT_EQ(one.borders, four.borders);
+    EXPECT_EQ(one.corner_source, four.corner_source);
+    EXPECT_EQ(outcomes(one), outcomes(four));
+  }
+}
+
+TEST(CloseHoles, StopsWhenTheCallIsCancelled) {
+  const TriangleMesh mesh = tube(150, 0.02, 1, 4);
+  const auto volume = volume_of(mesh, 0.03);
+  HoleClosingResult result;
+  const std::size_t polls =
+      polls_of([&] { result = close_holes(mesh.vertices, mesh.triangles, kSpace, *volume, {.threads = 1}); });
+  EXPECT_EQ(result.count(LoopOutcome::closed), 2u);
+  for (const std::size_t at : {polls / 3, polls / 2, polls - 2}) {
+    const Counted stops(at);
+    EXPECT_THROW(close_holes(mesh.vertices, mesh.triangles, kSpace, *volume, {.threads = 1}), Cancelled);
+  }
+  Progress progress;
+  progress.cancel();
+  EXPECT_THROW(close_holes(mesh.vertices, mesh.triangles, kSpace, *volume, {.progress = &progress}), Cancelled);
+}
+
+}  // namespace
