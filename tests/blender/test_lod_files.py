@@ -9,10 +9,10 @@ import pytest
 from addon import native
 from addon.shared.files import gltf_check
 from commands import LINE, decimate, save, succeeded, world
+from gltf_files import SQUARE, document, needs_gltf, picture, write
 from scenes import torus_arrays
 from test_command_line import PATCH
-from test_files import FAILING_REPLACE, failed, names, painted, unchanged
-from test_gltf import SQUARE, document, needs_gltf, picture, write
+from written import FAILING_REPLACE, failed, names, painted, unchanged
 
 
 def lines(done, count):
