@@ -40,6 +40,7 @@
 #include "base/call.h"
 #include "base/parallel.h"
 #include "geometry/hierarchy.h"
+#include "measure/fresh_corners.h"
 #include "measure/placed_pair.h"
 #include "measure/split.h"
 
@@ -140,6 +141,7 @@ class Search {
       : a_(a),
         b_(b),
         hierarchy_(b),
+        fresh_(a),
         bound_(bound),
         options_(options),
         patience_(kPatience + kPatiencePerTriangle * (a.triangles.size() + b.triangles.size())) {}
@@ -185,16 +187,21 @@ class Search {
     for (std::size_t first = 0; first < count;) {
       const std::size_t end_of_round = std::min(count, 8 * first + 8);
       std::vector<Sample> samples(end_of_round - first);
+      const auto seed_at = [&](std::size_t i) {
+        return std::uint32_t(i * kSpread % count * a_.triangles.size() / count);
+      };
+      std::vector<std::uint8_t> fresh(samples.size());
+      for (std::size_t i = 0; i < fresh.size(); ++i) fresh[i] = std::uint8_t(fresh_.of(seed_at(first + i)));
       parallel_for(samples.size(), kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-          const std::size_t spread = (first + i) * kSpread % count;
-          const auto triangle = std::uint32_t(spread * a_.triangles.size() / count);
+          const std::uint32_t triangle = seed_at(first + i);
           const std::array<dvec3, 3> p = corners(a_, triangle);
           const dvec3 centroid = (p[0] + p[1] + p[2]) / 3.0;
           const Hierarchy::Common middle = far_from(centroid, Hierarchy::kNone);
           samples[i] = {middle.distance, centroid, 0, triangle};
-          for (const dvec3& corner : p) {
-            samples[i].improve({far_from(corner, middle.triangle).distance, corner, 0, triangle});
+          for (int k = 0; k < 3; ++k) {
+            if (!(fresh[i] >> k & 1)) continue;
+            samples[i].improve({far_from(p[k], middle.triangle).distance, p[k], 0, triangle});
           }
         }
       });
@@ -215,6 +222,8 @@ class Search {
       const std::size_t chunk_end = std::min(chunk + kChunk, count);
       std::vector<Piece> pieces(chunk_end - chunk);
       std::vector<Sample> samples(pieces.size());
+      std::vector<std::uint8_t> fresh(pieces.size());
+      for (std::size_t i = 0; i < fresh.size(); ++i) fresh[i] = std::uint8_t(fresh_.of(std::uint32_t(chunk + i)));
       parallel_for(pieces.size(), kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
         std::uint32_t hint = Hierarchy::kNone;
         for (std::size_t i = begin; i < end; ++i) {
@@ -222,6 +231,9 @@ class Search {
           pieces[i].corner = corners(a_, pieces[i].triangle);
           pieces[i].nearest = hint;
           Sampled sampled;
+          for (int k = 0; k < 3; ++k) {
+            if (!(fresh[i] >> k & 1)) sampled.add(pieces[i].corner[k]);
+          }
           samples[i] = evaluate(pieces[i], sampled);
           hint = pieces[i].nearest;
         }
@@ -387,6 +399,7 @@ class Search {
 
   const TriangleMesh &a_, &b_;
   Hierarchy hierarchy_;
+  FreshCorners fresh_;
   double bound_;
   const HausdorffOptions& options_;
   const std::size_t patience_;  // After this many pieces the search accepts a wider interval.
