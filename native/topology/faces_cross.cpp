@@ -57,6 +57,33 @@ bool beside(const Points& a, const Points& b) {
   return one != CGAL::COPLANAR && side(a, b[2]) == one;
 }
 
+// A difference of two corners errs by u times itself, u = 2^-53, and a dot product by 3 u times the sum of its absolute
+// products. kSmallest is above what is lost where a product is subnormal. Where a number is not finite, all comparisons
+// are false, and the predicates decide.
+constexpr double kRounding = 8 * 0x1p-53, kSmallest = 1e-300;
+
+/// Tells whether `along` and `side` make an acute angle for sure.
+bool leads_along(const glm::dvec3& along, const glm::dvec3& side) {
+  return glm::dot(along, side) > kRounding * glm::dot(glm::abs(along), glm::abs(side)) + kSmallest;
+}
+
+/// Returns v with length 1, up to rounding, or what is not finite.
+glm::dvec3 direction(const glm::dvec3& v) {
+  return glm::normalize(v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}));
+}
+
+/// Returns true only if a plane through the corner `i` of `a`, which is the corner `k` of `b`, has all other corners of
+/// `a` on one side and those of `b` on the other. Tried is the plane between the middles of the two angles there: it
+/// tells most needles around a corner in one plane from each other, for which the predicates need exact arithmetic.
+bool apart_at_corner(const Corners& a, int i, const Corners& b, int k) {
+  const glm::dvec3 of_a[2] = {a[(i + 1) % 3] - a[i], a[(i + 2) % 3] - a[i]};
+  const glm::dvec3 of_b[2] = {b[(k + 1) % 3] - a[i], b[(k + 2) % 3] - a[i]};
+  const glm::dvec3 along =
+      direction(direction(of_a[0]) + direction(of_a[1])) - direction(direction(of_b[0]) + direction(of_b[1]));
+  return leads_along(along, of_a[0]) && leads_along(along, of_a[1]) && leads_along(-along, of_b[0]) &&
+         leads_along(-along, of_b[1]);
+}
+
 /// For triangles that share their corners 0 and no other.
 bool meet_beyond_corner(const Points& a, const Points& b) {
   if (beside(a, b) || beside(b, a)) return false;
@@ -118,7 +145,7 @@ bool faces_cross(const Corners& a, const Corners& b) {
     case 0:
       return CGAL::do_intersect(Kernel::Triangle_3(p[0], p[1], p[2]), Kernel::Triangle_3(q[0], q[1], q[2]));
     case 1:
-      return meet_beyond_corner(turned(p, i), turned(q, k));
+      return !apart_at_corner(a, i, b, k) && meet_beyond_corner(turned(p, i), turned(q, k));
     case 2: {
       const auto [j, l] = shared.at[1];
       return overlap_beside(p[i], p[j], p[3 - i - j], q[3 - k - l]);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <random>
 
@@ -54,6 +55,22 @@ TEST(FacesCross, TrianglesWithOneCommonCorner) {
   EXPECT_TRUE(cross(kFlat, {dvec3(0), dvec3(1, 1, 0), dvec3(1, 1, 1)}));     // an edge runs inside
   EXPECT_FALSE(cross(kFlat, {dvec3(0), dvec3(-1, 0, 0), dvec3(0, -1, 0)}));  // opposite, in one plane
   EXPECT_TRUE(cross(kFlat, {dvec3(0), dvec3(1, 0, 0), dvec3(0, 1, 0)}));     // one in the other
+}
+
+// Around one corner in one plane all needles are apart, but for those that lie on one another.
+TEST(FacesCross, NeedlesAroundACommonCorner) {
+  for (const double size : {1.0, 1e-140, 1e140}) {
+    const dvec3 hub = size * dvec3(0.3, 0.1, 0.7);
+    const auto needle = [&](double from, double width) {
+      const auto at = [&](double angle) { return hub + size * dvec3(std::cos(angle), std::sin(angle), 0); };
+      return Corners{hub, at(0.06 * from), at(0.06 * (from + width))};
+    };
+    for (int i = 0; i < 100; ++i) {
+      for (int k = 0; k < i; ++k) EXPECT_FALSE(faces_cross(needle(i, 0.5), needle(k, 0.5)));
+      EXPECT_TRUE(cross(needle(i, 0.5), needle(i + 0.4, 0.5)));
+      EXPECT_TRUE(cross(needle(i, 0.5), needle(i + 0.1, 0.3)));
+    }
+  }
 }
 
 TEST(FacesCross, TrianglesWithACommonEdge) {
