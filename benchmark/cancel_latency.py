@@ -4,10 +4,11 @@
 
 For each call the longest time of all rounds is printed, by the clock and by the processor.
 
-/usr/bin/python3 benchmark/cancel_latency.py [FILE.npz...] [--only CALL...] [--tolerance PERCENT...] [--rounds N]
-    [--threads N]
+/usr/bin/python3 benchmark/cancel_latency.py [MESH...] [--only CALL...] [--tolerance PERCENT...] [--rounds N] [--threads N]
 
-FILE.npz holds a mesh, as arrays `vertices` (n, 3) and `triangles` (m, 3). Without a file a torus of 240,000 triangles is made.
+MESH is a file FILE.npz that holds a mesh, as arrays `vertices` (n, 3) and `triangles` (m, 3), or the name of a mesh that is
+made: torus (240,000 triangles, also if none is named), million, fan, spikes, soup, sizes (huge triangles beside tiny ones) or
+outlier (a corner far away).
 The promise is 0.2 s by the clock on a machine without other work. If other programs use the processor too, the smaller of the
 two times is the fairer one.
 """
@@ -32,6 +33,52 @@ import meshes  # noqa: E402
 LONGEST = 20  # seconds; a call is not cancelled at a later moment
 
 
+def fan():
+    """A vertex of 50,000 faces, with rims that are near and far in turn."""
+    n = 50_000
+    angle, radius = np.arange(n) * 2 * np.pi / n, np.where(np.arange(n) % 2, 0.05, 1.0)
+    rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.01 * np.sin(50 * angle)], 1)
+    i = np.arange(n, dtype=np.int32)
+    return np.concatenate([rim, [[0, 0, 0.1]]]), np.stack([np.full_like(i, n), i, (i + 1) % n], 1)
+
+
+def spikes():
+    """A torus with every 50th vertex pulled out."""
+    vertices, triangles = meshes.torus(400, 125)
+    vertices[::50] *= 1.5
+    return vertices, triangles
+
+
+def soup():
+    """100,000 slivers anywhere, which cross one another."""
+    rng = np.random.default_rng(1)
+    corners = rng.random((100_000, 1, 3)) + 0.03 * rng.standard_normal((100_000, 3, 3))
+    corners[:, 2] = corners[:, 1] + 1e-4 * (corners[:, 2] - corners[:, 1])
+    return corners.reshape(-1, 3), np.arange(300_000, dtype=np.int32).reshape(-1, 3)
+
+
+def sizes():
+    """A torus of 100,000 triangles beside a box of 12 around it."""
+    return meshes.join(meshes.box((-1.5, -1.5, -0.5), (1.5, 1.5, 0.5)), meshes.torus(400, 125, tube=0.3))
+
+
+def outlier():
+    vertices, triangles = meshes.torus(400, 125)
+    vertices[12345] *= 1000
+    return vertices, triangles
+
+
+MADE = {
+    "torus": lambda: meshes.torus(600, 200, noise=0.0005),
+    "million": lambda: meshes.torus(1000, 500, noise=0.0002),
+    "fan": fan,
+    "spikes": spikes,
+    "soup": soup,
+    "sizes": sizes,
+    "outlier": outlier,
+}
+
+
 class Scene:
     """A mesh, and the other arguments of the calls."""
 
@@ -52,6 +99,8 @@ class Scene:
         points = tolvol.lattice_points(4, box)
         points[1:3, 1:3, 3] += 0.1 * self.size
         self.lattice = tolvol.Lattice(points, box)
+        gone = np.random.default_rng(1).random(len(triangles)) < 0.05
+        self.holed = vertices, triangles[~gone]
 
     def fresh_volume(self):
         return tolvol.ToleranceVolume(*self.mesh, self.tolerance)
@@ -92,6 +141,32 @@ def grid(s, p):
 
 def display(s, p):
     return lambda: tolvol.DisplayTree(s.volume, progress=p)
+
+
+def display_shares(s, p):
+    tree, bounds = tolvol.DisplayTree(s.volume), (-s.tolerance, s.tolerance)
+    return lambda: tree.shares(s.moved, s.mesh[1], bounds, **options(s, p))
+
+
+def display_distance(s, p):
+    tree = tolvol.DisplayTree(s.volume)
+    return lambda: tree.signed_distance(s.moved, **options(s, p))
+
+
+def crossing_pairs(s, p):
+    return lambda: tolvol.crossing_pairs(*s.mesh, **options(s, p))
+
+
+def solidity(s, p):
+    return lambda: tolvol.solidity(*s.mesh, **options(s, p))
+
+
+def close_holes(s, p):
+    return lambda: tolvol.close_holes(*s.holed, s.volume, **options(s, p))
+
+
+def decimate_with_holes(s, p):
+    return lambda: tolvol.decimate(*s.holed, s.volume, **options(s, p))
 
 
 def decimate(s, p):
@@ -135,6 +210,16 @@ def guard_constrain(s, p):
     guard = tolvol.Guard(s.mesh[0].astype(np.float32), s.mesh[1], s.volume, threads=s.threads)
     wish = s.pushed.astype(np.float32)
     return lambda: guard.constrain(wish, progress=p)
+
+
+def guard_reset(s, p):
+    guard = tolvol.Guard(s.mesh[0].astype(np.float32), s.mesh[1], s.volume, threads=s.threads)
+    return lambda: guard.reset(s.moved.astype(np.float32), progress=p)
+
+
+def guard_replace_faces(s, p):
+    guard = tolvol.Guard(s.mesh[0].astype(np.float32), s.mesh[1], s.volume, threads=s.threads)
+    return lambda: guard.replace_faces(np.roll(s.mesh[1], 1, axis=1), progress=p)
 
 
 def deform(mode):
@@ -190,7 +275,13 @@ CALLS = {
     "distance": distance,
     "grid, signed": grid,
     "DisplayTree": display,
+    "DisplayTree.shares": display_shares,
+    "DisplayTree.signed_distance": display_distance,
+    "crossing_pairs": crossing_pairs,
+    "solidity": solidity,
+    "close_holes": close_holes,
     "decimate": decimate,
+    "decimate, holes": decimate_with_holes,
     "decimate, one way": decimate_one_way,
     "decimate, thorough": decimate_thorough,
     "decimate, moved": decimate_moved,
@@ -200,6 +291,8 @@ CALLS = {
     "constrain": constrain,
     "Guard": guard,
     "Guard.constrain": guard_constrain,
+    "Guard.reset": guard_reset,
+    "Guard.replace_faces": guard_replace_faces,
     "deform, blocked": deform("blocked"),
     "deform, farthest": deform("farthest"),
     "deform, pull_back": deform("pull_back"),
@@ -256,27 +349,30 @@ def measure(make, scene, rounds):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("files", nargs="*", metavar="FILE.npz")
+    parser.add_argument("meshes", nargs="*", metavar="MESH", default=["torus"])
     parser.add_argument("--only", nargs="+", choices=CALLS, default=CALLS, metavar="CALL")
     parser.add_argument("--tolerance", type=float, nargs="+", default=[1, 0.1], metavar="PERCENT")
     parser.add_argument("--rounds", type=int, default=20)
     parser.add_argument("--threads", type=int, default=1)
     options = parser.parse_args()
     random.seed(1)
-    for file in options.files or [None]:
-        loaded = np.load(file) if file else None
-        mesh = (loaded["vertices"], loaded["triangles"]) if file else meshes.torus(600, 200, noise=0.0005)
+    for name in options.meshes:
+        if name in MADE:
+            mesh = MADE[name]()
+        else:
+            loaded = np.load(name)
+            mesh = loaded["vertices"], loaded["triangles"]
         for percent in options.tolerance:
-            print(f"{Path(file).stem if file else 'torus'}, {len(mesh[1])} triangles, {percent} %", flush=True)
+            print(f"{Path(name).stem}, {len(mesh[1])} triangles, {percent} %", flush=True)
             scene = Scene(*mesh, percent, options.threads)
-            for name in options.only:
+            for call in options.only:
                 try:
-                    seconds, stopped, (clock, processor), moment = measure(CALLS[name], scene, options.rounds)
+                    seconds, stopped, (clock, processor), moment = measure(CALLS[call], scene, options.rounds)
                 except tolvol.TolvolError as error:
-                    print(f"  {name}: {error}")
+                    print(f"  {call}: {error}")
                     continue
                 print(
-                    f"  {name}: {clock:.3f} s by the clock, {processor:.3f} s of the processor, cancelled at {moment:.2f} of "
+                    f"  {call}: {clock:.3f} s by the clock, {processor:.3f} s of the processor, cancelled at {moment:.2f} of "
                     f"{seconds:.2f} s ({stopped} of {options.rounds} stopped)",
                     flush=True,
                 )
