@@ -166,7 +166,7 @@ def close_holes(s, p):
 
 
 def decimate_with_holes(s, p):
-    return lambda: tolvol.decimate(*s.holed, s.volume, **options(s, p))
+    return lambda: tolvol.decimate(*s.holed, s.volume, outside="keep", **options(s, p))
 
 
 def decimate(s, p):

@@ -121,7 +121,9 @@ double DisplayTree::distance(const glm::dvec3& place, double reach) const {
     found = std::min(found, glm::length(from_triangle(t)));
   }
   i = 1;
+  std::size_t visited = 0;
   do {
+    if (++visited % 1024 == 0) poll();
     const Node& node = nodes[i];
     if (from_box(i) <= found + kTie) {
       if (i < leaves) {
@@ -169,7 +171,7 @@ std::vector<double> area_shares(const DisplayTree& tree, std::span<const glm::dv
                        ac = vertices[triangles[i].z] - a;
       const auto count = 1 + static_cast<std::size_t>(area[i] / whole * kSamples);
       for (std::size_t k = i; k < i + count; ++k) {
-        if (k % 256 == 0) poll();
+        if (k % 64 == 0) poll();
         double u = glm::fract(kStepU * static_cast<double>(k)), v = glm::fract(kStepV * static_cast<double>(k));
         if (u + v > 1) u = 1 - u, v = 1 - v;
         const double d = tree.distance(a + u * ab + v * ac, reach);

@@ -15,8 +15,9 @@ namespace {
 void append_pairs(std::uint32_t i, std::span<const Corners> corners, const NearFaces& near,
                   std::vector<glm::uvec2>& pairs) {
   const auto before = static_cast<std::ptrdiff_t>(pairs.size());
+  std::size_t seen = 0;
   near.for_each_near(corners[i], [&](std::uint32_t j) {
-    poll_at(j);
+    if (seen++ % 256 == 0) poll();
     if (j > i && faces_cross(corners[i], corners[j])) pairs.emplace_back(i, j);
     return true;
   });
