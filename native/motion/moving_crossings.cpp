@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include "base/call.h"
 #include "base/parallel.h"
@@ -15,8 +16,9 @@ namespace {
 
 /// The number of faces that a thread takes at a time, for work of about 1 us each.
 constexpr std::size_t kBlock = 64;
-/// A face is looked at no further once it crosses this many others anew: all of them have to go back anyway.
-constexpr std::size_t kEnough = 16;
+/// Once a face is known to cross another anew, it is compared with this many more whose boxes meet its own: where very
+/// many faces meet, all of them have to go back anyway.
+constexpr std::size_t kFurther = 64;
 /// The tree is built anew when its boxes have become more than this many times as large.
 constexpr double kWorn = 2;
 
@@ -32,6 +34,8 @@ MovingCrossings::MovingCrossings(std::span<const std::uint32_t> faces, int corne
       trial_(start_) {
   if (corners_ < 3) return;
   asked_.assign(face_count(), 0);
+  failed_.assign(face_count(), 0);
+  met_.assign(face_count(), kNone);
   is_fitted_.assign(face_count(), false);
   build();
 }
@@ -170,17 +174,34 @@ std::vector<std::uint32_t> MovingCrossings::crossing_replaced(std::span<const st
   return result;
 }
 
-/// Adds to `failed` a face and the faces that it crosses anew. A pair of which both were asked about comes
-/// from the one with the lower number alone.
-void MovingCrossings::test(std::uint32_t face, std::vector<std::uint32_t>& failed) const {
-  if (degenerates(face)) failed.push_back(face);
-  std::size_t found = 0, looked_at = 0;
+/// Adds to `failed` pairs of the face and another that it crosses anew, or of itself twice where it becomes degenerate.
+/// Of two faces that were both asked about, the one with the lower number looks at the pair. A face that is known to
+/// cross another looks only for those that were not asked about.
+void MovingCrossings::test(std::uint32_t face, std::vector<glm::uvec2>& failed) const {
+  if (degenerates(face)) failed.emplace_back(face, face);
+  bool crosses = met_[face] != kNone && cross_anew(face, met_[face]);
+  if (crosses) failed.emplace_back(face, met_[face]);
+  std::size_t looked_at = 0, further = 0;
   tree_.for_each_meeting(box(face), [&](std::uint32_t other) {
     if (++looked_at % 64 == 0) poll();
-    if (other == face || (other < face && asked_[other] == now_) || !cross_anew(face, other)) return true;
-    if (found == 0) failed.push_back(face);
-    failed.push_back(other);
-    return ++found < kEnough;
+    further += crosses;
+    const bool left_out = other == face || (asked_[other] == now_ && (other < face || crosses));
+    if (!left_out && cross_anew(face, other)) {
+      crosses = true;
+      failed.emplace_back(face, other);
+    }
+    return further < kFurther;
+  });
+}
+
+/// Does so for a face that is not known to fail, with another one that is and may therefore have left out this pair.
+void MovingCrossings::test_against_failed(std::uint32_t face, std::vector<glm::uvec2>& failed) const {
+  std::size_t looked_at = 0;
+  tree_.for_each_meeting(box(face), [&](std::uint32_t other) {
+    if (++looked_at % 64 == 0) poll();
+    if (other > face || failed_[other] != now_ || asked_[other] != now_ || !cross_anew(face, other)) return true;
+    failed.emplace_back(face, other);
+    return false;
   });
 }
 
@@ -202,15 +223,30 @@ std::vector<std::uint32_t> MovingCrossings::failing(std::span<const std::uint32_
   }
   tree_.change(asked, boxes_);
   refitted_ += asked.size();
-  std::vector<std::vector<std::uint32_t>> failed((asked.size() + kBlock - 1) / kBlock);
-  parallel_for(asked.size(), kBlock, threads_, [&](std::size_t begin, std::size_t end) {
-    if (progress) progress->update(progress->fraction());
-    for (std::size_t i = begin; i < end; ++i) test(asked[i], failed[begin / kBlock]);
-  });
+  std::vector<std::vector<glm::uvec2>> found((asked.size() + kBlock - 1) / kBlock);
   std::vector<std::uint32_t> result;
-  for (const std::vector<std::uint32_t>& part : failed) result.insert(result.end(), part.begin(), part.end());
+  const auto look = [&](auto&& of_face) {
+    parallel_for(asked.size(), kBlock, threads_, [&](std::size_t begin, std::size_t end) {
+      if (progress) progress->update(progress->fraction());
+      for (std::size_t i = begin; i < end; ++i) of_face(asked[i], found[begin / kBlock]);
+    });
+    for (std::vector<glm::uvec2>& pairs : found) {
+      for (const glm::uvec2& pair : pairs) {
+        for (int k = 0; k < 2; ++k) {
+          if (std::exchange(failed_[pair[k]], now_) == now_) continue;
+          result.push_back(pair[k]);
+          if (pair.x != pair.y) met_[pair[k]] = pair[1 - k];
+        }
+      }
+      pairs.clear();
+    }
+  };
+  look([&](std::uint32_t face, std::vector<glm::uvec2>& pairs) { test(face, pairs); });
+  if (result.empty()) return result;
+  look([&](std::uint32_t face, std::vector<glm::uvec2>& pairs) {
+    if (failed_[face] != now_) test_against_failed(face, pairs);
+  });
   std::sort(result.begin(), result.end());
-  result.erase(std::unique(result.begin(), result.end()), result.end());
   return result;
 }
 

@@ -40,10 +40,10 @@ class MovingCrossings {
   /// Whether the vertex is elsewhere on trial than in the state.
   bool moves(std::uint32_t vertex) const { return trial_[vertex] != state_[vertex]; }
 
-  /// Returns faces of new crossings and new degenerate faces on trial, ascending; none if there are none. A face that
-  /// crosses very many is not returned with all of them, so that what was returned has to be asked about again. Every
-  /// face must be asked about after the last change to a corner. Throws Cancelled; take_back() has to follow then.
-  /// About 1 us a face that moves, for a quad 5 us.
+  /// Returns faces of new crossings and new degenerate faces on trial, ascending; none if there are none. All of
+  /// `faces` that are such are returned. Where very many meet one face, not all others that it crosses are, so that
+  /// what was returned has to be asked about again. Every face must be asked about after the last change to a corner.
+  /// Throws Cancelled; take_back() has to follow then. About 1 us a face that moves, for a quad 5 us.
   std::vector<std::uint32_t> failing(std::span<const std::uint32_t> faces, Progress* progress);
   /// Looks at these faces, whose corners are others now, in the state, which is on trial: which of them cross another
   /// one or are degenerate, whatever was at the start?
@@ -60,6 +60,7 @@ class MovingCrossings {
   void tidy();
 
  private:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
   using Positions = std::vector<glm::dvec3>;
   /// The triangles of a face that are looked at.
   std::span<const PieceTriangle> shapes(std::uint32_t face) const;
@@ -72,7 +73,8 @@ class MovingCrossings {
   template <class Pair>
   bool any_pair(std::uint32_t a, std::uint32_t b, Pair&& pair) const;
   bool cross_anew(std::uint32_t a, std::uint32_t b) const;
-  void test(std::uint32_t face, std::vector<std::uint32_t>& failed) const;
+  void test(std::uint32_t face, std::vector<glm::uvec2>& failed) const;
+  void test_against_failed(std::uint32_t face, std::vector<glm::uvec2>& failed) const;
   void build();
 
   std::size_t face_count() const { return faces_.size() / corners_; }
@@ -84,12 +86,16 @@ class MovingCrossings {
   std::size_t corners_;
   unsigned threads_;
   Positions start_, state_, trial_;
-  FaceTree tree_;                     // of the faces as they are on trial, or wherever they have clearance
-  double extent_ = 0;                 // FaceTree::extent() when the tree was built
-  std::size_t refitted_ = 0;          // The number of boxes that changed since extent() was looked at.
-  std::vector<Box> boxes_;            // scratch
-  std::vector<std::uint32_t> asked_;  // For each face: in which call failing() looked at it last.
-  std::uint32_t now_ = 0;             // The number of these calls.
+  FaceTree tree_;                      // of the faces as they are on trial, or wherever they have clearance
+  double extent_ = 0;                  // FaceTree::extent() when the tree was built
+  std::size_t refitted_ = 0;           // The number of boxes that changed since extent() was looked at.
+  std::vector<Box> boxes_;             // scratch
+  std::vector<std::uint32_t> asked_;   // For each face: in which call failing() looked at it last.
+  std::vector<std::uint32_t> failed_;  // For each face: in which call it failed last.
+  // For each face: the one that it was found to cross anew last, or kNone. It is tried first when the face is asked
+  // about again, because as a rule it has to go back several times.
+  std::vector<std::uint32_t> met_;
+  std::uint32_t now_ = 0;  // The number of these calls.
   std::optional<Clearance> clearance_;
   /// The faces that were looked at since tidy(): their boxes in the tree are those of the trial.
   std::vector<std::uint32_t> fitted_;

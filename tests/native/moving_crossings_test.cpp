@@ -278,6 +278,54 @@ TEST(MovingCrossings, LongWaysOfManyFacesEndSoon) {
   EXPECT_LT(polls, 20'000u);
 }
 
+/// A plate of n x n squares, and where its vertices lie after each has gone by noise of so many widths of a square.
+struct Tangle {
+  Tangle(unsigned n, double widths) : plate(shapes::stored(shapes::grid(n))), faces(indices(plate)) {
+    shapes::Random random(5);
+    for (const dvec3& p : plate.vertices) place.push_back(rounded_to_float32(p + widths / n * random.point()));
+    all.resize(plate.triangles.size());
+    std::iota(all.begin(), all.end(), 0u);
+  }
+  TriangleMesh plate;
+  std::vector<std::uint32_t> faces, all;
+  std::vector<dvec3> place;
+};
+
+TEST(MovingCrossings, AllThatCrossAreToldWhereverVeryManyDo) {
+  for (const double widths : {0.3, 1.0, 5.0}) {
+    const Tangle tangle(30, widths);
+    std::set<std::uint32_t> expected;
+    for (const auto& [a, b] : pairs_of(tangle.place, tangle.plate.triangles)) expected.insert({a, b});
+    std::vector<std::uint32_t> of_both;
+    for (const unsigned threads : {1u, 3u}) {
+      MovingCrossings crossings(tangle.faces, 3, tangle.plate.vertices, threads);
+      for (std::uint32_t v = 0; v < tangle.place.size(); ++v) crossings.try_at(v, tangle.place[v]);
+      const std::vector<std::uint32_t> failing = crossings.failing(tangle.all, nullptr);
+      EXPECT_EQ(failing, std::vector(expected.begin(), expected.end())) << widths;
+      EXPECT_EQ(crossings.failing(tangle.all, nullptr), failing) << "asked again";
+      // Half of them stand for those that moved since.
+      std::vector<std::uint32_t> half(tangle.all.begin(), tangle.all.begin() + tangle.all.size() / 2);
+      const std::vector<std::uint32_t> of_half = crossings.failing(half, nullptr);
+      EXPECT_TRUE(std::ranges::includes(failing, of_half));
+      for (const std::uint32_t f : half) {
+        EXPECT_EQ(std::ranges::binary_search(of_half, f), expected.contains(f)) << f;
+      }
+      if (threads == 1) of_both = of_half;
+      EXPECT_EQ(of_half, of_both) << threads << " threads";
+    }
+  }
+}
+
+TEST(MovingCrossings, AFaceOfATangleIsComparedWithFew) {
+  const Tangle tangle(40, 4);
+  MovingCrossings crossings(tangle.faces, 3, tangle.plate.vertices, 1);
+  for (std::uint32_t v = 0; v < tangle.place.size(); ++v) crossings.try_at(v, tangle.place[v]);
+  // A face polls once for each 64 others that its box meets, and here it meets hundreds.
+  const std::size_t count = tangle.all.size();
+  EXPECT_LT(polls_of([&] { EXPECT_GT(crossings.failing(tangle.all, nullptr).size(), count / 2); }), 3 * count);
+  EXPECT_LT(polls_of([&] { crossings.failing(tangle.all, nullptr); }), 3 * count / 2) << "it meets the same one again";
+}
+
 TEST(MovingCrossings, PointsAndSegmentsNeverCross) {
   const TriangleMesh mesh = shapes::torus(8);
   const ToleranceVolume volume(mesh.vertices, mesh.triangles, kSingle, 0.5);
