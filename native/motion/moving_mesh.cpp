@@ -133,9 +133,10 @@ MovingMesh::FaceBound MovingMesh::bound_by_certificate(std::uint32_t face, Blame
   return bound;
 }
 
-/// Whether no proof of the face is possible on trial, because the point that was open last is open there, too.
+/// Whether no proof of the face is possible on trial, because the point that was open last is open there, too. What is
+/// known of the corners' distances does not matter.
 bool MovingMesh::refuses_again(std::uint32_t face, const Blame& blame) const {
-  if (std::isnan(blame.weights.x)) return false;
+  if (std::isnan(blame.weights.x) || bound_by_motion(face).distance != kUnproved) return false;
   bool refuses = false;
   for_triangles(face, [&](std::size_t k, const TriangleCorners& at, const auto&) {
     if (k != blame.triangle) return true;
@@ -146,14 +147,6 @@ bool MovingMesh::refuses_again(std::uint32_t face, const Blame& blame) const {
     return false;
   });
   return refuses;
-}
-
-/// What is known on trial of a face that is to blame for the last refusal.
-MovingMesh::FaceBound MovingMesh::bound_of_blamed(std::uint32_t face, Blame& blame) const {
-  const FaceBound bound = bound_by_motion(face);
-  if (bound.distance != kUnproved) return bound;
-  if (refuses_again(face, blame)) return {};
-  return bound_by_certificate(face, &blame);
 }
 
 void MovingMesh::set_trial_bound(std::uint32_t face, const FaceBound& bound) {
@@ -243,22 +236,28 @@ void MovingMesh::set_trial(std::uint32_t vertex, const VertexState& state) {
 bool MovingMesh::try_alone(std::uint32_t vertex, const glm::dvec3& at, Blame& blame) {
   const VertexState from = trial_[vertex];
   if (at == from.at) return true;
-  const PointBound there = bound_at(vertex, at, Aim::ahead);
   const double step = step_[vertex];
-  if (there.distance > limit_) return false;
-  set_trial(vertex, {at, there});
   const auto faces = ring(vertex);
+  const auto refuse = [&] {
+    trial_[vertex] = from, step_[vertex] = step;
+    return false;
+  };
+  set_trial(vertex, {at, {}});
+  if (refuses_again(faces[blame.place], blame)) return refuse();
+  trial_[vertex].bound = bound_at(vertex, at, Aim::ahead);
+  if (trial_[vertex].bound.distance > limit_) return refuse();
   thread_local std::vector<FaceBound> bounds;
   bounds.resize(faces.size());
   const std::size_t first = blame.place;
   for (std::size_t i = 0; i < faces.size(); ++i) {
     const std::size_t place = (i + first) % faces.size();
     Blame other{static_cast<std::uint32_t>(place)};
-    bounds[place] = bound_of_blamed(faces[place], i == 0 ? blame : other);
+    bounds[place] = bound_by_motion(faces[place]);
     if (bounds[place].distance != kUnproved) continue;
-    if (i > 0) blame = other;
-    trial_[vertex] = from, step_[vertex] = step;
-    return false;
+    bounds[place] = bound_by_certificate(faces[place], &other);
+    if (bounds[place].distance != kUnproved) continue;
+    blame = other;
+    return refuse();
   }
   for (std::size_t i = 0; i < faces.size(); ++i) set_trial_bound(faces[i], bounds[i]);
   return true;

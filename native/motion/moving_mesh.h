@@ -167,7 +167,6 @@ class MovingMesh {
   double distance_by(const TriangleCertificate& certificate, std::uint32_t face, MovingFacing::Known& facing,
                      Blame* blame) const;
   bool refuses_again(std::uint32_t face, const Blame& blame) const;
-  FaceBound bound_of_blamed(std::uint32_t face, Blame& blame) const;
   bool is_inside(std::uint32_t face) const;
   void set_trial_bound(std::uint32_t face, const FaceBound& bound);
   void accept(std::uint32_t face);

@@ -82,5 +82,27 @@ TEST(MovingMesh, WhatIsKeptOfARefusalChangesNoAnswer) {
   }
 }
 
+TEST(MovingMesh, AFaceThatRefusesAgainIsAskedBeforeTheDistanceOfTheVertex) {
+  // The face is about the middle of the upper half of a sphere, which is far to find the nearest point of from there.
+  TriangleMesh dome = shapes::sphere(160);
+  std::erase_if(dome.triangles, [&](const glm::uvec3& t) {
+    return std::min({dome.vertices[t.x].z, dome.vertices[t.y].z, dome.vertices[t.z].z}) < 0.3;
+  });
+  const StoredSpace space(glm::dmat4(1), Storage::float64);
+  const ToleranceVolume volume(dome.vertices, dome.triangles, space, 1.2);
+  const std::vector<std::uint32_t> faces{0, 1, 2}, around{0};
+  MovingMesh mesh(volume, space, faces, 3, 3, 1);
+  const std::vector<dvec3> corners{{0.05, 0, 0}, {0, 0.05, 0}, {-0.05, -0.05, 0}};
+  ASSERT_TRUE(mesh.start(corners, 60, {}, nullptr).outside.empty());
+  mesh.measure(around, nullptr);
+  // These places turn the face over.
+  const dvec3 over = mesh.space().frame(dvec3(0.1, 0.1, 0)), again = mesh.space().frame(dvec3(0.11, 0.1, 0));
+  MovingMesh::Blame blame;
+  EXPECT_GE(polls_of([&] { EXPECT_FALSE(mesh.try_alone(2, over, blame)); }), 1) << "the distance takes a long search";
+  EXPECT_EQ(polls_of([&] { EXPECT_FALSE(mesh.try_alone(2, again, blame)); }), 0);
+  EXPECT_EQ(mesh.trial(2), mesh.state(2));
+  EXPECT_EQ(mesh.step(2), 0);
+}
+
 }  // namespace
 }  // namespace tolvol
