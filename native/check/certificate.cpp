@@ -145,7 +145,16 @@ std::optional<glm::dvec3> TriangleCertificate::nearest_point(const glm::dvec3& p
 }
 
 bool TriangleCertificate::is_open(const glm::dvec3& p, const Facing* facing) const {
-  return !nearest_point(p, limit_ + kBeyondRounding, facing);
+  const double radius = limit_ + kBeyondRounding;
+  bool is_open = true;
+  const auto visit = [&](std::uint32_t triangle) {
+    if (facing && !facing->admits(triangle)) return true;
+    const WitnessTriangle& t = (*reference_)[triangle];
+    is_open = !(closest_point(p, t.a, t.a + t.ab, t.a + t.ac).distance_squared <= radius * radius);
+    return is_open;
+  };
+  hierarchy_->for_each_within(p, radius, visit, [&](std::uint32_t node) { return !facing || facing->may_admit(node); });
+  return is_open;
 }
 
 std::optional<glm::dvec3> TriangleCertificate::point_outside(const glm::dvec3 (&corners)[3],
@@ -220,6 +229,16 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       }
       return false;
     };
+    // Where the tolerance is larger than what the reference bounds, the nearest triangle among those that are admitted
+    // takes a look at most of them. The longer searches end at any of these that covers the part.
+    FacingRule::Enough covers;
+    if (kSearch != Search::quick && facing) {
+      covers = [&](std::uint32_t triangle) {
+        double d2[4];
+        witness_distances((*reference_)[triangle], points, d2);
+        return d2[0] <= limit2_ && d2[1] <= limit2_ && d2[2] <= limit2_;
+      };
+    }
     const std::uint32_t guess = grid_->triangle_near(centre);
     if (covered_by(hints.x) || covered_by(hints.y) || covered_by(hints.z) || covered_by(guess)) continue;
 
@@ -240,7 +259,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
     if (!looked_around && (seems_outside || longest2 < kSmall * kSmall * limit2_) && covered_by_node_around()) continue;
     if (!(centre2 <= limit2_) || longest2 < kExact * kExact * limit2_) {
       if (hint == Hierarchy::kNone) hint = guess;
-      const std::uint32_t nearest = around.nearest(part, centre, radius, hint);
+      const std::uint32_t nearest = around.nearest(part, centre, radius, hint, covers);
       if (nearest == Hierarchy::kNone) return Verdict::outside;
       hint = exact = nearest;
       if (covered_by(exact)) continue;
@@ -269,7 +288,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
       }
       // Among slivers it happens that no node of the grid names the triangle below the centre.
       if (exact == Hierarchy::kNone) {
-        exact = around.nearest(part, centre, limit_, below);
+        exact = around.nearest(part, centre, limit_, below, covers);
         // By rounding there may be none, if the centre is as far away as it may be.
         const bool is_another = exact != below && exact != Hierarchy::kNone;
         if (is_another && (covered_by(exact) || cut_along(exact))) continue;

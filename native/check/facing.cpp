@@ -87,12 +87,13 @@ void FacingRule::bound_normals(const Hierarchy& hierarchy) {
 }
 
 Hierarchy::Nearest FacingRule::nearest(const Hierarchy& hierarchy, const glm::dvec3& p, const glm::dvec3& normal,
-                                       double least, double radius, std::uint32_t hint) const {
+                                       double least, double radius, std::uint32_t hint, const Enough& enough) const {
   const auto accept = [&](std::uint32_t triangle) { return glm::dot(normals[triangle], normal) >= least; };
   const double scale = std::max(1.0, glm::length(normal)), scaled_least = least / scale;
   const glm::dvec3 scaled = normal / scale;
   const auto may_accept = [&](std::uint32_t node) { return may_face(node, scaled, scaled_least); };
-  return hierarchy.nearest_if(p, accept, radius, hint, may_accept);
+  return hierarchy.nearest_if(p, accept, radius, hint, may_accept,
+                              [&](std::uint32_t triangle) { return enough && enough(triangle); });
 }
 
 bool FacingRule::may_face(std::uint32_t node, const glm::dvec3& normal, double least) const {

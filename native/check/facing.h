@@ -42,10 +42,14 @@ struct FacingRule {
   /// triangle faces as it should. It has to be called again once `normals` has changed. O(m).
   void bound_normals(const Hierarchy& hierarchy);
 
+  /// Tells of a triangle whether a search may end with it.
+  using Enough = std::function<bool(std::uint32_t triangle)>;
+
   /// Returns the nearest triangle within `radius` of p whose normal has at least `least` as its dot product with
-  /// `normal`. `hierarchy` is the reference's, and `hint` a triangle that is tried first, or kNone.
+  /// `normal`. `hierarchy` is the reference's, and `hint` a triangle that is tried first, or kNone. With `enough` it
+  /// may return another such triangle for which that holds.
   Hierarchy::Nearest nearest(const Hierarchy& hierarchy, const glm::dvec3& p, const glm::dvec3& normal, double least,
-                             double radius, std::uint32_t hint = Hierarchy::kNone) const;
+                             double radius, std::uint32_t hint = Hierarchy::kNone, const Enough& enough = {}) const;
 
   /// Tells whether a triangle below a node of the hierarchy may have at least `least` as the dot product of its normal
   /// with `normal`, which is at most as long as a unit vector.
@@ -99,10 +103,11 @@ class Facing {
   bool admits(std::uint32_t triangle) const { return cosine(triangle) >= least_cosine_; }
   /// Tells whether a triangle below a node of the reference's hierarchy may be admitted.
   bool may_admit(std::uint32_t node) const { return rule_->may_face(node, normal_, least_cosine_); }
-  /// Returns the nearest triangle within `radius` of p that is admitted. `hierarchy` is the reference's.
-  Hierarchy::Nearest nearest(const Hierarchy& hierarchy, const glm::dvec3& p, double radius,
-                             std::uint32_t hint = kNone) const {
-    return rule_->nearest(hierarchy, p, normal_, least_cosine_, radius, hint);
+  /// Returns the nearest triangle within `radius` of p that is admitted, or one for which `enough` holds. `hierarchy`
+  /// is the reference's.
+  Hierarchy::Nearest nearest(const Hierarchy& hierarchy, const glm::dvec3& p, double radius, std::uint32_t hint = kNone,
+                             const FacingRule::Enough& enough = {}) const {
+    return rule_->nearest(hierarchy, p, normal_, least_cosine_, radius, hint, enough);
   }
   /// Notes that an admitted triangle is a witness.
   void take(std::uint32_t triangle) { least_ = std::min(least_, cosine(triangle)); }

@@ -5,15 +5,14 @@
 #include <cmath>
 #include <limits>
 
-#include "check/facing.h"
 #include "geometry/closest_point.h"
 
 namespace tolvol {
 namespace {
 
-// A piece gets its first list after this many searches. Most pieces of a fine mesh need fewer, and would not gain by
-// it.
-constexpr std::size_t kSearches = 8;
+// A piece gets its first list after this many searches, if they have visited this many nodes each on average. Most
+// pieces of a fine mesh need fewer searches, and where a search visits fewer nodes it costs less than a list.
+constexpr std::size_t kSearches = 8, kNodesOfSearch = 64;
 // A list has at most this many triangles. If a part has more, its own parts try again.
 constexpr std::size_t kLongest = 256;
 // The lists of a piece hold at most this many triangles, in 16 MiB. After that a part keeps the list that it inherits.
@@ -28,29 +27,34 @@ constexpr double kNothing = std::numeric_limits<double>::infinity();
 void NearTriangles::begin(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, double radius,
                           const Facing* facing) {
   triangles_ = &triangles, hierarchy_ = &hierarchy, facing_ = facing, radius_ = radius;
-  searches_ = 0, too_far_ = kNothing;
+  searches_ = nodes_ = 0, too_far_ = kNothing;
   pool_.clear();
   lists_.assign(1, {0, 0});
 }
 
-std::uint32_t NearTriangles::nearest(Part& part, const glm::dvec3& centre, double radius, std::uint32_t hint) {
+std::uint32_t NearTriangles::nearest(Part& part, const glm::dvec3& centre, double radius, std::uint32_t hint,
+                                     const FacingRule::Enough& enough) {
   if (part.of != 0) {
     narrow(part, centre);
-  } else if (searches_ < kSearches || !gather(part, centre)) {
-    return search(centre, radius, hint);
+  } else if (searches_ < kSearches || nodes_ < kNodesOfSearch * searches_ || !gather(part, centre)) {
+    return search(centre, radius, hint, enough);
   }
   if (best_ == Hierarchy::kNone) return Hierarchy::kNone;
   const double best = std::sqrt(best2_);
   if (std::abs(best - radius) < kRounding || std::sqrt(second2_) - best < kRounding) {
-    return search(centre, radius, hint);
+    return search(centre, radius, hint, enough);
   }
   return best <= radius ? best_ : Hierarchy::kNone;
 }
 
-std::uint32_t NearTriangles::search(const glm::dvec3& centre, double radius, std::uint32_t hint) {
+std::uint32_t NearTriangles::search(const glm::dvec3& centre, double radius, std::uint32_t hint,
+                                    const FacingRule::Enough& enough) {
   ++searches_;
-  return (facing_ ? facing_->nearest(*hierarchy_, centre, radius, hint) : hierarchy_->nearest(centre, radius, hint))
-      .triangle;
+  const Hierarchy::Nearest found =
+      facing_ ? facing_->nearest(*hierarchy_, centre, radius, hint, enough) : hierarchy_->nearest(centre, radius, hint);
+  // Where nothing is near, a list costs nothing.
+  nodes_ += found.triangle == Hierarchy::kNone ? kNodesOfSearch : found.nodes;
+  return found.triangle;
 }
 
 /// Returns a distance: a triangle within the radius of some point of the part is within this distance of its centre.

@@ -9,13 +9,12 @@
 #include <glm/glm.hpp>
 #include <vector>
 
+#include "check/facing.h"
 #include "check/part.h"
 #include "check/witness.h"
 #include "geometry/hierarchy.h"
 
 namespace tolvol {
-
-class Facing;
 
 /// Each thread has one of its own, and uses it for one piece after another, so that its memory is reused.
 class NearTriangles {
@@ -27,8 +26,10 @@ class NearTriangles {
              const Facing* facing = nullptr);
 
   /// Returns exactly hierarchy.nearest(centre, radius, hint).triangle, or that of facing->nearest(), for the centre of
-  /// a part. Writes part.of, which names the list of triangles near the part, and which its parts inherit.
-  std::uint32_t nearest(Part& part, const glm::dvec3& centre, double radius, std::uint32_t hint);
+  /// a part. Writes part.of, which names the list of triangles near the part, and which its parts inherit. `enough` is
+  /// as for facing->nearest(); it matters only as long as there is no list.
+  std::uint32_t nearest(Part& part, const glm::dvec3& centre, double radius, std::uint32_t hint,
+                        const FacingRule::Enough& enough = {});
 
   /// The number of searches of the hierarchy since begin().
   std::size_t searches() const { return searches_; }
@@ -42,17 +43,17 @@ class NearTriangles {
   bool gather(Part& part, const glm::dvec3& centre);
   void narrow(Part& part, const glm::dvec3& centre);
   void look_at(std::uint32_t triangle, const glm::dvec3& centre, double reach2);
-  std::uint32_t search(const glm::dvec3& centre, double radius, std::uint32_t hint);
+  std::uint32_t search(const glm::dvec3& centre, double radius, std::uint32_t hint, const FacingRule::Enough& enough);
 
   const std::vector<WitnessTriangle>* triangles_ = nullptr;
   const Hierarchy* hierarchy_ = nullptr;
   const Facing* facing_ = nullptr;
   double radius_ = 0;
-  std::size_t searches_ = 0;
-  double too_far_ = 0;               // is the least reach() for which a list became too long
-  std::vector<std::uint32_t> pool_;  // holds the lists, one after the other
-  std::vector<List> lists_;          // is indexed by Part::of; the first list stands for all triangles
-  double best2_ = 0, second2_ = 0;   // are the squared distances of the two nearest triangles that were looked at
+  std::size_t searches_ = 0, nodes_ = 0;  // nodes_ counts the nodes that the searches have visited
+  double too_far_ = 0;                    // is the least reach() for which a list became too long
+  std::vector<std::uint32_t> pool_;       // holds the lists, one after the other
+  std::vector<List> lists_;               // is indexed by Part::of; the first list stands for all triangles
+  double best2_ = 0, second2_ = 0;        // are the squared distances of the two nearest triangles that were looked at
   std::uint32_t best_ = Hierarchy::kNone;
 };
 

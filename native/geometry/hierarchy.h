@@ -36,6 +36,9 @@ class Hierarchy {
   struct Always {
     bool operator()(std::uint32_t) const { return true; }
   };
+  struct Never {
+    bool operator()(std::uint32_t) const { return false; }
+  };
 
   struct Common {
     std::uint32_t triangle = kNone;  ///< kNone: nothing within the radius
@@ -59,10 +62,11 @@ class Hierarchy {
 
   /// The same among the triangles for which accept(index) holds. `may_accept(node)` is false only where accept() holds
   /// for no triangle below the node; without it, a search whose radius holds many triangles, of which none is accepted,
-  /// looks at all of them.
-  template <class Accept, class MayAccept = Always>
+  /// looks at all of them. The search ends early at a triangle that is nearer than all before it if enough(index)
+  /// holds.
+  template <class Accept, class MayAccept = Always, class Enough = Never>
   Nearest nearest_if(const glm::dvec3& p, Accept&& accept, double radius = std::numeric_limits<double>::infinity(),
-                     std::uint32_t hint = kNone, MayAccept&& may_accept = {}) const;
+                     std::uint32_t hint = kNone, MayAccept&& may_accept = {}, Enough&& enough = {}) const;
 
   /// Tells what is below each node, all of a node before the node above it: calls triangle(node, index) for triangles,
   /// in nodes of more than one if the triangle is cut into slices, and child(node, node below) for nodes.
@@ -153,9 +157,9 @@ class Hierarchy {
   double scale_ = 1;                     // is a power of two that makes half the size of the mesh 1/2 to 1
 };
 
-template <class Accept, class MayAccept>
+template <class Accept, class MayAccept, class Enough>
 Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, double radius, std::uint32_t hint,
-                                         MayAccept&& may_accept) const {
+                                         MayAccept&& may_accept, Enough&& enough) const {
   bool beyond_reach = false;
   const glm::dvec3 at = local(p, beyond_reach), q = beyond_reach ? at + centre_ : scaled(p);
   std::uint32_t best = kNone;
@@ -167,18 +171,18 @@ Hierarchy::Nearest Hierarchy::nearest_if(const glm::dvec3& p, Accept&& accept, d
   constexpr unsigned kFew = 16;
   unsigned tried = 0;
   auto attempt = [&](std::uint32_t place) {
-    const Corners& t = corners_[place];
-    if (++tried > kFew && is_beyond(q, t[0], t[1], t[2], closest.distance_squared)) return;
     std::uint32_t triangle = triangle_[place];
     while (triangle != kNone && !accept(triangle)) triangle = twin(triangle);
     if (triangle == kNone) return;
+    const Corners& t = corners_[place];
+    if (++tried > kFew && is_beyond(q, t[0], t[1], t[2], closest.distance_squared)) return;
     const ClosestPoint candidate = closest_point(q, t[0], t[1], t[2]);
     if (candidate.distance_squared > closest.distance_squared) return;
     // A tie goes to the lower index; kNone is above all indices.
     if (candidate.distance_squared == closest.distance_squared && triangle > best) return;
     best = triangle;
     closest = candidate;
-    bound = std::min(bound, closest.distance_squared);
+    bound = enough(triangle) ? -1 : std::min(bound, closest.distance_squared);
   };
   if (hint < place_.size()) attempt(place_[hint]);
   const auto nodes = nodes_.empty() ? 0 : std::uint32_t(walk<1>({at}, bound, attempt, may_accept));

@@ -10,6 +10,7 @@
 #include "check/certificate.h"
 #include "check/tolerance_volume.h"
 #include "geometry/closest_point.h"
+#include "polls.h"
 #include "shapes.h"
 
 namespace {
@@ -201,6 +202,52 @@ TEST(Facing, AMeshThatLooksAwayCostsASearchNothing) {
     EXPECT_EQ(nearest.triangle, Hierarchy::kNone);
     EXPECT_EQ(nearest.nodes, 1u);
   }
+}
+
+TEST(Facing, ASearchEndsAtWhatIsEnough) {
+  // All of a sphere is about as far from its centre.
+  const TriangleMesh sphere = shapes::sphere(60);
+  const Hierarchy hierarchy(sphere);
+  FacingRule rule(sphere, kError, kError, kRight);
+  rule.bound_normals(hierarchy);
+  const Facing facing(rule, {0, 0, 1}, kRight);
+  const dvec3 p(0.001, 0.002, 0.003);
+  const Hierarchy::Nearest nearest = facing.nearest(hierarchy, p, 2);
+  EXPECT_GT(nearest.nodes, 1'000u) << "the nearest";
+  EXPECT_EQ(facing.nearest(hierarchy, p, 2, Hierarchy::kNone, [](std::uint32_t) { return false; }).triangle,
+            nearest.triangle);
+  const Hierarchy::Nearest any = facing.nearest(hierarchy, p, 2, Hierarchy::kNone, [](std::uint32_t) { return true; });
+  EXPECT_TRUE(facing.admits(any.triangle));
+  EXPECT_LT(any.nodes, 50u);
+  const Hierarchy::Nearest hinted =
+      facing.nearest(hierarchy, p, 2, nearest.triangle, [](std::uint32_t) { return true; });
+  EXPECT_EQ(hinted.triangle, nearest.triangle);
+  EXPECT_EQ(hinted.nodes, 1u) << "the hint is tried first";
+}
+
+TEST(CertifiedFacing, WhereAllIsNearAProofEndsAtAnyWitness) {
+  // The tolerance is larger than the sphere. Its nearest triangles to the middle would take a look at all of it.
+  const TriangleMesh sphere = shapes::sphere(80);
+  const StoredSpace space(glm::dmat4(1), Storage::float64);
+  const ToleranceVolume volume(sphere.vertices, sphere.triangles, space, 1.3);
+  const StoredSpace in_frame = space.in(volume.frame());
+  const DistanceGrid no_grid;  // The hierarchy finds all triangles.
+  const TriangleCertificate certificate(volume.witnesses(), no_grid, volume.hierarchy(), volume.provable(0),
+                                        volume.refutable(0));
+  FacingRule rule(volume.reference(), kError, kError, kRight);
+  rule.bound_normals(volume.hierarchy());
+  const glm::uvec3 no_hints(Hierarchy::kNone);
+  const dvec3 unknown(TriangleCertificate::kUnproved);
+  const dvec3 corners[3] = {in_frame.frame({-1e-5, -1e-5, 0}), in_frame.frame({1e-5, -1e-5, 0}),
+                            in_frame.frame({0, 1e-5, 0})};
+  Facing facing(rule, *sure_normal(corners[0], corners[1], corners[2], kError), kRight);
+  EXPECT_GE(polls_of([&] { facing.nearest(volume.hierarchy(), corners[0], 1); }), 2u) << "the nearest";
+  EXPECT_EQ(polls_of([&] { EXPECT_FALSE(certificate.is_open(corners[0], &facing)); }), 0u);
+  EXPECT_EQ(polls_of([&] {
+              EXPECT_NE(certificate.bound_in_any_order(corners, unknown, no_hints, &facing),
+                        TriangleCertificate::kUnproved);
+            }),
+            0u);
 }
 
 TEST(CertifiedFacing, CornersProveNothingByTrianglesThatAreNotAdmitted) {

@@ -101,6 +101,12 @@ TEST(NearTriangles, FewPartsAmongOverlappingTrianglesAskTheHierarchy) {
   EXPECT_LT(all.searches, all.parts / 2);
 }
 
+TEST(NearTriangles, AmongSmallTrianglesASearchCostsLessThanAList) {
+  const Work work = follow(shapes::torus(60), 7, 9);
+  EXPECT_GT(work.parts, 100u);
+  EXPECT_EQ(work.searches, 2 * work.parts) << "each part is asked about twice";
+}
+
 TEST(NearTriangles, NothingNearIsNoTriangle) {
   const TriangleMesh mesh = tangle(50);
   const Hierarchy hierarchy(mesh);
