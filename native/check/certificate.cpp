@@ -144,7 +144,7 @@ std::optional<glm::dvec3> TriangleCertificate::nearest_point(const glm::dvec3& p
   return closest_point(p, t.a, t.a + t.ab, t.a + t.ac).point;
 }
 
-bool TriangleCertificate::is_open(const glm::dvec3& p, const Facing* facing) const {
+bool TriangleCertificate::is_open(const glm::dvec3& p, const Facing* facing, const glm::uvec3& hints) const {
   const double radius = limit_ + kBeyondRounding;
   bool is_open = true;
   const auto visit = [&](std::uint32_t triangle) {
@@ -153,12 +153,15 @@ bool TriangleCertificate::is_open(const glm::dvec3& p, const Facing* facing) con
     is_open = !(closest_point(p, t.a, t.a + t.ab, t.a + t.ac).distance_squared <= radius * radius);
     return is_open;
   };
+  for (const std::uint32_t triangle : {hints.x, hints.y, hints.z, grid_->triangle_near(p)}) {
+    if (triangle != Hierarchy::kNone && !visit(triangle)) return false;
+  }
   hierarchy_->for_each_within(p, radius, visit, [&](std::uint32_t node) { return !facing || facing->may_admit(node); });
   return is_open;
 }
 
-std::optional<glm::dvec3> TriangleCertificate::point_outside(const glm::dvec3 (&corners)[3],
-                                                             const Facing* facing) const {
+std::optional<glm::dvec3> TriangleCertificate::point_outside(const glm::dvec3 (&corners)[3], const Facing* facing,
+                                                             const glm::uvec3& hints) const {
   const auto& [a, b, c] = corners;
   const double longest = std::sqrt(std::max({squared_length(b - a), squared_length(c - b), squared_length(a - c)}));
   const double wanted = std::min(longest / (kProbeSpacing * limit_), static_cast<double>(kMostProbes));
@@ -167,9 +170,7 @@ std::optional<glm::dvec3> TriangleCertificate::point_outside(const glm::dvec3 (&
   for (int i = 0; i < n; ++i) {
     for (int j = i == 0; i + j <= n && j < n; ++j) {  // this skips the corners
       const glm::dvec3 p = a + static_cast<double>(i) * u + static_cast<double>(j) * v;
-      const PointBound near = point_bound(p);
-      const bool is_near = near.distance <= limit_ && (!facing || facing->admits(near.triangle));
-      if (!is_near && is_open(p, facing)) return p;
+      if (is_open(p, facing, hints)) return p;
     }
   }
   return std::nullopt;

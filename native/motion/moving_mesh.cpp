@@ -104,7 +104,7 @@ double MovingMesh::distance_by(const TriangleCertificate& certificate, std::uint
     if (largest != kUnproved) {
       Facing* const rule = facing ? &*facing : nullptr;
       glm::dvec3 open(std::numeric_limits<double>::quiet_NaN());
-      if (const std::optional<glm::dvec3> point = certificate.point_outside(at, rule)) {
+      if (const std::optional<glm::dvec3> point = certificate.point_outside(at, rule, hints)) {
         largest = kUnproved, open = *point;
       } else {
         largest = std::max(largest, certificate.bound_in_any_order(at, bounds, hints, rule, blame ? &open : nullptr));

@@ -188,6 +188,24 @@ TEST(Certificate, ProvesLargeFacesOverTrianglesOfAnySize) {
   }
 }
 
+TEST(Certificate, APointOutsideIsSoughtAmongTheHintsFirst) {
+  // Among triangles as large as the cube that they fill, a search looks at a share of all of them, and polls.
+  TriangleMesh tangle;
+  shapes::Random random(2);
+  for (std::uint32_t i = 0; i < 50'000; ++i) {
+    for (int k = 0; k < 3; ++k) tangle.vertices.push_back(0.3 * random.point());
+    tangle.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+  }
+  const std::vector<WitnessTriangle> witnesses = prepare_witnesses(tangle);
+  const Hierarchy hierarchy(tangle);
+  const DistanceGrid no_grid;
+  const TriangleCertificate certificate(witnesses, no_grid, hierarchy, 0.001, 0.0011);
+  const dvec3 by(0, 0, 0.0001),
+      corners[3] = {tangle.vertices[0] + by, tangle.vertices[1] + by, tangle.vertices[2] + by};
+  EXPECT_GT(polls_of([&] { EXPECT_FALSE(certificate.point_outside(corners)); }), 0u);
+  EXPECT_EQ(polls_of([&] { EXPECT_FALSE(certificate.point_outside(corners, nullptr, {7, 0, 9})); }), 0u);
+}
+
 TEST(Certificate, AsksTheNodesAroundAPartBeforeTheHierarchy) {
   // A search of the hierarchy takes ten times as long as a look at a node. The searches are counted by a hierarchy that
   // is made of triangles across all space, so that each search looks at most of its nodes, and polls.
