@@ -212,11 +212,11 @@ Cancelled
 Notes
 -----
 Cost: about 1 us a vertex and 2 us a face of the reference to certify the mesh before the motion. Each vertex that is
-held back costs 2 to 20 us if its neighbours move like it over a smooth reference. It costs 100 to 400 us if the
+held back costs 2 to 20 us if its neighbours move like it over a smooth reference. It costs 50 to 800 us if the
 reference is rough, if each vertex is pushed in a direction of its own by several tolerances, or if it is at the
 tolerance already, as in a loop that pushes on. Keeping crossings out costs 1 us for each triangle that moves, and 5 us
 for each quad. Among large triangles that run through each other a search looks at a share of them all: with 3,000
-random ones a vertex that is held back costs 1.2 ms.
+random ones a vertex that is held back costs 0.7 ms.
 
 "reset" is from M. Botsch et al., GPU-based Tolerance Volumes for Mesh Processing, 2004, section 5.)doc");
 
