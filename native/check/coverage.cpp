@@ -233,6 +233,7 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   trial.placing_.budget = kBudget;
   bool settled = true;
   for (const Element& e : elements) {
+    poll_at(trial.candidates_.size() + 1);  // Most changes have a few elements and need no poll.
     const List& list = lists_[e.id];
     const double distance = list.pieces.empty() ? 0 : list.distance + e.moved;
     const bool keeps = e.moved == 0 || distance <= limit_;
@@ -250,6 +251,7 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   }
   if (settled) return true;
   for (std::size_t i = 0; i < elements.size(); ++i) {
+    poll_at(i + 1);
     trial.candidates_[i].witness = {elements[i].corners[0], elements[i].corners[1], elements[i].corners[2]};
   }
   trial.elements_ = elements;

@@ -377,6 +377,7 @@ BoundedMeshInput DecimationInput::take_mesh() {
     // Labels name wedges at one input vertex; vertices welded from several hold those of all of them.
     std::unordered_map<std::uint64_t, std::uint32_t> dense;
     for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
+      poll_at(t);
       glm::uvec3 wedges;
       for (int k = 0; k < 3; ++k) {
         const std::uint32_t corner = input_corner(t, k);

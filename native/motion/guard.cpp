@@ -78,6 +78,7 @@ std::vector<std::uint32_t> Guard::replace_faces(std::vector<std::uint32_t> faces
   resume();
   std::vector<std::uint32_t> differing, refused;
   for (std::uint32_t f = 0; f < faces.size() / corners; ++f) {
+    poll_at(f);
     const auto first = faces.begin() + static_cast<std::ptrdiff_t>(f * corners);
     const auto before = faces_.begin() + (first - faces.begin());
     if (std::equal(first, first + corners_, before)) continue;

@@ -133,8 +133,10 @@ std::vector<std::uint32_t> MovingCoverage::still_failing(std::span<const std::ui
 
 std::vector<std::uint32_t> MovingCoverage::failing_replaced(std::span<const std::uint32_t> faces) {
   std::vector<std::uint32_t> nearest;
-  std::ranges::copy_if(faces, std::back_inserter(nearest),
-                       [&](std::uint32_t f) { return std::ranges::binary_search(nearest_faces_, f); });
+  std::ranges::copy_if(faces, std::back_inserter(nearest), [&](std::uint32_t f) {
+    poll_at(f);
+    return std::ranges::binary_search(nearest_faces_, f);
+  });
   if (!nearest.empty()) return nearest;
   for (Layer& layer : layers_) {
     std::vector<std::uint32_t> failed = failing(layer, faces, Neighbours::only_take_pieces, Chosen::are_replaced);
@@ -167,13 +169,19 @@ std::vector<std::uint32_t> MovingCoverage::failing(Layer& layer, std::span<const
   const auto of_face = static_cast<std::uint32_t>(layer.triangles.size());
   std::vector<std::uint32_t> vertices;
   for (const std::uint32_t f : faces) {
+    poll_at(f);
     const std::span<const std::uint32_t> corners = mesh_->corners_of(f);
     vertices.insert(vertices.end(), corners.begin(), corners.end());
   }
   std::vector<std::uint32_t> around = mesh_->faces_around(vertices);
-  std::sort(around.begin(), around.end());
+  std::size_t compared = 0;
+  std::sort(around.begin(), around.end(), [&](std::uint32_t a, std::uint32_t b) {
+    poll_at(++compared);
+    return a < b;
+  });
   layer.elements.clear();
   for (const std::uint32_t f : around) {
+    poll_at(f);
     const std::span<const std::uint32_t> corners = mesh_->corners_of(f);
     const bool loses = neighbours == Neighbours::lose_pieces || std::binary_search(faces.begin(), faces.end(), f);
     for (std::uint32_t k = 0; k < of_face; ++k) {

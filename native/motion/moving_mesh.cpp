@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "base/call.h"
 #include "base/parallel.h"
 #include "geometry/closest_point.h"
 #include "motion/finite.h"
@@ -35,6 +36,7 @@ std::vector<std::uint32_t> MovingMesh::faces_around(std::span<const std::uint32_
   ++now_;
   std::vector<std::uint32_t> faces;
   for (const std::uint32_t v : vertices) {
+    poll_at(v);
     for (const std::uint32_t f : ring(v)) {
       if (std::exchange(seen_[f], now_) != now_) faces.push_back(f);
     }

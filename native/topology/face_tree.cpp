@@ -49,9 +49,10 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, std::span<const Box> bo
     next.back() = entries.size();
     border.swap(next);
   }
-  slots_.resize(leaves_ * kLeaf);
-  nodes_.resize(2 * leaves_ - 1);
+  fill(slots_, leaves_ * kLeaf, Slot());
+  fill(nodes_, 2 * leaves_ - 1, Box());
   for (std::size_t leaf = 0; leaf < leaves_; ++leaf) {
+    poll_at(leaf);
     for (std::size_t i = border[leaf], slot = leaf * kLeaf; i < border[leaf + 1]; ++i, ++slot) {
       const std::uint32_t index = entries[i].index;
       slots_[slot] = {boxes[index], faces[index]};
@@ -59,7 +60,10 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, std::span<const Box> bo
     }
     fit_leaf(leaf);
   }
-  for (std::size_t node = leaves_ - 1; node-- > 0;) nodes_[node] = fitted(node);
+  for (std::size_t node = leaves_ - 1; node-- > 0;) {
+    poll_at(node);
+    nodes_[node] = fitted(node);
+  }
 }
 
 void FaceTree::fit_leaf(std::size_t leaf) {

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <unordered_map>
 
+#include "base/call.h"
 #include "base/union_find.h"
 
 namespace tolvol {
@@ -36,21 +37,29 @@ std::vector<std::uint32_t> island_labels(std::span<const glm::uvec3> triangles, 
   std::vector<Side> sides;
   sides.reserve(3 * triangles.size());
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    poll_at(t);
     for (int k = 0; k < 3; ++k) {
       std::uint32_t a = triangles[t][k], b = triangles[t][(k + 1) % 3], wa = wedges[t][k], wb = wedges[t][(k + 1) % 3];
       if (a > b) std::swap(a, b), std::swap(wa, wb);
       sides.push_back({(static_cast<std::uint64_t>(a) << 32) | b, t, wa, wb});
     }
   }
-  std::sort(sides.begin(), sides.end(),
-            [](const Side& a, const Side& b) { return a.edge != b.edge ? a.edge < b.edge : a.triangle < b.triangle; });
+  std::size_t compared = 0;
+  std::sort(sides.begin(), sides.end(), [&](const Side& a, const Side& b) {
+    poll_at(++compared);
+    return a.edge != b.edge ? a.edge < b.edge : a.triangle < b.triangle;
+  });
   UnionFind islands(triangles.size());
   for (std::size_t i = 1; i < sides.size(); ++i) {
+    poll_at(i);
     const Side &a = sides[i - 1], &b = sides[i];
     if (a.edge == b.edge && a.low == b.low && a.high == b.high) islands.join(a.triangle, b.triangle);
   }
   std::vector<std::uint32_t> labels(triangles.size());
-  for (std::uint32_t t = 0; t < triangles.size(); ++t) labels[t] = islands.find(t);
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    poll_at(t);
+    labels[t] = islands.find(t);
+  }
   return labels;
 }
 

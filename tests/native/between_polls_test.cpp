@@ -3,13 +3,19 @@
 /// it was cancelled.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
+#include <numeric>
+#include <vector>
 
 #include "field/display_tree.h"
 #include "polls.h"
 #include "shapes.h"
 #include "topology/crossings.h"
+#include "topology/face_tree.h"
+#include "topology/wedges.h"
 
 namespace {
 
@@ -44,6 +50,29 @@ TEST(BetweenPolls, FacesThatAllCross) {
       polls_of([&] { found = crossings(mesh.vertices, mesh.triangles, std::size_t{1} << 30, team, nullptr); });
   EXPECT_EQ(found.pairs.size(), n * (n - 1) / 2);
   EXPECT_GE(polls, n * n / 512u);
+}
+
+TEST(BetweenPolls, ATreeOfFaces) {
+  const unsigned n = 400000;
+  shapes::Random random(3);
+  std::vector<std::uint32_t> faces(n);
+  std::iota(faces.begin(), faces.end(), 0u);
+  std::vector<Box> boxes(n);
+  for (Box& box : boxes) box.add(random.point());
+  Team team(1);
+  // There is a poll for each node that is cut in two, and further ones while the faces, the leaves and the nodes above
+  // them are written.
+  const std::size_t leaves = std::bit_ceil(n / 4u);
+  EXPECT_GE(polls_of([&] { FaceTree(faces, boxes, team); }), leaves - 1 + n / 4096 + 2 * (leaves / 4096));
+}
+
+TEST(BetweenPolls, IslandsOfWedges) {
+  const TriangleMesh mesh = shapes::grid(200);
+  const std::size_t sides = 3 * mesh.triangles.size();
+  std::vector<std::uint32_t> labels;
+  const std::size_t polls = polls_of([&] { labels = island_labels(mesh.triangles, mesh.triangles); });
+  EXPECT_GE(polls, 10 * sides / 4096) << "a sort compares each side more than ten times";
+  EXPECT_EQ(std::ranges::count(labels, labels.front()), std::ptrdiff_t(labels.size()));
 }
 
 }  // namespace
