@@ -40,7 +40,6 @@
 #include "base/call.h"
 #include "base/parallel.h"
 #include "geometry/hierarchy.h"
-#include "measure/fresh_corners.h"
 #include "measure/placed_pair.h"
 #include "measure/split.h"
 
@@ -141,7 +140,8 @@ class Search {
       : a_(a),
         b_(b),
         hierarchy_(b),
-        fresh_(a),
+        place_(weld_equal_positions(a.vertices)),
+        seen_(a.vertices.size()),
         bound_(bound),
         options_(options),
         patience_(kPatience + kPatiencePerTriangle * (a.triangles.size() + b.triangles.size())) {}
@@ -176,6 +176,18 @@ class Search {
     return {mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]};
   }
 
+  /// Returns a bit for each corner of a triangle of a_, from the lowest on: whether no earlier call had its place. The
+  /// distance at a corner that many triangles share, near which there may be as many of b_, is thus looked at once.
+  std::uint8_t fresh_corners(std::uint32_t triangle) {
+    std::uint8_t fresh = 0;
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t place = place_[a_.triangles[triangle][k]];
+      if (!seen_[place]) fresh |= static_cast<std::uint8_t>(1u << k);
+      seen_[place] = true;
+    }
+    return fresh;
+  }
+
   void report(double fraction) const {
     if (options_.progress) options_.progress->update(fraction);
   }
@@ -191,7 +203,7 @@ class Search {
         return std::uint32_t(i * kSpread % count * a_.triangles.size() / count);
       };
       std::vector<std::uint8_t> fresh(samples.size());
-      for (std::size_t i = 0; i < fresh.size(); ++i) fresh[i] = std::uint8_t(fresh_.of(seed_at(first + i)));
+      for (std::size_t i = 0; i < fresh.size(); ++i) fresh[i] = fresh_corners(seed_at(first + i));
       parallel_for(samples.size(), kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
           const std::uint32_t triangle = seed_at(first + i);
@@ -223,7 +235,7 @@ class Search {
       std::vector<Piece> pieces(chunk_end - chunk);
       std::vector<Sample> samples(pieces.size());
       std::vector<std::uint8_t> fresh(pieces.size());
-      for (std::size_t i = 0; i < fresh.size(); ++i) fresh[i] = std::uint8_t(fresh_.of(std::uint32_t(chunk + i)));
+      for (std::size_t i = 0; i < fresh.size(); ++i) fresh[i] = fresh_corners(std::uint32_t(chunk + i));
       parallel_for(pieces.size(), kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
         std::uint32_t hint = Hierarchy::kNone;
         for (std::size_t i = begin; i < end; ++i) {
@@ -399,7 +411,8 @@ class Search {
 
   const TriangleMesh &a_, &b_;
   Hierarchy hierarchy_;
-  FreshCorners fresh_;
+  std::vector<std::uint32_t> place_;  // the first vertex of a_ at the place of each
+  std::vector<bool> seen_;            // tells for each place whether fresh_corners() has had it
   double bound_;
   const HausdorffOptions& options_;
   const std::size_t patience_;  // After this many pieces the search accepts a wider interval.

@@ -22,14 +22,7 @@ TriangleMesh star(unsigned n, bool apart) {
   }
   mesh.vertices.emplace_back(0, 0, 0);
   for (unsigned i = 0; i < n; ++i) mesh.triangles.emplace_back(n, i, (i + 1) % n);
-  if (!apart) return mesh;
-  TriangleMesh soup;
-  for (const glm::uvec3& t : mesh.triangles) {
-    const auto first = static_cast<std::uint32_t>(soup.vertices.size());
-    for (int k = 0; k < 3; ++k) soup.vertices.push_back(mesh.vertices[t[k]]);
-    soup.triangles.push_back(first + glm::uvec3(0, 1, 2));
-  }
-  return soup;
+  return apart ? shapes::soup(mesh) : mesh;
 }
 
 // The corner that all share is the farthest from the other star, all triangles of which are about as near to it. To
