@@ -133,8 +133,9 @@ std::vector<std::uint32_t> MovingCoverage::still_failing(std::span<const std::ui
 
 std::vector<std::uint32_t> MovingCoverage::failing_replaced(std::span<const std::uint32_t> faces) {
   std::vector<std::uint32_t> nearest;
+  std::size_t looked_at = 0;
   std::ranges::copy_if(faces, std::back_inserter(nearest), [&](std::uint32_t f) {
-    poll_at(f);
+    poll_at(++looked_at);
     return std::ranges::binary_search(nearest_faces_, f);
   });
   if (!nearest.empty()) return nearest;
@@ -168,9 +169,9 @@ std::vector<std::uint32_t> MovingCoverage::failing(Layer& layer, std::span<const
                                                    Neighbours neighbours, Chosen chosen) {
   const auto of_face = static_cast<std::uint32_t>(layer.triangles.size());
   std::vector<std::uint32_t> vertices;
-  for (const std::uint32_t f : faces) {
-    poll_at(f);
-    const std::span<const std::uint32_t> corners = mesh_->corners_of(f);
+  for (std::size_t i = 0; i < faces.size(); ++i) {
+    poll_at(i + 1);  // A few faces need no poll.
+    const std::span<const std::uint32_t> corners = mesh_->corners_of(faces[i]);
     vertices.insert(vertices.end(), corners.begin(), corners.end());
   }
   std::vector<std::uint32_t> around = mesh_->faces_around(vertices);
@@ -181,7 +182,7 @@ std::vector<std::uint32_t> MovingCoverage::failing(Layer& layer, std::span<const
   });
   layer.elements.clear();
   for (const std::uint32_t f : around) {
-    poll_at(f);
+    poll_at(layer.elements.size() / of_face + 1);
     const std::span<const std::uint32_t> corners = mesh_->corners_of(f);
     const bool loses = neighbours == Neighbours::lose_pieces || std::binary_search(faces.begin(), faces.end(), f);
     for (std::uint32_t k = 0; k < of_face; ++k) {

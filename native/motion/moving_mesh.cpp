@@ -35,9 +35,9 @@ constexpr double kFarthest = 0x1p500;
 std::vector<std::uint32_t> MovingMesh::faces_around(std::span<const std::uint32_t> vertices) {
   ++now_;
   std::vector<std::uint32_t> faces;
-  for (const std::uint32_t v : vertices) {
-    poll_at(v);
-    for (const std::uint32_t f : ring(v)) {
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    poll_at(i + 1);  // A few vertices need no poll.
+    for (const std::uint32_t f : ring(vertices[i])) {
       if (std::exchange(seen_[f], now_) != now_) faces.push_back(f);
     }
   }
