@@ -109,7 +109,7 @@ bool Change::prepare_flip(Edge e) {
   if (mesh_->pinned(a) && mesh_->pinned(b)) return false;
   if (mesh_->has_copies()) {
     if (mesh_->slot(c) == mesh_->slot(d) || mesh_->joined_by_other(c, d)) return false;
-    if (mesh_->joined(a) && mesh_->joined_by_other(a, b)) return false;  // The sheets would meet there no more.
+    if (mesh_->joined_by_other(a, b)) return false;  // The sheets would meet there no more.
   }
   const std::uint32_t first = static_cast<std::uint32_t>(mesh.face_handle(h).idx()),
                       second = static_cast<std::uint32_t>(mesh.face_handle(o).idx());
@@ -259,9 +259,7 @@ bool Change::wedges_fit(Halfedge h) {
 /// only touch, the other copies are carried along.
 bool Change::gather_copies(Halfedge h) {
   const OpenMesh::TriConnectivity& mesh = mesh_->connectivity();
-  const auto in_line = [&](Halfedge edge) {
-    return mesh_->joined(mesh_->to(edge)) && mesh_->joined_by_other(mesh_->from(edge), mesh_->to(edge));
-  };
+  const auto in_line = [&](Halfedge edge) { return mesh_->joined_by_other(mesh_->from(edge), mesh_->to(edge)); };
   bool line = false;
   collapses_.clear();
   for (const std::uint32_t copy : mesh_->copies(mesh_->from(h))) {

@@ -22,7 +22,7 @@ struct DecimationOptions {
   enum class Effort { fast, thorough };
   enum class Crossings { keep_out, allow };
 
-  /// optimal leaves the fewest triangles; subset lets every surviving vertex be an original one.
+  /// optimal leaves the fewest triangles; subset leaves vertices only where original ones were.
   Placement placement = Placement::optimal;
   bool two_sided = true;         ///< Also keeps the whole reference within the tolerance of the result.
   Effort effort = Effort::fast;  ///< See decimate() for what each costs.

@@ -225,7 +225,8 @@ triangles : (m, 3) integer array
 volume : ToleranceVolume or None
     None decimates without a tolerance, for comparison. This needs target_triangles.
 placement : {"optimal", "subset"}
-    "optimal" leaves the fewest triangles. With "subset" every vertex of the result is where an original one was, bit for bit.
+    "optimal" leaves the fewest triangles. With "subset" every vertex of the result is where an original one was, bit
+    for bit.
 two_sided : bool
     Whether the reference, too, is kept within the tolerance of the result. If not, parts of it may be lost, but the
     boundary of the result and that of the reference are within the tolerance of each other. An open edge that lies on

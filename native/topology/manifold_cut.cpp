@@ -12,6 +12,7 @@
 #include <tuple>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 
 #include "base/call.h"
 #include "geometry/triangle_mesh.h"
@@ -388,9 +389,14 @@ class Cutter {
   /// there leaves the edge in nearly the same direction as one of another sheet. Sheets with different diagonals do not
   /// lie on each other exactly.
   bool lie_on_each_other(const std::vector<Side>& alike) const {
-    return std::ranges::all_of(alike, [&](Side s) {
-      return std::ranges::any_of(alike, [&](Side other) {
-        return other != s && other != mate_[s] && !(glm::dot(inwards(s), inwards(other)) < kUpon);
+    std::vector<std::pair<Side, glm::dvec3>> leaving;
+    leaving.reserve(alike.size());
+    for (const Side s : alike) leaving.emplace_back(s, inwards(s));
+    return std::ranges::all_of(leaving, [&](const auto& one) {
+      poll();
+      return std::ranges::any_of(leaving, [&](const auto& other) {
+        const bool is_of_another = other.first != one.first && other.first != mate_[one.first];
+        return is_of_another && !(glm::dot(one.second, other.second) < kUpon);
       });
     });
   }

@@ -15,7 +15,7 @@ namespace tolvol {
 
 struct CertifiedMesh {
   /// The mesh has the reference's triangles and these positions, which are within the tolerance. The reference must be
-  /// a manifold.
+  /// a manifold, sheets of which may touch.
   CertifiedMesh(const TriangleMesh& surface, const std::vector<glm::dvec3>& vertices, double tolerance,
                 std::vector<bool> pinned = {})
       : reference(surface) {
@@ -33,8 +33,8 @@ struct CertifiedMesh {
     for (std::uint32_t v = 0; v < vertices.size(); ++v) {
       input.positions.push_back({vertices[v], space->frame(vertices[v])});
       positions.push_back(input.positions.back().position);
-      input.slots.push_back(v);
     }
+    input.slots = weld_equal_positions(reference.vertices);
     input.pinned = pinned.empty() ? std::vector<bool>(vertices.size(), false) : std::move(pinned);
     input.store = [this](const glm::dvec3& p) {
       const glm::dvec3 stored = space->store(p);

@@ -6,6 +6,8 @@
 #include <random>
 #include <vector>
 
+#include "base/simd.h"
+
 namespace {
 
 using namespace tolvol;
@@ -61,6 +63,34 @@ TEST(DampedSystem, RefusesWhatIsNotPositiveDefinite) {
   system.start(1);
   system.add(0, 0, -1, dvec3(1, 2, 3));
   EXPECT_FALSE(system.solve(1e-2));
+}
+
+TEST(DampedSystem, InstructionsDoNotChangeABit) {
+  constexpr std::size_t kVertices = 13;
+  std::minstd_rand random(11);
+  const auto uniform = [&] { return std::uniform_real_distribution(-1.0, 1.0)(random); };
+  DampedSystem system;
+  system.start(kVertices);
+  for (int term = 0; term < 200; ++term) {
+    const dvec3 r(uniform(), uniform(), uniform());
+    double weights[kVertices];
+    for (double& w : weights) w = uniform();
+    for (std::size_t i = 0; i < kVertices; ++i) {
+      system.add(i, weights[i] * r);
+      for (std::size_t j = 0; j <= i; ++j) system.add(i, j, weights[i] * weights[j], r);
+    }
+  }
+  const auto solved = [&] {
+    EXPECT_TRUE(system.solve(1e-2));
+    std::vector<dvec3> solution;
+    for (std::size_t i = 0; i < kVertices; ++i) solution.push_back(system[i]);
+    return solution;
+  };
+  const std::vector<dvec3> fastest = solved();
+  const Simd best = simd_path();
+  simd_path() = Simd::portable;
+  EXPECT_EQ(solved(), fastest);
+  simd_path() = best;
 }
 
 }  // namespace

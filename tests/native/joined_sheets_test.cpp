@@ -301,19 +301,7 @@ TEST(TouchingSheets, StillMeetWhereTheyMet) {
 
 /// Two boxes of bumpy sides, the second moved by `offset`, each with vertices of its own where they touch.
 Case touching_boxes(unsigned n, const dvec3& offset) {
-  TriangleMesh first;
-  for (int side = 0; side < 6; ++side) {
-    TriangleMesh grid = shapes::grid(n);
-    const int axis = side / 2;
-    for (dvec3& p : grid.vertices) {
-      dvec3 q;
-      q[axis] = side % 2, q[(axis + 1) % 3] = p.x, q[(axis + 2) % 3] = side % 2 == 1 ? p.y : 1 - p.y;
-      p = q;
-    }
-    first = side == 0 ? grid : shapes::joined(first, grid);
-  }
-  const std::vector<std::uint32_t> weld = weld_equal_positions(first.vertices);
-  for (glm::uvec3& t : first.triangles) t = {weld[t.x], weld[t.y], weld[t.z]};
+  const TriangleMesh first = shapes::box(n);
   TriangleMesh second = first;
   for (dvec3& p : second.vertices) p += offset;
   Case c{shapes::stored(shapes::joined(first, second))};

@@ -22,7 +22,7 @@ constexpr std::size_t kMany = 320;
 constexpr std::size_t kAnyNumber = std::numeric_limits<std::size_t>::max();
 /// The rounds, in order. A round is repeated until it removes nothing. Many starts take ten times as long, and are
 /// worth it only where all else has failed; with three rings, seconds for each hundred edges. A round that would have
-/// more edges than `most_edges` is left out, and so is one with many starts after another one that removed nothing.
+/// more edges than `most_edges` is left out. A round with many starts that removes nothing is the last.
 constexpr struct {
   int rings;
   bool many_starts;
@@ -72,9 +72,7 @@ Refinement::Refinement(BoundedMesh& mesh, NewCrossings* crossings, Team& team)
 
 void Refinement::run(std::size_t target, Progress* progress) {
   if (progress) progress->begin("refining");
-  bool many_starts_failed = false;
   for (const auto& [rings, many_starts, most_edges] : kRounds) {
-    if (many_starts_failed) return;
     effort_.rings = rings, effort_.many_starts = many_starts;
     std::ranges::fill(tried_, 0);
     const std::size_t at_first = mesh_.triangle_count();
@@ -82,7 +80,7 @@ void Refinement::run(std::size_t target, Progress* progress) {
       before = mesh_.triangle_count();
       if (!round(most_edges, target, progress)) return;
     }
-    many_starts_failed = many_starts && mesh_.triangle_count() == at_first;
+    if (many_starts && mesh_.triangle_count() == at_first) return;
   }
 }
 

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The line of edges in which two closed sheets meet, each with vertices of its own: what a decimation may do to it.
+#include <gtest/gtest.h>
+
+#include "certified_mesh.h"
+#include "decimation/change.h"
+#include "decimation/refinement/patch.h"
+
+namespace {
+
+using namespace tolvol;
+
+constexpr unsigned kSide = 4;
+
+/// Two boxes that touch along an edge.
+CertifiedMesh boxes() {
+  TriangleMesh second = shapes::box(kSide);
+  for (glm::dvec3& p : second.vertices) p.x += 1, p.y += 1;
+  const TriangleMesh both = shapes::joined(shapes::box(kSide), second);
+  return {both, both.vertices, 0.3};
+}
+
+bool in_line(const BoundedMesh& mesh, std::uint32_t a, std::uint32_t b) {
+  const glm::dvec3 &p = mesh.stored(a), &q = mesh.stored(b);
+  return p.x == 1 && p.y == 1 && q.x == 1 && q.y == 1;
+}
+
+TEST(ContactLine, IsNotFlippedAway) {
+  const CertifiedMesh c = boxes();
+  Change change(*c.mesh);
+  std::size_t line = 0, others = 0;
+  for (std::uint32_t e = 0; e < c.mesh->connectivity().n_edges(); ++e) {
+    const auto h = c.mesh->connectivity().halfedge_handle(BoundedMesh::edge(e), 0);
+    const bool is_possible = change.prepare_flip(BoundedMesh::edge(e));
+    if (in_line(*c.mesh, c.mesh->from(h), c.mesh->to(h))) {
+      ++line;
+      EXPECT_FALSE(is_possible);
+    } else {
+      others += is_possible;
+    }
+  }
+  EXPECT_EQ(line, 2 * kSide);
+  EXPECT_GT(others, 100u);
+}
+
+TEST(ContactLine, CollapsesAlongItselfAlone) {
+  const CertifiedMesh c = boxes();
+  Change change(*c.mesh);
+  std::size_t along = 0, off = 0;
+  for (std::uint32_t h = 0; h < c.mesh->connectivity().n_halfedges(); ++h) {
+    const BoundedMesh::Halfedge halfedge(static_cast<int>(h));
+    const std::uint32_t from = c.mesh->from(halfedge), to = c.mesh->to(halfedge);
+    if (!in_line(*c.mesh, from, from)) continue;
+    const bool is_possible = change.prepare_collapse(halfedge, c.mesh->vertex_position(to));
+    if (in_line(*c.mesh, from, to)) {
+      along += is_possible;
+    } else {
+      ++off;
+      EXPECT_FALSE(is_possible);
+    }
+  }
+  EXPECT_EQ(along, 4 * kSide) << "each edge of both boxes, in both directions";
+  EXPECT_GT(off, 20u);
+}
+
+TEST(ContactLine, IsNotFlippedAwayInAPatch) {
+  const CertifiedMesh c = boxes();
+  Change change(*c.mesh);
+  std::size_t seen = 0;
+  for (std::uint32_t e = 0; e < c.mesh->connectivity().n_edges(); ++e) {
+    const auto h = c.mesh->connectivity().halfedge_handle(BoundedMesh::edge(e), 0);
+    if (!change.prepare_collapse(h, c.mesh->vertex_position(c.mesh->to(h)))) continue;
+    Patch patch;
+    if (!patch.gather(change, 2, true)) continue;
+    for (std::uint32_t f = 0; f < patch.faces().size(); ++f) {
+      for (int k = 0; k < 3; ++k) {
+        const auto id = [&](int corner) { return patch.vertices()[patch.faces()[f].corners[corner]].id; };
+        if (patch.faces()[f].across[k] == Patch::kNone || !in_line(*c.mesh, id(k), id((k + 1) % 3))) continue;
+        ++seen;
+        Patch::Flipped flipped;
+        EXPECT_FALSE(patch.can_flip(f, k, flipped));
+      }
+    }
+  }
+  EXPECT_GT(seen, 0u);
+}
+
+}  // namespace
