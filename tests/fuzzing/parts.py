@@ -109,6 +109,7 @@ def flipped(triangles, share, rng):
     """Returns the triangles with some pairs of neighbours cut along the other diagonal."""
     pairs, quads = quads_of(triangles)
     chosen = rng.random(len(pairs)) < share
+    chosen &= (np.diff(np.sort(quads, 1), axis=1) > 0).all(1)  # With a repeated corner there is no other diagonal.
     result = triangles.copy()
     result[pairs[chosen]] = quads[chosen][:, [[0, 1, 3], [1, 2, 3]]]
     return result
