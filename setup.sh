@@ -15,8 +15,7 @@ tests=""
 case "${1-}" in
 "") ;;
 --tests)
-  packages="$packages python3-pytest python3-venv ccache clang-format
-    clang-tidy xvfb xdotool imagemagick"
+  packages="$packages python3-pytest python3-venv ccache clang-format xvfb xdotool imagemagick"
   targets="all extension"
   tests=1
   ;;
@@ -68,4 +67,7 @@ fi
 
 stage "configured" cmake --preset release ${TOLVOL_PYTHONS:+"-DTOLVOL_PYTHONS=$TOLVOL_PYTHONS"}
 stage "built in build/release" cmake --build --preset release --target $targets
-[ -z "$tests" ] || stage "packages of the command tolvol in build/command" sh tests/command/setup.sh
+if [ -n "$tests" ]; then
+  stage "packages of the command tolvol in build/command" sh tests/environment.sh command --system-site-packages
+  stage "tools that check the style in build/style" sh tests/environment.sh style
+fi

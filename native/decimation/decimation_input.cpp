@@ -158,6 +158,7 @@ bool DecimationInput::added_triangles_are_open() const {
 
 Bounds* DecimationInput::set_bounds(Team& team) {
   std::vector<glm::dvec3> used;
+  used.reserve(cut_.vertex_input.size());
   for (const std::uint32_t i : cut_.vertex_input) used.push_back(vertices_[i]);
   if (const auto warning = storage_warning(*volume_, space_, used)) report_.warnings.push_back(*warning);
   // Vertices may end up anywhere in the volume.

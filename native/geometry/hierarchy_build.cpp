@@ -169,7 +169,8 @@ struct Hierarchy::Build {
         const std::uint32_t n = count[slot_of(keys[i], k)];
         if (n > sharing) sharing = n, hub.first = k;
       }
-      for (float reach = kTaper; hub.first < 3 && reach < float(sharing); reach *= kTaper) ++hub.second;
+      float reach = kTaper;
+      while (hub.first < 3 && reach < float(sharing)) reach *= kTaper, ++hub.second;
       hubs.push_back(hub);
     }
     return hubs;
@@ -244,7 +245,7 @@ struct Hierarchy::Build {
   std::uint32_t split(Range range) const {
     const std::uint64_t first = keys[range.begin].code, last = keys[range.end - 1].code;
     if (first == last) return range.begin + (range.end - range.begin) / 2;
-    const std::uint64_t high = last & ~((std::bit_floor(first ^ last)) - 1);
+    const std::uint64_t high = last & ~(std::bit_floor(first ^ last) - 1);
     const auto at = std::partition_point(keys.begin() + range.begin, keys.begin() + range.end,
                                          [&](const Key& key) { return key.code < high; });
     return std::uint32_t(at - keys.begin());

@@ -51,6 +51,7 @@ void MovingMesh::start_facing(FacingRule rule, std::span<const std::uint32_t> pl
   const bool is_plain = is_reference && is_plainly_oriented(place);
   if (!is_plain) {
     std::vector<glm::uvec3> places;
+    places.reserve(reference.triangles.size());
     places.reserve(of_face * face_count());
     for (std::uint32_t f = 0; f < face_count(); ++f) {
       const auto corner = corners_of(f);
@@ -67,6 +68,7 @@ void MovingMesh::start_facing(FacingRule rule, std::span<const std::uint32_t> pl
   } else {
     const std::vector<std::uint32_t> same = weld_equal_positions(reference.vertices);
     std::vector<glm::uvec3> places;
+    places.reserve(reference.triangles.size());
     for (const glm::uvec3& t : reference.triangles) places.emplace_back(same[t.x], same[t.y], same[t.z]);
     facing_->reverse_reference(orientation(places, same.size(), team).reversed, volume_->hierarchy());
   }

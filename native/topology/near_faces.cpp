@@ -60,6 +60,7 @@ NearFaces::NearFaces(std::span<const std::uint32_t> faces, std::span<const Corne
   std::vector<std::uint32_t> numbers(crowds_.size());
   std::iota(numbers.begin(), numbers.end(), 0u);
   std::vector<Box> places;
+  places.reserve(crowds_.size());
   for (const Crowd& crowd : crowds_) places.push_back(crowd.whole(crowd.rims.box()));
   places_ = FaceTree(numbers, places, team);
   rest.number = static_cast<std::uint32_t>(crowds_.size());

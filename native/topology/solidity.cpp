@@ -57,9 +57,10 @@ Solidity solidity(std::span<const glm::dvec3> vertices, std::span<const glm::uve
   std::vector<std::uint8_t> fans_at(vertices.size(), 0);
   for (std::uint32_t corner = 0; corner < at.size(); ++corner) {
     poll_at(corner);
-    if (fans.find(corner) == corner && fans_at[at[corner]] < 2 && ++fans_at[at[corner]] == 2) {
-      ++found.non_manifold_vertices;
-    }
+    std::uint8_t& fans_here = fans_at[at[corner]];
+    if (fans.find(corner) != corner || fans_here == 2) continue;
+    ++fans_here;
+    found.non_manifold_vertices += fans_here == 2;
   }
   found.shell_of.resize(triangles.size());
   std::iota(found.shell_of.begin(), found.shell_of.end(), 0u);

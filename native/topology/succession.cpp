@@ -9,6 +9,7 @@ namespace tolvol {
 
 std::optional<std::vector<std::uint32_t>> Succession::find() const {
   std::vector<const Need*> order;
+  order.reserve(needs_.size());
   for (const Need& need : needs_) order.push_back(&need);
   std::ranges::stable_sort(order, {}, [](const Need* need) { return need->members.size(); });
   std::vector<std::uint32_t> owners = owners_;

@@ -37,6 +37,7 @@ class Finder {
     const double scale = farthest > 0 ? std::ldexp(1.0, -std::clamp(std::ilogb(farthest), -1000, 1000)) : 1;
     for (glm::dvec3& p : mesh_.vertices) p *= scale;
     std::vector<double> sizes;
+    sizes.reserve(mesh_.vertices.size());
     for (const glm::dvec3& p : mesh_.vertices) sizes.push_back(largest(p));
     const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
     std::nth_element(sizes.begin(), middle, sizes.end());

@@ -10,7 +10,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PYTHON = "/usr/bin/python3"
-COMMAND_PYTHON = "build/command/bin/python"  # with the packages of the command tolvol: tests/command/setup.sh
+COMMAND_PYTHON = "build/command/bin/python"  # with the packages of the command tolvol: tests/environment.sh
 RUNNERS = ("native", "asan", "tsan", "python", "fuzz", "blender", "ui", "style")
 FULL_LENGTH = {"TOLVOL_ALL_TESTS": "1"}  # the environment in which tests are as long as they can be
 # The tests of what several threads do, and of the proofs that are made after them. Each has a task of its own, because a

@@ -1,18 +1,12 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Checks format and lint, builds the Python package by pip, and checks the types of the examples in the documentation. The
-# tools are from Debian and from requirements.txt here. tests/runners/clang_tidy.py runs clang-tidy.
+# tools are from Debian and from requirements.txt here, as is clang-tidy, which tests/runners/clang_tidy.py runs.
 set -eu
 cd "$(dirname "$0")/../.."
 
-venv=build/venv
-pins=tests/style/requirements.txt
-if ! cmp -s "$pins" "$venv/requirements.txt"; then
-  rm -rf "$venv"
-  /usr/bin/python3 -m venv "$venv"
-  "$venv/bin/pip" install --quiet --disable-pip-version-check --requirement "$pins"
-  cp "$pins" "$venv/requirements.txt"
-fi
+venv=build/style
+sh tests/environment.sh style
 
 failed=""
 
@@ -89,11 +83,11 @@ assert len(result.triangles) < 1000
 from pathlib import Path
 from tolvol.command import plain_formats
 from tolvol.command.mesh import Mesh
-plain_formats.write(Path("build/venv/torus.ply"), Mesh("torus", vertices, triangles))
+plain_formats.write(Path("build/style/torus.ply"), Mesh("torus", vertices, triangles))
 ' &&
     # A .ply file needs no other package than NumPy.
-    "$venv/bin/tolvol" decimate build/venv/torus.ply build/venv/small.ply --tolerance 1% >/dev/null &&
-    "$venv/bin/tolvol" check build/venv/small.ply build/venv/torus.ply --tolerance 1%
+    "$venv/bin/tolvol" decimate build/style/torus.ply build/style/small.ply --tolerance 1% >/dev/null &&
+    "$venv/bin/tolvol" check build/style/small.ply build/style/torus.ply --tolerance 1%
 }
 
 types() {
