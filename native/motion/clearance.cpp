@@ -54,13 +54,9 @@ Corners Clearance::corners(std::uint32_t face) const {
   return {anchor_[c[0]], anchor_[c[1]], anchor_[c[2]]};
 }
 
-Box Clearance::box(std::uint32_t face) const {
-  Box box;
-  for (const std::uint32_t v : mesh_.corners_of(face)) {
-    const glm::dvec3 reach = reach_[v] / kInside + glm::abs(anchor_[v]) * 0x1p-52;
-    box.add(anchor_[v] - reach), box.add(anchor_[v] + reach);
-  }
-  return box;
+Box Clearance::room_box(std::uint32_t vertex) const {
+  const glm::dvec3 reach = reach_[vertex] / kInside + glm::abs(anchor_[vertex]) * 0x1p-52;
+  return {anchor_[vertex] - reach, anchor_[vertex] + reach};
 }
 
 /// How far a point of the face may go at most.
@@ -140,7 +136,7 @@ void Clearance::limit_by_fans(std::span<const std::uint32_t> vertices) {
 }
 
 /// Notes what these faces leave to their corners, and to those of faces near them, that share no corner with them.
-void Clearance::limit_by_gaps(std::span<const std::uint32_t> faces, const FaceTree& tree) {
+void Clearance::limit_by_gaps(std::span<const std::uint32_t> faces, const MovingFaces& near) {
   parallel_for(faces.size(), kBlock, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t face = faces[i];
@@ -149,19 +145,20 @@ void Clearance::limit_by_gaps(std::span<const std::uint32_t> faces, const FaceTr
       const Corners triangle = corners(face);
       const double own_reach = reach(face);
       std::size_t looked_at = 0;
-      tree.for_each_meeting(box(face), [&](std::uint32_t other) {
+      near.for_each_near(face, in_room(), [&](std::uint32_t other) {
         if (++looked_at % 64 == 0) poll();
-        if (other < face && renewed_[other] == now_) return;  // it looks at this one
+        if (other < face && renewed_[other] == now_) return true;  // it looks at this one
         const auto c = mesh_.corners_of(other);
         for (const std::uint32_t v : own) {
-          if (v == c[0] || v == c[1] || v == c[2]) return;
+          if (v == c[0] || v == c[1] || v == c[2]) return true;
         }
-        if (rests(other)) return;
+        if (rests(other)) return true;
         const double both = (own_reach + reach(other)) / kInside;
         const double found = gap(triangle, corners(other), both);
-        if (found >= both) return;
+        if (found >= both) return true;
         lower(face_room_[face], found / 2);
         lower(face_room_[other], found / 2);
+        return true;
       });
     }
   });
@@ -187,7 +184,7 @@ std::vector<std::uint32_t> Clearance::gone(std::span<const glm::dvec3> stored) {
   return gone;
 }
 
-void Clearance::renew(std::span<const glm::dvec3> stored, FaceTree& tree) {
+void Clearance::renew(std::span<const glm::dvec3> stored, MovingFaces& near) {
   const std::vector<std::uint32_t> vertices = gone(stored);
   ++now_;
   for (const std::uint32_t v : vertices) reach_[v] = kFar, since_[v] = now_;
@@ -203,11 +200,9 @@ void Clearance::renew(std::span<const glm::dvec3> stored, FaceTree& tree) {
   for (const std::uint32_t f : mesh_.faces_around(around)) {
     for (const std::uint32_t v : mesh_.corners_of(f)) room_[v] = std::min(room_[v], reach_[v]);
   }
-  std::vector<Box> boxes;
-  boxes.reserve(faces.size());
-  for (const std::uint32_t f : faces) renewed_[f] = now_, boxes.push_back(box(f));
-  tree.change(faces, boxes);
-  limit_by_gaps(faces, tree);
+  for (const std::uint32_t f : faces) renewed_[f] = now_;
+  near.change(faces, in_room());
+  limit_by_gaps(faces, near);
   for (std::uint32_t f = 0; f < mesh_.face_count(); ++f) {
     if (face_room_[f].load(std::memory_order_relaxed) == kFar) continue;
     const double room = face_room_[f].exchange(kFar, std::memory_order_relaxed) * kInside;

@@ -16,8 +16,8 @@
 #include <span>
 #include <vector>
 
+#include "motion/moving_faces.h"
 #include "motion/moving_mesh.h"
-#include "topology/face_tree.h"
 #include "topology/faces_cross.h"
 
 namespace tolvol {
@@ -35,23 +35,26 @@ class Clearance {
   }
 
   /// Finds new anchors and rooms for the vertices that are not in their rooms where they are stored; other rooms may
-  /// become smaller. A vertex that left a room at once gets none for the next calls. The tree must have boxes around
+  /// become smaller. A vertex that left a room at once gets none for the next calls. `near` must have boxes around
   /// all faces and their rooms; faces that have no corner without room get such a box. Throws Cancelled, after which
   /// some vertices are in no room. About 1.5 us a face.
-  void renew(std::span<const glm::dvec3> stored, FaceTree& tree);
+  void renew(std::span<const glm::dvec3> stored, MovingFaces& near);
 
   /// Whether a corner of the face has no room, wherever it is.
   bool rests(std::uint32_t face) const;
 
-  /// A box around the face wherever its corners are in their rooms.
-  Box box(std::uint32_t face) const;
+  /// A box around a vertex wherever it is in its room, as MovingFaces asks for it.
+  auto in_room() const {
+    return [this](std::uint32_t vertex) { return room_box(vertex); };
+  }
 
  private:
+  Box room_box(std::uint32_t vertex) const;
   double fan(std::uint32_t vertex) const;
   double reach(std::uint32_t face) const;
   Corners corners(std::uint32_t face) const;
   void limit_by_fans(std::span<const std::uint32_t> vertices);
-  void limit_by_gaps(std::span<const std::uint32_t> faces, const FaceTree& tree);
+  void limit_by_gaps(std::span<const std::uint32_t> faces, const MovingFaces& near);
   std::vector<std::uint32_t> gone(std::span<const glm::dvec3> stored);
 
   MovingMesh& mesh_;

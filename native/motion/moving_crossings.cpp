@@ -19,7 +19,7 @@ constexpr std::size_t kBlock = 64;
 /// Once a face is known to cross another anew, it is compared with this many more whose boxes meet its own: where very
 /// many faces meet, all of them have to go back anyway.
 constexpr std::size_t kFurther = 64;
-/// The tree is built anew when its boxes have become more than this many times as large.
+/// The trees of faces are built anew when their boxes have become more than this many times as large.
 constexpr double kWorn = 2;
 
 }  // namespace
@@ -37,17 +37,14 @@ MovingCrossings::MovingCrossings(std::span<const std::uint32_t> faces, int corne
   failed_.assign(face_count(), 0);
   met_.assign(face_count(), kNone);
   is_fitted_.assign(face_count(), false);
+  near_ = MovingFaces(faces_, corners_, stored.size());
   build();
 }
 
 void MovingCrossings::build() {
-  std::vector<std::uint32_t> all(face_count());
-  std::iota(all.begin(), all.end(), 0u);
-  std::vector<Box> boxes(all.size());
-  for (const std::uint32_t f : all) poll_at(f), boxes[f] = box(f);
   Team team(thread_count(threads_));
-  tree_ = FaceTree(all, boxes, team);
-  extent_ = tree_.extent();
+  near_.build(on_trial(), team);
+  extent_ = near_.extent();
   refitted_ = 0;
 }
 
@@ -57,7 +54,7 @@ void MovingCrossings::skip_short_ways(MovingMesh& mesh) {
 }
 
 void MovingCrossings::tidy() {
-  const bool worn = refitted_ > face_count() && tree_.extent() > kWorn * extent_;
+  const bool worn = refitted_ > face_count() && near_.extent() > kWorn * extent_;
   if (refitted_ > face_count()) refitted_ = 0;
   if (worn) build();
   if (!clearance_) {
@@ -73,15 +70,15 @@ void MovingCrossings::tidy() {
   const auto fit = [&](auto&& has_room) {
     std::erase_if(fitted_, [&](std::uint32_t f) {
       if (!has_room(f)) return false;
-      tree_.change(f, clearance_->box(f));
+      near_.change(f, clearance_->in_room());
       is_fitted_[f] = false;
       return true;
     });
   };
   fit([&](std::uint32_t f) { return !is_due(f); });
-  clearance_->renew(state_, tree_);
+  clearance_->renew(state_, near_);
   fit([&](std::uint32_t f) { return !clearance_->rests(f); });
-  if (worn || extent_ == 0) extent_ = tree_.extent();
+  if (worn || extent_ == 0) extent_ = near_.extent();
 }
 
 std::span<const PieceTriangle> MovingCrossings::shapes(std::uint32_t face) const {
@@ -102,10 +99,14 @@ Corners MovingCrossings::corners(const Positions& positions, std::uint32_t face,
   return {positions[c[shape[0]]], positions[c[shape[1]]], positions[c[shape[2]]]};
 }
 
-Box MovingCrossings::box(std::uint32_t face) const {
-  Box box;
-  for (const std::uint32_t v : corners_of(face)) box.add(trial_[v]);
-  return box;
+/// Calls visit(other) for all faces that the face may cross on trial, until it returns false.
+template <class Visit>
+void MovingCrossings::for_each_near(std::uint32_t face, Visit&& visit) const {
+  if (corners_ == 3) {
+    near_.for_each_near(face, corners(trial_, face, triangles_of(3).front()), on_trial(), visit);
+  } else {
+    near_.for_each_near(face, on_trial(), visit);
+  }
 }
 
 /// Whether the face may cross others anew.
@@ -151,7 +152,7 @@ bool MovingCrossings::cross_anew(std::uint32_t a, std::uint32_t b) const {
 
 void MovingCrossings::fit(std::span<const std::uint32_t> faces) {
   if (corners_ < 3) return;
-  for (const std::uint32_t f : faces) tree_.change(f, box(f));
+  for (const std::uint32_t f : faces) near_.change(f, on_trial());
 }
 
 std::vector<std::uint32_t> MovingCrossings::crossing_replaced(std::span<const std::uint32_t> faces) {
@@ -168,7 +169,7 @@ std::vector<std::uint32_t> MovingCrossings::crossing_replaced(std::span<const st
           });
       return !crosses;
     };
-    if (!crosses) tree_.for_each_meeting(box(face), visit);
+    if (!crosses) for_each_near(face, visit);
     if (crosses) result.push_back(face);
   }
   return result;
@@ -182,7 +183,7 @@ void MovingCrossings::test(std::uint32_t face, std::vector<glm::uvec2>& failed) 
   bool crosses = met_[face] != kNone && cross_anew(face, met_[face]);
   if (crosses) failed.emplace_back(face, met_[face]);
   std::size_t looked_at = 0, further = 0;
-  tree_.for_each_meeting(box(face), [&](std::uint32_t other) {
+  for_each_near(face, [&](std::uint32_t other) {
     if (++looked_at % 64 == 0) poll();
     further += crosses;
     const bool left_out = other == face || (asked_[other] == now_ && (other < face || crosses));
@@ -197,7 +198,7 @@ void MovingCrossings::test(std::uint32_t face, std::vector<glm::uvec2>& failed) 
 /// Does so for a face that is not known to fail, with another one that is and may therefore have left out this pair.
 void MovingCrossings::test_against_failed(std::uint32_t face, std::vector<glm::uvec2>& failed) const {
   std::size_t looked_at = 0;
-  tree_.for_each_meeting(box(face), [&](std::uint32_t other) {
+  for_each_near(face, [&](std::uint32_t other) {
     if (++looked_at % 64 == 0) poll();
     if (other > face || failed_[other] != now_ || asked_[other] != now_ || !cross_anew(face, other)) return true;
     failed.emplace_back(face, other);
@@ -208,7 +209,6 @@ void MovingCrossings::test_against_failed(std::uint32_t face, std::vector<glm::u
 std::vector<std::uint32_t> MovingCrossings::failing(std::span<const std::uint32_t> faces, Progress* progress) {
   if (corners_ < 3) return {};
   ++now_;
-  boxes_.clear();
   std::vector<std::uint32_t> asked;
   for (std::size_t i = 0; i < faces.size(); ++i) {
     poll_at(i);
@@ -219,9 +219,9 @@ std::vector<std::uint32_t> MovingCrossings::failing(std::span<const std::uint32_
       fitted_.push_back(f), is_fitted_[f] = true;
     }
     asked_[f] = now_;
-    asked.push_back(f), boxes_.push_back(box(f));
+    asked.push_back(f);
   }
-  tree_.change(asked, boxes_);
+  near_.change(asked, on_trial());
   refitted_ += asked.size();
   std::vector<std::vector<glm::uvec2>> found((asked.size() + kBlock - 1) / kBlock);
   std::vector<std::uint32_t> result;
@@ -258,7 +258,7 @@ void MovingCrossings::take_back(std::span<const std::uint32_t> vertices, std::sp
   for (const std::uint32_t v : vertices) trial_[v] = state_[v];
   if (corners_ < 3) return;
   for (const std::uint32_t f : faces) {
-    if (is_fitted_[f]) tree_.change(f, box(f));
+    if (is_fitted_[f]) near_.change(f, on_trial());
   }
 }
 

@@ -17,7 +17,7 @@
 #include "base/progress.h"
 #include "check/tolerance_check.h"
 #include "motion/clearance.h"
-#include "topology/face_tree.h"
+#include "motion/moving_faces.h"
 #include "topology/faces_cross.h"
 
 namespace tolvol {
@@ -65,7 +65,12 @@ class MovingCrossings {
   /// The triangles of a face that are looked at.
   std::span<const PieceTriangle> shapes(std::uint32_t face) const;
   Corners corners(const Positions& positions, std::uint32_t face, const PieceTriangle& shape) const;
-  Box box(std::uint32_t face) const;
+  /// A box around a vertex on trial, as MovingFaces asks for it.
+  auto on_trial() const {
+    return [this](std::uint32_t vertex) { return Box{trial_[vertex], trial_[vertex]}; };
+  }
+  template <class Visit>
+  void for_each_near(std::uint32_t face, Visit&& visit) const;
   bool is_due(std::uint32_t face) const;
   bool degenerates(std::uint32_t face) const;
   bool triangles_cross(std::uint32_t a, const PieceTriangle& shape_a, std::uint32_t b,
@@ -86,10 +91,9 @@ class MovingCrossings {
   std::size_t corners_;
   unsigned threads_;
   Positions start_, state_, trial_;
-  FaceTree tree_;                      // of the faces as they are on trial, or wherever they have clearance
-  double extent_ = 0;                  // FaceTree::extent() when the tree was built
+  MovingFaces near_;                   // The faces as they are on trial, or wherever they have clearance.
+  double extent_ = 0;                  // MovingFaces::extent() when it was built.
   std::size_t refitted_ = 0;           // The number of boxes that changed since extent() was looked at.
-  std::vector<Box> boxes_;             // scratch
   std::vector<std::uint32_t> asked_;   // For each face: in which call failing() looked at it last.
   std::vector<std::uint32_t> failed_;  // For each face: in which call it failed last.
   // For each face: the one that it was found to cross anew last, or kNone. It is tried first when the face is asked

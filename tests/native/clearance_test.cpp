@@ -18,17 +18,15 @@ struct Scene {
   explicit Scene(TriangleMesh m) : mesh(std::move(m)), volume(mesh.vertices, mesh.triangles, space, 0.1) {
     for (const glm::uvec3& t : mesh.triangles) indices.insert(indices.end(), {t.x, t.y, t.z});
     moving = std::make_unique<MovingMesh>(volume, space, indices, 3, mesh.vertices.size(), 1);
-    std::vector<Box> boxes;
-    const MeshView view{mesh.triangles, mesh.vertices};
-    for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f)
-      faces.push_back(f), boxes.push_back(box_of(view.corners(f)));
+    for (std::uint32_t f = 0; f < mesh.triangles.size(); ++f) faces.push_back(f);
     Team alone(1);
-    tree = FaceTree(faces, boxes, alone);
+    near = MovingFaces(indices, 3, mesh.vertices.size());
+    near.build([&](std::uint32_t v) { return Box{mesh.vertices[v], mesh.vertices[v]}; }, alone);
     clearance = std::make_unique<Clearance>(*moving, mesh.vertices);
     vertices.resize(mesh.vertices.size());
     std::iota(vertices.begin(), vertices.end(), 0u);
   }
-  void renew() { clearance->renew(mesh.vertices, tree); }
+  void renew() { clearance->renew(mesh.vertices, near); }
 
   /// How far the vertex may go along `way`, to a thousandth of `most`.
   double room(std::uint32_t v, const dvec3& way, double most = 1) const {
@@ -44,7 +42,7 @@ struct Scene {
   ToleranceVolume volume;
   std::vector<std::uint32_t> indices, faces, vertices;
   std::unique_ptr<MovingMesh> moving;
-  FaceTree tree;
+  MovingFaces near;
   std::unique_ptr<Clearance> clearance;
 };
 
@@ -150,7 +148,7 @@ TEST(Clearance, BoxesHoldFacesInTheirRooms) {
   Scene scene(shapes::torus(12));
   scene.renew();
   for (const std::uint32_t f : scene.faces) {
-    const Box box = scene.clearance->box(f);
+    const Box box = scene.near.box(f, scene.clearance->in_room());
     for (const std::uint32_t v : scene.moving->corners_of(f)) {
       for (const dvec3 way : {dvec3(1, 0, 0), dvec3(0, -1, 0), dvec3(0, 0, 1)}) {
         const dvec3 at = scene.mesh.vertices[v] + scene.room(v, way) * way;
