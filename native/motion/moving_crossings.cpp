@@ -22,6 +22,14 @@ constexpr std::size_t kFurther = 64;
 /// The trees of faces are built anew when their boxes have become more than this many times as large.
 constexpr double kWorn = 2;
 
+/// Whether it is `face` that looks at a pair of faces that were both asked about. Each face looks at about a half of
+/// all others: if it were for the one with the lower number, one with a high number would come past very many in a
+/// tangle before it met one that it looks at.
+bool looks_at(std::uint32_t face, std::uint32_t other) {
+  const bool is_for_lower = ((face + other) * 0x9E3779B1u) >> 31;
+  return is_for_lower == (face < other);
+}
+
 }  // namespace
 
 MovingCrossings::MovingCrossings(std::span<const std::uint32_t> faces, int corners, std::span<const glm::dvec3> stored,
@@ -176,8 +184,8 @@ std::vector<std::uint32_t> MovingCrossings::crossing_replaced(std::span<const st
 }
 
 /// Adds to `failed` pairs of the face and another that it crosses anew, or of itself twice where it becomes degenerate.
-/// Of two faces that were both asked about, the one with the lower number looks at the pair. A face that is known to
-/// cross another looks only for those that were not asked about.
+/// Of two faces that were both asked about, looks_at() tells which one looks at the pair. A face that is known to cross
+/// another looks only for those that were not asked about.
 void MovingCrossings::test(std::uint32_t face, std::vector<glm::uvec2>& failed) const {
   if (degenerates(face)) failed.emplace_back(face, face);
   bool crosses = met_[face] != kNone && cross_anew(face, met_[face]);
@@ -186,7 +194,7 @@ void MovingCrossings::test(std::uint32_t face, std::vector<glm::uvec2>& failed) 
   for_each_near(face, [&](std::uint32_t other) {
     if (++looked_at % 64 == 0) poll();
     further += crosses;
-    const bool left_out = other == face || (asked_[other] == now_ && (other < face || crosses));
+    const bool left_out = other == face || (asked_[other] == now_ && (crosses || !looks_at(face, other)));
     if (!left_out && cross_anew(face, other)) {
       crosses = true;
       failed.emplace_back(face, other);
@@ -200,7 +208,8 @@ void MovingCrossings::test_against_failed(std::uint32_t face, std::vector<glm::u
   std::size_t looked_at = 0;
   for_each_near(face, [&](std::uint32_t other) {
     if (++looked_at % 64 == 0) poll();
-    if (other > face || failed_[other] != now_ || asked_[other] != now_ || !cross_anew(face, other)) return true;
+    if (failed_[other] != now_ || asked_[other] != now_ || other == face) return true;
+    if (looks_at(face, other) || !cross_anew(face, other)) return true;
     failed.emplace_back(face, other);
     return false;
   });

@@ -326,6 +326,15 @@ TEST(MovingCrossings, AFaceOfATangleIsComparedWithFew) {
   EXPECT_LT(polls_of([&] { crossings.failing(tangle.all, nullptr); }), 3 * count / 2) << "it meets the same one again";
 }
 
+TEST(MovingCrossings, InATangleFacesWithHighNumbersComePastFewToo) {
+  const Tangle tangle(60, 20);
+  MovingCrossings crossings(tangle.faces, 3, tangle.plate.vertices, 1);
+  for (std::uint32_t v = 0; v < tangle.place.size(); ++v) crossings.try_at(v, tangle.place[v]);
+  const std::size_t count = tangle.all.size();
+  // A face's box meets thousands.
+  EXPECT_LT(polls_of([&] { EXPECT_GT(crossings.failing(tangle.all, nullptr).size(), count - 10); }), 2 * count);
+}
+
 TEST(MovingCrossings, PointsAndSegmentsNeverCross) {
   const TriangleMesh mesh = shapes::torus(8);
   const ToleranceVolume volume(mesh.vertices, mesh.triangles, kSingle, 0.5);
