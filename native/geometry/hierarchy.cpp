@@ -44,8 +44,10 @@ bool Hierarchy::is_nearest_slice(const glm::dvec3& q, std::uint32_t place) const
   const Slice& slice = slices_[place];
   if (slice.from == 0 && slice.to > 1) return true;
   const Corners& t = corners_[place];
-  const double at = std::max(0.0, 1 - closest_point(q, t[0], t[1], t[2]).weights[static_cast<int>(slice.hub)]);
-  return at >= slice.from && at < slice.to;
+  const Legs legs(t, slice.hub);
+  const glm::dvec3 weights = closest_point(q, t[0], t[1], t[2]).weights;
+  const double at = weights[int(slice.hub + 1) % 3] * legs.b + weights[int(slice.hub + 2) % 3] * legs.c;
+  return at >= slice.from * legs.longer() && at < slice.to * legs.longer();
 }
 
 glm::dvec3 Hierarchy::local(const glm::dvec3& p, bool& beyond_reach) const {

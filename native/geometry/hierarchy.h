@@ -78,7 +78,8 @@ class Hierarchy {
   /// within `radius`. Ties go to the lower index. By convexity the distance holds for the whole convex hull of the
   /// points. The search ends early at any triangle that is within `enough` of all points. If a point is farther from
   /// the mesh than 2^27 times its size, the triangle may be worse than the best by 2^-26 of the distance; `distance` is
-  /// true for the triangle that is returned.
+  /// true for the triangle that is returned. A triangle at a corner that 64 or more share may be missed if its points
+  /// nearest to the given ones are at very different distances from this corner, unless it is `hint`.
   Common common(std::span<const glm::dvec3> points, double radius = std::numeric_limits<double>::infinity(),
                 double enough = -1, std::uint32_t hint = kNone) const;
 
@@ -103,11 +104,19 @@ class Hierarchy {
   };
   using Corners = std::array<glm::dvec3, 3>;
 
-  /// A part of a triangle between two lines parallel to the edge opposite a corner, the hub. `from` and `to` are their
-  /// distances from the hub over that of the edge.
+  /// A part of a triangle between two lines, each of which is as far from one corner, the hub, on both edges there.
+  /// `from` and `to` are these distances over the longer one of the two edges.
   struct Slice {
     float from = 0, to = std::numeric_limits<float>::infinity();
     std::uint32_t hub = 0;
+  };
+
+  /// The lengths of the two edges at the hub of a triangle: to the next corner, and to the one after it.
+  struct Legs {
+    double b, c;
+    Legs(const Corners& t, std::uint32_t hub)
+        : b(glm::distance(t[(hub + 1) % 3], t[hub])), c(glm::distance(t[(hub + 2) % 3], t[hub])) {}
+    double longer() const { return std::max(b, c); }
   };
 
   struct Build;

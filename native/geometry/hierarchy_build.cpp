@@ -10,9 +10,11 @@
 //
 // Needles that share a corner, the hub, do not fill turned boxes either: each is as wide at the hub as at the other
 // end, so that near the hub a search would look at all of them. They are cut into slices, each kTaper times as far from
-// the hub as the one before, with boxes of their own. A slice is a child like a triangle, and stands for the whole
-// triangle, so that no result depends on the slices. Their corners are computed in local coordinates, where they err by
-// less than 1e-15; kSliceRoom and the slack of the turned boxes are for that.
+// the hub as the one before, with boxes of their own. A line of a cut is as far from the hub on both edges there: a
+// line parallel to the opposite edge would be as long as the needle if only one of its edges at the hub is short. A
+// slice is a child like a triangle, and stands for the whole triangle, so that the nearest triangle does not depend on
+// the slices. Their corners are computed in local coordinates, where they err by less than 7e-14: a share of an edge by
+// less than 9 u / kSharp, u = 2^-53, and an edge is at most 3.5 long. kSliceRoom is for that.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -32,9 +34,12 @@ struct Key {
 constexpr std::uint32_t kHub = 64;
 constexpr float kTaper = 8;
 /// Widens the boxes of slices, in local coordinates.
-constexpr float kSliceRoom = 1e-14f;
+constexpr double kSliceRoom = 1e-13;
 /// Slices overlap by this share, so that what rounding puts into the next one is in the box of either.
 constexpr double kOverlap = 1e-9;
+/// The edge opposite the hub is cut only if its ends differ by this share in their distances from the hub. Where a line
+/// meets it is not sharp else.
+constexpr double kSharp = 1.0 / 16;
 
 /// Sorts by the least significant digit first, which is stable, so that equal codes stay in the order of their index.
 void radix_sort(std::vector<Key>& keys) {
@@ -79,7 +84,7 @@ float spread(float x) { return std::abs(x) * 2.4e-7f + 1e-37f; }
 }  // namespace
 
 struct Hierarchy::Build {
-  using Outline = std::array<glm::dvec3, 4>;
+  using Outline = std::array<glm::dvec3, 5>;
 
   Hierarchy& tree;
   std::vector<Key> keys;
@@ -176,13 +181,24 @@ struct Hierarchy::Build {
     return hubs;
   }
 
-  /// Returns the local corners of a slice, or of a whole triangle with the last one twice.
+  /// Returns the local corners of a convex part of a triangle that holds a slice. Where there are fewer than five, some
+  /// are the same.
   Outline outline(const Corners& triangle, const Slice& slice) const {
     const Corners t{triangle[0] - tree.centre_, triangle[1] - tree.centre_, triangle[2] - tree.centre_};
-    if (slice.from == 0 && slice.to > 1) return {t[0], t[1], t[2], t[2]};
-    const glm::dvec3 &hub = t[slice.hub], b = t[(slice.hub + 1) % 3] - hub, c = t[(slice.hub + 2) % 3] - hub;
+    if (slice.from == 0 && slice.to > 1) return {t[0], t[1], t[2], t[2], t[2]};
+    const Legs legs(triangle, slice.hub);
+    const glm::dvec3 &hub = t[slice.hub], &b = t[(slice.hub + 1) % 3], &c = t[(slice.hub + 2) % 3];
+    const glm::dvec3 &near = legs.b < legs.c ? b : c, &far = legs.b < legs.c ? c : b;
+    const double middle = std::min(legs.b, legs.c) / legs.longer();
+    const auto between = [](const glm::dvec3& p, const glm::dvec3& q, double share) { return p + share * (q - p); };
+    // Returns where a line is on the way from the hub over the near corner to the far one.
+    const auto opposite = [&](double at, const glm::dvec3& if_not_sharp) {
+      if (at < middle) return between(hub, near, at / middle);
+      return 1 - middle < kSharp ? if_not_sharp : between(near, far, (at - middle) / (1 - middle));
+    };
     const double from = slice.from * (1 - kOverlap), to = std::min(1.0, slice.to * (1 + kOverlap));
-    return {hub + from * b, hub + to * b, hub + to * c, hub + from * c};
+    const glm::dvec3 lower = opposite(from, near), upper = opposite(to, far);
+    return {between(hub, far, from), between(hub, far, to), upper, from < middle && middle <= to ? near : upper, lower};
   }
 
   /// Cuts the triangles around hubs into slices, and sorts these among the other triangles.
@@ -197,17 +213,18 @@ struct Hierarchy::Build {
     std::vector<Cut> cuts;
     for (std::size_t i = 0; i < keys.size(); ++i) {
       poll_at(i);
-      const auto& [hub, slices] = hubs[i];
+      const auto& [hub, most] = hubs[i];
       const glm::uvec3& t = mesh.triangles[keys[i].triangle];
       const Corners corners{tree.scaled(mesh.vertices[t.x]), tree.scaled(mesh.vertices[t.y]),
                             tree.scaled(mesh.vertices[t.z])};
+      const std::uint8_t slices = Legs(corners, hub % 3u).longer() > 0 ? most : 1;  // one that is a point stays whole
       float to = std::numeric_limits<float>::infinity(), from = 1 / kTaper;
       for (std::uint8_t k = 0; k < slices; ++k, to = from, from /= kTaper) {
         const Slice slice{k + 1 == slices ? 0 : from, to, hub % 3u};
         const Outline o = outline(corners, slice);
-        const glm::dvec3 middle = 0.5 * glm::min(glm::min(o[0], o[1]), glm::min(o[2], o[3])) +
-                                  0.5 * glm::max(glm::max(o[0], o[1]), glm::max(o[2], o[3]));
-        all.push_back({code_of(middle), keys[i].triangle, std::uint32_t(cuts.size())});
+        Box box;
+        for (const glm::dvec3& corner : o) box.add(corner);
+        all.push_back({code_of(0.5 * box.lower + 0.5 * box.upper), keys[i].triangle, std::uint32_t(cuts.size())});
         cuts.push_back({slice, o});
       }
     }
@@ -224,10 +241,10 @@ struct Hierarchy::Build {
     if (!outlines.empty()) {
       for (int k = 0; k < 3; ++k) {
         const Outline& o = outlines[place];
-        const float lower = float(std::min({o[0][k], o[1][k], o[2][k], o[3][k]}));
-        const float upper = float(std::max({o[0][k], o[1][k], o[2][k], o[3][k]}));
-        box.lower[k] = lower - spread(lower) - kSliceRoom;
-        box.upper[k] = upper + spread(upper) + kSliceRoom;
+        const float lower = float(std::min({o[0][k], o[1][k], o[2][k], o[3][k], o[4][k]}));
+        const float upper = float(std::max({o[0][k], o[1][k], o[2][k], o[3][k], o[4][k]}));
+        box.lower[k] = lower - spread(lower) - float(kSliceRoom);
+        box.upper[k] = upper + spread(upper) + float(kSliceRoom);
       }
       return box;
     }
@@ -257,8 +274,9 @@ struct Hierarchy::Build {
     for (std::size_t place = 0; place < tree.corners_.size(); ++place) {
       poll_at(place);
       if (!outlines.empty()) {
-        const Outline& o = outlines[place];
-        taken.push_back(taken.back() + glm::length(glm::cross(o[2] - o[0], o[3] - o[1])));
+        const auto& [p, q, r, s, t] = outlines[place];
+        taken.push_back(taken.back() +
+                        glm::length(glm::cross(q - p, r - p) + glm::cross(r - p, s - p) + glm::cross(s - p, t - p)));
         continue;
       }
       const Corners& t = tree.corners_[place];
@@ -284,9 +302,10 @@ struct Hierarchy::Build {
     double oriented = 0;
     for (std::size_t i = 0; i < parts.size(); ++i) {
       const std::size_t count = parts[i].end - parts[i].begin;
-      oriented += outlines.empty()
-                      ? boxes.fit(int(i), std::span<const Corners>(&tree.corners_[parts[i].begin], count), tree.centre_)
-                      : boxes.fit(int(i), std::span<const Outline>(&outlines[parts[i].begin], count), glm::dvec3(0));
+      oriented += outlines.empty() ? boxes.fit(int(i), std::span<const Corners>(&tree.corners_[parts[i].begin], count),
+                                               tree.centre_, 0)
+                                   : boxes.fit(int(i), std::span<const Outline>(&outlines[parts[i].begin], count),
+                                               glm::dvec3(0), kSliceRoom);
     }
     if (oriented > kSmaller * along_axes) return;
     tree.turned_.resize(tree.nodes_.size(), kNone);

@@ -39,7 +39,8 @@ OrientedBoxes::OrientedBoxes() {
 }
 
 template <std::size_t kCorners>
-double OrientedBoxes::fit(int i, std::span<const std::array<glm::dvec3, kCorners>> faces, const glm::dvec3& centre) {
+double OrientedBoxes::fit(int i, std::span<const std::array<glm::dvec3, kCorners>> faces, const glm::dvec3& centre,
+                          double room) {
   // This polls at n + 1, because most calls have a few triangles and need no poll.
   glm::dvec3 along(1, 0, 0), start(faces[0][0]);
   double longest = kShortest;
@@ -77,14 +78,14 @@ double OrientedBoxes::fit(int i, std::span<const std::array<glm::dvec3, kCorners
         lower = std::min(lower, x), upper = std::max(upper, x);
       }
     }
-    lower_[k][i] = std::nextafter(static_cast<float>(lower - kSlack), -kInfinity);
-    upper_[k][i] = std::nextafter(static_cast<float>(upper + kSlack), kInfinity);
+    lower_[k][i] = std::nextafter(static_cast<float>(lower - room - kSlack), -kInfinity);
+    upper_[k][i] = std::nextafter(static_cast<float>(upper + room + kSlack), kInfinity);
   }
   const double x = upper_[0][i] - lower_[0][i], y = upper_[1][i] - lower_[1][i], z = upper_[2][i] - lower_[2][i];
   return x * y + y * z + z * x;
 }
-template double OrientedBoxes::fit(int, std::span<const std::array<glm::dvec3, 3>>, const glm::dvec3&);
-template double OrientedBoxes::fit(int, std::span<const std::array<glm::dvec3, 4>>, const glm::dvec3&);
+template double OrientedBoxes::fit(int, std::span<const std::array<glm::dvec3, 3>>, const glm::dvec3&, double);
+template double OrientedBoxes::fit(int, std::span<const std::array<glm::dvec3, 5>>, const glm::dvec3&, double);
 
 template <class Real>
 void OrientedBoxes::distances(const glm::dvec3& p, Real (&squared)[kWidth]) const {

@@ -18,10 +18,11 @@ class OrientedBoxes {
   /// All boxes are empty at first, which means infinitely far from everything.
   OrientedBoxes();
 
-  /// Makes box i hold the triangles, or the faces of four corners. Its first axis is the direction of their longest
-  /// edge. `centre` is subtracted from the corners first. Returns half the area of the box. O(faces).
+  /// Makes box i hold all that is within `room` of the triangles, or of the faces of five corners. Its first axis is
+  /// the direction of their longest edge. `centre` is subtracted from the corners first. Returns half the area of the
+  /// box. O(faces).
   template <std::size_t kCorners>
-  double fit(int i, std::span<const std::array<glm::dvec3, kCorners>> faces, const glm::dvec3& centre);
+  double fit(int i, std::span<const std::array<glm::dvec3, kCorners>> faces, const glm::dvec3& centre, double room);
 
   /// Computes the squared distance of p from each box. It never exceeds the squared distance of p from the triangles in
   /// the box, except by the rounding of the square.

@@ -152,6 +152,42 @@ TEST(Hierarchy, LooksAtFewNearTheHubOfAFan) {
   }
 }
 
+// One of the edges at the hub may be much shorter than the other or have no length, or both may have any direction.
+TEST(Hierarchy, LooksAtFewNearTheHubOfUnequalEdges) {
+  const unsigned count = 20000;
+  shapes::Random random(23);
+  for (const double shorter : {0.05, 0.0, 1.0}) {
+    TriangleMesh mesh;
+    for (unsigned i = 0; i < count; ++i) {
+      const double angle = 2 * M_PI * i / count;
+      const dvec3 rim(std::cos(angle), std::sin(angle), 0);
+      mesh.vertices.push_back(i % 2 == 0 ? rim + 0.01 * random.point() : shorter * (rim + 0.2 * random.point()));
+      mesh.triangles.push_back({i, (i + 1) % count, count});
+    }
+    mesh.vertices.emplace_back(0);
+    const Hierarchy hierarchy(mesh);
+    for (const double from_hub : {0.04, 0.01, 0.003}) {
+      std::size_t nodes = 0;
+      for (int i = 0; i < 30; ++i) {
+        const double angle = random.share() * 2 * M_PI;
+        const dvec3 p = from_hub * dvec3(std::cos(angle), std::sin(angle), i % 2 * 0.1);
+        const Hierarchy::Nearest expected = brute(mesh, p, kInfinity, all), found = hierarchy.nearest(p);
+        ASSERT_EQ(found.distance, expected.distance);
+        ASSERT_EQ(found.triangle, expected.triangle);
+        nodes += found.nodes;
+        std::vector<std::uint32_t> within;
+        const double radius = 2 * found.distance;
+        hierarchy.for_each_within(p, radius, [&](std::uint32_t triangle) { within.push_back(triangle); });
+        std::ranges::sort(within);
+        ASSERT_EQ(std::ranges::adjacent_find(within), within.end()) << "once each";
+        const auto is_missed = [&](std::uint32_t t) { return !std::ranges::binary_search(within, t); };
+        ASSERT_GT(brute(mesh, p, kInfinity, is_missed).distance, radius);
+      }
+      EXPECT_LT(nodes, 30u * 900) << shorter << ' ' << from_hub;
+    }
+  }
+}
+
 // All triangles around a vertex are at distance 0 from it, and boxes rounded the wrong way would lose some.
 TEST(Hierarchy, AgreesAtSharedVertices) {
   shapes::Random random(19);
