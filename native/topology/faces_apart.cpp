@@ -125,17 +125,33 @@ bool surely_uncrossed(const Corners& a, const Corners& b) {
   }
 }
 
+namespace {
+
+/// Calls visit(corner) for the corners other than `hub`; for all corners if none of them is there, or all.
+template <class Visit>
+void for_each_of_rim(const Corners& corners, const dvec3& hub, Visit&& visit) {
+  const auto at_hub = std::ranges::count(corners, hub);
+  for (const dvec3& p : corners) {
+    if (p != hub || at_hub == 3) visit(p);
+  }
+}
+
+}  // namespace
+
 Box rim_of(const Corners& corners, const dvec3& hub) {
   Box rim;
-  bool has_hub = false;
-  for (const dvec3& p : corners) {
-    if (p == hub) {
-      has_hub = true;
-    } else {
-      rim.add(p);
-    }
-  }
-  return has_hub && !rim.empty() ? rim : box_of(corners);
+  for_each_of_rim(corners, hub, [&](const dvec3& p) { rim.add(p); });
+  return rim;
+}
+
+Box directions_of(const Corners& corners, const dvec3& hub) {
+  Box directions;
+  for_each_of_rim(corners, hub, [&](const dvec3& p) {
+    const dvec3 way = p - hub;
+    const double length = largest(way);
+    directions.add(length > 0 ? way / length : way);
+  });
+  return directions;
 }
 
 ApartFromFan::ApartFromFan(const Corners& own, const dvec3& hub)
@@ -184,7 +200,11 @@ bool ApartFromFan::surely(const Box& rims) const {
   Box faces = rims;
   faces.add(hub_);
   if (!meet(opposite_, faces) && !(shares_hub_ && meet(whole_, rims))) return true;
-  const dvec3 lower = rims.lower - hub_, upper = rims.upper - hub_;
+  return is_beyond_side({rims.lower - hub_, rims.upper - hub_});
+}
+
+bool ApartFromFan::is_beyond_side(const Box& from_hub) const {
+  const auto& [lower, upper] = from_hub;
   const double size = std::max(largest(lower), largest(upper));
   for (int i = 0; i < count_; ++i) {
     const auto& [normal, most] = sides_[static_cast<std::size_t>(i)];

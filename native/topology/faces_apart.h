@@ -22,6 +22,9 @@ bool surely_uncrossed(const Corners& a, const Corners& b);
 /// The box of the corners other than `hub`; of all corners if none of them is there, or all.
 Box rim_of(const Corners& corners, const glm::dvec3& hub);
 
+/// The box of the directions from `hub` to the same corners: the way to a corner over its largest coordinate.
+Box directions_of(const Corners& corners, const glm::dvec3& hub);
+
 /// Proofs that one triangle crosses none of many faces around a hub at once. The boxes of slivers side by side overlap,
 /// wherever they run aslant; seen from the hub, the slivers lie one beside the other.
 class ApartFromFan {
@@ -33,6 +36,11 @@ class ApartFromFan {
   /// points in the box `rims`, or such points alone. False where that is not certain. What holds of a box holds of each
   /// box in it. `rims` must not be empty. O(1), 5 to 50 ns.
   bool surely(const Box& rims) const;
+  /// The same by a box of the directions in which the corners are seen from the hub, instead of a box around them. This
+  /// has to be a triangle for which looks_by_directions() holds.
+  bool surely_seen(const Box& directions) const { return is_beyond_side(directions); }
+  /// Whether the triangle shares the hub and is not so flat that rounding leaves it no sides.
+  bool looks_by_directions() const { return shares_hub_ && count_ > 0; }
 
  private:
   /// All of the triangle but the hub lies where dot(normal, p - hub) is below `most`, which is not positive.
@@ -41,6 +49,8 @@ class ApartFromFan {
     double most;
   };
   void add(const Corners& own, const glm::dvec3& normal);
+  /// Whether all of a box, whose coordinates count from the hub, is beyond one of the sides.
+  bool is_beyond_side(const Box& from_hub) const;
 
   glm::dvec3 hub_;
   Box whole_, opposite_;  ///< Around the triangle, and around what of it is opposite the hub: all, if it has no hub.

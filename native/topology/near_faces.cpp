@@ -39,7 +39,7 @@ NearFaces::NearFaces(std::span<const std::uint32_t> faces, std::span<const Corne
   struct Group {
     std::uint32_t number;
     std::vector<std::uint32_t> faces{};
-    std::vector<Box> rims{};
+    std::vector<Box> rims{}, directions{};
   };
   const auto before = [](const glm::dvec3& a, const glm::dvec3& b) {
     return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
@@ -52,10 +52,12 @@ NearFaces::NearFaces(std::span<const std::uint32_t> faces, std::span<const Corne
     if (hubs[i] != kNoHub) group_of[i] = &groups.try_emplace(corners[i][hubs[i]], Group{0}).first->second;
     group_of[i]->faces.push_back(faces[i]);
     group_of[i]->rims.push_back(hubs[i] == kNoHub ? boxes[i] : rim_of(corners[i], corners[i][hubs[i]]));
+    if (hubs[i] != kNoHub) group_of[i]->directions.push_back(directions_of(corners[i], corners[i][hubs[i]]));
   }
   for (auto& [hub, group] : groups) {
     group.number = static_cast<std::uint32_t>(crowds_.size());
-    crowds_.push_back({hub, group.faces, FaceTree(group.faces, group.rims, team), group.faces.size()});
+    crowds_.push_back({hub, group.faces, FaceTree(group.faces, group.rims, team),
+                       FaceTree(group.faces, group.directions, team), group.faces.size()});
   }
   std::vector<std::uint32_t> numbers(crowds_.size());
   std::iota(numbers.begin(), numbers.end(), 0u);
@@ -82,6 +84,7 @@ void NearFaces::change(std::uint32_t face, const Corners& corners) {
   corners_[place] = corners;
   if (is_gone_[place]) is_gone_[place] = false, ++crowd.alive;
   crowd.rims.change(face, rim_of(corners, crowd.hub));
+  crowd.directions.change(face, directions_of(corners, crowd.hub));
   if (strays && 2 * ++crowd.strayed > crowd.alive) find_hub(crowd, corners);
   places_.change(crowd_of_[place], crowd.whole(crowd.rims.box()));
 }
@@ -99,12 +102,15 @@ void NearFaces::find_hub(Crowd& crowd, const Corners& corners) {
     if (2 * count <= crowd.alive) continue;
     crowd.hub = corner;
     std::vector<std::uint32_t> faces;
-    std::vector<Box> rims;
+    std::vector<Box> rims, directions;
     for (const std::uint32_t face : crowd.faces) {
       const std::size_t place = place_of(face);
-      if (!is_gone_[place]) faces.push_back(face), rims.push_back(rim_of(corners_[place], corner));
+      if (is_gone_[place]) continue;
+      faces.push_back(face), rims.push_back(rim_of(corners_[place], corner));
+      directions.push_back(directions_of(corners_[place], corner));
     }
     crowd.rims.change(faces, rims);
+    crowd.directions.change(faces, directions);
     return;
   }
 }
@@ -118,6 +124,7 @@ void NearFaces::remove(std::uint32_t face) {
   Crowd& crowd = crowds_[crowd_of_[place]];
   if (!is_gone_[place]) is_gone_[place] = true, --crowd.alive;
   crowd.rims.change(face, Box());
+  crowd.directions.change(face, Box());
   places_.change(crowd_of_[place], crowd.whole(crowd.rims.box()));
 }
 

@@ -71,11 +71,12 @@ class NearFaces {
   /// Of at most so many faces each is asked whether it is apart from faces around a hub.
   static constexpr std::size_t kFew = 32;
 
-  /// The faces around one hub, by the boxes of their corners beside the hub.
+  /// The faces around one hub, by the boxes of their corners beside the hub, and by those of the directions in which
+  /// these are seen from there. A box around a long rim that runs aslant is seen in many more directions than the rim.
   struct Crowd {
     glm::dvec3 hub;
     std::vector<std::uint32_t> faces;  ///< in rising order; those that were removed stay
-    FaceTree rims;
+    FaceTree rims, directions;
     std::size_t alive;        ///< the number of faces that were not removed
     std::size_t strayed = 0;  ///< how many have left the hub since it was last looked for
 
@@ -127,12 +128,20 @@ void NearFaces::for_each_near(const Box& all, const Faces& own, Visit&& visit) c
     if (own.size() <= kFew) {
       for (const auto& face : own) apart.emplace_back(face.corners, crowd.hub);
     }
-    crowd.rims.for_each_where(
-        [&](const Box& rims) {
-          if (rims.empty() || !(meet(crowd.whole(rims), first) || meet(rims, sharing))) return false;
-          return apart.empty() || !std::ranges::all_of(apart, [&](const ApartFromFan& a) { return a.surely(rims); });
+    const auto may_cross = [&](const Box& rims) {
+      if (rims.empty() || !(meet(crowd.whole(rims), first) || meet(rims, sharing))) return false;
+      return apart.empty() || !std::ranges::all_of(apart, [&](const ApartFromFan& a) { return a.surely(rims); });
+    };
+    if (apart.empty() || !std::ranges::all_of(apart, &ApartFromFan::looks_by_directions)) {
+      crowd.rims.for_each_where(may_cross, next);
+      return more;
+    }
+    crowd.directions.for_each_where(
+        [&](const Box& directions) {
+          return !directions.empty() &&
+                 !std::ranges::all_of(apart, [&](const ApartFromFan& a) { return a.surely_seen(directions); });
         },
-        next);
+        [&](std::uint32_t face) { return !may_cross(rim_of(corners_[place_of(face)], crowd.hub)) || next(face); });
     return more;
   });
 }

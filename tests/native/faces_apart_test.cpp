@@ -107,7 +107,7 @@ TEST(FacesApart, NeighboursOnAFlatSurfaceAreToldApartWithoutExactArithmetic) {
 
 TEST(FacesApart, WhatIsApartFromAFanCrossesNoFaceOfIt) {
   shapes::Random random(5);
-  std::size_t apart = 0, cross = 0;
+  std::size_t apart = 0, seen = 0, cross = 0;
   for (int i = 0; i < 20'000; ++i) {
     const bool is_flat = i % 2 == 0, shares_hub = i % 3 == 0, shares_rim = i % 5 == 0;
     const auto point = [&] {
@@ -119,17 +119,24 @@ TEST(FacesApart, WhatIsApartFromAFanCrossesNoFaceOfIt) {
     const auto on_rim = [&] { return middle + size * (point() - middle); };
     Corners own{point(), point(), point()};
     const Corners face{hub, on_rim(), on_rim()}, strayed{on_rim(), on_rim(), on_rim()};
-    Box rims;
+    Box rims, directions = directions_of(face, hub);
     for (const dvec3& p : {face[1], face[2], strayed[0], strayed[1], strayed[2]}) rims.add(p);
+    directions.add(directions_of(strayed, hub));
     if (shares_hub) own[static_cast<std::size_t>(i) % 9 / 3] = hub;
     if (shares_rim) own[static_cast<std::size_t>(i) % 9 / 3 == 0 ? 1 : 0] = face[1];
     const bool crosses = faces_cross(own, face) || faces_cross(own, strayed);
     cross += crosses;
-    if (!ApartFromFan(own, hub).surely(rims)) continue;
+    const ApartFromFan from_fan(own, hub);
+    if (from_fan.looks_by_directions() && from_fan.surely_seen(directions)) {
+      ++seen;
+      EXPECT_FALSE(crosses) << i;
+    }
+    if (!from_fan.surely(rims)) continue;
     ++apart;
     EXPECT_FALSE(crosses) << i;
   }
   EXPECT_GT(apart, 3000u);
+  EXPECT_GT(seen, 1000u);
   EXPECT_GT(cross, 3000u);
 }
 
