@@ -135,14 +135,13 @@ bool Filling::prove_guess() {
   return keeps;
 }
 
-/// Calls visit(corners) for the faces of the input, and of the fillings that the hole has to keep apart from, whose
-/// boxes meet that of a triangle. A visit that returns false is the last one.
+/// Calls visit(corners) for all faces of the input, and of the fillings that the hole has to keep apart from, that a
+/// triangle crosses, and for some others whose boxes meet its box. A visit that returns false is the last one.
 template <class Visit>
 void Filling::for_each_near(const Corners& stored, Visit&& visit) const {
-  const Box box = box_of(stored);
   bool more = true;
-  rules_.for_each_near(box, [&](const Corners& other) { return more = visit(other); });
-  if (earlier_ && more) earlier_->for_each_near(hole_, box, visit);
+  rules_.for_each_near(stored, [&](const Corners& other) { return more = visit(other); });
+  if (earlier_ && more) earlier_->for_each_near(hole_, box_of(stored), visit);
 }
 
 /// Whether a triangle crosses nothing that an earlier try crossed.

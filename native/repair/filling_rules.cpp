@@ -34,14 +34,14 @@ FillingRules::FillingRules(const MeshView& mesh, std::vector<std::uint32_t> plac
 }
 
 void FillingRules::gather_faces(Team& team) {
-  std::vector<Box> boxes(mesh_.triangles.size());
-  for (std::uint32_t t = 0; t < boxes.size(); ++t) {
+  std::vector<Corners> corners(mesh_.triangles.size());
+  for (std::uint32_t t = 0; t < corners.size(); ++t) {
     poll_at(t);
-    boxes[t] = box_of(mesh_.corners(t));
+    corners[t] = mesh_.corners(t);
   }
-  std::vector<std::uint32_t> faces(boxes.size());
+  std::vector<std::uint32_t> faces(corners.size());
   std::iota(faces.begin(), faces.end(), 0u);
-  tree_ = FaceTree(faces, boxes, team);
+  faces_ = NearFaces(faces, corners, NearFaces::hubs_of(mesh_.triangles, mesh_.vertices.size()), team);
 }
 
 /// Only edges between two places at rims can be those of new faces.

@@ -17,8 +17,8 @@
 #include "check/tolerance_volume.h"
 #include "geometry/frame.h"
 #include "repair/loop_outcome.h"
-#include "topology/face_tree.h"
 #include "topology/faces_cross.h"
+#include "topology/near_faces.h"
 #include "topology/sides.h"
 
 namespace tolvol {
@@ -72,11 +72,12 @@ class FillingRules {
   std::uint64_t edge_of(const Hole& hole, std::uint32_t i, std::uint32_t j) const {
     return pair_key(place_[hole.corner[i]], place_[hole.corner[j]]);
   }
-  /// Calls visit(corners) for the faces of the mesh whose boxes meet `box`. A visit that returns false is the last one.
+  /// Calls visit(corners) for all faces of the mesh that a triangle crosses, and for some others whose boxes meet its
+  /// box. A visit that returns false is the last one.
   template <class Visit>
-  void for_each_near(const Box& box, Visit&& visit) const {
+  void for_each_near(const Corners& stored, Visit&& visit) const {
     std::size_t met = 0;
-    tree_.for_each_meeting(box, [&](std::uint32_t face) {
+    faces_.for_each_near(stored, [&](std::uint32_t face) {
       if (++met % 64 == 0) poll();
       return visit(mesh_.corners(face));
     });
@@ -98,7 +99,7 @@ class FillingRules {
   std::span<const double> shares_;
   std::optional<TriangleCertificate> certificate_;
   std::optional<FacingRule> facing_;
-  FaceTree tree_;                            ///< of the mesh's faces
+  NearFaces faces_;                          ///< of the mesh
   std::unordered_set<std::uint64_t> edges_;  ///< between places at rims
 };
 

@@ -83,6 +83,28 @@ TEST(CloseHoles, ALoopThatMeandersIsGivenUp) {
   EXPECT_LT(polls, 120000u);  // 158,376 without an end
 }
 
+TEST(CloseHoles, HolesAtAHubAreComparedWithFewOfItsFaces) {
+  // Two cones over one rim; around one apex each 20th face is a hole. The boxes of a quarter of its faces meet there.
+  const unsigned n = 6000;
+  TriangleMesh whole;
+  for (unsigned i = 0; i < n; ++i) {
+    const double a = 2 * std::numbers::pi * i / n, y = std::sin(a);
+    whole.vertices.emplace_back(std::cos(a), 0.8 * y, 0.6 * y);
+  }
+  for (const double height : {0.3, -0.3}) whole.vertices.emplace_back(0, -0.6 * height, 0.8 * height);
+  for (unsigned i = 0; i < n; ++i) {
+    whole.triangles.emplace_back(i, (i + 1) % n, n);
+    whole.triangles.emplace_back((i + 1) % n, i, n + 1);
+  }
+  const TriangleMesh mesh = without(whole, [](unsigned t) { return t % 40 == 0; });
+  const auto volume = volume_of(whole, 0.01);
+  HoleClosingResult result;
+  const std::size_t polls =
+      polls_of([&] { result = close_holes(mesh.vertices, mesh.triangles, kSpace, *volume, {.threads = 1}); });
+  EXPECT_EQ(result.count(LoopOutcome::closed), n / 20);
+  EXPECT_LT(polls, 20000u);
+}
+
 TEST(CloseHoles, ManyThreadsGiveTheSameBits) {
   shapes::Random random(8);
   for (int round = 0; round < many(4); ++round) {
