@@ -114,6 +114,10 @@ def volume(s, p):
     return lambda: tolvol.ToleranceVolume(*s.mesh, s.tolerance, **options(s, p))
 
 
+def field_of_gl(s, p):
+    return lambda: tolvol.ToleranceVolume(*s.mesh, s.tolerance, field="gl", **options(s, p))
+
+
 def fast_marching(s, p):
     return lambda: tolvol.ToleranceVolume(*s.mesh, s.tolerance, field="fast_marching", **options(s, p))
 
@@ -268,6 +272,7 @@ def render_volume_again(s, p):
 
 CALLS = {
     "ToleranceVolume": volume,
+    "ToleranceVolume, field of GL": field_of_gl,
     "ToleranceVolume, fast marching": fast_marching,
     "check": check,
     "check, outside": check_outside,

@@ -31,6 +31,7 @@ BATCH = 1_000_000
 PICTURE = (1024, 1024)
 TABLE_1 = 1.1  # the precision of [Botsch04, Table 1]
 METHODS = ("gl_certificate", "occlusion_query", "paper", "paper_half_h")
+FIELDS = ("scatter", "gl", "fast_marching")
 
 
 def measure(name, vertices, triangles, options):
@@ -62,10 +63,10 @@ def measure(name, vertices, triangles, options):
     tolvol.render_distance(points, triangles, volume, size=PICTURE, samples=1)
     for _ in range(REPEATS):
         timed(("picture", "drawn"), lambda: tolvol.render_distance(points, triangles, volume, size=PICTURE, samples=1))
-        for field in ("scatter", "fast_marching"):
+        for field in FIELDS:
             timed((field, "field"), lambda field=field: build(field))
     drawn, fields = timed.seconds.pop(("picture", "drawn")), {}
-    for field in ("scatter", "fast_marching"):
+    for field in FIELDS:
         fields[field] = timed.seconds.pop((field, "field"))
     for (method, what), seconds in timed.seconds.items():
         verdict = results[method, what].verdicts
@@ -144,10 +145,8 @@ def main(options):
         for rate in entry["rates"]:
             print(line(rate), flush=True)
         print(f"  picture of 1024 x 1024: {entry['picture_triangles_per_second'] / 1e6:.2f} M triangles/s")
-        scatter, marching = entry["field_seconds"].values()
-        print(
-            f"  field at precision 1.1, one thread: scatter {scatter:.3f} s, fast marching {marching:.3f} s", flush=True
-        )
+        fields = (f"{field} {seconds:.3f} s" for field, seconds in entry["field_seconds"].items())
+        print(f"  field at precision {TABLE_1}, one thread: {', '.join(fields)}", flush=True)
     if options.write:
         where = f"{figures['machine']}; {figures['renderer']}; version {figures['version']}."
         tables.write(options.write, "rates", f"{where}\n\n{table(figures['meshes'])}")

@@ -10,10 +10,8 @@
 #include <cmath>
 #include <numeric>
 #include <span>
-#include <sstream>
 
 #include "base/call.h"
-#include "base/errors.h"
 #include "base/parallel.h"
 #include "gl/context.h"
 
@@ -45,17 +43,6 @@ float threshold(double limit) { return static_cast<float>(limit * limit * (1 - 0
 struct CertificateProgram : gl::Program {
   CertificateProgram() : Program({{GL_COMPUTE_SHADER, {"witness.glsl", "split.glsl", "certificate.comp"}}}) {}
 };
-
-/// Throws ResourceLimit unless GL takes a buffer of that many bytes. Must run on the GL thread.
-void require_room(std::size_t bytes, const char* what) {
-  GLint64 limit = 0;
-  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &limit);
-  if (bytes <= static_cast<std::size_t>(limit)) return;
-  std::ostringstream text;
-  text << what << " take " << (bytes >> 20) << " MB, more than this GL holds in one buffer (" << (limit >> 20)
-       << " MB); the method certificate has no such limit";
-  throw ResourceLimit(text.str());
-}
 
 /// Returns nine coordinates for each triangle of `count` pieces from `begin` on.
 std::vector<float> corners_to_send(const PlacedPieces& pieces, std::size_t begin, std::size_t count, double magnitude,
@@ -95,6 +82,9 @@ GlCertificate::GlCertificate(const ToleranceVolume& volume) : ToleranceCheck(vol
     return values;
   };
   gl::run([&] {
+    const auto require_room = [](std::size_t bytes, const char* what) {
+      gl::Buffer::require_room(bytes, what, "the method certificate");
+    };
     require_room(nodes.size() * sizeof(std::uint32_t), "the ids at the grid's nodes");
     require_room(3 * reference.size() * sizeof(float), "the corners of the reference's triangles");
     nodes_ = gl::Buffer(nodes);

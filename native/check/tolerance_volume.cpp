@@ -9,6 +9,9 @@
 #include "base/parallel.h"
 #include "field/fast_marching.h"
 #include "field/scatter.h"
+#ifdef TOLVOL_GL
+#include "field/scatter_gl.h"
+#endif
 #include "field/signs.h"
 
 namespace tolvol {
@@ -69,17 +72,30 @@ ToleranceVolume::ToleranceVolume(std::span<const glm::dvec3> vertices, std::span
   grid_ = layout_grid(box, frame_tolerance(), options.precision, options.grid_memory);
   // The two parts run at the same time, because neither needs the other.
   parallel_for(2, 1, options.threads, [&](std::size_t part, std::size_t) {
-    if (part == 0 && field_ == Field::scatter) {
-      scatter(reference_, grid_, options.threads, options.progress);
-    } else if (part == 0) {
-      in_the_world(reference_, mirrored_, [&](const TriangleMesh& mesh) {
-        fast_marching(mesh, grid_, frame_tolerance(), options.threads, options.progress);
-      });
+    if (part == 0) {
+      fill_grid(options);
     } else {
       hierarchy_.emplace(reference_);
       witnesses_ = prepare_witnesses(reference_);
     }
   });
+}
+
+void ToleranceVolume::fill_grid(const Options& options) {
+  switch (field_) {
+    case Field::scatter:
+      return scatter(reference_, grid_, options.threads, options.progress);
+    case Field::gl:
+#ifdef TOLVOL_GL
+      return scatter_gl(reference_, grid_, options.progress);
+#else
+      throw GlUnavailable("GL unavailable: this module was built without it (TOLVOL_GL=OFF)");
+#endif
+    case Field::fast_marching:
+      in_the_world(reference_, mirrored_, [&](const TriangleMesh& mesh) {
+        fast_marching(mesh, grid_, frame_tolerance(), options.threads, options.progress);
+      });
+  }
 }
 
 std::vector<float> ToleranceVolume::signed_distance() const {

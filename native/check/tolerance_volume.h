@@ -21,9 +21,9 @@ namespace tolvol {
 /// proves a result in finite time. The share costs hardly any triangles.
 inline constexpr double kHeadroom = 1e-4;
 
-/// Says what fills the distance grid: field/scatter.h (exact), or field/fast_marching.h (the paper's way, for
-/// comparison).
-enum class Field { scatter, fast_marching };
+/// Says what fills the distance grid: field/scatter.h (exact), field/scatter_gl.h (the same on the GPU), or
+/// field/fast_marching.h (the paper's way, for comparison).
+enum class Field { scatter, gl, fast_marching };
 
 class ToleranceVolume {
  public:
@@ -37,7 +37,8 @@ class ToleranceVolume {
 
   /// `tolerance` is in world units. Throws InvalidInput for a bad mesh, and for a tolerance that is not finite and
   /// positive, that is larger than the reference, or that double precision cannot hold at this distance from the
-  /// origin. Throws ResourceLimit for a precision whose grid does not fit. O(m log m + nodes in the band).
+  /// origin. Throws ResourceLimit for a precision whose grid does not fit, and GlUnavailable for Field::gl without GL.
+  /// O(m log m + nodes in the band).
   ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
                   double tolerance, const Options& options);
   ToleranceVolume(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const StoredSpace& space,
@@ -73,6 +74,7 @@ class ToleranceVolume {
   double refutable(double mapping_error) const { return 2 * frame_tolerance() - provable(mapping_error); }
 
  private:
+  void fill_grid(const Options& options);
   [[noreturn]] void refuse_tolerance() const;
 
   Frame frame_;

@@ -8,13 +8,13 @@
 #include "field/scatter.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
 
 #include "base/call.h"
 #include "base/parallel.h"
 #include "base/simd.h"
+#include "field/scatter_triangle.h"
 
 namespace tolvol {
 namespace {
@@ -24,56 +24,8 @@ constexpr int kLanes = DistanceGrid::kLanes;
 constexpr int kWide = 3 * kLanes;
 // This many rows of nodes, or triangles, are between two polls.
 constexpr std::size_t kBetweenPolls = 1024;
-// float32 rounds a distance by less than this share of it.
-constexpr double kSlack = 1e-5;
-// Nodes that are skipped in a row are farther than this many bands.
-constexpr double kBeyond = 1.001;
 using Floats = float __attribute__((vector_size(4 * kLanes)));
 using Masks = std::int32_t __attribute__((vector_size(4 * kLanes)));
-
-/// A triangle prepared for many nodes. All its positions are relative to corner a.
-struct Prepared {
-  glm::dvec3 a;
-  std::array<glm::dvec3, 3> corner;
-  Box box;
-  glm::vec3 ab, ac, bc;
-  glm::vec3 gs, gt;  ///< are the gradients of the barycentric coordinates of b and c
-  glm::vec3 normal;  ///< is of unit length, or zero if the triangle is degenerate
-  glm::vec3 middle;  ///< is the middle of the box
-  float inverse_ab, inverse_ac, inverse_bc;
-  float radius;  ///< is the radius of a ball about this middle that holds the triangle, with room for rounding
-  float slab;    ///< bounds |normal . p| in the band, with the rounding of float32; infinite for degenerate triangles
-};
-
-float safe_inverse(double x) { return x > 0 ? static_cast<float>(std::min(1 / x, 1e30)) : 0.0f; }
-
-Prepared prepare(const TriangleMesh& mesh, std::uint32_t id, double band) {
-  const glm::uvec3 t = mesh.triangles[id];
-  const glm::dvec3 &a = mesh.vertices[t.x], &b = mesh.vertices[t.y], &c = mesh.vertices[t.z];
-  Prepared r;
-  r.a = a;
-  r.box.add(a), r.box.add(b), r.box.add(c);
-  const glm::dvec3 middle = (r.box.lower + r.box.upper) * 0.5;
-  const double radius = std::max({glm::length(a - middle), glm::length(b - middle), glm::length(c - middle)});
-  r.middle = middle - a;
-  r.radius = static_cast<float>(radius + kSlack * (band + radius));
-  const glm::dvec3 ab = b - a, ac = c - a, bc = c - b, n = glm::cross(ab, ac);
-  const double nn = glm::dot(n, n), ab2 = glm::dot(ab, ab), ac2 = glm::dot(ac, ac);
-  r.corner = {glm::dvec3(0), ab, ac};
-  r.ab = ab, r.ac = ac, r.bc = bc;
-  r.inverse_ab = safe_inverse(ab2), r.inverse_ac = safe_inverse(ac2), r.inverse_bc = safe_inverse(glm::dot(bc, bc));
-  // A needle whose height float32 cannot hold is left to its edges, because their distances are never too small.
-  constexpr double kThinnestSine = 1e-4;
-  if (nn > kThinnestSine * kThinnestSine * ab2 * ac2 && nn > 0) {
-    r.gs = glm::cross(ac, n) / nn, r.gt = glm::cross(n, ab) / nn, r.normal = n / std::sqrt(nn);
-    r.slab = static_cast<float>(band * kBeyond);
-  } else {
-    r.gs = r.gt = glm::vec3(std::numeric_limits<float>::quiet_NaN()),
-    r.normal = glm::vec3(0);  // no foot of a perpendicular is then inside
-    r.slab = std::numeric_limits<float>::infinity();
-  }
-  return r;
-}
 
 TOLVOL_INLINE bool any(Masks masks) {
   using Wide = std::int64_t __attribute__((vector_size(sizeof(Masks))));
@@ -95,7 +47,7 @@ TOLVOL_INLINE Floats edge_distance(Floats x, float y, float z, const glm::vec3& 
 }
 
 /// Returns the box of the part of the triangle whose coordinate k differs from `at` by no more than `reach`.
-TOLVOL_INLINE Box part_beside(const Prepared& t, int k, double at, double reach) {
+TOLVOL_INLINE Box part_beside(const ScatterTriangle& t, int k, double at, double reach) {
   Box part;
   for (int i = 0; i < 3; ++i) {
     const glm::dvec3 &p = t.corner[i], along = t.corner[(i + 1) % 3] - p;
@@ -112,7 +64,7 @@ TOLVOL_INLINE Box part_beside(const Prepared& t, int k, double at, double reach)
 }
 
 /// Writes the distances of one triangle to the nodes of its box in rows z0 <= z < z1.
-TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid, int z0, int z1) {
+TOLVOL_INLINE void splat(const ScatterTriangle& t, std::uint32_t id, DistanceGrid& grid, int z0, int z1) {
   const double h = grid.spacing;
   const float band = static_cast<float>(grid.band), band2 = band * band, hf = static_cast<float>(h);
   const glm::dvec3 low = (t.box.lower - grid.band - grid.origin) / h,
@@ -129,7 +81,7 @@ TOLVOL_INLINE void splat(const Prepared& t, std::uint32_t id, DistanceGrid& grid
 
   const glm::vec3 lower = t.box.lower - t.a, upper = t.box.upper - t.a;
   const glm::vec3 first = grid.origin - t.a;
-  const double reach = kBeyond * grid.band;
+  const double reach = ScatterTriangle::kBeyond * grid.band;
   const bool is_wide = std::max(box_end - box_begin, yend - ybegin) >= kWide;
   std::size_t rows = 0;
   for (int z = zbegin; z <= zend; ++z) {
@@ -209,7 +161,7 @@ TOLVOL_INLINE void splat_all(const TriangleMesh& mesh, DistanceGrid& grid, int z
     const glm::uvec3 t = mesh.triangles[id];
     const double a = mesh.vertices[t.x].z, b = mesh.vertices[t.y].z, c = mesh.vertices[t.z].z;
     if (std::max({a, b, c}) < zlow || std::min({a, b, c}) > zhigh) continue;
-    splat(prepare(mesh, id, grid.band), id, grid, z0, z1);
+    splat(ScatterTriangle(mesh, id, grid.band), id, grid, z0, z1);
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <sstream>
 
 #include "base/errors.h"
 #include "gl/context.h"
@@ -50,6 +51,16 @@ void Buffer::clear() {
 }
 
 void Buffer::bind_storage(GLuint binding) const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, binding, name()); }
+
+void Buffer::require_room(std::size_t bytes, const char* what, const char* unlimited) {
+  GLint64 limit = 0;
+  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &limit);
+  if (bytes <= static_cast<std::size_t>(limit)) return;
+  std::ostringstream text;
+  text << what << " take " << (bytes >> 20) << " MB, more than this GL holds in one buffer (" << (limit >> 20)
+       << " MB); " << unlimited << " has no such limit";
+  throw ResourceLimit(text.str());
+}
 
 Texture::Texture(GLenum target, GLenum internal_format, const glm::ivec3& size, GLenum format, GLenum type,
                  const void* data, int row) {

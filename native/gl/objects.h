@@ -61,6 +61,9 @@ class Buffer {
   void read(std::size_t offset, std::size_t bytes, void* data) const;
   void clear();
   void bind_storage(GLuint binding) const;
+  /// Throws ResourceLimit, naming `what` and what has no such limit, unless GL takes a buffer of that many bytes. Must
+  /// be called on the GL thread.
+  static void require_room(std::size_t bytes, const char* what, const char* unlimited);
 
  private:
   Object object_;

@@ -16,10 +16,18 @@
 namespace tolvol::python {
 namespace {
 
+constexpr std::pair<Field, const char*> kFields[] = {
+    {Field::scatter, "scatter"}, {Field::gl, "gl"}, {Field::fast_marching, "fast_marching"}};
+
 Field to_field(const std::string& name) {
-  if (name == "scatter") return Field::scatter;
-  if (name == "fast_marching") return Field::fast_marching;
-  throw InvalidInput("unknown field \"" + name + "\"; there are: scatter, fast_marching");
+  for (const auto& [field, field_name] : kFields) {
+    if (name == field_name) return field;
+  }
+  throw InvalidInput("unknown field \"" + name + "\"; there are: scatter, gl, fast_marching");
+}
+
+const char* name_of(Field field) {
+  return std::ranges::find(kFields, field, &std::pair<Field, const char*>::first)->second;
 }
 
 std::unique_ptr<Volume> make_volume(const py::object& vertices, const py::object& triangles, double tolerance,
@@ -157,8 +165,9 @@ precision : float, optional
 grid_memory : int, optional
     The most bytes that the grid takes if no precision is given. None is 256 MiB, which is also the most. Less makes proofs
     slower, and no verdict wrong.
-field : {"scatter", "fast_marching"}
-    What fills the grid: exact distances, or the method of the paper, which is signed, for comparison.
+field : {"scatter", "gl", "fast_marching"}
+    What fills the grid: exact distances, computed by the processor or by a compute shader, or the method of the paper,
+    which is signed, for comparison.
 to_world, threads, progress
     See help(tolvol).
 
@@ -168,6 +177,8 @@ InvalidInput
     If the mesh or the tolerance is not valid. The message names the first offender.
 ResourceLimit
     If the grid of this precision does not fit. The message names a precision that does.
+GlUnavailable
+    If field="gl" and there is no OpenGL 4.5.
 Cancelled
 
 Notes
@@ -279,8 +290,7 @@ Cost: none for the view. Signs take about a quarter of the time that the field t
       .def_property_readonly(
           "precision", [](const Volume& v) { return v.native.precision(); }, "The number of grid nodes per tolerance.")
       .def_property_readonly(
-          "field", [](const Volume& v) { return v.native.field() == Field::scatter ? "scatter" : "fast_marching"; },
-          "What filled the distance grid.")
+          "field", [](const Volume& v) { return name_of(v.native.field()); }, "What filled the distance grid.")
       .def_property_readonly(
           "spacing", [](const Volume& v) { return v.native.grid().spacing / v.native.frame().scale(); },
           "The distance between two grid nodes, in world units.")

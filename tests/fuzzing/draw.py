@@ -38,6 +38,6 @@ def case_of(seed, number):
     if rng.random() < 0.1:
         common["precision"] = float(rng.choice([0.25, 1, 2]))
     if rng.random() < 0.05:
-        common["field"] = "fast_marching"
+        common["field"] = str(rng.choice(["gl", "fast_marching"]))
     operations.DRAW[case.operation](rng, case)
     return case

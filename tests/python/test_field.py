@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Filling the distance grid by exact scatter or fast marching, and its signs."""
+"""Filling the distance grid by exact scatter, on the processor or in GL, or by fast marching, and its signs."""
 
 import numpy as np
 import pytest
@@ -23,8 +23,19 @@ def test_field_is_named_and_unknown_ones_are_refused():
     assert tolvol.ToleranceVolume(*plate, 0.1).field == "scatter"
     for field in FIELDS:
         assert tolvol.ToleranceVolume(*plate, 0.1, field=field).field == field
-    with pytest.raises(tolvol.InvalidInput, match="scatter, fast_marching"):
+    with pytest.raises(tolvol.InvalidInput, match="scatter, gl, fast_marching"):
         tolvol.ToleranceVolume(*plate, 0.1, field="march")
+
+
+def test_the_field_of_gl_is_that_of_scatter(gl):
+    torus = meshes.torus(48, 24)
+    scatter, of_gl = (tolvol.ToleranceVolume(*torus, 0.1, precision=2, field=field) for field in ("scatter", "gl"))
+    assert of_gl.field == "gl" and of_gl.precision == scatter.precision
+    assert np.allclose(of_gl.grid()[0], scatter.grid()[0], atol=1e-6, rtol=0)
+    assert np.allclose(of_gl.grid(signed=True)[0], scatter.grid(signed=True)[0], atol=1e-6, rtol=0)
+    results = [tolvol.decimate(*torus, volume) for volume in (scatter, of_gl)]
+    judge.assert_promise(*torus, results[1], 0.1)
+    assert len(results[1].triangles) == pytest.approx(len(results[0].triangles), rel=0.1, abs=4)
 
 
 def test_fast_marching_is_signed_and_scatter_on_demand():

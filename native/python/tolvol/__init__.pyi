@@ -72,7 +72,7 @@ class ToleranceVolume:
         to_world: ArrayLike | None = None,
         precision: float | None = None,
         grid_memory: int | None = None,
-        field: Literal["scatter", "fast_marching"] = "scatter",
+        field: Literal["scatter", "gl", "fast_marching"] = "scatter",
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> None: ...
@@ -83,7 +83,7 @@ class ToleranceVolume:
     @property
     def precision(self) -> float: ...
     @property
-    def field(self) -> Literal["scatter", "fast_marching"]: ...
+    def field(self) -> Literal["scatter", "gl", "fast_marching"]: ...
     @property
     def spacing(self) -> float: ...
     @property
