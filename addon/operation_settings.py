@@ -45,8 +45,7 @@ def decimate_settings(options=frozenset()):
     return {
         "keep": EnumProperty(
             name="Keep",
-            description="The directions in which the tolerance has to hold, for every operation except Fit and the "
-            "lattice guard",
+            description="The directions in which the tolerance has to hold, for every operation except Fit",
             items=(
                 (
                     "BOTH",

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Guard Lattice: the control points of a lattice stop where the mesh that its modifier deforms would leave the tolerance.
 
-The mesh is checked as the viewport shows it, with all modifiers. If only lattices deform the mesh, its vertices move in
-a straight line while the control points do: along that line the guard looks for the farthest permitted position. It
-moves the control points there, and checks the mesh that results once more.
+The mesh is checked as the viewport shows it, with all modifiers: both ways if the object keeps both ways. If only
+lattices deform the mesh, its vertices move in a straight line while the control points do: along that line the guard
+looks for the farthest permitted position. It moves the control points there, and checks the mesh that results once more.
 """
 
 import time
@@ -56,7 +56,9 @@ class LatticeWatch(watch.Preparing):
         except (Refused, native.module.TolvolError) as error:
             self.reason = str(error)
             return
-        self._options = {"to_world": matrix, "threads": threads}
+        self._reference, self._tolerance = reference, tolerance
+        self._options = {"to_world": matrix, "threads": threads, "progress": None}
+        self.two_sided = ob.tolvol.keep == "BOTH"
         self.begin(lambda progress: volumes.native_volume(reference, tolerance, threads, progress))
 
     def prepared(self, outcome):
@@ -73,20 +75,18 @@ class LatticeWatch(watch.Preparing):
         the last ones that were kept. They stay if the guard is off, or if a change of something else took the mesh out.
         """
         positions = arrays.vertices
-        failing = self._failing(positions, arrays.triangles)
-        if not len(failing):
+        if not (reason := self._broken(positions, arrays)):
             self._positions, self._points = positions, points
             self.on, self.reason = True, None
             self._stopped = _equal(points, self._proposed)
             return None
-        outside = len(np.unique(arrays.polygons[failing]))
         if not self.on or _equal(points, self._points):
-            self.on, self.reason = False, f"{outside:,} faces of the deformed mesh are outside"
+            self.on, self.reason = False, reason
             return None
         self.stopped()
         # A proposed position whose mesh is outside leads to a nearer proposal, but only _MOST_TRIES times.
         self._tries = self._tries + 1 if _equal(points, self._proposed) else 0
-        share = 0.0 if self._tries > _MOST_TRIES else self._share(positions, arrays.triangles[failing])
+        share = 0.0 if self._tries > _MOST_TRIES else self._share(positions, arrays)
         self._proposed = [last + np.float32(share) * (now - last) for now, last in zip(points, self._points)]
         return self._proposed
 
@@ -95,20 +95,36 @@ class LatticeWatch(watch.Preparing):
         self._stopped = True
 
     def said(self):
-        """Returns the message about the last correction, or None."""
-        return "The lattice was stopped at the tolerance" if self._stopped else None
+        """Returns the message about the last correction or about what the guard does not keep, or None."""
+        if self._stopped:
+            return "The lattice was stopped at the tolerance"
+        if self.uncovered is not None and self.uncovered.any():
+            return f"{np.count_nonzero(self.uncovered):,} faces of the reference are beyond the tolerance"
+        return None
 
-    def _failing(self, positions, triangles):
-        return np.flatnonzero(
-            self._built.check(positions, triangles, **self._options).verdicts < native.module.Verdict.INSIDE
-        )
+    def _broken(self, positions, arrays):
+        """Returns what is wrong with a mesh that has these positions, or None if the guard keeps it.
 
-    def _share(self, positions, triangles):
+        Faces of the reference may be beyond the tolerance if they are so for the first mesh that is looked at.
+        """
+        verdicts = self._built.check(positions, arrays.triangles, **self._options).verdicts
+        outside = verdicts < native.module.Verdict.INSIDE
+        if outside.any():
+            return f"{len(np.unique(arrays.polygons[outside])):,} faces of the deformed mesh are outside"
+        if not self.two_sided:
+            return None
+        uncovered = watch.uncovered_faces(self._reference, positions, arrays.triangles, self._tolerance, self._options)
+        if self.uncovered is None:
+            self.uncovered = uncovered
+        lost = np.count_nonzero(uncovered & ~self.uncovered)
+        return watch.lost_reason(lost) if lost else None
+
+    def _share(self, positions, arrays):
         inside, outside = 0.0, 1.0
         for _ in range(_HALVINGS):
             middle = (inside + outside) / 2
             tried = self._positions + np.float32(middle) * (positions - self._positions)
-            if len(self._failing(tried, triangles)):
+            if self._broken(tried, arrays):
                 outside = middle
             else:
                 inside = middle

@@ -107,8 +107,7 @@ class TOLVOL_PG_guard(bpy.types.PropertyGroup):
     )
     lattice: BoolProperty(
         name="Lattice",
-        description="Stop the control points of a lattice where the mesh that its modifier deforms would leave the tolerance. "
-        "This guard keeps the tolerance one way: parts of the reference may be farther from the mesh",
+        description="Stop the control points of a lattice where the mesh that its modifier deforms would leave the tolerance",
     )
 
 

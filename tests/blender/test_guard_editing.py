@@ -229,7 +229,8 @@ def test_the_lattice_guard_does_not_say_that_a_mesh_with_a_hole_is_within():
     ob.tolvol.guard.lattice = True
     updated(ob)
     assert bpy.ops.tolvol.check() == {"FINISHED"} and verdict.word(ob) == verdict.FAIL
-    assert state(ob)["lattice"] == ("Guarding one way", True)
+    said, on = state(ob)["lattice"]
+    assert on and said.endswith("faces of the reference are beyond the tolerance")
     ob.tolvol.keep = "ONE"
     assert verdict.word(ob) == verdict.PASS and verdict.of(ob).ways.startswith("one way")
 
@@ -251,6 +252,32 @@ def test_the_points_of_a_lattice_stop_at_the_tolerance(matrix):
     ob.tolvol.guard.lattice = False
     lift(lattice, 0.7)
     assert evaluated(ob, reference)[0] > 1
+
+
+@pytest.mark.parametrize("keep", ["BOTH", "ONE"])
+def test_a_lattice_that_draws_the_border_in_stops_only_where_both_ways_are_kept(keep):
+    """All that the mesh loses is the part of the reference beside it: in the plane it stays on the reference."""
+    ob = sheet(count=20, bumps=0.0)
+    ob.tolvol.keep = keep
+    lattice = caged(ob)
+    vertices, triangles = guarded(ob, "lattice", mode="OBJECT")
+    points = mesh_io.column(lattice.data.points, "co_deform", 3)
+    for _ in range(3):
+        points[:, 0] *= 0.7
+        lattice.data.points.foreach_set("co_deform", points.ravel())
+        lattice.data.update_tag()
+        bpy.context.view_layer.update()
+        bpy.context.view_layer.update()
+    surface = ob.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    arrays = mesh_io.read_mesh(surface)
+    moved = to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world))
+    backward = native.module.directed_hausdorff(vertices, triangles, moved, arrays.triangles, bound=TOLERANCE)
+    if keep == "BOTH":
+        assert 0.9 * TOLERANCE < backward.lower and backward.upper <= TOLERANCE
+        assert state(ob)["lattice"] == ("The lattice was stopped at the tolerance", True)
+    else:
+        assert backward.lower > 5 * TOLERANCE
+        assert state(ob)["lattice"] == ("Guarding one way", True)
 
 
 def test_what_is_not_the_points_doing_is_said_and_left():
