@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // scatter.cpp on the GPU. Instead of rows that are cut to the band, the shader gets boxes of nodes. The box of a large
-// triangle is nearly empty, so that large triangles are halved until the boxes of their parts hold few nodes.
+// triangle is nearly empty, so that large triangles are halved until the boxes of their parts hold few nodes. Where the
+// band is wide, a box is cut into blocks.
 #include "field/scatter_gl.h"
 
 #include <algorithm>
@@ -19,7 +20,9 @@ namespace {
 
 // A part of a triangle is at most this many nodes long, or as long as the band is wide.
 constexpr double kLongest = 8;
-// A step has at most so many boxes and looks at about so many nodes: only between steps a cancel is seen and a GPU
+// The shader gets blocks of at most this many nodes along each axis.
+constexpr unsigned kBlock = 16;
+// A step has at most so many blocks and looks at about so many nodes: only between steps a cancel is seen and a GPU
 // serves its screen.
 constexpr std::size_t kMostBoxes = 1 << 14, kMostNodes = 1 << 21;
 // The numbers that scatter.comp reads of a triangle and of a box.
@@ -51,12 +54,12 @@ void add_triangle(const ScatterTriangle& t, const DistanceGrid& grid, std::vecto
   numbers.push_back(t.radius);
 }
 
-/// The parts of triangles, each with the box of the nodes in its band.
-class Boxes {
+/// The parts of triangles, each with the blocks of nodes in its band.
+class Blocks {
  public:
-  explicit Boxes(const DistanceGrid& grid) : grid_(grid), longest_(std::max(kLongest * grid.spacing, grid.band)) {}
+  explicit Blocks(const DistanceGrid& grid) : grid_(grid), longest_(std::max(kLongest * grid.spacing, grid.band)) {}
 
-  /// Adds the boxes of a triangle. Calls go() whenever the step is full, which leaves it empty.
+  /// Adds the blocks of a triangle. Calls go() whenever the step is full, which leaves it empty.
   template <class Go>
   void add(const ScatterTriangle& triangle, std::uint32_t id, Step& step, Go&& go) {
     waiting_ = {{triangle.a + triangle.corner[0], triangle.a + triangle.corner[1], triangle.a + triangle.corner[2]}};
@@ -70,11 +73,14 @@ class Boxes {
         halve(part);
         continue;
       }
-      if (step.full()) go();
-      const std::size_t place = step.triangles.size();
-      const bool is_new = step.boxes.empty() || step.boxes[step.boxes.size() - kBoxNumbers + 1] != id;
-      if (is_new) add_triangle(triangle, grid_, step.triangles);
-      add_box(box, static_cast<std::uint32_t>(is_new ? place : place - kTriangleNumbers), id, step);
+      for_each_block(box, [&](const glm::uvec3& begin, const glm::uvec3& size) {
+        if (step.full()) go();
+        const bool is_new = step.boxes.empty() || step.boxes[step.boxes.size() - kBoxNumbers + 1] != id;
+        if (is_new) add_triangle(triangle, grid_, step.triangles);
+        const auto place = static_cast<std::uint32_t>(step.triangles.size() - kTriangleNumbers);
+        step.boxes.insert(step.boxes.end(), {place, id, begin.x, begin.y, begin.z, size.x, size.y, size.z});
+        step.nodes += std::size_t{size.x} * size.y * size.z;
+      });
     }
   }
 
@@ -92,14 +98,25 @@ class Boxes {
     waiting_.push_back({middle, q, opposite});
   }
 
-  void add_box(const Box& box, std::uint32_t place, std::uint32_t id, Step& step) const {
+  /// Calls visit(first node, numbers of nodes) for blocks that hold all nodes within the band of a box.
+  template <class Visit>
+  void for_each_block(const Box& box, Visit&& visit) const {
     const glm::dvec3 last = glm::dvec3(grid_.nodes) - 1.0;
     const glm::dvec3 low = glm::ceil((box.lower - grid_.band - grid_.origin) / grid_.spacing),
                      high = glm::floor((box.upper + grid_.band - grid_.origin) / grid_.spacing);
     const glm::uvec3 begin(glm::clamp(low, glm::dvec3(0), last)), end(glm::clamp(high, glm::dvec3(0), last));
-    const glm::uvec3 size = end - begin + 1u;
-    step.boxes.insert(step.boxes.end(), {place, id, begin.x, begin.y, begin.z, size.x, size.y, size.z});
-    step.nodes += std::size_t{size.x} * size.y * size.z;
+    glm::uvec3 at;
+    for (at.z = begin.z; at.z <= end.z; at.z += kBlock) {
+      for (at.y = begin.y; at.y <= end.y; at.y += kBlock) {
+        for (at.x = begin.x; at.x <= end.x; at.x += kBlock) {
+          const glm::uvec3 size = glm::min(end - at + 1u, glm::uvec3(kBlock));
+          const glm::dvec3 lower = grid_.origin + grid_.spacing * glm::dvec3(at),
+                           upper = lower + grid_.spacing * glm::dvec3(size - 1u);
+          const glm::dvec3 apart = glm::max(glm::max(box.lower - upper, lower - box.upper), glm::dvec3(0));
+          if (glm::length(apart) <= ScatterTriangle::kBeyond * grid_.band) visit(at, size);
+        }
+      }
+    }
   }
 
   const DistanceGrid& grid_;
@@ -145,7 +162,7 @@ void scatter_gl(const TriangleMesh& reference, DistanceGrid& grid, Progress* pro
       });
       step.clear();
     };
-    Boxes all(grid);
+    Blocks all(grid);
     for (std::uint32_t id = 0; id < reference.triangles.size(); ++id) {
       if (progress && id % 1024 == 0) {
         const double share = static_cast<double>(id) / static_cast<double>(reference.triangles.size());

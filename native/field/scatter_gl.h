@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The same field as scatter()'s, computed by a compute shader: what [Botsch04] names as future work, its [8, 17].
+/// The same field as scatter()'s, computed by a compute shader. [Botsch04] names distance fields on the GPU as future
+/// work.
 #pragma once
 
 #include "base/progress.h"

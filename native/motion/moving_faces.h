@@ -61,7 +61,7 @@ class MovingFaces {
     search(none, face, at, visit);
   }
   /// The same for a triangle with these corners, where `at` has all hubs at points. Those around a hub that are apart
-  /// from it as seen from there are left out, too, and it may be itself.
+  /// from it as seen from there are left out, too; so may be the face itself.
   template <class At, class Visit>
   void for_each_near(std::uint32_t face, const Corners& corners, At&& at, Visit&& visit) const {
     const auto apart_from = [&](const glm::dvec3& hub) {

@@ -51,7 +51,6 @@ void MovingMesh::start_facing(FacingRule rule, std::span<const std::uint32_t> pl
   const bool is_plain = is_reference && is_plainly_oriented(place);
   if (!is_plain) {
     std::vector<glm::uvec3> places;
-    places.reserve(reference.triangles.size());
     places.reserve(of_face * face_count());
     for (std::uint32_t f = 0; f < face_count(); ++f) {
       const auto corner = corners_of(f);

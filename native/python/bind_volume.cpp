@@ -20,10 +20,12 @@ constexpr std::pair<Field, const char*> kFields[] = {
     {Field::scatter, "scatter"}, {Field::gl, "gl"}, {Field::fast_marching, "fast_marching"}};
 
 Field to_field(const std::string& name) {
+  std::string names;
   for (const auto& [field, field_name] : kFields) {
     if (name == field_name) return field;
+    names += (names.empty() ? "" : ", ") + std::string(field_name);
   }
-  throw InvalidInput("unknown field \"" + name + "\"; there are: scatter, gl, fast_marching");
+  throw InvalidInput("unknown field \"" + name + "\"; there are: " + names);
 }
 
 const char* name_of(Field field) {
@@ -166,8 +168,9 @@ grid_memory : int, optional
     The most bytes that the grid takes if no precision is given. None is 256 MiB, which is also the most. Less makes proofs
     slower, and no verdict wrong.
 field : {"scatter", "gl", "fast_marching"}
-    What fills the grid: exact distances, computed by the processor or by a compute shader, or the method of the paper,
-    which is signed, for comparison.
+    What fills the grid: exact distances, computed by the processor or, up to the rounding of float32, by a compute
+    shader, or the method of the paper, which is signed, for comparison. With "gl" the number of triangles that a
+    decimation leaves may depend on the graphics driver.
 to_world, threads, progress
     See help(tolvol).
 

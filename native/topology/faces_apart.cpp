@@ -149,7 +149,12 @@ Box directions_of(const Corners& corners, const dvec3& hub) {
   for_each_of_rim(corners, hub, [&](const dvec3& p) {
     const dvec3 way = p - hub;
     const double length = largest(way);
-    directions.add(length > 0 ? way / length : way);
+    if (std::isfinite(length)) {
+      directions.add(length > 0 ? way / length : way);
+    } else {
+      // The difference is too large for double precision: any direction.
+      directions.add(dvec3(-1)), directions.add(dvec3(1));
+    }
   });
   return directions;
 }
@@ -189,9 +194,11 @@ void ApartFromFan::add(const Corners& own, const dvec3& normal) {
   for (const dvec3& corner : own) {
     if (shares_hub_ && corner == hub_) continue;
     const dvec3 p = corner - hub_;
-    most = std::max(most, glm::dot(normal, p) + 4 * kRounding * sum(normal) * largest(p) + kSmallest);
-    if (!(most < 0)) return;  // also if rounding has left no direction
+    const double bound = glm::dot(normal, p) + 4 * kRounding * sum(normal) * largest(p) + kSmallest;
+    if (!(bound < 0)) return;  // also if it is NaN, because rounding has left no direction
+    most = std::max(most, bound);
   }
+  if (std::isinf(most)) return;  // all corners are at the hub
   sides_[static_cast<std::size_t>(count_++)] = {normal, shares_hub_ ? 0 : most};
 }
 

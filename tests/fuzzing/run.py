@@ -32,6 +32,8 @@ class Run:
             return function()
         except (tolvol.InvalidInput, tolvol.ResourceLimit) as error:
             self._refuse(name, error)
+        except tolvol.GlUnavailable as error:
+            raise Refused(str(error)) from None
         except tolvol.Cancelled:
             raise Finding(f"cancelled: {name}", "Cancelled, though nobody asked for it") from None
         except Exception as error:

@@ -158,6 +158,15 @@ TEST(FacesApart, SliversBesideEachOtherAreApartSeenFromTheirHub) {
   }
 }
 
+TEST(FacesApart, WhatHasNoDirectionIsNotSoughtByDirections) {
+  const dvec3 hub(0), p(1, 0.5, 0.2), q(0.3, 1, 0.1);
+  EXPECT_TRUE(ApartFromFan({hub, p, q}, hub).looks_by_directions());
+  for (const Corners& own :
+       {Corners{hub, p, p}, Corners{hub, p, 2.0 * p}, Corners{hub, hub, p}, Corners{hub, hub, hub}}) {
+    EXPECT_FALSE(ApartFromFan(own, hub).looks_by_directions()) << "all of the crowd would be looked at";
+  }
+}
+
 TEST(FacesApart, CoordinatesOfAnySizeAreHandled) {
   for (const double scale : {1e-150, 1e-20, 1.0, 1e20, 1e150}) {
     const Corners own{scale * dvec3(0, 0, 0), scale * dvec3(1, 0, 0), scale * dvec3(0, 1, 0)};

@@ -41,6 +41,10 @@ struct Fan {
       faces.push_back(static_cast<std::uint32_t>(places.size()));
       places.push_back(1.1 * places[rim(i)] + dvec3(0, 0, 0.1));
     }
+    renew();
+  }
+  /// After places or faces were added.
+  void renew() {
     all.resize(faces.size() / static_cast<std::size_t>(corners));
     std::iota(all.begin(), all.end(), 0u);
     near = MovingFaces(faces, static_cast<std::size_t>(corners), places.size());
@@ -118,6 +122,21 @@ TEST(MovingFaces, HaveAllThatCrossWhereverAHubAndItsRimGo) {
     fan.move(random, 0.2, [](std::uint32_t v) { return v == 7; });
     fan.expect_all_found();
   }
+}
+
+// The two hubs share an edge, and faces with both are in the group of one of them.
+TEST(MovingFaces, HaveAllThatCrossAtTwoHubs) {
+  Fan fan(300);
+  const auto other = static_cast<std::uint32_t>(fan.places.size());
+  fan.places.emplace_back(0.2, 0.3, 0.1);
+  for (std::uint32_t i = 1; i <= 300; ++i) fan.faces.insert(fan.faces.end(), {other, i, 1 + i % 300});
+  fan.faces.insert(fan.faces.end(), {0, other, 40, other, 0, 200});
+  fan.renew();
+  shapes::Random random(5);
+  fan.move(random, 0.05, [](std::uint32_t) { return true; });
+  fan.expect_all_found();
+  fan.move(random, 0.2, [&](std::uint32_t v) { return v == other || v == 7; });
+  fan.expect_all_found();
 }
 
 TEST(MovingFaces, HaveAllThatCrossWhereFacesLostTheirHub) {

@@ -123,6 +123,17 @@ TEST(NearFaces, HaveAllThatCrossAfterChanges) {
   }
 }
 
+// Differences of these coordinates overflow.
+TEST(NearFaces, HaveAllThatCrossAtHugeCoordinates) {
+  TriangleMesh mesh = fan(300, 0.4);
+  for (dvec3& p : mesh.vertices) p *= 1e308;
+  mesh.vertices[0].x = -1e308;
+  mesh.triangles.push_back(mesh.triangles[5]);
+  const Faces faces(mesh);
+  ASSERT_TRUE(faces_cross(faces.corners[5], faces.corners[300]));
+  for (const Corners& own : faces.corners) faces.expect_all_found(own);
+}
+
 TEST(NearFaces, AreFewAtAHub) {
   for (const unsigned n : {1000u, 8000u}) {
     // A box around a long edge opposite the hub is seen from there over more than half of a right angle.
