@@ -187,7 +187,7 @@ def draw(picture):
                     )
             axis.grid(True, which="both", color="#DDDDDD", linewidth=0.6)
             low, high = axis.get_ylim()
-            axis.set_ylim(low / (high / low) ** (0.2 * len(by_method)), high)  # room for the legend
+            axis.set_ylim(low / (high / low) ** (0.3 * len(by_method)), high)  # room for the legend
             axis.legend(fontsize=8, loc="lower right", framealpha=1)
             axis.set_xticks(spacing, [f"{h:.2g}" for h in spacing])
             axis.minorticks_off()
