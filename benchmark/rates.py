@@ -65,9 +65,8 @@ def measure(name, vertices, triangles, options):
         timed(("picture", "drawn"), lambda: tolvol.render_distance(points, triangles, volume, size=PICTURE, samples=1))
         for field in FIELDS:
             timed((field, "field"), lambda field=field: build(field))
-    drawn, fields = timed.seconds.pop(("picture", "drawn")), {}
-    for field in FIELDS:
-        fields[field] = timed.seconds.pop((field, "field"))
+    drawn = timed.seconds.pop(("picture", "drawn"))
+    fields = {field: timed.seconds.pop((field, "field")) for field in FIELDS}
     for (method, what), seconds in timed.seconds.items():
         verdict = results[method, what].verdicts
         entries.append(

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Distances of triangles at the nodes of a grid, as scatter.cpp computes them. Each work group looks at the nodes of one
-// box near one triangle. A first pass leaves the smallest distance at each node, and a second the lowest id of the
+// Distances of triangles at the nodes of a grid, as scatter.cpp computes them. Each work group looks at one
+// block of nodes near one triangle. A first pass leaves the smallest distance at each node, and a second the lowest id of the
 // triangles that have this distance. Positive floats are ordered like their bits, so that atomicMin() finds the smallest
 // distance as well as the lowest id.
 layout(local_size_x = 64) in;
 
 // The numbers of a triangle, in the order of scatter_gl.cpp.
 layout(std430, binding = 0) readonly buffer Triangles { float triangles[]; };
-// The place of a triangle among the numbers, its id, the first node of the box, and the box's numbers of nodes.
-layout(std430, binding = 1) readonly buffer Boxes { uint boxes[]; };
+// The place of a triangle among the numbers, its id, the first node of the block, and the block's numbers of nodes.
+layout(std430, binding = 1) readonly buffer Blocks { uint blocks[]; };
 layout(std430, binding = 2) coherent buffer Distances { uint distances[]; };
 layout(std430, binding = 3) coherent buffer Ids { uint ids[]; };
 
@@ -27,9 +27,9 @@ float edge_distance2(vec3 p, vec3 e, float inverse) {
 }
 
 void main() {
-  const uint box = 8 * gl_WorkGroupID.x, t = boxes[box], id = boxes[box + 1];
-  const uvec3 begin = uvec3(boxes[box + 2], boxes[box + 3], boxes[box + 4]);
-  const uvec3 size = uvec3(boxes[box + 5], boxes[box + 6], boxes[box + 7]);
+  const uint block = 8 * gl_WorkGroupID.x, t = blocks[block], id = blocks[block + 1];
+  const uvec3 begin = uvec3(blocks[block + 2], blocks[block + 3], blocks[block + 4]);
+  const uvec3 size = uvec3(blocks[block + 5], blocks[block + 6], blocks[block + 7]);
   const vec3 first = vector_at(t), ab = vector_at(t + 3), ac = vector_at(t + 6), bc = vector_at(t + 9);
   const vec3 gs = vector_at(t + 12), gt = vector_at(t + 15), normal = vector_at(t + 18), inverse = vector_at(t + 21);
   const vec3 middle = vector_at(t + 24);

@@ -105,15 +105,20 @@ class LatticeWatch(watch.Preparing):
     def _broken(self, positions, arrays):
         """Returns what is wrong with a mesh that has these positions, or None if the guard keeps it.
 
-        Faces of the reference may be beyond the tolerance if they are so for the first mesh that is looked at.
+        Faces of the reference may be beyond the tolerance if they are so for the first mesh that is inside.
         """
-        verdicts = self._built.check(positions, arrays.triangles, **self._options).verdicts
-        outside = verdicts < native.module.Verdict.INSIDE
-        if outside.any():
-            return f"{len(np.unique(arrays.polygons[outside])):,} faces of the deformed mesh are outside"
-        if not self.two_sided:
-            return None
-        uncovered = watch.uncovered_faces(self._reference, positions, arrays.triangles, self._tolerance, self._options)
+        try:
+            verdicts = self._built.check(positions, arrays.triangles, **self._options).verdicts
+            outside = verdicts < native.module.Verdict.INSIDE
+            if outside.any():
+                return f"{len(np.unique(arrays.polygons[outside])):,} faces of the deformed mesh are outside"
+            if not self.two_sided:
+                return None
+            uncovered = watch.uncovered_faces(
+                self._reference, positions, arrays.triangles, self._tolerance, self._options
+            )
+        except native.module.TolvolError as error:  # for example, the mesh has become smaller than the tolerance
+            return str(error)
         if self.uncovered is None:
             self.uncovered = uncovered
         lost = np.count_nonzero(uncovered & ~self.uncovered)

@@ -173,10 +173,11 @@ def draw(picture):
         for axis, by_method in zip(axes[:, column], errors):
             for name, values in by_method.items():
                 colour, marker = METHODS[name]
+                at = spacing[: len(values)]
                 for k, (what, line) in enumerate((("max", "-"), ("mean", "--"))):
-                    slope = np.polyfit(np.log(spacing[: len(values)]), np.log(values[:, k]), 1)[0]
+                    slope = np.polyfit(np.log(at), np.log(values[:, k]), 1)[0]
                     axis.loglog(
-                        spacing[: len(values)],
+                        at,
                         values[:, k],
                         line,
                         color=colour,

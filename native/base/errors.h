@@ -37,6 +37,10 @@ struct ResourceLimit : Error {
 /// "GL unavailable: " and gives the reason.
 struct GlUnavailable : Error {
   explicit GlUnavailable(const std::string& message) : Error("gl_unavailable", message) {}
+  /// What a build without GL throws.
+  static GlUnavailable not_built() {
+    return GlUnavailable("GL unavailable: this module was built without it (TOLVOL_GL=OFF)");
+  }
 };
 
 /// The caller asked for a stop through Progress::cancel().

@@ -23,9 +23,7 @@ std::unique_ptr<ToleranceCheck> make_paper(const ToleranceVolume& volume) {
   return std::make_unique<Paper>(volume, kMargin);
 }
 #else
-std::unique_ptr<ToleranceCheck> without_gl(const ToleranceVolume&) {
-  throw GlUnavailable("GL unavailable: this module was built without it (TOLVOL_GL=OFF)");
-}
+std::unique_ptr<ToleranceCheck> without_gl(const ToleranceVolume&) { throw GlUnavailable::not_built(); }
 #endif
 
 struct Method {

@@ -89,7 +89,7 @@ void ToleranceVolume::fill_grid(const Options& options) {
 #ifdef TOLVOL_GL
       return scatter_gl(reference_, grid_, options.progress);
 #else
-      throw GlUnavailable("GL unavailable: this module was built without it (TOLVOL_GL=OFF)");
+      throw GlUnavailable::not_built();
 #endif
     case Field::fast_marching:
       in_the_world(reference_, mirrored_, [&](const TriangleMesh& mesh) {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// scatter.cpp on the GPU. Instead of rows that are cut to the band, the shader gets boxes of nodes. The box of a large
+// scatter.cpp on the GPU. Instead of rows that are cut to the band, the shader gets blocks of nodes. The box of a large
 // triangle is nearly empty, so that large triangles are halved until the boxes of their parts hold few nodes. Where the
-// band is wide, a box is cut into blocks.
+// band is wide, such a box has several blocks.
 #include "field/scatter_gl.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <span>
+#include <iterator>
 #include <vector>
 
 #include "base/call.h"
@@ -24,9 +24,9 @@ constexpr double kLongest = 8;
 constexpr unsigned kBlock = 16;
 // A step has at most so many blocks and looks at about so many nodes: only between steps a cancel is seen and a GPU
 // serves its screen.
-constexpr std::size_t kMostBoxes = 1 << 14, kMostNodes = 1 << 21;
-// The numbers that scatter.comp reads of a triangle and of a box.
-constexpr std::size_t kTriangleNumbers = 28, kBoxNumbers = 8;
+constexpr std::size_t kMostBlocks = 1 << 14, kMostNodes = 1 << 21;
+// The numbers that scatter.comp reads of a triangle and of a block.
+constexpr std::size_t kTriangleNumbers = 28, kBlockNumbers = 8;
 
 using Corners = std::array<glm::dvec3, 3>;
 
@@ -37,11 +37,11 @@ struct ScatterProgram : gl::Program {
 /// What one dispatch of the shader works on.
 struct Step {
   std::vector<float> triangles;
-  std::vector<std::uint32_t> boxes;
+  std::vector<std::uint32_t> blocks;
   std::size_t nodes = 0;
 
-  bool full() const { return boxes.size() >= kMostBoxes * kBoxNumbers || nodes >= kMostNodes; }
-  void clear() { triangles.clear(), boxes.clear(), nodes = 0; }
+  bool full() const { return blocks.size() >= kMostBlocks * kBlockNumbers || nodes >= kMostNodes; }
+  void clear() { triangles.clear(), blocks.clear(), nodes = 0; }
 };
 
 void add_triangle(const ScatterTriangle& t, const DistanceGrid& grid, std::vector<float>& numbers) {
@@ -75,10 +75,10 @@ class Blocks {
       }
       for_each_block(box, [&](const glm::uvec3& begin, const glm::uvec3& size) {
         if (step.full()) go();
-        const bool is_new = step.boxes.empty() || step.boxes[step.boxes.size() - kBoxNumbers + 1] != id;
+        const bool is_new = step.blocks.empty() || step.blocks[step.blocks.size() - kBlockNumbers + 1] != id;
         if (is_new) add_triangle(triangle, grid_, step.triangles);
         const auto place = static_cast<std::uint32_t>(step.triangles.size() - kTriangleNumbers);
-        step.boxes.insert(step.boxes.end(), {place, id, begin.x, begin.y, begin.z, size.x, size.y, size.z});
+        step.blocks.insert(step.blocks.end(), {place, id, begin.x, begin.y, begin.z, size.x, size.y, size.z});
         step.nodes += std::size_t{size.x} * size.y * size.z;
       });
     }
@@ -131,12 +131,12 @@ void scatter_gl(const TriangleMesh& reference, DistanceGrid& grid, Progress* pro
   const std::size_t size = static_cast<std::size_t>(grid.pitch) * grid.nodes.y * grid.nodes.z;
   fill(grid.distance, size, static_cast<float>(grid.band));
   fill(grid.triangle, size, DistanceGrid::kNone);
-  gl::Buffer distances, ids, triangles, boxes;
+  gl::Buffer distances, ids, triangles, blocks;
   gl::run([&] {
     gl::Buffer::require_room(size * sizeof(float), "the distances at the grid's nodes", "the field scatter");
     distances = gl::Buffer(grid.distance), ids = gl::Buffer(grid.triangle);
-    triangles = gl::Buffer(kMostBoxes * kTriangleNumbers * sizeof(float), nullptr);
-    boxes = gl::Buffer(kMostBoxes * kBoxNumbers * sizeof(std::uint32_t), nullptr);
+    triangles = gl::Buffer(kMostBlocks * kTriangleNumbers * sizeof(float), nullptr);
+    blocks = gl::Buffer(kMostBlocks * kBlockNumbers * sizeof(std::uint32_t), nullptr);
     gl::of_context<ScatterProgram>();
   });
   Step step;
@@ -153,11 +153,11 @@ void scatter_gl(const TriangleMesh& reference, DistanceGrid& grid, Progress* pro
         program.set("band", static_cast<float>(grid.band));
         program.set("finds_ids", pass);
         triangles.write(0, step.triangles.size() * sizeof(float), step.triangles.data());
-        boxes.write(0, step.boxes.size() * sizeof(std::uint32_t), step.boxes.data());
-        const gl::Buffer* const bindings[] = {&triangles, &boxes, &distances, &ids};
+        blocks.write(0, step.blocks.size() * sizeof(std::uint32_t), step.blocks.data());
+        const gl::Buffer* const bindings[] = {&triangles, &blocks, &distances, &ids};
         for (GLuint i = 0; i < std::size(bindings); ++i) bindings[i]->bind_storage(i);
         glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-        glDispatchCompute(static_cast<GLuint>(step.boxes.size() / kBoxNumbers), 1, 1);
+        glDispatchCompute(static_cast<GLuint>(step.blocks.size() / kBlockNumbers), 1, 1);
         glFinish();
       });
       step.clear();
@@ -170,7 +170,7 @@ void scatter_gl(const TriangleMesh& reference, DistanceGrid& grid, Progress* pro
       }
       all.add(ScatterTriangle(reference, id, grid.band), id, step, go);
     }
-    if (!step.boxes.empty()) go();
+    if (!step.blocks.empty()) go();
   }
   gl::run([&] {
     distances.read(0, distances.bytes(), grid.distance.data());

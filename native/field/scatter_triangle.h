@@ -14,7 +14,7 @@ namespace tolvol {
 struct ScatterTriangle {
   ScatterTriangle(const TriangleMesh& mesh, std::uint32_t id, double band);
 
-  /// Nodes that are not looked at, because of the slab, are farther than this many bands.
+  /// Nodes that are left out without a look at each are farther than this many bands.
   static constexpr double kBeyond = 1.001;
 
   glm::dvec3 a;

@@ -22,7 +22,7 @@ void shutdown() {
   gl::shutdown();
 }
 #else
-std::string renderer() { throw GlUnavailable("GL unavailable: this module was built without it (TOLVOL_GL=OFF)"); }
+std::string renderer() { throw GlUnavailable::not_built(); }
 void shutdown() {}
 #endif
 

@@ -162,9 +162,7 @@ py::array_t<std::uint8_t> render_volume(const Volume& volume, const std::optiona
   return to_array(image);
 }
 #else
-[[noreturn]] py::object no_pictures(const py::args&, const py::kwargs&) {
-  throw GlUnavailable("GL unavailable: this module was built without it (TOLVOL_GL=OFF)");
-}
+[[noreturn]] py::object no_pictures(const py::args&, const py::kwargs&) { throw GlUnavailable::not_built(); }
 #endif
 
 }  // namespace

@@ -298,9 +298,12 @@ def test_a_baked_mesh_looks_like_the_original():
     places = column(ob.data.vertices, "co", 3)
     places *= 1 + 0.006 * np.sin(40 * places[:, 2:])
     # Blender makes the faces of a ball in another order in each run, and the decimation would be another one.
-    faces = [list(face.vertices) for face in ob.data.polygons]
-    turned = [face[(first := face.index(min(face))) :] + face[:first] for face in faces]
-    add_object("original", places, sorted(turned))
+    faces = []
+    for face in ob.data.polygons:
+        corners = list(face.vertices)
+        first = corners.index(min(corners))
+        faces.append(corners[first:] + corners[:first])
+    add_object("original", places, sorted(faces))
     original = bpy.context.object
     bpy.data.objects.remove(ob)
     original.data.polygons.foreach_set("use_smooth", np.ones(len(original.data.polygons), bool))

@@ -203,17 +203,25 @@ def lift(lattice, height):
     points = mesh_io.column(lattice.data.points, "co_deform", 3)
     points[4, 2] += height
     points[13, 2] += height
+    place(lattice, points)
+
+
+def place(lattice, points):
     lattice.data.points.foreach_set("co_deform", points.ravel())
     lattice.data.update_tag()
     bpy.context.view_layer.update()
     bpy.context.view_layer.update()  # Blender evaluates the points that the guard wrote without calling a handler.
 
 
-def evaluated(ob, reference):
+def deformed(ob):
+    """Returns the (vertices, triangles) of the evaluated mesh in the world."""
     surface = ob.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
     arrays = mesh_io.read_mesh(surface)
-    vertices = to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world))
-    found = native.module.directed_hausdorff(vertices, arrays.triangles, *reference, bound=TOLERANCE)
+    return to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world)), arrays.triangles
+
+
+def evaluated(ob, reference):
+    found = native.module.directed_hausdorff(*deformed(ob), *reference, bound=TOLERANCE)
     return found.lower / TOLERANCE, found.upper / TOLERANCE
 
 
@@ -260,24 +268,32 @@ def test_a_lattice_that_draws_the_border_in_stops_only_where_both_ways_are_kept(
     ob = sheet(count=20, bumps=0.0)
     ob.tolvol.keep = keep
     lattice = caged(ob)
-    vertices, triangles = guarded(ob, "lattice", mode="OBJECT")
+    reference = guarded(ob, "lattice", mode="OBJECT")
     points = mesh_io.column(lattice.data.points, "co_deform", 3)
     for _ in range(3):
         points[:, 0] *= 0.7
-        lattice.data.points.foreach_set("co_deform", points.ravel())
-        lattice.data.update_tag()
-        bpy.context.view_layer.update()
-        bpy.context.view_layer.update()
-    surface = ob.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
-    arrays = mesh_io.read_mesh(surface)
-    moved = to_world(arrays.vertices, mesh_io.matrix_array(ob.matrix_world))
-    backward = native.module.directed_hausdorff(vertices, triangles, moved, arrays.triangles, bound=TOLERANCE)
+        place(lattice, points)
+    backward = native.module.directed_hausdorff(*reference, *deformed(ob), bound=TOLERANCE)
     if keep == "BOTH":
         assert 0.9 * TOLERANCE < backward.lower and backward.upper <= TOLERANCE
         assert state(ob)["lattice"] == ("The lattice was stopped at the tolerance", True)
     else:
         assert backward.lower > 5 * TOLERANCE
         assert state(ob)["lattice"] == ("Guarding one way", True)
+
+
+def test_a_lattice_that_shrinks_the_mesh_to_a_point_stops_too():
+    """A mesh that is smaller than the tolerance is no reference, so that nothing could be covered by it."""
+    ob = sheet(count=20, bumps=0.0)
+    lattice = caged(ob)
+    lattice.scale = (2, 2, 2)  # around all of the sheet
+    lattice.data.interpolation_type_u = lattice.data.interpolation_type_v = "KEY_LINEAR"
+    bpy.context.view_layer.update()
+    reference = guarded(ob, "lattice", mode="OBJECT")
+    place(lattice, 1e-4 * mesh_io.column(lattice.data.points, "co_deform", 3))
+    backward = native.module.directed_hausdorff(*reference, *deformed(ob), bound=TOLERANCE)
+    assert backward.upper <= TOLERANCE
+    assert state(ob)["lattice"] == ("The lattice was stopped at the tolerance", True)
 
 
 def test_what_is_not_the_points_doing_is_said_and_left():

@@ -14,6 +14,7 @@
 #include "field/display_grid.h"
 #include "field/scatter.h"
 #include "field/signs.h"
+#include "laid_out.h"
 #include "many.h"
 #include "measure/deviation.h"
 #include "measure/hausdorff.h"
@@ -128,9 +129,7 @@ TEST(Call, IsHeardWhileALargeGridIsFilled) {
   // Two small triangles far from each other: hardly any work but that of writing the grid.
   const TriangleMesh specks{{{0, 0, 0}, {0.01, 0, 0}, {0, 0.01, 0}, {1, 1, 1}, {0.99, 1, 1}, {1, 0.99, 1}},
                             {{0, 1, 2}, {3, 4, 5}}};
-  Box box;
-  for (const glm::dvec3& p : specks.vertices) box.add(p);
-  DistanceGrid grid = layout_grid(box, 0.005, 1);
+  DistanceGrid grid = laid_out(specks, 0.005, 1);
   const std::size_t polls = polls_of([&] { scatter(specks, grid, 1, nullptr); });
   ASSERT_GT(grid.distance.size(), 7 * kFilledAtOnce);
   EXPECT_GT(polls, 2 * (grid.distance.size() / kFilledAtOnce));

@@ -9,6 +9,7 @@
 #include "base/simd.h"
 #include "field/scatter.h"
 #include "geometry/closest_point.h"
+#include "laid_out.h"
 #include "shapes.h"
 
 namespace {
@@ -16,14 +17,8 @@ namespace {
 using namespace tolvol;
 using glm::dvec3;
 
-Box box_of(const TriangleMesh& mesh) {
-  Box box;
-  for (const dvec3& p : mesh.vertices) box.add(p);
-  return box;
-}
-
 DistanceGrid grid_of(const TriangleMesh& mesh, double tolerance, double precision, unsigned threads = 1) {
-  DistanceGrid grid = layout_grid(box_of(mesh), tolerance, precision);
+  DistanceGrid grid = laid_out(mesh, tolerance, precision);
   scatter(mesh, grid, threads);
   return grid;
 }

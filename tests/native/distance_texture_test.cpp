@@ -9,6 +9,7 @@
 #include "base/errors.h"
 #include "field/scatter.h"
 #include "gl_fixture.h"
+#include "laid_out.h"
 #include "shapes.h"
 
 namespace {
@@ -21,9 +22,7 @@ class DistanceTextureTest : public GlTest {
 
   static DistanceGrid grid() {
     const TriangleMesh torus = shapes::torus(12);
-    Box box;
-    for (const glm::dvec3& p : torus.vertices) box.add(p);
-    DistanceGrid grid = layout_grid(box, kTolerance, 3.0);
+    DistanceGrid grid = laid_out(torus, kTolerance, 3.0);
     scatter(torus, grid);
     return grid;
   }

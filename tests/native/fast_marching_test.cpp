@@ -9,18 +9,13 @@
 #include "base/simd.h"
 #include "field/scatter.h"
 #include "field/signs.h"
+#include "laid_out.h"
 #include "shapes.h"
 
 namespace {
 
 using namespace tolvol;
 using glm::dvec3;
-
-DistanceGrid laid_out(const TriangleMesh& mesh, double tolerance, double precision) {
-  Box box;
-  for (const dvec3& p : mesh.vertices) box.add(p);
-  return layout_grid(box, tolerance, precision);
-}
 
 DistanceGrid marched(const TriangleMesh& mesh, double tolerance, double precision, unsigned threads = 1) {
   DistanceGrid grid = laid_out(mesh, tolerance, precision);

@@ -159,7 +159,7 @@ TEST(Hierarchy, LooksAtFewNearTheHubOfUnequalEdges) {
   for (const double shorter : {0.05, 0.0, 1.0}) {
     TriangleMesh mesh;
     for (unsigned i = 0; i < count; ++i) {
-      const double angle = 2 * M_PI * i / count;
+      const double angle = 2 * std::numbers::pi * i / count;
       const dvec3 rim(std::cos(angle), std::sin(angle), 0);
       mesh.vertices.push_back(i % 2 == 0 ? rim + 0.01 * random.point() : shorter * (rim + 0.2 * random.point()));
       mesh.triangles.push_back({i, (i + 1) % count, count});
@@ -169,7 +169,7 @@ TEST(Hierarchy, LooksAtFewNearTheHubOfUnequalEdges) {
     for (const double from_hub : {0.04, 0.01, 0.003}) {
       std::size_t nodes = 0;
       for (int i = 0; i < 30; ++i) {
-        const double angle = random.share() * 2 * M_PI;
+        const double angle = random.share() * 2 * std::numbers::pi;
         const dvec3 p = from_hub * dvec3(std::cos(angle), std::sin(angle), i % 2 * 0.1);
         const Hierarchy::Nearest expected = brute(mesh, p, kInfinity, all), found = hierarchy.nearest(p);
         ASSERT_EQ(found.distance, expected.distance);

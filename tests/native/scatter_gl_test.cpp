@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/call.h"
 #include "check/tolerance_volume.h"
 #include "decimation_cases.h"
 #include "field/scatter.h"
+#include "geometry/closest_point.h"
 #include "gl_fixture.h"
+#include "laid_out.h"
 #include "shapes.h"
 
 namespace {
@@ -25,9 +28,7 @@ struct Fields {
 };
 
 Fields fields_of(const TriangleMesh& mesh, double tolerance, double precision) {
-  Box box;
-  for (const dvec3& p : mesh.vertices) box.add(p);
-  Fields fields{layout_grid(box, tolerance, precision), layout_grid(box, tolerance, precision)};
+  Fields fields{laid_out(mesh, tolerance, precision), laid_out(mesh, tolerance, precision)};
   scatter(mesh, fields.cpu, 1);
   scatter_gl(mesh, fields.gpu);
   return fields;
@@ -98,9 +99,7 @@ TEST_F(ScatterGl, LargeTrianglesNeedlesPointsAndWideBands) {
 
 TEST_F(ScatterGl, EndsOnRequest) {
   const TriangleMesh mesh = shapes::torus(100);
-  Box box;
-  for (const dvec3& p : mesh.vertices) box.add(p);
-  DistanceGrid grid = layout_grid(box, 0.02, 1);
+  DistanceGrid grid = laid_out(mesh, 0.02, 1);
   Progress progress;
   progress.cancel();
   const Call call(&progress);

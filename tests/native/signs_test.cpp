@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "field/scatter.h"
+#include "laid_out.h"
 #include "shapes.h"
 
 namespace {
@@ -14,9 +15,7 @@ using namespace tolvol;
 using glm::dvec3;
 
 DistanceGrid grid_of(const TriangleMesh& mesh, double tolerance, double precision) {
-  Box box;
-  for (const dvec3& p : mesh.vertices) box.add(p);
-  DistanceGrid grid = layout_grid(box, tolerance, precision);
+  DistanceGrid grid = laid_out(mesh, tolerance, precision);
   scatter(mesh, grid, 1);
   return grid;
 }
