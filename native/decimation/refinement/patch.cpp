@@ -17,6 +17,9 @@ std::uint32_t Patch::add_vertex(std::uint32_t id) {
 bool Patch::gather(const Change& collapse, int rings, bool boundary_free) {
   mesh_ = &collapse.mesh();
   vertex_count_ = 0;
+  kept_slot_ = mesh_->slot(*collapse.vertex()), merged_slot_ = mesh_->slot(mesh_->from(collapse.halfedge()));
+  vanishing_.clear();
+  for (const Change::Halfedge h : collapse.collapses()) vanishing_.push_back(mesh_->from(h));
   faces_.clear(), flips_.clear(), local_vertex_.clear(), local_face_.clear(), outer_edges_.clear();
   if (collapse.elements().size() > kMostFaces || !gather_core(collapse, rings)) return false;
   // The faces of the change come first, in its order, so that their numbers are those of its elements.
@@ -163,6 +166,27 @@ bool Patch::joined_by_edge(std::uint32_t a, std::uint32_t b) const {
   });
 }
 
+/// Whether an edge between copies of two vertices, and not these two, may lie where an edge between these two lies or
+/// would lie once the collapse is carried out: see BoundedMesh::joined_by_other().
+bool Patch::may_be_joined_by_other(std::uint32_t a, std::uint32_t b) const {
+  if (!vertices_[a].joined && !vertices_[b].joined) return false;
+  // The collapse or another flip of this patch may make an edge between copies of the two.
+  if (vertices_[a].joined && vertices_[b].joined) return true;
+  const std::uint32_t one = vertices_[a].joined ? b : a, joined = vertices_[a].joined ? a : b;
+  const std::uint32_t slot = slot_after_collapse(vertices_[joined].id);
+  const auto is_copy = [&](std::uint32_t id) {
+    return id != vertices_[joined].id && slot_after_collapse(id) == slot && !vanishes(id);
+  };
+  const auto has_copy = [&](std::uint32_t f) {
+    return std::ranges::any_of(faces_[f].corners, [&](std::uint32_t v) { return is_copy(vertices_[v].id); });
+  };
+  if (std::ranges::any_of(vertices_[one].faces, has_copy)) return true;
+  for (const auto near : mesh_->connectivity().vv_range(BoundedMesh::handle(vertices_[one].id))) {
+    if (is_copy(static_cast<std::uint32_t>(near.idx()))) return true;
+  }
+  return false;
+}
+
 bool Patch::can_flip(std::uint32_t face, int k, Flipped& flipped) const {
   const std::uint32_t other = faces_[face].across[k];
   if (other == kNone) return false;
@@ -173,10 +197,8 @@ bool Patch::can_flip(std::uint32_t face, int k, Flipped& flipped) const {
   const int b1 = k, a1 = (k + 1) % 3, c1 = (k + 2) % 3, a2 = j, b2 = (j + 1) % 3, d2 = (j + 2) % 3;
   const std::uint32_t a = first.corners[a1], b = first.corners[b1], c = first.corners[c1], d = second.corners[d2];
   if (c == d || (vertices_[a].pinned && vertices_[b].pinned) || joined_by_edge(c, d)) return false;
-  // The collapse or another flip of this patch may make an edge between copies of the two.
-  if (vertices_[c].joined && vertices_[d].joined) return false;
-  // Other sheets may meet this one in the edge.
-  if (vertices_[a].joined && vertices_[b].joined) return false;
+  if (may_be_joined_by_other(c, d)) return false;
+  if (may_be_joined_by_other(a, b)) return false;  // The sheets would meet there no more.
   if (first.wedges[a1] != second.wedges[a2] || first.wedges[b1] != second.wedges[b2]) return false;
   flipped = {{face, other},
              {{b, d, c}, {a, c, d}},

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <limits>
+#include <stdexcept>
 
 #include "base/call.h"
 #include "decimation/refinement/separation.h"
@@ -384,21 +385,20 @@ Box PatchTrial::carry_out(BoundedMesh& mesh) {
   const Box changed = around_ ? around_->follow(crossings_) : Box();
 
   const std::uint32_t kept = patch_.find_vertex(*change_.vertex());
-  [[maybe_unused]] bool possible = change_.prepare_collapse(change_.halfedge(), positions_[kept]);
-  assert(possible);
-  mesh.apply(change_);
+  const auto apply = [&](bool is_possible) {
+    if (!is_possible) throw std::logic_error("the mesh does not allow what its patch allowed");
+    mesh.apply(change_);
+  };
+  apply(change_.prepare_collapse(change_.halfedge(), positions_[kept]));
   const OpenMesh::TriConnectivity& connectivity = mesh.connectivity();
   for (const Patch::Flip& flip : patch_.flips()) {
     const Halfedge h = connectivity.find_halfedge(BoundedMesh::handle(flip.from), BoundedMesh::handle(flip.to));
-    possible = change_.prepare_flip(connectivity.edge_handle(h));
-    assert(possible);
-    mesh.apply(change_);
+    apply(h.is_valid() && change_.prepare_flip(connectivity.edge_handle(h)));
   }
   for (std::uint32_t v = 0; v < positions_.size(); ++v) {
     const std::uint32_t id = patch_.vertices()[v].id;
     if (!patch_.vertices()[v].free || v == kept || positions_[v].stored == mesh.stored(id)) continue;
-    change_.prepare_relocate(id, positions_[v]);
-    mesh.apply(change_);
+    apply(change_.prepare_relocate(id, positions_[v]));
   }
   return changed;
 }

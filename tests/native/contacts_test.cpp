@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The line of edges in which two closed sheets meet, each with vertices of its own: what a decimation may do to it.
+// The edges and points in which sheets meet, each with vertices of its own: what a decimation may do to them.
 #include <gtest/gtest.h>
+
+#include <random>
 
 #include "certified_mesh.h"
 #include "decimation/change.h"
@@ -83,6 +85,58 @@ TEST(ContactLine, IsNotFlippedAwayInAPatch) {
     }
   }
   EXPECT_GT(seen, 0u);
+}
+
+/// A plate with a fold, whose two sides touch in one point.
+CertifiedMesh folded() {
+  constexpr unsigned n = 8;
+  TriangleMesh plate = shapes::grid(n);
+  glm::dvec3 &left = plate.vertices[3 * (n + 1) + 4], &middle = plate.vertices[4 * (n + 1) + 4],
+             &right = plate.vertices[5 * (n + 1) + 4];
+  left = right = middle;
+  middle.z += 0.2;
+  return {plate, plate.vertices, 0.3};
+}
+
+/// Flips all edges of a patch that it lets flip, in an order that the generator gives, carries the collapse and the
+/// flips out, and returns whether the mesh allowed each of them.
+bool carry_out(BoundedMesh& mesh, Change& change, Patch& patch, std::mt19937& random) {
+  std::vector<std::uint32_t> faces;
+  for (std::uint32_t f = 0; f < patch.faces().size(); ++f) faces.push_back(f);
+  std::shuffle(faces.begin(), faces.end(), random);
+  for (const std::uint32_t f : faces) {
+    Patch::Flipped flipped;
+    for (int k = 0; k < 3; ++k) {
+      if (patch.can_flip(f, k, flipped)) patch.flip(flipped);
+    }
+  }
+  mesh.apply(change);
+  for (const Patch::Flip& flip : patch.flips()) {
+    const auto h = mesh.connectivity().find_halfedge(BoundedMesh::handle(flip.from), BoundedMesh::handle(flip.to));
+    if (!h.is_valid() || !change.prepare_flip(mesh.connectivity().edge_handle(h))) return false;
+    mesh.apply(change);
+  }
+  return true;
+}
+
+TEST(ContactPoint, AllowsInTheMeshWhatItAllowsInAPatch) {
+  std::size_t flips = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    std::mt19937 random(seed);
+    CertifiedMesh c = folded();
+    const OpenMesh::TriConnectivity& connectivity = c.mesh->connectivity();
+    Change change(*c.mesh);
+    Patch patch;
+    for (int step = 0; step < 20; ++step) {
+      const BoundedMesh::Halfedge h(static_cast<int>(random() % connectivity.n_halfedges()));
+      if (connectivity.status(connectivity.edge_handle(h)).deleted()) continue;
+      if (!change.prepare_collapse(h, c.mesh->vertex_position(c.mesh->to(h)))) continue;
+      if (!patch.gather(change, 2, true)) continue;
+      ASSERT_TRUE(carry_out(*c.mesh, change, patch, random)) << "seed " << seed << ", step " << step;
+      flips += patch.flips().size();
+    }
+  }
+  EXPECT_GT(flips, 10000u);
 }
 
 }  // namespace
