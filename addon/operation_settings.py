@@ -92,7 +92,7 @@ def decimate_settings(options=frozenset()):
         ),
         "crossings": EnumProperty(
             name="Crossings",
-            description="Whether faces may come to cross each other, for every operation except Fit and the guards",
+            description="Whether faces may come to cross each other, for every operation except the guards",
             items=(
                 (
                     "KEEP_OUT",

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Guard Lattice: the control points of a lattice stop where the mesh that its modifier deforms would leave the tolerance.
 
-The mesh is checked as the viewport shows it, with all modifiers: both ways if the object keeps both ways. If only
-lattices deform the mesh, its vertices move in a straight line while the control points do: along that line the guard
-looks for the farthest permitted position. It moves the control points there, and checks the mesh that results once more.
+The mesh is checked as the viewport shows it, with all modifiers: both ways if the object keeps both ways, and for crossings
+if they are kept out. If only lattices deform the mesh, its vertices move in a straight line while the control points do:
+along that line the guard looks for the farthest permitted position. It moves the control points there, and checks the mesh
+that results once more.
 """
 
 import time
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -15,6 +17,7 @@ from .. import native
 from ..mesh import mesh_io
 from ..shared import volumes
 from ..shared.errors import Refused
+from ..shared.proof import solidity
 from . import watch
 
 watches = watch.Watches()
@@ -51,6 +54,7 @@ class LatticeWatch(watch.Preparing):
         self._stopped = False
         self._built = None
         self._positions = self._points = self._proposed = None
+        self._crossing = None  # how many pairs of triangles cross in the first mesh that is kept
         try:
             reference, tolerance, matrix, threads = watch.needed(ob)
         except (Refused, native.module.TolvolError) as error:
@@ -59,6 +63,7 @@ class LatticeWatch(watch.Preparing):
         self._reference, self._tolerance = reference, tolerance
         self._options = {"to_world": matrix, "threads": threads, "progress": None}
         self.two_sided = ob.tolvol.keep == "BOTH"
+        self._keeps_crossings_out = ob.tolvol.guard.crossings
         self.begin(lambda progress: volumes.native_volume(reference, tolerance, threads, progress))
 
     def prepared(self, outcome):
@@ -105,24 +110,30 @@ class LatticeWatch(watch.Preparing):
     def _broken(self, positions, arrays):
         """Returns what is wrong with a mesh that has these positions, or None if the guard keeps it.
 
-        Faces of the reference may be beyond the tolerance if they are so for the first mesh that is inside.
+        Faces of the reference may be beyond the tolerance, and faces cross, as far as they do for the first mesh that is kept.
         """
         try:
             verdicts = self._built.check(positions, arrays.triangles, **self._options).verdicts
             outside = verdicts < native.module.Verdict.INSIDE
             if outside.any():
                 return f"{len(np.unique(arrays.polygons[outside])):,} faces of the deformed mesh are outside"
-            if not self.two_sided:
-                return None
-            uncovered = watch.uncovered_faces(
-                self._reference, positions, arrays.triangles, self._tolerance, self._options
-            )
+            if self.two_sided:
+                uncovered = watch.uncovered_faces(
+                    self._reference, positions, arrays.triangles, self._tolerance, self._options
+                )
+                if self.uncovered is None:
+                    self.uncovered = uncovered
+                if lost := np.count_nonzero(uncovered & ~self.uncovered):
+                    return watch.lost_reason(lost)
+            if self._keeps_crossings_out:
+                crossing = len(solidity.crossing_pairs(replace(arrays, vertices=positions), self._options["threads"]))
+                if self._crossing is None:
+                    self._crossing = crossing
+                if crossing > self._crossing:
+                    return f"Crossing pairs of faces: {solidity.pair_count(crossing)}, at first {self._crossing:,}"
         except native.module.TolvolError as error:  # for example, the mesh has become smaller than the tolerance
             return str(error)
-        if self.uncovered is None:
-            self.uncovered = uncovered
-        lost = np.count_nonzero(uncovered & ~self.uncovered)
-        return watch.lost_reason(lost) if lost else None
+        return None
 
     def _share(self, positions, arrays):
         inside, outside = 0.0, 1.0

@@ -268,26 +268,31 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         )
 
     def _proved(self, evaluation, parameter, trial, found):
-        """Returns (value, mesh, the result of certified()) for the first of the values whose mesh is proved to be within.
+        """Returns (value, mesh, the result of certified()) for the first of the values whose mesh is proved to be within
+        and, where crossings are kept out, has no more of them than before.
 
         It returns None if there is none, but a value at which the modifier removes no triangle.
         found: (number of triangles, or 0 if it is not known, value) of each, the one with the fewest triangles first.
         """
-        name = evaluation.modifier.name
-        for i, (triangles, value) in enumerate(found):
+        name, refused = evaluation.modifier.name, None
+        for triangles, value in found:
             self.part, self.doing = f"Proving {name}", f"{parameter.label} {value:.4g}"
             self.share, self.count = 0.0, f"{triangles:,} triangles" if triangles else ""
             setattr(evaluation.modifier, parameter.name, value)
             mesh = evaluation.new_mesh()
             try:
-                return value, mesh, (yield trial.certified(mesh_io.read_mesh(mesh)))
+                arrays = mesh_io.read_mesh(mesh)
+                if self.ob.tolvol.crossings == "KEEP_OUT":
+                    yield trial.uncrossed(arrays)
+                return value, mesh, (yield trial.certified(arrays))
             except BaseException as error:
                 bpy.data.meshes.remove(mesh)
-                if not isinstance(error, NotProved) or i + 1 == len(found) and not self._none_fewer:
+                if not isinstance(error, NotProved):
                     raise
+                refused = error
         if self._none_fewer:
             return None
-        raise Refused(f"No {parameter.label} of {name} keeps {self.ob.name} within the tolerance both ways")
+        raise refused or Refused(f"No {parameter.label} of {name} keeps {self.ob.name} within the tolerance both ways")
 
     def _plain(self, context, trial):
         """Returns how many triangles Decimate would leave with its default settings."""
@@ -376,6 +381,21 @@ class _Trial:
                 if largest > self.tolerance:
                     break
             return largest / self.tolerance
+
+        return work
+
+    def uncrossed(self, arrays):
+        """Returns work that raises NotProved if more pairs of faces cross than before: Blender's modifiers do not look for
+        them."""
+
+        def work(progress):
+            after = len(solidity.crossing_pairs(arrays, self.threads, progress))
+            before = solidity.facts(self.surface, self.threads, progress, again=False)["crossing_pairs"] if after else 0
+            if after > before:
+                raise NotProved(
+                    f"the number of crossing pairs of faces would be {solidity.pair_count(after)}, and is {before:,} now: "
+                    "press Decimate, which keeps crossings out, or set Crossings to Allow in its options"
+                )
 
         return work
 

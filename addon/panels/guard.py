@@ -24,10 +24,9 @@ class TOLVOL_PT_guard(SubPanel, bpy.types.Panel):
         settings = ob.tolvol.guard
         for setting in guard.MODULES:
             layout.prop(settings, setting)
-            if setting == "editing":
-                row = layout.row()
-                row.active = settings.sculpting or settings.editing
-                row.prop(settings, "crossings")
+        row = layout.row()
+        row.active = any(getattr(settings, setting) for setting in guard.MODULES)
+        row.prop(settings, "crossings")
         # The sentences are below all buttons, so that they move none.
         column, rows = layout.column(align=True), 0
         for setting, text, on in guard.states(ob):

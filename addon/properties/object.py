@@ -100,14 +100,14 @@ class TOLVOL_PG_guard(bpy.types.PropertyGroup):
         name="Editing",
         description="Stop vertices at the tolerance in Edit Mode, and undo edits of the faces that leave the tolerance",
     )
-    crossings: BoolProperty(
-        name="Keep Crossings Out",
-        description="While sculpting and editing, also stop vertices where faces would cross that did not cross when the "
-        "guard began, and undo edits that make more faces cross",
-    )
     lattice: BoolProperty(
         name="Lattice",
         description="Stop the control points of a lattice where the mesh that its modifier deforms would leave the tolerance",
+    )
+    crossings: BoolProperty(
+        name="Keep Crossings Out",
+        description="Also stop vertices and control points where faces would cross that did not cross when the guard began, "
+        "and undo edits that make more faces cross",
     )
 
 

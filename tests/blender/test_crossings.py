@@ -11,9 +11,10 @@ from mathutils import Matrix
 
 from addon import guard, native
 from addon.mesh import mesh_io
-from addon.proof import kept_warnings, last_run
-from addon.shared.proof import report
+from addon.proof import kept_warnings, last_run, verdict
+from addon.shared.proof import report, solidity
 from commands import decimate, save, succeeded, world
+from modified import modified
 from scenes import activate, add_object, link, sheet_arrays, world_triangles
 
 
@@ -123,9 +124,37 @@ def test_an_applied_modifier_makes_no_crossings_unless_they_are_allowed(choice):
     assert bool(pairs(world_triangles(ob))) == (choice == "ALLOW")
 
 
-def test_a_fitted_modifier_that_makes_faces_cross_says_so(capfd):
+def test_a_fit_passes_over_values_that_make_faces_cross():
+    ob = modified("DECIMATE")
+    before, seen = pairs(world_triangles(ob)), []
+    with pytest.MonkeyPatch.context() as patch:
+        crossing_pairs = solidity.crossing_pairs
+
+        def first_cross(arrays, *options):
+            seen.append(len(arrays.triangles))
+            return np.zeros((1, 2), np.int32) if len(seen) == 1 else crossing_pairs(arrays, *options)
+
+        patch.setattr(solidity, "crossing_pairs", first_cross)
+        assert bpy.ops.tolvol.fit_modifier() == {"FINISHED"}
+    left = world_triangles(ob)
+    assert seen[0] <= seen[1] and pairs(left) == before == 0 and verdict.of(ob).kind == verdict.WITHIN
+
+
+def test_a_fit_is_refused_where_all_values_make_faces_cross():
+    ob = wall("wall")
+    ob.modifiers.new("Collapse", "DECIMATE")
+    before = world_triangles(ob)[0].tobytes()
+    with pytest.raises(
+        RuntimeError, match="Not proved: the number of crossing pairs of faces would be [0-9,]+, and is 0"
+    ):
+        bpy.ops.tolvol.fit_modifier()
+    assert world_triangles(ob)[0].tobytes() == before and len(ob.modifiers) == 1
+
+
+def test_a_fitted_modifier_that_may_make_faces_cross_says_so(capfd):
     for result in ("REPLACE", "OBJECT"):
         ob = wall(result)
+        ob.tolvol.crossings = "ALLOW"
         ob.modifiers.new("Collapse", "DECIMATE")
         assert bpy.ops.tolvol.fit_modifier(result=result) == {"FINISHED"}
         fitted = bpy.context.active_object

@@ -11,7 +11,7 @@ from addon import guard, native
 from addon.mesh import mesh_io
 from addon.proof import verdict
 from addon.shared.surface import to_world
-from scenes import sheet
+from scenes import activate, add_object, sheet, sheet_arrays
 from test_guard import PLACED, TOLERANCE, coordinates, guarded, judged, state, updated
 
 # Editing ------------------------------------------------------------------------------------------------------------
@@ -280,6 +280,27 @@ def test_a_lattice_that_draws_the_border_in_stops_only_where_both_ways_are_kept(
     else:
         assert backward.lower > 5 * TOLERANCE
         assert state(ob)["lattice"] == ("Guarding one way", True)
+
+
+@pytest.mark.parametrize("crossings_out", [True, False])
+def test_a_lattice_that_exchanges_two_sheets_stops_only_where_crossings_are_kept_out(crossings_out):
+    vertices, quads = sheet_arrays(count=20, bumps=0.0)
+    above, below = vertices + np.float32([0, 0, 0.01]), vertices - np.float32([0, 0, 0.01])
+    ob = add_object("sheets", np.concatenate([below, above]), np.concatenate([quads, quads + len(vertices)]))
+    activate(ob)
+    lattice = caged(ob)
+    lattice.data.interpolation_type_w = "KEY_LINEAR"
+    bpy.context.view_layer.update()
+    ob.tolvol.guard.crossings = crossings_out
+    guarded(ob, "lattice", mode="OBJECT")
+    points = mesh_io.column(lattice.data.points, "co_deform", 3)
+    points[4, 2] += 3
+    points[13, 2] -= 3
+    place(lattice, points)
+    crossing = len(native.module.crossing_pairs(*deformed(ob)))
+    assert (crossing == 0) == crossings_out
+    said = "The lattice was stopped at the tolerance" if crossings_out else "Guarding both ways"
+    assert state(ob)["lattice"] == (said, True)
 
 
 def test_a_lattice_that_shrinks_the_mesh_to_a_point_stops_too():
