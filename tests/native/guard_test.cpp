@@ -341,6 +341,30 @@ TEST(Guard, FacesThatAreOutsideOrLeaveTheReferenceUncoveredAreNotTaken) {
   EXPECT_EQ(s.guard().replace_faces(twice), (std::vector<std::uint32_t>{1}));
 }
 
+TEST(Guard, ReplacedFacesPollOftenAndAreAsBeforeOnceCancelled) {
+  const unsigned n = 100;
+  Sculpture s(shapes::grid(n));
+  std::vector<std::uint32_t> otherwise;
+  for (unsigned i = 0; i < n; ++i) {
+    for (unsigned j = 0; j < n; ++j) {
+      const unsigned a = i * (n + 1) + j, b = a + n + 1;
+      otherwise.insert(otherwise.end(), {a, b, a + 1, b, b + 1, a + 1});
+    }
+  }
+  Guard guard = s.guard({.crossings = PullBack::Crossings::keep_out});
+  std::size_t polls = polls_of([&] { ASSERT_TRUE(guard.replace_faces(otherwise).empty()); });
+  EXPECT_GE(polls, 2 * n * n) << "each face is searched for crossings";
+  for (const std::size_t share : {10, 2}) {
+    const Counted cancelled(polls / share);
+    EXPECT_THROW(guard.replace_faces(s.faces()), Cancelled);
+  }
+  ASSERT_TRUE(guard.replace_faces(s.faces()).empty());
+  s.push((n / 2) * (n + 1) + n / 2, {0, 0, 1});
+  s.correct(guard.constrain(s.positions));
+  EXPECT_LE(s.deviation(), kTolerance);
+  EXPECT_GT(s.deviation(), 0.9 * kTolerance);
+}
+
 TEST(Guard, FacesThatTurnOverOrCrossAreNotTaken) {
   Sculpture s(square(0));
   const std::vector<std::uint32_t> turned{0, 2, 1, 0, 2, 3};
