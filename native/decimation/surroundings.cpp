@@ -36,18 +36,17 @@ void Surroundings::renew() {
 
 void Surroundings::renew(Team& team) {
   std::vector<std::uint32_t> alive;
-  std::vector<Corners> corners;
   std::vector<std::uint8_t> hubs;
   for (const std::uint32_t face : faces_) {
     poll_at(face);
     const bool is_fixed = face >= mesh_.connectivity().n_faces();
     if (!is_fixed && !mesh_.alive(face)) continue;
     alive.push_back(face);
-    corners.push_back(crossings_.corners(face));
     const auto faces_around = [&](std::uint32_t v) { return mesh_.faces_around(v); };
     hubs.push_back(is_fixed ? NearFaces::kNoHub : NearFaces::hub_of(mesh_.triangle(face), faces_around));
   }
-  near_ = NearFaces(alive, corners, hubs, team);
+  near_ = NearFaces(
+      alive, [&](std::size_t i) { return crossings_.corners(alive[i]); }, hubs, team);
 }
 
 /// The faces that get another shape. One that moves by nothing may still have another vertex for a corner.

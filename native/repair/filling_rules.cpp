@@ -34,13 +34,9 @@ FillingRules::FillingRules(const MeshView& mesh, std::vector<std::uint32_t> plac
 }
 
 void FillingRules::gather_faces(Team& team) {
-  std::vector<Corners> corners(mesh_.triangles.size());
-  for (std::uint32_t t = 0; t < corners.size(); ++t) {
-    poll_at(t);
-    corners[t] = mesh_.corners(t);
-  }
-  std::vector<std::uint32_t> faces(corners.size());
+  std::vector<std::uint32_t> faces(mesh_.triangles.size());
   std::iota(faces.begin(), faces.end(), 0u);
+  const auto corners = [&](std::size_t face) { return mesh_.corners(face); };
   faces_ = NearFaces(faces, corners, NearFaces::hubs_of(mesh_.triangles, mesh_.vertices.size()), team);
 }
 

@@ -12,13 +12,13 @@ namespace tolvol {
 namespace {
 
 /// Appends the pairs of face `i` and a higher one, in order.
-void append_pairs(std::uint32_t i, std::span<const Corners> corners, const NearFaces& near,
-                  std::vector<glm::uvec2>& pairs) {
+void append_pairs(std::uint32_t i, const MeshView& mesh, const NearFaces& near, std::vector<glm::uvec2>& pairs) {
   const auto before = static_cast<std::ptrdiff_t>(pairs.size());
+  const Corners own = mesh.corners(i);
   std::size_t seen = 0;
-  near.for_each_near(corners[i], [&](std::uint32_t j) {
+  near.for_each_near(own, [&](std::uint32_t j) {
     if (seen++ % 256 == 0) poll();
-    if (j > i && faces_cross(corners[i], corners[j])) pairs.emplace_back(i, j);
+    if (j > i && faces_cross(own, mesh.corners(j))) pairs.emplace_back(i, j);
     return true;
   });
   std::sort(pairs.begin() + before, pairs.end(), [](const glm::uvec2& a, const glm::uvec2& b) { return a.y < b.y; });
@@ -29,14 +29,10 @@ void append_pairs(std::uint32_t i, std::span<const Corners> corners, const NearF
 Crossings crossings(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, std::size_t most,
                     Team& team, Progress* progress) {
   const MeshView mesh{triangles, vertices};
-  std::vector<Corners> corners(triangles.size());
-  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
-    poll_at(i);
-    corners[i] = mesh.corners(i);
-  }
   std::vector<std::uint32_t> faces(triangles.size());
   std::iota(faces.begin(), faces.end(), 0u);
-  const NearFaces near(faces, corners, NearFaces::hubs_of(triangles, vertices.size()), team);
+  const NearFaces near(
+      faces, [&](std::size_t i) { return mesh.corners(i); }, NearFaces::hubs_of(triangles, vertices.size()), team);
   if (progress) progress->begin("finding crossings");
   Crossings found;
   // One face may cross all others: few faces are searched at once, and more only as long as they cross few.
@@ -50,7 +46,7 @@ Crossings crossings(std::span<const glm::dvec3> vertices, std::span<const glm::u
       std::vector<glm::uvec2>& pairs = of_block[begin / block];
       pairs.clear();
       for (std::size_t i = first + begin; i < first + end && pairs.size() <= more; ++i) {
-        append_pairs(static_cast<std::uint32_t>(i), corners, near, pairs);
+        append_pairs(static_cast<std::uint32_t>(i), mesh, near, pairs);
       }
     });
     for (std::size_t i = 0; i * block < count && found.complete; ++i) {

@@ -14,7 +14,7 @@ bool same(const Box& a, const Box& b) { return a.lower == b.lower && a.upper == 
 
 }  // namespace
 
-FaceTree::FaceTree(std::span<const std::uint32_t> faces, std::span<const Box> boxes, Team& team)
+FaceTree::FaceTree(std::span<const std::uint32_t> faces, const std::function<Box(std::size_t)>& box, Team& team)
     : faces_(faces.begin(), faces.end()), place_(faces.size()) {
   if (faces.empty()) return;
   struct Entry {
@@ -24,7 +24,8 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, std::span<const Box> bo
   std::vector<Entry> entries(faces.size());
   for (std::uint32_t i = 0; i < entries.size(); ++i) {
     poll_at(i);
-    entries[i] = {0.5 * boxes[i].lower + 0.5 * boxes[i].upper, i};
+    const Box of_face = box(i);
+    entries[i] = {0.5 * of_face.lower + 0.5 * of_face.upper, i};
   }
   leaves_ = std::bit_ceil((entries.size() + kLeaf - 1) / kLeaf);
   // Level by level, each range of entries is cut in two at the median along the longest side of its centres' box.
@@ -36,9 +37,9 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, std::span<const Box> bo
       const std::span range(entries.begin() + static_cast<std::ptrdiff_t>(border[i]),
                             entries.begin() + static_cast<std::ptrdiff_t>(border[i + 1]));
       next[2 * i] = border[i], next[2 * i + 1] = border[i] + range.size() / 2;
-      Box box;
-      for (const Entry& e : range) box.add(e.centre);
-      const glm::dvec3 size = box.upper - box.lower;
+      Box centres;
+      for (const Entry& e : range) centres.add(e.centre);
+      const glm::dvec3 size = centres.upper - centres.lower;
       const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
       std::nth_element(range.begin(), range.begin() + static_cast<std::ptrdiff_t>(range.size() / 2), range.end(),
                        [axis](const Entry& a, const Entry& b) {
@@ -55,7 +56,7 @@ FaceTree::FaceTree(std::span<const std::uint32_t> faces, std::span<const Box> bo
     poll_at(leaf);
     for (std::size_t i = border[leaf], slot = leaf * kLeaf; i < border[leaf + 1]; ++i, ++slot) {
       const std::uint32_t index = entries[i].index;
-      slots_[slot] = {boxes[index], faces[index]};
+      slots_[slot] = {box(index), faces[index]};
       place_[index] = static_cast<std::uint32_t>(slot);
     }
     fit_leaf(leaf);

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -20,7 +21,11 @@ class FaceTree {
   FaceTree() = default;
   /// `faces` are the numbers of the faces, in rising order, and `boxes` their boxes. O(n log n), about 0.2 us and 120
   /// bytes a face.
-  FaceTree(std::span<const std::uint32_t> faces, std::span<const Box> boxes, Team& team);
+  FaceTree(std::span<const std::uint32_t> faces, std::span<const Box> boxes, Team& team)
+      : FaceTree(
+            faces, [boxes](std::size_t i) { return boxes[i]; }, team) {}
+  /// The same with box(i) for the box of faces[i], which is asked for twice.
+  FaceTree(std::span<const std::uint32_t> faces, const std::function<Box(std::size_t)>& box, Team& team);
 
   /// Gives a face of the constructor's another box; an empty one removes the face. O(log n).
   void change(std::uint32_t face, const Box& box);

@@ -54,13 +54,11 @@ void InputCrossings::keep_crossing(std::vector<std::uint32_t>& faces) const {
   std::call_once(states_ready_, [&] {
     std::vector<std::uint32_t> all(face_count());
     std::iota(all.begin(), all.end(), 0u);
-    std::vector<Corners> places;
-    places.reserve(all.size());
-    for (const std::uint32_t face : all) places.push_back(corners(face));
     std::vector<std::uint8_t> hubs = NearFaces::hubs_of(input_.triangles, input_.vertices.size());
     if (!hubs.empty()) hubs.resize(all.size(), NearFaces::kNoHub);
     Team alone(1);
-    near_ = NearFaces(all, places, hubs, alone);
+    near_ = NearFaces(
+        all, [&](std::size_t i) { return corners(all[i]); }, hubs, alone);
     state_ = std::vector<std::atomic<std::uint8_t>>(all.size());
   });
   std::erase_if(faces, [&](std::uint32_t face) {

@@ -25,15 +25,11 @@ std::vector<std::uint8_t> NearFaces::hubs_of(std::span<const glm::uvec3> triangl
   return hubs;
 }
 
-NearFaces::NearFaces(std::span<const std::uint32_t> faces, std::span<const Corners> corners,
+NearFaces::NearFaces(std::span<const std::uint32_t> faces, const std::function<Corners(std::size_t)>& corners,
                      std::span<const std::uint8_t> hubs, Team& team) {
-  std::vector<Box> boxes(faces.size());
-  for (std::size_t i = 0; i < faces.size(); ++i) {
-    poll_at(i);
-    boxes[i] = box_of(corners[i]);
-  }
   if (std::ranges::all_of(hubs, [](std::uint8_t corner) { return corner == kNoHub; })) {
-    others_ = FaceTree(faces, boxes, team);
+    others_ = FaceTree(
+        faces, [&](std::size_t i) { return box_of(corners(i)); }, team);
     return;
   }
   struct Group {
@@ -49,10 +45,12 @@ NearFaces::NearFaces(std::span<const std::uint32_t> faces, std::span<const Corne
   std::vector<Group*> group_of(faces.size(), &rest);
   for (std::size_t i = 0; i < faces.size(); ++i) {
     poll_at(i);
-    if (hubs[i] != kNoHub) group_of[i] = &groups.try_emplace(corners[i][hubs[i]], Group{0}).first->second;
+    corners_.push_back(corners(i));
+    const Corners& own = corners_.back();
+    if (hubs[i] != kNoHub) group_of[i] = &groups.try_emplace(own[hubs[i]], Group{0}).first->second;
     group_of[i]->faces.push_back(faces[i]);
-    group_of[i]->rims.push_back(hubs[i] == kNoHub ? boxes[i] : rim_of(corners[i], corners[i][hubs[i]]));
-    if (hubs[i] != kNoHub) group_of[i]->directions.push_back(directions_of(corners[i], corners[i][hubs[i]]));
+    group_of[i]->rims.push_back(hubs[i] == kNoHub ? box_of(own) : rim_of(own, own[hubs[i]]));
+    if (hubs[i] != kNoHub) group_of[i]->directions.push_back(directions_of(own, own[hubs[i]]));
   }
   for (auto& [hub, group] : groups) {
     group.number = static_cast<std::uint32_t>(crowds_.size());
@@ -68,7 +66,6 @@ NearFaces::NearFaces(std::span<const std::uint32_t> faces, std::span<const Corne
   rest.number = static_cast<std::uint32_t>(crowds_.size());
   others_ = FaceTree(rest.faces, rest.rims, team);
   faces_.assign(faces.begin(), faces.end());
-  corners_.assign(corners.begin(), corners.end());
   is_gone_.assign(faces.size(), false);
   for (const Group* const group : group_of) crowd_of_.push_back(group->number);
 }

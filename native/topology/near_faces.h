@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <glm/glm.hpp>
 #include <span>
 #include <vector>
@@ -27,11 +28,11 @@ class NearFaces {
   static constexpr std::uint8_t kNoHub = 3;
 
   NearFaces() = default;
-  /// `faces` are the numbers of the faces, in rising order, and `corners` their corners. `hubs` has for each the corner
-  /// that is a hub, or kNoHub; if none has one it may be empty. Which corners count as hubs decides about time alone.
-  /// O(n log n), as a FaceTree, and twice as much for faces at hubs.
-  NearFaces(std::span<const std::uint32_t> faces, std::span<const Corners> corners, std::span<const std::uint8_t> hubs,
-            Team& team);
+  /// `faces` are the numbers of the faces, in rising order, and corners(i) are the corners of faces[i]. `hubs` has for
+  /// each the corner that is a hub, or kNoHub; if none has one it may be empty. Which corners count as hubs decides
+  /// about time alone. O(n log n), as a FaceTree, and twice as much for faces at hubs.
+  NearFaces(std::span<const std::uint32_t> faces, const std::function<Corners(std::size_t)>& corners,
+            std::span<const std::uint8_t> hubs, Team& team);
 
   /// The corner of a triangle that is a hub, the one with the most faces, or kNoHub. `faces_at` tells how many faces a
   /// vertex has.

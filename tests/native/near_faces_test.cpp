@@ -42,7 +42,9 @@ struct Faces {
       corners.push_back({mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]});
     }
     Team team(1);
-    near = NearFaces(numbers, corners, NearFaces::hubs_of(mesh.triangles, mesh.vertices.size()), team);
+    near = NearFaces(
+        numbers, [&](std::size_t i) { return corners[i]; }, NearFaces::hubs_of(mesh.triangles, mesh.vertices.size()),
+        team);
   }
   std::vector<std::uint32_t> found(const Corners& own) const {
     std::vector<std::uint32_t> faces;

@@ -31,10 +31,8 @@ struct Scene {
   NearFaces near() const {
     std::vector<std::uint32_t> faces(crossings.face_count());
     std::iota(faces.begin(), faces.end(), 0u);
-    std::vector<Corners> corners;
-    for (const std::uint32_t face : faces) corners.push_back(crossings.corners(face));
     Team alone(1);
-    return {faces, corners, {}, alone};
+    return {faces, [&](std::size_t i) { return crossings.corners(faces[i]); }, {}, alone};
   }
   bool none(const std::vector<Face>& faces, const std::vector<Removed>& removed = {}) {
     return crossings.none(near(), faces, removed, trial);
