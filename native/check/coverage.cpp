@@ -109,19 +109,31 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
     const Part piece = stack.back();
     stack.pop_back();
     const auto& c = piece.corners;
-    const Hierarchy::Common common = hierarchy.common(c, provable, -1, hint);
-    if (common.triangle != Hierarchy::kNone) {
-      hint = common.triangle;
-      const std::uint32_t element = ids[common.triangle];
-      if (element == kNone) continue;
+    const auto take = [&](std::uint32_t witness, double distance) {
+      hint = witness;
+      const std::uint32_t element = ids[witness];
+      if (element == kNone) return;
       List& list = lists_[element];
-      list.distance = std::max(list.distance, common.distance);
+      list.distance = std::max(list.distance, distance);
       list.pieces.push_back(piece);
       if (piece.cuts > 0) ++split_into_[triangle];
+    };
+    const Hierarchy::Common common = hierarchy.common(c, provable, -1, hint);
+    if (common.triangle != Hierarchy::kNone) {
+      take(common.triangle, common.distance);
       continue;
     }
     const glm::dvec3 centre = (c[0] + c[1] + c[2]) * (1.0 / 3);
     const Hierarchy::Nearest closest = hierarchy.nearest(centre, std::numeric_limits<double>::infinity(), hint);
+    const glm::uvec3& t = mesh.triangles[closest.triangle];
+    const WitnessTriangle below{mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]};
+    // The search may have missed it at a vertex of very many faces.
+    double d2[4];
+    witness_distances(below, with_centre(piece), d2);
+    if (const double distance = std::sqrt(std::max({d2[0], d2[1], d2[2]})); distance <= provable) {
+      take(closest.triangle, distance);
+      continue;
+    }
     const double radius =
         std::sqrt(std::max({glm::dot(c[0] - centre, c[0] - centre), glm::dot(c[1] - centre, c[1] - centre),
                             glm::dot(c[2] - centre, c[2] - centre)}));
@@ -135,10 +147,8 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
       uncovered.nearest.push_back(closest.triangle);
       if (!(split_into_[triangle] & kNeverWhole)) uncovered.triangles.push_back(triangle);
       split_into_[triangle] |= kNeverWhole;
-    } else {
-      const glm::uvec3& t = mesh.triangles[closest.triangle];
-      const WitnessTriangle below{mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]};
-      if (!cut(piece, below, kWorthCutting * limit_, stack)) split(piece, stack);
+    } else if (!cut(piece, below, kWorthCutting * limit_, stack)) {
+      split(piece, stack);
     }
   }
 }
