@@ -61,7 +61,8 @@ def mesh_blocked(ob, modes=_OBJECT_MODE):
         return f"The mesh {mesh.name} is linked from another file: Object > Relations > Make Local > All"
     users = mesh.users - mesh.use_fake_user
     if users > 1:
-        return f"The mesh {mesh.name} has {users} users: Object > Relations > Make Single User > Object & Data"
+        # The number comes first: one line of a narrow panel shows no more than the beginning.
+        return f"{users} users share the mesh {mesh.name}: Object > Relations > Make Single User > Object & Data"
     return None
 
 

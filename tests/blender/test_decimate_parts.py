@@ -308,7 +308,7 @@ def test_one_that_cannot_be_done_leaves_all_as_they_are(monkeypatch):
     objects = three()
     other = bpy.data.objects.new("user", objects[1].data)
     bpy.context.collection.objects.link(other)
-    refused("b: The mesh b has 2 users")
+    refused("b: 2 users share the mesh b:")
     bpy.data.objects.remove(other)
 
     enter = transfer.Writing.__enter__

@@ -306,7 +306,7 @@ def test_what_is_in_the_way_of_the_original_is_said():
     assert original.restore_blocked(ob) is None
     twin = ob.copy()
     bpy.context.collection.objects.link(twin)
-    assert "has 2 users" in original.restore_blocked(ob)
+    assert "2 users share the mesh" in original.restore_blocked(ob)
     bpy.data.objects.remove(twin)
     bpy.ops.object.mode_set(mode="EDIT")
     assert original.restore_blocked(ob) == "Switch to Object Mode"

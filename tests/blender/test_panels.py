@@ -106,7 +106,7 @@ def test_the_panel_has_one_line_for_what_is_in_the_way_and_notes_the_whole_sente
     with_reference(ob)
     assert status(ob)[0] == ("2,304 triangles", GREEN)
     twin = ob.copy()
-    said = f"The mesh {ob.data.name} has 2 users: Object > Relations > Make Single User > Object & Data"
+    said = f"2 users share the mesh {ob.data.name}: Object > Relations > Make Single User > Object & Data"
     (line, sentences) = status(ob)
     assert line == (said, AMBER) and said in sentences
     bpy.data.objects.remove(twin)
@@ -120,6 +120,15 @@ def test_the_panel_has_one_line_for_what_is_in_the_way_and_notes_the_whole_sente
     ob.scale.x = 0
     bpy.context.view_layer.update()
     assert status(ob)[0][1] == RED
+
+
+def test_the_line_begins_with_what_is_in_the_way_where_it_is_cut():
+    ob = torus()
+    ob.data.name = "Icosphere.003 of a scan with a long name"
+    twin = ob.copy()
+    layout = drawn(panels.TOLVOL_PT_tolerance, sidebar(230), _other_form=lambda _context, _ob: "")
+    assert layout.labels()[-1] == ("2 users share the mesh\u2026", AMBER)
+    bpy.data.objects.remove(twin)
 
 
 def test_no_sentence_stands_between_or_above_buttons():

@@ -31,7 +31,7 @@ def test_multi_user_mesh_is_refused_with_the_remedy():
     link(bpy.data.objects.new("twin", ob.data))
     activate(ob)
     before = stored(ob)
-    refused("has 2 users.*Make Single User")
+    refused("2 users share the mesh.*Make Single User")
     assert stored(ob) == before
     ob.data = ob.data.copy()
     assert bpy.ops.tolvol.decimate() == {"FINISHED"}
