@@ -45,7 +45,11 @@ def reference_blocked(ob, modes=_OBJECT_MODE):
 
 def check_blocked(ob, modes=_OBJECT_MODE):
     """Why `ob` cannot be compared with its reference now, or None."""
-    if reason := object_blocked(ob, modes) or snapshots.reference_missing(ob):
+    if reason := object_blocked(ob, modes):
+        return reason
+    if ob.tolvol.snapshot is None and (reason := reference_blocked(ob, modes)):
+        return reason  # Without it, "Set the reference first" would point at a greyed button.
+    if reason := snapshots.reference_missing(ob):
         return reason
     if not ob.data.polygons:
         return f"{ob.name} has no faces"

@@ -188,6 +188,15 @@ def test_not_checked_says_what_is_in_the_way_of_check():
     assert why_not_checked() == "torus has no faces" and not bpy.ops.tolvol.check.poll()
 
 
+def test_not_checked_asks_for_no_reference_that_cannot_be_set():
+    ob = torus()
+    ob.tolvol.reference_kind = "OBJECT"
+    assert why_not_checked() == "Choose the reference object" and not bpy.ops.tolvol.set_reference.poll()
+    ob.tolvol.reference_kind = "SELF"
+    ob.data.clear_geometry()
+    assert why_not_checked() == "torus has no faces" and not bpy.ops.tolvol.set_reference.poll()
+
+
 # Greyed buttons ------------------------------------------------------------------------------------------------------
 
 
