@@ -289,6 +289,15 @@ ways, and apply the modifier to the base mesh. An object without a reference get
                 bpy.data.meshes.remove(mesh)
                 if not isinstance(error, NotProved):
                     raise
+                if i + 1 < len(found):
+                    continue
+                if self.progress.finishing:
+                    raise Refused(
+                        f"The search was ended before a {parameter.label} of {name} was proved to keep {self.ob.name} within "
+                        "the tolerance both ways. Nothing was changed: let it go on for longer"
+                    ) from error
+                if not self._none_fewer:
+                    raise
                 refused = error
         if self._none_fewer:
             return None

@@ -149,6 +149,25 @@ def test_a_search_that_is_ended_keeps_the_best_so_far(monkeypatch):
     assert not any("Decimate leaves" in warning for warning in kept_warnings.of(ob)[0])
 
 
+def test_a_search_that_is_ended_before_a_value_is_proved_says_that_nothing_was_changed(monkeypatch):
+    ob = modified("DECIMATE")
+    before, advance = world_triangles(ob), Run.advance
+
+    def until_one_is_within(run):
+        if run._job is not None and run.operator.improving():
+            run.progress.finish()
+        return advance(run)
+
+    def beyond(_progress):
+        raise NotProved("beyond")
+
+    monkeypatch.setattr(Run, "advance", until_one_is_within)
+    monkeypatch.setattr(modifiers._Trial, "certified", lambda *_: beyond)
+    proved = "before a Ratio of DECIMATE was proved to keep DECIMATE within the tolerance both ways"
+    refused(f"The search was ended {proved}. Nothing was changed: let it go on for longer", bpy.ops.tolvol.fit_modifier)
+    assert ob.tolvol.snapshot is None and ob.modifiers and (world_triangles(ob)[1] == before[1]).all()
+
+
 def test_a_search_says_how_many_of_its_values_are_tried(monkeypatch):
     modified("DECIMATE")
     told, work = [], Run._next_work
