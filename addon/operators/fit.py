@@ -99,6 +99,21 @@ def search(first, last, most=_MOST_VALUES):
     return best
 
 
+def onward(values, last):
+    """A generator of values beyond all of `values` towards `last`, the end of the range with the most triangles, with which it
+    ends. The steps begin as small as what is known of the limit, and double, so that few values lead to the end."""
+    if not values:
+        return
+    end, step = math.log(last), _CLOSE
+    left = min((math.log(value) - end for value in values), key=abs)
+    while abs(left) > step:
+        left -= math.copysign(step, left)
+        step *= 2
+        yield math.exp(end + left)
+    if left:
+        yield last
+
+
 @dataclass(frozen=True)
 class Parameter:
     """The parameter of a modifier that is searched, with its range."""

@@ -229,8 +229,8 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         return bool(self._found) and not self.progress.finishing
 
     def _search(self, evaluation, parameter, trial):
-        """Finds the values at which no sample is beyond the tolerance. Remesh makes new faces, which may be wanted even if they
-        are more than before; a value at which another modifier removes no triangle is left out."""
+        """Finds the values at which no sample is beyond the tolerance. One at which the modifier removes no triangle is left out
+        unless it _counts()."""
         name, triangles = evaluation.modifier.name, len(trial.surface.arrays.triangles)
         most, tried = fit.most_values(triangles), 0
         search, deviation = fit.search(parameter.first, parameter.last, most), None
@@ -246,7 +246,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             deviation = yield trial.measured(arrays)
             if deviation > 1:
                 continue
-            if len(arrays.triangles) < triangles or evaluation.modifier.type == "REMESH":
+            if self._counts(evaluation, trial, len(arrays.triangles)):
                 self._found.append((len(arrays.triangles), value))
                 self.count = f"{min(self._found)[0]:,} triangles so far"
             else:
@@ -271,37 +271,53 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         """Returns (value, mesh, the result of certified()) for the first of the values whose mesh is proved to be within
         and, where crossings are kept out, has no more of them than before.
 
-        It returns None if there is none, but a value at which the modifier removes no triangle.
+        Samples may miss the largest deviation of all values that the search has found. Values with more triangles then follow,
+        in growing steps. It returns None if no value is proved at which the modifier removes a triangle.
         found: (number of triangles, or 0 if it is not known, value) of each, the one with the fewest triangles first.
         """
-        name, refused = evaluation.modifier.name, None
         for triangles, value in found:
-            self.part, self.doing = f"Proving {name}", f"{parameter.label} {value:.4g}"
-            self.share, self.count = 0.0, f"{triangles:,} triangles" if triangles else ""
-            setattr(evaluation.modifier, parameter.name, value)
-            mesh = evaluation.new_mesh()
             try:
-                arrays = mesh_io.read_mesh(mesh)
-                if self.ob.tolvol.crossings == "KEEP_OUT":
-                    yield trial.uncrossed(arrays)
-                return value, mesh, (yield trial.certified(arrays))
-            except BaseException as error:
-                bpy.data.meshes.remove(mesh)
-                if not isinstance(error, NotProved):
+                return (yield from self._proof(evaluation, parameter, trial, value, triangles))
+            except NotProved:
+                if self.value:
                     raise
-                if i + 1 < len(found):
-                    continue
-                if self.progress.finishing:
-                    raise Refused(
-                        f"The search was ended before a {parameter.label} of {name} was proved to keep {self.ob.name} within "
-                        "the tolerance both ways. Nothing was changed: let it go on for longer"
-                    ) from error
-                if not self._none_fewer:
-                    raise
-                refused = error
+        for value in fit.onward([value for _, value in found], parameter.last):
+            try:
+                proved = yield from self._proof(evaluation, parameter, trial, value)
+            except NotProved:
+                continue
+            if self._counts(evaluation, trial, trial.left):
+                return proved
+            bpy.data.meshes.remove(proved[1])
+            self._none_fewer = True
+            break
+        name, ob = evaluation.modifier.name, self.ob.name
+        if self.progress.finishing:
+            raise Refused(
+                f"The search was ended before a {parameter.label} of {name} was proved to keep {ob} within the tolerance both "
+                "ways. Nothing was changed: let it go on for longer"
+            )
         if self._none_fewer:
             return None
-        raise refused or Refused(f"No {parameter.label} of {name} keeps {self.ob.name} within the tolerance both ways")
+        raise Refused(f"No {parameter.label} of {name} keeps {ob} within the tolerance both ways")
+
+    def _proof(self, evaluation, parameter, trial, value, triangles=0):
+        """Returns (value, mesh, the result of certified()) for a value. It raises NotProved if that fails."""
+        self.part, self.doing = f"Proving {evaluation.modifier.name}", f"{parameter.label} {value:.4g}"
+        self.share, self.count = 0.0, f"{triangles:,} triangles" if triangles else ""
+        setattr(evaluation.modifier, parameter.name, value)
+        mesh = evaluation.new_mesh()
+        try:
+            return value, mesh, (yield trial.certified(mesh_io.read_mesh(mesh)))
+        except BaseException:
+            bpy.data.meshes.remove(mesh)
+            raise
+
+    @staticmethod
+    def _counts(evaluation, trial, triangles):
+        """Whether a value that leaves so many triangles is wanted. Remesh makes new faces, which may be wanted even if they are
+        more than before."""
+        return triangles < len(trial.surface.arrays.triangles) or evaluation.modifier.type == "REMESH"
 
     def _plain(self, context, trial):
         """Returns how many triangles Decimate would leave with its default settings."""

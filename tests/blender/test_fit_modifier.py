@@ -121,12 +121,53 @@ def test_a_mesh_of_which_only_the_proof_shows_that_it_is_beyond_is_passed_over(m
         assert native.module.directed_hausdorff(*pair[0], *pair[1], bound=tolerance).upper <= tolerance
 
 
+def nothing_is_proved(monkeypatch):
+    def beyond(_progress):
+        raise NotProved("beyond")
+
+    monkeypatch.setattr(modifiers._Trial, "certified", lambda *_: beyond)
+
+
 def test_a_fit_of_which_no_value_is_proved_changes_nothing(monkeypatch):
     ob = modified("DECIMATE")
+    nothing_is_proved(monkeypatch)
+    refused("No Ratio of DECIMATE keeps DECIMATE within the tolerance both ways$", bpy.ops.tolvol.fit_modifier)
+    # With these samples the search finds values at which the modifier removes no triangle.
     monkeypatch.setattr(modifiers.measure, "sampled_distance", lambda points, *_: 0.0 if len(points) > 500 else 9.0)
     none = "No Ratio of DECIMATE leaves fewer than the 1,024 triangles of DECIMATE within the tolerance"
     refused(f"{none}. Take a larger tolerance, or press Decimate, which leaves 168$", bpy.ops.tolvol.fit_modifier)
     assert ob.tolvol.snapshot is None
+
+
+def test_a_value_is_found_if_samples_miss_the_largest_deviation_of_all_that_the_search_has_found(monkeypatch):
+    ob = modified("DECIMATE")
+    reference, tolerance = world_triangles(ob), 0.01 * snapshots.surface_of(ob).size()
+    proofs, measured, certified = [], modifiers._Trial.measured, modifiers._Trial.certified
+
+    def half_of_it(trial, arrays):
+        work = measured(trial, arrays)
+        return lambda progress: work(progress) / 2
+
+    def noted(trial, arrays):
+        proofs.append(len(arrays.triangles))
+        return certified(trial, arrays)
+
+    monkeypatch.setattr(modifiers._Trial, "measured", half_of_it)
+    monkeypatch.setattr(modifiers._Trial, "certified", noted)
+    assert bpy.ops.tolvol.fit_modifier() == {"FINISHED"}
+    now = world_triangles(ob)
+    assert len(proofs) > 2 and len(now[1]) == max(proofs) < len(reference[1])
+    for pair in ((now, reference), (reference, now)):
+        assert native.module.directed_hausdorff(*pair[0], *pair[1], bound=tolerance).upper <= tolerance
+
+
+def test_the_values_onward_go_to_the_end_in_growing_steps():
+    for first, last in ((0.1, 1.0), (2.0, 0.001)):
+        values = list(fit.onward([(first * last) ** 0.5, first], last))
+        assert values[-1] == last and len(values) < 9
+        steps = np.abs(np.diff(np.log([(first * last) ** 0.5, *values])))
+        assert (np.diff(steps[:-1]) > 0).all() and steps[0] < 0.1
+    assert list(fit.onward([1.0], 1.0)) == list(fit.onward([], 1.0)) == []
 
 
 def test_a_search_that_is_ended_keeps_the_best_so_far(monkeypatch):
@@ -158,11 +199,8 @@ def test_a_search_that_is_ended_before_a_value_is_proved_says_that_nothing_was_c
             run.progress.finish()
         return advance(run)
 
-    def beyond(_progress):
-        raise NotProved("beyond")
-
     monkeypatch.setattr(Run, "advance", until_one_is_within)
-    monkeypatch.setattr(modifiers._Trial, "certified", lambda *_: beyond)
+    nothing_is_proved(monkeypatch)
     proved = "before a Ratio of DECIMATE was proved to keep DECIMATE within the tolerance both ways"
     refused(f"The search was ended {proved}. Nothing was changed: let it go on for longer", bpy.ops.tolvol.fit_modifier)
     assert ob.tolvol.snapshot is None and ob.modifiers and (world_triangles(ob)[1] == before[1]).all()
