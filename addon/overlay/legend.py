@@ -25,6 +25,8 @@ _GAP, _MARGIN = 10, 14
 _STRIPE = 12
 # The line with the verdict is so high, and the coloured square beside the verdict so wide.
 _WORD, _MARK = 30, 16
+# The heading makes the legend at most so wide. The name of an object in it may have 63 letters.
+_HEADING = 240
 # The legend has room in a view of which it takes at most these shares of the width and the height.
 _MOST_WIDTH, _MOST_HEIGHT = 0.5, 0.75
 # The colours of Blender's icons in the panel. The word beside them says the same without colours.
@@ -93,9 +95,19 @@ def width_of(text):
     return blf.dimensions(_FONT, text)[0]
 
 
+def shortened(text, room):
+    """Returns as many letters of a text as fit with an ellipsis behind them, or the whole text if that fits."""
+    if width_of(text) <= room:
+        return text
+    while text and width_of(f"{text}\u2026") > room:
+        text = text[:-1].rstrip()
+    return f"{text}\u2026"
+
+
 def draw(context, heading, note, word, of, colours, shares, palette):
     """Draws the legend.
 
+    heading: the top line. If it is long, its end is left out.
     note: the lowest line.
     word: the verdict, in large letters on top; of: what the verdict is of, beside it, if it is not of what is coloured.
     colours: the Scale.
@@ -116,7 +128,7 @@ def draw(context, heading, note, word, of, colours, shares, palette):
         label_width = max([width_of(text) for _, text in labels] + [width_of("Outside")])
         share_width = max(width_of(text) for text in [*texts, "88.8 %"])
         columns = bins_width + bar_width + label_width + share_width + 2 * gap
-        width = max(columns, width_of(heading), width_of(note)) + 2 * gap
+        width = max(columns, min(width_of(heading), _HEADING * scale), width_of(note)) + 2 * gap
         width = max(width, page.width(word, _LARGE) + _MARK * scale + 3 * gap + (width_of(of) + gap if of else 0))
         height = 3 * row + _WORD * scale + bar_height + 4 * gap
         place = _place(context, width, height, scale)
@@ -145,7 +157,7 @@ def draw(context, heading, note, word, of, colours, shares, palette):
     for i, text in enumerate(rows):
         page.text(right - width_of(text), y + (i + 0.5) / len(rows) * bar_height, text, faint=True)
     top = bottom + height - gap
-    page.text(left + gap, top - row / 2, heading)
+    page.text(left + gap, top - row / 2, shortened(heading, width - 2 * gap))
     at, mark = top - row - _WORD * scale / 2, _MARK * scale
     page.rectangle(left + gap, at - mark / 2, mark, mark, shaders.FLAT, (*_COLOURS[word], 1))
     page.text(left + mark + 2 * gap, at, word, points=_LARGE)

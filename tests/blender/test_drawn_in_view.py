@@ -59,10 +59,10 @@ def page(monkeypatch):
 # The legend ----------------------------------------------------------------------------------------------------------
 
 
-def draw_legend(context, histogram):
+def draw_legend(context, histogram, name="torus"):
     scale = Scale(0.01, True, 0.01, 0)
     shares = Shares([0.25] * scale.counted, 0.0, histogram, 1.0)
-    legend.draw(context, "Deviation of torus", "Colours not proved", PASS, "", scale, shares, "SAFE")
+    legend.draw(context, f"Deviation of {name}", "Colours not proved", PASS, "", scale, shares, "SAFE")
 
 
 def test_the_histogram_has_a_bar_for_each_bin_at_its_height(page):
@@ -76,6 +76,18 @@ def test_the_histogram_has_a_bar_for_each_bin_at_its_height(page):
     assert all(bar[0] + bar[2] == pytest.approx(x - 2) for bar in bars)
     longest = legend._BINS_WIDTH - 2
     assert [bar[2] for bar in bars] == pytest.approx([longest, longest / 2, 1, longest / 5])
+
+
+def test_a_long_name_of_an_object_does_not_make_the_legend_wide(page):
+    for name, drawn in (("a part", "Deviation of a part"), ("p" * 63, f"Deviation of {'p' * 22}\u2026")):
+        page.texts.clear()
+        draw_legend(view(), [1.0], name)
+        assert drawn in page.texts
+        assert legend.box(view().region)[2] <= legend._HEADING + 2 * legend._GAP
+    # A view that has no room for the whole name has room for the legend.
+    page.texts.clear()
+    draw_legend(view(width=600), [1.0], "p" * 63)
+    assert len(page.texts) > 1
 
 
 def test_a_note_without_room_is_the_word_alone(page):
