@@ -44,6 +44,8 @@ def tell(operator, progress, clock):
         stage, share, count = operator.doing, operator.share, operator.count
     else:
         stage, share = progress.stage.capitalize() or "Preparing", progress.fraction
+        if progress.finishing and progress.stage == "refining":
+            stage = "Ending"  # Esc was pressed: who still read Refining would press it again.
         # In these two stages the count is the number of triangles left.
         counts = progress.count and progress.stage in {"decimating", "refining"}
         count = f"{progress.count:,} triangles left" if counts else ""
@@ -56,7 +58,7 @@ def tell(operator, progress, clock):
         share or None,
         f"{_duration(left)} left" if left is not None else "",
         count,
-        "Keep Present Result" if operator.improving() else "Cancel",
+        "Keep Present Result" if operator.improving() else "Discard Result" if progress.finishing else "Cancel",
     )
 
 

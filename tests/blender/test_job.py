@@ -312,7 +312,7 @@ def test_a_second_job_waits_for_the_first(waiting):
 
 
 class Progress:
-    stage, fraction, count, cancelled = "decimating", 0.0, 0, False
+    stage, fraction, count, cancelled, finishing = "decimating", 0.0, 0, False, False
 
 
 def test_the_panel_is_told_stage_count_part_and_time_left(waiting, monkeypatch):
@@ -336,6 +336,18 @@ def test_the_panel_is_told_stage_count_part_and_time_left(waiting, monkeypatch):
     assert (told.stage, told.left, told.count) == ("Measuring", "", "")  # A new stage has just begun.
     now[0] += 200
     assert operator._run.told().left == "3 min left"
+
+
+def test_after_the_first_escape_the_panel_says_that_it_was_heard_and_what_a_second_one_does(waiting, monkeypatch):
+    operator, _ = waiting
+    operator._run.progress = progress = Progress()
+    operator.improving = lambda: progress.stage == "refining" and not progress.finishing
+    progress.stage, progress.count = "refining", 1859
+    assert (operator._run.told().stage, operator._run.told().escape) == ("Refining", "Keep Present Result")
+    progress.finishing = True
+    assert progress_text.status_line(operator._run.told()) == "Ending, 1,859 triangles left    Esc: Discard Result"
+    progress.stage = "measuring"
+    assert (operator._run.told().stage, operator._run.told().escape) == ("Measuring", "Discard Result")
 
 
 def test_an_operator_that_says_what_it_does_says_how_far_it_is_over_all_its_steps(waiting, monkeypatch):
