@@ -29,7 +29,10 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
             text_lines(context, layout, native.reason, "ERROR")
             return
         if ob is None or ob.type != "MESH":
-            layout.label(text="Select a mesh object", icon="INFO")
+            # A box that selects makes no object active, and deleting the active one leaves none.
+            selected = any(other.type == "MESH" for other in context.selected_objects)
+            other_active = "Shift-click a selected mesh to make it the active object"
+            text_lines(context, layout, other_active if selected else "Select a mesh object", "INFO")
             return
         settings = ob.tolvol
         layout.prop(settings, "reference_kind")

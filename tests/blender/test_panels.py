@@ -131,6 +131,16 @@ def test_the_line_begins_with_what_is_in_the_way_where_it_is_cut():
     bpy.data.objects.remove(twin)
 
 
+def test_without_an_active_mesh_the_panel_says_how_to_get_one():
+    ob = torus()
+    bpy.context.view_layer.objects.active = None
+    assert drawn(panels.TOLVOL_PT_tolerance, sidebar(900)).labels() == [
+        ("Shift-click a selected mesh to make it the active object", "INFO")
+    ]
+    ob.select_set(False)
+    assert drawn(panels.TOLVOL_PT_tolerance, sidebar(900)).labels() == [("Select a mesh object", "INFO")]
+
+
 def test_no_sentence_stands_between_or_above_buttons():
     ob = with_reference(torus())
     twin = ob.copy()  # Blocks all operations.
