@@ -189,7 +189,6 @@ ways, and apply the modifier to the base mesh. An object without a reference get
 
     def steps(self, context):
         self._found = []  # (number of triangles, value) of each value at which no sample is beyond the tolerance
-        self._none_fewer = False  # whether there are such values at which the modifier removes no triangle
         context.view_layer.update()
         ob, modifier = self.ob, self.chosen(fitted=True)
         if self.result == "SHAPE_KEY":
@@ -249,8 +248,6 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             if self._counts(evaluation, trial, len(arrays.triangles)):
                 self._found.append((len(arrays.triangles), value))
                 self.count = f"{min(self._found)[0]:,} triangles so far"
-            else:
-                self._none_fewer = True
 
     def _refuse(self, context, name, parameter, trial):
         """Raises Refused, because no value leaves fewer triangles within the tolerance."""
@@ -272,7 +269,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         and, where crossings are kept out, has no more of them than before.
 
         Samples may miss the largest deviation of all values that the search has found. Values with more triangles then follow,
-        in growing steps. It returns None if no value is proved at which the modifier removes a triangle.
+        in growing steps. It returns None if no value is proved at which the modifier, other than Remesh, removes a triangle.
         found: (number of triangles, or 0 if it is not known, value) of each, the one with the fewest triangles first.
         """
         for triangles, value in found:
@@ -289,7 +286,6 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             if self._counts(evaluation, trial, trial.left):
                 return proved
             bpy.data.meshes.remove(proved[1])
-            self._none_fewer = True
             break
         name, ob = evaluation.modifier.name, self.ob.name
         if self.progress.finishing:
@@ -297,9 +293,9 @@ ways, and apply the modifier to the base mesh. An object without a reference get
                 f"The search was ended before a {parameter.label} of {name} was proved to keep {ob} within the tolerance both "
                 "ways. Nothing was changed: let it go on for longer"
             )
-        if self._none_fewer:
-            return None
-        raise Refused(f"No {parameter.label} of {name} keeps {ob} within the tolerance both ways")
+        if evaluation.modifier.type == "REMESH":
+            raise Refused(f"No {parameter.label} of {name} keeps {ob} within the tolerance both ways")
+        return None
 
     def _proof(self, evaluation, parameter, trial, value, triangles=0):
         """Returns (value, mesh, the result of certified()) for a value. It raises NotProved if that fails."""

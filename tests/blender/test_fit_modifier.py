@@ -131,11 +131,16 @@ def nothing_is_proved(monkeypatch):
 def test_a_fit_of_which_no_value_is_proved_changes_nothing(monkeypatch):
     ob = modified("DECIMATE")
     nothing_is_proved(monkeypatch)
-    refused("No Ratio of DECIMATE keeps DECIMATE within the tolerance both ways$", bpy.ops.tolvol.fit_modifier)
+    none = "No Ratio of DECIMATE leaves fewer than the 1,024 triangles of DECIMATE within the tolerance"
+    remedy = "Take a larger tolerance, or press Decimate, which leaves 168$"
+    refused(f"{none}. {remedy}", bpy.ops.tolvol.fit_modifier)
     # With these samples the search finds values at which the modifier removes no triangle.
     monkeypatch.setattr(modifiers.measure, "sampled_distance", lambda points, *_: 0.0 if len(points) > 500 else 9.0)
-    none = "No Ratio of DECIMATE leaves fewer than the 1,024 triangles of DECIMATE within the tolerance"
-    refused(f"{none}. Take a larger tolerance, or press Decimate, which leaves 168$", bpy.ops.tolvol.fit_modifier)
+    refused(f"{none}. {remedy}", bpy.ops.tolvol.fit_modifier)
+    # With these it finds none, not even the end of the range.
+    monkeypatch.setattr(modifiers.measure, "sampled_distance", lambda *_: 9.0)
+    cut = "the modifier may cut bent quads along the other diagonal, which takes them beyond the tolerance"
+    refused(f"{none}: {cut}. {remedy}", bpy.ops.tolvol.fit_modifier)
     assert ob.tolvol.snapshot is None
 
 
