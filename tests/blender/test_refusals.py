@@ -102,7 +102,9 @@ def test_what_the_module_refuses_is_said_in_the_panels_words():
     ob.tolvol.tolerance_mode, ob.tolvol.tolerance_length = "LENGTH", 0.05
     for operator in (bpy.ops.tolvol.decimate, bpy.ops.tolvol.smooth):
         with pytest.raises(
-            RuntimeError, match=r"faces are .* take a larger tolerance or set the reference anew\. Select Outside"
+            RuntimeError,
+            match=r"faces are .* take a larger tolerance or set the reference anew\. Select Outside.* once the "
+            "reference is set",
         ) as said:
             operator()
         assert "=" not in str(said.value)
