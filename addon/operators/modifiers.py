@@ -290,8 +290,8 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         name, ob = evaluation.modifier.name, self.ob.name
         if self.progress.finishing:
             raise Refused(
-                f"The search was ended before a {parameter.label} of {name} was proved to keep {ob} within the tolerance both "
-                "ways. Nothing was changed: let it go on for longer"
+                f"The search was ended, and no {parameter.label} of {name} was proved to keep {ob} within the tolerance both "
+                "ways. Nothing was changed: take a larger tolerance"
             )
         if evaluation.modifier.type == "REMESH":
             raise Refused(f"No {parameter.label} of {name} keeps {ob} within the tolerance both ways")

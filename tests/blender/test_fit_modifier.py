@@ -206,8 +206,8 @@ def test_a_search_that_is_ended_before_a_value_is_proved_says_that_nothing_was_c
 
     monkeypatch.setattr(Run, "advance", until_one_is_within)
     nothing_is_proved(monkeypatch)
-    proved = "before a Ratio of DECIMATE was proved to keep DECIMATE within the tolerance both ways"
-    refused(f"The search was ended {proved}. Nothing was changed: let it go on for longer", bpy.ops.tolvol.fit_modifier)
+    proved = "and no Ratio of DECIMATE was proved to keep DECIMATE within the tolerance both ways"
+    refused(f"The search was ended, {proved}. Nothing was changed: take a larger", bpy.ops.tolvol.fit_modifier)
     assert ob.tolvol.snapshot is None and ob.modifiers and (world_triangles(ob)[1] == before[1]).all()
 
 
