@@ -189,6 +189,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
 
     def steps(self, context):
         self._found = []  # (number of triangles, value) of each value at which no sample is beyond the tolerance
+        self._crossing = None  # the error of a value that was refused because more faces would cross, if there is one
         context.view_layer.update()
         ob, modifier = self.ob, self.chosen(fitted=True)
         if self.result == "SHAPE_KEY":
@@ -288,6 +289,8 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             bpy.data.meshes.remove(proved[1])
             break
         name, ob = evaluation.modifier.name, self.ob.name
+        if self._crossing:
+            raise self._crossing
         if self.progress.finishing:
             raise Refused(
                 f"The search was ended, and no {parameter.label} of {name} was proved to keep {ob} within the tolerance both "
@@ -304,7 +307,11 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         setattr(evaluation.modifier, parameter.name, value)
         mesh = evaluation.new_mesh()
         try:
-            return value, mesh, (yield trial.certified(mesh_io.read_mesh(mesh)))
+            arrays = mesh_io.read_mesh(mesh)
+            if self.ob.tolvol.crossings == "KEEP_OUT" and (error := (yield trial.crossing_error(arrays))):
+                self._crossing = error
+                raise error
+            return value, mesh, (yield trial.certified(arrays))
         except BaseException:
             bpy.data.meshes.remove(mesh)
             raise
@@ -405,18 +412,18 @@ class _Trial:
 
         return work
 
-    def uncrossed(self, arrays):
-        """Returns work that raises NotProved if more pairs of faces cross than before: Blender's modifiers do not look for
-        them."""
+    def crossing_error(self, arrays):
+        """Returns work that gives a NotProved, with what to do, if more pairs of faces cross than before, or else None."""
 
         def work(progress):
             after = len(solidity.crossing_pairs(arrays, self.threads, progress))
             before = solidity.facts(self.surface, self.threads, progress, again=False)["crossing_pairs"] if after else 0
-            if after > before:
-                raise NotProved(
-                    f"the number of crossing pairs of faces would be {solidity.pair_count(after)}, and is {before:,} now: "
-                    "press Decimate, which keeps crossings out, or set Crossings to Allow in its options"
-                )
+            if after <= before:
+                return None
+            return NotProved(
+                f"the number of crossing pairs of faces would be {solidity.pair_count(after)}, and is {before:,} now: press "
+                "Decimate, which keeps crossings out, or set Crossings to Allow in its options"
+            )
 
         return work
 

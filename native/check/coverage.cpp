@@ -109,7 +109,7 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
     const Part piece = stack.back();
     stack.pop_back();
     const auto& c = piece.corners;
-    const auto take = [&](std::uint32_t witness, double distance) {
+    const auto assign = [&](std::uint32_t witness, double distance) {
       hint = witness;
       const std::uint32_t element = ids[witness];
       if (element == kNone) return;
@@ -120,7 +120,7 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
     };
     const Hierarchy::Common common = hierarchy.common(c, provable, -1, hint);
     if (common.triangle != Hierarchy::kNone) {
-      take(common.triangle, common.distance);
+      assign(common.triangle, common.distance);
       continue;
     }
     const glm::dvec3 centre = (c[0] + c[1] + c[2]) * (1.0 / 3);
@@ -131,7 +131,7 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
     double d2[4];
     witness_distances(below, with_centre(piece), d2);
     if (const double distance = std::sqrt(std::max({d2[0], d2[1], d2[2]})); distance <= provable) {
-      take(closest.triangle, distance);
+      assign(closest.triangle, distance);
       continue;
     }
     const double radius =
