@@ -8,12 +8,13 @@ import bpy
 
 from . import original
 from .appearance import TOLVOL_OT_bake_normals, TOLVOL_OT_shade_by_reference
+from .apply_modifier import TOLVOL_OT_apply_modifier
 from .check import TOLVOL_OT_check, TOLVOL_OT_measure_statistics, TOLVOL_OT_select_outside
 from .crossings import TOLVOL_OT_select_crossing
 from .decimate import TOLVOL_OT_decimate
 from .deform import TOLVOL_OT_deform
+from .fit_modifier import TOLVOL_OT_fit_modifier
 from .lod import TOLVOL_OT_make_lods, TOLVOL_OT_show_level
-from .modifiers import TOLVOL_OT_apply_modifier, TOLVOL_OT_fit_modifier
 from .original import TOLVOL_OT_new_original, TOLVOL_OT_restore_original, TOLVOL_OT_show_original
 from .places import TOLVOL_OT_clear_places, TOLVOL_OT_next_place, TOLVOL_OT_worst_point
 from .presets import TOLVOL_MT_tolerances, TOLVOL_OT_set_tolerance

@@ -10,7 +10,7 @@ from addon import native
 from addon.job.run import Run
 from addon.mesh import mesh_io
 from addon.mesh.evaluation import Evaluation
-from addon.operators import fit, modifiers
+from addon.operators import fit, fit_modifier
 from addon.proof import kept_warnings, verdict
 from addon.reference import snapshots
 from addon.shared.errors import NotProved
@@ -105,7 +105,7 @@ def test_a_search_ends_where_nothing_is_within():
 def test_a_mesh_of_which_only_the_proof_shows_that_it_is_beyond_is_passed_over(monkeypatch):
     ob = modified("DECIMATE")
     reference, tolerance = world_triangles(ob), 0.01 * snapshots.surface_of(ob).size()
-    tried, certified = [], modifiers._Trial.certified
+    tried, certified = [], fit_modifier._Trial.certified
 
     def beyond(_progress):
         raise NotProved("beyond")
@@ -114,7 +114,7 @@ def test_a_mesh_of_which_only_the_proof_shows_that_it_is_beyond_is_passed_over(m
         tried.append(len(arrays.triangles))
         return beyond if len(tried) == 1 else certified(trial, arrays)
 
-    monkeypatch.setattr(modifiers._Trial, "certified", first_is_beyond)
+    monkeypatch.setattr(fit_modifier._Trial, "certified", first_is_beyond)
     bpy.ops.tolvol.fit_modifier()
     assert tried[0] <= tried[1] <= tried[-1] == len(world_triangles(ob)[1]) < len(reference[1])
     for pair in ((world_triangles(ob), reference), (reference, world_triangles(ob))):
@@ -125,7 +125,7 @@ def nothing_is_proved(monkeypatch):
     def beyond(_progress):
         raise NotProved("beyond")
 
-    monkeypatch.setattr(modifiers._Trial, "certified", lambda *_: beyond)
+    monkeypatch.setattr(fit_modifier._Trial, "certified", lambda *_: beyond)
 
 
 def test_a_fit_of_which_no_value_is_proved_changes_nothing(monkeypatch):
@@ -135,10 +135,10 @@ def test_a_fit_of_which_no_value_is_proved_changes_nothing(monkeypatch):
     remedy = "Take a larger tolerance, or press Decimate, which leaves 168$"
     refused(f"{none}. {remedy}", bpy.ops.tolvol.fit_modifier)
     # With these samples the search finds values at which the modifier removes no triangle.
-    monkeypatch.setattr(modifiers.measure, "sampled_distance", lambda points, *_: 0.0 if len(points) > 500 else 9.0)
+    monkeypatch.setattr(fit_modifier.measure, "sampled_distance", lambda points, *_: 0.0 if len(points) > 500 else 9.0)
     refused(f"{none}. {remedy}", bpy.ops.tolvol.fit_modifier)
     # With these it finds none, not even the end of the range.
-    monkeypatch.setattr(modifiers.measure, "sampled_distance", lambda *_: 9.0)
+    monkeypatch.setattr(fit_modifier.measure, "sampled_distance", lambda *_: 9.0)
     cut = "the modifier may cut bent quads along the other diagonal, which takes them beyond the tolerance"
     refused(f"{none}: {cut}. {remedy}", bpy.ops.tolvol.fit_modifier)
     assert ob.tolvol.snapshot is None
@@ -147,7 +147,7 @@ def test_a_fit_of_which_no_value_is_proved_changes_nothing(monkeypatch):
 def test_a_value_is_found_if_samples_miss_the_largest_deviation_of_all_that_the_search_has_found(monkeypatch):
     ob = modified("DECIMATE")
     reference, tolerance = world_triangles(ob), 0.01 * snapshots.surface_of(ob).size()
-    proofs, measured, certified = [], modifiers._Trial.measured, modifiers._Trial.certified
+    proofs, measured, certified = [], fit_modifier._Trial.measured, fit_modifier._Trial.certified
 
     def half_of_it(trial, arrays):
         work = measured(trial, arrays)
@@ -157,8 +157,8 @@ def test_a_value_is_found_if_samples_miss_the_largest_deviation_of_all_that_the_
         proofs.append(len(arrays.triangles))
         return certified(trial, arrays)
 
-    monkeypatch.setattr(modifiers._Trial, "measured", half_of_it)
-    monkeypatch.setattr(modifiers._Trial, "certified", noted)
+    monkeypatch.setattr(fit_modifier._Trial, "measured", half_of_it)
+    monkeypatch.setattr(fit_modifier._Trial, "certified", noted)
     assert bpy.ops.tolvol.fit_modifier() == {"FINISHED"}
     now = world_triangles(ob)
     assert len(proofs) > 2 and len(now[1]) == max(proofs) < len(reference[1])
@@ -177,7 +177,7 @@ def test_the_values_onward_go_to_the_end_in_growing_steps():
 
 def test_a_search_that_is_ended_keeps_the_best_so_far(monkeypatch):
     ob = modified("DECIMATE")
-    asked, advance, measured = [], Run.advance, modifiers._Trial.measured
+    asked, advance, measured = [], Run.advance, fit_modifier._Trial.measured
 
     def until_one_is_within(run):
         if run._job is not None and run.operator.improving():
@@ -189,7 +189,7 @@ def test_a_search_that_is_ended_keeps_the_best_so_far(monkeypatch):
         return measured(trial, arrays)
 
     monkeypatch.setattr(Run, "advance", until_one_is_within)
-    monkeypatch.setattr(modifiers._Trial, "measured", noted)
+    monkeypatch.setattr(fit_modifier._Trial, "measured", noted)
     bpy.ops.tolvol.fit_modifier()
     assert len(asked) < 8 and len(world_triangles(ob)[1]) in asked and verdict.of(ob).passed
     assert not any("Decimate leaves" in warning for warning in kept_warnings.of(ob)[0])

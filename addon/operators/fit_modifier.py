@@ -1,0 +1,324 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Applies a modifier that changes the faces with the setting that leaves the fewest triangles within the tolerance."""
+
+import bpy
+import numpy as np
+from bpy.props import FloatProperty, StringProperty
+
+from .. import native, preferences
+from ..mesh import mesh_io
+from ..mesh.evaluation import Evaluation
+from ..operation_settings import modifier_settings, threads_setting
+from ..proof import kept_warnings, last_run
+from ..properties import automatic_placement
+from ..reference import measurements, snapshots, tolerances
+from ..shared.decimation import Task
+from ..shared.errors import NotProved, Refused
+from ..shared.proof import measure, report, solidity
+from ..shared.proof.certify import certify
+from ..shared.proof.verdict import Verdict
+from ..shared.surface import Surface
+from . import decimation, fit
+from . import settings as shared
+from .modifiers import ModifierOperator
+
+
+class TOLVOL_OT_fit_modifier(ModifierOperator, bpy.types.Operator):
+    """Find the setting of a Decimate, Remesh or Weld modifier that leaves the fewest triangles within the tolerance both \
+ways, and apply the modifier to the base mesh. An object without a reference gets one first, as by Set Reference"""
+
+    bl_idname = "tolvol.fit_modifier"
+    bl_label = "Fit Modifier to Tolerance"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = modifier_settings({"SKIP_SAVE"})
+    modifier: StringProperty(
+        name="Modifier",
+        description="The name of the modifier. If none is given, the first modifier that can be fitted is used",
+        options={"SKIP_SAVE"},
+    )
+    value: FloatProperty(
+        name="Value",
+        description="The ratio, voxel size or distance of the modifier. If it is 0, the value is searched",
+        min=0.0,
+        precision=5,
+        options={"SKIP_SAVE"},
+    )
+    threads: threads_setting()
+
+    def draw(self, _context):
+        self.layout.use_property_split = True
+        self.layout.prop(self, "value")
+        self.layout.prop(self, "result")
+
+    def steps(self, context):
+        self._found = []  # (number of triangles, value) of each value at which no sample is beyond the tolerance
+        self._crossing = None  # the error of a value that was refused because more faces would cross, if there is one
+        context.view_layer.update()
+        ob, modifier = self.ob, self.chosen(fitted=True)
+        if self.result == "SHAPE_KEY":
+            raise Refused(f"{modifier.name} changes the faces of {ob.name}: choose Replace or New Object")
+        name, trial = modifier.name, _Trial(ob, self.threads or preferences.threads(context))
+        parameter = trial.parameter(modifier)
+        with Evaluation(ob, name) as evaluation:
+            # Adjust Last Operation passes the value that was found, or one that the user typed: no search is needed.
+            if self.value:
+                found = [(0, self.value)]
+            else:
+                yield from self._search(evaluation, parameter, trial)
+                found = sorted(self._found)
+            proved = yield from self._proved(evaluation, parameter, trial, found)
+            if proved is None:
+                yield from self._refuse(context, name, parameter, trial)
+            self.value, mesh, certified = proved
+        try:
+            plain = None if self.progress.finishing else (yield from self._plain(context, trial))
+            settings = self.ob.tolvol.modifiers
+        except BaseException:
+            bpy.data.meshes.remove(mesh)
+            raise
+        shared.give(self, settings, modifier_settings())
+        warnings = _crossings(name, certified["solidity"])
+        if plain is not None and plain < trial.left:
+            warnings.append(
+                f"The button Decimate leaves fewer triangles within this tolerance: {plain:,}, and the modifier {name} "
+                f"{trial.left:,}"
+            )
+        self._write(context, trial, mesh, certified, warnings)
+        for warning in warnings:
+            self.say({"WARNING"}, warning)
+        self.say({"INFO"}, f"{name}: {parameter.label} {self.value:.4g}, {trial.line(certified)}")
+
+    def improving(self):
+        return bool(self._found) and not self.progress.finishing
+
+    def _search(self, evaluation, parameter, trial):
+        """Finds the values at which no sample is beyond the tolerance. One at which the modifier removes no triangle is left out
+        unless it _counts()."""
+        name, triangles = evaluation.modifier.name, len(trial.surface.arrays.triangles)
+        most, tried = fit.most_values(triangles), 0
+        search, deviation = fit.search(parameter.first, parameter.last, most), None
+        while not self.progress.finishing:
+            try:
+                value = search.send(deviation)
+            except StopIteration:
+                break
+            self.part, self.doing = f"Fitting {name}", f"{parameter.label} {value:.4g}"
+            self.share, tried = min(tried / most, 1), tried + 1
+            setattr(evaluation.modifier, parameter.name, value)
+            arrays = mesh_io.read_mesh(evaluation.mesh())
+            deviation = yield trial.measured(arrays)
+            if deviation > 1:
+                continue
+            if self._counts(evaluation, trial, len(arrays.triangles)):
+                self._found.append((len(arrays.triangles), value))
+                self.count = f"{min(self._found)[0]:,} triangles so far"
+
+    def _refuse(self, context, name, parameter, trial):
+        """Raises Refused, because no value leaves fewer triangles within the tolerance."""
+        ob, before = self.ob, len(trial.surface.arrays.triangles)
+        why, remedy = "", "Take a larger tolerance"
+        self.part, self.doing, self.share, self.count = f"Fitting {name}", "Comparing the quads", 0.0, ""
+        if (yield trial.measured(mesh_io.both_triangulations(ob.data, trial.surface.arrays))) > 1:
+            why = ": the modifier may cut bent quads along the other diagonal, which takes them beyond the tolerance"
+        plain = yield from self._plain(context, trial)
+        if plain is not None and plain < before:
+            remedy += f", or press Decimate, which leaves {plain:,}"
+        raise Refused(
+            f"No {parameter.label} of {name} leaves fewer than the {before:,} triangles of {ob.name} within the "
+            f"tolerance{why}. {remedy}"
+        )
+
+    def _proved(self, evaluation, parameter, trial, found):
+        """Returns (value, mesh, the result of certified()) for the first of the values whose mesh is proved to be within
+        and, where crossings are kept out, has no more of them than before.
+
+        Samples may miss the largest deviation of all values that the search has found. Values with more triangles then follow,
+        in growing steps. It returns None if no value is proved at which the modifier, other than Remesh, removes a triangle.
+        found: (number of triangles, or 0 if it is not known, value) of each, the one with the fewest triangles first.
+        """
+        for triangles, value in found:
+            try:
+                return (yield from self._proof(evaluation, parameter, trial, value, triangles))
+            except NotProved:
+                if self.value:
+                    raise
+        for value in fit.onward([value for _, value in found], parameter.last):
+            try:
+                proved = yield from self._proof(evaluation, parameter, trial, value)
+            except NotProved:
+                continue
+            if self._counts(evaluation, trial, trial.left):
+                return proved
+            bpy.data.meshes.remove(proved[1])
+            break
+        name, ob = evaluation.modifier.name, self.ob.name
+        if self._crossing:
+            raise self._crossing
+        if self.progress.finishing:
+            raise Refused(
+                f"The search was ended, and no {parameter.label} of {name} was proved to keep {ob} within the tolerance both "
+                "ways. Nothing was changed: take a larger tolerance"
+            )
+        if evaluation.modifier.type == "REMESH":
+            raise Refused(f"No {parameter.label} of {name} keeps {ob} within the tolerance both ways")
+        return None
+
+    def _proof(self, evaluation, parameter, trial, value, triangles=0):
+        """Returns (value, mesh, the result of certified()) for a value. It raises NotProved if that fails."""
+        self.part, self.doing = f"Proving {evaluation.modifier.name}", f"{parameter.label} {value:.4g}"
+        self.share, self.count = 0.0, f"{triangles:,} triangles" if triangles else ""
+        setattr(evaluation.modifier, parameter.name, value)
+        mesh = evaluation.new_mesh()
+        try:
+            arrays = mesh_io.read_mesh(mesh)
+            if self.ob.tolvol.crossings == "KEEP_OUT" and (error := (yield trial.crossing_error(arrays))):
+                self._crossing = error
+                raise error
+            return value, mesh, (yield trial.certified(arrays))
+        except BaseException:
+            bpy.data.meshes.remove(mesh)
+            raise
+
+    @staticmethod
+    def _counts(evaluation, trial, triangles):
+        """Whether a value that leaves so many triangles is wanted. Remesh makes new faces, which may be wanted even if they are
+        more than before."""
+        return triangles < len(trial.surface.arrays.triangles) or evaluation.modifier.type == "REMESH"
+
+    def _plain(self, context, trial):
+        """Returns how many triangles Decimate would leave with its default settings."""
+        self.part, self.doing, self.share = "", "Comparing with Decimate", 0.0
+        settings = self.ob.tolvol
+        options = decimation.options(settings, automatic_placement(self.ob.data), trial.threads)
+        options |= {"two_sided": True, "effort": "fast", "target_triangles": None, "max_seconds": None}
+        task = Task(self.ob.name, trial.surface, trial.reference, trial.tolerance, options)
+        task.uvs = mesh_io.corner_uvs(self.ob.data)
+        try:
+            return (yield task.count)
+        except native.module.Cancelled:
+            raise
+        except native.module.TolvolError:
+            # The mesh may be beyond the tolerance, so that Decimate cannot begin with it.
+            return None
+
+    def _write(self, context, trial, mesh, certified, warnings):
+        ob = self.target(context)
+        if ob.tolvol.snapshot is None:
+            snapshots.set_reference(ob, trial.reference)
+        before = ob.data
+        name, mesh.use_fake_user = before.name, before.use_fake_user
+        for key, value in before.items():
+            mesh[key] = value
+        ob.data = mesh
+        bpy.data.meshes.remove(before)
+        mesh.name = name
+        kept_warnings.keep(ob, warnings)
+        measurements.remember(ob, snapshots.surface_of(ob), certified, trial.tolerance)
+        last_run.keep(ob, {"operation": "fit_modifier", "solidity": certified["solidity"]})
+
+
+def _crossings(name, compared):
+    """Returns a list with a warning if more pairs of faces cross than before: Blender's modifiers do not look for them."""
+    before, after = (compared[when]["crossing_pairs"] for when in ("before", "after"))
+    if after <= before:
+        return []
+    pairs = solidity.pair_count(after)
+    return [f"{name} makes faces cross: the number of crossing pairs of faces is {pairs}, and was {before:,} before"]
+
+
+# The number of vertices of the reference that are looked at first.
+_FEW = 4000
+
+
+def _samples(vertices, triangles):
+    """Returns points of a surface: the corners, the centre and the middles of the edges of each triangle."""
+    corners = vertices[triangles]
+    middles = (corners + corners[:, [1, 2, 0]]) / 2
+    return np.concatenate([vertices[np.unique(triangles)], corners.mean(1), middles.reshape(-1, 3)])
+
+
+class _Trial:
+    """Compares meshes of one object with its reference. measured() and certified() return work for the thread."""
+
+    def __init__(self, ob, threads):
+        self.surface = snapshots.surface_of(ob)
+        self.reference = snapshots.reference_of(ob)
+        self.size = self.reference.size()
+        self.tolerance = tolerances.required(ob, self.size)
+        self.threads = threads
+        self._pair = self.reference.world(), self.reference.arrays.triangles
+        self.left = 0
+
+    def parameter(self, modifier):
+        arrays = self.surface.arrays
+        used = arrays.vertices[np.unique(arrays.triangles)]
+        size = float(np.linalg.norm(used.max(0) - used.min(0)))
+        return fit.parameter(modifier, len(arrays.triangles), size, self.tolerance * size / self.surface.size())
+
+    def measured(self, arrays):
+        """Returns work that gives the larger of the deviations both ways, in tolerances. It is above 1 if a sample proves that
+        the mesh is beyond the tolerance. If it is at most 1, certified() decides.
+        """
+
+        def work(progress):
+            if not len(arrays.triangles):
+                return np.inf
+            pair = Surface(arrays, self.surface.matrix).world(), arrays.triangles
+            vertices, triangles = self._pair
+            all_vertices, largest = vertices[np.unique(triangles)], 0.0
+            few = all_vertices[:: max(len(all_vertices) // _FEW, 1)]
+            for points, other in ((few, pair), (_samples(*pair), self._pair), (all_vertices, pair)):
+                largest = max(largest, measure.sampled_distance(points, other, self.threads, progress))
+                if largest > self.tolerance:
+                    break
+            return largest / self.tolerance
+
+        return work
+
+    def crossing_error(self, arrays):
+        """Returns work that gives a NotProved, with what to do, if more pairs of faces cross than before, or else None."""
+
+        def work(progress):
+            after = len(solidity.crossing_pairs(arrays, self.threads, progress))
+            before = solidity.facts(self.surface, self.threads, progress, again=False)["crossing_pairs"] if after else 0
+            if after <= before:
+                return None
+            return NotProved(
+                f"the number of crossing pairs of faces would be {solidity.pair_count(after)}, and is {before:,} now: press "
+                "Decimate, which keeps crossings out, or set Crossings to Allow in its options"
+            )
+
+        return work
+
+    def certified(self, arrays):
+        """Returns work that gives the result of certify() for the mesh as Blender will store it, and "solidity", the result
+        of solidity.compared().
+
+        The work raises NotProved unless the mesh is within the tolerance both ways.
+        """
+
+        def work(progress):
+            surface = Surface(arrays, self.surface.matrix)
+            found = certify(surface, self.reference, self.tolerance, 0, self.threads, progress)
+            if not Verdict.certified(found, self.tolerance).passed:
+                ways = (report.percent(found[way][1], self.size) for way in ("forward", "backward"))
+                raise NotProved(
+                    "the result is up to {} of the size from the reference, and the reference up to {} from the "
+                    "result".format(*ways)
+                )
+            self.left = len(arrays.triangles)
+            facts = (solidity.facts(one, self.threads, progress) for one in (self.surface, surface))
+            return found | {"solidity": solidity.compared(*facts)}
+
+        return work
+
+    def line(self, certified):
+        """Returns the outcome as one line of text."""
+        forward, backward = (report.percent(certified[way][1], self.size) for way in ("forward", "backward"))
+        word = Verdict.certified(certified, self.tolerance).word
+        return (
+            f"{word}: {len(self.surface.arrays.triangles):,} -> {self.left:,} triangles, tolerance "
+            f"{100 * self.tolerance / self.size:.4g} % = {self.tolerance:.3g}, result within {forward}, reference within "
+            f"{backward} (certified)"
+        )
