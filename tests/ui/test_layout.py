@@ -16,6 +16,7 @@ from window import (
     DOWN,
     PAGES,
     at_rest,
+    copied_in_sidebar,
     find,
     finished,
     on_screen,
@@ -38,12 +39,11 @@ def torus():
 
 def rows(*operators):
     """Returns the heights at which the buttons are."""
-    places = []
+    seen, heights = (yield from copied_in_sidebar(across=0.25)), []
     for operator in operators or ("tolvol.decimate", "tolvol.check"):
-        place = yield from find(operator, across=0.25)
-        assert place is not None, f"{operator} is not on the first screen"
-        places.append(place[1])
-    return places
+        heights.append(next((y for (_, y), copied in seen if f"bpy.ops.{operator}" in copied), None))
+        assert heights[-1] is not None, f"{operator} is not on the first screen"
+    return heights
 
 
 def test_the_first_screen_has_everything_and_buttons_stay_where_they_are():
@@ -120,15 +120,18 @@ def test_no_button_moves_when_sentences_and_labels_come_and_go():
     yield from press("tolvol.set_reference")
     yield from finished(lambda: torus().tolvol.snapshot)
     first = "tolvol.set_reference", "tolvol.decimate", "tolvol.check"
+    steps = []  # of the wheel, that take it to the others
     with unfolded(panels.TOLVOL_PT_smooth):
 
         def seen(name):
             """Returns the heights of the first buttons, and the distance of two of the others, which have to be scrolled to."""
             yield from scroll()
             heights = yield from rows(*first)
-            for _ in range(PAGES):
-                if (yield from find("tolvol.smooth", across=0.25)) is None:
-                    yield from scroll(DOWN, steps=3)
+            if steps:
+                yield from scroll(DOWN, sum(steps))
+            while len(steps) < PAGES and (yield from find("tolvol.smooth", across=0.25)) is None:
+                steps.append(3)
+                yield from scroll(DOWN, steps[-1])
             above, below = yield from rows("tolvol.save_report", "tolvol.smooth")
             xdotool("mousemove", *on_screen(region("WINDOW"), 300, 300))
             yield

@@ -236,10 +236,10 @@ def move_onto_hold():
     yield from _scrolled_to("tolvol_show_original", "ctrl+shift+alt+c", 0.33)
 
 
-_last_seen = {}
+_last_seen, _last_found, _last_pages = {}, {}, {}
 
 
-def _copied_in_sidebar(keys, across=0.33):
+def copied_in_sidebar(keys="ctrl+c", across=0.33):
     """Moves the mouse down the sidebar and presses keys that copy something from the button below the mouse.
 
     Returns pairs (place, what was copied). Buttons that moved since the last time may move still: it then does so again.
@@ -254,10 +254,14 @@ def _copied_in_sidebar(keys, across=0.33):
     raise AssertionError("the buttons do not come to rest")
 
 
-def _down_the_sidebar(keys, across, step=8):
+def _places(across, step=8):
+    sidebar = region("UI")
+    return [on_screen(sidebar, int(sidebar.width * across), y) for y in range(30, sidebar.height - 5, step)]
+
+
+def _down_the_sidebar(keys, across):
     """The events come so quickly that Blender draws few times meanwhile."""
-    sidebar, events = region("UI"), []
-    places = [on_screen(sidebar, int(sidebar.width * across), y) for y in range(30, sidebar.height - 5, step)]
+    places, events = _places(across), []
     for x, y in places:
         if events:
             events += "key", "--delay", 0, _MARK
@@ -278,15 +282,25 @@ def _onto(x, y):
 
 def _find(wanted, keys, across):
     end = time.monotonic() + _STUCK
+    # Most buttons are where they were the last time. To go down the whole sidebar takes many times as long as a look.
+    place = _last_found.get((wanted, keys, across))
+    if place not in _places(across):
+        place = None
     while time.monotonic() < end:
-        found = yield from _copied_in_sidebar(keys, across)
+        # The button may have moved since it was found.
+        if place and (yield from _is_at(place, wanted, keys)):
+            _last_found[wanted, keys, across] = place
+            return place
+        found = yield from copied_in_sidebar(keys, across)
         place = next((place for place, copied in found if wanted in copied), None)
         if place is None:
             return None
-        # The button may have moved since.
-        if wanted in (yield from sent(*_onto(*place), "key", keys))[0]:
-            return place
     raise AssertionError(f"{wanted} does not come to rest")
+
+
+def _is_at(place, wanted, keys):
+    bpy.context.window_manager.clipboard = ""
+    return wanted in (yield from sent(*_onto(*place), "key", keys))[0]
 
 
 def press(operator, across=0.33):
@@ -307,17 +321,20 @@ def click_property(name, across):
 
 def _scrolled_to(wanted, keys, across):
     """Moves the mouse onto what _find() finds, and scrolls the sidebar if necessary. Returns whether it has scrolled."""
+    pages = _last_pages.get((wanted, keys, across), 0)
+    if pages:
+        yield from scroll(DOWN, pages * _PAGE)
     place = yield from _find(wanted, keys, across)
-    scrolled = place is None
-    if scrolled:
+    scrolled = bool(pages) or place is None
+    if place is None:
         yield from scroll(UP)
-        place = yield from _find(wanted, keys, across)
+        pages, place = 0, (yield from _find(wanted, keys, across))
     # The sidebar may be several times as high as the window.
-    for _ in range(PAGES):
-        if place is None:
-            yield from scroll(DOWN, _PAGE)
-            place = yield from _find(wanted, keys, across)
+    while place is None and pages < PAGES:
+        yield from scroll(DOWN, _PAGE)
+        pages, place = pages + 1, (yield from _find(wanted, keys, across))
     assert place is not None, f"no button for {wanted}"
+    _last_pages[wanted, keys, across] = pages
     return scrolled
 
 
@@ -329,9 +346,7 @@ def scroll(button=UP, steps=30):
     """Turns the wheel over the sidebar. After 30 steps it no longer scrolls."""
     sidebar = region("UI")
     middle = on_screen(sidebar, sidebar.width // 2, sidebar.height // 2)
-    xdotool("mousemove", *middle)
-    yield
-    xdotool("click", "--repeat", steps, "--delay", 1, button)
+    xdotool("mousemove", *middle, "click", "--repeat", steps, "--delay", 1, button)
     yield
 
 
