@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The guards, with Blender's own tools in a real window."""
 
+import contextlib
 from unittest import mock
 
 import bpy
@@ -20,6 +21,7 @@ from window import (
     find_setting,
     finished,
     key,
+    on_screen,
     open_tab,
     region,
     reset,
@@ -30,6 +32,8 @@ from window import (
 )
 
 TOLERANCE = 0.02
+# Where brushes are at work the sheet is seen from afar: the colours on it are computed for each of its pixels.
+FAR, BRUSH = 7.5, 20  # the distance of the view, and pixels
 
 
 def sheet(count=60, z=0.0):
@@ -43,9 +47,9 @@ def ob():
     return bpy.data.objects["sheet"]
 
 
-def look(tilt=0.0):
+def look(tilt=0.0, distance=3.0):
     camera = view()[1].spaces[0].region_3d
-    camera.view_perspective, camera.view_distance = "ORTHO", 3.0
+    camera.view_perspective, camera.view_distance = "ORTHO", distance
     camera.view_location, camera.view_rotation = (0, 0, 0), Euler((tilt, 0, 0)).to_quaternion()
 
 
@@ -67,6 +71,17 @@ def forward(reference):
     )
 
 
+@contextlib.contextmanager
+def small_brush():
+    """Has brushes the size that belongs to the view from afar."""
+    settings = bpy.context.tool_settings.unified_paint_settings
+    usual, settings.size = settings.size, BRUSH
+    try:
+        yield
+    finally:
+        settings.size = usual
+
+
 def stroke(*points):
     """Drags the mouse with the left button along these places."""
     xdotool("mousemove", *points[0])
@@ -80,9 +95,11 @@ def stroke(*points):
     yield
 
 
-def across(length=200, steps=12):
-    x, y = centre()
-    return [(x - length // 2 + i * length // steps, y + 3 * (i % 2)) for i in range(steps + 1)]
+def across(length=80, steps=6):
+    """Returns places along a line that begins near the edge of the sheet and ends near its middle."""
+    middle = region("WINDOW")
+    x, y = on_screen(middle, middle.width // 2 - 70, middle.height // 2)
+    return [(x - length // 2 + i * length // steps, y + i % 2) for i in range(steps + 1)]
 
 
 def switch(setting):
@@ -102,10 +119,10 @@ def undone_and_redone(read, *steps):
 
 
 def test_guard_sculpting_by_mouse():
-    yield from reset(sheet)
-    look()
+    yield from reset(lambda: sheet(30))
+    look(distance=FAR)
     reference, before = scenes.world_triangles(ob()), coordinates()
-    with alone(TOLVOL_PT_guard):
+    with alone(TOLVOL_PT_guard), small_brush():
         yield from open_tab()
         yield from switch("sculpting")
         mode("SCULPT")
@@ -120,7 +137,8 @@ def test_guard_sculpting_by_mouse():
     held = guard.sculpt.watches.shown(ob()).held_back
     assert 0 < held <= touched.sum() < len(before) / 2
     assert [*guard.states(ob())] == [("sculpting", f"Held back {held:,} vertices", True)]
-    yield from stroke(*across())
+    with small_brush():
+        yield from stroke(*across())
     again = coordinates()
     assert forward(reference) <= 1
     undo, redo = "ctrl+z", "ctrl+shift+z"
@@ -132,22 +150,22 @@ def test_guard_sculpting_by_mouse():
 
 def test_guard_other_brushes():
     yield from reset(lambda: sheet(z=0.1))
-    look(1.0)
+    look(1.0, FAR)
     reference = scenes.world_triangles(ob())
     ob().tolvol.guard.sculpting = True
     mode("SCULPT")
     yield
-    bpy.context.tool_settings.unified_paint_settings.size = 60
-    for name in ("Grab", "Snake Hook", "Pose", "Cloth", "Inflate/Deflate", "Smooth"):
-        bpy.context.tool_settings.sculpt.brush = bpy.data.brushes[name]
-        before = coordinates()
-        # A brush begins where a ray meets the surface.
-        way = [ob().data.vertices[60 * 31 + 10 + 4 * i].co[:] for i in range(10)]
-        with window_context():
-            bpy.ops.sculpt.brush_stroke("EXEC_DEFAULT", True, stroke=[_sample(i, at) for i, at in enumerate(way)])
-        yield
-        assert not np.array_equal(coordinates(), before), name
-        assert forward(reference) <= 1, name
+    with small_brush():
+        for name in ("Grab", "Snake Hook", "Pose", "Cloth", "Inflate/Deflate", "Smooth"):
+            bpy.context.tool_settings.sculpt.brush = bpy.data.brushes[name]
+            before = coordinates()
+            # A brush begins where a ray meets the surface.
+            way = [ob().data.vertices[60 * 31 + 10 + 4 * i].co[:] for i in range(10)]
+            with window_context():
+                bpy.ops.sculpt.brush_stroke("EXEC_DEFAULT", True, stroke=[_sample(i, at) for i, at in enumerate(way)])
+            yield
+            assert not np.array_equal(coordinates(), before), name
+            assert forward(reference) <= 1, name
     assert forward(reference) > 0.95
     mode("OBJECT")
 
@@ -160,7 +178,7 @@ def _sample(i, at):
         "mouse": place,
         "mouse_event": place,
         "pressure": 1,
-        "size": 60,
+        "size": BRUSH,
         "time": i / 50,
     }
     return sample | {"is_start": i == 0, "pen_flip": False, "x_tilt": 0, "y_tilt": 0}

@@ -262,7 +262,7 @@ def test_what_deviates_by_nothing_is_drawn_as_nothing():
     space.show_gizmo = space.overlay.show_object_origins = space.overlay.show_cursor = True
 
 
-def stroke(start, end, steps=8, before_it_ends=lambda: True):
+def stroke(start, end, steps=4, before_it_ends=lambda: True):
     """Drags the brush over the mesh. The stroke ends once before_it_ends() is true."""
     xdotool("mousemove", *start)
     yield
