@@ -10,7 +10,7 @@ import bpy
 from addon import job, panels
 from addon.appearance import normals, other_blender
 from addon.proof import verdict
-from panels_open import unfolded
+from panels_open import alone
 from test_panel import monkey, suzanne
 from window import (
     at_rest,
@@ -23,7 +23,6 @@ from window import (
     region,
     reset,
     screenshot,
-    scroll,
     xdotool,
 )
 
@@ -70,7 +69,7 @@ def test_normals_and_a_normal_map_by_mouse():
     yield from open_tab()
     yield from press("tolvol.decimate")
     yield from finished(lambda: verdict.word(suzanne()) == verdict.PASS)
-    with unfolded(panels.TOLVOL_PT_appearance):
+    with alone(panels.TOLVOL_PT_appearance):
         yield
         yield from press("tolvol.shade_by_reference")
         yield from finished(lambda: suzanne().data.has_custom_normals)
@@ -95,7 +94,6 @@ def test_normals_and_a_normal_map_by_mouse():
         engine, uvs = bpy.context.scene.render.engine, len(suzanne().data.uv_layers)
         yield from press("tolvol.bake_normals")
         yield from finished(job.under_way)
-        yield from scroll(4)
         aside()
         yield
         screenshot("look 2 baking")

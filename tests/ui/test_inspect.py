@@ -7,10 +7,12 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 import scenes
+from addon import panels
 from addon.mesh import mesh_io
 from addon.overlay import markers
 from addon.panels import notes
 from addon.proof import kept_warnings, places
+from panels_open import alone
 from test_job import status_bar_pixels
 from test_warnings import islands
 from window import (
@@ -62,31 +64,32 @@ def white_near_the_middle():
 
 def test_worst_point_next_and_previous_by_mouse():
     yield from reset(ball)
-    yield from open_tab()
-    plain = white_near_the_middle()
-    yield from press("tolvol.worst_point", across=0.25)
-    yield from finished(lambda: places.shown(the_ball())[0])
-    yield from at_rest()
-    screenshot("worst point")
-    found, _, _ = places.shown(the_ball())
-    assert len(found) == 4 and found[0].distance.lower > 0.19 and found[0].position[1] > 0
-    assert in_the_middle(found[0].position) and white_near_the_middle() > plain + 20
-    towards = view()[1].spaces[0].region_3d.view_rotation @ Vector((0, 0, 1))
-    assert towards.y > 0.2  # The view was turned to the back.
-    for at, across in ((1, 0.684), (2, 0.684), (1, 0.59)):
-        yield from press("tolvol.next_place", across=across)
-        yield from finished(lambda at=at: places.shown(the_ball())[1] == at)
-        yield
-        screenshot(f"worst point {at + 1}")
-        assert in_the_middle(found[at].position)
-    yield from press("tolvol.clear_places", across=0.775)
-    yield from finished(lambda: not places.any_shown())
-    yield from at_rest()
-    assert not markers._drawing and white_near_the_middle() < plain + 20
-    # Select Outside brings the selected faces into view, too: all of them are at two ends of the ball.
-    view()[1].spaces[0].region_3d.view_distance = 50
-    yield from press("tolvol.select_outside", across=0.7)
-    yield from finished(lambda: the_ball().mode == "EDIT")
+    with alone(panels.TOLVOL_PT_deviation):
+        yield from open_tab()
+        plain = white_near_the_middle()
+        yield from press("tolvol.worst_point", across=0.25)
+        yield from finished(lambda: places.shown(the_ball())[0])
+        yield from at_rest()
+        screenshot("worst point")
+        found, _, _ = places.shown(the_ball())
+        assert len(found) == 4 and found[0].distance.lower > 0.19 and found[0].position[1] > 0
+        assert in_the_middle(found[0].position) and white_near_the_middle() > plain + 20
+        towards = view()[1].spaces[0].region_3d.view_rotation @ Vector((0, 0, 1))
+        assert towards.y > 0.2  # The view was turned to the back.
+        for at, across in ((1, 0.684), (2, 0.684), (1, 0.59)):
+            yield from press("tolvol.next_place", across=across)
+            yield from finished(lambda at=at: places.shown(the_ball())[1] == at)
+            yield
+            screenshot(f"worst point {at + 1}")
+            assert in_the_middle(found[at].position)
+        yield from press("tolvol.clear_places", across=0.775)
+        yield from finished(lambda: not places.any_shown())
+        yield from at_rest()
+        assert not markers._drawing and white_near_the_middle() < plain + 20
+        # Select Outside brings the selected faces into view, too: all of them are at two ends of the ball.
+        view()[1].spaces[0].region_3d.view_distance = 50
+        yield from press("tolvol.select_outside", across=0.7)
+        yield from finished(lambda: the_ball().mode == "EDIT")
     yield from at_rest()
     screenshot("select outside frames")
     assert view()[1].spaces[0].region_3d.view_distance < 10
