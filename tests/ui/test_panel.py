@@ -312,19 +312,20 @@ def sidebar_pixels():
 
 
 def test_the_answer_of_check_is_seen_without_moving_the_mouse():
-    yield from reset(monkey)
+    yield from reset(scenes.torus)
     yield from open_tab()
+    ob = bpy.data.objects["torus"]
     yield from press("tolvol.set_reference")
-    yield from finished(lambda: suzanne().tolvol.snapshot is not None)
-    suzanne().data.vertices[0].co.z += 0.001
-    suzanne().data.update()
+    yield from finished(lambda: ob.tolvol.snapshot is not None)
+    ob.data.vertices[0].co.z += 0.001
+    ob.data.update()
     xdotool("mousemove", *centre())
     yield
     before = yield from still(sidebar_pixels, beside=())  # The sidebar shows the estimate.
-    assert verdict.of(suzanne()) is None
+    assert verdict.of(ob) is None
     with window_context(), job_time.in_background():
         bpy.ops.tolvol.check("INVOKE_DEFAULT")
-    yield from finished(lambda: verdict.of(suzanne()) is not None)
+    yield from finished(lambda: verdict.of(ob) is not None)
     yield from finished(lambda: (sidebar_pixels() != before).any())
     seen = yield from still(sidebar_pixels, beside=())
     screenshot("14 checked without the mouse")

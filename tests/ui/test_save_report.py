@@ -8,8 +8,9 @@ from pathlib import Path
 
 import bpy
 
+import scenes
 from addon.operators.report import TOLVOL_OT_save_report
-from test_panel import monkey, suzanne
+from test_layout import torus
 from window import at_rest, finished, key, open_tab, press, reset, screenshot, xdotool
 
 
@@ -25,19 +26,19 @@ def folder_to_save_in():
             os.environ["HOME"] = home
 
 
-def monkey_with_reference():
-    yield from reset(monkey)
+def torus_with_reference():
+    yield from reset(scenes.torus)
     yield from open_tab()
     yield from press("tolvol.set_reference")
-    yield from finished(lambda: suzanne().tolvol.snapshot is not None)
+    yield from finished(lambda: torus().tolvol.snapshot is not None)
 
 
 def test_save_report_by_mouse():
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"  # The file browser opens in this window.
-    yield from reset(monkey)
+    yield from reset(scenes.torus)
     yield from open_tab()
     yield from press("tolvol.decimate")
-    yield from finished(lambda: len(suzanne().data.polygons) < 3000)
+    yield from finished(lambda: len(torus().data.polygons) < 500)
     yield from at_rest()
     with folder_to_save_in() as folder:
         yield from press("tolvol.save_report", across=0.7)
@@ -46,16 +47,16 @@ def test_save_report_by_mouse():
         xdotool("mousemove", 640, 400)
         yield
         key("Return")
-        saved = folder / "Suzanne deviation.html"
+        saved = folder / "torus deviation.html"
         yield from finished(saved.is_file)
         yield from at_rest()
         screenshot("15 saved")
-        assert "Suzanne from its reference" in saved.read_text()
+        assert "torus from its reference" in saved.read_text()
 
 
 def test_escape_in_the_file_browser_of_save_report():
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
-    yield from monkey_with_reference()
+    yield from torus_with_reference()
     ended, cancel = [], TOLVOL_OT_save_report.cancel
     TOLVOL_OT_save_report.cancel = lambda operator, context: ended.append(cancel(operator, context))
     try:
@@ -92,19 +93,19 @@ def choose_next_format():
 
 def test_format_is_chosen_in_the_file_browser():
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
-    yield from monkey_with_reference()
+    yield from torus_with_reference()
     with folder_to_save_in() as folder:
         yield from press("tolvol.save_report", across=0.7)
         yield from at_rest()
         area, _ = browser()
-        assert area.spaces[0].params.filename == "Suzanne deviation.html"
+        assert area.spaces[0].params.filename == "torus deviation.html"
         yield from choose_next_format()
         yield from at_rest()
         screenshot("16 format chosen")
-        assert area.spaces[0].params.filename == "Suzanne deviation.csv"
+        assert area.spaces[0].params.filename == "torus deviation.csv"
         xdotool("mousemove", 640, 400)
         yield
         key("Return")
-        saved = folder / "Suzanne deviation.csv"
+        saved = folder / "torus deviation.csv"
         yield from finished(saved.is_file)
         assert saved.read_text().startswith("direction,quantity")
