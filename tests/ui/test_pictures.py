@@ -6,6 +6,7 @@ the documentation.
 """
 
 import os
+from functools import partial
 
 import bpy
 import numpy as np
@@ -42,7 +43,7 @@ _SNOUT = (0.36, 0.72), (0.38, 0.75)
 
 def test_pictures_for_the_documentation():
     for_documentation = "TOLVOL_ALL_TESTS" in os.environ
-    make = (lambda: solid_monkey(0.025)) if for_documentation else solid_monkey
+    make = partial(solid_monkey, 0.025 if for_documentation else 0.06)
     yield from reset(make)
     usual = view()[0].width, view()[0].height
     if for_documentation:
