@@ -2,6 +2,7 @@
 """One run of an operator: its steps, the job of the present step, and the objects that it works on."""
 
 import time
+from dataclasses import replace
 
 from .. import native, status_bar
 from ..background import Job
@@ -44,6 +45,7 @@ class Run:
         self._steps = operator.steps(context)
         self._job = None
         self._timer = None
+        self._seen = None  # what the status bar and the sidebars show of the run
         self._began = time.monotonic()
 
     def told(self):
@@ -147,9 +149,16 @@ class Run:
                 self._leave(context)
                 return ended
         if waits or time.monotonic() >= self._began + _QUIET:
-            status = progress_text.status_line(self.told())
-            status_bar.show(status + (f"    Waits for {_MODES.get(self._mode, 'its mode')}" if waits else ""))
-            redraw_sidebars()
+            told = self.told()
+            status = progress_text.status_line(told) + (
+                f"    Waits for {_MODES.get(self._mode, 'its mode')}" if waits else ""
+            )
+            # Without a GPU a drawing of the sidebars takes most of the time between two ticks.
+            seen = status, replace(told, share=told.share and round(told.share, 2))
+            if seen != self._seen:
+                self._seen = seen
+                status_bar.show(status)
+                redraw_sidebars()
         return None
 
     def close(self, context):

@@ -232,7 +232,10 @@ _OTHERS = {
     ("addon/overlay/field.py", "finest"),  # whether colours can show the tolerance
     ("addon/overlay/scale.py", "self.tolerance"),  # the shares in the legend of the colours, which prove nothing
     ("addon/shared/proof/deviation_drawings.py", "abs(lower)"),  # the bars of the histogram that are striped
-    ("addon/operators/fit_modifier.py", "largest > self.tolerance"),  # where sampling ends; the proof decides afterwards
+    (
+        "addon/operators/fit_modifier.py",
+        "largest > self.tolerance",
+    ),  # where sampling ends; the proof decides afterwards
     ("addon/estimate/curve.py", ""),  # the order of tolerances on a curve
     ("addon/shared/command/arguments.py", "tolerance > size"),  # an argument that makes no sense
     ("addon/shared/command/file_report.py", "left <= target"),  # numbers of triangles
