@@ -161,7 +161,10 @@ ways, and apply the modifier to the base mesh. An object without a reference get
                 "ways. Nothing was changed: take a larger tolerance"
             )
         if evaluation.modifier.type == "REMESH":
-            raise Refused(f"No {parameter.label} of {name} keeps {ob} within the tolerance both ways")
+            raise Refused(
+                f"No {parameter.label} of {name} keeps {ob} within the tolerance both ways: a remeshed surface is closed and "
+                "has rounded edges. Take a larger tolerance, or press Decimate"
+            )
         return None
 
     def _proof(self, evaluation, parameter, trial, value, triangles=0):
