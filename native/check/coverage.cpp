@@ -75,11 +75,6 @@ Coverage::Coverage(const TriangleMesh& reference, double limit, std::size_t elem
       budget_of_beyond_(budget_of_first_),
       split_into_(reference.triangles.size()) {}
 
-Part Coverage::whole(std::uint32_t triangle) const {
-  const glm::uvec3 t = reference_->triangles[triangle];
-  return {{reference_->vertices[t.x], reference_->vertices[t.y], reference_->vertices[t.z]}, 0, triangle};
-}
-
 void Coverage::set_witness(std::uint32_t element, std::uint32_t triangle) {
   lists_[element].pieces.push_back(whole(triangle));
 }
@@ -160,17 +155,19 @@ bool Coverage::may_look(std::size_t parts, bool found_beyond) {
 }
 
 void Coverage::sample(std::uint32_t element, std::size_t stride, std::vector<Sample>& out) const {
-  const std::vector<Part>& pieces = lists_[element].pieces;
+  const PieceList& pieces = lists_[element].pieces;
   for (std::size_t i = 0; i < pieces.size(); i += stride) {
-    const auto& [a, b, c] = pieces[i].corners;
+    const Part piece = pieces.at(i, *reference_);
+    const auto& [a, b, c] = piece.corners;
     out.push_back({(a + b + c) * (1.0 / 3), 0.5 * glm::length(glm::cross(b - a, c - a))});
   }
 }
 
 void Coverage::points(std::uint32_t element, std::size_t stride, std::vector<glm::dvec3>& out) const {
-  const std::vector<Part>& pieces = lists_[element].pieces;
+  const PieceList& pieces = lists_[element].pieces;
   for (std::size_t i = 0; i < pieces.size(); i += stride) {
-    const auto& [a, b, c] = pieces[i].corners;
+    const Part piece = pieces.at(i, *reference_);
+    const auto& [a, b, c] = piece.corners;
     for (const glm::dvec3& p : {(a + b + c) * (1.0 / 3), a, b, c}) out.push_back(p);
   }
 }
@@ -204,7 +201,8 @@ bool Coverage::place(const Part& whole, std::uint32_t first, const Trial& trial,
       if (d2[3] < centre2) centre2 = d2[3], below = i;
       // A comparison with NaN is false, so that NaN is not covered.
       if (d2[0] <= limit2_ && d2[1] <= limit2_ && d2[2] <= limit2_) {
-        placing.moved.push_back({piece, i, std::sqrt(std::max({d2[0], d2[1], d2[2]}))});
+        placing.moved.push_back(piece);
+        placing.goals.push_back({i, std::sqrt(std::max({d2[0], d2[1], d2[2]}))});
         placing.last = i;
         return true;
       }
@@ -237,6 +235,7 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   trial.candidates_.clear();
   trial.removed_lists_.clear();
   trial.placing_.moved.clear();
+  trial.placing_.goals.clear();
   trial.placing_.failed.clear();
   trial.placing_.last = 0;
   trial.hierarchy_.reset();
@@ -268,9 +267,7 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   thread_local std::vector<std::uint32_t> gathered;  // has a count for each triangle of the reference, 0 between calls
   if (gathered.size() < split_into_.size()) gathered.resize(split_into_.size(), 0);
   const auto for_each_split = [&](auto&& call) {
-    trial.for_each_replaced(lists_, [&](const Part& piece) {
-      if (piece.cuts > 0) call(gathered[piece.of]);
-    });
+    trial.for_each_replaced_part(lists_, [&](const Part& piece) { call(gathered[piece.of]); });
   };
   // The counts are cleared even if the search throws.
   const struct Clear {
@@ -287,10 +284,10 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
 /// triangle of the reference once, if all its pieces are lost. `gathered` counts the lost pieces for each triangle that
 /// was split. The first call that returns false is the last one. Returns whether every call returned true.
 template <class Call>
-bool Coverage::for_each_to_place(const std::vector<Part>& pieces, bool of_many, std::vector<std::uint32_t>& gathered,
+bool Coverage::for_each_to_place(const PieceList& pieces, bool of_many, std::vector<std::uint32_t>& gathered,
                                  Call&& call) const {
   constexpr std::uint32_t kPlaced = 0xFFFFFFFFu;
-  return std::all_of(pieces.begin(), pieces.end(), [&](const Part& piece) {
+  const auto place = [&](const Part& piece) {
     if (piece.cuts == 0) return call(piece);
     std::uint32_t& count = gathered[piece.of];
     if (count == kPlaced) return true;
@@ -298,13 +295,17 @@ bool Coverage::for_each_to_place(const std::vector<Part>& pieces, bool of_many, 
     if (too_many || count != split_into_[piece.of].load(std::memory_order_relaxed)) return call(piece);
     count = kPlaced;
     return call(whole(piece.of));
-  });
+  };
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    if (!place(pieces.at(i, *reference_))) return false;
+  }
+  return true;
 }
 
 /// Places the pieces of all that is replaced.
 bool Coverage::place_all(Trial& trial, std::vector<std::uint32_t>& gathered) const {
   Placing& placing = trial.placing_;
-  const auto place_list = [&](const std::vector<Part>& pieces, std::uint32_t first) {
+  const auto place_list = [&](const PieceList& pieces, std::uint32_t first) {
     const std::size_t enough = placing.failed.size() + std::max<std::size_t>(trial.most_failures_, 1);
     return for_each_to_place(pieces, false, gathered, [&](const Part& piece) {
       return place(piece, first, trial, placing) || placing.failed.size() < enough;
@@ -334,9 +335,9 @@ bool Coverage::place_in_blocks(Trial& trial, std::vector<std::uint32_t>& gathere
     std::uint32_t first;  // is where a new witness is sought first
     std::size_t begin;    // of its pieces; they end where those of the next one begin
   };
-  std::vector<Part> pieces;
+  PieceList pieces;
   std::vector<Lost> lost;
-  const auto add = [&](const std::vector<Part>& list, std::uint32_t first) {
+  const auto add = [&](const PieceList& list, std::uint32_t first) {
     lost.push_back({first, pieces.size()});
     for_each_to_place(list, true, gathered, [&](const Part& piece) {
       pieces.push_back(piece);
@@ -358,7 +359,7 @@ bool Coverage::place_in_blocks(Trial& trial, std::vector<std::uint32_t>& gathere
     for (std::size_t i = begin; i < end; ++i) {
       const std::size_t enough = placing.failed.size() + std::max<std::size_t>(trial.most_failures_, 1);
       for (std::size_t k = lost[i].begin; k < lost[i + 1].begin; ++k) {
-        if (!place(pieces[k], lost[i].first, trial, placing) && placing.failed.size() == enough) break;
+        if (!place(pieces.at(k, *reference_), lost[i].first, trial, placing) && placing.failed.size() == enough) break;
       }
     }
     placing.stack = {};
@@ -366,7 +367,8 @@ bool Coverage::place_in_blocks(Trial& trial, std::vector<std::uint32_t>& gathere
   });
   Placing& all = trial.placing_;
   for (Placing& placing : placings) {
-    all.moved.insert(all.moved.end(), placing.moved.begin(), placing.moved.end());
+    all.moved.append(placing.moved);
+    all.goals.insert(all.goals.end(), placing.goals.begin(), placing.goals.end());
     all.failed.insert(all.failed.end(), placing.failed.begin(), placing.failed.end());
     all.looked_at += placing.looked_at;
     placing = {};
@@ -375,27 +377,25 @@ bool Coverage::place_in_blocks(Trial& trial, std::vector<std::uint32_t>& gathere
 }
 
 void Coverage::commit(const Trial& trial) {
+  const PieceList& moved = trial.placing_.moved;
   // Counts grow before they shrink, so that no count is ever less than the number of pieces.
-  for (const Moved& m : trial.placing_.moved) {
-    if (m.piece.cuts > 0) split_into_[m.piece.of].fetch_add(1, std::memory_order_relaxed);
-  }
-  trial.for_each_replaced(lists_, [&](const Part& piece) {
-    if (piece.cuts > 0) split_into_[piece.of].fetch_sub(1, std::memory_order_relaxed);
-  });
+  for (const Part& part : moved.parts()) split_into_[part.of].fetch_add(1, std::memory_order_relaxed);
+  trial.for_each_replaced_part(lists_,
+                               [&](const Part& part) { split_into_[part.of].fetch_sub(1, std::memory_order_relaxed); });
   for (const Trial::Candidate& c : trial.candidates_) {
     if (c.replaced) lists_[c.id].pieces.clear();
     lists_[c.id].distance = c.distance;
   }
   for (const Trial::RemovedList& h : trial.removed_lists_) {
     // This frees the memory of the element, which is gone; clear() would keep it.
-    const std::vector<Part> pieces = std::exchange(lists_[h.id].pieces, {});
-    std::vector<Part>& to = lists_[trial.candidates_[h.successor].id].pieces;
-    if (h.whole) to.insert(to.end(), pieces.begin(), pieces.end());
+    const PieceList pieces = std::exchange(lists_[h.id].pieces, {});
+    if (h.whole) lists_[trial.candidates_[h.successor].id].pieces.append(pieces);
   }
-  for (const Moved& m : trial.placing_.moved) {
-    List& to = lists_[trial.candidates_[m.element].id];
-    to.pieces.push_back(m.piece);
-    to.distance = std::max(to.distance, m.distance);
+  for (std::size_t i = 0; i < moved.size(); ++i) {
+    const Goal& goal = trial.placing_.goals[i];
+    List& to = lists_[trial.candidates_[goal.element].id];
+    to.pieces.push_back(moved.at(i, *reference_));
+    to.distance = std::max(to.distance, goal.distance);
   }
 }
 

@@ -19,6 +19,7 @@
 
 #include "base/progress.h"
 #include "check/part.h"
+#include "check/piece_list.h"
 #include "check/witness.h"
 #include "geometry/hierarchy.h"
 #include "geometry/triangle_mesh.h"
@@ -93,22 +94,22 @@ class Coverage {
 
  private:
   struct List {
-    std::vector<Part> pieces;
+    PieceList pieces;
     double distance = 0;  ///< no piece is farther than this from the element
   };
-  struct Moved {
-    Part piece;
+  /// Where a piece goes, and how far it is from that element at most.
+  struct Goal {
     std::uint32_t element;
-    double distance;  ///< of the piece from the element, at most
+    double distance;
   };
 
-  Part whole(std::uint32_t triangle) const;
+  Part whole(std::uint32_t triangle) const { return PieceList::whole(triangle, *reference_); }
   void find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mesh, const Hierarchy& hierarchy,
                          std::span<const std::uint32_t> ids, double provable, Uncovered& uncovered);
   bool may_look(std::size_t parts, bool found_beyond);
   struct Placing;
   template <class Call>
-  bool for_each_to_place(const std::vector<Part>& pieces, bool of_many, std::vector<std::uint32_t>& gathered,
+  bool for_each_to_place(const PieceList& pieces, bool of_many, std::vector<std::uint32_t>& gathered,
                          Call&& call) const;
   bool place_all(Trial& trial, std::vector<std::uint32_t>& gathered) const;
   bool place_in_blocks(Trial& trial, std::vector<std::uint32_t>& gathered) const;
@@ -134,7 +135,8 @@ struct Coverage::Failure {
 
 /// The witnesses that were found for some pieces of a change, and scratch memory.
 struct Coverage::Placing {
-  std::vector<Moved> moved;
+  PieceList moved;
+  std::vector<Goal> goals;  ///< of each of them
   std::vector<Failure> failed;
   std::vector<Part> stack;
   std::size_t budget = 0;     ///< is the number of pieces that this change, or this piece, may still add
@@ -170,14 +172,14 @@ class Coverage::Trial {
     std::uint32_t id, successor;
     bool whole;  ///< tells whether the list is passed on as it is
   };
-  /// Calls call(piece) for all pieces that the change places anew.
+  /// Calls call(piece) for all pieces that the change places anew and that are no whole triangles.
   template <class Call>
-  void for_each_replaced(const std::vector<List>& lists, Call&& call) const {
+  void for_each_replaced_part(const std::vector<List>& lists, Call&& call) const {
     for (const RemovedList& h : removed_lists_) {
-      if (!h.whole) std::for_each(lists[h.id].pieces.begin(), lists[h.id].pieces.end(), call);
+      if (!h.whole) std::ranges::for_each(lists[h.id].pieces.parts(), call);
     }
     for (const Candidate& c : candidates_) {
-      if (c.replaced) std::for_each(lists[c.id].pieces.begin(), lists[c.id].pieces.end(), call);
+      if (c.replaced) std::ranges::for_each(lists[c.id].pieces.parts(), call);
     }
   }
 
