@@ -28,8 +28,8 @@ def say(text):
 
 
 def showing():
-    """Whether there is a text now."""
-    return bool(_given)
+    """Whether all windows show a text now. Others may have removed it, and the user may have gone to another workspace."""
+    return all(window.workspace.name in _given for window in bpy.context.window_manager.windows)
 
 
 def clear():

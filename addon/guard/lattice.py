@@ -45,6 +45,10 @@ def cages_of(ob):
     return [m.object for m in ob.modifiers if m.type == "LATTICE" and m.object and m.show_viewport]
 
 
+# What may stop a lattice.
+_AT_TOLERANCE, _AT_CROSSINGS = "at the tolerance", "where faces would cross"
+
+
 class LatticeWatch(watch.Preparing):
     """Keeps the last control points for which the deformed mesh was inside, and that mesh."""
 
@@ -54,7 +58,8 @@ class LatticeWatch(watch.Preparing):
         self._stopped = False
         self._built = None
         self._positions = self._points = self._proposed = None
-        self._crossing = None  # how many pairs of triangles cross in the first mesh that is kept
+        self._first_pairs = None  # the pairs of polygons that cross in the first mesh that is kept, a number for each
+        self._limit = _AT_TOLERANCE  # what stopped the lattice last
         try:
             reference, tolerance, matrix, threads = watch.needed(ob)
         except (Refused, native.module.TolvolError) as error:
@@ -80,14 +85,15 @@ class LatticeWatch(watch.Preparing):
         the last ones that were kept. They stay if the guard is off, or if a change of something else took the mesh out.
         """
         positions = arrays.vertices
-        if not (reason := self._broken(positions, arrays)):
+        if not (broken := self._broken(positions, arrays)):
             self._positions, self._points = positions, points
             self.on, self.reason = True, None
             self._stopped = _equal(points, self._proposed)
             return None
         if not self.on or _equal(points, self._points):
-            self.on, self.reason = False, reason
+            self.on, self.reason = False, broken[1]
             return None
+        self._limit = broken[0]
         self.stopped()
         # A proposed position whose mesh is outside leads to a nearer proposal, but only _MOST_TRIES times.
         self._tries = self._tries + 1 if _equal(points, self._proposed) else 0
@@ -102,13 +108,13 @@ class LatticeWatch(watch.Preparing):
     def said(self):
         """Returns the message about the last correction or about what the guard does not keep, or None."""
         if self._stopped:
-            return "The lattice was stopped at the tolerance"
+            return f"The lattice was stopped {self._limit}"
         if self.uncovered is not None and self.uncovered.any():
             return f"{np.count_nonzero(self.uncovered):,} faces of the reference are beyond the tolerance"
         return None
 
     def _broken(self, positions, arrays):
-        """Returns what is wrong with a mesh that has these positions, or None if the guard keeps it.
+        """Returns (what stops the lattice, what is wrong with a mesh that has these positions), or None if the guard keeps it.
 
         Faces of the reference may be beyond the tolerance, and faces cross, as far as they do for the first mesh that is kept.
         """
@@ -116,7 +122,10 @@ class LatticeWatch(watch.Preparing):
             verdicts = self._built.check(positions, arrays.triangles, **self._options).verdicts
             outside = verdicts < native.module.Verdict.INSIDE
             if outside.any():
-                return f"{len(np.unique(arrays.polygons[outside])):,} faces of the deformed mesh are outside"
+                return (
+                    _AT_TOLERANCE,
+                    f"{len(np.unique(arrays.polygons[outside])):,} faces of the deformed mesh are outside",
+                )
             if self.two_sided:
                 uncovered = watch.uncovered_faces(
                     self._reference, positions, arrays.triangles, self._tolerance, self._options
@@ -124,15 +133,18 @@ class LatticeWatch(watch.Preparing):
                 if self.uncovered is None:
                     self.uncovered = uncovered
                 if lost := np.count_nonzero(uncovered & ~self.uncovered):
-                    return watch.lost_reason(lost)
+                    return _AT_TOLERANCE, watch.lost_reason(lost)
             if self._keeps_crossings_out:
-                crossing = len(solidity.crossing_pairs(replace(arrays, vertices=positions), self._options["threads"]))
-                if self._crossing is None:
-                    self._crossing = crossing
-                if crossing > self._crossing:
-                    return f"Crossing pairs of faces: {solidity.pair_count(crossing)}, at first {self._crossing:,}"
+                pairs = _crossing_polygons(replace(arrays, vertices=positions), self._options["threads"])
+                if pairs is None:
+                    count = solidity.pair_count(solidity.MOST_PAIRS)
+                    return _AT_CROSSINGS, f"{count} pairs of faces cross, too many to keep others out"
+                if self._first_pairs is None:
+                    self._first_pairs = pairs
+                if new := len(np.setdiff1d(pairs, self._first_pairs, assume_unique=True)):
+                    return _AT_CROSSINGS, f"{new:,} pairs of faces would cross that did not cross when the guard began"
         except native.module.TolvolError as error:  # for example, the mesh has become smaller than the tolerance
-            return str(error)
+            return _AT_TOLERANCE, str(error)
         return None
 
     def _share(self, positions, arrays):
@@ -140,8 +152,8 @@ class LatticeWatch(watch.Preparing):
         for _ in range(_HALVINGS):
             middle = (inside + outside) / 2
             tried = self._positions + np.float32(middle) * (positions - self._positions)
-            if self._broken(tried, arrays):
-                outside = middle
+            if broken := self._broken(tried, arrays):
+                outside, self._limit = middle, broken[0]
             else:
                 inside = middle
         return inside
@@ -183,6 +195,15 @@ def _write(cages, points):
 def rest(ob):
     """Checks the mesh after a correction: Blender evaluates the written control points without calling a handler."""
     follow(ob, None, bpy.context.evaluated_depsgraph_get())
+
+
+def _crossing_polygons(arrays, threads):
+    """Returns the pairs of polygons that cross, a number for each, in rising order. None if there are too many to find all."""
+    found = solidity.crossing_pairs(arrays, threads)
+    if len(found) >= solidity.MOST_PAIRS:
+        return None
+    first, second = np.sort(arrays.polygons[found].astype(np.int64), axis=1).T
+    return np.unique((first << 32 | second)[first != second])
 
 
 def _equal(points, others):

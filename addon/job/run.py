@@ -45,7 +45,7 @@ class Run:
         self._steps = operator.steps(context)
         self._job = None
         self._timer = None
-        self._seen = None  # what the status bar and the sidebars show of the run
+        self._seen = None  # what the status bar and the sidebars were told last
         self._began = time.monotonic()
 
     def told(self):
@@ -155,7 +155,7 @@ class Run:
             )
             # Without a GPU a drawing of the sidebars takes most of the time between two ticks.
             seen = status, replace(told, share=told.share and round(told.share, 2))
-            if seen != self._seen:
+            if seen != self._seen or not status_bar.showing():
                 self._seen = seen
                 status_bar.show(status)
                 redraw_sidebars()

@@ -48,7 +48,7 @@ def check_blocked(ob, modes=_OBJECT_MODE):
     if reason := object_blocked(ob, modes):
         return reason
     if ob.tolvol.snapshot is None and (reason := reference_blocked(ob, modes)):
-        return reason  # Without it, "Set the reference first" would point at a greyed button.
+        return reason  # Otherwise the message would name Set Reference, which is greyed.
     if reason := snapshots.reference_missing(ob):
         return reason
     if not ob.data.polygons:

@@ -25,6 +25,8 @@ _SLOPE, _FLATTEST, _STEEPEST_FALL = 0.75, 0.5, 2.0
 _SMALLEST_STEP, _LARGEST_STEP = math.log(1.2), math.log(1000)
 # Where the fine steps begin is known with this ratio.
 _CLOSE = math.log(1.06)
+# A mesh within the tolerance that is refused for another reason steers the search as one that is beyond it by so much.
+REFUSED = 1.5
 _LEAST_KNOWN, _MOST_KNOWN = math.exp(-3), 1e6  # deviations beyond these steer as if they were these
 
 # Blender needs as long for each value as for the mesh without the modifier: all values together take as long as so many
@@ -99,9 +101,9 @@ def search(first, last, most=_MOST_VALUES):
     return best
 
 
-def onward(values, last):
+def further(values, last):
     """A generator of values beyond all of `values` towards `last`, the end of the range with the most triangles, with which it
-    ends. The steps begin as small as what is known of the limit, and double, so that few values lead to the end."""
+    ends. The first step is _CLOSE, to which the search knows the limit. The steps double, so that few lead to the end."""
     if not values:
         return
     end, step = math.log(last), _CLOSE

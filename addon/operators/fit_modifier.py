@@ -13,7 +13,7 @@ from ..proof import kept_warnings, last_run
 from ..properties import automatic_placement
 from ..reference import measurements, snapshots, tolerances
 from ..shared.decimation import Task
-from ..shared.errors import NotProved, Refused
+from ..shared.errors import NotProved, Refused, WouldCross
 from ..shared.proof import measure, report, solidity
 from ..shared.proof.certify import certify
 from ..shared.proof.verdict import Verdict
@@ -53,7 +53,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
 
     def steps(self, context):
         self._found = []  # (number of triangles, value) of each value at which no sample is beyond the tolerance
-        self._crossing = None  # the error of a value that was refused because more faces would cross, if there is one
+        self._crossed = False  # whether a value was refused because more faces would cross
         context.view_layer.update()
         ob, modifier = self.ob, self.chosen(fitted=True)
         if self.result == "SHAPE_KEY":
@@ -65,8 +65,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             if self.value:
                 found = [(0, self.value)]
             else:
-                yield from self._search(evaluation, parameter, trial)
-                found = sorted(self._found)
+                found = yield from self._search(evaluation, parameter, trial, parameter.first)
             proved = yield from self._proved(evaluation, parameter, trial, found)
             if proved is None:
                 yield from self._refuse(context, name, parameter, trial)
@@ -78,7 +77,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             bpy.data.meshes.remove(mesh)
             raise
         shared.give(self, settings, modifier_settings())
-        warnings = _crossings(name, certified["solidity"])
+        warnings = _crossing_warnings(name, certified["solidity"])
         if plain is not None and plain < trial.left:
             warnings.append(
                 f"The button Decimate leaves fewer triangles within this tolerance: {plain:,}, and the modifier {name} "
@@ -92,12 +91,13 @@ ways, and apply the modifier to the base mesh. An object without a reference get
     def improving(self):
         return bool(self._found) and not self.progress.finishing
 
-    def _search(self, evaluation, parameter, trial):
-        """Finds the values at which no sample is beyond the tolerance. One at which the modifier removes no triangle is left out
-        unless it _counts()."""
+    def _search(self, evaluation, parameter, trial, first):
+        """Returns (number of triangles, value) of values from `first` on at which no sample is beyond the tolerance and no more
+        faces cross than may, the fewest triangles first. A value at which the modifier removes no triangle is left out unless
+        it _counts()."""
         name, triangles = evaluation.modifier.name, len(trial.surface.arrays.triangles)
         most, tried = fit.most_values(triangles), 0
-        search, deviation = fit.search(parameter.first, parameter.last, most), None
+        search, deviation = fit.search(first, parameter.last, most), None
         while not self.progress.finishing:
             try:
                 value = search.send(deviation)
@@ -110,9 +110,13 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             deviation = yield trial.measured(arrays)
             if deviation > 1:
                 continue
+            if (yield from self._crosses(trial, arrays)):
+                deviation = fit.REFUSED
+                continue
             if self._counts(evaluation, trial, len(arrays.triangles)):
                 self._found.append((len(arrays.triangles), value))
                 self.count = f"{min(self._found)[0]:,} triangles so far"
+        return sorted(self._found)
 
     def _refuse(self, context, name, parameter, trial):
         """Raises Refused, because no value leaves fewer triangles within the tolerance."""
@@ -124,6 +128,8 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         plain = yield from self._plain(context, trial)
         if plain is not None and plain < before:
             remedy += f", or press Decimate, which leaves {plain:,}"
+        if self._crossed:
+            remedy += ". At a value within the tolerance faces would cross, which Crossings can allow"
         raise Refused(
             f"No {parameter.label} of {name} leaves fewer than the {before:,} triangles of {ob.name} within the "
             f"tolerance{why}. {remedy}"
@@ -133,28 +139,28 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         """Returns (value, mesh, the result of certified()) for the first of the values whose mesh is proved to be within
         and, where crossings are kept out, has no more of them than before.
 
-        Samples may miss the largest deviation of all values that the search has found. Values with more triangles then follow,
-        in growing steps. It returns None if no value is proved at which the modifier, other than Remesh, removes a triangle.
+        Samples may miss the largest deviation of all values that a search has found. Further searches then begin at values with
+        more triangles, in growing steps; after Esc only these values are tried. It returns None if no value is proved at which
+        the modifier, other than Remesh, removes a triangle.
         found: (number of triangles, or 0 if it is not known, value) of each, the one with the fewest triangles first.
         """
-        for triangles, value in found:
-            try:
-                return (yield from self._proof(evaluation, parameter, trial, value, triangles))
-            except NotProved:
-                if self.value:
-                    raise
-        for value in fit.onward([value for _, value in found], parameter.last):
-            try:
-                proved = yield from self._proof(evaluation, parameter, trial, value)
-            except NotProved:
-                continue
-            if self._counts(evaluation, trial, trial.left):
-                return proved
-            bpy.data.meshes.remove(proved[1])
-            break
+        firsts = fit.further([value for _, value in found], parameter.last)
+        while found:
+            for triangles, value in found:
+                try:
+                    proved = yield from self._proof(evaluation, parameter, trial, value, triangles)
+                except (NotProved, WouldCross):
+                    if self.value:
+                        raise
+                    continue
+                if self.value or self._counts(evaluation, trial, trial.left):
+                    return proved
+                bpy.data.meshes.remove(proved[1])
+            if (first := next(firsts, None)) is None:
+                break
+            self._found = []
+            found = (yield from self._search(evaluation, parameter, trial, first)) or [(0, first)]
         name, ob = evaluation.modifier.name, self.ob.name
-        if self._crossing:
-            raise self._crossing
         if self.progress.finishing:
             raise Refused(
                 f"The search was ended, and no {parameter.label} of {name} was proved to keep {ob} within the tolerance both "
@@ -168,20 +174,31 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         return None
 
     def _proof(self, evaluation, parameter, trial, value, triangles=0):
-        """Returns (value, mesh, the result of certified()) for a value. It raises NotProved if that fails."""
+        """Returns (value, mesh, the result of certified()) for a value. It raises NotProved if that fails, and WouldCross."""
         self.part, self.doing = f"Proving {evaluation.modifier.name}", f"{parameter.label} {value:.4g}"
         self.share, self.count = 0.0, f"{triangles:,} triangles" if triangles else ""
         setattr(evaluation.modifier, parameter.name, value)
         mesh = evaluation.new_mesh()
         try:
             arrays = mesh_io.read_mesh(mesh)
-            if self.ob.tolvol.crossings == "KEEP_OUT" and (error := (yield trial.crossing_error(arrays))):
-                self._crossing = error
-                raise error
-            return value, mesh, (yield trial.certified(arrays))
+            certified = yield trial.certified(arrays)
+            if pairs := (yield from self._crosses(trial, arrays)):
+                raise WouldCross(
+                    f"At the {parameter.label} {value:.4g} of {evaluation.modifier.name}, {pairs} pairs of faces would cross: "
+                    "press Decimate, which keeps crossings out, or set Crossings to Allow in its options"
+                )
+            return value, mesh, certified
         except BaseException:
             bpy.data.meshes.remove(mesh)
             raise
+
+    def _crosses(self, trial, arrays):
+        """Returns as text how many pairs of faces cross if these are more than before and crossings are kept out, else None."""
+        pairs = None
+        if self.ob.tolvol.crossings == "KEEP_OUT":
+            pairs = yield trial.crossings(arrays)
+            self._crossed |= pairs is not None
+        return pairs
 
     @staticmethod
     def _counts(evaluation, trial, triangles):
@@ -221,7 +238,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         last_run.keep(ob, {"operation": "fit_modifier", "solidity": certified["solidity"]})
 
 
-def _crossings(name, compared):
+def _crossing_warnings(name, compared):
     """Returns a list with a warning if more pairs of faces cross than before: Blender's modifiers do not look for them."""
     before, after = (compared[when]["crossing_pairs"] for when in ("before", "after"))
     if after <= before:
@@ -242,7 +259,7 @@ def _samples(vertices, triangles):
 
 
 class _Trial:
-    """Compares meshes of one object with its reference. measured() and certified() return work for the thread."""
+    """Compares meshes of one object with its reference. measured(), crossings() and certified() return work for the thread."""
 
     def __init__(self, ob, threads):
         self.surface = snapshots.surface_of(ob)
@@ -279,18 +296,14 @@ class _Trial:
 
         return work
 
-    def crossing_error(self, arrays):
-        """Returns work that gives a NotProved, with what to do, if more pairs of faces cross than before, or else None."""
+    def crossings(self, arrays):
+        """Returns work that gives as text how many pairs of faces cross, if these are more than before or too many to be
+        counted, else None."""
 
         def work(progress):
             after = len(solidity.crossing_pairs(arrays, self.threads, progress))
             before = solidity.facts(self.surface, self.threads, progress, again=False)["crossing_pairs"] if after else 0
-            if after <= before:
-                return None
-            return NotProved(
-                f"the number of crossing pairs of faces would be {solidity.pair_count(after)}, and is {before:,} now: press "
-                "Decimate, which keeps crossings out, or set Crossings to Allow in its options"
-            )
+            return solidity.pair_count(after) if after > before or after >= solidity.MOST_PAIRS else None
 
         return work
 

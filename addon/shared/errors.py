@@ -19,5 +19,9 @@ class NotProved(Refused):
         super().__init__(f"{NOT_PROVED}: {intervals}")
 
 
+class WouldCross(Refused):
+    """More pairs of faces would cross than before. The operator has changed nothing."""
+
+
 class NotWritten(Refused):
     """A file could not be written: the system refused, or the disk is full. No other file was changed."""

@@ -122,7 +122,7 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
     const Hierarchy::Nearest closest = hierarchy.nearest(centre, std::numeric_limits<double>::infinity(), hint);
     const glm::uvec3& t = mesh.triangles[closest.triangle];
     const WitnessTriangle below{mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z]};
-    // The search may have missed it at a vertex of very many faces.
+    // common() may have missed this face at a vertex of very many.
     double d2[4];
     witness_distances(below, with_centre(piece), d2);
     if (const double distance = std::sqrt(std::max({d2[0], d2[1], d2[2]})); distance <= provable) {

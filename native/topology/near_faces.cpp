@@ -43,6 +43,7 @@ NearFaces::NearFaces(std::span<const std::uint32_t> faces, const std::function<C
   std::map<glm::dvec3, Group, decltype(before)> groups(before);
   Group rest{0};
   std::vector<Group*> group_of(faces.size(), &rest);
+  corners_.reserve(faces.size());
   for (std::size_t i = 0; i < faces.size(); ++i) {
     poll_at(i);
     corners_.push_back(corners(i));

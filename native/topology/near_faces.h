@@ -28,9 +28,9 @@ class NearFaces {
   static constexpr std::uint8_t kNoHub = 3;
 
   NearFaces() = default;
-  /// `faces` are the numbers of the faces, in rising order, and corners(i) are the corners of faces[i]. `hubs` has for
-  /// each the corner that is a hub, or kNoHub; if none has one it may be empty. Which corners count as hubs decides
-  /// about time alone. O(n log n), as a FaceTree, and twice as much for faces at hubs.
+  /// `faces` are the numbers of the faces, in rising order, and corners(i), which may be asked for twice, the corners
+  /// of faces[i]. `hubs` has for each the corner that is a hub, or kNoHub; if none has one it may be empty. Which
+  /// corners count as hubs decides about time alone. O(n log n), as a FaceTree, and twice as much for faces at hubs.
   NearFaces(std::span<const std::uint32_t> faces, const std::function<Corners(std::size_t)>& corners,
             std::span<const std::uint8_t> hubs, Team& team);
 

@@ -140,17 +140,24 @@ def test_a_fit_passes_over_values_that_make_faces_cross():
     assert seen[0] <= seen[1] and pairs(left) == before == 0 and verdict.of(ob).kind == verdict.WITHIN
 
 
-def test_a_fit_goes_on_to_a_value_at_which_no_faces_cross():
+@pytest.mark.parametrize(("percent", "most"), [(0.5, 420), (1, 420), (2, 420)])
+def test_a_fit_finds_values_at_which_no_faces_cross(percent, most):
+    """Of 150 ratios, 53 keep the sheets within 1 % and apart; the best one leaves 320 triangles."""
+    ob = wall("wall")
+    ob.tolvol.tolerance_percent = percent
+    ob.modifiers.new("Collapse", "DECIMATE")
+    assert bpy.ops.tolvol.fit_modifier() == {"FINISHED"}
+    assert not pairs(world_triangles(ob)) and len(world_triangles(ob)[1]) <= most
+
+
+def test_a_value_at_which_faces_would_cross_is_refused():
     ob = wall("wall")
     ob.modifiers.new("Collapse", "DECIMATE")
     with pytest.raises(
-        RuntimeError, match="Not proved: the number of crossing pairs of faces would be [0-9,]+, and is 0"
+        RuntimeError, match="At the Ratio 0.05 of Collapse, [0-9,]+ pairs of faces would cross: press Decimate"
     ):
         bpy.ops.tolvol.fit_modifier(value=0.05)
-    before = world_triangles(ob)
-    assert len(before[1]) == 3600 and len(ob.modifiers) == 1
-    assert bpy.ops.tolvol.fit_modifier(value=0) == {"FINISHED"}
-    assert not pairs(world_triangles(ob)) and len(world_triangles(ob)[1]) < 1200
+    assert len(world_triangles(ob)[1]) == 3600 and len(ob.modifiers) == 1
 
 
 def test_a_fitted_modifier_that_may_make_faces_cross_says_so(capfd):

@@ -166,13 +166,13 @@ def test_a_value_is_found_if_samples_miss_the_largest_deviation_of_all_that_the_
         assert native.module.directed_hausdorff(*pair[0], *pair[1], bound=tolerance).upper <= tolerance
 
 
-def test_the_values_onward_go_to_the_end_in_growing_steps():
+def test_the_values_further_on_go_to_the_end_in_growing_steps():
     for first, last in ((0.1, 1.0), (2.0, 0.001)):
-        values = list(fit.onward([(first * last) ** 0.5, first], last))
+        values = list(fit.further([(first * last) ** 0.5, first], last))
         assert values[-1] == last and len(values) < 9
         steps = np.abs(np.diff(np.log([(first * last) ** 0.5, *values])))
         assert (np.diff(steps[:-1]) > 0).all() and steps[0] < 0.1
-    assert list(fit.onward([1.0], 1.0)) == list(fit.onward([], 1.0)) == []
+    assert list(fit.further([1.0], 1.0)) == list(fit.further([], 1.0)) == []
 
 
 def test_a_search_that_is_ended_keeps_the_best_so_far(monkeypatch):
@@ -223,7 +223,8 @@ def test_a_search_says_how_many_of_its_values_are_tried(monkeypatch):
     monkeypatch.setattr(Run, "_next_work", next_work)
     assert bpy.ops.tolvol.fit_modifier() == {"FINISHED"}
     most = fit.most_values(1024)
-    searching = [share for part, share in told if part == "Fitting DECIMATE"]
+    # A value within the tolerance is looked at twice, the second time for crossings.
+    searching = list(dict.fromkeys(share for part, share in told if part == "Fitting DECIMATE"))
     assert searching == [i / most for i in range(len(searching))] and len(searching) > 5
     assert {share for part, share in told if part != "Fitting DECIMATE"} == {0.0}
 

@@ -299,8 +299,32 @@ def test_a_lattice_that_exchanges_two_sheets_stops_only_where_crossings_are_kept
     place(lattice, points)
     crossing = len(native.module.crossing_pairs(*deformed(ob)))
     assert (crossing == 0) == crossings_out
-    said = "The lattice was stopped at the tolerance" if crossings_out else "Guarding both ways"
+    said = "The lattice was stopped where faces would cross" if crossings_out else "Guarding both ways"
     assert state(ob)["lattice"] == (said, True)
+
+
+def test_a_lattice_may_not_exchange_crossings_for_others():
+    """Of two crossing sheets one is moved aside: as many pairs cross as before, and others."""
+    vertices, quads = sheet_arrays(count=20, bumps=0.0)
+    upright = 0.4 * vertices[:, [0, 2, 1]] + np.float32([0, 0.013, 0])
+    ob = add_object("sheets", np.concatenate([vertices, upright]), np.concatenate([quads, quads + len(vertices)]))
+    activate(ob)
+    ob.vertex_groups.new(name="upright").add(range(len(vertices), 2 * len(vertices)), 1.0, "REPLACE")
+    lattice = caged(ob)
+    ob.modifiers[0].vertex_group = "upright"
+    bpy.context.view_layer.update()
+    ob.tolvol.guard.crossings = True
+    guarded(ob, "lattice", mode="OBJECT", tolerance=0.2)
+    points = mesh_io.column(lattice.data.points, "co_deform", 3)
+    before = len(native.module.crossing_pairs(*deformed(ob)))
+    assert before > 10
+    points[:, 1] += 0.1  # across a row of quads
+    place(lattice, points)
+    assert state(ob)["lattice"] == ("The lattice was stopped where faces would cross", True)
+    ob.tolvol.guard.crossings = False
+    updated(ob)
+    place(lattice, points)
+    assert len(native.module.crossing_pairs(*deformed(ob))) == before and state(ob)["lattice"][1]
 
 
 def test_a_lattice_that_shrinks_the_mesh_to_a_point_stops_too():

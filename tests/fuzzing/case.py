@@ -49,7 +49,7 @@ class Case:
         return small and self.tolerance >= 0.001 * self.size() and self.options.get("field") != "gl"
 
     def _area(self, vertices):
-        """Returns the area of the triangles, in squares as long as the size of the case."""
+        """Returns the area of the triangles, in units of the squared size of the case."""
         a, b, c = self.world(vertices)[self.triangles].transpose(1, 0, 2) / (self.size() or 1.0)
         return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
 

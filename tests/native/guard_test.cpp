@@ -357,6 +357,8 @@ TEST(Guard, ReplacedFacesPollOftenAndAreAsBeforeOnceCancelled) {
   for (const std::size_t share : {10, 2}) {
     const Counted cancelled(polls / share);
     EXPECT_THROW(guard.replace_faces(s.faces()), Cancelled);
+    EXPECT_TRUE(guard.replace_faces(otherwise).empty());
+    EXPECT_TRUE(guard.constrain(s.positions).vertices.empty()) << "the state is the same";
   }
   ASSERT_TRUE(guard.replace_faces(s.faces()).empty());
   s.push((n / 2) * (n + 1) + n / 2, {0, 0, 1});

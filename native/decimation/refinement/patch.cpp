@@ -18,8 +18,8 @@ bool Patch::gather(const Change& collapse, int rings, bool boundary_free) {
   mesh_ = &collapse.mesh();
   vertex_count_ = 0;
   kept_slot_ = mesh_->slot(*collapse.vertex()), merged_slot_ = mesh_->slot(mesh_->from(collapse.halfedge()));
-  vanishing_.clear();
-  for (const Change::Halfedge h : collapse.collapses()) vanishing_.push_back(mesh_->from(h));
+  vanishing_vertices_.clear();
+  for (const Change::Halfedge h : collapse.collapses()) vanishing_vertices_.push_back(mesh_->from(h));
   faces_.clear(), flips_.clear(), local_vertex_.clear(), local_face_.clear(), outer_edges_.clear();
   if (collapse.elements().size() > kMostFaces || !gather_core(collapse, rings)) return false;
   // The faces of the change come first, in its order, so that their numbers are those of its elements.
@@ -166,8 +166,8 @@ bool Patch::joined_by_edge(std::uint32_t a, std::uint32_t b) const {
   });
 }
 
-/// Whether an edge between copies of two vertices, and not these two, may lie where an edge between these two lies or
-/// would lie once the collapse is carried out: see BoundedMesh::joined_by_other().
+/// Whether, after the collapse, an edge other than the one from a to b may lie between the same two places. It may say
+/// so where BoundedMesh::joined_by_other() will not, and never the reverse.
 bool Patch::may_be_joined_by_other(std::uint32_t a, std::uint32_t b) const {
   if (!vertices_[a].joined && !vertices_[b].joined) return false;
   // The collapse or another flip of this patch may make an edge between copies of the two.

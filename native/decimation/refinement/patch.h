@@ -93,12 +93,14 @@ class Patch {
   void note_outer_edges();
   bool joined_by_edge(std::uint32_t a, std::uint32_t b) const;
   bool may_be_joined_by_other(std::uint32_t a, std::uint32_t b) const;
-  /// The slot of a vertex of the mesh when the collapse is carried out.
+  /// The slot of a vertex of the mesh once the collapse has been carried out.
   std::uint32_t slot_after_collapse(std::uint32_t id) const {
     const std::uint32_t slot = mesh_->slot(id);
     return slot == merged_slot_ ? kept_slot_ : slot;
   }
-  bool vanishes(std::uint32_t id) const { return std::ranges::find(vanishing_, id) != vanishing_.end(); }
+  bool vanishes(std::uint32_t id) const {
+    return std::ranges::find(vanishing_vertices_, id) != vanishing_vertices_.end();
+  }
   void set_across(std::uint32_t face, std::uint32_t from, std::uint32_t to, std::uint32_t other);
 
   const BoundedMesh* mesh_ = nullptr;
@@ -108,7 +110,7 @@ class Patch {
   std::vector<Flip> flips_;
   std::unordered_map<std::uint32_t, std::uint32_t> local_vertex_, local_face_;
   std::uint32_t kept_slot_ = 0, merged_slot_ = 0;  ///< Those of the ends of the collapse.
-  std::vector<std::uint32_t> vanishing_;           ///< The vertices that the collapse takes away.
+  std::vector<std::uint32_t> vanishing_vertices_;  ///< The vertices that the collapse takes away.
   std::vector<std::uint32_t> core_;                ///< The vertices of the mesh whose faces are taken.
   std::vector<std::pair<std::uint32_t, std::uint32_t>>
       outer_edges_;  ///< Edges of the mesh that no face here has; sorted.
