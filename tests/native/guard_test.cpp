@@ -355,8 +355,10 @@ TEST(Guard, ReplacedFacesPollOftenAndAreAsBeforeOnceCancelled) {
   std::size_t polls = polls_of([&] { ASSERT_TRUE(guard.replace_faces(otherwise).empty()); });
   EXPECT_GE(polls, 2 * n * n) << "each face is searched for crossings";
   for (const std::size_t share : {10, 2}) {
-    const Counted cancelled(polls / share);
-    EXPECT_THROW(guard.replace_faces(s.faces()), Cancelled);
+    {
+      const Counted cancelled(polls / share);
+      EXPECT_THROW(guard.replace_faces(s.faces()), Cancelled);
+    }
     EXPECT_TRUE(guard.replace_faces(otherwise).empty());
     EXPECT_TRUE(guard.constrain(s.positions).vertices.empty()) << "the state is the same";
   }
