@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Distances of triangles at the nodes of a grid, as scatter.cpp computes them. Each work group looks at one
-// block of nodes near one triangle. A first pass leaves the smallest distance at each node, and a second the lowest id of the
-// triangles that have this distance. Positive floats are ordered like their bits, so that atomicMin() finds the smallest
-// distance as well as the lowest id.
+// Distances of triangles at the nodes of a grid, as scatter.cpp computes them. Each work group looks at one block of nodes
+// near one triangle. A first pass leaves the smallest distance at each node, and a second the lowest id of the triangles
+// that have this distance. Positive floats are ordered like their bits, so that atomicMin() finds the smallest distance as
+// well as the lowest id.
 layout(local_size_x = 64) in;
 
 // The numbers of a triangle, in the order of scatter_gl.cpp.

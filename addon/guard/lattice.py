@@ -58,7 +58,7 @@ class LatticeWatch(watch.Preparing):
         self._stopped = False
         self._built = None
         self._positions = self._points = self._proposed = None
-        self._first_pairs = None  # the pairs of polygons that cross in the first mesh that is kept, a number for each
+        self._first_pairs = None  # the pairs of polygons that cross in the first mesh that is kept
         self._limit = _AT_TOLERANCE  # what stopped the lattice last
         try:
             reference, tolerance, matrix, threads = watch.needed(ob)
@@ -135,13 +135,14 @@ class LatticeWatch(watch.Preparing):
                 if lost := np.count_nonzero(uncovered & ~self.uncovered):
                     return _AT_TOLERANCE, watch.lost_reason(lost)
             if self._keeps_crossings_out:
-                pairs = _crossing_polygons(replace(arrays, vertices=positions), self._options["threads"])
-                if pairs is None:
-                    count = solidity.pair_count(solidity.MOST_PAIRS)
+                found = solidity.crossing_pairs(replace(arrays, vertices=positions), self._options["threads"])
+                if len(found) >= solidity.MOST_PAIRS:
+                    count = solidity.pair_count(len(found))
                     return _AT_CROSSINGS, f"{count} pairs of faces cross, too many to keep others out"
+                pairs = set(map(tuple, solidity.polygon_pairs(found, arrays.polygons).tolist()))
                 if self._first_pairs is None:
                     self._first_pairs = pairs
-                if new := len(np.setdiff1d(pairs, self._first_pairs, assume_unique=True)):
+                if new := len(pairs - self._first_pairs):
                     return _AT_CROSSINGS, f"{new:,} pairs of faces would cross that did not cross when the guard began"
         except native.module.TolvolError as error:  # for example, the mesh has become smaller than the tolerance
             return _AT_TOLERANCE, str(error)
@@ -195,15 +196,6 @@ def _write(cages, points):
 def rest(ob):
     """Checks the mesh after a correction: Blender evaluates the written control points without calling a handler."""
     follow(ob, None, bpy.context.evaluated_depsgraph_get())
-
-
-def _crossing_polygons(arrays, threads):
-    """Returns the pairs of polygons that cross, a number for each, in rising order. None if there are too many to find all."""
-    found = solidity.crossing_pairs(arrays, threads)
-    if len(found) >= solidity.MOST_PAIRS:
-        return None
-    first, second = np.sort(arrays.polygons[found].astype(np.int64), axis=1).T
-    return np.unique((first << 32 | second)[first != second])
 
 
 def _equal(points, others):

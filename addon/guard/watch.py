@@ -110,8 +110,7 @@ class Faces:
         faces, polygons = self.guarded
         triangles, of_face = mesh_io.cut_both_ways(faces)
         found = solidity.crossing_pairs(MeshArrays(positions, triangles, None, None), threads, progress, _MOST_PAIRS)
-        pairs = np.sort(polygons[of_face][found], axis=1)
-        return len(np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0))
+        return len(solidity.polygon_pairs(found, polygons[of_face]))
 
     def outside(self, built, positions, options):
         """Returns how many polygons are outside in the triangulation that Blender shows. options: of a check."""

@@ -53,7 +53,6 @@ ways, and apply the modifier to the base mesh. An object without a reference get
 
     def steps(self, context):
         self._found = []  # (number of triangles, value) of each value at which no sample is beyond the tolerance
-        self._crossed = False  # whether a value was refused because more faces would cross
         context.view_layer.update()
         ob, modifier = self.ob, self.chosen(fitted=True)
         if self.result == "SHAPE_KEY":
@@ -95,6 +94,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         """Returns (number of triangles, value) of values from `first` on at which no sample is beyond the tolerance and no more
         faces cross than may, the fewest triangles first. A value at which the modifier removes no triangle is left out unless
         it _counts()."""
+        self._found = []
         name, triangles = evaluation.modifier.name, len(trial.surface.arrays.triangles)
         most, tried = fit.most_values(triangles), 0
         search, deviation = fit.search(first, parameter.last, most), None
@@ -107,11 +107,8 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             self.share, tried = min(tried / most, 1), tried + 1
             setattr(evaluation.modifier, parameter.name, value)
             arrays = mesh_io.read_mesh(evaluation.mesh())
-            deviation = yield trial.measured(arrays)
+            deviation = yield trial.judged(arrays)
             if deviation > 1:
-                continue
-            if (yield from self._crosses(trial, arrays)):
-                deviation = fit.REFUSED
                 continue
             if self._counts(evaluation, trial, len(arrays.triangles)):
                 self._found.append((len(arrays.triangles), value))
@@ -128,7 +125,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         plain = yield from self._plain(context, trial)
         if plain is not None and plain < before:
             remedy += f", or press Decimate, which leaves {plain:,}"
-        if self._crossed:
+        if trial.crossed:
             remedy += ". At a value within the tolerance faces would cross, which Crossings can allow"
         raise Refused(
             f"No {parameter.label} of {name} leaves fewer than the {before:,} triangles of {ob.name} within the "
@@ -158,7 +155,6 @@ ways, and apply the modifier to the base mesh. An object without a reference get
                 bpy.data.meshes.remove(proved[1])
             if (first := next(firsts, None)) is None:
                 break
-            self._found = []
             found = (yield from self._search(evaluation, parameter, trial, first)) or [(0, first)]
         name, ob = evaluation.modifier.name, self.ob.name
         if self.progress.finishing:
@@ -174,31 +170,18 @@ ways, and apply the modifier to the base mesh. An object without a reference get
         return None
 
     def _proof(self, evaluation, parameter, trial, value, triangles=0):
-        """Returns (value, mesh, the result of certified()) for a value. It raises NotProved if that fails, and WouldCross."""
+        """Returns (value, mesh, the result of certified()) for a value. It raises what certified() raises."""
         self.part, self.doing = f"Proving {evaluation.modifier.name}", f"{parameter.label} {value:.4g}"
         self.share, self.count = 0.0, f"{triangles:,} triangles" if triangles else ""
         setattr(evaluation.modifier, parameter.name, value)
         mesh = evaluation.new_mesh()
         try:
-            arrays = mesh_io.read_mesh(mesh)
-            certified = yield trial.certified(arrays)
-            if pairs := (yield from self._crosses(trial, arrays)):
-                raise WouldCross(
-                    f"At the {parameter.label} {value:.4g} of {evaluation.modifier.name}, {pairs} pairs of faces would cross: "
-                    "press Decimate, which keeps crossings out, or set Crossings to Allow in its options"
-                )
-            return value, mesh, certified
-        except BaseException:
+            return value, mesh, (yield trial.certified(mesh_io.read_mesh(mesh)))
+        except BaseException as error:
             bpy.data.meshes.remove(mesh)
+            if isinstance(error, WouldCross):
+                raise WouldCross(f"At the {self.doing} of {evaluation.modifier.name}, {error}") from None
             raise
-
-    def _crosses(self, trial, arrays):
-        """Returns as text how many pairs of faces cross if these are more than before and crossings are kept out, else None."""
-        pairs = None
-        if self.ob.tolvol.crossings == "KEEP_OUT":
-            pairs = yield trial.crossings(arrays)
-            self._crossed |= pairs is not None
-        return pairs
 
     @staticmethod
     def _counts(evaluation, trial, triangles):
@@ -259,7 +242,11 @@ def _samples(vertices, triangles):
 
 
 class _Trial:
-    """Compares meshes of one object with its reference. measured(), crossings() and certified() return work for the thread."""
+    """Compares meshes of one object with its reference. measured(), judged() and certified() return work for the thread.
+
+    left: the number of triangles of the last mesh that was proved to be within the tolerance.
+    crossed: whether a mesh that no sample proves to be beyond was refused because more faces would cross.
+    """
 
     def __init__(self, ob, threads):
         self.surface = snapshots.surface_of(ob)
@@ -268,7 +255,8 @@ class _Trial:
         self.tolerance = tolerances.required(ob, self.size)
         self.threads = threads
         self._pair = self.reference.world(), self.reference.arrays.triangles
-        self.left = 0
+        self.left, self.crossed = 0, False
+        self._keeps_crossings_out = ob.tolvol.crossings == "KEEP_OUT"
 
     def parameter(self, modifier):
         arrays = self.surface.arrays
@@ -296,22 +284,30 @@ class _Trial:
 
         return work
 
-    def crossings(self, arrays):
-        """Returns work that gives as text how many pairs of faces cross, if these are more than before or too many to be
-        counted, else None."""
+    def judged(self, arrays):
+        """Returns work that gives what measured() gives, or fit.REFUSED if that is at most 1 and more faces would cross."""
 
         def work(progress):
+            deviation = self.measured(arrays)(progress)
+            if deviation > 1 or not self._keeps_crossings_out:
+                return deviation
             after = len(solidity.crossing_pairs(arrays, self.threads, progress))
             before = solidity.facts(self.surface, self.threads, progress, again=False)["crossing_pairs"] if after else 0
-            return solidity.pair_count(after) if after > before or after >= solidity.MOST_PAIRS else None
+            return fit.REFUSED if self._would_cross(before, after) else deviation
 
         return work
+
+    def _would_cross(self, before, after):
+        """Whether crossings are kept out and more pairs of faces cross after than before, or too many to be counted."""
+        would = self._keeps_crossings_out and (after > before or after >= solidity.MOST_PAIRS)
+        self.crossed |= would
+        return would
 
     def certified(self, arrays):
         """Returns work that gives the result of certify() for the mesh as Blender will store it, and "solidity", the result
         of solidity.compared().
 
-        The work raises NotProved unless the mesh is within the tolerance both ways.
+        The work raises NotProved unless the mesh is within the tolerance both ways, and WouldCross if more faces cross.
         """
 
         def work(progress):
@@ -324,8 +320,13 @@ class _Trial:
                     "result".format(*ways)
                 )
             self.left = len(arrays.triangles)
-            facts = (solidity.facts(one, self.threads, progress) for one in (self.surface, surface))
-            return found | {"solidity": solidity.compared(*facts)}
+            before, after = (solidity.facts(one, self.threads, progress) for one in (self.surface, surface))
+            if self._would_cross(before["crossing_pairs"], after["crossing_pairs"]):
+                raise WouldCross(
+                    f"{solidity.pair_count(after['crossing_pairs'])} pairs of faces would cross: press Decimate, which keeps "
+                    "crossings out, or set Crossings to Allow in its options"
+                )
+            return found | {"solidity": solidity.compared(before, after)}
 
         return work
 

@@ -305,6 +305,20 @@ def test_an_outcome_waits_until_the_mode_is_that_of_the_start(waiting, monkeypat
     assert operator.modal(context, event("TIMER")) == {"FINISHED"} and operator.ended == [True]
 
 
+def test_the_status_bar_is_told_again_once_something_else_has_removed_the_text(waiting, monkeypatch):
+    texts, shown = [], []
+    monkeypatch.setattr(status_bar, "show", lambda text: (texts.append(text), shown.append(text)))
+    monkeypatch.setattr(status_bar, "showing", lambda: bool(shown))
+    operator, _ = waiting
+    operator._run._began -= 10
+    for _ in range(3):
+        assert operator.modal(Context(), event("TIMER")) == {"PASS_THROUGH"}
+    assert len(texts) == 1
+    shown.clear()
+    operator.modal(Context(), event("TIMER"))
+    assert len(texts) == 2 and texts[0] == texts[1]
+
+
 def test_a_second_job_waits_for_the_first(waiting):
     second = type("Second", (Modal,), {"__init__": lambda self: None})()
     assert second.invoke(None, None) == {"CANCELLED"}

@@ -2,11 +2,14 @@
 // The edges and points in which sheets meet, each with vertices of its own: what a decimation may do to them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
+#include <vector>
 
 #include "certified_mesh.h"
 #include "decimation/change.h"
 #include "decimation/refinement/patch.h"
+#include "patches.h"
 
 namespace {
 
@@ -98,27 +101,6 @@ CertifiedMesh folded() {
   return {plate, plate.vertices, 0.3};
 }
 
-/// Flips all edges of a patch that it lets flip, in an order that the generator gives, carries the collapse and the
-/// flips out, and returns whether the mesh allowed each of them.
-bool carry_out(BoundedMesh& mesh, Change& change, Patch& patch, std::mt19937& random) {
-  std::vector<std::uint32_t> faces;
-  for (std::uint32_t f = 0; f < patch.faces().size(); ++f) faces.push_back(f);
-  std::shuffle(faces.begin(), faces.end(), random);
-  for (const std::uint32_t f : faces) {
-    Patch::Flipped flipped;
-    for (int k = 0; k < 3; ++k) {
-      if (patch.can_flip(f, k, flipped)) patch.flip(flipped);
-    }
-  }
-  mesh.apply(change);
-  for (const Patch::Flip& flip : patch.flips()) {
-    const auto h = mesh.connectivity().find_halfedge(BoundedMesh::handle(flip.from), BoundedMesh::handle(flip.to));
-    if (!h.is_valid() || !change.prepare_flip(mesh.connectivity().edge_handle(h))) return false;
-    mesh.apply(change);
-  }
-  return true;
-}
-
 TEST(ContactPoint, AllowsInTheMeshWhatItAllowsInAPatch) {
   std::size_t flips = 0;
   for (unsigned seed = 0; seed < 200; ++seed) {
@@ -132,7 +114,10 @@ TEST(ContactPoint, AllowsInTheMeshWhatItAllowsInAPatch) {
       if (connectivity.status(connectivity.edge_handle(h)).deleted()) continue;
       if (!change.prepare_collapse(h, c.mesh->vertex_position(c.mesh->to(h)))) continue;
       if (!patch.gather(change, 2, true)) continue;
-      ASSERT_TRUE(carry_out(*c.mesh, change, patch, random)) << "seed " << seed << ", step " << step;
+      std::vector<std::uint32_t> faces = patches::faces_of(patch);
+      std::shuffle(faces.begin(), faces.end(), random);
+      patches::flip_all(patch, faces);
+      ASSERT_TRUE(patches::carry_out(*c.mesh, change, patch)) << "seed " << seed << ", step " << step;
       flips += patch.flips().size();
     }
   }

@@ -11,6 +11,7 @@
 
 #include "certified_mesh.h"
 #include "many.h"
+#include "patches.h"
 
 namespace {
 
@@ -91,21 +92,10 @@ TEST(Patch, FlipsAsTheMeshDoes) {
   ASSERT_TRUE(change.prepare_collapse(edge_into(*c.mesh, kMiddle), c.mesh->vertex_position(kMiddle)));
   Patch patch;
   patch.gather(change, 3, true);
-  for (std::uint32_t f = 0; f < patch.faces().size(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      Patch::Flipped flipped;
-      if (patch.can_flip(f, k, flipped)) patch.flip(flipped);
-    }
-  }
+  patches::flip_all(patch, patches::faces_of(patch));
   EXPECT_GT(patch.flips().size(), 20u);
   expect_linked(patch);
-  c.mesh->apply(change);
-  for (const Patch::Flip& flip : patch.flips()) {
-    const auto h = c.mesh->connectivity().find_halfedge(BoundedMesh::handle(flip.from), BoundedMesh::handle(flip.to));
-    ASSERT_TRUE(h.is_valid());
-    ASSERT_TRUE(change.prepare_flip(c.mesh->connectivity().edge_handle(h))) << "the mesh allows what the patch allows";
-    c.mesh->apply(change);
-  }
+  ASSERT_TRUE(patches::carry_out(*c.mesh, change, patch)) << "the mesh allows what the patch allows";
   for (const Patch::Face& face : patch.faces()) {
     const glm::uvec3& t = c.mesh->triangle(face.id);
     EXPECT_EQ(corners_of(patch, face), turned(t.x, t.y, t.z));
@@ -113,19 +103,9 @@ TEST(Patch, FlipsAsTheMeshDoes) {
 }
 
 TEST(Patch, IsNotTakenAroundAVertexWithManyFaces) {
-  // A cone, flat but for its rim's waves: its apex has all faces.
-  const auto cone = [](unsigned sides) {
-    TriangleMesh mesh;
-    mesh.vertices.emplace_back(0, 0, 0);
-    for (unsigned i = 0; i < sides; ++i) {
-      const double angle = 2 * std::numbers::pi * i / sides;
-      mesh.vertices.emplace_back(std::cos(angle), std::sin(angle), 0.1 * (i % 2));
-      mesh.triangles.emplace_back(0, i + 1, (i + 1) % sides + 1);
-    }
-    return mesh;
-  };
   for (const unsigned sides : {100u, 150u, 700u, unsigned(many(20000))}) {
-    const TriangleMesh mesh = cone(sides);
+    TriangleMesh mesh = shapes::fan(sides);  // flat but for the waves of its rim
+    for (unsigned i = 0; i < sides; ++i) mesh.vertices[i + 1].z = 0.1 * (i % 2);
     const CertifiedMesh c(mesh, mesh.vertices, 0.3);
     Change change(*c.mesh);
     const auto h = c.mesh->connectivity().find_halfedge(BoundedMesh::handle(1), BoundedMesh::handle(2));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <vector>
@@ -24,6 +25,35 @@ inline void gather(const BoundedMesh& mesh, Change& change, Patch& patch) {
   const auto h = mesh.connectivity().find_halfedge(BoundedMesh::handle(kMiddle - 1), BoundedMesh::handle(kMiddle));
   if (!change.prepare_collapse(h, mesh.vertex_position(kMiddle))) throw std::logic_error("no collapse");
   patch.gather(change, 2, true);
+}
+
+/// All faces of a patch, in order.
+inline std::vector<std::uint32_t> faces_of(const Patch& patch) {
+  std::vector<std::uint32_t> faces(patch.faces().size());
+  std::iota(faces.begin(), faces.end(), 0u);
+  return faces;
+}
+
+/// Flips each edge that the patch lets flip, of one face after the other.
+inline void flip_all(Patch& patch, const std::vector<std::uint32_t>& faces) {
+  for (const std::uint32_t f : faces) {
+    for (int k = 0; k < 3; ++k) {
+      Patch::Flipped flipped;
+      if (patch.can_flip(f, k, flipped)) patch.flip(flipped);
+    }
+  }
+}
+
+/// Carries out in the mesh the collapse that a patch was taken around, and its flips. Returns whether the mesh allowed
+/// each of them.
+inline bool carry_out(BoundedMesh& mesh, Change& change, const Patch& patch) {
+  mesh.apply(change);
+  for (const Patch::Flip& flip : patch.flips()) {
+    const auto h = mesh.connectivity().find_halfedge(BoundedMesh::handle(flip.from), BoundedMesh::handle(flip.to));
+    if (!h.is_valid() || !change.prepare_flip(mesh.connectivity().edge_handle(h))) return false;
+    mesh.apply(change);
+  }
+  return true;
 }
 
 /// A flat plate, which is its own reference. The free vertices of the patch are lifted by so many tolerances.

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "measure/hausdorff.h"
+#include "shapes.h"
 
 namespace {
 
@@ -14,17 +15,6 @@ using namespace tolvol;
 using glm::dvec3;
 
 constexpr double kWithin = 0.01;
-
-/// A fan of triangles around a point, as high as `height` there.
-TriangleMesh fan(unsigned count, double height) {
-  TriangleMesh mesh{{{0, 0, height}}, {}};
-  for (unsigned i = 0; i < count; ++i) {
-    const double angle = 2 * M_PI * i / count;
-    mesh.vertices.emplace_back(std::cos(angle), std::sin(angle), 0);
-    mesh.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % count);
-  }
-  return mesh;
-}
 
 ReplacedFaces faces_of(const TriangleMesh& mesh, double distance) {
   ReplacedFaces faces;
@@ -34,7 +24,7 @@ ReplacedFaces faces_of(const TriangleMesh& mesh, double distance) {
 }
 
 TEST(ReplacedFaces, BoundWhatLiesInTheirPlane) {
-  const TriangleMesh mesh = fan(7, 0);
+  const TriangleMesh mesh = shapes::fan(7, 0);
   ReplacedFaces faces = faces_of(mesh, 0);
   const dvec3 across[3] = {mesh.vertices[1], mesh.vertices[3], mesh.vertices[6]};
   const double bound = faces.bound(across, kWithin, nullptr).distance;
@@ -51,7 +41,7 @@ TEST(ReplacedFaces, BoundWhatLiesInTheirPlane) {
 
 // Each part of the triangle is near a few of the faces, and only these are compared with it.
 TEST(ReplacedFaces, LookAtTheFacesNearEachPart) {
-  const TriangleMesh mesh = fan(400, 0);
+  const TriangleMesh mesh = shapes::fan(400, 0);
   ReplacedFaces faces = faces_of(mesh, 0);
   const dvec3 over_forty[3] = {mesh.vertices[1], mesh.vertices[41], 0.3 * mesh.vertices[21]};
   ASSERT_LE(faces.bound(over_forty, kWithin, nullptr).distance, 1e-9 * kWithin);
@@ -60,7 +50,7 @@ TEST(ReplacedFaces, LookAtTheFacesNearEachPart) {
 
 TEST(ReplacedFaces, TakeAShareOfTheRoomThatIsLeftAndNoMore) {
   // A corner a little above their plane each time.
-  const TriangleMesh mesh = fan(7, 0);
+  const TriangleMesh mesh = shapes::fan(7, 0);
   double distance = 0;
   for (int i = 0; i < 100; ++i) {
     const double height = 0.01 * (kWithin - distance);
@@ -78,7 +68,7 @@ TEST(ReplacedFaces, NeverBoundByLessThanTheDistance) {
   int bounded = 0;
   for (int i = 0; i < 3'000; ++i) {
     const double distance = 0.3 * (1 + unit(engine)) * kWithin, scale = std::pow(10, 2 * unit(engine) - 3);
-    const TriangleMesh mesh = fan(5, scale * kWithin * unit(engine));
+    const TriangleMesh mesh = shapes::fan(5, scale * kWithin * unit(engine));
     dvec3 corners[3];
     for (dvec3& p : corners) p = {0.6 * unit(engine), 0.6 * unit(engine), scale * kWithin * unit(engine)};
     const double bound = faces_of(mesh, distance).bound(corners, kWithin, nullptr).distance;
@@ -94,14 +84,16 @@ TEST(ReplacedFaces, NeverBoundByLessThanTheDistance) {
 TEST(ReplacedFaces, LeaveOpenWhatTheyCannotBound) {
   const dvec3 inside[3] = {{0.1, 0.1, 0}, {0.4, 0.1, 0}, {0.1, 0.4, 0}},
               beyond[3] = {{0, 0, 0}, {1.2, 0, 0}, {0, 1, 0}};
-  EXPECT_LE(faces_of(fan(6, 0), 0).bound(inside, kWithin, nullptr).distance, kWithin);
-  EXPECT_GT(faces_of(fan(6, 0), 0).bound(beyond, kWithin, nullptr).distance, kWithin);
-  EXPECT_GT(faces_of(fan(6, 0), kWithin).bound(inside, kWithin, nullptr).distance, kWithin) << "no room is left";
-  EXPECT_GT(faces_of(fan(6, 0), std::numeric_limits<double>::infinity()).bound(inside, kWithin, nullptr).distance,
-            kWithin);
+  EXPECT_LE(faces_of(shapes::fan(6, 0), 0).bound(inside, kWithin, nullptr).distance, kWithin);
+  EXPECT_GT(faces_of(shapes::fan(6, 0), 0).bound(beyond, kWithin, nullptr).distance, kWithin);
+  EXPECT_GT(faces_of(shapes::fan(6, 0), kWithin).bound(inside, kWithin, nullptr).distance, kWithin)
+      << "no room is left";
+  EXPECT_GT(
+      faces_of(shapes::fan(6, 0), std::numeric_limits<double>::infinity()).bound(inside, kWithin, nullptr).distance,
+      kWithin);
   EXPECT_GT(ReplacedFaces().bound(inside, kWithin, nullptr).distance, kWithin);
   constexpr double kTiny = 1e-12;
-  EXPECT_GT(faces_of(fan(6, 0), 0).bound(inside, kTiny, nullptr).distance, kTiny)
+  EXPECT_GT(faces_of(shapes::fan(6, 0), 0).bound(inside, kTiny, nullptr).distance, kTiny)
       << "a step of it is no more than rounding hides";
 }
 

@@ -78,6 +78,17 @@ inline TriangleMesh torus(unsigned n, double noise = 0, unsigned seed = 1) {
   return stored(mesh);
 }
 
+/// A fan of n triangles around vertex 0, which is as high as `height`; its rim is a circle in the plane z = 0.
+inline TriangleMesh fan(unsigned n, double height = 0) {
+  TriangleMesh mesh{{{0, 0, height}}, {}};
+  for (unsigned i = 0; i < n; ++i) {
+    const double angle = 2 * std::numbers::pi * i / n;
+    mesh.vertices.emplace_back(std::cos(angle), std::sin(angle), 0);
+    mesh.triangles.emplace_back(0, i + 1, (i + 1) % n + 1);
+  }
+  return mesh;
+}
+
 /// The closed surface of a box with n x n squares a side.
 inline TriangleMesh box(unsigned n) {
   TriangleMesh mesh;

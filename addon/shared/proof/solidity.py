@@ -44,6 +44,15 @@ def crossing_pairs(arrays, threads=None, progress=None, most=None):
     )
 
 
+def polygon_pairs(pairs, polygons):
+    """Returns (k, 2): the pairs of different polygons of which triangles cross, each once, the lower number first.
+
+    pairs: of triangles, from crossing_pairs(); polygons: (m,), the polygon of each triangle.
+    """
+    found = np.sort(polygons[pairs], axis=1)
+    return np.unique(found[found[:, 0] != found[:, 1]], axis=0)
+
+
 def pair_count(pairs):
     """Returns a number of crossing pairs as text. They are counted up to MOST_PAIRS only."""
     return f"at least {MOST_PAIRS:,}" if pairs >= MOST_PAIRS else f"{pairs:,}"
