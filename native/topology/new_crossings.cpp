@@ -187,17 +187,24 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
   });
   Box all;
   for (const Box& box : trial.boxes_) all.add(box);
-  std::size_t pairs = 0;
-  bool possible = true;
+  // The order of a search depends on which corners counted as hubs when the tree was built, and what is found here must
+  // not depend on that.
+  std::vector<std::uint32_t> others;
   near.for_each_near(all, faces, [&](std::uint32_t other) {
-    if (std::binary_search(trial.replaced_.begin(), trial.replaced_.end(), other)) return true;
+    if (!std::ranges::binary_search(trial.replaced_, other)) others.push_back(other);
+    return true;
+  });
+  std::ranges::sort(others);
+  others.erase(std::unique(others.begin(), others.end()), others.end());
+  std::size_t pairs = 0;
+  for (const std::uint32_t other : others) {
     const Corners t = corners(other);
     std::vector<std::uint32_t> crossing;
     ring.for_each_near(t, [&](std::uint32_t i) {
       if (faces_cross(faces[i].corners, t)) crossing.push_back(i);
       return true;
     });
-    if (crossing.empty()) return true;
+    if (crossing.empty()) continue;
     std::vector<std::uint32_t> origins = origins_of(other, {});
     input_.keep_crossing(origins);
     pairs += origins.size() * members.size();
@@ -205,11 +212,9 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
     for (std::uint32_t m = 0; m < members.size() && pairs <= kMostPairs; ++m) {
       if (input_.any_crossed({&members[m].input_face, 1}, origins)) of_other.push_back(m);
     }
-    possible = !of_other.empty();
+    if (of_other.empty()) return false;
     for (const std::uint32_t i : crossing) succession.need(i, of_other);
-    return possible;
-  });
-  if (!possible) return false;
+  }
   const std::optional<std::vector<std::uint32_t>> found = succession.find();
   if (!found) return false;
   for (std::size_t m = 0; m < members.size(); ++m) {
