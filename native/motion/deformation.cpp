@@ -186,14 +186,14 @@ class Deformation {
     take_uncovered(uncovered_before, Outside::error);
   }
 
-  /// Looks how the faces of the result face the reference.
+  /// Looks how the faces of the result face the reference. They are compared by the same sides as at the start: a start
+  /// from the result might find others for parts that face the reference by about as much area with either.
   void take_normals() {
     result_.normals = mesh_->normals();
     if (!result_.normals || result_.vertices == std::vector(before_.begin(), before_.end())) return;
-    const std::size_t before = result_.normals->exceeded_before;
-    mesh_->start(result_.vertices, options_.max_normal_angle, place_, options_.progress);
+    const PullBack::Moving moving = try_at(result_.vertices);
+    mesh_->accept_proved(moving.vertices, moving.faces, options_.progress);
     result_.normals = mesh_->normals();
-    result_.normals->exceeded_before = before;
   }
 
   void hold_t_junctions() {
@@ -319,23 +319,24 @@ class Deformation {
     std::vector<std::uint32_t> result = not_inside(stored, faces_);
     if (!kept_.empty()) std::erase_if(result, [&](std::uint32_t face) { return kept_[face]; });
     if (!result.empty() || !coverage_) return result;
-    return coverage_->failing(try_at(stored));
+    return coverage_->failing(try_at(stored).faces);
   }
 
   /// Faces that would exceed their angle, where none are leaving.
   std::vector<std::uint32_t> turning(std::span<const glm::dvec3> stored) {
-    return mesh_->turned(try_at(stored), options_.progress);
+    return mesh_->turned(try_at(stored).faces, options_.progress);
   }
 
-  /// Has the mesh try these positions. Returns the faces that move.
-  std::vector<std::uint32_t> try_at(std::span<const glm::dvec3> stored) {
-    std::vector<std::uint32_t> moving;
+  /// Has the mesh try these positions.
+  PullBack::Moving try_at(std::span<const glm::dvec3> stored) {
+    PullBack::Moving moving;
     std::vector<glm::dvec3> from, to;
     for (std::uint32_t v = 0; v < before_.size(); ++v) {
-      if (after_[v] != before_[v]) moving.push_back(v), from.push_back(before_[v]), to.push_back(stored[v]);
+      if (after_[v] != before_[v]) moving.vertices.push_back(v), from.push_back(before_[v]), to.push_back(stored[v]);
     }
-    mesh_->try_all(moving, from, to);
-    return mesh_->faces_around(moving);
+    mesh_->try_all(moving.vertices, from, to);
+    moving.faces = mesh_->faces_around(moving.vertices);
+    return moving;
   }
 
   /// Faces that would cross others anew or become degenerate.

@@ -88,6 +88,8 @@ class MovingMesh {
   std::vector<std::uint32_t> turned(std::span<const std::uint32_t> faces, Progress* progress);
   /// Makes the trial of these vertices the state. `faces` are all faces around them.
   void accept(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces);
+  /// The same where a longer search than that of failing() has proved that no face is outside and none is turned().
+  void accept_proved(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces, Progress* progress);
 
   const glm::dvec3& state(std::uint32_t vertex) const { return state_[vertex].at; }
   const glm::dvec3& trial(std::uint32_t vertex) const { return trial_[vertex].at; }

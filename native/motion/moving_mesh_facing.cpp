@@ -202,6 +202,17 @@ std::vector<std::uint32_t> MovingMesh::turned(std::span<const std::uint32_t> fac
   return chosen(open, turned);
 }
 
+void MovingMesh::accept_proved(std::span<const std::uint32_t> vertices, std::span<const std::uint32_t> faces,
+                               Progress* progress) {
+  const std::vector<std::uint32_t> open = failing(faces, progress);
+  accept(vertices, faces);
+  if (!facing_) return;
+  parallel_for(open.size(), kFewAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
+    if (progress) progress->update(progress->fraction());
+    for (std::size_t i = begin; i < end; ++i) limit_angle(open[i]);
+  });
+}
+
 std::optional<Normals> MovingMesh::normals() const {
   if (!facing_) return std::nullopt;
   Normals result;

@@ -251,3 +251,18 @@ def test_a_face_without_a_normal_may_stay_so_and_keeps_the_angle_once_it_has_one
     found = angles_of(reference, result.vertices[flat[has_area]].astype(float), volume.tolerance)
     assert (found > 90 + ROUNDING).sum() <= result.report["normals"]["exceeded_after"]
     assert np.isfinite(unit_normals(result.vertices[flat[has_area]].astype(float))).all()
+
+
+def test_a_deformation_compares_its_result_by_the_sides_that_it_began_with():
+    # In the reference three triangles share an edge, so that they are parts of their own. Of the mesh one is outside, so
+    # that the other two, which run along the edge in one direction, are one part, half of which looks to either side.
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, -1, 0], [0.5, 0, 1.0]])
+    volume = tolvol.ToleranceVolume(vertices, np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]], np.int32), 0.01)
+    apart = np.concatenate([vertices, vertices[[0, 1, 4]] + [0, 0, 0.05]])
+    triangles = np.array([[0, 1, 2], [0, 1, 3], [5, 6, 7]], np.int32)
+    domain = meshes.matrix(np.diag([1.2, 2.2, 1.4]), [-0.1, -1.1, -0.1])
+    lattice = tolvol.Lattice(tolvol.lattice_points(2, domain) + [0.001, 0, 0], domain)
+    result = tolvol.deform(apart, lattice, triangles, volume, two_sided=False, outside="keep", crossings="allow")
+    assert result.report["moved"] > 0
+    normals = result.report["normals"]
+    assert normals["exceeded_before"] == normals["exceeded_after"] == 0
