@@ -104,7 +104,8 @@ bool PatchTrial::relax_and_certify(double worth_going_on, bool quick) {
     if (certify()) return true;
     if (!learnt_) return false;
     deviations_.renew();
-    if (deviations_.is_stuck()) return false;
+    // Where the samples see nothing to lower, nothing would move, and the certificates would refuse the same again.
+    if (deviations_.enough() || deviations_.is_stuck()) return false;
     quick ? relaxation_.try_lower_largest(deviations_, kStepsAfterRefusal)
           : relaxation_.lower_largest(deviations_, kStepsAfterRefusal);
     if (!deviations_.enough()) return false;
