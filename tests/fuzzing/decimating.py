@@ -144,7 +144,7 @@ def _judge_decimation(run, result, vertices, triangles, volume, given, side):
     joins = judge.joins_t_junctions(result)
     judges.connected_alike(run, before, after, joins)
     if not given["two_sided"] and vertices is case.vertices and not joins:
-        judges.rims_alike(run, reference, (placed, result.triangles), case.tolerance)
+        judges.rims_alike(run, before, after, case.tolerance)
 
 
 def _judge_cell(result, vertices, triangles, cell):

@@ -278,12 +278,14 @@ def connected_alike(run, before, after, joins=False):
 def rims_alike(run, before, after, tolerance):
     """Requires that the boundaries before and after a one-sided operation are within the tolerance of each other.
 
-    The boundary is the edges of one triangle, by position. Meshes with repeated faces are not judged: these may be the two
-    sides of a sheet, which may move apart, or one may be left of them.
+    The boundary is the edges of one triangle, by stored position: a map to the world may round two positions, between
+    which a boundary runs, to one. Meshes with repeated faces are not judged: these may be the two sides of a sheet, which
+    may move apart, or one may be left of them.
     """
     (places, faces), (new_places, new_faces) = proper_faces(*before), proper_faces(*after)
     if len(np.unique(faces, axis=0)) < len(faces):
         return
+    places, new_places = run.case.world(places), run.case.world(new_places)
     rim, new_rim = meshes.boundary_segments(places, faces), meshes.boundary_segments(new_places, new_faces)
     if (len(rim) == 0) != (len(new_rim) == 0):
         raise Finding("boundary", f"a boundary of {len(rim)} edges became one of {len(new_rim)}")

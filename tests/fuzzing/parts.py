@@ -126,7 +126,7 @@ def draw_spline(rng, case):
 
 def lattice_of(run, vertices):
     options = run.case.options
-    placed = run.case.world(vertices)
+    placed = run.case.world(vertices) if len(vertices) else np.zeros((1, 3))
     lower, upper = placed.min(0), placed.max(0)
     edges = (upper - lower) * options["reach"] + 1e-6 * np.ptp(placed)
     domain = meshes.matrix(np.diag(edges), lower - edges * 0.01)
