@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 #include <numeric>
+#include <optional>
+#include <utility>
 
 #include "base/call.h"
 #include "base/errors.h"
@@ -21,6 +23,11 @@ constexpr std::size_t kLeaf = 4;  // a leaf has at most this many triangles
 constexpr double kTie = 2e-6;
 constexpr double kTiny = 1e-30;
 constexpr double kSamples = 1 << 16;
+// So many samples, of triangles spread over the mesh, tell how many nodes a sample visits. If all samples would visit
+// more nodes than kMostVisits, and kVisitsPerTriangle for each triangle, there are fewer, but kFewestSamples. A scan
+// stays below half of that.
+constexpr std::size_t kProbes = 64;
+constexpr double kMostVisits = 1 << 24, kVisitsPerTriangle = 256, kFewestSamples = 256;
 // These steps spread the samples of a triangle, or the first samples of neighbouring triangles, evenly [M. Roberts, The
 // Unreasonable Effectiveness of Quasirandom Sequences, 2018].
 constexpr double kStepU = 0.7548776662466927, kStepV = 0.5698402909980532;
@@ -103,7 +110,7 @@ DisplayTree::DisplayTree(const TriangleMesh& reference, bool mirrored, Progress*
   }
 }
 
-double DisplayTree::distance(const glm::dvec3& place, double reach) const {
+double DisplayTree::distance(const glm::dvec3& place, double reach, std::size_t& visited) const {
   const std::size_t leaves = nodes.size() / 2;
   const auto from_box = [&](std::size_t i) {
     const glm::dvec3 lower(nodes[i].lower), upper(nodes[i].upper);
@@ -121,7 +128,6 @@ double DisplayTree::distance(const glm::dvec3& place, double reach) const {
     found = std::min(found, glm::length(from_triangle(t)));
   }
   i = 1;
-  std::size_t visited = 0;
   do {
     if (++visited % 1024 == 0) poll();
     const Node& node = nodes[i];
@@ -146,6 +152,40 @@ double DisplayTree::distance(const glm::dvec3& place, double reach) const {
   return side * found;
 }
 
+namespace {
+
+/// The numbers of the samples of each triangle of a mesh.
+class SampleCounts {
+ public:
+  SampleCounts(std::vector<double> area, double whole) : area_(std::move(area)), whole_(whole) {}
+
+  /// From now on there are only about so many samples of all, each of which stands for an equal area.
+  void limit(double count) {
+    double before = 0, samples = 0;
+    for (double& area : area_) {
+      const double after = before + area / whole_ * count;
+      area = std::floor(after) - std::floor(before);
+      before = after, samples += area;
+    }
+    limit_ = samples;
+  }
+  std::size_t of(std::size_t triangle) const {
+    return limit_ ? static_cast<std::size_t>(area_[triangle])
+                  : 1 + static_cast<std::size_t>(area_[triangle] / whole_ * kSamples);
+  }
+  /// The share of the whole area that each sample of a triangle stands for.
+  double share(std::size_t triangle) const {
+    return limit_ ? 1 / *limit_ : area_[triangle] / (static_cast<double>(of(triangle)) * whole_);
+  }
+
+ private:
+  std::vector<double> area_;  // with a limit, the numbers of samples themselves
+  double whole_;
+  std::optional<double> limit_;
+};
+
+}  // namespace
+
 std::vector<double> area_shares(const DisplayTree& tree, std::span<const glm::dvec3> vertices,
                                 std::span<const glm::uvec3> triangles, std::span<const double> edges,
                                 unsigned threads) {
@@ -161,23 +201,35 @@ std::vector<double> area_shares(const DisplayTree& tree, std::span<const glm::dv
   if (!(whole > 0)) return shares;
   double reach = 0;
   for (const double edge : edges) reach = std::max(reach, 1.001 * std::abs(edge) + 2 * DisplayTree::kRounding);
+  const auto sample = [&](std::size_t triangle, std::size_t k, std::size_t& visited) {
+    const glm::dvec3 a = vertices[triangles[triangle].x], ab = vertices[triangles[triangle].y] - a,
+                     ac = vertices[triangles[triangle].z] - a;
+    double u = glm::fract(kStepU * static_cast<double>(k)), v = glm::fract(kStepV * static_cast<double>(k));
+    if (u + v > 1) u = 1 - u, v = 1 - v;
+    return tree.distance(a + u * ab + v * ac, reach, visited);
+  };
+
+  SampleCounts counts(std::move(area), whole);
+  std::size_t probed = 0, visited = 0;
+  for (std::size_t i = 0; i < triangles.size(); i += triangles.size() / kProbes + 1, ++probed) sample(i, i, visited);
+  const double all = static_cast<double>(triangles.size()) + kSamples;
+  const double each = static_cast<double>(visited) / static_cast<double>(probed);
+  const double most = (kMostVisits + kVisitsPerTriangle * static_cast<double>(triangles.size())) / each;
+  if (most < all) counts.limit(std::max(std::floor(most), kFewestSamples));
+
   // Each block has a sum, and the sums are added in order, so that the result is the same for any number of threads.
   constexpr std::size_t kBlock = 1024;
   std::vector<double> sums((triangles.size() + kBlock - 1) / kBlock * bins, 0);
   parallel_for(triangles.size(), kBlock, threads, [&](std::size_t begin, std::size_t end) {
     double* sum = &sums[begin / kBlock * bins];
+    std::size_t nodes = 0;
     for (std::size_t i = begin; i < end; ++i) {
-      const glm::dvec3 a = vertices[triangles[i].x], ab = vertices[triangles[i].y] - a,
-                       ac = vertices[triangles[i].z] - a;
-      const auto count = 1 + static_cast<std::size_t>(area[i] / whole * kSamples);
+      const std::size_t count = counts.of(i);
       for (std::size_t k = i; k < i + count; ++k) {
         if (k % 64 == 0) poll();
-        double u = glm::fract(kStepU * static_cast<double>(k)), v = glm::fract(kStepV * static_cast<double>(k));
-        if (u + v > 1) u = 1 - u, v = 1 - v;
-        const double d = tree.distance(a + u * ab + v * ac, reach);
+        const double d = sample(i, k, nodes);
         const double shown = std::copysign(std::max(std::abs(d) - DisplayTree::kRounding, 0.0), d);
-        sum[std::upper_bound(edges.begin(), edges.end(), shown) - edges.begin()] +=
-            area[i] / (static_cast<double>(count) * whole);
+        sum[std::upper_bound(edges.begin(), edges.end(), shown) - edges.begin()] += counts.share(i);
       }
     }
   });

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "geometry/hierarchy.h"
+#include "polls.h"
 #include "shapes.h"
 
 namespace {
@@ -112,6 +113,29 @@ TEST(AreaShares, OfTheReferenceItselfNothingIsOutside) {
       area_shares(DisplayTree(reference, false), reference.vertices, reference.triangles, edges, 2);
   EXPECT_EQ(shares.front(), 0);
   EXPECT_EQ(shares.back(), 0);
+}
+
+// Two fans of needles between two lines, each from the far end of the other line. The boxes of half of the needles meet
+// in any place, and 85,000 searches would visit a thousand million nodes.
+TEST(AreaShares, OfAslantNeedlesAreEstimatedByFewerSamples) {
+  constexpr std::uint32_t kNeedles = 10000;
+  TriangleMesh strip;
+  for (const double y : {0.0, 0.001}) {
+    for (std::uint32_t i = 0; i <= kNeedles; ++i) strip.vertices.emplace_back(double{i} / kNeedles, y, 0);
+  }
+  constexpr std::uint32_t kUpper = kNeedles + 1, kLast = 2 * kNeedles + 1;
+  for (std::uint32_t i = 0; i < kNeedles; ++i) {
+    strip.triangles.emplace_back(i, i + 1, kLast);
+    strip.triangles.emplace_back(kUpper + i, 0, kUpper + i + 1);
+  }
+  const DisplayTree tree(strip, false);
+  TriangleMesh slanted = strip;
+  for (dvec3& p : slanted.vertices) p.z = 0.04 * p.x - 0.01;
+  const std::vector<double> edges{-0.5, 0, 0.5};
+  std::vector<double> shares;
+  EXPECT_LT(polls_of([&] { shares = area_shares(tree, slanted.vertices, slanted.triangles, edges, 1); }), 40000u);
+  EXPECT_NEAR(shares[1], 0.25, 0.03);
+  EXPECT_NEAR(shares[1] + shares[2], 1, 1e-9);
 }
 
 TEST(AreaShares, OfNoAreaAreNothing) {
