@@ -101,10 +101,12 @@ Hierarchy::Common Hierarchy::common_of(std::span<const glm::dvec3> points, doubl
     bound = squared <= enough_squared ? -1 : std::min(bound, squared);  // -1 ends the search
   };
   if (hint < place_.size()) attempt(place_[hint]);
-  if (bound >= 0) walk<Count>(at, bound, attempt);
-  if (best == kNone) return {};
+  Common found;
+  if (bound >= 0) found.nodes = static_cast<std::uint32_t>(walk<Count>(at, bound, attempt));
+  if (best == kNone) return found;
   const double distance = std::sqrt(best_squared) / scale_;
-  return distance <= radius ? Common{triangle_[best], distance} : Common{};
+  if (distance <= radius) found.triangle = triangle_[best], found.distance = distance;
+  return found;
 }
 
 Hierarchy::Common Hierarchy::common(std::span<const glm::dvec3> points, double radius, double enough,

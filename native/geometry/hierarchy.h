@@ -43,6 +43,7 @@ class Hierarchy {
   struct Common {
     std::uint32_t triangle = kNone;  ///< kNone: nothing within the radius
     double distance = std::numeric_limits<double>::infinity();
+    std::uint32_t nodes = 0;  ///< as in Nearest
   };
 
   /// Copies the triangles of a valid mesh (geometry/triangle_mesh.h), with about 150 bytes for each, or 330 if nearly

@@ -69,11 +69,14 @@ constexpr std::size_t kSpread = 1'000'003;
 constexpr std::size_t kChunk = 16384, kBlock = 64, kBatch = 512, kSmallBlock = 8;
 // The budget, in pieces. An edge of b that crosses a triangle of a costs a few pieces, so that a subdivided copy needs
 // about ten for each of its triangles. A piece costs 1 us and, while it waits, 100 bytes.
-constexpr std::size_t kPieces = 4'000'000, kPiecesPerTriangle = 16;
+constexpr std::size_t kPieces = 1'000'000, kPiecesPerTriangle = 16;
 // After this many pieces the search accepts a wider interval: by kGap of the bound, or of the length below if that is
 // less, for as many pieces again. Nearly all searches end before, those between a surface and its subdivided copy among
 // them. Needles that lie on one another would need a million pieces to show that nothing but rounding is between them.
 constexpr std::size_t kPatience = 20'000, kPatiencePerTriangle = 12;
+// A piece whose searches visit more nodes than this counts as one more piece for each so many: at a corner that
+// thousands of triangles share, one search may look at all of them.
+constexpr std::size_t kNodesPerPiece = 64;
 // If the bound is larger than this, in frame lengths, growth() counts with this in its place.
 constexpr double kLargestBound = 1e-3;
 
@@ -127,6 +130,7 @@ class Sampled {
 struct Children {
   std::array<Piece, 3> piece;
   int count = 0;
+  std::size_t nodes = 0;  // are those that the searches for the pieces have visited
 };
 
 dvec3 without(const dvec3& v, const dvec3& direction) {
@@ -246,7 +250,8 @@ class Search {
           for (int k = 0; k < 3; ++k) {
             if (!(fresh[i] >> k & 1)) sampled.add(pieces[i].corner[k]);
           }
-          samples[i] = evaluate(pieces[i], sampled);
+          std::size_t nodes = 0;
+          samples[i] = evaluate(pieces[i], sampled, nodes);
           hint = pieces[i].nearest;
         }
       });
@@ -267,14 +272,16 @@ class Search {
       for (std::size_t i = begin; i < end; ++i) {
         children[i] = split(batch[i]);
         Sampled sampled(batch[i].corner);
-        for (int k = 0; k < children[i].count; ++k) samples[i].improve(evaluate(children[i].piece[k], sampled));
+        for (int k = 0; k < children[i].count; ++k) {
+          samples[i].improve(evaluate(children[i].piece[k], sampled, children[i].nodes));
+        }
       }
     });
     learn(samples);
     for (std::size_t i = 0; i < batch.size(); ++i) {
       if (children[i].count == 0) settled_ = std::max(settled_, batch[i].upper);
       for (int k = 0; k < children[i].count; ++k) keep(children[i].piece[k]);
-      pieces_ += children[i].count;
+      pieces_ += std::max(static_cast<std::size_t>(children[i].count), children[i].nodes / kNodesPerPiece);
     }
     report(0.5 + 0.5 * std::min(1.0, lower_ / std::max(upper(), kNoise)));
   }
@@ -303,11 +310,13 @@ class Search {
   }
 
   /// Sets `upper` and `near` of a piece, whose `near` is a guess before. Returns the best lower bound it finds, not
-  /// certified, or none for a piece that is settled. Adds to `sampled` the corners at which it has looked.
-  Sample evaluate(Piece& piece, Sampled& sampled) const {
+  /// certified, or none for a piece that is settled. Adds to `sampled` the corners at which it has looked, and to
+  /// `nodes` the nodes that it has visited.
+  Sample evaluate(Piece& piece, Sampled& sampled, std::size_t& nodes) const {
     const double margin = kUpperMargin + piece.error, enough = cutoff() - margin;
     if (enough >= 0) {
       const Hierarchy::Common common = hierarchy_.common(piece.corner, enough, enough, piece.nearest);
+      nodes += common.nodes;
       if (common.triangle != Hierarchy::kNone) {
         piece.nearest = common.triangle;
         piece.upper = common.distance + margin;
@@ -316,6 +325,7 @@ class Search {
     }
     const dvec3 middle = (piece.corner[0] + piece.corner[1] + piece.corner[2]) / 3.0;
     const Hierarchy::Nearest nearest = hierarchy_.nearest(middle, kInfinity, piece.nearest);
+    nodes += nearest.nodes;
     piece.nearest = nearest.triangle;
     piece.upper = 0;
     Sample best{nearest.distance, middle, piece.error, piece.triangle};
@@ -324,7 +334,9 @@ class Search {
       const double distance = std::sqrt(closest_point(corner, t[0], t[1], t[2]).distance_squared);
       piece.upper = std::max(piece.upper, distance + margin);
       if (!sampled.add(corner) || distance <= std::max(lower_, best.distance)) continue;
-      best.improve({far_from(corner, piece.nearest).distance, corner, piece.error, piece.triangle});
+      const Hierarchy::Common far = far_from(corner, piece.nearest);
+      nodes += far.nodes;
+      best.improve({far.distance, corner, piece.error, piece.triangle});
     }
     return best;
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -105,6 +106,23 @@ TEST(Hausdorff, FansTakeLittleForEachTriangle) {
   TriangleMesh moved = fan;
   for (unsigned i = 0; i < n; ++i) moved.vertices[i] += 1e-3 * random.point();
   for (const auto& [a, b] : {std::pair{fan, fan}, {moved, fan}, {fan, moved}}) EXPECT_LT(polls_of(a, b), 1000u);
+}
+
+// Two fans whose common corners are at nearly the same place. Every search near the corner that all triangles share may
+// look at all of them, so that each of its pieces takes as much as hundreds of others.
+TEST(Hausdorff, PiecesAtACornerThatVeryManyShareCountForSeveral) {
+  constexpr unsigned kFaces = 4000;
+  TriangleMesh one;
+  for (unsigned i = 0; i <= kFaces; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kFaces, x = std::cos(angle), y = std::sin(angle);
+    one.vertices.push_back(i == kFaces ? dvec3(0) : dvec3(0.36 * x - 0.8 * y, 0.48 * x + 0.6 * y, 0.8 * x));
+    if (i < kFaces) one.triangles.emplace_back(kFaces, i, (i + 1) % kFaces);
+  }
+  TriangleMesh other = one;
+  other.vertices.back() += dvec3(8e-11, 5e-11, -3e-11);
+  HausdorffInterval found{};
+  EXPECT_LT(tolvol::polls_of([&] { found = hausdorff(one, other, {.threads = 1}); }), 3000u);
+  EXPECT_LT(found.upper, 1e-9);
 }
 
 }  // namespace
