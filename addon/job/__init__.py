@@ -14,9 +14,9 @@ from .. import status_bar
 from . import adjusting, interruptions
 from .interruptions import under_way
 from .operator import JobOperator
-from .run import WRITE
+from .run import WRITE, breathe
 
-__all__ = ["WRITE", "JobOperator", "register", "under_way", "unregister"]
+__all__ = ["WRITE", "JobOperator", "breathe", "register", "under_way", "unregister"]
 
 
 def register():

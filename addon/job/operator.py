@@ -46,6 +46,10 @@ class JobOperator:
     def progress(self):
         return self._run.progress
 
+    def edited(self):
+        """Whether Blender has reported a change of the objects' meshes since the last call, be it of their attributes alone."""
+        return self._run.take_edited()
+
     def improving(self):
         """Whether Esc keeps the present result. A second Esc cancels."""
         return self.progress.stage == "refining" and not self.progress.finishing
@@ -53,8 +57,9 @@ class JobOperator:
     def steps(self, context):
         """A generator in the main thread: yields work(progress) and is sent its outcome. It may change Blender's data only
         after the last yield, which should be that of WRITE: the panel of Adjust Last Operation then stays. Blender may have
-        made its data anew meanwhile, so that the generator has to take the objects from self.objects after that. It returns
-        the operator's result, or None for FINISHED: CANCELLED makes no undo step."""
+        made its data anew meanwhile, so that the generator has to take the objects from self.objects after that. Where it
+        works for long itself, it yields `breathe` from time to time. It returns the operator's result, or None for FINISHED:
+        CANCELLED makes no undo step."""
         outcome = yield self.prepare(context)
         yield run.WRITE
         return self.finish(context, outcome)

@@ -4,6 +4,8 @@
 import time
 from dataclasses import replace
 
+import bpy
+
 from .. import native, status_bar
 from ..background import Job
 from ..redraw import redraw_sidebars
@@ -20,6 +22,11 @@ _TICK = 0.1
 
 # steps() of an operator yields this in place of work once nothing is left to do but to change Blender's data.
 WRITE = object()
+
+
+def breathe(_progress):
+    """steps() of an operator yields this between parts of what it does itself, so that Blender draws and takes events."""
+
 
 # Adjust Last Operation has undone the result before it repeats the operator.
 _AS_BEFORE = "The mesh is as it was before that operation"
@@ -45,6 +52,8 @@ class Run:
         self._steps = operator.steps(context)
         self._job = None
         self._timer = None
+        self._breathes = False  # whether the present job is breathe()
+        self._edited = False  # whether Blender has reported a change of a mesh since the last call of take_edited()
         self._seen = None  # what the status bar and the sidebars were told last
         self._began = time.monotonic()
 
@@ -73,11 +82,14 @@ class Run:
         return self._told_errors(self._write)
 
     def _begin_next(self):
-        self._job = Job(self._next_work(), self.progress)
+        work = self._next_work()
+        self._breathes = work is breathe
+        self._job = Job(work, self.progress)
 
     def _write(self):
         if self.rewinding:
             self.operator.objects = [claim.renewed() for claim in self._claims]
+        if self.rewinding or self._breathes:
             try:
                 self._check()
             except BaseException as error:
@@ -183,13 +195,21 @@ class Run:
         """Whether the run works on this object or mesh."""
         return any(claim.concerns(data) for claim in self._claims)
 
+    def take_edited(self):
+        """Returns whether Blender has reported a change of a mesh of the run since the last call."""
+        bpy.context.view_layer.update()  # Blender may not have reported the last change yet.
+        edited, self._edited = self._edited or interruptions.take_edited(), False
+        return edited
+
     def _look(self):
         """Ends the job as soon as its outcome cannot be written any more."""
         if self._gone():
             self.interrupt("Blender keeps only 32 operations, and as many have followed", _AS_BEFORE)
             return
+        edited = interruptions.take_edited()
+        self._edited |= edited
         try:
-            self._check(thoroughly=interruptions.take_edited())
+            self._check(thoroughly=edited)
         except Refused as error:
             self.interrupted = str(error)
             self._end()
@@ -205,6 +225,8 @@ class Run:
 
     def _next_work(self):
         work = self._go_on_with_outcome()
+        while work is breathe and self._timer is None:  # The caller waits, and Blender takes no events meanwhile.
+            work = self._steps.send(None)
         return self._last_part() if work is WRITE else work
 
     def _go_on_with_outcome(self):
@@ -214,10 +236,22 @@ class Run:
             outcome = self._job.outcome()
             if self.progress.cancelled:  # The work may have ended before it noticed the cancel.
                 raise native.module.Cancelled("cancelled")
-            self._check()
+            if not self._breathes:  # That takes as long as a part between two breaths: _write() does it after them.
+                self._check()
         except BaseException as error:
             return self._steps.throw(error)
-        return self._steps.send(outcome)
+        return self._resumed(outcome)
+
+    def _resumed(self, outcome):
+        """Goes on with the steps. The scratch data that they make and remove is no change by somebody else."""
+        if self._timer is None:
+            return self._steps.send(outcome)
+        bpy.context.view_layer.update()  # Blender may not have reported what somebody else has changed.
+        something_else = self.something_else
+        work = self._steps.send(outcome)
+        bpy.context.view_layer.update()
+        self.something_else = something_else
+        return work
 
     def _last_part(self):
         """Ends the steps, and raises StopIteration as they do."""

@@ -60,9 +60,9 @@ class Carry:
         # Before 3.5 Blender does not list UV maps among the attributes.
         self._uvs = [column(layer.data, "uv", 2) for layer in mesh.uv_layers]
         self._normals = custom_normals(mesh)
-        self._edges = column(mesh.edges, "vertices", 2, np.int32)
         self._marks = edge_marks(mesh)
         self._edge_attributes = attributes(mesh, "EDGE")
+        self._edges = column(mesh.edges, "vertices", 2, np.int32) if self._marks or self._edge_attributes else None
 
     def blend_groups(self, built):
         """Interpolates the vertex groups of the vertices that moved, in the BMesh before its vertices are merged."""
@@ -110,7 +110,7 @@ class Carry:
     # Edges ----------------------------------------------------------------------------------------------------------
 
     def _write_edges(self, mesh, layout):
-        if not self._marks and not self._edge_attributes:
+        if self._edges is None:
             return
         count = len(mesh.vertices)
         keys = _edge_keys(column(mesh.edges, "vertices", 2, np.int32), count)

@@ -28,8 +28,8 @@ class Writing:
     """A context manager that turns `mesh`, whose arrays are `source`, into the Decimated `result`. The arrays may be
     FilledArrays: the mesh then gets their new faces first.
 
-    Entering the context builds a scratch mesh, compares it with the result vertex by vertex and triangle by triangle, and
-    raises MeshMismatch if they differ. Its `layout` tells then where the result is in the mesh. Only write() changes the mesh.
+    prepare() builds a scratch mesh, which lives as long as the context. Its `layout` tells then where the result is in the
+    mesh. Only write() changes the mesh.
     """
 
     def __init__(self, mesh, source, result):
@@ -38,27 +38,41 @@ class Writing:
         self._result = result
 
     def __enter__(self):
-        mesh, source, result = self._mesh, self._source, self._result
-        self._carry = Carry(mesh, source, result)
-        self._built = built = bmesh.new()
-        try:
-            built.from_mesh(mesh)
-            loose = _loose(mesh, built)
-            if isinstance(source, FilledArrays):
-                add_faces(built, mesh, source)
-            _triangulate(built, source)
-            faces = _keep_faces(built, source, result.triangle_source)
-            _turn(built, faces, result)
-            self._carry.blend_groups(built)
-            _weld(built, _weld_targets(result), loose)
-            self.layout = _compare(_scratch_arrays(built), source, result)
-        except BaseException:
-            built.free()
-            raise
+        self._built = bmesh.new()
         return self
 
     def __exit__(self, *_):
         self._built.free()
+
+    def prepare(self):
+        """A generator: builds the scratch mesh and compares it with the result vertex by vertex and triangle by triangle.
+        Raises MeshMismatch if they differ.
+
+        It yields between its parts, each of which takes about 0.1 s for 300,000 triangles. The mesh must stay as it is.
+        """
+        mesh, source, result, built = self._mesh, self._source, self._result, self._built
+        self._carry = Carry(mesh, source, result)
+        yield
+        built.from_mesh(mesh)
+        yield
+        loose = _loose(mesh, built)
+        if isinstance(source, FilledArrays):
+            add_faces(built, mesh, source)
+        if not _only_triangles(source):
+            _triangulate(built, source)
+        yield
+        self._carry.blend_groups(built)
+        verts = built.verts[:]
+        faces, present = _keep_faces(built, verts, source, result)
+        yield
+        _turn(built, verts, faces, result)
+        _weld(built, verts, present, _weld_targets(result), loose)
+        self.layout = _compare(_scratch_arrays(built), source, result)
+        yield
+
+    def made_anew(self, mesh):
+        """Takes the mesh that Blender has made in place of the present one, with the same content, when it undid a step."""
+        self._mesh = mesh
 
     def write(self):
         self._built.to_mesh(self._mesh)
@@ -114,29 +128,43 @@ def _triangulate(built, source):
             bmesh.ops.triangulate(built, faces=[faces[i] for i in chosen], **method)
 
 
-def _keep_faces(built, source, kept):
-    """Deletes all faces except the triangles `kept` of the source and returns those. All edges and vertices stay."""
-    faces = built.faces[:]
-    if source.polygons[-1] + 1 == len(source.polygons):  # All polygons are triangles: face i is triangle i.
-        rows = np.arange(len(faces))
+def _only_triangles(source):
+    """Whether face i of the mesh is triangle i of the source."""
+    return source.polygons[-1] + 1 == len(source.polygons)
+
+
+def _keep_faces(built, verts, source, result):
+    """Deletes all faces except those that are triangles of the result, and vertices that only deleted faces use.
+
+    Returns the face of each triangle of the result, and (n,) bool: the vertices of the source that are there still.
+    """
+    if _only_triangles(source):
+        rows = np.arange(len(built.faces))
     else:
-        _, present = _scratch_arrays(built)
-        rows = _matching_rows(_rotated(source.triangles)[0], _rotated(present)[0])
+        _, triangles = _scratch_arrays(built)
+        rows = _matching_rows(_rotated(source.triangles)[0], _rotated(triangles)[0])
         if rows is None:
             raise MeshMismatch(
                 "its n-gons would be triangulated otherwise than shown. Triangulate them first (Ctrl T in Edit Mode)"
             )
-    stays = np.zeros(len(faces), bool)
-    stays[rows[kept]] = True
-    bmesh.ops.delete(built, geom=[faces[i] for i in np.flatnonzero(~stays)], context="FACES_ONLY")
-    return [faces[i] for i in rows[kept].tolist()]
+    built.faces.ensure_lookup_table()
+    faces = [built.faces[i] for i in rows[result.triangle_source].tolist()]
+    present = _stays(_weld_targets(result))
+    present[source.triangles[result.triangle_source]] = True
+    # To remove a vertex with its faces takes a fraction of the time that it takes to delete these and to merge it.
+    for vertex in np.flatnonzero(~present).tolist():
+        built.verts.remove(verts[vertex])
+    stays = set(faces)
+    bmesh.ops.delete(built, geom=[face for face in built.faces if face not in stays], context="FACES_ONLY")
+    return faces, present
 
 
-def _turn(built, faces, result):
+def _turn(built, verts, faces, result):
     """Replaces each face around which an edge was flipped by a new one on the remaining vertices, with the same attributes,
     and one that was divided at T-junctions by its pieces.
 
-    faces: the face of each triangle of the result; several triangles may be pieces of one face.
+    verts: the vertex of each vertex of the source; faces: the face of each triangle of the result; several triangles may
+    be pieces of one face.
     """
     turned = np.flatnonzero(result.turned).tolist()
     if not turned:
@@ -147,10 +175,9 @@ def _turn(built, faces, result):
     copies = bmesh.ops.duplicate(built, geom=replaced)["face_map"]
     copies = [copies[faces[row]] for row in turned]
     bmesh.ops.delete(built, geom=replaced, context="FACES_ONLY")
-    built.verts.ensure_lookup_table()
     corners = result.vertex_source[result.triangles[turned]].tolist()
     for copy, vertices in zip(copies, corners):
-        face = built.faces.new([built.verts[vertex] for vertex in vertices], copy)
+        face = built.faces.new([verts[vertex] for vertex in vertices], copy)
         for loop, other in zip(face.loops, copy.loops):
             loop.copy_from(other)
     bmesh.ops.delete(built, geom=list({vertex for copy in copies for vertex in copy.verts}), context="VERTS")
@@ -164,9 +191,14 @@ def _weld_targets(result):
     return targets
 
 
-def _weld(built, targets, loose):
-    verts = built.verts[:]
-    gone = np.flatnonzero(targets != np.arange(len(targets)))
+def _stays(targets):
+    """Returns (n,) bool: the vertices that are not merged into another one."""
+    return targets == np.arange(len(targets))
+
+
+def _weld(built, verts, present, targets, loose):
+    """Merges the vertices that are there still. verts: the vertex of each vertex of the source."""
+    gone = np.flatnonzero(present & ~_stays(targets))
     bmesh.ops.weld_verts(built, targetmap={verts[i]: verts[j] for i, j in zip(gone.tolist(), targets[gone].tolist())})
     # Some edges of deleted faces have become edges of no other face. Edges that were loose before stay.
     stray = [edge for edge in built.edges if edge.is_wire and edge not in loose]
@@ -190,7 +222,7 @@ def _compare(written, source, result):
     """Returns the Layout of the written arrays. Raises MeshMismatch if they are not the result, triangle by triangle."""
     vertices, triangles = written
     targets = _weld_targets(result)
-    stays = targets == np.arange(len(targets))
+    stays = _stays(targets)
     rank = np.cumsum(stays) - 1
     if not np.array_equal(vertices.view(np.uint32), source.vertices[stays].view(np.uint32)):
         raise MeshMismatch("its vertices were not merged as computed")

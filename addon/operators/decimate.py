@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from .. import preferences
-from ..job import WRITE, JobOperator
+from ..job import WRITE, JobOperator, breathe
 from ..mesh import transfer
 from ..operation_settings import PROTECTED, decimate_settings, threads_setting
 from ..proof import verdict
@@ -129,8 +129,13 @@ object. An object without a reference gets one first, as by Set Reference"""
         other = "PERCENT" if self.tolerance_mode == "LENGTH" else "LENGTH"
         tolerances.convert_tolerance(self, tasks[0].reference.size(), other)
         outcomes = yield from self.each(tasks)
-        yield WRITE
-        self.finish(outcomes)
+        with contextlib.ExitStack() as stack:
+            # All are prepared, which checks that Blender can hold all results, before the first mesh is changed.
+            writes = yield from self._prepared(stack, outcomes)
+            yield WRITE
+            for ob, write in zip(self.objects, writes):
+                write.made_anew(ob.data)
+            self.finish(outcomes, writes)
 
     def _task(self, context, ob):
         surface = snapshots.surface_of(ob)
@@ -140,13 +145,31 @@ object. An object without a reference gets one first, as by Set Reference"""
         options = decimation.options(self, placement, self.threads or preferences.threads(context))
         return decimation.task(ob, surface, reference, tolerance, self, options | {"outside": self.outside.lower()})
 
-    def finish(self, outcomes):
-        # Entering all contexts checks that Blender can hold all results before the first mesh is changed.
+    def _prepared(self, stack, outcomes):
+        """A generator for steps(): returns the prepared Writing of each object, in contexts of the stack."""
+        self.doing = "Writing"
+        self.edited()  # From here on.
+        writes = self._writes(stack, outcomes)
+        for write in writes:
+            for _ in write.prepare():
+                yield breathe
+        if self.edited():
+            # The user may have shaded the mesh meanwhile, say. It is read again, and nothing can come between now.
+            stack.close()
+            writes = self._writes(stack, outcomes)
+            for write in writes:
+                for _ in write.prepare():
+                    pass
+        return writes
+
+    def _writes(self, stack, outcomes):
+        return [
+            stack.enter_context(transfer.Writing(ob.data, source, result))
+            for ob, (source, _, result, _) in zip(self.objects, outcomes)
+        ]
+
+    def finish(self, outcomes, writes):
         with contextlib.ExitStack() as stack:
-            writes = [
-                stack.enter_context(transfer.Writing(ob.data, source, result))
-                for ob, (source, _, result, _) in zip(self.objects, outcomes)
-            ]
             without = [ob for ob in self.objects if ob.tolvol.snapshot is None]
             # If anything fails until the meshes are written, the objects have no reference, as before.
             stack.callback(lambda: [snapshots.clear_reference(ob) for ob in without])
