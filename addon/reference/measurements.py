@@ -25,6 +25,13 @@ _shown = {}
 # The rounding of float32 rotations adds up to half of it.
 _RIGID = 1e-6
 
+# A matrix with a larger condition number is not inverted. For others the map from one place to another is off by a smaller
+# share than _MAP_ROUNDING, because its rounding grows by the square of the condition number.
+_WELL_CONDITIONED, _MAP_ROUNDING = 500, 1e-9
+# The coordinates of two points in the world, each a sum of four rounded products in double precision, change their distance
+# by less than this share of the largest coordinate.
+_WORLD_ROUNDING = 2.0**-47
+
 
 @dataclass(frozen=True)
 class Measurement:
@@ -148,15 +155,22 @@ def measurement_of(ob):
     """Returns what is known of the mesh as it is now, or None if mesh, place or reference have changed since it was measured."""
     if ob.tolvol.snapshot is None or snapshots.stale_reason(ob):
         return None
-    known = (find(ob) for find in (_kept_of, _stored_of, _unchanged_of))
-    return next((found for found in known if found is not None and _holds(ob, found)), None)
+    found = [each for find in (_kept_of, _stored_of, _unchanged_of) if (each := find(ob)) is not None]
+    true = (each for each in found if _holds(ob, each))
+    scaled = (_scaled(ob, each) for each in found)
+    return next(true, None) or next(filter(None, scaled), None)
+
+
+def _sound(measurement):
+    """Whether no number of a measurement is damaged."""
+    lengths = measurement.tolerance, measurement.size, 1 + measurement.forward, 1 + measurement.backward
+    return all(map(snapshots.sound, lengths))
 
 
 def _holds(ob, measurement):
     """Whether a measurement of this mesh and its reference is sound, and true at the present place."""
-    lengths = measurement.tolerance, measurement.size, 1 + measurement.forward, 1 + measurement.backward
-    if not all(map(snapshots.sound, lengths)):
-        return False  # The file is damaged.
+    if not _sound(measurement):
+        return False
     before, now = snapshots.stored_matrix(measurement.matrix), mesh_io.matrix_array(ob.matrix_world)
     if np.array_equal(before, now):
         return True
@@ -165,6 +179,46 @@ def _holds(ob, measurement):
     # The distances of a mesh that was turned with its reference may have changed by rounding.
     limit = measurement.tolerance
     return not any(abs(end - limit) <= _RIGID * limit for end in (measurement.forward, measurement.backward))
+
+
+def _scaled(ob, measurement):
+    """Returns what a measurement of a mesh, which is its own reference, says at the present place, if it was scaled by one
+    factor since, or None if it is not so or decides nothing.
+
+    Each distance in the world is multiplied by a factor between the least and the largest singular value of the map from the
+    place of the measurement to the present one. So are the largest distances of the two surfaces, whose coordinates in the
+    world are rounded at either place.
+    """
+    if ob.tolvol.snapshot_kind != "SELF" or not _sound(measurement):
+        return None
+    before, now = snapshots.stored_matrix(measurement.matrix), mesh_io.matrix_array(ob.matrix_world)
+    try:
+        if not np.linalg.cond(before[:3, :3]) < _WELL_CONDITIONED:
+            return None
+        factors = np.linalg.svd(now[:3, :3] @ np.linalg.inv(before[:3, :3]), compute_uv=False)
+    except np.linalg.LinAlgError:  # The file is damaged.
+        return None
+    least, most = (1 - _MAP_ROUNDING) * factors.min(), (1 + _MAP_ROUNDING) * factors.max()
+    if not 0 < most <= (1 + _RIGID) * least:
+        return None
+    # The mesh is at most so far from the reference as was measured.
+    was_off, is_off = (
+        _WORLD_ROUNDING * (snapshots.farthest(ob, matrix) + factor * measurement.forward)
+        for matrix, factor in ((before, 1), (now, most))
+    )
+
+    def carried(lower, upper):
+        return Interval(max(least * (lower - was_off) - is_off, 0.0), most * (upper + was_off) + is_off)
+
+    forward = carried(measurement.forward_lower, measurement.forward)
+    backward = carried(measurement.backward_lower, measurement.backward)
+    size = snapshots.snapshot_size(ob)
+    tolerance = tolerances.tolerance_length(ob.tolvol, size)
+    if forward.undecided(tolerance) or backward.undecided(tolerance):
+        return None
+    place = tuple(now.ravel())
+    ends = forward.lower, forward.upper, backward.lower, backward.upper
+    return Measurement(measurement.fingerprint, place, tolerance, size, *ends, time=measurement.time)
 
 
 def same_shape(matrix, other):

@@ -69,17 +69,26 @@ def snapshot_size(ob):
 
     Returns nan if a damaged file holds no surface, or if an axis of the object is scaled to zero.
     """
-    settings = ob.tolvol
-    key = settings.snapshot_fingerprint
-    if key not in _boxes:
-        _boxes[key] = _box(mesh_io.read_mesh(settings.snapshot))
-    if not np.isfinite(_boxes[key]).all():
+    box = _box_of(ob)
+    if not np.isfinite(box).all():
         return math.nan
     # The size of a surface is the size of the bounding box of its used vertices.
     try:
-        return native.module.diagonal(_boxes[key], np.array([[0, 1, 1]]), to_world=reference_matrix(ob))
+        return native.module.diagonal(box, np.array([[0, 1, 1]]), to_world=reference_matrix(ob))
     except native.module.TolvolError:
         return math.nan
+
+
+def farthest(ob, matrix):
+    """Returns a length that no coordinate of the snapshot in the world exceeds, if `matrix` maps it there."""
+    return float((np.abs(matrix[:3, :3]) @ np.abs(_box_of(ob)).max(0) + np.abs(matrix[:3, 3])).max())
+
+
+def _box_of(ob):
+    key = ob.tolvol.snapshot_fingerprint
+    if key not in _boxes:
+        _boxes[key] = _box(mesh_io.read_mesh(ob.tolvol.snapshot))
+    return _boxes[key]
 
 
 def _box(arrays):
