@@ -59,6 +59,22 @@ def _shortened(line, room):
     return " ".join(words) + "\u2026"
 
 
+_BESIDE_FIELD = 0.4  # the share of the width that Blender gives to the name of a property beside its field
+
+
+def property_fields(context, layout, settings, *names):
+    """Draws properties, each with its name beside its field, or above it if the name has no room there."""
+    for name in names:
+        title = settings.rna_type.properties[name].name  # Of an operator, bl_rna does not list them.
+        if fitting(context, title, "", share=_BESIDE_FIELD):
+            layout.prop(settings, name)
+            continue
+        column = layout.column(align=True)
+        column.use_property_split = False
+        column.label(text=title)
+        column.row(align=True).prop(settings, name, text="")
+
+
 def text_lines(context, layout, text, icon):
     """Draws a label, broken into lines that fit the region. Returns the number of lines."""
     column, lines = layout.column(align=True), wrapped(context, text)

@@ -15,6 +15,7 @@ from ..properties import automatic_placement, placement_setting, tolerance_setti
 from ..reference import snapshots, tolerances
 from ..shared.errors import Refused
 from ..shared.proof import report
+from ..wrapping import property_fields
 from . import decimation, original
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
@@ -34,14 +35,13 @@ def draw_decimate_settings(layout, settings):
     layout.row(heading="Holes").prop(settings, "close_holes", text="Close")
 
 
-def draw_advanced_settings(layout, settings):
+def draw_advanced_settings(context, layout, settings):
     """Draws the settings of a decimation that hardly anybody changes, for the panel and for Adjust Last Operation."""
-    layout.prop(settings, "max_seconds")
-    row = layout.row()
-    row.active = settings.close_holes
-    row.prop(settings, "largest_perimeter")
-    layout.prop(settings, "crossings")
-    layout.prop(settings, "max_normal_angle")
+    property_fields(context, layout, settings, "max_seconds")
+    column = layout.column()
+    column.active = settings.close_holes
+    property_fields(context, column, settings, "largest_perimeter")
+    property_fields(context, layout, settings, "crossings", "max_normal_angle")
 
 
 def draw_protect_settings(layout, settings, ob):
@@ -112,7 +112,7 @@ object. An object without a reference gets one first, as by Set Reference"""
         draw_decimate_settings(layout, self)
         draw_protect_settings(layout, self, context.active_object)
         layout.prop(self, "outside")
-        draw_advanced_settings(layout, self)
+        draw_advanced_settings(context, layout, self)
 
     def targets(self, context):
         return targets(context)

@@ -45,7 +45,7 @@ def draw_lod_settings(layout, settings):
             column.prop(settings, name)
     column = layout.column(align=True)
     for i in range(settings.levels):
-        unit = " (%)" if vector == "percentages" else ""
+        unit = " %" if vector == "percentages" else ""
         column.prop(settings, vector, index=i, text=f"LOD{i + 1}{unit}")
 
 

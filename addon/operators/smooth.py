@@ -11,6 +11,7 @@ from ..operation_settings import smooth_settings, threads_setting
 from ..proof import kept_warnings
 from ..shared.errors import Refused
 from ..shared.proof.verdict import PASS
+from ..wrapping import property_fields
 from . import settings as shared
 from .blocked import allowed, decimate_blocked
 from .motion import Motion
@@ -18,11 +19,9 @@ from .motion import Motion
 _MODES = {"OBJECT", "EDIT"}
 
 
-def draw_smooth_settings(layout, settings, ob):
+def draw_smooth_settings(context, layout, settings, ob):
     """Draws the settings of smoothing, for the panel and for Adjust Last Operation."""
-    layout.prop(settings, "iterations")
-    for name in ("method", "weights", "boundary"):
-        layout.prop(settings, name)
+    property_fields(context, layout, settings, "iterations", "method", "weights", "boundary")
     shared.draw_vertex_group(layout, settings, ob)
 
 
@@ -43,7 +42,7 @@ of all edited meshes. An object without a reference gets one first, as by Set Re
 
     def draw(self, context):
         self.layout.use_property_split = True
-        draw_smooth_settings(self.layout, self, context.active_object)
+        draw_smooth_settings(context, self.layout, self, context.active_object)
 
     def targets(self, context):
         """Returns the active object, in Edit Mode together with all other meshes that are edited."""

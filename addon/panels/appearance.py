@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 import bpy
 
-from .layout import SubPanel, active
+from ..wrapping import property_fields
+from .layout import SubPanel, active, is_narrow
 
 
 class TOLVOL_PT_appearance(SubPanel, bpy.types.Panel):
@@ -17,6 +18,8 @@ class TOLVOL_PT_appearance(SubPanel, bpy.types.Panel):
         settings = active(context).tolvol.bake
         layout.operator("tolvol.shade_by_reference", text="Shade by Reference")
         column = layout.column(align=True)
-        column.prop(settings, "image_size")
-        column.prop(settings, "shade")
+        property_fields(context, column, settings, "image_size")
+        row = column.row()
+        row.use_property_split = not is_narrow(context)
+        row.prop(settings, "shade")
         column.operator("tolvol.bake_normals")

@@ -39,4 +39,4 @@ class TOLVOL_PT_advanced(SubPanel, bpy.types.Panel):
         layout = self.layout
         layout.use_property_split = True
         layout.use_property_decorate = False
-        draw_advanced_settings(layout, active(context).tolvol)
+        draw_advanced_settings(context, layout, active(context).tolvol)

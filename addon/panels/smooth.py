@@ -14,5 +14,5 @@ class TOLVOL_PT_smooth(SubPanel, bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         ob = active(context)
-        draw_smooth_settings(layout, ob.tolvol.smooth, ob)
+        draw_smooth_settings(context, layout, ob.tolvol.smooth, ob)
         layout.operator("tolvol.smooth", text="Smooth")

@@ -8,7 +8,7 @@ from ..operators import blocked
 from ..reference import measurements, tolerances
 from ..shared.numbers import NO_BREAK
 from ..units import length
-from ..wrapping import fitting, text_lines, wrapped
+from ..wrapping import fitting, property_fields, text_lines, wrapped
 from .layout import AMBER, GREEN, GREY, RED, Panel, active, is_narrow, right
 from .notes import in_the_way
 from .progress import in_a_row
@@ -35,14 +35,17 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
             text_lines(context, layout, other_active if selected else "Select a mesh object", "INFO")
             return
         settings = ob.tolvol
-        layout.prop(settings, "reference_kind")
+        property_fields(context, layout, settings, "reference_kind")
         if settings.reference_kind == "OBJECT":
             layout.prop(settings, "reference_object")
         column = layout.column(align=True)
-        row = column.row(align=True)
-        row.prop(settings, "tolerance_percent" if settings.tolerance_mode == "PERCENT" else "tolerance_length")
+        row, narrow = column.row(align=True), is_narrow(context)
+        # A narrow panel has no room for a name beside a field with a number and its unit. Its title is the name, too.
+        row.use_property_split = not narrow
+        name = "tolerance_percent" if settings.tolerance_mode == "PERCENT" else "tolerance_length"
+        row.prop(settings, name, **({"text": ""} if narrow else {}))
         row.menu("TOLVOL_MT_tolerances", text="", icon="PRESET")
-        other, narrow = self._other_form(context, ob), is_narrow(context)
+        other = self._other_form(context, ob)
         # Beside the unit the other form takes no room from the verdict, which has to be on the first screen.
         beside = fitting(context, other, other.removeprefix("= "), share=_BESIDE_UNIT)
         column.prop(settings, "tolerance_mode", text=" " if narrow else beside or " ")

@@ -94,6 +94,28 @@ def test_a_running_job_has_four_rows_and_a_bar_where_blender_has_one(monkeypatch
         assert layout.shown[1][2]["text"] == "Decimating (25%)"
 
 
+NAMES = "Time Limit", "Largest Perimeter", "Crossings", "Normals"
+
+
+@pytest.mark.parametrize(("width", "above"), ((400, ()), (230, NAMES[1:2]), (190, NAMES[:3])))
+def test_a_name_without_room_beside_its_field_is_above_it(width, above):
+    torus()
+    layout = drawn(panels.TOLVOL_PT_advanced, sidebar(width))
+    assert [text for text, _ in layout.labels()] == list(above)
+    fields = {arguments[1]: options for name, arguments, options in layout.shown if name == "prop"}
+    properties = bpy.types.Object.bl_rna.properties["tolvol"].fixed_type.properties
+    assert [properties[name].name for name in fields] == list(NAMES)
+    assert {properties[name].name for name, options in fields.items() if options == {"text": ""}} == set(above)
+
+
+@pytest.mark.parametrize("mode", ("PERCENT", "LENGTH"))
+def test_a_narrow_panel_leaves_the_tolerance_room_for_its_unit(mode):
+    torus().tolvol.tolerance_mode = mode
+    for width, options in ((400, {}), (190, {"text": ""})):
+        layout = drawn(panels.TOLVOL_PT_tolerance, sidebar(width), _other_form=lambda _context, _ob: "")
+        assert ("prop", (bpy.context.object.tolvol, f"tolerance_{mode.lower()}"), options) in layout.shown
+
+
 # What is in the way --------------------------------------------------------------------------------------------------
 
 
