@@ -76,7 +76,12 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             bpy.data.meshes.remove(mesh)
             raise
         shared.give(self, settings, modifier_settings())
-        warnings = _crossing_warnings(name, certified["solidity"])
+        warnings, before = _crossing_warnings(name, certified["solidity"]), len(trial.surface.arrays.triangles)
+        if trial.left > before:
+            warnings.append(
+                f"{name} leaves {trial.left:,} triangles, more than the {before:,} that there were: undo it unless its new "
+                "faces are wanted"
+            )
         if plain is not None and plain < trial.left:
             warnings.append(
                 f"The button Decimate leaves fewer triangles within this tolerance: {plain:,}, and the modifier {name} "
@@ -112,7 +117,9 @@ ways, and apply the modifier to the base mesh. An object without a reference get
                 continue
             if self._counts(evaluation, trial, len(arrays.triangles)):
                 self._found.append((len(arrays.triangles), value))
-                self.count = f"{min(self._found)[0]:,} triangles so far"
+                fewest = min(self._found)[0]
+                than = f", before {triangles:,}" if fewest > triangles else ""
+                self.count = f"{fewest:,} triangles so far{than}"
         return sorted(self._found)
 
     def _refuse(self, context, name, parameter, trial):

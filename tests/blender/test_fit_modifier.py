@@ -241,6 +241,21 @@ def test_says_if_decimate_would_leave_fewer_triangles():
     assert plain < fitted
 
 
+def test_a_fit_that_leaves_more_triangles_says_so_while_it_searches_and_afterwards(monkeypatch):
+    bpy.ops.mesh.primitive_cube_add()
+    ob = bpy.context.object
+    ob.modifiers.new("Boxes", "REMESH")
+    ob.tolvol.tolerance_percent = 2
+    told, each = [], Run._next_work
+    monkeypatch.setattr(Run, "_next_work", lambda self: (each(self), told.append(self.operator.count))[0])
+    assert bpy.ops.tolvol.fit_modifier() == {"FINISHED"}
+    left = len(world_triangles(ob)[1])
+    assert left > 100 and f"{left:,} triangles so far, before 12" in told
+    more = f"Boxes leaves {left:,} triangles, more than the 12 that there were: undo it unless its new faces are wanted"
+    fewer = f"The button Decimate leaves fewer triangles within this tolerance: 12, and the modifier Boxes {left:,}"
+    assert kept_warnings.of(ob)[0] == [more, fewer]
+
+
 def test_a_fit_that_leaves_no_triangle_fewer_changes_nothing_and_says_why():
     ob = torus()
     ob.modifiers.new("fewer", "DECIMATE")

@@ -5,12 +5,13 @@ import bpy
 
 import job_time
 import scenes
+from addon.proof import kept_warnings
 from test_panel import assert_proved, large_monkey, stored, suzanne
 from window import at_rest, centre, finished, key, reset, screenshot, status_texts, view, xdotool
 
 
-def fit(ob):
-    ob.modifiers.new("Decimate", "DECIMATE")
+def fit(ob, kind="DECIMATE"):
+    ob.modifiers.new(kind.title(), kind)
     bpy.ops.ed.undo_push(message="modifier")
     with bpy.context.temp_override(window=view()[0], area=view()[1]), job_time.in_background():
         assert bpy.ops.tolvol.fit_modifier("INVOKE_DEFAULT") == {"RUNNING_MODAL"}
@@ -40,6 +41,21 @@ def test_escape_keeps_the_best_so_far():
     key("Escape")
     yield from finished(lambda: not suzanne().modifiers)
     assert_proved(suzanne(), reference, 0.2)
+
+
+def test_escape_keeps_more_triangles_than_before_and_says_so():
+    yield from reset(bpy.ops.mesh.primitive_cube_add)
+    ob, said = bpy.data.objects["Cube"], status_texts()
+    ob.tolvol.tolerance_percent = 1
+    reference = scenes.world_triangles(ob)
+    fit(ob, "REMESH")
+    yield from finished(lambda: said and ", before 12    Esc: Keep Present Result" in said[-1], pause=0.02)
+    key("Escape")
+    yield from finished(lambda: not ob.modifiers)
+    left = len(scenes.world_triangles(ob)[1])
+    (warning,) = kept_warnings.of(ob)[0]
+    assert warning.startswith(f"Remesh leaves {left:,} triangles, more than the 12 that there were: ")
+    assert_proved(ob, reference, 1)
 
 
 def test_fitted_in_a_window_and_undone_by_one_ctrl_z():
