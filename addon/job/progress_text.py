@@ -1,10 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Says how far the work of an operator is, for the status bar and the panel."""
 
+import time
 from dataclasses import dataclass
 
-# The time that has passed is told after so many seconds.
-_TOLD_AFTER = 1.0
+# The time that a stage still takes is told after so many seconds, and after such a share of the stage.
+_KNOWN_AFTER, _KNOWN_SHARE = 1.0, 0.05
+
+
+class Clock:
+    """Estimates how long the present stage of a job goes on."""
+
+    def __init__(self):
+        self._stage = None
+        self._began = 0.0
+
+    def seconds_left(self, stage, share):
+        """Returns the seconds, or None as long as too little of the stage is done. share: of the stage that is done."""
+        if stage != self._stage or share == 0:
+            self._stage, self._began = stage, time.monotonic()
+        took = time.monotonic() - self._began
+        return took * (1 - share) / share if took >= _KNOWN_AFTER and share >= _KNOWN_SHARE else None
 
 
 @dataclass(frozen=True)
@@ -15,17 +31,13 @@ class Told:
     part: str  # the part of the work that is under way
     stage: str
     share: float | None  # of the stage that is done
-    passed: str  # how long the operator has been at work. How long it goes on is not known: see tell()
+    left: str  # how long the stage goes on
     count: str
     escape: str  # what Esc does
 
 
-def tell(operator, progress, seconds):
-    """Returns the Told of an operator. seconds: since it began.
-
-    It gives no time that is left. The first 90 % of the collapses of a decimation take a third of its time or less, so that the
-    share of a stage tells how far the work is, but not how long the rest takes; nor does it tell of the stages that follow.
-    """
+def tell(operator, progress, clock):
+    """Returns the Told of an operator."""
     if progress.cancelled:
         return stopping(operator.bl_label, operator.part)
     if operator.doing:
@@ -37,12 +49,14 @@ def tell(operator, progress, seconds):
         # In these two stages the count is the number of triangles left.
         counts = progress.count and progress.stage in {"decimating", "refining"}
         count = f"{progress.count:,} triangles left" if counts else ""
+    # An operator that says what it is doing says so for each of its steps, which are one stage together.
+    left = clock.seconds_left(operator.part if operator.doing else progress.stage, share)
     return Told(
         operator.bl_label,
         operator.part,
         stage,
         share or None,
-        f"{_duration(seconds)} so far" if seconds >= _TOLD_AFTER else "",
+        f"{_duration(left)} left" if left is not None else "",
         count,
         "Keep Present Result" if operator.improving() else "Discard Result" if progress.finishing else "Cancel",
     )
@@ -64,4 +78,4 @@ def status_line(told):
 
 
 def _duration(seconds):
-    return f"{int(seconds)} s" if seconds < 60 else f"{int(seconds / 60)} min"
+    return f"{seconds:.0f} s" if seconds < 60 else f"{seconds / 60:.0f} min"

@@ -47,7 +47,7 @@ class Run:
         self.has_written = False
         self.rewinding = False  # whether a step is being undone for the run itself, which that does not end
         self.something_else = False  # whether Blender has reported a change since begin_modal()
-        self._mode = context.mode
+        self._mode, self._clock = context.mode, progress_text.Clock()
         self._claims = [Claim(ob) for ob in operator.objects]
         self._steps = operator.steps(context)
         self._job = None
@@ -62,7 +62,7 @@ class Run:
         return (
             progress_text.stopping(self.label)
             if self._gone()
-            else progress_text.tell(self.operator, self.progress, time.monotonic() - self._began)
+            else progress_text.tell(self.operator, self.progress, self._clock)
         )
 
     def _gone(self):

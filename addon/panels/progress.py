@@ -14,12 +14,15 @@ def draw_progress(context, box, told):
     row.scale_y = 1.5
     row.label(text=_name(told), icon="SORTTIME")
     column = box.column(align=True)
-    done = told.stage if told.share is None else f"{told.stage} ({told.share:.0%})"
-    text = fitting(context, *([f"{done}, {told.passed}"] if told.passed else []), done)
-    if _HAS_BAR and told.share is not None:
-        column.progress(factor=told.share, text=text)
+    if told.share is None:
+        column.label(text=told.stage)
     else:
-        column.label(text=text)
+        done = f"{told.stage} ({told.share:.0%})"
+        text = fitting(context, *([f"{done}, {told.left}"] if told.left else []), done)
+        if _HAS_BAR:
+            column.progress(factor=told.share, text=text)
+        else:
+            column.label(text=text)
     column.label(text=told.count)
     column.label(text=f"Esc: {told.escape}" if told.escape else "")
 

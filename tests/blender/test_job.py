@@ -10,7 +10,7 @@ import pytest
 
 from addon import job, native, status_bar
 from addon.background import queue, thread
-from addon.job import interruptions, progress_text, run
+from addon.job import interruptions, progress_text
 from addon.job.run import Run
 from scenes import torus
 
@@ -329,15 +329,10 @@ class Progress:
     stage, fraction, count, cancelled, finishing = "decimating", 0.0, 0, False, False
 
 
-def begun_at(operator, monkeypatch, now):
-    """Lets the run of the operator have begun now, at the time in the list `now`, by a clock that shows this time."""
-    monkeypatch.setattr(run.time, "monotonic", lambda: now[0])
-    operator._run._began = now[0]
-
-
-def test_the_panel_is_told_stage_count_part_and_time_so_far(waiting, monkeypatch):
+def test_the_panel_is_told_stage_count_part_and_time_left(waiting, monkeypatch):
     operator, _ = waiting
-    begun_at(operator, monkeypatch, now := [100.0])
+    now = [100.0]
+    monkeypatch.setattr(progress_text.time, "monotonic", lambda: now[0])
     operator._run.progress = progress = Progress()
     operator.improving = lambda: False
     operator.part = "torus, 2 of 3"
@@ -346,16 +341,15 @@ def test_the_panel_is_told_stage_count_part_and_time_so_far(waiting, monkeypatch
     progress.stage = "decimating"
     assert operator._run.told() == progress_text.Told("Modal", "torus, 2 of 3", "Decimating", None, "", "", "Cancel")
     now[0] += 10
-    # A stage at a quarter may take ten times as long as the first quarter, and others follow: no time is told that is left.
     progress.fraction, progress.count = 0.25, 12_400
     told = operator._run.told()
-    assert (told.share, told.passed, told.count) == (0.25, "10 s so far", "12,400 triangles left")
+    assert (told.share, told.left, told.count) == (0.25, "30 s left", "12,400 triangles left")
     assert progress_text.status_line(told) == ("torus, 2 of 3: Decimating (25%), 12,400 triangles left    Esc: Cancel")
     progress.stage, progress.fraction = "measuring", 0.5
     told = operator._run.told()
-    assert (told.stage, told.passed, told.count) == ("Measuring", "10 s so far", "")  # The time is that of all stages.
+    assert (told.stage, told.left, told.count) == ("Measuring", "", "")  # A new stage has just begun.
     now[0] += 200
-    assert operator._run.told().passed == "3 min so far"
+    assert operator._run.told().left == "3 min left"
 
 
 def test_after_the_first_escape_the_panel_says_that_it_was_heard_and_what_a_second_one_does(waiting, monkeypatch):
@@ -372,12 +366,13 @@ def test_after_the_first_escape_the_panel_says_that_it_was_heard_and_what_a_seco
 
 def test_an_operator_that_says_what_it_does_says_how_far_it_is_over_all_its_steps(waiting, monkeypatch):
     operator, _ = waiting
-    begun_at(operator, monkeypatch, now := [100.0])
+    now = [100.0]
+    monkeypatch.setattr(progress_text.time, "monotonic", lambda: now[0])
     operator._run.progress = progress = Progress()
     progress.fraction = 0.9  # of the native stage, which is one of many
     operator.improving = lambda: True
     operator.part, operator.doing, operator.share, operator.count = "Fitting Decimate", "Ratio 0.1", 0.0, ""
-    assert operator._run.told().share is None and operator._run.told().passed == ""
+    assert operator._run.told().share is None and operator._run.told().left == ""
     now[0] += 10
     operator.doing, operator.share, operator.count, progress.stage = (
         "Ratio 0.12",
@@ -386,7 +381,7 @@ def test_an_operator_that_says_what_it_does_says_how_far_it_is_over_all_its_step
         "sampling",
     )
     told = operator._run.told()
-    assert (told.stage, told.share, told.passed) == ("Ratio 0.12", 0.25, "10 s so far")
+    assert (told.stage, told.share, told.left) == ("Ratio 0.12", 0.25, "30 s left")
     text = "Fitting Decimate: Ratio 0.12 (25%), 900 triangles so far    Esc: Keep Present Result"
     assert progress_text.status_line(told) == text
 
@@ -407,5 +402,5 @@ def test_a_batch_names_each_object_and_reports_totals(monkeypatch, capfd):
 def test_a_job_that_stops_keeps_the_name_that_the_panel_has_shown():
     operator = SimpleNamespace(bl_label="A name without room in the panel", part="Short")
     progress = SimpleNamespace(cancelled=True, stage="reading", fraction=0.0, count=0)
-    told = progress_text.tell(operator, progress, 10.0)
+    told = progress_text.tell(operator, progress, progress_text.Clock())
     assert (told.part, told.stage) == ("Short", "Stopping")
