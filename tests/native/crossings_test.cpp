@@ -28,8 +28,6 @@ Pairs found(const TriangleMesh& mesh, unsigned threads = 2, std::size_t most = k
   return pairs;
 }
 
-}  // namespace
-
 // On a coarse lattice many corners and edges are shared, and many triangles lie in one plane.
 TEST(Crossings, AreThoseWhoseIntersectionIsMoreThanACornerOrAnEdge) {
   std::size_t total = 0;
@@ -96,3 +94,5 @@ TEST(Crossings, EndAtTheMostThatWereAskedFor) {
   const tolvol::Crossings exact = crossings(fan.vertices, fan.triangles, all.pairs.size(), team, nullptr);
   EXPECT_TRUE(exact.complete);
 }
+
+}  // namespace

@@ -82,8 +82,6 @@ std::vector<Case> thin() {
   return all;
 }
 
-}  // namespace
-
 TEST(DecimationCrossings, ThinWallsDoNotCross) {
   std::size_t allowed = 0;
   const std::vector<Case> all = thin();
@@ -235,3 +233,5 @@ TEST(DecimationCrossings, SoupsAndJoinedSheets) {
     ++number;
   }
 }
+
+}  // namespace

@@ -43,8 +43,6 @@ std::set<std::uint32_t> among(const std::vector<Box>& boxes, const Box& box) {
   return faces;
 }
 
-}  // namespace
-
 TEST(FaceTree, FindsWhatMeetsABoxWhileFacesChangeAndVanish) {
   Random random(5);
   Team team(2);
@@ -77,3 +75,5 @@ TEST(FaceTree, TouchingBoxesMeet) {
   EXPECT_EQ(found(tree, {glm::dvec3(1), glm::dvec3(2)}).size(), 1u);
   EXPECT_EQ(found(tree, {glm::dvec3(1.5), glm::dvec3(2)}).size(), 0u);
 }
+
+}  // namespace

@@ -26,8 +26,6 @@ dvec3 random_point(const Corners& t, shapes::Random& random) {
   return t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0]);
 }
 
-}  // namespace
-
 TEST(FacesApart, TheGapOfParallelTrianglesIsTheirDistance) {
   const Corners above{dvec3(0, 0, 0.5), dvec3(4, 0, 0.5), dvec3(0, 4, 0.5)};
   EXPECT_NEAR(gap(kFlat, above, kFar), 0.5, 1e-12);
@@ -180,3 +178,5 @@ TEST(FacesApart, CoordinatesOfAnySizeAreHandled) {
     }
   }
 }
+
+}  // namespace

@@ -34,8 +34,6 @@ bool cross(Corners a, Corners b) {
   return answer;
 }
 
-}  // namespace
-
 TEST(FacesCross, TrianglesWithoutACommonCorner) {
   EXPECT_TRUE(cross(kFlat, {dvec3(1, 1, -1), dvec3(1, 1, 1), dvec3(9, 9, 0)}));    // pierced
   EXPECT_TRUE(cross(kFlat, {dvec3(1, 1, 0), dvec3(1, 1, 1), dvec3(2, 2, 1)}));     // touched by a corner
@@ -135,3 +133,5 @@ TEST(FacesCross, KeepsTheAnswerWhenMoved) {
   EXPECT_GT(crossing, 2000);
   EXPECT_LT(crossing, 18000);
 }
+
+}  // namespace

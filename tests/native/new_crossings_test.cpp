@@ -72,8 +72,6 @@ TriangleMesh wall(double thickness, unsigned n = 4) {
 
 constexpr unsigned kMiddle = 12;  // of 5 x 5 vertices
 
-}  // namespace
-
 TEST(NewCrossings, AVertexStopsAtTheOtherSideOfAWall) {
   Scene scene(wall(0.01));
   EXPECT_TRUE(scene.may_move(kMiddle, dvec3(0.52, 0.51, 0.0099)));
@@ -262,3 +260,4 @@ TEST(NewCrossings, WhatIsSharedOutDoesNotDependOnHubs) {
   }
   EXPECT_GT(shared_out, 5u);
 }
+}  // namespace

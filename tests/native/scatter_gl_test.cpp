@@ -53,8 +53,6 @@ std::size_t expect_same(const TriangleMesh& mesh, const Fields& fields) {
   return named;
 }
 
-}  // namespace
-
 TEST_F(ScatterGl, IsScatterOnEveryMesh) {
   std::size_t named = 0;
   for (const cases::Case& c : cases::all()) {
@@ -105,3 +103,5 @@ TEST_F(ScatterGl, EndsOnRequest) {
   const Call call(&progress);
   EXPECT_THROW(scatter_gl(mesh, grid, &progress), Cancelled);
 }
+
+}  // namespace

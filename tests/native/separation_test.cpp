@@ -44,8 +44,6 @@ double depth(const std::vector<Separation>& all, const Corners& face) {
 
 const Corners kFlat{dvec3(0, 0, 0), {1, 0, 0}, {0, 1, 0}};
 
-}  // namespace
-
 TEST(Separation, PointsToTheSideWhereTheSheetIs) {
   const Corners face = moved(kFlat, {0.1, 0.1, 0.02});
   for (const double z : {0.3, -0.3}) {
@@ -136,3 +134,5 @@ TEST(Separation, FewFacesOfALargeSheetAreMeasured) {
   EXPECT_EQ(separate(moved(other, {3, 0, 0.02}), other, sheet, kAnyReach, found), 0u) << "they do not overlap";
   EXPECT_TRUE(found.empty());
 }
+
+}  // namespace
