@@ -23,10 +23,9 @@ check() {
 licence() {
   # The licence is in one of the first two lines, because the first line of a script is its #!.
   without=$(find . \( -path ./build -o -path ./out -o -path ./.git \) -prune -o -type f \( -name '*.h' -o -name '*.hh' -o \
-    -name '*.cpp' -o -name '*.py' -o -name '*.sh' -o -name 'CMakeLists.txt' -o -name '*.toml' -o -path './.ci/*' \) -print |
-    while read -r file; do
-      head -n 2 "$file" | grep -q 'SPDX-License-Identifier: GPL-3.0-or-later' || echo "$file"
-    done)
+    -name '*.cpp' -o -name '*.py' -o -name '*.sh' -o -name 'CMakeLists.txt' -o -name '*.toml' -o -path './.ci/*' \) -print0 |
+    xargs -0 awk 'FNR <= 2 && /SPDX-License-Identifier: GPL-3.0-or-later/ { found[FILENAME] = 1 }
+      END { for (i = 1; i < ARGC; ++i) if (!(ARGV[i] in found)) print ARGV[i] }')
   [ -z "$without" ] || { echo "no licence line in: $without" && return 1; }
 }
 
