@@ -151,7 +151,7 @@ class PullBack {
   void start_crossings(const std::vector<Held>& held, const Wish& wish);
   bool is_away(std::uint32_t vertex) const;
   void widen(std::vector<std::uint32_t>& vertices, std::size_t rings);
-  void retreat(Held& held, Mode mode, double least);
+  void retreat(Held& held, Mode mode, double least, bool is_tangled);
 
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
   /// When step (3) of pull_back.cpp ends in Mode::pull_back, no factor alone can rise by this much.

@@ -20,6 +20,11 @@ namespace {
 /// Where the reference would lose a witness or faces would cross, a factor shrinks by this share first, then by twice
 /// the share each time, and after half of it by kShrink.
 constexpr double kRetreat = 1.0 / 16;
+/// Where at least this many faces cross others, and they are more than half of those that move, the wish is a tangle.
+/// Each factor shrinks to the share kUntangle then: small steps would leave nearly all of them crossing, and every step
+/// looks at all of them.
+constexpr std::size_t kTangle = 4096;
+constexpr double kUntangle = 0.25;
 /// Where vertices went back for crossings this many times and faces still cross, they go all the way back, together
 /// with more and more rings of vertices around them: far from where they were, faces that stay in the way of others
 /// meet them one after the other.
@@ -73,6 +78,7 @@ void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Pr
     }
     if (changed.empty()) throw std::logic_error("faces that do not move would break the promise");
     const bool is_hasty = cross && rounds > kPatience;
+    const bool is_tangled = cross && failed.size() >= kTangle && 2 * failed.size() > wish.moving.faces.size();
     if (is_hasty) widen(changed, std::size_t{1} << std::min<std::size_t>(rounds - kPatience, 30));
     std::sort(changed.begin(), changed.end());
     changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
@@ -80,7 +86,7 @@ void PullBack::back_off(std::vector<Held>& held, const Wish& wish, Mode mode, Pr
       if (held_index_[v] == kNone) hold(v, wish, held).factor = 1;
       Held& h = held[held_index_[v]];
       h.kept_from_crossing = h.kept_from_crossing || cross;
-      retreat(h, is_hasty ? Mode::reset : mode, cross ? kRise : little(h));
+      retreat(h, is_hasty ? Mode::reset : mode, cross ? kRise : little(h), is_tangled);
     }
     if (!next_twin_.empty()) hold_twins(wish, std::vector(changed), held, changed);
     if (crossings_) since.insert(since.end(), changed.begin(), changed.end());
@@ -179,11 +185,15 @@ void PullBack::widen(std::vector<std::uint32_t>& vertices, std::size_t rings) {
   }
 }
 
-/// Sends a vertex back by the next share of its way, or all the way where less than `least` would be left.
-void PullBack::retreat(Held& held, Mode mode, double least) {
+/// Sends a vertex back by the next share of its way, a large one in a tangle, or all the way where less than `least`
+/// would be left.
+void PullBack::retreat(Held& held, Mode mode, double least, bool is_tangled) {
   if (held.retreat == 0) held.factor_before = held.factor;
   if (mode == Mode::reset) {
     held.factor = 0;
+  } else if (is_tangled) {
+    held.retreat = kShrink;
+    held.factor *= kUntangle;
   } else if (held.retreat < kShrink) {
     held.retreat = held.retreat == 0 ? kRetreat : 2 * held.retreat;
     held.factor = held.factor_before * (1 - held.retreat);

@@ -37,6 +37,15 @@ TEST(MovingCrossings, ThreadsDoNotChangeABit) {
   }
 }
 
+// All faces of a torus are thrown about by many times their size, and nearly all cross others until they are almost
+// back.
+TEST(MovingCrossings, ATangleGoesBackInFewRounds) {
+  const Motion motion(shapes::torus(60), 0.5);
+  ConstrainResult end;
+  EXPECT_LT(polls_of([&] { end = motion.run(motion.noise(0.5, 3), {.two_sided = false, .threads = 1}); }), 25000u);
+  EXPECT_TRUE(pairs_of(end.vertices, motion.mesh.triangles).empty());
+}
+
 TEST(MovingCrossings, SmoothingKeepsWallsApart) {
   // The outer sphere shrinks towards the inner one, which stays.
   const Motion motion(hollow(6, 0.03), 0.3);

@@ -260,4 +260,5 @@ TEST(NewCrossings, WhatIsSharedOutDoesNotDependOnHubs) {
   }
   EXPECT_GT(shared_out, 5u);
 }
+
 }  // namespace
