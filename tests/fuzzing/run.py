@@ -11,6 +11,7 @@ import tolvol
 from .case import Finding
 
 SECONDS = 10  # time limit of a call on a mesh for which calls are short
+THOROUGH_SECONDS = 60  # the same for thorough, whose last rounds take seconds for each hundred edges (refinement.h)
 CANCEL_SECONDS = 0.5  # time limit after a cancel; 0.2 s are promised on a machine without other work
 
 
@@ -40,8 +41,12 @@ class Run:
             raise Finding(f"exception: {name}", f"{type(error).__name__}: {error}") from error
         finally:
             seconds = min(time.perf_counter() - clock, (time.process_time() - processor) / threads)
-            if self.limited and seconds > SECONDS:
+            if self.limited and seconds > self._limit(name):
                 raise Finding(f"slow: {name}", f"{seconds:.1f} s")
+
+    def _limit(self, name):
+        decimates_thoroughly = name == "decimate" and self.case.options.get("effort") == "thorough"
+        return THOROUGH_SECONDS if name == "thorough" or decimates_thoroughly else SECONDS
 
     def repeated(self, name, call, fields, same=True):
         """Calls call(threads, progress) on several numbers of threads, and cancels one call in between.
