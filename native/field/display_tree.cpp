@@ -23,9 +23,9 @@ constexpr std::size_t kLeaf = 4;  // a leaf has at most this many triangles
 constexpr double kTie = 2e-6;
 constexpr double kTiny = 1e-30;
 constexpr double kSamples = 1 << 16;
-// So many samples, of triangles spread over the mesh, tell how many nodes a sample visits. If all samples would visit
-// more nodes than kMostVisits, and kVisitsPerTriangle for each triangle, there are fewer, but kFewestSamples. A scan
-// stays below half of that.
+// So many samples, of triangles spread over the mesh, tell how many nodes a sample visits. All samples together may
+// visit about kMostVisits nodes and kVisitsPerTriangle more for each triangle. If they would visit more, there are
+// fewer samples, but about kFewestSamples at least. On a scan all samples visit less than half of what they may.
 constexpr std::size_t kProbes = 64;
 constexpr double kMostVisits = 1 << 24, kVisitsPerTriangle = 256, kFewestSamples = 256;
 // These steps spread the samples of a triangle, or the first samples of neighbouring triangles, evenly [M. Roberts, The
@@ -154,12 +154,12 @@ double DisplayTree::distance(const glm::dvec3& place, double reach, std::size_t&
 
 namespace {
 
-/// The numbers of the samples of each triangle of a mesh.
+/// How many samples each triangle of a mesh has.
 class SampleCounts {
  public:
   SampleCounts(std::vector<double> area, double whole) : area_(std::move(area)), whole_(whole) {}
 
-  /// From now on there are only about so many samples of all, each of which stands for an equal area.
+  /// From now on all triangles together have only about so many samples, each of which stands for an equal area.
   void limit(double count) {
     double before = 0, samples = 0;
     for (double& area : area_) {

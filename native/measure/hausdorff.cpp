@@ -74,8 +74,8 @@ constexpr std::size_t kPieces = 1'000'000, kPiecesPerTriangle = 16;
 // less, for as many pieces again. Nearly all searches end before, those between a surface and its subdivided copy among
 // them. Needles that lie on one another would need a million pieces to show that nothing but rounding is between them.
 constexpr std::size_t kPatience = 20'000, kPatiencePerTriangle = 12;
-// A piece whose searches visit more nodes than this counts as one more piece for each so many: at a corner that
-// thousands of triangles share, one search may look at all of them.
+// The parts of a piece count as one piece for each so many nodes that their searches visit, if that is more than their
+// number: at a corner that thousands of triangles share, one search may look at all of them.
 constexpr std::size_t kNodesPerPiece = 64;
 // If the bound is larger than this, in frame lengths, growth() counts with this in its place.
 constexpr double kLargestBound = 1e-3;
@@ -130,7 +130,7 @@ class Sampled {
 struct Children {
   std::array<Piece, 3> piece;
   int count = 0;
-  std::size_t nodes = 0;  // are those that the searches for the pieces have visited
+  std::size_t nodes = 0;  // is how many the searches for the pieces have visited
 };
 
 dvec3 without(const dvec3& v, const dvec3& direction) {
@@ -309,9 +309,9 @@ class Search {
     return store_[place];
   }
 
-  /// Sets `upper` and `near` of a piece, whose `near` is a guess before. Returns the best lower bound it finds, not
-  /// certified, or none for a piece that is settled. Adds to `sampled` the corners at which it has looked, and to
-  /// `nodes` the nodes that it has visited.
+  /// Sets `upper` and `nearest` of a piece, whose `nearest` is a guess before. Returns the best lower bound it finds,
+  /// not certified, or none for a piece that is settled. Adds to `sampled` the corners at which it has looked, and to
+  /// `nodes` the number of nodes that it has visited.
   Sample evaluate(Piece& piece, Sampled& sampled, std::size_t& nodes) const {
     const double margin = kUpperMargin + piece.error, enough = cutoff() - margin;
     if (enough >= 0) {

@@ -109,8 +109,9 @@ class PullBack {
     /// About the factor at which the vertex itself leaves the volume, 1 only if it does not leave it. In Mode::settle,
     /// the factor that it is to reach.
     double largest_factor = 1;
-    double retreat = 0;        ///< The share of `factor_before` by which it went back for the reference or a crossing.
-    double factor_before = 0;  ///< The factor before it did.
+    /// The share of `factor_before` by which it went back for the reference or a crossing; kShrink if that was more.
+    double retreat = 0;
+    double factor_before = 0;         ///< The factor before it did.
     bool kept_from_crossing = false;  ///< Whether it went back because of a crossing.
     MovingMesh::Blame blame{};
     std::uint32_t colour = 0;

@@ -166,8 +166,9 @@ Cancelled
 
 Notes
 -----
-The shares are estimates by one sample a triangle and 65,536 more. Cost: about 0.3 s of one thread for 270,000
-triangles.)doc")
+The shares are estimates by one sample a triangle and 65,536 more, or by fewer where a search takes long, as between
+thousands of needles that run aslant. Cost: about 0.3 s of one thread for 270,000 triangles, and some seconds for 100,000
+such needles.)doc")
       .def("signed_distance", &signed_distance, py::arg("points"), py::kw_only(), py::arg("to_world") = py::none(),
            py::arg("threads") = py::none(), py::arg("progress") = py::none(),
            R"doc(Return the distances of points from the reference, negative inside it.
