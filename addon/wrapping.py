@@ -65,7 +65,7 @@ _BESIDE_FIELD = 0.4  # the share of the width that Blender gives to the name of 
 def property_fields(context, layout, settings, *names):
     """Draws properties, each with its name beside its field, or above it if the name has no room there."""
     for name in names:
-        title = settings.rna_type.properties[name].name  # Of an operator, bl_rna does not list them.
+        title = settings.rna_type.properties[name].name  # bl_rna of an operator does not list its properties.
         if fitting(context, title, "", share=_BESIDE_FIELD):
             layout.prop(settings, name)
             continue

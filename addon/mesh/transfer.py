@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Writes a decimated mesh into a Blender mesh and keeps the mesh's attributes.
 
-The remaining triangles stay the faces that they are in the Blender mesh, and one call of bmesh.ops.weld_verts merges each
-removed vertex into a remaining one. Data that Blender stores at faces and at remaining vertices is thereby kept as it is.
-Data at corners and edges is computed as arrays by carry.py.
+The remaining triangles stay the faces that they are in the Blender mesh. A vertex that has none of them is removed, and one
+call of bmesh.ops.weld_verts merges each other vertex that the result lacks into a remaining one. Data that Blender stores at
+faces and at remaining vertices is thereby kept as it is. Data at corners and edges is computed as arrays by carry.py.
 """
 
 import bmesh
@@ -28,8 +28,8 @@ class Writing:
     """A context manager that turns `mesh`, whose arrays are `source`, into the Decimated `result`. The arrays may be
     FilledArrays: the mesh then gets their new faces first.
 
-    prepare() builds a scratch mesh, which lives as long as the context. Its `layout` tells then where the result is in the
-    mesh. Only write() changes the mesh.
+    prepare() builds a scratch mesh, which lives as long as the context. After that, `layout` tells where the result is in
+    the written mesh. Only write() changes the mesh.
     """
 
     def __init__(self, mesh, source, result):

@@ -148,7 +148,7 @@ object. An object without a reference gets one first, as by Set Reference"""
     def _prepared(self, stack, outcomes):
         """A generator for steps(): returns the prepared Writing of each object, in contexts of the stack."""
         self.doing = "Writing"
-        self.edited()  # From here on.
+        self.edited()  # What was changed until now is read below.
         writes = self._writes(stack, outcomes)
         for write in writes:
             for _ in write.prepare():

@@ -28,8 +28,8 @@ _RIGID = 1e-6
 # A matrix with a larger condition number is not inverted. For others the map from one place to another is off by a smaller
 # share than _MAP_ROUNDING, because its rounding grows by the square of the condition number.
 _WELL_CONDITIONED, _MAP_ROUNDING = 500, 1e-9
-# The coordinates of two points in the world, each a sum of four rounded products in double precision, change their distance
-# by less than this share of the largest coordinate.
+# A coordinate in the world is a sum of four rounded products in double precision. This rounding changes the distance of two
+# points by less than this share of the largest sum of the absolute values of these products.
 _WORLD_ROUNDING = 2.0**-47
 
 
@@ -152,7 +152,10 @@ def _unchanged_of(ob):
 
 
 def measurement_of(ob):
-    """Returns what is known of the mesh as it is now, or None if mesh, place or reference have changed since it was measured."""
+    """Returns what is known of the mesh as it is now, or None if mesh, place or reference have changed since it was measured.
+
+    A mesh that is its own reference may have been moved, turned or scaled by one factor since.
+    """
     if ob.tolvol.snapshot is None or snapshots.stale_reason(ob):
         return None
     found = [each for find in (_kept_of, _stored_of, _unchanged_of) if (each := find(ob)) is not None]
@@ -182,8 +185,9 @@ def _holds(ob, measurement):
 
 
 def _scaled(ob, measurement):
-    """Returns what a measurement of a mesh, which is its own reference, says at the present place, if it was scaled by one
-    factor since, or None if it is not so or decides nothing.
+    """Returns what a measurement says at the present place, if the mesh is its own reference and was scaled by one factor since.
+
+    Returns None otherwise, and if what is known there does not decide about the tolerance.
 
     Each distance in the world is multiplied by a factor between the least and the largest singular value of the map from the
     place of the measurement to the present one. So are the largest distances of the two surfaces, whose coordinates in the
@@ -201,7 +205,7 @@ def _scaled(ob, measurement):
     least, most = (1 - _MAP_ROUNDING) * factors.min(), (1 + _MAP_ROUNDING) * factors.max()
     if not 0 < most <= (1 + _RIGID) * least:
         return None
-    # The mesh is at most so far from the reference as was measured.
+    # The coordinates of the mesh exceed those of the reference at most by the distance that was measured.
     was_off, is_off = (
         _WORLD_ROUNDING * (snapshots.farthest(ob, matrix) + factor * measurement.forward)
         for matrix, factor in ((before, 1), (now, most))

@@ -80,7 +80,10 @@ def snapshot_size(ob):
 
 
 def farthest(ob, matrix):
-    """Returns a length that no coordinate of the snapshot in the world exceeds, if `matrix` maps it there."""
+    """Returns a length that no coordinate of the snapshot in the world exceeds, if `matrix` maps it there.
+
+    The sum of the absolute values of the four numbers whose sum a coordinate is does not exceed it either.
+    """
     return float((np.abs(matrix[:3, :3]) @ np.abs(_box_of(ob)).max(0) + np.abs(matrix[:3, 3])).max())
 
 
