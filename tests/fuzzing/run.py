@@ -11,7 +11,7 @@ import tolvol
 from .case import Finding
 
 SECONDS = 10  # time limit of a call on a mesh for which calls are short
-THOROUGH_SECONDS = 60  # the same for thorough, whose last rounds take seconds for each hundred edges (refinement.h)
+THOROUGH_SECONDS = 60  # the same for thorough, which may take half a minute for some hundred triangles
 CANCEL_SECONDS = 0.5  # time limit after a cancel; 0.2 s are promised on a machine without other work
 
 
