@@ -7,7 +7,7 @@ is not stored with the object at all, because that would need an undo step.
 """
 
 import datetime
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -27,7 +27,10 @@ _RIGID = 1e-6
 
 # A matrix with a larger condition number is not inverted. For others the map from one place to another is off by a smaller
 # share than _MAP_ROUNDING, because its rounding grows by the square of the condition number.
-_WELL_CONDITIONED, _MAP_ROUNDING = 500, 1e-9
+_WELL_CONDITIONED, _MAP_ROUNDING = 2000, 1e-8
+# An object counts as scaled by one factor if the factors of all directions differ by less than this share. The rounding of
+# float32 rotations makes a difference of 3e-5 where one axis is a thousand times as long as another.
+_ONE_FACTOR = 1e-4
 # A coordinate in the world is a sum of four rounded products in double precision. This rounding changes the distance of two
 # points by less than this share of the largest sum of the absolute values of these products.
 _WORLD_ROUNDING = 2.0**-47
@@ -79,7 +82,7 @@ def _keep(ob, surface, certified, tolerance, share_outside=0.0, statistics=""):
     fingerprint = surface.arrays.fingerprint()
     key = _key(ob, fingerprint)
     known = (_kept.pop(key, None), ob.tolvol.measurement)
-    same = [each for each in known if each and each.fingerprint == fingerprint and _holds(ob, each)]
+    same = [each for each in known if each and each.fingerprint == fingerprint and _is_of_this_shape(ob, each)]
     if same and not statistics:
         statistics = same[0].statistics
     if same and not share_outside and same[0].tolerance == tolerance:
@@ -159,9 +162,10 @@ def measurement_of(ob):
     if ob.tolvol.snapshot is None or snapshots.stale_reason(ob):
         return None
     found = [each for find in (_kept_of, _stored_of, _unchanged_of) if (each := find(ob)) is not None]
-    true = (each for each in found if _holds(ob, each))
-    scaled = (_scaled(ob, each) for each in found)
-    return next(true, None) or next(filter(None, scaled), None)
+    here = [_at_present_place(ob, each) for each in found]
+    # The numbers of the present place itself are the best.
+    measured_here = (each for each, original in zip(here, found) if each is original)
+    return next(measured_here, None) or next(filter(None, here), None)
 
 
 def _sound(measurement):
@@ -170,46 +174,45 @@ def _sound(measurement):
     return all(map(snapshots.sound, lengths))
 
 
-def _holds(ob, measurement):
-    """Whether a measurement of this mesh and its reference is sound, and true at the present place."""
+def _place_then_and_now(ob, measurement):
+    return snapshots.stored_matrix(measurement.matrix), mesh_io.matrix_array(ob.matrix_world)
+
+
+def _is_of_this_shape(ob, measurement):
+    """Whether a measurement of this mesh and its reference is sound, and of the same place or of the same lengths."""
     if not _sound(measurement):
         return False
-    before, now = snapshots.stored_matrix(measurement.matrix), mesh_io.matrix_array(ob.matrix_world)
-    if np.array_equal(before, now):
-        return True
-    if ob.tolvol.snapshot_kind != "SELF" or not same_shape(before, now):
-        return False
-    # The distances of a mesh that was turned with its reference may have changed by rounding.
-    limit = measurement.tolerance
-    return not any(abs(end - limit) <= _RIGID * limit for end in (measurement.forward, measurement.backward))
+    before, now = _place_then_and_now(ob, measurement)
+    return np.array_equal(before, now) or (ob.tolvol.snapshot_kind == "SELF" and same_shape(before, now))
 
 
-def _scaled(ob, measurement):
-    """Returns what a measurement says at the present place, if the mesh is its own reference and was scaled by one factor since.
+def _at_present_place(ob, measurement):
+    """Returns what a measurement of this mesh and its reference says at the present place, or None if it does not hold there.
 
-    Returns None otherwise, and if what is known there does not decide about the tolerance.
-
-    Each distance in the world is multiplied by a factor between the least and the largest singular value of the map from the
-    place of the measurement to the present one. So are the largest distances of the two surfaces, whose coordinates in the
-    world are rounded at either place.
+    A mesh that is its own reference may have been moved, turned or scaled by one factor since. Each distance in the world is
+    then multiplied by a factor between the least and the largest singular value of the map from the place of the measurement
+    to the present one. So are the largest distances of the two surfaces, whose coordinates in the world are rounded at either
+    place. If what is known then does not decide about the tolerance, the result is None, too.
     """
-    if ob.tolvol.snapshot_kind != "SELF" or not _sound(measurement):
+    if not _sound(measurement):
         return None
-    before, now = snapshots.stored_matrix(measurement.matrix), mesh_io.matrix_array(ob.matrix_world)
-    try:
-        if not np.linalg.cond(before[:3, :3]) < _WELL_CONDITIONED:
-            return None
-        factors = np.linalg.svd(now[:3, :3] @ np.linalg.inv(before[:3, :3]), compute_uv=False)
-    except np.linalg.LinAlgError:  # The file is damaged.
+    before, now = _place_then_and_now(ob, measurement)
+    if np.array_equal(before, now):
+        return measurement
+    if ob.tolvol.snapshot_kind != "SELF":
         return None
-    least, most = (1 - _MAP_ROUNDING) * factors.min(), (1 + _MAP_ROUNDING) * factors.max()
-    if not 0 < most <= (1 + _RIGID) * least:
+    factors = _factors(before[:3, :3], now[:3, :3])
+    if factors is None:
         return None
-    # The coordinates of the mesh exceed those of the reference at most by the distance that was measured.
+    least, most = factors
+    # The coordinates of the mesh exceed those of the reference at most by the distance that was measured. The numbers of whose
+    # sum they consist may exceed them by the condition number.
     was_off, is_off = (
-        _WORLD_ROUNDING * (snapshots.farthest(ob, matrix) + factor * measurement.forward)
+        _WORLD_ROUNDING * (snapshots.farthest(ob, matrix) + _condition(matrix[:3, :3]) * factor * measurement.forward)
         for matrix, factor in ((before, 1), (now, most))
     )
+    if not np.isfinite((was_off, is_off)).all():
+        return None
 
     def carried(lower, upper):
         return Interval(max(least * (lower - was_off) - is_off, 0.0), most * (upper + was_off) + is_off)
@@ -220,9 +223,47 @@ def _scaled(ob, measurement):
     tolerance = tolerances.tolerance_length(ob.tolvol, size)
     if forward.undecided(tolerance) or backward.undecided(tolerance):
         return None
-    place = tuple(now.ravel())
-    ends = forward.lower, forward.upper, backward.lower, backward.upper
-    return Measurement(measurement.fingerprint, place, tolerance, size, *ends, time=measurement.time)
+    found = Measurement(
+        measurement.fingerprint,
+        tuple(now.ravel()),
+        tolerance,
+        size,
+        forward.lower,
+        forward.upper,
+        backward.lower,
+        backward.upper,
+        time=measurement.time,
+    )
+    if not same_shape(before, now):
+        return found
+    return replace(
+        found,
+        tolerance=measurement.tolerance,
+        share_outside=measurement.share_outside,
+        statistics=measurement.statistics,
+    )
+
+
+def _condition(linear):
+    try:
+        return float(np.linalg.cond(linear))
+    except np.linalg.LinAlgError:  # The file is damaged.
+        return np.inf
+
+
+def _factors(before, now):
+    """Returns the least and the largest factor of lengths from one place to another, by the linear parts of the maps from there
+    to the world, or None if they are not known well enough, or differ by more than _ONE_FACTOR."""
+    if np.array_equal(before, now):
+        return 1.0, 1.0
+    try:
+        if not _condition(before) < _WELL_CONDITIONED:
+            return None
+        factors = np.linalg.svd(now @ np.linalg.inv(before), compute_uv=False)
+    except np.linalg.LinAlgError:  # The file is damaged.
+        return None
+    least, most = (1 - _MAP_ROUNDING) * factors.min(), (1 + _MAP_ROUNDING) * factors.max()
+    return (least, most) if 0 < most <= (1 + _ONE_FACTOR) * least else None
 
 
 def same_shape(matrix, other):

@@ -77,7 +77,7 @@ def test_a_place_so_far_away_that_coordinates_are_rounded_is_not_checked():
     assert verdict.word(ob) == NOT_CHECKED
 
 
-@pytest.mark.parametrize("factors", ((2, 2, 2.001), (2, 1, 1), (1, 1, 1 + 1e-5)))
+@pytest.mark.parametrize("factors", ((2, 2, 2.001), (2, 1, 1), (1, 1, 1.0003)))
 def test_other_scales_are_not_checked(factors):
     ob = decimated()
     scaled(ob, *factors)
@@ -100,3 +100,39 @@ def test_a_changed_mesh_is_not_checked():
     ob.data.update()
     scaled(ob, 2, 2, 2)
     assert read_mesh(ob.data).fingerprint() != before and verdict.word(ob) == NOT_CHECKED
+
+
+def test_a_turned_object_is_not_proved_without_the_margin_of_its_rounding():
+    ob = decimated()
+    tolerances.set_length(ob.tolvol, verdict.of(ob).largest)
+    assert verdict.word(ob) == PASS
+    ob.rotation_euler.z += 1
+    bpy.context.view_layer.update()
+    assert verdict.word(ob) == NOT_CHECKED
+
+
+def test_an_object_that_was_measured_far_away_is_not_proved_nearer():
+    ob = torus(matrix=Matrix.Translation((5e9, 0, 0)))
+    assert bpy.ops.tolvol.set_reference() == {"FINISHED"}
+    tolerances.set_length(ob.tolvol, 1e-6)
+    assert bpy.ops.tolvol.check() == {"FINISHED"} and verdict.word(ob) == PASS
+    ob.data.vertices[0].co.z += 2e-7  # which the rounding of the world hides
+    ob.data.update()
+    assert bpy.ops.tolvol.check() == {"FINISHED"}
+    ob.location = (0, 0, 0)
+    bpy.context.view_layer.update()
+    assert verdict.word(ob) == NOT_CHECKED
+
+
+def test_a_sheared_object_whose_short_axis_grows_is_not_checked():
+    parent = bpy.data.objects.new("parent", None)
+    bpy.context.scene.collection.objects.link(parent)
+    parent.scale = (100, 1, 1)
+    ob = decimated()
+    ob.parent = parent
+    ob.rotation_euler = (0, 0, 0.8)
+    bpy.context.view_layer.update()
+    assert bpy.ops.tolvol.check() == {"FINISHED"} and verdict.word(ob) != NOT_CHECKED
+    parent.scale.y = 1.001
+    bpy.context.view_layer.update()
+    assert verdict.word(ob) == NOT_CHECKED
