@@ -198,7 +198,7 @@ class Run:
     def take_edited(self):
         """Returns whether Blender has reported a change of a mesh of the run since the last call."""
         bpy.context.view_layer.update()  # Blender may not have reported the last change yet.
-        edited, self._edited = self._edited or interruptions.take_edited(), False
+        edited, self._edited = interruptions.take_edited() or self._edited, False
         return edited
 
     def _look(self):

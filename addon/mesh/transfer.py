@@ -54,10 +54,10 @@ class Writing:
         self._carry = Carry(mesh, source, result)
         yield
         built.from_mesh(mesh)
-        yield
         loose = _loose(mesh, built)
         if isinstance(source, FilledArrays):
             add_faces(built, mesh, source)
+        yield
         if not _only_triangles(source):
             _triangulate(built, source)
         yield

@@ -118,7 +118,7 @@ ways, and apply the modifier to the base mesh. An object without a reference get
             if self._counts(evaluation, trial, len(arrays.triangles)):
                 self._found.append((len(arrays.triangles), value))
                 fewest = min(self._found)[0]
-                than = f", before {triangles:,}" if fewest > triangles else ""
+                than = f", {triangles:,} before the fit" if fewest > triangles else ""
                 self.count = f"{fewest:,} triangles so far{than}"
         return sorted(self._found)
 

@@ -68,8 +68,9 @@ constexpr std::size_t kSpread = 1'000'003;
 // pieces see the same lower bound, and a thread takes kSmallBlock of them at once.
 constexpr std::size_t kChunk = 16384, kBlock = 64, kBatch = 512, kSmallBlock = 8;
 // The budget, in pieces. An edge of b that crosses a triangle of a costs a few pieces, so that a subdivided copy needs
-// about ten for each of its triangles. A piece costs 1 us and, while it waits, 100 bytes.
-constexpr std::size_t kPieces = 1'000'000, kPiecesPerTriangle = 16;
+// about ten for each of its triangles. A piece costs 1 us and, while it waits, 100 bytes. As long as the bound is not
+// decided about, the budget is kPiecesToDecide.
+constexpr std::size_t kPieces = 1'000'000, kPiecesToDecide = 4'000'000, kPiecesPerTriangle = 16;
 // After this many pieces the search accepts a wider interval: by kGap of the bound, or of the length below if that is
 // less, for as many pieces again. Nearly all searches end before, those between a surface and its subdivided copy among
 // them. Needles that lie on one another would need a million pieces to show that nothing but rounding is between them.
@@ -151,10 +152,13 @@ class Search {
         patience_(kPatience + kPatiencePerTriangle * (a.triangles.size() + b.triangles.size())) {}
 
   void run() {
-    const std::size_t budget = kPieces + kPiecesPerTriangle * (a_.triangles.size() + b_.triangles.size());
+    const std::size_t more = kPiecesPerTriangle * (a_.triangles.size() + b_.triangles.size());
     seed();
     first_pass();
-    while (!queue_.empty() && queue_.front().upper > cutoff() && lower_ <= bound_ && pieces_ < budget) refine();
+    while (!queue_.empty() && queue_.front().upper > cutoff() && lower_ <= bound_) {
+      if (pieces_ >= more + (upper() <= bound_ ? kPieces : kPiecesToDecide)) break;
+      refine();
+    }
   }
 
   double lower() const { return lower_; }

@@ -38,8 +38,9 @@ struct HausdorffInterval {
 /// distance is measured: the interval is then no narrower than about 1e-15 of the size of a. A long search,
 /// as between needles that lie on one another, accepts a wider interval, which is still true: with every 20,000 pieces
 /// and 12 for each triangle the width may grow by 0.1 % of the bound, or of a thousandth of the size if that is less.
-/// The search stops after a million pieces and 16 for each triangle, and as soon as lower > bound. At a corner that
-/// thousands of triangles share, a piece may count for several, so that the search ends earlier.
+/// The search stops after a million pieces and 16 for each triangle, or four million if lower <= bound < upper until
+/// then, and as soon as lower > bound. At a corner that thousands of triangles share, a piece may count for several, so
+/// that the search ends earlier.
 ///
 /// Throws InvalidInput if a mesh is not valid (measure/placed_pair.h) or the bound is negative or not a number, and
 /// Cancelled. The bounds share no code with the check of operations (check/), which they judge. They share with it the

@@ -89,8 +89,8 @@ DirectedHausdorffResult
     Its `upper` - `lower` is at most 0.1 % of `upper`, unless the distance is rounding itself or the search takes very
     many pieces, as it does between needles that lie on one another. With every 20,000 pieces and 12 for each triangle
     the width may then grow by 0.1 % of the bound, or of a thousandth of the size if that is less, until the search stops
-    after a million pieces and 16 for each triangle. At a corner that thousands of triangles share, a piece may count for
-    several. The interval is true in every case.
+    after a million pieces and 16 for each triangle, or four million as long as it has not decided about the bound. At a
+    corner that thousands of triangles share, a piece may count for several. The interval is true in every case.
 
     Rounding is about 1e-15 of the size of both meshes together. Far corners of mesh b do not add to this size, unless
     they are those of a triangle whose corners are all far away and whose plane passes near mesh a, or of a triangle that

@@ -250,7 +250,7 @@ def test_a_fit_that_leaves_more_triangles_says_so_while_it_searches_and_afterwar
     monkeypatch.setattr(Run, "_next_work", lambda self: (each(self), told.append(self.operator.count))[0])
     assert bpy.ops.tolvol.fit_modifier() == {"FINISHED"}
     left = len(world_triangles(ob)[1])
-    assert left > 100 and f"{left:,} triangles so far, before 12" in told
+    assert left > 100 and f"{left:,} triangles so far, 12 before the fit" in told
     more = f"Boxes leaves {left:,} triangles, more than the 12 that there were: undo it unless its new faces are wanted"
     fewer = f"The button Decimate leaves fewer triangles within this tolerance: 12, and the modifier Boxes {left:,}"
     assert kept_warnings.of(ob)[0] == [more, fewer]

@@ -15,6 +15,12 @@ THOROUGH_SECONDS = 60  # the same for thorough, which may take half a minute for
 CANCEL_SECONDS = 0.5  # time limit after a cancel; 0.2 s are promised on a machine without other work
 
 
+def limit(call, options):
+    """Returns the time limit of a call, by its name, in a case with these options."""
+    decimates_thoroughly = call == "decimate" and options.get("effort") == "thorough"
+    return THOROUGH_SECONDS if call == "thorough" or decimates_thoroughly else SECONDS
+
+
 class Refused(Exception):
     """The module refused the case, as its documentation says."""
 
@@ -41,12 +47,8 @@ class Run:
             raise Finding(f"exception: {name}", f"{type(error).__name__}: {error}") from error
         finally:
             seconds = min(time.perf_counter() - clock, (time.process_time() - processor) / threads)
-            if self.limited and seconds > self._limit(name):
+            if self.limited and seconds > limit(name, self.case.options):
                 raise Finding(f"slow: {name}", f"{seconds:.1f} s")
-
-    def _limit(self, name):
-        decimates_thoroughly = name == "decimate" and self.case.options.get("effort") == "thorough"
-        return THOROUGH_SECONDS if name == "thorough" or decimates_thoroughly else SECONDS
 
     def repeated(self, name, call, fields, same=True):
         """Calls call(threads, progress) on several numbers of threads, and cancels one call in between.

@@ -49,7 +49,7 @@ def test_escape_keeps_more_triangles_than_before_and_says_so():
     ob.tolvol.tolerance_percent = 1
     reference = scenes.world_triangles(ob)
     fit(ob, "REMESH")
-    yield from finished(lambda: said and ", before 12    Esc: Keep Present Result" in said[-1], pause=0.02)
+    yield from finished(lambda: said and ", 12 before the fit    Esc: Keep Present Result" in said[-1], pause=0.02)
     key("Escape")
     yield from finished(lambda: not ob.modifiers)
     left = len(scenes.world_triangles(ob)[1])
