@@ -70,6 +70,11 @@ class Writing:
         self.layout = _compare(_scratch_arrays(built), source, result)
         yield
 
+    def prepare_at_once(self):
+        """The same without a pause."""
+        for _ in self.prepare():
+            pass
+
     def made_anew(self, mesh):
         """Takes the mesh that Blender has made in place of the present one, with the same content, when it undid a step."""
         self._mesh = mesh

@@ -158,8 +158,7 @@ object. An object without a reference gets one first, as by Set Reference"""
             stack.close()
             writes = self._writes(stack, outcomes)
             for write in writes:
-                for _ in write.prepare():
-                    pass
+                write.prepare_at_once()
         return writes
 
     def _writes(self, stack, outcomes):

@@ -137,8 +137,7 @@ Decimate, and proved both ways. Its custom property geometricError is its deviat
             for arrays, _, result, _ in outcomes:
                 meshes.append(source.copy())
                 with transfer.Writing(meshes[-1], arrays, result) as writing:
-                    for _ in writing.prepare():
-                        pass
+                    writing.prepare_at_once()
                     writing.write()
                 layouts.append(writing.layout)
             if ob.tolvol.snapshot is None:

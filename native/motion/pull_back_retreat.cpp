@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Step (4) of pull_back.cpp: while the reference would lose faces as witnesses, or faces would cross that did not at
-// the start, the vertices of these faces go back, by a small share of the way first. What goes back may uncover a part
-// of the reference that it covered, leave the volume as its neighbours go on, or meet another face, so that all is
-// asked again until all of it holds. In the state itself all of it does, so that this comes to an end.
+// the start, the vertices of these faces go back, by a small share of the way first, and by a large one in a tangle.
+// What goes back may uncover a part of the reference that it covered, leave the volume as its neighbours go on, or meet
+// another face, so that all is asked again until all of it holds. In the state itself all of it does, so that this
+// comes to an end.
 #include <algorithm>
 #include <numeric>
 #include <stdexcept>
