@@ -83,9 +83,9 @@ def decimate_settings(options=frozenset()):
                 (
                     "THOROUGH",
                     "Thorough",
-                    "After the pass of Fast, move the vertices around each further collapse together. This leaves a "
+                    "After the pass of Fast, move vertices around each further collapse together. This leaves a "
                     "third fewer triangles in 6 to 35 times the processor time, at a tolerance of 0.1 % in 20 to 45 "
-                    "times. A mesh of some hundred triangles may take half a minute",
+                    "times. Some hundred triangles may take half a minute",
                 ),
             ),
             options=set(options),
