@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from fuzzing import ROOT, draw, judges  # noqa: E402
 from fuzzing.case import Case  # noqa: E402
-from fuzzing.run import limit  # noqa: E402
+from fuzzing.run import SECONDS  # noqa: E402
 from fuzzing.shrink import Shrink  # noqa: E402
 from fuzzing.watchdog import Watchdog  # noqa: E402
 
@@ -49,7 +49,7 @@ def report(watchdog, case, name, found, options):
 
         def still(smaller):
             # A reduced case that hangs shows the same finding as one that is slow.
-            again = watchdog.run(smaller, limit(what.partition(": ")[2], case.options))[1]
+            again = watchdog.run(smaller, SECONDS)[1]
             return again.replace("hang: ", "slow: ") == what.replace("hang: ", "slow: ")
 
         case = Shrink(case, still, options.shrink).case

@@ -11,14 +11,7 @@ import tolvol
 from .case import Finding
 
 SECONDS = 10  # time limit of a call on a mesh for which calls are short
-THOROUGH_SECONDS = 60  # the same for thorough, which may take half a minute for some hundred triangles
 CANCEL_SECONDS = 0.5  # time limit after a cancel; 0.2 s are promised on a machine without other work
-
-
-def limit(call, options):
-    """Returns the time limit of a call, by its name, in a case with these options."""
-    decimates_thoroughly = call == "decimate" and options.get("effort") == "thorough"
-    return THOROUGH_SECONDS if call == "thorough" or decimates_thoroughly else SECONDS
 
 
 class Refused(Exception):
@@ -47,7 +40,7 @@ class Run:
             raise Finding(f"exception: {name}", f"{type(error).__name__}: {error}") from error
         finally:
             seconds = min(time.perf_counter() - clock, (time.process_time() - processor) / threads)
-            if self.limited and seconds > limit(name, self.case.options):
+            if self.limited and seconds > SECONDS:
                 raise Finding(f"slow: {name}", f"{seconds:.1f} s")
 
     def repeated(self, name, call, fields, same=True):

@@ -15,7 +15,7 @@ from .run import Refused, Run
 
 # Time limits for an answer of the child, of the processor and by the clock. A deadlock takes no time of the processor, and
 # other programs may slow the clock, so both are needed. A case that is only slow ends, and run.py finds it.
-HANG_SECONDS = 160
+HANG_SECONDS = 40
 DEADLOCK_SECONDS = 400
 MEMORY = 8 << 30
 
