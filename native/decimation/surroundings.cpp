@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "decimation/surroundings.h"
 
-#include <algorithm>
 #include <limits>
 #include <numeric>
 
@@ -66,21 +65,6 @@ void Surroundings::gather(const Change& change, Trial& trial) const {
 bool Surroundings::allow(const Change& change, Trial& trial) const {
   gather(change, trial);
   return allow(trial);
-}
-
-std::vector<std::uint32_t> Surroundings::faces_near(const Trial& trial) const {
-  Box all;
-  std::vector<std::uint32_t> found, replaced;
-  for (const NewCrossings::Face& face : trial.faces) all.add(box_of(face.corners)), replaced.push_back(face.id);
-  for (const NewCrossings::Removed& r : trial.removed) replaced.push_back(r.id);
-  std::ranges::sort(replaced);
-  near_.for_each_near(all, trial.faces, [&](std::uint32_t face) {
-    if (!std::ranges::binary_search(replaced, face)) found.push_back(face);
-    return true;
-  });
-  std::ranges::sort(found);
-  found.erase(std::unique(found.begin(), found.end()), found.end());
-  return found;
 }
 
 Box Surroundings::follow(const Change& change, Trial& trial) {

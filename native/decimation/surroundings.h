@@ -45,7 +45,9 @@ class Surroundings {
   bool allow(Trial& trial) const { return crossings_.none(near_, trial.faces, trial.removed, trial.crossings); }
   /// The faces, in rising order, that the change may cross which the trial was asked about last, and that stay as they
   /// are.
-  std::vector<std::uint32_t> faces_near(const Trial& trial) const;
+  std::vector<std::uint32_t> faces_near(const Trial& trial) const {
+    return crossings_.others_near(near_, trial.faces, trial.crossings);
+  }
   /// Whether none of some faces that were changed on trust, as they are now, crosses others anew or is degenerate.
   bool allow(std::span<const std::uint32_t> changed) const { return crossings_.none(near_, changed); }
   /// Follows a change, which `trial` was asked about last, before it is carried out on the mesh. Returns a box around

@@ -5,8 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <numeric>
-#include <optional>
-#include <utility>
 
 #include "base/call.h"
 #include "base/errors.h"
@@ -154,35 +152,26 @@ double DisplayTree::distance(const glm::dvec3& place, double reach, std::size_t&
 
 namespace {
 
-/// How many samples each triangle of a mesh has.
-class SampleCounts {
- public:
-  SampleCounts(std::vector<double> area, double whole) : area_(std::move(area)), whole_(whole) {}
+/// How many samples each triangle has: one, and more by its share of the whole area.
+std::vector<std::size_t> many_samples(std::span<const double> shares) {
+  std::vector<std::size_t> counts;
+  counts.reserve(shares.size());
+  for (const double share : shares) counts.push_back(1 + static_cast<std::size_t>(share * kSamples));
+  return counts;
+}
 
-  /// From now on all triangles together have only about so many samples, each of which stands for an equal area.
-  void limit(double count) {
-    double before = 0, samples = 0;
-    for (double& area : area_) {
-      const double after = before + area / whole_ * count;
-      area = std::floor(after) - std::floor(before);
-      before = after, samples += area;
-    }
-    limit_ = samples;
+/// The same where about `all` samples are spread over the whole area, one on each equal part of it.
+std::vector<std::size_t> few_samples(std::span<const double> shares, double all) {
+  std::vector<std::size_t> counts;
+  counts.reserve(shares.size());
+  double before = 0;
+  for (const double share : shares) {
+    const double after = before + share * all;
+    counts.push_back(static_cast<std::size_t>(std::floor(after) - std::floor(before)));
+    before = after;
   }
-  std::size_t of(std::size_t triangle) const {
-    return limit_ ? static_cast<std::size_t>(area_[triangle])
-                  : 1 + static_cast<std::size_t>(area_[triangle] / whole_ * kSamples);
-  }
-  /// The share of the whole area that each sample of a triangle stands for.
-  double share(std::size_t triangle) const {
-    return limit_ ? 1 / *limit_ : area_[triangle] / (static_cast<double>(of(triangle)) * whole_);
-  }
-
- private:
-  std::vector<double> area_;  // with a limit, the numbers of samples themselves
-  double whole_;
-  std::optional<double> limit_;
-};
+  return counts;
+}
 
 }  // namespace
 
@@ -209,13 +198,15 @@ std::vector<double> area_shares(const DisplayTree& tree, std::span<const glm::dv
     return tree.distance(a + u * ab + v * ac, reach, visited);
   };
 
-  SampleCounts counts(std::move(area), whole);
+  for (double& share : area) share /= whole;
   std::size_t probed = 0, visited = 0;
   for (std::size_t i = 0; i < triangles.size(); i += triangles.size() / kProbes + 1, ++probed) sample(i, i, visited);
-  const double all = static_cast<double>(triangles.size()) + kSamples;
   const double each = static_cast<double>(visited) / static_cast<double>(probed);
   const double most = (kMostVisits + kVisitsPerTriangle * static_cast<double>(triangles.size())) / each;
-  if (most < all) counts.limit(std::max(std::floor(most), kFewestSamples));
+  const bool are_few = most < static_cast<double>(triangles.size()) + kSamples;
+  const std::vector<std::size_t> counts =
+      are_few ? few_samples(area, std::max(std::floor(most), kFewestSamples)) : many_samples(area);
+  const auto of_all = static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::size_t{0}));
 
   // Each block has a sum, and the sums are added in order, so that the result is the same for any number of threads.
   constexpr std::size_t kBlock = 1024;
@@ -224,12 +215,12 @@ std::vector<double> area_shares(const DisplayTree& tree, std::span<const glm::dv
     double* sum = &sums[begin / kBlock * bins];
     std::size_t nodes = 0;
     for (std::size_t i = begin; i < end; ++i) {
-      const std::size_t count = counts.of(i);
-      for (std::size_t k = i; k < i + count; ++k) {
+      const double share = are_few ? 1 / of_all : area[i] / static_cast<double>(counts[i]);
+      for (std::size_t k = i; k < i + counts[i]; ++k) {
         if (k % 64 == 0) poll();
         const double d = sample(i, k, nodes);
         const double shown = std::copysign(std::max(std::abs(d) - DisplayTree::kRounding, 0.0), d);
-        sum[std::upper_bound(edges.begin(), edges.end(), shown) - edges.begin()] += counts.share(i);
+        sum[std::upper_bound(edges.begin(), edges.end(), shown) - edges.begin()] += share;
       }
     }
   });

@@ -146,6 +146,20 @@ bool NewCrossings::none(const NearFaces& near, std::span<const Face> faces, std:
   return trial.met_last_ == kNone || share_out(near, faces, removed, trial);
 }
 
+std::vector<std::uint32_t> NewCrossings::others_near(const NearFaces& near, std::span<const Face> faces,
+                                                     const Trial& trial) const {
+  Box all;
+  for (const Box& box : trial.boxes_) all.add(box);
+  std::vector<std::uint32_t> found;
+  near.for_each_near(all, faces, [&](std::uint32_t face) {
+    if (!std::ranges::binary_search(trial.replaced_, face)) found.push_back(face);
+    return true;
+  });
+  std::ranges::sort(found);
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  return found;
+}
+
 /// Whether the input faces that the changed and the removed faces stand for can be shared out among the changed faces
 /// so that every crossing is inherited, after one was found with `trial.met_last_` that is not. Notes in `trial` what
 /// has to be given then.
@@ -185,19 +199,8 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
     }
     return true;  // they are inherited, so that this is not reached
   });
-  Box all;
-  for (const Box& box : trial.boxes_) all.add(box);
-  // The order of a search depends on which corners counted as hubs when the tree was built, and what is found here must
-  // not depend on that.
-  std::vector<std::uint32_t> others;
-  near.for_each_near(all, faces, [&](std::uint32_t other) {
-    if (!std::ranges::binary_search(trial.replaced_, other)) others.push_back(other);
-    return true;
-  });
-  std::ranges::sort(others);
-  others.erase(std::unique(others.begin(), others.end()), others.end());
   std::size_t pairs = 0;
-  for (const std::uint32_t other : others) {
+  for (const std::uint32_t other : others_near(near, faces, trial)) {
     const Corners t = corners(other);
     std::vector<std::uint32_t> crossing;
     ring.for_each_near(t, [&](std::uint32_t i) {

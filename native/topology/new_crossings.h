@@ -70,6 +70,11 @@ class NewCrossings {
   /// vertex lie about it like a fan.
   bool none(const NearFaces& near, std::span<const Face> faces, std::span<const Removed> removed, Trial& trial) const;
 
+  /// The faces that those of a change may cross, which none() was asked about last with this trial, and that stay as
+  /// they are. They are in rising order: that of a search depends on which corners counted as hubs when the tree was
+  /// built, and no result may depend on that.
+  std::vector<std::uint32_t> others_near(const NearFaces& near, std::span<const Face> faces, const Trial& trial) const;
+
   /// The same of changes that were carried out on trust: whether none of the `changed` faces, as they are now, is
   /// degenerate or crosses any face anew. `near` has to have every face that meets them, as it is now. Several threads
   /// may ask at once. About 3 us a face.
