@@ -63,11 +63,12 @@ class Writing:
         yield
         self._carry.blend_groups(built)
         verts = built.verts[:]
-        faces, present = _keep_faces(built, verts, source, result)
+        targets = _weld_targets(result)
+        faces, present = _keep_faces(built, verts, source, result.triangle_source, targets)
         yield
         _turn(built, verts, faces, result)
-        _weld(built, verts, present, _weld_targets(result), loose)
-        self.layout = _compare(_scratch_arrays(built), source, result)
+        _weld(built, verts, present, targets, loose)
+        self.layout = _compare(_scratch_arrays(built), source, result, targets)
         yield
 
     def prepare_at_once(self):
@@ -138,10 +139,10 @@ def _only_triangles(source):
     return source.polygons[-1] + 1 == len(source.polygons)
 
 
-def _keep_faces(built, verts, source, result):
-    """Deletes all faces except those that are triangles of the result, and vertices that only deleted faces use.
+def _keep_faces(built, verts, source, kept, targets):
+    """Deletes all faces except the triangles `kept` of the source, and vertices that only deleted faces use.
 
-    Returns the face of each triangle of the result, and (n,) bool: the vertices of the source that are there still.
+    Returns the faces of these triangles, and (n,) bool: the vertices of the source that are there still.
     """
     if _only_triangles(source):
         rows = np.arange(len(built.faces))
@@ -153,9 +154,9 @@ def _keep_faces(built, verts, source, result):
                 "its n-gons would be triangulated otherwise than shown. Triangulate them first (Ctrl T in Edit Mode)"
             )
     built.faces.ensure_lookup_table()
-    faces = [built.faces[i] for i in rows[result.triangle_source].tolist()]
-    present = _stays(_weld_targets(result))
-    present[source.triangles[result.triangle_source]] = True
+    faces = [built.faces[i] for i in rows[kept].tolist()]
+    present = _stays(targets)
+    present[source.triangles[kept]] = True
     # To remove a vertex with its faces takes a fraction of the time that it takes to delete these and to merge it.
     for vertex in np.flatnonzero(~present).tolist():
         built.verts.remove(verts[vertex])
@@ -223,10 +224,9 @@ def _scratch_arrays(built):
         bpy.data.meshes.remove(scratch)
 
 
-def _compare(written, source, result):
+def _compare(written, source, result, targets):
     """Returns the Layout of the written arrays. Raises MeshMismatch if they are not the result, triangle by triangle."""
     vertices, triangles = written
-    targets = _weld_targets(result)
     stays = _stays(targets)
     rank = np.cumsum(stays) - 1
     if not np.array_equal(vertices.view(np.uint32), source.vertices[stays].view(np.uint32)):

@@ -40,8 +40,7 @@ class TOLVOL_PT_tolerance(Panel, bpy.types.Panel):
             layout.prop(settings, "reference_object")
         column = layout.column(align=True)
         row, narrow = column.row(align=True), is_narrow(context)
-        # A narrow panel has no room for a name beside a field with a number and its unit. The panel's
-        # title is the name, too.
+        # A narrow panel has no room for a name beside a field with a number and its unit. The name is also the panel's title.
         row.use_property_split = not narrow
         name = "tolerance_percent" if settings.tolerance_mode == "PERCENT" else "tolerance_length"
         row.prop(settings, name, **({"text": ""} if narrow else {}))
