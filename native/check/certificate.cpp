@@ -185,16 +185,17 @@ inline double TriangleCertificate::bound_by_corners(const glm::dvec3 (&corners)[
   return room > 0 && longest2 <= 3 * room * room ? corner + std::sqrt(longest2 * (1.0 / 3)) : kUnproved;
 }
 
-/// Sets `farthest` if the verdict is inside, or else `open`, if it is not null, to the centre of the last part.
+/// Sets `farthest` if the verdict is inside, or else `open`, if it is not null, to the centre of the last part. Adds
+/// the parts that it looked at and the nodes that it visited to `steps`, if it is not null.
 template <TriangleCertificate::Search kSearch>
 Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::uvec3& hints, Facing* facing,
-                                    double& farthest, glm::dvec3* open) const {
+                                    double& farthest, glm::dvec3* open, std::size_t* steps) const {
   constexpr bool kProve = kSearch == Search::verdict;
   thread_local std::vector<Part> queue;
   thread_local NearTriangles around;
   queue.assign(1, {{corners[0], corners[1], corners[2]}});
   const double radius = kProve ? beyond_ : limit_;
-  around.begin(*reference_, *hierarchy_, radius, facing);
+  around.begin(*reference_, *hierarchy_, radius, facing, steps);
   Verdict result = Verdict::inside;
   double farthest2 = 0;  // the largest squared distance of the parts proved so far
   std::uint32_t hint = hints.x;
@@ -205,6 +206,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
     const auto& [a, b, c] = part.corners;
     const glm::dvec3 centre = (a + b + c) * (1.0 / 3);
     if (open) *open = centre;
+    if (steps) ++*steps;
     FourPoints points;
     points.set(a, b, c, centre);
     double centre2 = std::numeric_limits<double>::infinity();  // the best known squared distance of the centre
@@ -308,17 +310,18 @@ double TriangleCertificate::bound(const glm::dvec3 (&corners)[3], const glm::dve
 
 template <TriangleCertificate::Search kSearch>
 double TriangleCertificate::bound_by(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds, const glm::uvec3& hints,
-                                     Facing* facing, glm::dvec3* open) const {
+                                     Facing* facing, glm::dvec3* open, std::size_t* steps) const {
   if (facing) facing->begin();
   double farthest = bound_by_corners(corners, bounds);
   if (farthest != kUnproved && (!facing || facing->take_corners())) return farthest;
-  return search<kSearch>(corners, hints, facing, farthest, open) == Verdict::inside ? farthest : kUnproved;
+  return search<kSearch>(corners, hints, facing, farthest, open, steps) == Verdict::inside ? farthest : kUnproved;
 }
 
 double TriangleCertificate::bound_in_any_order(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
-                                               const glm::uvec3& hints, Facing* facing, glm::dvec3* open) const {
+                                               const glm::uvec3& hints, Facing* facing, glm::dvec3* open,
+                                               std::size_t* steps) const {
   const Ordered ordered(corners, hints);
-  return bound_by<Search::fine>(ordered.corners, bounds, ordered.hints, facing, open);
+  return bound_by<Search::fine>(ordered.corners, bounds, ordered.hints, facing, open, steps);
 }
 
 double TriangleCertificate::bound_with_room(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,

@@ -25,8 +25,8 @@ constexpr double kNothing = std::numeric_limits<double>::infinity();
 }  // namespace
 
 void NearTriangles::begin(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, double radius,
-                          const Facing* facing) {
-  triangles_ = &triangles, hierarchy_ = &hierarchy, facing_ = facing, radius_ = radius;
+                          const Facing* facing, std::size_t* steps) {
+  triangles_ = &triangles, hierarchy_ = &hierarchy, facing_ = facing, steps_ = steps, radius_ = radius;
   searches_ = nodes_ = 0, too_far_ = kNothing;
   pool_.clear();
   lists_.assign(1, {0, 0});
@@ -52,6 +52,7 @@ std::uint32_t NearTriangles::search(const glm::dvec3& centre, double radius, std
   ++searches_;
   const Hierarchy::Nearest found =
       facing_ ? facing_->nearest(*hierarchy_, centre, radius, hint, enough) : hierarchy_->nearest(centre, radius, hint);
+  if (steps_) *steps_ += found.nodes;
   // Where nothing is near, a list costs nothing.
   nodes_ += found.triangle == Hierarchy::kNone ? kNodesOfSearch : found.nodes;
   return found.triangle;

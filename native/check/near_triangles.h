@@ -21,9 +21,10 @@ class NearTriangles {
  public:
   /// Begins with a new piece, whose whole has of = 0. Keeps references. `hierarchy` holds the triangles, which must be
   /// as large as in a frame. `radius` is the largest radius that nearest() will be asked for. If `facing` is not null,
-  /// there are only the triangles that it admits.
+  /// there are only the triangles that it admits. If `steps` is not null, the nodes that searches visit are added to
+  /// it.
   void begin(const std::vector<WitnessTriangle>& triangles, const Hierarchy& hierarchy, double radius,
-             const Facing* facing = nullptr);
+             const Facing* facing = nullptr, std::size_t* steps = nullptr);
 
   /// Returns exactly hierarchy.nearest(centre, radius, hint).triangle, or that of facing->nearest(), for the centre of
   /// a part. Writes part.of, which names the list of triangles near the part, and which its parts inherit. `enough` is
@@ -48,6 +49,7 @@ class NearTriangles {
   const std::vector<WitnessTriangle>* triangles_ = nullptr;
   const Hierarchy* hierarchy_ = nullptr;
   const Facing* facing_ = nullptr;
+  std::size_t* steps_ = nullptr;
   double radius_ = 0;
   std::size_t searches_ = 0, nodes_ = 0;  // nodes_ counts the nodes that the searches have visited
   double too_far_ = 0;                    // is the least reach() for which a list became too long

@@ -17,13 +17,14 @@ namespace {
 constexpr int kMostTries = 32, kMostTriesOfLong = 8;
 /// A loop with more corners than this is long.
 constexpr std::size_t kLong = 200;
-/// So many triangulations of a loop that is not long may be refused as guesses. A guess is found before its triangles
-/// are proved. Where it keeps the rules, which is usual, its n - 2 triangles are all that need a proof; a search that
-/// asks the rules as it goes proves n / 2 times as many. A long loop is often the border of an open surface, most of
-/// whose triangles are refused: to find a guess takes longer there than to ask.
-constexpr int kMostGuesses = 8;
-/// A loop is given up after so many of its triangles were refused, in all searches together.
-constexpr std::size_t kMostRefused = 50000;
+/// So many triangulations of a loop may be refused as guesses. A guess is found before its triangles are proved. Where
+/// it keeps the rules, which is usual, its n - 2 triangles are all that need a proof; a search that asks the rules as
+/// it goes proves n / 2 times as many. A long loop is often the border of an open surface, most of whose triangles are
+/// refused: to find a guess takes longer there than to ask.
+constexpr int kMostGuesses = 8, kMostGuessesOfLong = 1;
+/// A loop is given up after so many of its triangles were refused, or so many steps of searches for proofs, in all
+/// searches together. A proof of one triangle among needles may take tens of thousands of steps.
+constexpr std::size_t kMostRefused = 50'000, kMostSteps = 100'000'000;
 /// Where the triangles of a loop cross more faces than so many, each further triangle is compared with all faces near
 /// it instead of with these.
 constexpr std::size_t kMostObstacles = 64;
@@ -34,7 +35,7 @@ LoopOutcome Filling::run() {
   TriangulationRules rules{[this](std::uint32_t i, std::uint32_t j) { return admits_edge(i, j); },
                            [this](const glm::uvec3& face) { return admits(face); }};
   const int most_tries = is_long() ? kMostTriesOfLong : kMostTries;
-  int guesses_left = is_long() ? 0 : kMostGuesses;
+  int guesses_left = is_long() ? (has_ears() ? kMostGuessesOfLong : 0) : kMostGuesses;
   for (int tries = 0;;) {
     is_guessing_ = guesses_left > 0;
     refused_.fill(0);
@@ -61,6 +62,19 @@ LoopOutcome Filling::run() {
   return reason();
 }
 
+/// Whether two triangles that have two sides at the rim keep the rules. Each triangulation has at least two of them.
+bool Filling::has_ears() {
+  const auto n = static_cast<std::uint32_t>(hole_.at.size());
+  int ears = 0;
+  for (std::uint32_t tip = 0; tip < n && ears < 2; ++tip) {
+    poll();
+    std::array<std::uint32_t, 3> corners{(tip + n - 1) % n, tip, (tip + 1) % n};
+    std::ranges::sort(corners);
+    ears += !refusal_by_rules({corners[0], corners[1], corners[2]});
+  }
+  return ears == 2;
+}
+
 LoopOutcome Filling::give_up() {
   hole_.faces.clear();
   return LoopOutcome::given_up;
@@ -81,7 +95,7 @@ bool Filling::refuse(LoopOutcome reason) {
   return false;
 }
 
-bool Filling::gives_up() const { return refused_triangles_ >= kMostRefused; }
+bool Filling::gives_up() const { return refused_triangles_ >= kMostRefused || steps_ >= kMostSteps; }
 
 bool Filling::admits_edge(std::uint32_t i, std::uint32_t j) {
   if (gives_up()) return false;
@@ -89,7 +103,7 @@ bool Filling::admits_edge(std::uint32_t i, std::uint32_t j) {
     return refuse(LoopOutcome::non_manifold);
   }
   const std::optional<LoopOutcome> refusal =
-      answer(of_edges_, number(i, j), [&] { return rules_.refusal_of_edge(hole_, i, j); });
+      answer(of_edges_, number(i, j), !is_long(), [&] { return rules_.refusal_of_edge(hole_, i, j); });
   return !refusal || refuse(*refusal);
 }
 
@@ -113,14 +127,15 @@ std::optional<LoopOutcome> Filling::refusal_of(const glm::uvec3& face) {
 }
 
 std::optional<LoopOutcome> Filling::refusal_by_rules(const glm::uvec3& face) {
-  return answer(of_faces_, number(face), [&] { return rules_.refusal_of_face(hole_, face); });
+  return answer(of_faces_, number(face), !is_long() || is_guessing_,
+                [&] { return rules_.refusal_of_face(hole_, face, steps_); });
 }
 
-/// Returns ask(), or what it has returned before for this number. Of a long loop the answers would take too much
-/// memory.
+/// Returns ask(), or what it has returned before for this number, if it may be kept. All answers of a long loop would
+/// take too much memory; those about its guesses are few.
 template <class Ask>
-std::optional<LoopOutcome> Filling::answer(Answers& answers, std::uint64_t number, Ask&& ask) {
-  if (is_long()) return ask();
+std::optional<LoopOutcome> Filling::answer(Answers& answers, std::uint64_t number, bool keep, Ask&& ask) {
+  if (!keep) return ask();
   const auto known = answers.find(number);
   return known != answers.end() ? known->second : answers.emplace(number, ask()).first->second;
 }

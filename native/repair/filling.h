@@ -42,6 +42,7 @@ class Filling {
   /// Whether the hole has one triangulation only.
   bool is_triangle() const { return hole_.at.size() == 3; }
   bool is_long() const;
+  bool has_ears();
   LoopOutcome reason() const;
   LoopOutcome give_up();
   bool refuse(LoopOutcome reason);
@@ -51,7 +52,7 @@ class Filling {
   std::optional<LoopOutcome> refusal_of(const glm::uvec3& face);
   std::optional<LoopOutcome> refusal_by_rules(const glm::uvec3& face);
   template <class Ask>
-  std::optional<LoopOutcome> answer(Answers& answers, std::uint64_t number, Ask&& ask);
+  std::optional<LoopOutcome> answer(Answers& answers, std::uint64_t number, bool keep, Ask&& ask);
   bool prove_guess();
   template <class Visit>
   void for_each_near(const Corners& stored, Visit&& visit) const;
@@ -62,10 +63,10 @@ class Filling {
   const FillingRules& rules_;
   Hole& hole_;
   const EarlierFillings* earlier_;
-  std::size_t refused_triangles_ = 0;
-  std::vector<Obstacle> obstacles_;  ///< faces that an earlier try crossed
-  bool is_guessing_ = true;          ///< whether the present search leaves the rules of triangles for later
-  Answers of_faces_, of_edges_;      ///< what refuses the triangles and edges that the rules were asked about
+  std::size_t refused_triangles_ = 0, steps_ = 0;  ///< in all searches
+  std::vector<Obstacle> obstacles_;                ///< faces that an earlier try crossed
+  bool is_guessing_ = true;      ///< whether the present search leaves the rules of triangles for later
+  Answers of_faces_, of_edges_;  ///< what refuses the triangles and edges that the rules were asked about
   std::set<std::array<std::uint32_t, 3>> left_out_;
   std::set<std::array<std::uint32_t, 2>> left_out_edges_;
   std::array<std::size_t, kLoopOutcomeNames.size()> refused_{};  ///< for each outcome, in the present search

@@ -92,7 +92,8 @@ std::optional<LoopOutcome> FillingRules::refusal_of_edge(const Hole& hole, std::
   return std::nullopt;
 }
 
-std::optional<LoopOutcome> FillingRules::refusal_of_face(const Hole& hole, const glm::uvec3& face) const {
+std::optional<LoopOutcome> FillingRules::refusal_of_face(const Hole& hole, const glm::uvec3& face,
+                                                         std::size_t& steps) const {
   if (is_degenerate(corners_of(hole, face))) return LoopOutcome::degenerate;
   const glm::dvec3 placed[3] = {hole.at[face.z], hole.at[face.y], hole.at[face.x]};
   std::optional<Facing> facing;
@@ -115,7 +116,7 @@ std::optional<LoopOutcome> FillingRules::refusal_of_face(const Hole& hole, const
   const glm::uvec3 no_hints(Hierarchy::kNone);
   if (rule) rule->set_corners({a.triangle, b.triangle, c.triangle});
   glm::dvec3 open;
-  if (certificate.bound_in_any_order(placed, bounds, no_hints, rule, &open) == TriangleCertificate::kUnproved) {
+  if (certificate.bound_in_any_order(placed, bounds, no_hints, rule, &open, &steps) == TriangleCertificate::kUnproved) {
     return reason_at(open);
   }
   return std::nullopt;

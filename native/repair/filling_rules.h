@@ -60,8 +60,9 @@ class FillingRules {
   /// Returns what refuses an edge between two corners of a hole, if something does. A point that is outside refuses all
   /// triangles at the edge.
   std::optional<LoopOutcome> refusal_of_edge(const Hole& hole, std::uint32_t i, std::uint32_t j) const;
-  /// The same for a face between three corners; that it may cross others is not asked here.
-  std::optional<LoopOutcome> refusal_of_face(const Hole& hole, const glm::uvec3& face) const;
+  /// The same for a face between three corners; that it may cross others is not asked here. Adds the steps of the
+  /// search for a proof to `steps`.
+  std::optional<LoopOutcome> refusal_of_face(const Hole& hole, const glm::uvec3& face, std::size_t& steps) const;
 
   /// The corners of a face as they are stored.
   Corners corners_of(const Hole& hole, const glm::uvec3& face) const {

@@ -67,6 +67,24 @@ TEST(CloseHoles, AWideHoleNeedsFewProofs) {
   EXPECT_LT(polls, 18000u);
 }
 
+TEST(CloseHoles, AWideHoleWithALongRimNeedsFewProofs) {
+  // 240 corners, and triangles across the hole that take hundreds of parts each.
+  const unsigned n = 200;
+  const TriangleMesh whole = shapes::grid(n);
+  const TriangleMesh mesh = without(whole, [&](unsigned t) {
+    const unsigned row = t / 2 / n, column = t / 2 % n;
+    return row >= 70 && row < 130 && column >= 70 && column < 130;
+  });
+  const auto volume = volume_of(whole, 0.005);
+  CloseHolesOptions options;
+  options.largest_perimeter = 3;  // between those of the hole, 1.2, and of the border, 4
+  const std::size_t polls = polls_of([&] {
+    const HoleClosingResult result = close_holes(mesh.vertices, mesh.triangles, kSpace, *volume, options);
+    EXPECT_EQ(outcomes(result), (Outcomes{LoopOutcome::perimeter, LoopOutcome::closed}));
+  });
+  EXPECT_LT(polls, 70000u);  // 91,748 without a guess
+}
+
 TEST(CloseHoles, ALoopThatMeandersIsGivenUp) {
   // Many triangles between the corners of a long loop are within the tolerance and most of them are refused.
   shapes::Random random(6);
