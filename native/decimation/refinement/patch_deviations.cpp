@@ -56,7 +56,7 @@ glm::dvec3 weights_of_nearest(const glm::dvec3& p, const glm::dvec3& a, const gl
 void PatchDeviations::start(Patch& patch) {
   patch_ = &patch;
   points_.clear(), added_points_.clear(), separations_.clear(), terms_.clear();
-  power_ = kPower;
+  power_ = kPower, work_ = 0;
   take_points_of_faces();
 }
 
@@ -235,7 +235,7 @@ PatchDeviations::Term PatchDeviations::into_half_space(const HeldPoint& p) const
 }
 
 /// Finds the terms of all points, as the patch is now. The search for a nearest face begins at that of terms_.
-void PatchDeviations::evaluate(bool look_around, std::vector<Term>& terms) const {
+void PatchDeviations::evaluate(bool look_around, std::vector<Term>& terms) {
   terms.clear();
   for (std::size_t i = 0; i < points_.size(); ++i) {
     terms.push_back(nearest(points_[i].point, terms_[i].face, look_around));
@@ -244,6 +244,7 @@ void PatchDeviations::evaluate(bool look_around, std::vector<Term>& terms) const
     for (const FacePoint& p : *all) terms.push_back(toward_reference(p));
   }
   for (const HeldPoint& p : separations_) terms.push_back(into_half_space(p));
+  work_ += terms.size();
 }
 
 PatchDeviations::State PatchDeviations::sum(const std::vector<Term>& terms) const {

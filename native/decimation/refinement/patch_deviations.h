@@ -50,6 +50,9 @@ class PatchDeviations {
   /// The same as renew() after flips, which change the edges and faces that have points.
   void renew_after_flips();
 
+  /// The number of deviations that were found since start(). They take most of the time of a relaxation.
+  std::size_t work() const { return work_; }
+
   /// The energy is the sum of the weighted deviations to this power, which is even: kPower from the start on.
   static constexpr int kPower = 8;
   int power() const { return power_; }
@@ -139,7 +142,7 @@ class PatchDeviations {
   Term toward_reference(const FacePoint& p) const;
   std::optional<glm::dvec3> nearest_admitted(const FacePoint& p, const glm::dvec3& x) const;
   Term into_half_space(const HeldPoint& p) const;
-  void evaluate(bool look_around, std::vector<Term>& terms) const;
+  void evaluate(bool look_around, std::vector<Term>& terms);
   State sum(const std::vector<Term>& terms) const;
   const FacePoint& face_point(std::size_t i) const {
     if (i < own_points_.size()) return own_points_[i];
@@ -157,6 +160,7 @@ class PatchDeviations {
   std::vector<FacePoint> own_points_, added_points_;  ///< Those of every vertex, edge and face; those that were added.
   std::vector<HeldPoint> separations_;
   std::vector<Term> terms_, tried_;  ///< Of points_, own_points_, added_points_ and separations_, in this order.
+  std::size_t work_ = 0;
   int power_ = kPower;
   State now_;
 };

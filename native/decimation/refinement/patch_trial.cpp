@@ -86,11 +86,14 @@ bool PatchTrial::try_collapse(const Price& price, const Effort& effort) {
   met_another_ = false;
   vanished_ = mesh_.from(price.halfedge);
   reached_ = kAnywhere;
+  work_ = 0;
   for (int start = 0; prepare(price.halfedge, price.position, effort.rings); ++start) {
     const std::uint32_t kept = patch_.find_vertex(*change_.vertex());
     if (start > 0 && !EdgeFlips::flip_near(deviations_, kept, start - 1)) return false;
     const bool again = start > 0;
-    if (relax_and_certify(again ? kWorthGoingOnAgain : kWorthGoingOn, effort.quick || again)) return true;
+    const bool possible = relax_and_certify(again ? kWorthGoingOnAgain : kWorthGoingOn, effort.quick || again);
+    work_ += deviations_.work();
+    if (possible) return true;
     if (start == 0) reached_ = deviations_.state().largest;
     if (!effort.many_starts || reached_ > kNearMiss || start == kMostFlippedFirst) return false;
   }

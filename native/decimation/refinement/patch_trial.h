@@ -57,6 +57,8 @@ class PatchTrial {
   /// The largest deviation, over the tolerance, that the last try came to from its first start; infinite if it had
   /// none.
   double reached() const { return reached_; }
+  /// The number of deviations that the last try found: the same for each number of threads.
+  std::size_t work() const { return work_; }
   /// The patch of the last try.
   const Patch& patch() const { return patch_; }
   /// The vertex that the last try would remove, and the faces.
@@ -96,6 +98,7 @@ class PatchTrial {
   Relaxation relaxation_;
   std::uint32_t vanished_ = 0;
   double reached_ = 0;
+  std::size_t work_ = 0;
   std::vector<VertexPosition> positions_;  ///< For each vertex of the patch.
   std::vector<bool> moved_;                ///< For each vertex of the patch: whether it leaves its place in the mesh.
   std::vector<CertifiedBounds::PointBound> vertex_bounds_;

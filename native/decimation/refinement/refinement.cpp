@@ -29,6 +29,9 @@ constexpr struct {
   std::size_t most_edges;
 } kRounds[] = {
     {2, false, kAnyNumber}, {3, false, kAnyNumber}, {4, false, kAnyNumber}, {2, true, kAnyNumber}, {3, true, kMany}};
+/// All rounds with many starts together may take as much work as the rounds before them, and kStartsWork more: most of
+/// what they remove comes early, and of a small part with straight edges they would try the same edges for minutes.
+constexpr std::size_t kStartsWork = 50'000'000;
 /// An edge is not tried if the deviation with its vertex alone moved is beyond so many tolerances.
 constexpr double kMostLargest = 1.7;
 /// The number of steps that are tried at once, for each thread. More would often be in vain, because one before them
@@ -72,7 +75,9 @@ Refinement::Refinement(BoundedMesh& mesh, NewCrossings* crossings, Team& team)
 
 void Refinement::run(std::size_t target, Progress* progress) {
   if (progress) progress->begin("refining");
+  most_work_ = kAnyNumber;
   for (const auto& [rings, many_starts, most_edges] : kRounds) {
+    if (many_starts && !effort_.many_starts) most_work_ = 2 * work_ + kStartsWork;
     effort_.rings = rings, effort_.many_starts = many_starts;
     std::ranges::fill(tried_, 0);
     const std::size_t at_first = mesh_.triangle_count();
@@ -127,7 +132,7 @@ bool Refinement::round(std::size_t most_edges, std::size_t target, Progress* pro
   ahead_.drop_all();
   Patience patience(steps.size());
   effort_.quick = steps.size() > kMany;
-  for (std::size_t place = 0; place < steps.size() && !patience.is_over(); ++place) {
+  for (std::size_t place = 0; place < steps.size() && !patience.is_over() && work_ < most_work_; ++place) {
     poll();
     if (progress) {
       progress->set_count(mesh_.triangle_count());
@@ -138,6 +143,7 @@ bool Refinement::round(std::size_t most_edges, std::size_t target, Progress* pro
     Attempt& a = tried(steps, place);
     tried_[steps[place]] = ahead_.now();
     reached_[steps[place]] = {ahead_.now(), a.reached};
+    work_ += a.work;
     patience.note(a.possible);
     if (a.possible) carry_out(a);
   }
@@ -171,8 +177,9 @@ void Refinement::attempt(std::uint32_t edge, Attempt& a) const {
   const std::optional<PatchTrial::Price> price =
       touched(edge) > priced_[edge] ? a.trial.price(BoundedMesh::edge(edge)) : prices_[edge];
   a.reached = std::numeric_limits<double>::infinity();
+  a.work = 0;
   a.possible = price && price->largest <= kMostLargest && a.trial.try_collapse(*price, effort_);
-  if (price && price->largest <= kMostLargest) a.reached = a.trial.reached();
+  if (price && price->largest <= kMostLargest) a.reached = a.trial.reached(), a.work = a.trial.work();
   for (const Patch::Vertex& v : a.trial.patch().vertices()) a.read.push_back(v.id);
 }
 

@@ -53,6 +53,7 @@ class Refinement {
     std::vector<std::uint32_t> read;  ///< The vertices around which the try reads.
     bool possible = false;
     double reached = 0;  ///< The largest deviation that the try came to, over the tolerance.
+    std::size_t work = 0;
   };
   struct Reached {
     std::uint64_t at = 0;
@@ -77,6 +78,7 @@ class Refinement {
   TriesAhead ahead_;
   std::vector<Attempt> attempts_;  ///< For each slot of ahead_.
   PatchTrial::Effort effort_{};
+  std::size_t work_ = 0, most_work_ = 0;  ///< Of all tries, by PatchTrial::work(); no try begins beyond most_work_.
   // A step that failed is not tried again until a face around it has changed. The times are those of ahead_.
   std::vector<std::uint64_t> touched_;         ///< For each vertex: when a face around it changed last.
   std::vector<std::uint64_t> tried_, priced_;  ///< For each edge: when it was tried and when its price was found last.
