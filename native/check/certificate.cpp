@@ -17,6 +17,7 @@
 #include "check/part.h"
 #include "check/segment_cover.h"
 #include "geometry/closest_point.h"
+#include "geometry/lengths.h"
 
 namespace tolvol {
 namespace {
@@ -50,8 +51,6 @@ constexpr double kRoomToLeave = 1.0 / 32;
 constexpr double kRoom = 0.7;
 // In the frame, more than ten times the rounding by which a proof may reach a point that is beyond the limit.
 constexpr double kBeyondRounding = 0x1p-40;
-
-double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
 bool comes_first(const glm::dvec3& p, const glm::dvec3& q) {
   if (p.x != q.x) return p.x < q.x;

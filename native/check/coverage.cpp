@@ -16,11 +16,11 @@ namespace tolvol {
 namespace {
 
 // A piece is cut along an edge only if both sides are at least this wide, in tolerances.
-constexpr double kWorthCutting = 0.25;
+constexpr double kNarrowestStrip = 0.25;
 // A piece shorter than this, in tolerances, is not split further.
-constexpr double kFloor = 0.1;
+constexpr double kShortestPiece = 0.1;
 // A change is refused once splitting has added this many pieces.
-constexpr std::size_t kBudget = 1 << 12;
+constexpr std::size_t kBudgetOfChange = 1 << 12;
 // find_witnesses() may look at this many parts more for each element, all calls together, and divides a part down to
 // the headroom below the tolerance, so that it finds witnesses again for a mesh that kept within the headroom. Once a
 // point of a triangle is known to be beyond the tolerance, it goes no deeper than a change does.
@@ -34,7 +34,7 @@ constexpr std::uint32_t kMostUnited = 256;
 // If there are more candidates than this, a piece looks only at the nearest.
 constexpr std::size_t kMany = 64;
 // A try polls after this many parts of pieces, each of which may look at kMany candidates.
-constexpr std::size_t kBetweenPolls = 64;
+constexpr std::size_t kPartsBetweenPolls = 64;
 // In a change of many elements a thread takes this many at a time. A piece takes about 1 us.
 constexpr std::size_t kElementsOfBlock = 16;
 // This bit of split_into_ marks a triangle some of which is out of reach.
@@ -133,7 +133,7 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
         std::sqrt(std::max({glm::dot(c[0] - centre, c[0] - centre), glm::dot(c[1] - centre, c[1] - centre),
                             glm::dot(c[2] - centre, c[2] - centre)}));
     found_beyond = found_beyond || closest.distance > provable;
-    const double floor = (found_beyond ? kFloor : kHeadroom) * limit_;
+    const double floor = (found_beyond ? kShortestPiece : kHeadroom) * limit_;
     const bool finest =
         longest_squared(piece) <= floor * floor || piece.cuts == kMostCuts || !may_look(++looked, found_beyond);
     const bool is_beyond = closest.distance > provable + radius;
@@ -142,7 +142,7 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
       uncovered.nearest.push_back(closest.triangle);
       if (!(split_into_[triangle] & kNeverWhole)) uncovered.triangles.push_back(triangle);
       split_into_[triangle] |= kNeverWhole;
-    } else if (!cut(piece, below, kWorthCutting * limit_, stack)) {
+    } else if (!cut(piece, below, kNarrowestStrip * limit_, stack)) {
       split(piece, stack);
     }
   }
@@ -150,8 +150,8 @@ void Coverage::find_witnesses_of(std::uint32_t triangle, const TriangleMesh& mes
 
 /// Whether find_witnesses() may look at this many parts of a triangle.
 bool Coverage::may_look(std::size_t parts, bool found_beyond) {
-  if (!found_beyond) return parts <= kBudget || take(budget_of_first_);
-  return parts <= kBudgetOfBeyond || (parts <= kBudget && take(budget_of_beyond_));
+  if (!found_beyond) return parts <= kBudgetOfChange || take(budget_of_first_);
+  return parts <= kBudgetOfBeyond || (parts <= kBudgetOfChange && take(budget_of_beyond_));
 }
 
 void Coverage::sample(std::uint32_t element, std::size_t stride, std::vector<Sample>& out) const {
@@ -179,9 +179,9 @@ const Hierarchy& Coverage::Trial::hierarchy() const {
 
 bool Coverage::place(const Part& whole, std::uint32_t first, const Trial& trial, Placing& placing) const {
   placing.stack.assign(1, whole);
-  placing.budget = trial.of_many_ ? kBudget : placing.budget + kBudgetOfPiece;
+  placing.budget = trial.of_many_ ? kBudgetOfChange : placing.budget + kBudgetOfPiece;
   while (!placing.stack.empty()) {
-    if (++placing.looked_at % kBetweenPolls == 0) poll();
+    if (++placing.looked_at % kPartsBetweenPolls == 0) poll();
     const Part piece = placing.stack.back();
     placing.stack.pop_back();
     const auto fail = [&] {
@@ -222,11 +222,12 @@ bool Coverage::place(const Part& whole, std::uint32_t first, const Trial& trial,
       }
     }
     if (covered) continue;
-    if (!(centre2 <= limit2_) || longest_squared(piece) <= kFloor * kFloor * limit2_ || piece.cuts == kMostCuts) {
+    if (!(centre2 <= limit2_) || longest_squared(piece) <= kShortestPiece * kShortestPiece * limit2_ ||
+        piece.cuts == kMostCuts) {
       return fail();
     }
     const WitnessTriangle& nearest = trial.candidates_[below].witness;
-    if (!cut(piece, nearest, kWorthCutting * limit_, placing.stack)) split(piece, placing.stack);
+    if (!cut(piece, nearest, kNarrowestStrip * limit_, placing.stack)) split(piece, placing.stack);
   }
   return true;
 }
@@ -239,7 +240,7 @@ bool Coverage::try_change(std::span<const Element> elements, std::span<const Rem
   trial.placing_.failed.clear();
   trial.placing_.last = 0;
   trial.hierarchy_.reset();
-  trial.placing_.budget = kBudget;
+  trial.placing_.budget = kBudgetOfChange;
   bool settled = true;
   for (const Element& e : elements) {
     poll_at(trial.candidates_.size() + 1);  // Most changes have a few elements and need no poll.

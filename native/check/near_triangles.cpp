@@ -19,7 +19,7 @@ constexpr std::size_t kLongest = 256;
 constexpr std::size_t kMostKept = 1 << 22;
 // If two distances in the frame differ by less than this, the hierarchy decides. This is more than a thousand times the
 // rounding here and in the hierarchy, whose corners may differ from those of the witnesses in the last bits.
-constexpr double kRounding = 0x1p-40;
+constexpr double kAsNear = 0x1p-40;
 constexpr double kNothing = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -41,7 +41,7 @@ std::uint32_t NearTriangles::nearest(Part& part, const glm::dvec3& centre, doubl
   }
   if (best_ == Hierarchy::kNone) return Hierarchy::kNone;
   const double best = std::sqrt(best2_);
-  if (std::abs(best - radius) < kRounding || std::sqrt(second2_) - best < kRounding) {
+  if (std::abs(best - radius) < kAsNear || std::sqrt(second2_) - best < kAsNear) {
     return search(centre, radius, hint, enough);
   }
   return best <= radius ? best_ : Hierarchy::kNone;
@@ -64,7 +64,7 @@ double NearTriangles::reach(const Part& part, const glm::dvec3& centre) const {
   for (const glm::dvec3& corner : part.corners) {
     farthest2 = std::max(farthest2, glm::dot(corner - centre, corner - centre));
   }
-  return radius_ + std::sqrt(farthest2) + kRounding;
+  return radius_ + std::sqrt(farthest2) + kAsNear;
 }
 
 void NearTriangles::look_at(std::uint32_t triangle, const glm::dvec3& centre, double reach2) {

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/lengths.h"
+
 namespace tolvol {
 namespace {
-
-double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
 /// Returns the point at share t of the way from p to q. It starts from the nearer of the two, which errs less.
 glm::dvec3 between(const glm::dvec3& p, const glm::dvec3& q, double t) {

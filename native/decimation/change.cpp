@@ -8,14 +8,13 @@
 #include <limits>
 
 #include "decimation/is_turned.h"
+#include "geometry/lengths.h"
 
 namespace tolvol {
 namespace {
 
 /// The normal of a face may turn by less than the angle of this cosine.
 constexpr double kFoldCosine = 0.2;
-
-double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
 /// Whether the vertices are neighbours. O(faces around the one that has fewer), because both are walked around in turn.
 bool are_neighbours(const OpenMesh::TriConnectivity& mesh, OpenMesh::VertexHandle a, OpenMesh::VertexHandle b) {

@@ -14,8 +14,6 @@
 namespace tolvol {
 namespace {
 
-constexpr std::uint32_t kNone = CutMesh::kNone;
-
 void check(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles, const ToleranceVolume* volume,
            const DecimationOptions& options) {
   validate(vertices, triangles);
@@ -110,14 +108,14 @@ void DecimationInput::hold_outside_cell() {
 template <class Visit>
 void DecimationInput::for_holders(Visit&& visit) const {
   for (std::uint32_t i = 0; i < vertices_.size(); ++i) {
-    if (cut_.input_vertex[i] != kNone) visit(i, cut_.input_vertex[i]);
+    if (cut_.input_vertex[i] != CutMesh::kNone) visit(i, cut_.input_vertex[i]);
   }
   for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
     const std::uint32_t held_by = cut_.stand_in[t];
-    if (held_by == t || held_by == kNone) continue;
+    if (held_by == t || held_by == CutMesh::kNone) continue;
     for (int k = 0; k < 9; ++k) {
       const std::uint32_t dropped = triangles_[t][k / 3], held = triangles_[held_by][k % 3];
-      if (vertices_[dropped] == vertices_[held] && cut_.input_vertex[held] != kNone) {
+      if (vertices_[dropped] == vertices_[held] && cut_.input_vertex[held] != CutMesh::kNone) {
         visit(dropped, cut_.input_vertex[held]);
       }
     }
@@ -133,7 +131,7 @@ void DecimationInput::pin(std::uint32_t vertex, const std::string& cause) {
 void DecimationInput::pin_corners(std::uint32_t triangle, const std::string& cause) {
   for (int k = 0; k < 3; ++k) {
     const std::uint32_t v = cut_.input_vertex[triangles_[triangle][k]];
-    if (v != kNone) pin(v, cause);
+    if (v != CutMesh::kNone) pin(v, cause);
   }
 }
 
@@ -151,7 +149,7 @@ bool DecimationInput::input_begins_as_reference() const {
 /// Whether a triangle that is none of the reference has an open edge.
 bool DecimationInput::added_triangles_are_open() const {
   for (std::uint32_t side = 0; side < cut_.mates.size(); ++side) {
-    if (parent(cut_.triangle_input[side / 3]) >= own_count_ && cut_.mates[side] == kNone) return true;
+    if (parent(cut_.triangle_input[side / 3]) >= own_count_ && cut_.mates[side] == CutMesh::kNone) return true;
   }
   return false;
 }
@@ -172,7 +170,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   const Certificate certificate(*volume_);
   report_.method = certificate.method(), report_.renderer = certificate.renderer();
   if (own_count_ > 0) {
-    element_of_.assign(triangles_.size(), kNone);
+    element_of_.assign(triangles_.size(), CutMesh::kNone);
     for (std::uint32_t t = 0; t < cut_.triangle_input.size(); ++t) element_of_[cut_.triangle_input[t]] = t;
   }
   forward_.emplace(volume_->witnesses(), volume_->grid(), volume_->hierarchy(), limit,
@@ -198,7 +196,7 @@ Bounds* DecimationInput::set_bounds(Team& team) {
   std::vector<std::uint32_t> on_reference;
   if (own_count_ > 0) {
     on_reference = cut_.triangle_input;
-    for (std::uint32_t& t : on_reference) t = is_of_reference(t) ? t : kNone;
+    for (std::uint32_t& t : on_reference) t = is_of_reference(t) ? t : CutMesh::kNone;
   }
   certified_.emplace(directions, MeshView{cut_.triangles, positions_}, on_reference);
   // What is proved to face the reference is within the tolerance, and is not proved again.
@@ -278,7 +276,8 @@ void DecimationInput::cover(double provable) {
     for (std::uint32_t i = 0; i < own_count_; ++i) {
       if (!is_of_reference(i)) continue;
       const std::uint32_t element = element_of_[cut_.stand_in[i]];
-      if (element != kNone) backward_->set_witness(element, i);  // what is set aside never changes and covers itself
+      if (element != CutMesh::kNone)
+        backward_->set_witness(element, i);  // what is set aside never changes and covers itself
     }
     if (joined_) cover_divided(provable);
     return;
@@ -289,7 +288,7 @@ void DecimationInput::cover(double provable) {
   for (const std::uint32_t i : cut_.aside) {
     elements.triangles.emplace_back(cut_.input_vertex[triangles_[i].x], cut_.input_vertex[triangles_[i].y],
                                     cut_.input_vertex[triangles_[i].z]);
-    ids.push_back(kNone);
+    ids.push_back(CutMesh::kNone);
   }
   std::vector<std::uint32_t> all(volume_->reference().triangles.size());
   std::iota(all.begin(), all.end(), 0u);
@@ -326,7 +325,7 @@ void DecimationInput::cover_divided(double provable) {
     if (!joined_->is_piece[i]) continue;
     if (i < own_count_) divided.push_back(i);
     const std::uint32_t element = element_of_[cut_.stand_in[i]];
-    if (element == kNone || parent(i) >= own_count_) continue;
+    if (element == CutMesh::kNone || parent(i) >= own_count_) continue;
     pieces.triangles.push_back(cut_.triangles[element]);
     ids.push_back(element);
   }

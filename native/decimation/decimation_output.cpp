@@ -13,8 +13,6 @@
 namespace tolvol {
 namespace {
 
-constexpr std::uint32_t kNone = CutMesh::kNone;
-
 class Output {
  public:
   Output(const DecimationInput& input, const BoundedMesh& mesh, DecimationResult& result)
@@ -27,27 +25,28 @@ class Output {
   void write() {
     // Result vertices are in the order of the input vertices that they continue.
     std::vector<std::uint32_t> order;
-    std::vector<std::uint32_t> used(input_.positions().size(), kNone);
+    std::vector<std::uint32_t> used(input_.positions().size(), CutMesh::kNone);
     // Copies that were several vertices of the input stay several, unless they have become one with the same vertex.
-    std::vector<std::uint32_t> chosen(input_.positions().size(), kNone);
+    std::vector<std::uint32_t> chosen(input_.positions().size(), CutMesh::kNone);
     const auto slot = [&](std::uint32_t v) {
       const std::uint32_t survivor = mesh_.survivor(v), same = same_.find(survivor), copy = mesh_.slot(survivor);
-      if (chosen[same] == kNone) chosen[same] = same_.find(copy) == same ? copy : survivor;
+      if (chosen[same] == CutMesh::kNone) chosen[same] = same_.find(copy) == same ? copy : survivor;
       return chosen[same];
     };
     // Returns the vertex at corner k of a result triangle, in the corner order of the input triangle that it continues.
     const auto corner = [&](std::uint32_t input, std::uint32_t t, int k) {
-      return slot(t == kNone ? cut_.input_vertex[input_.triangles()[input][k]]
-                             : mesh_.triangle(t)[input_.own_corner(t, k)]);
+      return slot(t == CutMesh::kNone ? cut_.input_vertex[input_.triangles()[input][k]]
+                                      : mesh_.triangle(t)[input_.own_corner(t, k)]);
     };
     const auto use = [&](std::uint32_t s) {
-      if (used[s] == kNone) used[s] = 0, order.push_back(s);
+      if (used[s] == CutMesh::kNone) used[s] = 0, order.push_back(s);
     };
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> kept;  // (of input_.triangles(), of the cut mesh or kNone)
+    std::vector<std::pair<std::uint32_t, std::uint32_t>>
+        kept;  // (of input_.triangles(), of the cut mesh or CutMesh::kNone)
     for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
       if (mesh_.alive(t)) kept.emplace_back(cut_.triangle_input[t], t);
     }
-    for (const std::uint32_t i : cut_.aside) kept.emplace_back(i, kNone);
+    for (const std::uint32_t i : cut_.aside) kept.emplace_back(i, CutMesh::kNone);
     std::ranges::sort(kept, {}, [&](const auto& k) { return std::pair(input_.parent(k.first), k.first); });
     for (const auto& [input, t] : kept) {
       poll_at(order.size());
@@ -71,7 +70,7 @@ class Output {
     }
     result_.vertex_map.assign(input_.vertices().size(), -1);
     for (std::size_t i = 0; i < input_.vertices().size(); ++i) {
-      if (cut_.input_vertex[i] == kNone) continue;
+      if (cut_.input_vertex[i] == CutMesh::kNone) continue;
       result_.vertex_map[i] = static_cast<std::int32_t>(used[slot(cut_.input_vertex[i])]);
     }
   }
@@ -79,11 +78,11 @@ class Output {
   void take_attributes() {
     const glm::dmat3 unit(1);
     const std::vector<std::uint32_t>& islands = input_.islands();
-    std::vector<std::uint32_t> any_corner(input_.positions().size(), kNone);
+    std::vector<std::uint32_t> any_corner(input_.positions().size(), CutMesh::kNone);
     for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
       for (int k = 0; k < 3; ++k) {
         std::uint32_t& corner = any_corner[cut_.triangles[t][k]];
-        if (corner == kNone) corner = 3 * t + static_cast<std::uint32_t>(k);
+        if (corner == CutMesh::kNone) corner = 3 * t + static_cast<std::uint32_t>(k);
       }
     }
     std::optional<Hierarchy> own;
@@ -92,7 +91,7 @@ class Output {
       poll_at(i);
       glm::uvec3 triangle(result_.triangle_source[i]);
       glm::dmat3 weights = unit;
-      for (int k = 0; k < 3 && kept_[i] != kNone; ++k) {
+      for (int k = 0; k < 3 && kept_[i] != CutMesh::kNone; ++k) {
         const std::uint32_t t = kept_[i];
         const int corner = input_.own_corner(t, k);
         const std::uint32_t v = mesh_.triangle(t)[corner];
@@ -110,7 +109,7 @@ class Output {
         const glm::dvec3& p = mesh_.position(v);
         if (const Hierarchy* const reference = input_.own_hierarchy()) {
           const Hierarchy::Nearest nearest = reference->nearest_if(p, [&](std::uint32_t i) {
-            return input_.element_of()[i] != kNone && same_island(input_.element_of()[i]);
+            return input_.element_of()[i] != CutMesh::kNone && same_island(input_.element_of()[i]);
           });
           triangle[k] = nearest.triangle;
           weights[k] = nearest.weights;
@@ -142,7 +141,7 @@ class Output {
     repair(cut_.reversed_count, "misoriented", "faces against their neighbours' orientation, kept so");
     repair(cut_.double_sheet_faces, "double_sheet", "faces that lie exactly on another face, which they may cross");
     std::size_t unused = 0;
-    for (const std::uint32_t v : cut_.input_vertex) unused += v == kNone;
+    for (const std::uint32_t v : cut_.input_vertex) unused += v == CutMesh::kNone;
     repair(unused, "unused", "vertices that no face uses are not part of the result");
     report_normals();
     for (const CutCause cause : cut_.cause) {

@@ -8,6 +8,7 @@
 #include <array>
 
 #include "base/call.h"
+#include "geometry/lengths.h"
 
 namespace tolvol {
 namespace {
@@ -18,12 +19,10 @@ constexpr double kBoundaryWeight = 10;
 constexpr double kReach = 2;
 /// The fit takes at most as many steps as there are numbers here. It gives up in step i if the deviation before the
 /// step is beyond number i, in tolerances, because from there hardly one collapse in fifty succeeds.
-constexpr double kGiveUpAbove[] = {1.4, 1.2, 1.12};
+constexpr double kGiveUpFitAbove[] = {1.4, 1.2, 1.12};
 /// The weight of the fourth power of an edge's length, which has the quadrics' unit. It lets short edges go first where
 /// many collapses cost nothing, as on a plate. Without it one vertex would sweep along a row and leave needles behind.
 constexpr double kLengthWeight = 1e-6;
-
-double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
 double length_cost(const glm::dvec3& a, const glm::dvec3& b) {
   const double length2 = squared_length(b - a);
@@ -145,7 +144,7 @@ EdgeCollapse::Outcome EdgeCollapse::search(Attempt& a, const glm::dvec3& best) c
     if (possible_at_end(false)) return Outcome::possible;
     a.spared = q(best) <= nothing && !a.at_any_cost;
     if (a.spared) return Outcome::refused;
-    const Outcome fitted = a.fit.collapse(a.trial, h, best, kGiveUpAbove);
+    const Outcome fitted = a.fit.collapse(a.trial, h, best, kGiveUpFitAbove);
     if (fitted != Outcome::refused) return fitted;
     if (possible_at_end(true)) return Outcome::possible;
     if (!mesh_.joined(mesh_.to(h))) return Outcome::refused;

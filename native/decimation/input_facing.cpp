@@ -13,16 +13,15 @@
 namespace tolvol {
 namespace {
 
-constexpr std::uint32_t kNone = CutMesh::kNone;
 constexpr std::size_t kBlock = 64;
-constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+constexpr double kUnknownBound = std::numeric_limits<double>::infinity();
 
 /// For each triangle, the first triangle of its connected part.
 std::vector<std::uint32_t> connected_parts(const CutMesh& cut) {
   UnionFind parts(cut.triangles.size());
   for (std::uint32_t side = 0; side < cut.mates.size(); ++side) {
     poll_at(side);
-    if (cut.mates[side] != kNone) parts.join(side / 3, cut.mates[side] / 3);
+    if (cut.mates[side] != CutMesh::kNone) parts.join(side / 3, cut.mates[side] / 3);
   }
   std::vector<std::uint32_t> part(cut.triangles.size());
   for (std::uint32_t t = 0; t < part.size(); ++t) part[t] = parts.find(t);
@@ -47,7 +46,7 @@ InputFacing face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> po
                               const FacingRule& rule, Team& team, CertifiedBounds& bounds, Progress* progress) {
   struct Place {
     double area = 0;  ///< Of the triangle, negative if all near it face against it, and 0 if some do and some do not.
-    std::uint32_t below = kNone;  ///< The nearest triangle that faces as this one, or else the nearest one.
+    std::uint32_t below = CutMesh::kNone;  ///< The nearest triangle that faces as this one, or else the nearest one.
   };
   std::vector<Place> places(cut.triangles.size());
   team.run(places.size(), kBlock, [&](std::size_t begin, std::size_t end) {
@@ -59,8 +58,9 @@ InputFacing face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> po
         return rule.nearest(hierarchy, centre, sign * normal, kSameSide, certificate.limit()).triangle;
       };
       const std::uint32_t along = nearest(1), against = nearest(-1);
-      places[i].below = along != kNone ? along : against;
-      if ((along == kNone) != (against == kNone)) places[i].area = (along != kNone ? 1 : -1) * glm::length(normal);
+      places[i].below = along != CutMesh::kNone ? along : against;
+      if ((along == CutMesh::kNone) != (against == CutMesh::kNone))
+        places[i].area = (along != CutMesh::kNone ? 1 : -1) * glm::length(normal);
     }
   });
   const std::vector<std::uint32_t> part = connected_parts(cut);
@@ -90,7 +90,7 @@ InputFacing keep_angles(const CutMesh& cut, std::span<const glm::dvec3> position
       const std::uint32_t f = faces[i];
       const glm::uvec3& t = cut.triangles[f];
       const glm::dvec3 corners[3] = {positions[t.x], positions[t.y], positions[t.z]};
-      const glm::uvec3 hint(hints.empty() ? kNone : hints[i], kNone, kNone);
+      const glm::uvec3 hint(hints.empty() ? CutMesh::kNone : hints[i], CutMesh::kNone, CutMesh::kNone);
       FaceRule of_face = bounds.rule(f);
       const auto prove = [&](double limit) -> std::optional<double> {
         of_face.limit = limit;
@@ -98,7 +98,7 @@ InputFacing keep_angles(const CutMesh& cut, std::span<const glm::dvec3> position
         std::optional<Facing> question;
         bounds.start(f, corners, question);
         if (!question) return 0;
-        if (certificate.verdict(corners, glm::dvec3(kAnywhere), hint, &*question) != Verdict::inside) return {};
+        if (certificate.verdict(corners, glm::dvec3(kUnknownBound), hint, &*question) != Verdict::inside) return {};
         bounds.note_face(f, {bounds.face_bound(f).distance, question->angle()});
         found.proved[f] = 1;
         return question->angle();

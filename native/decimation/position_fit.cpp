@@ -22,7 +22,7 @@ constexpr std::size_t kStride = 24;
 /// The number of samples between two polls.
 constexpr std::size_t kBetweenPolls = 256;
 /// The share of the trace that is added to the diagonal: the vertex stays along directions that nothing determines.
-constexpr double kDamping = 1e-3;
+constexpr double kShareOfTrace = 1e-3;
 /// The share of a face's area that each of its own points stands for.
 constexpr double kFaceShare = 0.1;
 /// Points of a face: the weight of the moving corner, and the share of the other weights that the corner before it has.
@@ -114,7 +114,7 @@ PositionFit::Fit PositionFit::fit(const Change& change, const glm::dvec3& positi
   const double trace = sums.m[0][0] + sums.m[1][1] + sums.m[2][2];
   const double deviation = sums.deviation();
   if (!(trace > 0) || deviation > most) return {sums.energy, deviation, position};
-  for (int i = 0; i < 3; ++i) sums.m[i][i] += kDamping * trace;
+  for (int i = 0; i < 3; ++i) sums.m[i][i] += kShareOfTrace * trace;
   glm::dvec3 step = glm::inverse(sums.m) * sums.g;
   const double length = glm::length(step);
   if (length > limit) step *= limit / length;

@@ -21,6 +21,7 @@
 #include <limits>
 
 #include "geometry/frame.h"
+#include "geometry/lengths.h"
 
 namespace tolvol {
 namespace {
@@ -29,8 +30,6 @@ constexpr double kThin = 0.01;  // a triangle is thin below this ratio of its sq
 constexpr double kSmallest = 1e-60, kLargest = 1e60;
 constexpr double kApart = 1e-6, kNoise = 128 * kUnitRoundoff;  // both are derived above
 constexpr double kFlat = 1e-200;  // the products of a normal with a smaller square may have lost their bits
-
-double largest(const glm::dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
 ClosestPoint at(const glm::dvec3& p, const glm::dvec3& q, const glm::dvec3& weights) {
   const glm::dvec3 r = p - q;

@@ -16,7 +16,7 @@ namespace {
 
 // A face lower than this share of the largest coordinate is flat. Mapping into the frame moves a corner by up to 1e-15
 // of that coordinate, which turns the normal of a face of this height by a thousandth.
-constexpr double kFlat = 1e-12;
+constexpr double kFlatFace = 1e-12;
 
 struct HalfEdge {
   std::uint32_t other;  ///< is the higher end
@@ -120,7 +120,7 @@ Pseudonormals::Pseudonormals(const TriangleMesh& mesh)
     const glm::dvec3 ab = mesh.vertices[t.y] - mesh.vertices[t.x], ac = mesh.vertices[t.z] - mesh.vertices[t.x];
     const glm::dvec3 n = glm::cross(ab, ac);
     const double longest = std::sqrt(std::max({glm::dot(ab, ab), glm::dot(ac, ac), glm::dot(ac - ab, ac - ab)}));
-    flat[i] = !(glm::length(n) > kFlat * magnitude * longest);
+    flat[i] = !(glm::length(n) > kFlatFace * magnitude * longest);
     face_.push_back(flat[i] ? glm::dvec3(0) : n / glm::length(n));
   }
 

@@ -25,7 +25,7 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kOverflow = std::numeric_limits<double>::infinity();
 constexpr double kNear = 8;  // corners within this many R are near
 constexpr double kCut = 32;  // far edges are cut this many R from their near corners
 constexpr double kSlack = 64 * kUnitRoundoff;
@@ -33,12 +33,12 @@ constexpr double kSlack = 64 * kUnitRoundoff;
 /// Computes the length without the square of a huge number.
 double norm(const dvec3& v) {
   const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-  return largest > 0 && largest < kInfinity ? largest * glm::length(v / largest) : largest;
+  return largest > 0 && largest < kOverflow ? largest * glm::length(v / largest) : largest;
 }
 
-dvec3 direction(const dvec3& v) {
+dvec3 finite_direction(const dvec3& v) {
   const double length = norm(v);
-  return length > 0 && length < kInfinity ? v / length : dvec3(0);
+  return length > 0 && length < kOverflow ? v / length : dvec3(0);
 }
 
 /// Returns the largest distance of a point of the box from the origin of the frame.
@@ -122,15 +122,15 @@ class Cutter {
                          [&](const dvec3& p) { return glm::dot(normal, p) > reach_ + kSlack * norm(p); });
     };
     const dvec3* const p = points.begin();
-    const dvec3 edge = direction(p[1] - p[0]);
+    const dvec3 edge = finite_direction(p[1] - p[0]);
     const dvec3 across = p[0] - glm::dot(p[0], edge) * edge;  // leads from the origin to the line of the cut
-    if (shown_by(direction(p[0])) || shown_by(direction(across))) return true;
+    if (shown_by(finite_direction(p[0])) || shown_by(finite_direction(across))) return true;
     for (int k = 0; k < 3; ++k) {
       dvec3 axis(0);
       axis[k] = 1;
       if (shown_by(axis) || shown_by(-axis)) return true;
     }
-    return shown_by(direction(closest_point(dvec3(0), p[0], p[1], p[2]).point));
+    return shown_by(finite_direction(closest_point(dvec3(0), p[0], p[1], p[2]).point));
   }
 
   const TriangleMesh& b_;
@@ -157,8 +157,8 @@ NearPart near_part(const TriangleMesh& a, const TriangleMesh& b) {
   const Frame frame(box_a);
   const double radius = extent(box_a, frame), span = extent(box_b, frame);
   // Without a finite frame nothing can be proved.
-  if (span <= kNear * radius || !(span < kInfinity) || !std::isfinite(frame.scale())) return {b.triangles, {}, true};
-  double nearest = kInfinity;
+  if (span <= kNear * radius || !(span < kOverflow) || !std::isfinite(frame.scale())) return {b.triangles, {}, true};
+  double nearest = kOverflow;
   std::size_t turn = 0;
   for (const glm::uvec3& t : b.triangles) {
     poll_at(++turn);

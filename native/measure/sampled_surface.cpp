@@ -28,9 +28,9 @@ constexpr double kEnough = 0.001;
 // pieces.
 constexpr std::size_t kLeastRoom = 64;
 // The progress is updated after this many pieces.
-constexpr std::size_t kChunk = 4096;
+constexpr std::size_t kPiecesPerUpdate = 4096;
 // A thread takes so many pieces at once.
-constexpr std::size_t kBlock = 64;
+constexpr std::size_t kPiecesAtOnce = 64;
 
 /// Returns b, or one triangle of it if b is a point: to every search all of its triangles would be about as near.
 TriangleMesh searched(const TriangleMesh& b) {
@@ -80,10 +80,10 @@ void SampledSurface::measure() {
 std::size_t SampledSurface::evaluate(std::span<SampledPiece> pieces, std::size_t first, bool all) {
   std::size_t done = 0;
   while (done < pieces.size() && (all || steps_ < most_steps_)) {
-    const std::size_t count = std::min(kChunk, pieces.size() - done);
+    const std::size_t count = std::min(kPiecesPerUpdate, pieces.size() - done);
     const bool loosely = steps_ >= most_steps_;
     std::atomic<std::size_t> steps = 0;
-    parallel_for(count, kBlock, threads_, [&](std::size_t begin, std::size_t end) {
+    parallel_for(count, kPiecesAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
       std::uint32_t hint = Hierarchy::kNone;
       std::size_t made = 0;
       for (std::size_t i = done + begin; i < done + end; ++i) {

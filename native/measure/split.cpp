@@ -22,7 +22,7 @@ constexpr double kCoarse = 4;
 // A piece is cut between two triangles only where both parts have at least this share of it, so that pieces shrink.
 constexpr double kWellInside = 0.125;
 // A piece or a part thinner than this, in frame lengths, is as small as rounding.
-constexpr double kNoise = 256 * kUnitRoundoff;
+constexpr double kThinnest = 256 * kUnitRoundoff;
 
 dvec3 between(const dvec3& p, const dvec3& q, double t) { return t <= 0.5 ? p + t * (q - p) : q + (1 - t) * (p - q); }
 
@@ -60,7 +60,7 @@ Parts cut_along(const TriangleCorners& p, const TriangleCorners& t) {
     length[e] = glm::distance(t[e], t[(e + 1) % 3]);
     if (length[e] > length[longest]) longest = e;
   }
-  const bool flat = glm::length(normal) <= kNoise * length[longest];
+  const bool flat = glm::length(normal) <= kThinnest * length[longest];
   const dvec3 segment = t[(longest + 1) % 3] - t[longest];
   std::array<double, 3> side{};
   double best = 0;
@@ -74,9 +74,9 @@ Parts cut_along(const TriangleCorners& p, const TriangleCorners& t) {
     const double depth = std::min(*std::max_element(s.begin(), s.end()), -*std::min_element(s.begin(), s.end()));
     if (depth > best) best = depth, side = s;
   }
-  if (best <= kNoise) return {};
+  if (best <= kThinnest) return {};
   for (double& s : side) {
-    if (std::abs(s) <= kNoise) s = 0;
+    if (std::abs(s) <= kThinnest) s = 0;
   }
   return cut_at(p, side);
 }
@@ -90,9 +90,9 @@ Parts cut_between(const TriangleCorners& p, const TriangleCorners& t, const Tria
   std::array<double, 3> side;
   for (int i = 0; i < 3; ++i) side[i] = distance(p[i], other) - distance(p[i], t);
   const auto [least, most] = std::minmax({side[0], side[1], side[2]});
-  if (std::min(-least, most) <= std::max(kNoise, kWellInside * (most - least))) return {};
+  if (std::min(-least, most) <= std::max(kThinnest, kWellInside * (most - least))) return {};
   for (double& s : side) {
-    if (std::abs(s) <= kNoise) s = 0;
+    if (std::abs(s) <= kThinnest) s = 0;
   }
   return cut_at(p, side);
 }
@@ -114,7 +114,7 @@ Parts split(const TriangleCorners& piece, const TriangleCorners& t, const Triang
     if (length[i] > length[longest]) longest = i;
   }
   Parts parts;
-  if (length[longest] <= kNoise) return parts;
+  if (length[longest] <= kThinnest) return parts;
   const bool coarse = length[longest] > kCoarse * reach;
   for (int i = 0; i < 3; ++i) {
     if (length[i] > 0) continue;

@@ -22,7 +22,7 @@ constexpr double kInside = 1 - 1e-9;
 constexpr double kRounding = 8 * 0x1p-53;
 /// What products that are too small for double precision lose.
 constexpr double kSmallest = 1e-300;
-constexpr std::size_t kBlock = 64;
+constexpr std::size_t kRoomsAtOnce = 64;
 /// A vertex that leaves its room at once would do so again. It gets a room again at the kRest-th call of renew(),
 /// counted from the call that finds it gone.
 constexpr std::uint8_t kRest = 8;
@@ -125,7 +125,7 @@ double Clearance::fan(std::uint32_t vertex) const {
 /// Lowers what all vertices may reach that share a face with these.
 void Clearance::limit_by_fans(std::span<const std::uint32_t> vertices) {
   std::vector<double> rooms(vertices.size());
-  parallel_for(vertices.size(), kBlock, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
+  parallel_for(vertices.size(), kRoomsAtOnce, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) rooms[i] = fan(vertices[i]);
   });
   for (std::size_t i = 0; i < vertices.size(); ++i) {
@@ -137,7 +137,7 @@ void Clearance::limit_by_fans(std::span<const std::uint32_t> vertices) {
 
 /// Notes what these faces leave to their corners, and to those of faces near them, that share no corner with them.
 void Clearance::limit_by_gaps(std::span<const std::uint32_t> faces, const MovingFaces& near) {
-  parallel_for(faces.size(), kBlock, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
+  parallel_for(faces.size(), kRoomsAtOnce, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t face = faces[i];
       if (rests(face)) continue;

@@ -17,14 +17,13 @@
 #include "motion/moving_coverage.h"
 #include "motion/moving_crossings.h"
 #include "motion/moving_mesh.h"
+#include "motion/selection.h"
 
 namespace tolvol {
 namespace {
 
 /// The permitted fraction is known to this share of the way.
 constexpr int kHalvings = 10;
-
-constexpr std::size_t kBlock = 1024;
 
 using Mode = DeformationOptions::Mode;
 
@@ -80,7 +79,7 @@ class Deformation {
     const StoredSpace world = space_.in({});
     after_.assign(before_.begin(), before_.end());
     std::atomic<std::size_t> outside{0};
-    parallel_for(after_.size(), kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
+    parallel_for(after_.size(), kManyAtOnce, options_.threads, [&](std::size_t begin, std::size_t end) {
       if (options_.progress) options_.progress->update(static_cast<double>(begin) / static_cast<double>(after_.size()));
       for (std::size_t i = begin; i < end; ++i) {
         const glm::dvec3 p = world.world(before_[i]);

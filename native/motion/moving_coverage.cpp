@@ -7,14 +7,13 @@
 
 #include "base/call.h"
 #include "base/parallel.h"
+#include "motion/selection.h"
 
 namespace tolvol {
 namespace {
 
 /// A bound on the relative rounding of a step's length.
 constexpr double kInflate = 0x1p-50;
-/// The number of faces that a thread takes at a time, for work of about 10 ns each.
-constexpr std::size_t kBlock = 1024;
 /// A triangulation of a quad has this many triangles.
 constexpr std::size_t kOfQuad = 2;
 /// Motion divides pieces and seldom unites them. tidy() acts once there are kGrowth times as many pieces as at first
@@ -150,7 +149,7 @@ std::vector<std::uint32_t> MovingCoverage::failing_replaced(std::span<const std:
 std::vector<std::uint32_t> MovingCoverage::unsettled(const Layer& layer, std::span<const std::uint32_t> faces) const {
   const auto of_face = static_cast<std::uint32_t>(layer.triangles.size());
   std::vector<std::uint8_t> chosen(faces.size(), 0);  // Threads would share bits.
-  parallel_for(faces.size(), kBlock, mesh_->threads(), [&](std::size_t begin, std::size_t end) {
+  parallel_for(faces.size(), kManyAtOnce, mesh_->threads(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       for (std::uint32_t e = of_face * faces[i]; e < of_face * (faces[i] + 1); ++e) {
         if (!layer.coverage.settles(e, moved(layer, e))) chosen[i] = 1;

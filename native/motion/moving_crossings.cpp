@@ -15,7 +15,7 @@ namespace tolvol {
 namespace {
 
 /// The number of faces that a thread takes at a time, for work of about 1 us each.
-constexpr std::size_t kBlock = 64;
+constexpr std::size_t kFacesAtOnce = 64;
 /// Once a face is known to cross another anew, it is compared with this many more whose boxes meet its own: where very
 /// many faces meet, all of them have to go back anyway.
 constexpr std::size_t kFurther = 64;
@@ -232,12 +232,12 @@ std::vector<std::uint32_t> MovingCrossings::failing(std::span<const std::uint32_
   }
   near_.change(asked, on_trial());
   refitted_ += asked.size();
-  std::vector<std::vector<glm::uvec2>> found((asked.size() + kBlock - 1) / kBlock);
+  std::vector<std::vector<glm::uvec2>> found((asked.size() + kFacesAtOnce - 1) / kFacesAtOnce);
   std::vector<std::uint32_t> result;
   const auto look = [&](auto&& of_face) {
-    parallel_for(asked.size(), kBlock, threads_, [&](std::size_t begin, std::size_t end) {
+    parallel_for(asked.size(), kFacesAtOnce, threads_, [&](std::size_t begin, std::size_t end) {
       if (progress) progress->update(progress->fraction());
-      for (std::size_t i = begin; i < end; ++i) of_face(asked[i], found[begin / kBlock]);
+      for (std::size_t i = begin; i < end; ++i) of_face(asked[i], found[begin / kFacesAtOnce]);
     });
     for (std::vector<glm::uvec2>& pairs : found) {
       for (const glm::uvec2& pair : pairs) {

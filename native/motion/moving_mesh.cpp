@@ -23,9 +23,9 @@ constexpr double kEasy = 0.98;
 /// Distances are known up to this multiple of the provable distance.
 constexpr double kKnown = 2;
 /// A bound on the rounding of distances in the frame.
-constexpr double kRounding = 0x1p-44;
+constexpr double kRoundingInFrame = 0x1p-44;
 /// A bound on the relative rounding of a step's length, and of a sum with it.
-constexpr double kInflate = 0x1p-50;
+constexpr double kRoundUp = 0x1p-50;
 // A trial beyond this, in frame lengths, is here instead: the squares of its coordinates do not overflow, and it is as
 // far outside.
 constexpr double kFarthest = 0x1p500;
@@ -60,7 +60,7 @@ MovingMesh::PointBound MovingMesh::bound_at(std::uint32_t vertex, const glm::dve
   }
   const PointBound found = bound_at(at);
   const double room = std::min(found.distance, kKnown * provable_) - provable_;
-  if (room > 0) known[static_cast<std::size_t>(aim)] = {at, room - kRounding};
+  if (room > 0) known[static_cast<std::size_t>(aim)] = {at, room - kRoundingInFrame};
   return found;
 }
 
@@ -73,7 +73,7 @@ MovingMesh::FaceBound MovingMesh::bound_by_motion(std::uint32_t face) const {
     if (facing_) bound.facing.room = facing_->room(face);
     return bound;
   }
-  const double distance = (distance_[face] + step) * (1 + kInflate);
+  const double distance = (distance_[face] + step) * (1 + kRoundUp);
   if (!(distance <= kEasy * limit_)) return bound;
   if (facing_) {
     bound.facing.room = facing_->room(face) - step;

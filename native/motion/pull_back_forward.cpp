@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "motion/pull_back.h"
+#include "motion/selection.h"
 
 namespace tolvol {
 namespace {
@@ -22,8 +23,6 @@ constexpr double kSettled = 0.965, kLast = 0.04;
 constexpr int kLeavingTries = 8;
 /// This search ends within this share of the provable distance.
 constexpr double kClose = 0.002;
-/// The number of vertices that a thread takes at a time, for work of a few us each.
-constexpr std::size_t kBlock = 32;
 
 }  // namespace
 
@@ -95,7 +94,7 @@ void PullBack::release(Held& held, Mode mode) {
 
 /// Does step (2).
 void PullBack::pull(std::vector<Held>& held, Mode mode, Progress* progress) {
-  parallel_for(held.size(), kBlock, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
+  parallel_for(held.size(), kFewAtOnce, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) release(held[i], mode);
   });
   std::vector<std::uint32_t> changed;
@@ -167,7 +166,7 @@ void PullBack::let_go(std::vector<Held>& held, Mode mode, Progress* progress) {
       const std::vector<std::uint32_t> turn = std::exchange(list, {});
       any = any || !turn.empty();
       raised.assign(turn.size(), 0);
-      parallel_for(turn.size(), kBlock, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
+      parallel_for(turn.size(), kFewAtOnce, mesh_.threads(), [&](std::size_t begin, std::size_t end) {
         if (progress) progress->update(progress->fraction());
         for (std::size_t i = begin; i < end; ++i) {
           Held& h = held[turn[i]];

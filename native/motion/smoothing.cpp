@@ -19,6 +19,7 @@
 #include "check/certificate.h"
 #include "check/input_checks.h"
 #include "motion/finite.h"
+#include "motion/selection.h"
 #include "topology/t_junctions.h"
 
 namespace tolvol {
@@ -27,7 +28,6 @@ namespace {
 constexpr double kLaplacianStep = 0.5, kBilaplacianStep = 0.25;
 /// The cotangent of 3 degrees.
 constexpr double kLargestCotangent = 19.1;
-constexpr std::size_t kBlock = 1024;
 
 class Smoothing {
  public:
@@ -187,7 +187,7 @@ class Smoothing {
 
   template <class Body>
   void each(std::size_t count, Body&& body) {
-    parallel_for(count, kBlock, options_.threads, [&](std::size_t begin, std::size_t end) {
+    parallel_for(count, kManyAtOnce, options_.threads, [&](std::size_t begin, std::size_t end) {
       if (options_.progress) options_.progress->update(options_.progress->fraction());
       for (std::size_t i = begin; i < end; ++i) body(static_cast<std::uint32_t>(i));
     });

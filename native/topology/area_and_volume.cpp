@@ -8,11 +8,10 @@
 #include <cmath>
 
 #include "base/call.h"
+#include "geometry/lengths.h"
 
 namespace tolvol {
 namespace {
-
-double largest(const glm::dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
 glm::dvec3 scaled(const glm::dvec3& v, int exponent) {
   return {std::ldexp(v.x, exponent), std::ldexp(v.y, exponent), std::ldexp(v.z, exponent)};

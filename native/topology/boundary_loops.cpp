@@ -18,15 +18,15 @@
 namespace tolvol {
 namespace {
 
-constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+constexpr std::uint32_t kNoSide = 0xFFFFFFFFu;
 
 /// The places of a triangle's corners, turned so that the lowest comes first.
-struct Places {
+struct CornerPlaces {
   glm::uvec3 at;
-  bool operator==(const Places& other) const { return at == other.at; }
+  bool operator==(const CornerPlaces& other) const { return at == other.at; }
 };
-struct HashOfPlaces {
-  std::size_t operator()(const Places& p) const {
+struct HashOfCornerPlaces {
+  std::size_t operator()(const CornerPlaces& p) const {
     std::uint64_t hash = 0;
     for (int k = 0; k < 3; ++k) hash = (hash ^ p.at[k]) * 0x9E3779B97F4A7C15u, hash ^= hash >> 29;
     return hash;
@@ -57,12 +57,12 @@ class Loops {
     std::vector<std::pair<Side, BoundaryLoop>> found;  // each with its lowest side
     std::vector<bool> has_one_before(3 * triangles_.size(), false), walked(3 * triangles_.size(), false);
     for (const Side side : open_) {
-      if (next_[side] != kNone) has_one_before[next_[side]] = true;
+      if (next_[side] != kNoSide) has_one_before[next_[side]] = true;
     }
     const auto follow = [&](Side first) {
       BoundaryLoop loop{{}, false};
       Side side = first, lowest = first;
-      for (; side != kNone && !walked[side]; side = next_[side]) {
+      for (; side != kNoSide && !walked[side]; side = next_[side]) {
         poll_at(loop.sides.size());
         walked[side] = true;
         lowest = std::min(lowest, side);
@@ -91,7 +91,7 @@ class Loops {
   void find_open(Team& team) {
     std::vector<Side> sides;
     sides.reserve(3 * triangles_.size());
-    std::unordered_set<Places, HashOfPlaces> seen;
+    std::unordered_set<CornerPlaces, HashOfCornerPlaces> seen;
     seen.reserve(triangles_.size());
     for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
       poll_at(t);
@@ -131,7 +131,7 @@ class Loops {
 
   /// Finds the open edge that follows on each.
   void link(Team& team) {
-    next_.assign(3 * triangles_.size(), kNone);
+    next_.assign(3 * triangles_.size(), kNoSide);
     using Keyed = std::pair<std::uint32_t, Side>;
     std::vector<Keyed> leaving, arriving;
     for (const Side side : open_)
@@ -204,7 +204,7 @@ class Loops {
   std::span<const std::uint32_t> place_;
   std::span<const glm::uvec3> triangles_;
   std::vector<Side> open_;           ///< in rising order
-  std::vector<std::uint32_t> next_;  ///< for each open side, the one that follows it, or kNone
+  std::vector<std::uint32_t> next_;  ///< for each open side, the one that follows it, or kNoSide
 };
 
 }  // namespace

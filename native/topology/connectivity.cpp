@@ -15,8 +15,6 @@
 namespace tolvol {
 namespace {
 
-constexpr std::uint32_t kNone = CutMesh::kNone;
-
 void require_manifold(bool holds) {
   if (!holds) throw std::logic_error("the triangles are not an oriented manifold");
 }
@@ -35,11 +33,11 @@ void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, std::s
   team.run(sides, 4096, [&](std::size_t begin, std::size_t end) {
     for (auto s = static_cast<std::uint32_t>(begin); s < end; ++s) {
       const std::uint32_t other = mates[s];
-      if (other == kNone) continue;
+      if (other == CutMesh::kNone) continue;
       require_manifold(other < sides && mates[other] == s && from(s) == to(other) && to(s) == from(other));
     }
   });
-  const auto first_of_edge = [&](std::uint32_t s) { return mates[s] == kNone || mates[s] > s; };
+  const auto first_of_edge = [&](std::uint32_t s) { return mates[s] == CutMesh::kNone || mates[s] > s; };
   std::size_t edges = 0;
   for (std::uint32_t s = 0; s < sides; ++s) edges += first_of_edge(s);
   mesh.resize(vertices, edges, triangles.size());
@@ -53,7 +51,7 @@ void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, std::s
     const HalfedgeHandle other(next++);
     mesh.set_vertex_handle(halfedge[s], vertex(to(s)));
     mesh.set_vertex_handle(other, vertex(from(s)));
-    if (mates[s] != kNone) halfedge[mates[s]] = other;
+    if (mates[s] != CutMesh::kNone) halfedge[mates[s]] = other;
   }
   for (std::uint32_t s = 0; s < sides; ++s) {
     poll_at(s);
@@ -66,14 +64,14 @@ void connect(std::size_t vertices, std::span<const glm::uvec3> triangles, std::s
   // A vertex on the boundary names the halfedge there.
   for (std::uint32_t s = 0; s < sides; ++s) {
     poll_at(s);
-    if (mates[s] != kNone) continue;
+    if (mates[s] != CutMesh::kNone) continue;
     const auto v = vertex(to(s));
     require_manifold(!mesh.is_boundary(v));
     mesh.set_halfedge_handle(v, mesh.opposite_halfedge_handle(halfedge[s]));
   }
   for (std::uint32_t s = 0; s < sides; ++s) {
     poll_at(s);
-    if (mates[s] != kNone) continue;
+    if (mates[s] != CutMesh::kNone) continue;
     mesh.set_next_halfedge_handle(mesh.opposite_halfedge_handle(halfedge[s]), mesh.halfedge_handle(vertex(from(s))));
   }
   // A walk around a vertex sees one fan of faces, and no vertex may have a second fan.

@@ -8,6 +8,8 @@
 #include <limits>
 #include <utility>
 
+#include "geometry/lengths.h"
+
 namespace tolvol {
 namespace {
 
@@ -18,8 +20,6 @@ using glm::dvec3;
 constexpr double kRounding = 16 * 0x1p-53;
 /// What products that are too small for double precision lose.
 constexpr double kSmallest = 1e-300;
-
-double largest(const dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
 
 double sum(const dvec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 

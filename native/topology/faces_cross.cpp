@@ -58,13 +58,13 @@ bool beside(const Points& a, const Points& b) {
 }
 
 // A difference of two corners errs by u times itself, u = 2^-53, and a dot product by 3 u times the sum of its absolute
-// products. kSmallest is above what is lost where a product is subnormal. Where a number is not finite, all comparisons
+// products. kDotLoss is above what is lost where a product is subnormal. Where a number is not finite, all comparisons
 // are false, and the predicates decide.
-constexpr double kRounding = 8 * 0x1p-53, kSmallest = 1e-300;
+constexpr double kDotRounding = 8 * 0x1p-53, kDotLoss = 1e-300;
 
 /// Tells whether `along` and `side` make an acute angle for sure.
 bool leads_along(const glm::dvec3& along, const glm::dvec3& side) {
-  return glm::dot(along, side) > kRounding * glm::dot(glm::abs(along), glm::abs(side)) + kSmallest;
+  return glm::dot(along, side) > kDotRounding * glm::dot(glm::abs(along), glm::abs(side)) + kDotLoss;
 }
 
 /// Returns v with length 1, up to rounding, or what is not finite.

@@ -21,7 +21,7 @@
 namespace tolvol {
 namespace {
 
-constexpr std::uint32_t kNone = 0xFFFFFFFFu;
+constexpr std::uint32_t kNoVertex = 0xFFFFFFFFu;
 /// The least height of a piece, in lengths that rounding may have moved its corners by.
 constexpr double kLeastHeight = 16;
 /// After so many tries nothing is put in: each try but the last refuses something.
@@ -40,7 +40,7 @@ class Joining {
         unit_(unit),
         team_(team),
         place_(weld_equal_positions(vertices)),
-        vertex_at_(vertices.size(), kNone) {
+        vertex_at_(vertices.size(), kNoVertex) {
     for (const glm::uvec3& t : triangles) {
       for (int k = 0; k < 3; ++k) vertex_at_[place_[t[k]]] = std::min(vertex_at_[place_[t[k]]], t[k]);
     }

@@ -15,7 +15,7 @@ namespace tolvol {
 namespace {
 
 /// With more changed faces than this they are searched in a tree.
-constexpr std::size_t kMany = 48;
+constexpr std::size_t kManyChanged = 48;
 /// A change is refused where more pairs of input faces would have to be looked at to share them out.
 constexpr std::size_t kMostPairs = 1 << 17;
 
@@ -43,10 +43,10 @@ struct Ring {
   bool for_each_near(const Corners& own, Visit&& visit) const {
     bool all = true;
     const auto next = [&](std::uint32_t i) { return all = visit(i); };
-    if (faces.size() > kMany && hub) {
+    if (faces.size() > kManyChanged && hub) {
       const ApartFromFan apart(own, *hub);
       tree.for_each_where([&](const Box& rims) { return !rims.empty() && !apart.surely(rims); }, next);
-    } else if (faces.size() > kMany) {
+    } else if (faces.size() > kManyChanged) {
       tree.for_each_meeting(box_of(own), next);
     } else {
       const Box box = box_of(own);
@@ -61,7 +61,7 @@ struct Ring {
   /// pair may come twice.
   template <class Visit>
   bool for_each_crossing(Visit&& visit) const {
-    const bool twice = faces.size() > kMany;
+    const bool twice = faces.size() > kManyChanged;
     for (std::uint32_t i = 0; i < faces.size(); ++i) {
       if (twice) poll();
       const bool all = for_each_near(faces[i].corners, [&](std::uint32_t k) {
@@ -108,7 +108,7 @@ bool NewCrossings::none(const NearFaces& near, std::span<const Face> faces, std:
   for (const Removed& r : removed) trial.replaced_.push_back(r.id);
   std::sort(trial.replaced_.begin(), trial.replaced_.end());
   trial.read_.add(all);
-  if (faces.size() > kMany) {
+  if (faces.size() > kManyChanged) {
     std::vector<std::uint32_t> places(faces.size());
     std::iota(places.begin(), places.end(), 0u);
     Team alone(1);

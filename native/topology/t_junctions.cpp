@@ -10,6 +10,7 @@
 #include "base/union_find.h"
 #include "geometry/closest_point.h"
 #include "geometry/hierarchy.h"
+#include "geometry/lengths.h"
 #include "topology/face_tree.h"
 
 namespace tolvol {
@@ -21,8 +22,6 @@ constexpr std::size_t kBlock = 256;
 /// Open edges from a place where more vertices are than this are not compared with other edges: the triangles there are
 /// in the way of each other.
 constexpr std::uint32_t kCrowd = 100;
-
-double largest(const glm::dvec3& p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
 
 bool before(const glm::dvec3& a, const glm::dvec3& b) {
   return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;

@@ -31,7 +31,7 @@ constexpr double kHeldWeight = 0.05;
 constexpr double kNearMiss = 1.2;
 constexpr int kMostFlippedFirst = 20;
 /// A face that has no proof is looked at in the points of a grid that divides each edge into this many parts.
-constexpr int kFacePoints = 24;
+constexpr int kPartsOfEdge = 24;
 
 }  // namespace
 
@@ -254,9 +254,9 @@ FaceBound PatchTrial::prove(std::uint32_t face, glm::dvec3& open) const {
 bool PatchTrial::add_face_points(std::uint32_t face) {
   glm::dvec3 worst[3];
   double largest[3] = {PatchDeviations::kEnough, PatchDeviations::kEnough, PatchDeviations::kEnough};
-  for (int i = 0; i <= kFacePoints; ++i) {
-    for (int j = 0; i + j <= kFacePoints; ++j) {
-      const glm::dvec3 weights = glm::dvec3(i, j, kFacePoints - i - j) / static_cast<double>(kFacePoints);
+  for (int i = 0; i <= kPartsOfEdge; ++i) {
+    for (int j = 0; i + j <= kPartsOfEdge; ++j) {
+      const glm::dvec3 weights = glm::dvec3(i, j, kPartsOfEdge - i - j) / static_cast<double>(kPartsOfEdge);
       const double deviation = deviations_.deviation_of(face, weights);
       const int corner = weights.x >= weights.y ? (weights.x >= weights.z ? 0 : 2) : (weights.y >= weights.z ? 1 : 2);
       if (deviation > largest[corner]) largest[corner] = deviation, worst[corner] = weights;
