@@ -45,6 +45,8 @@ constexpr double kSmall = 2.0;
 constexpr double kLong = 1.9;
 // A piece shorter than this is worth an exact search.
 constexpr double kExact = 0.7;
+// Among needles a long part that no node helps to cut is not worth a search after so many in vain.
+constexpr int kSearchesInVain = 4;
 // bound_with_room() tries to leave this much of the tolerance.
 constexpr double kRoomToLeave = 1.0 / 32;
 // The grid's guess of a distance is used without a search up to this distance.
@@ -198,6 +200,8 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
   Verdict result = Verdict::inside;
   double farthest2 = 0;  // the largest squared distance of the parts proved so far
   std::uint32_t hint = hints.x;
+  const bool are_needles = hierarchy_->has_mostly_needles();
+  int in_vain = 0;
   for (std::size_t next = 0; next < queue.size(); ++next) {
     if (next == (kProve ? kBudget : kQuickBudget)) return Verdict::unproved;
     if ((next + 1) % kBetweenPolls == 0) poll();
@@ -288,12 +292,17 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
         const std::uint32_t before = below;
         if (covered_by_node_around() || (below != before && cut_along(below))) continue;
       }
-      // Among slivers it happens that no node of the grid names the triangle below the centre.
-      if (exact == Hierarchy::kNone) {
+      // Among slivers it happens that no node of the grid names the triangle below the centre. Where many are side by
+      // side, a search finds another one nearly always, and hardly ever one that helps.
+      if (exact == Hierarchy::kNone && !(are_needles && in_vain == kSearchesInVain)) {
         exact = around.nearest(part, centre, limit_, below, covers);
         // By rounding there may be none, if the centre is as far away as it may be.
         const bool is_another = exact != below && exact != Hierarchy::kNone;
-        if (is_another && (covered_by(exact) || cut_along(exact))) continue;
+        if (is_another && (covered_by(exact) || cut_along(exact))) {
+          in_vain = 0;
+          continue;
+        }
+        ++in_vain;
       }
     }
     split(part, queue);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/call.h"
 #include "geometry/closest_point.h"
 
 namespace tolvol {
@@ -17,6 +18,8 @@ constexpr std::size_t kSearches = 8, kNodesOfSearch = 64;
 constexpr std::size_t kLongest = 256;
 // The lists of a piece hold at most this many triangles, in 16 MiB. After that a part keeps the list that it inherits.
 constexpr std::size_t kMostKept = 1 << 22;
+// A piece polls after this many nodes, as a search does.
+constexpr std::size_t kBetweenPolls = 1024;
 // If two distances in the frame differ by less than this, the hierarchy decides. This is more than a thousand times the
 // rounding here and in the hierarchy, whose corners may differ from those of the witnesses in the last bits.
 constexpr double kAsNear = 0x1p-40;
@@ -54,7 +57,9 @@ std::uint32_t NearTriangles::search(const glm::dvec3& centre, double radius, std
       facing_ ? facing_->nearest(*hierarchy_, centre, radius, hint, enough) : hierarchy_->nearest(centre, radius, hint);
   if (steps_) *steps_ += found.nodes;
   // Where nothing is near, a list costs nothing.
+  const std::size_t before = nodes_;
   nodes_ += found.triangle == Hierarchy::kNone ? kNodesOfSearch : found.nodes;
+  if (nodes_ / kBetweenPolls != before / kBetweenPolls) poll();
   return found.triangle;
 }
 

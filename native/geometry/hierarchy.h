@@ -91,6 +91,9 @@ class Hierarchy {
   std::size_t for_each_within(const glm::dvec3& p, double radius, Visit&& visit, MayVisit&& may_visit = {}) const;
 
   std::size_t size() const { return place_.size(); }
+  /// Tells whether most nodes hold needles, which overlap where they are side by side: many are then nearly as near to
+  /// a point as the nearest one.
+  bool has_mostly_needles() const { return 2 * oriented_.size() > nodes_.size(); }
 
  private:
   static constexpr int kWidth = OrientedBoxes::kWidth;

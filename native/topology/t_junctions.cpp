@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <utility>
 
 #include "base/call.h"
@@ -12,6 +13,7 @@
 #include "geometry/hierarchy.h"
 #include "geometry/lengths.h"
 #include "topology/face_tree.h"
+#include "topology/near_points.h"
 
 namespace tolvol {
 namespace {
@@ -19,6 +21,8 @@ namespace {
 /// The rounding of vertices that are so many times farther from the origin than the others does not count.
 constexpr double kFar = 8;
 constexpr std::size_t kBlock = 256;
+/// Places where a search visits more nodes of the hierarchy than this are looked at together.
+constexpr std::size_t kMostNodes = 128;
 /// Open edges from a place where more vertices are than this are not compared with other edges: the triangles there are
 /// in the way of each other.
 constexpr std::uint32_t kCrowd = 100;
@@ -66,20 +70,10 @@ class Finder {
     for (const auto& [vertex, triangle] : around_) {
       if (ends.empty() || ends.back() != vertex) ends.push_back(vertex);
     }
-    const std::vector<std::size_t> starts = sort_by_place(ends);
-    const Hierarchy hierarchy(mesh_);
-    std::vector<std::vector<TJunction>> found((starts.size() + kBlock - 1) / kBlock);
-    team.run(starts.size() - 1, kBlock, [&](std::size_t begin, std::size_t end) {
-      std::vector<std::uint32_t> near;
-      for (std::size_t i = begin; i < end; ++i) {
-        find_near(place(ends[starts[i]]), hierarchy, mesh_.triangles, near);
-        for (std::size_t k = starts[i]; k < starts[i + 1]; ++k) add(ends[k], near, found[begin / kBlock]);
-      }
-    });
     TJunctions result;
-    for (const std::vector<TJunction>& f : found) {
-      result.vertices.insert(result.vertices.end(), f.begin(), f.end());
-    }
+    result.vertices = at_places<TJunction>(ends, mesh_, team,
+                                           [&](std::uint32_t vertex, std::span<const std::uint32_t> near,
+                                               std::vector<TJunction>& junctions) { add(vertex, near, junctions); });
     add_on_open_edges(team, result.vertices);
     add_across(team, result);
     return result;
@@ -170,16 +164,67 @@ class Finder {
   }
 
   /// Finds the triangles that a vertex at `p` may lie on. Those with a corner there are left out: where thousands of
-  /// vertices are at one place, each of them would look at the triangles of all others.
-  void find_near(const glm::dvec3& p, const Hierarchy& hierarchy, std::span<const glm::uvec3> triangles,
+  /// vertices are at one place, each of them would look at the triangles of all others. Returns false, with only some
+  /// of them, if there is too much to look at.
+  bool find_near(const glm::dvec3& p, const Hierarchy& hierarchy, std::span<const glm::uvec3> triangles,
                  std::vector<std::uint32_t>& near) const {
     near.clear();
-    std::size_t turn = 0;
-    hierarchy.for_each_within(p, most_reach(p), [&](std::uint32_t index) {
-      poll_at(++turn);
-      const glm::uvec3& t = triangles[index];
-      if (place(t.x) != p && place(t.y) != p && place(t.z) != p) near.push_back(index);
+    std::size_t turn = 0, nodes = 0;
+    hierarchy.for_each_within(
+        p, most_reach(p),
+        [&](std::uint32_t index) {
+          poll_at(++turn);
+          if (!has_corner_at(p, triangles[index])) near.push_back(index);
+          return nodes <= kMostNodes;
+        },
+        [&](std::uint32_t) { return ++nodes <= kMostNodes; });
+    return nodes <= kMostNodes;
+  }
+
+  bool has_corner_at(const glm::dvec3& p, const glm::uvec3& t) const {
+    return place(t.x) == p || place(t.y) == p || place(t.z) == p;
+  }
+
+  /// Calls add(vertex, triangles near it, what is found) for all these vertices, place by place, in several threads.
+  /// `mesh` has the vertices of mesh_. Returns all that is found.
+  template <class Found, class Add>
+  std::vector<Found> at_places(std::vector<std::uint32_t> vertices, const TriangleMesh& mesh, Team& team,
+                               Add&& add) const {
+    const std::vector<std::size_t> starts = sort_by_place(vertices);
+    const Hierarchy hierarchy(mesh);
+    std::vector<std::vector<Found>> found((starts.size() + kBlock - 1) / kBlock + 1);
+    std::vector<std::vector<std::size_t>> crowded(found.size());
+    const auto add_all = [&](std::size_t i, std::span<const std::uint32_t> near, std::vector<Found>& to) {
+      for (std::size_t k = starts[i]; k < starts[i + 1]; ++k) add(vertices[k], near, to);
+    };
+    team.run(starts.size() - 1, kBlock, [&](std::size_t begin, std::size_t end) {
+      std::vector<std::uint32_t> near;
+      for (std::size_t i = begin; i < end; ++i) {
+        if (find_near(place(vertices[starts[i]]), hierarchy, mesh.triangles, near)) {
+          add_all(i, near, found[begin / kBlock]);
+        } else {
+          crowded[begin / kBlock].push_back(i);
+        }
+      }
     });
+    std::vector<std::size_t> rest;
+    std::vector<glm::dvec3> points;
+    double reach = 0;
+    for (const std::vector<std::size_t>& block : crowded) rest.insert(rest.end(), block.begin(), block.end());
+    for (const std::size_t i : rest) {
+      points.push_back(place(vertices[starts[i]]));
+      reach = std::max(reach, most_reach(points.back()));
+    }
+    std::vector<std::uint32_t> near;
+    for_each_near(points, mesh, reach, [&](std::uint32_t point, std::span<const std::uint32_t> triangles) {
+      near.clear();
+      std::ranges::copy_if(triangles, std::back_inserter(near),
+                           [&](std::uint32_t t) { return !has_corner_at(points[point], mesh.triangles[t]); });
+      add_all(rest[point], near, found.back());
+    });
+    std::vector<Found> result;
+    for (const std::vector<Found>& f : found) result.insert(result.end(), f.begin(), f.end());
+    return result;
   }
 
   /// Adds the T-junctions of a vertex with the triangles near it.
@@ -225,35 +270,24 @@ class Finder {
       if (is_open(t.x, t.y) || is_open(t.y, t.z) || is_open(t.z, t.x)) rim.triangles.push_back(t);
     }
     if (rim.triangles.empty()) return;
-    const Hierarchy hierarchy(rim);
     std::vector<std::uint32_t> inner;
     const std::vector<bool> used = used_vertices(mesh_.vertices.size(), mesh_.triangles);
     for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
       if (used[v] && !is_end_[v]) inner.push_back(v);
     }
-    const std::vector<std::size_t> starts = sort_by_place(inner);
-    std::vector<std::vector<OnOpenEdge>> found((starts.size() + kBlock - 1) / kBlock);
-    team.run(starts.size() - 1, kBlock, [&](std::size_t begin, std::size_t end) {
-      std::vector<std::uint32_t> near;
-      const auto add = [&](std::uint32_t v) {
-        for (const std::uint32_t index : near) {
-          const glm::uvec3& t = rim.triangles[index];
-          for (int k = 0; k < 3; ++k) {
-            const std::uint32_t a = t[k], b = t[(k + 1) % 3];
-            if (!is_open(a, b) || !lies_on(place(v), a, b) || is_joined(v, std::minmax(a, b))) continue;
-            found[begin / kBlock].push_back({v, t, std::minmax(a, b)});
-          }
+    const auto add = [&](std::uint32_t v, std::span<const std::uint32_t> near, std::vector<OnOpenEdge>& found) {
+      for (const std::uint32_t index : near) {
+        const glm::uvec3& t = rim.triangles[index];
+        for (int k = 0; k < 3; ++k) {
+          const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+          if (!is_open(a, b) || !lies_on(place(v), a, b) || is_joined(v, std::minmax(a, b))) continue;
+          found.push_back({v, t, std::minmax(a, b)});
         }
-      };
-      for (std::size_t i = begin; i < end; ++i) {
-        find_near(place(inner[starts[i]]), hierarchy, rim.triangles, near);
-        for (std::size_t k = starts[i]; k < starts[i + 1]; ++k) add(inner[k]);
       }
-    });
+    };
+    const std::vector<OnOpenEdge> found = at_places<OnOpenEdge>(inner, rim, team, add);
     std::vector<bool> is_found(mesh_.vertices.size());
-    for (const auto& block : found) {
-      for (const OnOpenEdge& f : block) is_found[f.vertex] = true;
-    }
+    for (const OnOpenEdge& f : found) is_found[f.vertex] = true;
     std::vector<Around> around;
     for (const glm::uvec3& t : mesh_.triangles) {
       for (int k = 0; k < 3; ++k) {
@@ -261,11 +295,9 @@ class Finder {
       }
     }
     std::ranges::stable_sort(around, {}, &Around::first);
-    for (const auto& block : found) {
-      for (const OnOpenEdge& f : block) {
-        if (lies_in_plane(f.vertex, f.triangle, around)) continue;
-        junctions.push_back({f.vertex, {f.edge.first, f.edge.second, f.edge.second}});
-      }
+    for (const OnOpenEdge& f : found) {
+      if (lies_in_plane(f.vertex, f.triangle, around)) continue;
+      junctions.push_back({f.vertex, {f.edge.first, f.edge.second, f.edge.second}});
     }
   }
 

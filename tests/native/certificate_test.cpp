@@ -235,6 +235,44 @@ TEST(Certificate, AsksTheNodesAroundAPartBeforeTheHierarchy) {
   EXPECT_LE(polls_of(prove), 60) << "a search for each part that the nearest node does not settle takes 337";
 }
 
+TEST(Certificate, AmongNeedlesSideBySideFewSearchesAreInVain) {
+  // Two fans of needles between two lines close to each other, each from an end of one line to the other line: many are
+  // nearly as near to a point as the nearest one. A face that moved by less than the tolerance is cut into many parts.
+  TriangleMesh fans;
+  std::mt19937 engine(6);
+  std::uniform_real_distribution<double> u(0, 1);
+  const std::uint32_t count = 20'000;
+  for (const double y : {0.0, 1e-4}) {
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const double x = static_cast<double>(i) / (count - 1);
+      fans.vertices.emplace_back(0.6 * x - 0.8 * y, 0.48 * x + 0.36 * y, 0.64 * x + 0.48 * y);
+    }
+  }
+  for (std::uint32_t i = 0; i + 1 < count; ++i) {
+    fans.triangles.emplace_back(i, i + 1, 2 * count - 1);
+    fans.triangles.emplace_back(i + count, 0, i + count + 1);
+  }
+  fans = shapes::stored(fans);  // where they overlap, rounding decides which one is the nearest
+  const double tolerance = 0.005;
+  const ToleranceVolume volume(fans.vertices, fans.triangles, kIdentity, tolerance);
+  EXPECT_TRUE(volume.hierarchy().has_mostly_needles());
+  const StoredSpace placed = kIdentity.in(volume.frame());
+  const TriangleCertificate certificate(volume.witnesses(), volume.grid(), volume.hierarchy(), volume.provable(0),
+                                        volume.refutable(0));
+  const std::size_t polls = polls_of([&] {
+    for (std::uint32_t f = 0; f < 2 * count - 2; f += 100) {
+      dvec3 corners[3];
+      for (int k = 0; k < 3; ++k) {
+        const dvec3 by = tolerance * dvec3(u(engine) - 0.5, u(engine) - 0.5, u(engine) - 0.5);
+        corners[k] = placed.frame(fans.vertices[fans.triangles[f][k]] + by);
+      }
+      const double bound = certificate.bound_in_any_order(corners, dvec3(TriangleCertificate::kUnproved));
+      EXPECT_NE(bound, TriangleCertificate::kUnproved);
+    }
+  });
+  EXPECT_LT(polls, 500) << "a search for each part that no node helps to cut takes 2,439";
+}
+
 TEST(Certificate, ProbesFindWhatHasNoProofAndNothingElse) {
   const TriangleMesh torus = shapes::torus(60);
   const double tolerance = 0.02;

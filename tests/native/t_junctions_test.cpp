@@ -228,6 +228,33 @@ TEST(TJunctions, LookOnceAtWhatIsAroundManyVerticesAtOnePlace) {
   }
 }
 
+TEST(TJunctions, NeedlesThatEndNearEachOtherAreDividedTogether) {
+  // Each needle has an end of its own near the middle. All ends are near all needles, and on none but their own.
+  constexpr std::uint32_t count = 16'000;
+  TriangleMesh mesh;
+  std::vector<glm::uvec2> open;
+  shapes::Random random(7);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto on_rim = [&](double k) {
+      const double angle = 2 * std::numbers::pi * k / count;
+      return dvec3(std::cos(angle), std::sin(angle), 0) + 0.001 * random.point();
+    };
+    mesh.vertices.insert(mesh.vertices.end(), {0.001 * random.point(), on_rim(i), on_rim(i + 1)});
+    mesh.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+    open.insert(open.end(), {{3 * i, 3 * i + 1}, {3 * i + 1, 3 * i + 2}, {3 * i + 2, 3 * i}});
+  }
+  // A vertex on the inside of a needle in the middle of the crowd, with a face of its own.
+  const dvec3 on = 0.9998 * mesh.vertices[0] + 0.0001 * mesh.vertices[1] + 0.0001 * mesh.vertices[2];
+  mesh.vertices.insert(mesh.vertices.end(), {on, on + dvec3(0, 0, 1), on + dvec3(1, 0, 1)});
+  mesh.triangles.emplace_back(3 * count, 3 * count + 1, 3 * count + 2);
+  open.emplace_back(3 * count, 3 * count + 1);
+  Team alone(1);
+  const std::size_t polls = polls_of([&] {
+    EXPECT_EQ(t_junctions(mesh, open, 0x1p-53, alone), (Indices{0, 1, 2, 3 * count}));
+  });
+  EXPECT_LT(polls, 20'000) << "a search for each end looks at most of the needles, and takes 42,186";
+}
+
 TEST(TJunctions, ALongFootStaysOnItsPlate) {
   // The plate is bent on both sides of the foot, which goes over many of its squares.
   const unsigned n = 24;
