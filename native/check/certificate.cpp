@@ -33,6 +33,8 @@ constexpr double kWorthCutting = 0.25;
 constexpr std::size_t kBudget = 1 << 20;
 // A search looks at this many parts if it is only one of many tries.
 constexpr std::size_t kQuickBudget = 1 << 13;
+// A part takes as long as the visit of so many nodes.
+constexpr std::size_t kStepsOfPart = 2;
 // A search polls after this many parts.
 constexpr std::size_t kBetweenPolls = 256;
 // Probes of a triangle are this far apart along its longest edge.
@@ -187,7 +189,7 @@ inline double TriangleCertificate::bound_by_corners(const glm::dvec3 (&corners)[
 }
 
 /// Sets `farthest` if the verdict is inside, or else `open`, if it is not null, to the centre of the last part. Adds
-/// the parts that it looked at and the nodes that it visited to `steps`, if it is not null.
+/// its steps to `steps`, if it is not null.
 template <TriangleCertificate::Search kSearch>
 Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::uvec3& hints, Facing* facing,
                                     double& farthest, glm::dvec3* open, std::size_t* steps) const {
@@ -209,7 +211,7 @@ Verdict TriangleCertificate::search(const glm::dvec3 (&corners)[3], const glm::u
     const auto& [a, b, c] = part.corners;
     const glm::dvec3 centre = (a + b + c) * (1.0 / 3);
     if (open) *open = centre;
-    if (steps) ++*steps;
+    if (steps) *steps += kStepsOfPart;
     FourPoints points;
     points.set(a, b, c, centre);
     double centre2 = std::numeric_limits<double>::infinity();  // the best known squared distance of the centre
