@@ -15,11 +15,16 @@ void InputCrossings::find_sheets() const {
   });
 }
 
-bool InputCrossings::crossed(std::uint32_t a, std::uint32_t b) const {
-  const Corners one = corners(a), other = corners(b);
-  if (meet(box_of(one), box_of(other)) && faces_cross(one, other)) return true;
+bool InputCrossings::are_of_one_sheet(std::uint32_t a, std::uint32_t b) const {
+  // A face of a double sheet crosses the one that lies on it, so that a mesh without crossings needs no sheets.
+  if (!crosses_another(a) || !crosses_another(b)) return false;
   find_sheets();
   return sheets_[a] != kNoSheet && sheets_[a] == sheets_[b];
+}
+
+bool InputCrossings::crossed(std::uint32_t a, std::uint32_t b) const {
+  const Corners one = corners(a), other = corners(b);
+  return meet(box_of(one), box_of(other)) && faces_cross(one, other) && !are_of_one_sheet(a, b);
 }
 
 bool InputCrossings::any_crossed(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) const {
@@ -40,17 +45,19 @@ bool InputCrossings::any_crossed(std::span<const std::uint32_t> a, std::span<con
   std::vector<Input> others;
   others.reserve(some_b.size());
   for (const std::uint32_t face : some_b) others.push_back(input(face));
-  find_sheets();
   return std::ranges::any_of(some_a, [&](std::uint32_t face) {
     const Input one = input(face);
     return std::ranges::any_of(others, [&](const Input& other) {
-      return (sheets_[face] != kNoSheet && sheets_[face] == sheets_[other.face]) ||
-             (meet(one.box, other.box) && faces_cross(one.corners, other.corners));
+      return meet(one.box, other.box) && faces_cross(one.corners, other.corners) && !are_of_one_sheet(face, other.face);
     });
   });
 }
 
 void InputCrossings::keep_crossing(std::vector<std::uint32_t>& faces) const {
+  std::erase_if(faces, [&](std::uint32_t face) { return !crosses_another(face); });
+}
+
+bool InputCrossings::crosses_another(std::uint32_t face) const {
   std::call_once(states_ready_, [&] {
     std::vector<std::uint32_t> all(face_count());
     std::iota(all.begin(), all.end(), 0u);
@@ -61,18 +68,15 @@ void InputCrossings::keep_crossing(std::vector<std::uint32_t>& faces) const {
         all, [&](std::size_t i) { return corners(all[i]); }, hubs, alone);
     state_ = std::vector<std::atomic<std::uint8_t>>(all.size());
   });
-  std::erase_if(faces, [&](std::uint32_t face) {
-    std::uint8_t state = state_[face].load(std::memory_order_relaxed);
-    if (state == unknown) {
-      state = crosses_another(face) ? crossing : clear;
-      state_[face].store(state, std::memory_order_relaxed);
-    }
-    return state == clear;
-  });
+  std::uint8_t state = state_[face].load(std::memory_order_relaxed);
+  if (state == unknown) {
+    state = find_crossing(face) ? crossing : clear;
+    state_[face].store(state, std::memory_order_relaxed);
+  }
+  return state == crossing;
 }
 
-/// A face of a double sheet crosses the one that lies on it.
-bool InputCrossings::crosses_another(std::uint32_t face) const {
+bool InputCrossings::find_crossing(std::uint32_t face) const {
   const Corners own = corners(face);
   bool found = false;
   near_.for_each_near(own, [&](std::uint32_t other) {

@@ -27,11 +27,13 @@ class InputCrossings {
 
   // Several threads may ask any of these at once.
 
-  /// Whether two faces crossed or are of one double sheet (topology/double_sheets.h). O(1) but for the first time,
-  /// which takes about 1 us for each face of the mesh.
+  /// Whether two faces are of one double sheet (topology/double_sheets.h). Costs as keep_crossing() does; the first
+  /// time that both cross others it takes about 1 us for each face of the mesh.
+  bool are_of_one_sheet(std::uint32_t a, std::uint32_t b) const;
+  /// Whether two faces crossed that are not of one double sheet.
   bool crossed(std::uint32_t a, std::uint32_t b) const;
-  /// Whether one of the first crossed one of the second, or is of one double sheet with it. Costs as keep_crossing()
-  /// does, and then about 5 ns a pair.
+  /// Whether crossed() holds for one of the first and one of the second. Costs as keep_crossing() does, and then about
+  /// 5 ns a pair.
   bool any_crossed(std::span<const std::uint32_t> a, std::span<const std::uint32_t> b) const;
   /// Takes away the faces that crossed no other. The first time it takes about 0.2 us for each face of the mesh, and 3
   /// us for each face that it is asked about for the first time.
@@ -41,6 +43,7 @@ class InputCrossings {
   enum State : std::uint8_t { unknown, crossing, clear };
 
   bool crosses_another(std::uint32_t face) const;
+  bool find_crossing(std::uint32_t face) const;
   void find_sheets() const;
 
   MeshView input_;

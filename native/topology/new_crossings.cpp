@@ -91,9 +91,9 @@ std::vector<std::uint32_t> NewCrossings::origins_of(std::uint32_t face, std::spa
   return found;
 }
 
-/// Whether input faces of both crossed, or are of sheets that lie on each other.
-bool NewCrossings::inherited(std::uint32_t a, std::uint32_t b, std::span<const Removed> removed) const {
-  return input_.any_crossed(origins_of(a, removed), origins_of(b, removed));
+/// Whether both are of sheets that lie on each other, or input faces of both crossed.
+bool NewCrossings::may_cross(std::uint32_t a, std::uint32_t b, std::span<const Removed> removed) const {
+  return input_.any_crossed(origins_of(a, removed), origins_of(b, removed)) || input_.are_of_one_sheet(a, b);
 }
 
 bool NewCrossings::none(const NearFaces& near, std::span<const Face> faces, std::span<const Removed> removed,
@@ -126,14 +126,14 @@ bool NewCrossings::none(const NearFaces& near, std::span<const Face> faces, std:
   const auto crosses_any = [&](std::uint32_t other) {
     const Corners t = corners(other);
     return !ring.for_each_near(t, [&](std::uint32_t i) {
-      return !faces_cross(faces[i].corners, t) || inherited(faces[i].id, other, removed);
+      return !faces_cross(faces[i].corners, t) || may_cross(faces[i].id, other, removed);
     });
   };
   const auto stays = [&](std::uint32_t other) {
     return !std::binary_search(trial.replaced_.begin(), trial.replaced_.end(), other);
   };
   const bool alone = ring.for_each_crossing(
-      [&](std::uint32_t i, std::uint32_t k) { return inherited(faces[i].id, faces[k].id, removed); });
+      [&](std::uint32_t i, std::uint32_t k) { return may_cross(faces[i].id, faces[k].id, removed); });
   if (!alone) return false;
   if (trial.met_last_ != kNone && stays(trial.met_last_) && crosses_any(trial.met_last_)) {
     return share_out(near, faces, removed, trial);
@@ -189,6 +189,7 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
   Succession succession(owners);
   const Ring ring{faces, trial.boxes_, trial.ring_, trial.hub_};
   ring.for_each_crossing([&](std::uint32_t i, std::uint32_t k) {
+    if (input_.are_of_one_sheet(faces[i].id, faces[k].id)) return true;
     for (std::uint32_t a = 0; a < members.size(); ++a) {
       if (owners[a] != i) continue;
       for (std::uint32_t b = 0; b < members.size(); ++b) {
@@ -204,7 +205,7 @@ bool NewCrossings::share_out(const NearFaces& near, std::span<const Face> faces,
     const Corners t = corners(other);
     std::vector<std::uint32_t> crossing;
     ring.for_each_near(t, [&](std::uint32_t i) {
-      if (faces_cross(faces[i].corners, t)) crossing.push_back(i);
+      if (faces_cross(faces[i].corners, t) && !input_.are_of_one_sheet(faces[i].id, other)) crossing.push_back(i);
       return true;
     });
     if (crossing.empty()) continue;
@@ -234,7 +235,7 @@ bool NewCrossings::none(const NearFaces& near, std::span<const std::uint32_t> ch
     if (is_degenerate(own) && !is_degenerate(input_.corners(face))) return true;
     bool crosses = false;
     near.for_each_near(own, [&](std::uint32_t other) {
-      crosses = other != face && faces_cross(own, corners(other)) && !inherited(face, other, {});
+      crosses = other != face && faces_cross(own, corners(other)) && !may_cross(face, other, {});
       return !crosses;
     });
     return crosses;

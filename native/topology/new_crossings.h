@@ -4,7 +4,8 @@
 /// number of pairs of faces that cross never rises, and a mesh without crossings stays without.
 ///
 /// The sheets of a double sheet (topology/double_sheets.h) are exempt from each other: they touch in all their points,
-/// and could not change one after the other.
+/// and could not change one after the other. A face is of the sheet that it was of as it came in, whatever else it
+/// stands for.
 #pragma once
 
 #include <cstdint>
@@ -96,7 +97,7 @@ class NewCrossings {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
   std::vector<std::uint32_t> origins_of(std::uint32_t face, std::span<const Removed> removed) const;
-  bool inherited(std::uint32_t a, std::uint32_t b, std::span<const Removed> removed) const;
+  bool may_cross(std::uint32_t a, std::uint32_t b, std::span<const Removed> removed) const;
   bool share_out(const NearFaces& near, std::span<const Face> faces, std::span<const Removed> removed,
                  Trial& trial) const;
 

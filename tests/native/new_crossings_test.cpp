@@ -174,6 +174,20 @@ TEST(NewCrossings, SheetsThatLieOnEachOtherAreExempt) {
   EXPECT_FALSE(Scene(mesh).may_move(n, dvec3(0.6, 0.55, -0.1)));
 }
 
+// Such a face would cross others of the sheet, so that the number of pairs rises that are not of one sheet.
+TEST(NewCrossings, AFaceThatStandsForOneOfASheetIsNotOfTheSheet) {
+  TriangleMesh mesh = wall(0);
+  mesh.triangles.resize(mesh.triangles.size() - 16);  // the rest of the second plate lies on half of the first one
+  const auto sheets = tolvol::double_sheets(mesh.vertices, mesh.triangles);
+  const std::uint32_t of_sheet = 0, alone = 31;
+  ASSERT_NE(sheets[of_sheet], tolvol::kNoSheet);
+  ASSERT_EQ(sheets[alone], tolvol::kNoSheet);
+  const Corners through{dvec3(0.3, 0.1, -0.1), dvec3(0.4, 0.1, 0.1), dvec3(0.3, 0.2, 0.1)};  // the sheet
+  EXPECT_TRUE(Scene(mesh).none({{of_sheet, through}}));
+  EXPECT_FALSE(Scene(mesh).none({{alone, through}}));
+  EXPECT_FALSE(Scene(mesh).none({{alone, through}}, {{of_sheet, alone}}));
+}
+
 TEST(NewCrossings, DoubleSheetsAreFoundByPosition) {
   TriangleMesh mesh = wall(0);
   const TriangleMesh apart = wall(0.5, 2);
