@@ -18,8 +18,8 @@ using glm::dvec3;
 /// Products of directions and differences of coordinates, and sums of three of them, have at most this error relative
 /// to the sum of their parts; it is several times what the operations can round.
 constexpr double kRounding = 16 * 0x1p-53;
-/// What products that are too small for double precision lose.
-constexpr double kSmallest = 1e-300;
+/// What products that are too small for double precision lose, and the largest product that is trusted.
+constexpr double kSmallest = 1e-300, kLargest = 1e300;
 
 double sum(const dvec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 
@@ -38,13 +38,16 @@ Pair pair_of(const Corners& a, const Corners& b) {
   return pair;
 }
 
-/// By how much one comes before the other along `u`, times its length; not positive where they overlap.
+/// By how much one comes before the other along `u`, times its length; not positive where they overlap, or where a
+/// product may be too large for double precision.
 double gap_along(const dvec3& u, const Pair& pair) {
+  const double most = sum(u) * pair.size;
+  if (!(most < kLargest)) return 0;
   const double a0 = glm::dot(u, pair.a[0]), a1 = glm::dot(u, pair.a[1]), a2 = glm::dot(u, pair.a[2]);
   const double b0 = glm::dot(u, pair.b[0]), b1 = glm::dot(u, pair.b[1]), b2 = glm::dot(u, pair.b[2]);
   const double b_after_a = std::min({b0, b1, b2}) - std::max({a0, a1, a2});
   const double a_after_b = std::min({a0, a1, a2}) - std::max({b0, b1, b2});
-  return std::max(b_after_a, a_after_b) - (4 * kRounding * sum(u) * pair.size + kSmallest);
+  return std::max(b_after_a, a_after_b) - (4 * kRounding * most + kSmallest);
 }
 
 /// Calls visit(direction) for the directions along which they may be apart, until it returns true.

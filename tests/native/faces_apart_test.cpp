@@ -165,6 +165,25 @@ TEST(FacesApart, WhatHasNoDirectionIsNotSoughtByDirections) {
   }
 }
 
+TEST(FacesApart, WhatCrossesIsNeverSurelyUncrossedAtAnySize) {
+  // Across needles some products are too large for double precision from 1e76 on.
+  shapes::Random random(7);
+  std::size_t crossing = 0;
+  for (int i = 0; i < 60'000; ++i) {
+    const double size = std::pow(10, 60 + 40 * random.share());
+    const auto needle = [&] {
+      const dvec3 start = random.point();
+      return Corners{size * start, size * (start + 2.0 * random.point()), size * (start + 0.2 * random.point())};
+    };
+    const Corners a = needle(), b = needle();
+    if (!faces_cross(a, b)) continue;
+    ++crossing;
+    ASSERT_FALSE(surely_uncrossed(a, b)) << size;
+    ASSERT_EQ(gap(a, b, kFar), 0) << size;
+  }
+  EXPECT_GT(crossing, 500u);
+}
+
 TEST(FacesApart, CoordinatesOfAnySizeAreHandled) {
   for (const double scale : {1e-150, 1e-20, 1.0, 1e20, 1e150}) {
     const Corners own{scale * dvec3(0, 0, 0), scale * dvec3(1, 0, 0), scale * dvec3(0, 1, 0)};
