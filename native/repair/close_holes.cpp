@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -22,6 +23,10 @@ namespace tolvol {
 namespace {
 
 constexpr std::uint32_t kNone = HoleClosingResult::kNone;
+/// All searches for proofs take about so many steps (TriangleCertificate::bound_in_any_order()), which the holes share
+/// by the squares of their numbers of corners. A hole has kLeastSteps at least. The proof of one triangle among needles
+/// may take tens of thousands of steps.
+constexpr double kMostSteps = 1e8, kLeastSteps = 1e7;
 
 void check(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
            const CloseHolesOptions& options) {
@@ -60,6 +65,7 @@ class Closing {
       const FillingRules rules(mesh_, std::move(place), holes_, space_, volume_, options_.shares,
                                options_.max_normal_angle, team_, result_.warnings);
       if (options_.progress) options_.progress->begin("closing holes");
+      share_steps(open);
       fill(open, rules);
       keep_apart(open, rules);
     }
@@ -98,6 +104,15 @@ class Closing {
   }
 
   std::uint32_t vertex_of(Side corner) const { return mesh_.triangles[corner / 3][static_cast<int>(corner % 3)]; }
+
+  void share_steps(std::span<const std::uint32_t> open) {
+    const auto squared = [&](std::uint32_t i) { return std::pow(static_cast<double>(holes_[i].corner.size()), 2); };
+    double sum = 0;
+    for (const std::uint32_t i : open) sum += squared(i);
+    for (const std::uint32_t i : open) {
+      holes_[i].most_steps = static_cast<std::size_t>(std::max(kMostSteps * squared(i) / sum, kLeastSteps));
+    }
+  }
 
   /// Fills each hole as if it were alone.
   void fill(std::span<const std::uint32_t> open, const FillingRules& rules) {

@@ -22,9 +22,8 @@ constexpr std::size_t kLong = 200;
 /// it goes proves n / 2 times as many. A long loop is often the border of an open surface, most of whose triangles are
 /// refused: to find a guess takes longer there than to ask.
 constexpr int kMostGuesses = 8, kMostGuessesOfLong = 1;
-/// A loop is given up after so many of its triangles were refused, or so many steps of searches for proofs, in all
-/// searches together. A proof of one triangle among needles may take tens of thousands of steps.
-constexpr std::size_t kMostRefused = 50'000, kMostSteps = 100'000'000;
+/// A loop is given up after so many of its triangles were refused, in all searches together.
+constexpr std::size_t kMostRefused = 50'000;
 /// Where the triangles of a loop cross more faces than so many, each further triangle is compared with all faces near
 /// it instead of with these.
 constexpr std::size_t kMostObstacles = 64;
@@ -95,7 +94,7 @@ bool Filling::refuse(LoopOutcome reason) {
   return false;
 }
 
-bool Filling::gives_up() const { return refused_triangles_ >= kMostRefused || steps_ >= kMostSteps; }
+bool Filling::gives_up() const { return refused_triangles_ >= kMostRefused || steps_ >= hole_.most_steps; }
 
 bool Filling::admits_edge(std::uint32_t i, std::uint32_t j) {
   if (gives_up()) return false;

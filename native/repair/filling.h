@@ -21,8 +21,8 @@ namespace tolvol {
 /// Searches for the triangles of one hole, and counts what refused others.
 class Filling {
  public:
-  /// Keeps references to all. The hole has been measured. If `earlier` is given, the hole has to keep apart from the
-  /// fillings of lower holes.
+  /// Keeps references to all. The hole has been measured, and has its most_steps. If `earlier` is given, the hole has
+  /// to keep apart from the fillings of lower holes.
   Filling(const FillingRules& rules, Hole& hole, const EarlierFillings* earlier = nullptr)
       : rules_(rules), hole_(hole), earlier_(earlier) {}
 

@@ -31,6 +31,7 @@ struct Hole {
   std::vector<glm::dvec3> at;                           ///< its position in the frame
   std::vector<TriangleCertificate::PointBound> bounds;  ///< of the positions
   bool reversed = false;                                ///< tells whether the rim looks against the reference
+  std::size_t most_steps = 0;                           ///< after so many steps of proofs the hole is given up
   std::vector<glm::uvec3> faces;  ///< corners i < k < j of the loop, the front of which is (j, k, i)
 
   /// Calls visit(i, j) for the edges of the filling that are none of the rim, once each.
