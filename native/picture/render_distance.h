@@ -16,7 +16,7 @@ class DistanceRenderer {
   struct Options {
     Transfer transfer = Transfer::signed_distance;
     bool edges = false;  ///< says whether to draw the mesh's edges as well
-    Resolution resolution;
+    Resolution resolution = {};
     Progress* progress = nullptr;
   };
 

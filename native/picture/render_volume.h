@@ -19,8 +19,8 @@ class VolumeRenderer {
     glm::dvec3 point, normal;
   };
   struct Options {
-    std::optional<Cut> cut;
-    Resolution resolution;
+    std::optional<Cut> cut = std::nullopt;
+    Resolution resolution = {};
     Progress* progress = nullptr;
   };
 

@@ -121,7 +121,7 @@ TEST(AreaShares, OfAslantNeedlesAreEstimatedByFewerSamples) {
   constexpr std::uint32_t kNeedles = 10000;
   TriangleMesh strip;
   for (const double y : {0.0, 0.001}) {
-    for (std::uint32_t i = 0; i <= kNeedles; ++i) strip.vertices.emplace_back(double{i} / kNeedles, y, 0);
+    for (std::uint32_t i = 0; i <= kNeedles; ++i) strip.vertices.emplace_back(static_cast<double>(i) / kNeedles, y, 0);
   }
   constexpr std::uint32_t kUpper = kNeedles + 1, kLast = 2 * kNeedles + 1;
   for (std::uint32_t i = 0; i < kNeedles; ++i) {

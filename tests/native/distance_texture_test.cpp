@@ -60,7 +60,9 @@ TEST_F(DistanceTextureTest, HoldsTheGridWithinItsQuantisation) {
       }
     }
     EXPECT_LE(largest, quantisation * 1.0001 + 1e-7);
-    if (format == TextureFormat::normalised8) EXPECT_GT(largest, quantisation / 10);
+    if (format == TextureFormat::normalised8) {
+      EXPECT_GT(largest, quantisation / 10);
+    }
   }
 }
 

@@ -35,7 +35,9 @@ TEST(Facing, BoundsEveryAngleFromAbove) {
     const double angle = angle_between(a, b), bound = angle_bound(glm::dot(a, b));
     ASSERT_GE(bound, angle);
     ASSERT_LE(bound, angle + 0.02);
-    if (angle < 0.1) ASSERT_LE(bound, angle + 2e-5);
+    if (angle < 0.1) {
+      ASSERT_LE(bound, angle + 2e-5);
+    }
   }
 }
 
@@ -72,7 +74,9 @@ TEST(Facing, NoLimitAdmitsALargerAngle) {
       EXPECT_GE(facing.angle(), angle - 1e-15);
       EXPECT_LE(facing.angle(), limit);
     }
-    if (limit > 1e-5) EXPECT_GT(admitted, 500) << limit;
+    if (limit > 1e-5) {
+      EXPECT_GT(admitted, 500) << limit;
+    }
   }
 }
 
@@ -97,7 +101,9 @@ struct Wall {
     if (faces) facing.emplace(*rule, *sure_normal(corners[0], corners[1], corners[2], kError), kRight);
     const auto below = certificate->nearest((corners[0] + corners[1] + corners[2]) * (1.0 / 3), 1.0).triangle;
     const double ordered = certificate->bound(corners, anywhere, glm::uvec3(below), facing ? &*facing : nullptr);
-    if (facing && ordered != TriangleCertificate::kUnproved) EXPECT_LE(facing->angle(), kRight);
+    if (facing && ordered != TriangleCertificate::kUnproved) {
+      EXPECT_LE(facing->angle(), kRight);
+    }
     Facing* const admits = facing ? &*facing : nullptr;
     dvec3 open(std::numeric_limits<double>::quiet_NaN());
     const double any = certificate->bound_in_any_order(corners, anywhere, glm::uvec3(below), admits, &open);

@@ -186,7 +186,9 @@ TEST_F(Picture, SamplesSmoothEdgesAreDrawnAndColoursAreNotDarkenedByNothing) {
   EXPECT_GT(partly(four), 100u);
   for (int i = 0; i < 100 * 100; ++i) {
     const Colour c = at(four, i % 100, i / 100);
-    if (c[3] > 0) EXPECT_GT(c[0] + c[1] + c[2], 255) << "colours are not multiplied by alpha";
+    if (c[3] > 0) {
+      EXPECT_GT(c[0] + c[1] + c[2], 255) << "colours are not multiplied by alpha";
+    }
   }
   const Image edges = draw(reference, reference, {.edges = true, .resolution = resolution(100, 100, 1)}, camera);
   EXPECT_NE(edges.pixels, one.pixels);
