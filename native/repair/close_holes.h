@@ -64,16 +64,18 @@ struct HoleClosingResult {
 /// whole or not at all, in the orientation of its rim. Of the triangulations whose triangles keep these bounds one by
 /// one it takes the least (repair/least_triangulation.h). Where these cross a face, the next search goes around that
 /// face, and where two of them cross each other, or lie on one edge, it goes without one of them: 40 searches at most,
-/// and 8 in a loop of more than 200 corners. After these, or once 50,000 triangles were refused, a loop is given up.
-/// Loops are filled as if they were alone; then each whose faces are in conflict with those of a loop of lower number
-/// is filled anew around those, if possible.
+/// and 9 in a loop of more than 200 corners. A loop is given up after these, once 50,000 triangles were refused, or
+/// once its share of the steps is used up that all proofs together may take, 100 million. Loops are filled as if they
+/// were alone; then each whose faces are in conflict with those of a loop of lower number is filled anew around those,
+/// if possible.
 ///
 /// No vertex moves and none is added, and every input triangle keeps its number. Because the input stays, the reference
 /// is as near to the result as it is to the input. Throws InvalidInput for a bad mesh, and where the stored type cannot
 /// hold the tolerance; Cancelled. 1 us a triangle. A search for the filling of a loop of n corners takes about
-/// 5 ns * n^3 / 6. In a loop of at most 200 corners a triangulation is found first and its n - 2 triangles are proved
-/// afterwards; mostly one such search is enough. Otherwise, and in a longer loop, a search takes n^2 / 2 certificates,
-/// but n^3 / 6 where nearly all triangles are refused although their edges are admitted, as around an island in a hole.
+/// 5 ns * n^3 / 6. First a triangulation is found and its n - 2 triangles are proved afterwards; mostly one such search
+/// is enough. Otherwise a search takes n^2 / 2 certificates, but n^3 / 6 where nearly all triangles are refused
+/// although their edges are admitted, as around an island in a hole. A certificate takes 1 us, and milliseconds among
+/// needles.
 HoleClosingResult close_holes(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
                               const StoredSpace& space, const ToleranceVolume& volume,
                               const CloseHolesOptions& options = {});
