@@ -244,7 +244,7 @@ wedges : (m, 3) integer array, optional
 effort : {"fast", "thorough"}
     "thorough" then collapses further edges and moves all vertices around each together. It leaves a third fewer
     triangles in 6 to 35 times the processor time, at a tolerance of 0.1 % in 20 to 45 times. A mesh of some hundred
-    triangles may take half a minute.
+    triangles may take 20 seconds.
 crossings : {"keep_out", "allow"}
     Two faces cross if they meet anywhere but in the corners and edges that they share. "keep_out" makes no new
     crossing: each input face is stood for by one face of the result, and two faces of the result cross only if input

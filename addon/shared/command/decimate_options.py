@@ -102,7 +102,7 @@ def add(parser):
         choices=("fast", "thorough"),
         default="fast",
         help="thorough: a third fewer triangles in 6 to 35 times the processor time, at a tolerance of 0.1%% in 20 to 45 "
-        "times; a mesh of some hundred triangles may take half a minute (default: fast)",
+        "times; a mesh of some hundred triangles may take 20 seconds (default: fast)",
     )
     parser.add_argument(
         "--crossings",
