@@ -47,7 +47,8 @@ constexpr double kSmall = 2.0;
 constexpr double kLong = 1.9;
 // A piece shorter than this is worth an exact search.
 constexpr double kExact = 0.7;
-// Among needles a long part that no node helps to cut is not worth a search after so many in vain.
+// Among needles, once so many searches in a row were in vain, a piece goes on without them. They are for long parts
+// that no node helps to cut.
 constexpr int kSearchesInVain = 4;
 // bound_with_room() tries to leave this much of the tolerance.
 constexpr double kRoomToLeave = 1.0 / 32;

@@ -16,10 +16,12 @@ namespace {
 constexpr std::size_t kSearches = 8, kNodesOfSearch = 64;
 // A list has at most this many triangles. If a part has more, its own parts try again.
 constexpr std::size_t kLongest = 256;
+// A visit of a node takes as long as a look at so many triangles of a list.
+constexpr std::size_t kListedAtNode = 4;
 // The lists of a piece hold at most this many triangles, in 16 MiB. After that a part keeps the list that it inherits.
 constexpr std::size_t kMostKept = 1 << 22;
 // A piece polls after this many nodes, as a search does.
-constexpr std::size_t kBetweenPolls = 1024;
+constexpr std::size_t kNodesBetweenPolls = 1024;
 // If two distances in the frame differ by less than this, the hierarchy decides. This is more than a thousand times the
 // rounding here and in the hierarchy, whose corners may differ from those of the witnesses in the last bits.
 constexpr double kAsNear = 0x1p-40;
@@ -59,7 +61,7 @@ std::uint32_t NearTriangles::search(const glm::dvec3& centre, double radius, std
   // Where nothing is near, a list costs nothing.
   const std::size_t before = nodes_;
   nodes_ += found.triangle == Hierarchy::kNone ? kNodesOfSearch : found.nodes;
-  if (nodes_ / kBetweenPolls != before / kBetweenPolls) poll();
+  if (nodes_ / kNodesBetweenPolls != before / kNodesBetweenPolls) poll();
   return found.triangle;
 }
 
@@ -97,8 +99,9 @@ bool NearTriangles::gather(Part& part, const glm::dvec3& centre) {
     look_at(triangle, centre, reach2);
     return pool_.size() - begin <= kLongest;
   };
-  hierarchy_->for_each_within(centre, reach, visit,
-                              [&](std::uint32_t node) { return !facing_ || facing_->may_admit(node); });
+  const std::size_t visited = hierarchy_->for_each_within(
+      centre, reach, visit, [&](std::uint32_t node) { return !facing_ || facing_->may_admit(node); });
+  if (steps_) *steps_ += visited;
   if (pool_.size() - begin > kLongest) {
     pool_.resize(begin);
     too_far_ = reach;
@@ -116,6 +119,7 @@ void NearTriangles::narrow(Part& part, const glm::dvec3& centre) {
   const std::size_t begin = pool_.size(), length = from.end - from.begin;
   best2_ = second2_ = kNothing, best_ = Hierarchy::kNone;
   for (std::size_t i = from.begin; i < from.end; ++i) look_at(pool_[i], centre, reach2);
+  if (steps_) *steps_ += length / kListedAtNode;
   if (pool_.size() - begin == length || pool_.size() > kMostKept) {
     pool_.resize(begin);
     return;

@@ -276,8 +276,8 @@ void DecimationInput::cover(double provable) {
     for (std::uint32_t i = 0; i < own_count_; ++i) {
       if (!is_of_reference(i)) continue;
       const std::uint32_t element = element_of_[cut_.stand_in[i]];
-      if (element != CutMesh::kNone)
-        backward_->set_witness(element, i);  // what is set aside never changes and covers itself
+      // What is set aside never changes and covers itself.
+      if (element != CutMesh::kNone) backward_->set_witness(element, i);
     }
     if (joined_) cover_divided(provable);
     return;

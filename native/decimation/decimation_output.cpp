@@ -41,8 +41,8 @@ class Output {
     const auto use = [&](std::uint32_t s) {
       if (used[s] == CutMesh::kNone) used[s] = 0, order.push_back(s);
     };
-    std::vector<std::pair<std::uint32_t, std::uint32_t>>
-        kept;  // (of input_.triangles(), of the cut mesh or CutMesh::kNone)
+    // Of input_.triangles(), and of the cut mesh or CutMesh::kNone.
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> kept;
     for (std::uint32_t t = 0; t < cut_.triangles.size(); ++t) {
       if (mesh_.alive(t)) kept.emplace_back(cut_.triangle_input[t], t);
     }

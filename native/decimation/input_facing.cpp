@@ -59,8 +59,9 @@ InputFacing face_as_reference(const CutMesh& cut, std::span<const glm::dvec3> po
       };
       const std::uint32_t along = nearest(1), against = nearest(-1);
       places[i].below = along != CutMesh::kNone ? along : against;
-      if ((along == CutMesh::kNone) != (against == CutMesh::kNone))
+      if ((along == CutMesh::kNone) != (against == CutMesh::kNone)) {
         places[i].area = (along != CutMesh::kNone ? 1 : -1) * glm::length(normal);
+      }
     }
   });
   const std::vector<std::uint32_t> part = connected_parts(cut);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Measures of a vector's length that take no square root.
+/// Measures of a vector's length.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <limits>
 
 namespace tolvol {
 
@@ -12,5 +13,11 @@ inline double squared_length(const glm::dvec3& v) { return glm::dot(v, v); }
 
 /// The largest absolute value of a coordinate.
 inline double largest(const glm::dvec3& v) { return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}); }
+
+/// The length, without the square of a number that is too large or too small for it. Infinite for one that is.
+inline double norm(const glm::dvec3& v) {
+  const double most = largest(v);
+  return most > 0 && most < std::numeric_limits<double>::infinity() ? most * glm::length(v / most) : most;
+}
 
 }  // namespace tolvol

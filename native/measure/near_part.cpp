@@ -19,26 +19,21 @@
 
 #include "base/call.h"
 #include "geometry/closest_point.h"
+#include "geometry/lengths.h"
 
 namespace tolvol {
 namespace {
 
 using glm::dvec3;
 
-constexpr double kOverflow = std::numeric_limits<double>::infinity();
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kNear = 8;  // corners within this many R are near
 constexpr double kCut = 32;  // far edges are cut this many R from their near corners
 constexpr double kSlack = 64 * kUnitRoundoff;
 
-/// Computes the length without the square of a huge number.
-double norm(const dvec3& v) {
-  const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-  return largest > 0 && largest < kOverflow ? largest * glm::length(v / largest) : largest;
-}
-
 dvec3 finite_direction(const dvec3& v) {
-  const double length = norm(v);
-  return length > 0 && length < kOverflow ? v / length : dvec3(0);
+  const double size = norm(v);
+  return size > 0 && size < kInfinite ? v / size : dvec3(0);
 }
 
 /// Returns the largest distance of a point of the box from the origin of the frame.
@@ -157,8 +152,8 @@ NearPart near_part(const TriangleMesh& a, const TriangleMesh& b) {
   const Frame frame(box_a);
   const double radius = extent(box_a, frame), span = extent(box_b, frame);
   // Without a finite frame nothing can be proved.
-  if (span <= kNear * radius || !(span < kOverflow) || !std::isfinite(frame.scale())) return {b.triangles, {}, true};
-  double nearest = kOverflow;
+  if (span <= kNear * radius || !(span < kInfinite) || !std::isfinite(frame.scale())) return {b.triangles, {}, true};
+  double nearest = kInfinite;
   std::size_t turn = 0;
   for (const glm::uvec3& t : b.triangles) {
     poll_at(++turn);

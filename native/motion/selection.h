@@ -12,7 +12,8 @@
 
 namespace tolvol {
 
-/// The numbers of faces or vertices that a thread takes at a time, for work of about 10 ns and of about 1 us each.
+/// The numbers of faces or vertices that a thread takes at a time, for work of about 10 ns each and of 1 us
+/// or more.
 inline constexpr std::size_t kManyAtOnce = 1024, kFewAtOnce = 32;
 
 /// The least index in [0, count) for which hits(i) holds; count when there is none.

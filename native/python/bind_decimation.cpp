@@ -250,9 +250,10 @@ crossings : {"keep_out", "allow"}
     crossing: each input face is stood for by one face of the result, and two faces of the result cross only if input
     faces that they stand for crossed. So the number of crossing pairs never rises, and a mesh without crossings stays
     without. Sheets that lie exactly on each other are exempt from each other: pairs of their faces may become more, and
-    the repair "double_sheet" counts these faces. Crossings are decided exactly, for the coordinates of the result as
-    they are returned; without a volume the option is ignored. "allow" takes a tenth to a quarter less time, and leaves
-    fewer triangles of walls that are thinner than twice the tolerance.
+    the repair "double_sheet" counts these faces. A face beside a sheet is not exempt, whatever it comes to stand for.
+    Crossings are decided exactly, for the coordinates of the result as they are returned; without a volume the option
+    is ignored. "allow" takes a tenth to a quarter less time, and leaves fewer triangles of walls that are thinner than
+    twice the tolerance.
 max_normal_angle : float, optional
     In degrees, more than 0 and at most 180: every point of a face of the result has a witness, a triangle of the
     reference within the tolerance whose normal is within this angle of the face's. None keeps 90: no face is turned

@@ -168,12 +168,12 @@ anew around those, if possible.
 Of all triangulations whose triangles keep the bounds one by one, the one with the least sum of area times squared sides
 is taken. In a plane this is the Delaunay triangulation. Where its triangles cross faces, the next search goes around
 these faces. Where two of its triangles cross each other, or lie on one edge, the next search leaves one of them out. A
-loop is searched at most 32 times, and one of more than 200 corners 8 times. A loop is given up when 50,000 of its
+loop is searched at most 40 times, and one of more than 200 corners 9 times. A loop is given up when 50,000 of its
 triangles were refused, or when it has used up its share of the steps that all proofs may take.
 
 Cost: about 1 us a triangle of the mesh. A search takes 5 ms in a loop of 100 corners, and 2 s in one of 1,000, which is
 the most. It costs up to 3 s more where most triangles between the corners are refused, as around an island in a hole.
-Where proofs are long, as among needles, those of all loops together take up to 8 s, and up to 1 s for each loop.)doc");
+Where proofs are long, as among needles, those of all loops together take up to 8 s, or 1 s a loop if that is more.)doc");
 }
 
 }  // namespace tolvol::python

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <string>
 #include <utility>
 
@@ -23,9 +22,9 @@ namespace tolvol {
 namespace {
 
 constexpr std::uint32_t kNone = HoleClosingResult::kNone;
-/// All searches for proofs take about so many steps (TriangleCertificate::bound_in_any_order()), which the holes share
-/// by the squares of their numbers of corners. A hole has kLeastSteps at least. The proof of one triangle among needles
-/// may take tens of thousands of steps.
+/// The holes share kMostSteps steps of searches for proofs (TriangleCertificate::bound_in_any_order()) by the squares
+/// of their numbers of corners, but each has kLeastSteps at least, and as many again where it is filled anew. The proof
+/// of one triangle among needles may take tens of thousands of steps.
 constexpr double kMostSteps = 1e8, kLeastSteps = 1e7;
 
 void check(std::span<const glm::dvec3> vertices, std::span<const glm::uvec3> triangles,
@@ -106,7 +105,10 @@ class Closing {
   std::uint32_t vertex_of(Side corner) const { return mesh_.triangles[corner / 3][static_cast<int>(corner % 3)]; }
 
   void share_steps(std::span<const std::uint32_t> open) {
-    const auto squared = [&](std::uint32_t i) { return std::pow(static_cast<double>(holes_[i].corner.size()), 2); };
+    const auto squared = [&](std::uint32_t i) {
+      const auto count = static_cast<double>(holes_[i].corner.size());
+      return count * count;
+    };
     double sum = 0;
     for (const std::uint32_t i : open) sum += squared(i);
     for (const std::uint32_t i : open) {

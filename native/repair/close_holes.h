@@ -65,9 +65,9 @@ struct HoleClosingResult {
 /// one it takes the least (repair/least_triangulation.h). Where these cross a face, the next search goes around that
 /// face, and where two of them cross each other, or lie on one edge, it goes without one of them: 40 searches at most,
 /// and 9 in a loop of more than 200 corners. A loop is given up after these, once 50,000 triangles were refused, or
-/// once its share of the steps is used up that all proofs together may take, 100 million. Loops are filled as if they
-/// were alone; then each whose faces are in conflict with those of a loop of lower number is filled anew around those,
-/// if possible.
+/// once its share of the steps is used up that all proofs together may take: 100 million, and at least 10 million for
+/// each loop. Loops are filled as if they were alone; then each whose faces are in conflict with those of a loop of
+/// lower number is filled anew around those, if possible.
 ///
 /// No vertex moves and none is added, and every input triangle keeps its number. Because the input stays, the reference
 /// is as near to the result as it is to the input. Throws InvalidInput for a bad mesh, and where the stored type cannot

@@ -20,7 +20,8 @@ constexpr std::size_t kLong = 200;
 /// So many triangulations of a loop may be refused as guesses. A guess is found before its triangles are proved. Where
 /// it keeps the rules, which is usual, its n - 2 triangles are all that need a proof; a search that asks the rules as
 /// it goes proves n / 2 times as many. A long loop is often the border of an open surface, most of whose triangles are
-/// refused: to find a guess takes longer there than to ask.
+/// refused: to find a guess takes longer there than to ask. Therefore it has one guess, and none if fewer than two ears
+/// keep the rules.
 constexpr int kMostGuesses = 8, kMostGuessesOfLong = 1;
 /// A loop is given up after so many of its triangles were refused, in all searches together.
 constexpr std::size_t kMostRefused = 50'000;
@@ -61,7 +62,8 @@ LoopOutcome Filling::run() {
   return reason();
 }
 
-/// Whether two triangles that have two sides at the rim keep the rules. Each triangulation has at least two of them.
+/// Whether at least two triangles that have two sides at the rim keep the rules. Each triangulation has at least two of
+/// them.
 bool Filling::has_ears() {
   const auto n = static_cast<std::uint32_t>(hole_.at.size());
   int ears = 0;
@@ -134,9 +136,9 @@ std::optional<LoopOutcome> Filling::refusal_by_rules(const glm::uvec3& face) {
 /// take too much memory; those about its guesses are few.
 template <class Ask>
 std::optional<LoopOutcome> Filling::answer(Answers& answers, std::uint64_t number, bool keep, Ask&& ask) {
-  if (!keep) return ask();
   const auto known = answers.find(number);
-  return known != answers.end() ? known->second : answers.emplace(number, ask()).first->second;
+  if (known != answers.end()) return known->second;
+  return keep ? answers.emplace(number, ask()).first->second : ask();
 }
 
 /// Whether all triangles of a guess keep the rules. Searches refuse those that do not from now on.

@@ -88,7 +88,7 @@ double gap(const Corners& a, const Corners& b, double enough) {
   double largest_gap = 0;
   for_each_direction(pair, [&](const dvec3& u) {
     const double along = gap_along(u, pair);
-    if (along > 0) largest_gap = std::max(largest_gap, along / glm::length(u) * (1 - kRounding));
+    if (along > 0) largest_gap = std::max(largest_gap, along / norm(u) * (1 - kRounding));
     return largest_gap >= enough;
   });
   return largest_gap;

@@ -45,9 +45,11 @@ bool InputCrossings::any_crossed(std::span<const std::uint32_t> a, std::span<con
   std::vector<Input> others;
   others.reserve(some_b.size());
   for (const std::uint32_t face : some_b) others.push_back(input(face));
+  std::size_t turn = 0;
   return std::ranges::any_of(some_a, [&](std::uint32_t face) {
     const Input one = input(face);
     return std::ranges::any_of(others, [&](const Input& other) {
+      poll_at(++turn);
       return meet(one.box, other.box) && faces_cross(one.corners, other.corners) && !are_of_one_sheet(face, other.face);
     });
   });

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A box and a triangle are apart if their shadows on some line are, whatever line that is. If they are apart, it is so
-// on one of 13: the box's axes, the triangle's normal, and what is across an axis and an edge [Gottschalk96].
+// on one of 13: the box's axes, the triangle's normal, and what is across an axis and an edge (S. Gottschalk, M. C.
+// Lin, D. Manocha, "OBBTree", 1996).
 #include "topology/near_points.h"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
+#include <span>
+#include <vector>
 
 #include "base/call.h"
 
@@ -12,7 +16,7 @@ namespace tolvol {
 namespace {
 
 /// A bound on the rounding of a shadow on a line, for coordinates up to 2.
-constexpr double kRounding = 1e-14;
+constexpr double kShadowRounding = 1e-14;
 /// So few triangles are not told apart any more.
 constexpr std::size_t kFew = 16;
 
@@ -20,13 +24,16 @@ using Visit = std::function<void(std::uint32_t point, std::span<const std::uint3
 
 class Division {
  public:
-  Division(std::span<const glm::dvec3> points, const TriangleMesh& mesh, double reach, const Visit& visit)
-      : points_(points), mesh_(mesh), room_(reach + kRounding), visit_(visit) {}
+  Division(std::span<const glm::dvec3> points, std::span<const double> reach, const TriangleMesh& mesh,
+           const Visit& visit)
+      : points_(points), reach_(reach), mesh_(mesh), visit_(visit) {}
 
   void divide(std::span<std::uint32_t> points, std::span<const std::uint32_t> triangles) {
     Box box;
-    for (const std::uint32_t p : points) box.add(points_[p]);
-    const glm::dvec3 centre = 0.5 * (box.lower + box.upper), half = 0.5 * (box.upper - box.lower) + room_;
+    double reach = 0;
+    for (const std::uint32_t p : points) box.add(points_[p]), reach = std::max(reach, reach_[p]);
+    const glm::dvec3 centre = 0.5 * (box.lower + box.upper);
+    const glm::dvec3 half = 0.5 * (box.upper - box.lower) + (reach + kShadowRounding);
     std::vector<std::uint32_t> near;
     for (const std::uint32_t t : triangles) {
       poll_at(++compared_);
@@ -70,20 +77,21 @@ class Division {
   }
 
   std::span<const glm::dvec3> points_;
+  std::span<const double> reach_;
   const TriangleMesh& mesh_;
-  double room_;
   const Visit& visit_;
   std::size_t compared_ = 0;
 };
 
 }  // namespace
 
-void for_each_near(std::span<const glm::dvec3> points, const TriangleMesh& mesh, double reach, const Visit& visit) {
+void for_each_near(std::span<const glm::dvec3> points, std::span<const double> reach, const TriangleMesh& mesh,
+                   const Visit& visit) {
   if (points.empty()) return;
   std::vector<std::uint32_t> all(points.size()), triangles(mesh.triangles.size());
   std::iota(all.begin(), all.end(), 0u);
   std::iota(triangles.begin(), triangles.end(), 0u);
-  Division(points, mesh, reach, visit).divide(all, triangles);
+  Division(points, reach, mesh, visit).divide(all, triangles);
 }
 
 }  // namespace tolvol

@@ -8,16 +8,16 @@
 #include <functional>
 #include <glm/glm.hpp>
 #include <span>
-#include <vector>
 
 #include "geometry/triangle_mesh.h"
 
 namespace tolvol {
 
-/// Calls visit(number of a point, triangles) once for every point, with all triangles of the mesh that are within
-/// `reach` of it, and some others. Coordinates may be up to 2. Costs about 50 ns for each triangle that meets the box
-/// of the points, and for each that meets the box of a half of them, and so on.
-void for_each_near(std::span<const glm::dvec3> points, const TriangleMesh& mesh, double reach,
+/// Calls visit(number of a point, triangles) once for every point, with all triangles of the mesh that are within its
+/// `reach` of it, and some others. Coordinates may be up to 2. Costs about 50 ns for each triangle of the mesh, as much
+/// again for each that meets the box of the points, again for each that meets the box of a half of them, and so on.
+/// Runs on one thread.
+void for_each_near(std::span<const glm::dvec3> points, std::span<const double> reach, const TriangleMesh& mesh,
                    const std::function<void(std::uint32_t point, std::span<const std::uint32_t> triangles)>& visit);
 
 }  // namespace tolvol

@@ -93,7 +93,7 @@ std::vector<std::uint32_t> NewCrossings::origins_of(std::uint32_t face, std::spa
 
 /// Whether both are of sheets that lie on each other, or input faces of both crossed.
 bool NewCrossings::may_cross(std::uint32_t a, std::uint32_t b, std::span<const Removed> removed) const {
-  return input_.any_crossed(origins_of(a, removed), origins_of(b, removed)) || input_.are_of_one_sheet(a, b);
+  return input_.are_of_one_sheet(a, b) || input_.any_crossed(origins_of(a, removed), origins_of(b, removed));
 }
 
 bool NewCrossings::none(const NearFaces& near, std::span<const Face> faces, std::span<const Removed> removed,

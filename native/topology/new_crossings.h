@@ -4,8 +4,8 @@
 /// number of pairs of faces that cross never rises, and a mesh without crossings stays without.
 ///
 /// The sheets of a double sheet (topology/double_sheets.h) are exempt from each other: they touch in all their points,
-/// and could not change one after the other. A face is of the sheet that it was of as it came in, whatever else it
-/// stands for.
+/// and could not change one after the other. Pairs of their faces may become more. A face is of the sheet that it was
+/// of as it came in, whatever else it stands for.
 #pragma once
 
 #include <cstdint>

@@ -175,7 +175,6 @@ class Finder {
         [&](std::uint32_t index) {
           poll_at(++turn);
           if (!has_corner_at(p, triangles[index])) near.push_back(index);
-          return nodes <= kMostNodes;
         },
         [&](std::uint32_t) { return ++nodes <= kMostNodes; });
     return nodes <= kMostNodes;
@@ -185,7 +184,8 @@ class Finder {
     return place(t.x) == p || place(t.y) == p || place(t.z) == p;
   }
 
-  /// Calls add(vertex, triangles near it, what is found) for all these vertices, place by place, in several threads.
+  /// Calls add(vertex, triangles near it, what is found) for all these vertices, place by place, in several threads
+  /// but for crowded places, which come last.
   /// `mesh` has the vertices of mesh_. Returns all that is found.
   template <class Found, class Add>
   std::vector<Found> at_places(std::vector<std::uint32_t> vertices, const TriangleMesh& mesh, Team& team,
@@ -209,14 +209,14 @@ class Finder {
     });
     std::vector<std::size_t> rest;
     std::vector<glm::dvec3> points;
-    double reach = 0;
+    std::vector<double> reach;
     for (const std::vector<std::size_t>& block : crowded) rest.insert(rest.end(), block.begin(), block.end());
     for (const std::size_t i : rest) {
       points.push_back(place(vertices[starts[i]]));
-      reach = std::max(reach, most_reach(points.back()));
+      reach.push_back(most_reach(points.back()));
     }
     std::vector<std::uint32_t> near;
-    for_each_near(points, mesh, reach, [&](std::uint32_t point, std::span<const std::uint32_t> triangles) {
+    for_each_near(points, reach, mesh, [&](std::uint32_t point, std::span<const std::uint32_t> triangles) {
       near.clear();
       std::ranges::copy_if(triangles, std::back_inserter(near),
                            [&](std::uint32_t t) { return !has_corner_at(points[point], mesh.triangles[t]); });

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """smooth, deform, constrain and Guard with any of their options, judged by the promises of their docstrings."""
 
+import re
+
 import numpy as np
 import tolvol
 
@@ -20,6 +22,8 @@ from .parts import (
     volume_of,
     within_as_pieces,
 )
+
+HELD = re.compile(r"(\d+) vert\w+ holds? T-junctions together and cannot move")
 
 
 def draw_smooth(rng, case):
@@ -198,8 +202,10 @@ def constrain(run):
     before = vertices.astype(np.float64)
     kept = np.zeros(len(vertices), bool)
     kept[faces[~proved_inside(run, vertices, faces, volume)]] = True
-    # What holds a T-junction together does not move, and a warning counts it.
-    if any("T-junction" in warning for warning in result.report["warnings"]):
+    # What holds a T-junction together does not move, and a warning counts it. All other vertices that stay are judged
+    # where there are more of them than it says.
+    held = [int(said[1]) for said in map(HELD.match, result.report["warnings"]) if said]
+    if held and (f == 0).sum() <= held[0] + kept.sum():
         kept |= f == 0
     for v in np.flatnonzero((f < 1) & ~kept)[:3]:
         # Vertices at one place that are to go to one place move together.

@@ -255,7 +255,7 @@ TEST(Certificate, AmongNeedlesSideBySideFewSearchesAreInVain) {
   fans = shapes::stored(fans);  // where they overlap, rounding decides which one is the nearest
   const double tolerance = 0.005;
   const ToleranceVolume volume(fans.vertices, fans.triangles, kIdentity, tolerance);
-  EXPECT_TRUE(volume.hierarchy().has_mostly_needles());
+  ASSERT_TRUE(volume.hierarchy().has_mostly_needles());
   const StoredSpace placed = kIdentity.in(volume.frame());
   const TriangleCertificate certificate(volume.witnesses(), volume.grid(), volume.hierarchy(), volume.provable(0),
                                         volume.refutable(0));

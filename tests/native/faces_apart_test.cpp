@@ -166,11 +166,11 @@ TEST(FacesApart, WhatHasNoDirectionIsNotSoughtByDirections) {
 }
 
 TEST(FacesApart, WhatCrossesIsNeverSurelyUncrossedAtAnySize) {
-  // Across needles some products are too large for double precision from 1e76 on.
+  // Across needles some products are too large for double precision from 1e76 on, and some squares too small before.
   shapes::Random random(7);
   std::size_t crossing = 0;
   for (int i = 0; i < 60'000; ++i) {
-    const double size = std::pow(10, 60 + 40 * random.share());
+    const double size = std::pow(10, (i % 2 ? 1 : -1) * (60 + 40 * random.share()));
     const auto needle = [&] {
       const dvec3 start = random.point();
       return Corners{size * start, size * (start + 2.0 * random.point()), size * (start + 0.2 * random.point())};
@@ -182,6 +182,20 @@ TEST(FacesApart, WhatCrossesIsNeverSurelyUncrossedAtAnySize) {
     ASSERT_EQ(gap(a, b, kFar), 0) << size;
   }
   EXPECT_GT(crossing, 500u);
+}
+
+TEST(FacesApart, TheGapGrowsWithTheSize) {
+  const Corners above{dvec3(0, 0, 0.5), dvec3(4, 0, 0.5), dvec3(0, 4, 0.5)};
+  for (const double size : {1e-90, 1e-80, 1e-70, 1e-30, 1e30, 1e70}) {
+    Corners one = kFlat, other = above;
+    for (dvec3& p : one) p *= size;
+    for (dvec3& p : other) p *= size;
+    const double apart = gap(one, other, kFar);
+    EXPECT_LE(apart, 0.5 * size * (1 + 1e-12));
+    if (size > 1e-80) {
+      EXPECT_NEAR(apart / size, 0.5, 1e-9) << size;
+    }
+  }
 }
 
 TEST(FacesApart, CoordinatesOfAnySizeAreHandled) {

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <random>
 
+#include "polls.h"
 #include "shapes.h"
 #include "topology/double_sheets.h"
 
@@ -186,6 +187,29 @@ TEST(NewCrossings, AFaceThatStandsForOneOfASheetIsNotOfTheSheet) {
   EXPECT_TRUE(Scene(mesh).none({{of_sheet, through}}));
   EXPECT_FALSE(Scene(mesh).none({{alone, through}}));
   EXPECT_FALSE(Scene(mesh).none({{alone, through}}, {{of_sheet, alone}}));
+}
+
+TEST(NewCrossings, FacesOfASheetAreToldByThemselves) {
+  // Each of two faces stands for 3,200 of its sheet, of which 10 million pairs might be looked at.
+  Scene scene(wall(0, 40));
+  const auto half = static_cast<std::uint32_t>(scene.now.triangles.size() / 2);
+  std::vector<Removed> removed;
+  for (std::uint32_t i = 1; i < half; ++i) removed.push_back({i, 0}), removed.push_back({half + i, half});
+  scene.crossings.hand_over(removed);
+  Team alone(1);
+  const std::uint32_t left[] = {0, half};
+  const NearFaces near(
+      left, [&](std::size_t i) { return scene.crossings.corners(left[i]); }, {}, alone);
+  Corners through = scene.crossings.corners(0);
+  through[0].z = -0.1, through[1].z = through[2].z = 0.1;
+  ASSERT_TRUE(faces_cross(through, scene.crossings.corners(half)));
+  const auto may_cross = [&] {
+    NewCrossings::Trial trial;
+    EXPECT_TRUE(scene.crossings.none(near, std::vector<Face>{{0, through}}, {}, trial));
+  };
+  may_cross();  // finds what is known from then on
+  const std::size_t polls = tolvol::polls_of(may_cross);
+  EXPECT_LT(polls, 200u);
 }
 
 TEST(NewCrossings, DoubleSheetsAreFoundByPosition) {

@@ -89,7 +89,10 @@ bool PatchTrial::try_collapse(const Price& price, const Effort& effort) {
   work_ = 0;
   for (int start = 0; prepare(price.halfedge, price.position, effort.rings); ++start) {
     const std::uint32_t kept = patch_.find_vertex(*change_.vertex());
-    if (start > 0 && !EdgeFlips::flip_near(deviations_, kept, start - 1)) return false;
+    if (start > 0 && !EdgeFlips::flip_near(deviations_, kept, start - 1)) {
+      work_ += deviations_.work();
+      return false;
+    }
     const bool again = start > 0;
     const bool possible = relax_and_certify(again ? kWorthGoingOnAgain : kWorthGoingOn, effort.quick || again);
     work_ += deviations_.work();
