@@ -12,7 +12,10 @@
 #include "many.h"
 #include "polls.h"
 #include "repair/close_holes.h"
+#include "repair/filling.h"
+#include "repair/filling_rules.h"
 #include "shapes.h"
+#include "topology/boundary_loops.h"
 #include "without.h"
 
 namespace {
@@ -99,6 +102,42 @@ TEST(CloseHoles, ALoopThatMeandersIsGivenUp) {
   EXPECT_EQ(longest->corners, 270u);
   EXPECT_EQ(longest->outcome, LoopOutcome::given_up);
   EXPECT_LT(polls, 120000u);  // 158,376 without an end
+}
+
+TEST(CloseHoles, AHoleIsGivenUpAfterItsStepsOfProofs) {
+  // The wavy surface across the hole refuses the one guess that a long loop has, and then thousands of triangles.
+  const unsigned n = 200;
+  TriangleMesh whole = shapes::grid(n);
+  for (dvec3& p : whole.vertices) p.z = 0.05 * std::sin(7 * p.x) * std::sin(5 * p.y);
+  const TriangleMesh mesh = without(whole, [&](unsigned t) {
+    const unsigned row = t / 2 / n, column = t / 2 % n;
+    return row >= 70 && row < 130 && column >= 70 && column < 130;
+  });
+  const auto volume = volume_of(whole, 0.003);
+  const std::vector<std::uint32_t> place = weld_equal_positions(mesh.vertices);
+  Team alone(1);
+  const std::vector<BoundaryLoop> loops =
+      boundary_loops(kSpace.in(volume->frame()).frame(mesh.vertices), place, mesh.triangles, alone);
+  ASSERT_EQ(loops.size(), 2u);
+  std::vector<Hole> holes(1);
+  holes[0].sides = loops[1].sides;
+  for (const std::uint32_t side : holes[0].sides) {
+    holes[0].corner.push_back(mesh.triangles[side / 3][static_cast<int>(side % 3)]);
+    holes[0].at.push_back(volume->frame().from_world(mesh.vertices[holes[0].corner.back()]));
+  }
+  ASSERT_EQ(holes[0].corner.size(), 240u);
+  const MeshView view{mesh.triangles, mesh.vertices};
+  std::vector<std::string> warnings;
+  const FillingRules rules(view, place, holes, kSpace.in(volume->frame()), *volume, {},
+                           CloseHolesOptions().max_normal_angle, alone, warnings);
+  rules.measure(holes[0]);
+  const auto polls_with = [&](std::size_t steps, LoopOutcome outcome) {
+    Hole hole = holes[0];
+    hole.most_steps = steps;
+    return polls_of([&] { EXPECT_EQ(Filling(rules, hole).run(), outcome); });
+  };
+  const std::size_t few = polls_with(100'000, LoopOutcome::given_up);
+  EXPECT_LT(few, polls_with(1'000'000'000, LoopOutcome::closed));
 }
 
 TEST(CloseHoles, HolesAtAHubAreComparedWithFewOfItsFaces) {

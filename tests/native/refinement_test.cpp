@@ -61,6 +61,19 @@ TEST(Refinement, ARoundEndsAfterFailuresInARowAndWhereHardlyATrySucceeds) {
   EXPECT_LT(tries(8000, 80), 1600u);
 }
 
+TEST(Refinement, RoundsWithManyStartsMayTakeSoMuchMoreThanThoseBefore) {
+  for (const std::size_t before : {0u, 1'000'000u, 700'000'000u}) {
+    Refinement::Budget budget;
+    budget.note(before);
+    EXPECT_FALSE(budget.is_over());
+    budget.limit();
+    budget.note(before + 49'999'999);
+    EXPECT_FALSE(budget.is_over());
+    budget.note(1);
+    EXPECT_TRUE(budget.is_over());
+  }
+}
+
 TEST(Refinement, KeepsTheOneDirectionThatIsAskedFor) {
   Options options = thorough();
   options.two_sided = false;

@@ -55,6 +55,8 @@ void Refinement::Patience::note(bool success) {
   }
 }
 
+void Refinement::Budget::limit() { most_ = 2 * work_ + kStartsWork; }
+
 Refinement::Refinement(BoundedMesh& mesh, NewCrossings* crossings, Team& team)
     : mesh_(mesh),
       team_(team),
@@ -75,9 +77,8 @@ Refinement::Refinement(BoundedMesh& mesh, NewCrossings* crossings, Team& team)
 
 void Refinement::run(std::size_t target, Progress* progress) {
   if (progress) progress->begin("refining");
-  most_work_ = kAnyNumber;
   for (const auto& [rings, many_starts, most_edges] : kRounds) {
-    if (many_starts && !effort_.many_starts) most_work_ = 2 * work_ + kStartsWork;
+    if (many_starts && !effort_.many_starts) budget_.limit();
     effort_.rings = rings, effort_.many_starts = many_starts;
     std::ranges::fill(tried_, 0);
     const std::size_t at_first = mesh_.triangle_count();
@@ -132,7 +133,7 @@ bool Refinement::round(std::size_t most_edges, std::size_t target, Progress* pro
   ahead_.drop_all();
   Patience patience(steps.size());
   effort_.quick = steps.size() > kMany;
-  for (std::size_t place = 0; place < steps.size() && !patience.is_over() && work_ < most_work_; ++place) {
+  for (std::size_t place = 0; place < steps.size() && !patience.is_over() && !budget_.is_over(); ++place) {
     poll();
     if (progress) {
       progress->set_count(mesh_.triangle_count());
@@ -143,7 +144,7 @@ bool Refinement::round(std::size_t most_edges, std::size_t target, Progress* pro
     Attempt& a = tried(steps, place);
     tried_[steps[place]] = ahead_.now();
     reached_[steps[place]] = {ahead_.now(), a.reached};
-    work_ += a.work;
+    budget_.note(a.work);
     patience.note(a.possible);
     if (a.possible) carry_out(a);
   }

@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -34,6 +35,18 @@ class Refinement {
 
    private:
     std::size_t most_failures_, failures_ = 0;
+  };
+
+  /// How much work the tries of all rounds together may take (PatchTrial::work()).
+  class Budget {
+   public:
+    /// From now on as much as was taken so far, and some more. Before, there is no limit.
+    void limit();
+    bool is_over() const { return work_ >= most_; }
+    void note(std::size_t work) { work_ += work; }
+
+   private:
+    std::size_t work_ = 0, most_ = std::numeric_limits<std::size_t>::max();
   };
 
   /// Changes `mesh`, whose bounds are certified, and keeps references to all. `crossings` is null where crossings are
@@ -78,7 +91,7 @@ class Refinement {
   TriesAhead ahead_;
   std::vector<Attempt> attempts_;  ///< For each slot of ahead_.
   PatchTrial::Effort effort_{};
-  std::size_t work_ = 0, most_work_ = 0;  ///< Of all tries, by PatchTrial::work(); no try begins beyond most_work_.
+  Budget budget_;
   // A step that failed is not tried again until a face around it has changed. The times are those of ahead_.
   std::vector<std::uint64_t> touched_;         ///< For each vertex: when a face around it changed last.
   std::vector<std::uint64_t> tried_, priced_;  ///< For each edge: when it was tried and when its price was found last.
