@@ -61,7 +61,7 @@ class TriangleCertificate {
   /// here has the verdict inside. If there is no bound and `open` is not null, it is set to a point of the triangle
   /// around which the search found no witness: most often it is farther than limit() from all that `facing` admits. If
   /// `steps` is not null, the steps of the search are added to it, each about 0.07 us: two for a part of the triangle,
-  /// and one for a node of the hierarchy that is visited.
+  /// one for a node of the hierarchy that is visited, and one for four triangles of a list (check/near_triangles.h).
   double bound_in_any_order(const glm::dvec3 (&corners)[3], const glm::dvec3& bounds,
                             const glm::uvec3& hints = glm::uvec3(Hierarchy::kNone), Facing* facing = nullptr,
                             glm::dvec3* open = nullptr, std::size_t* steps = nullptr) const;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/errors.h"
+#include "geometry/lengths.h"
 
 namespace tolvol {
 
@@ -47,8 +48,8 @@ StoredSpace::StoredSpace(const glm::dmat4& to_world, Storage storage, const Fram
   glm::dvec3 lengths{0};
   for (int column = 0; column < 3; ++column) {
     const glm::dvec3 c = linear[column];
-    const double largest = std::max({std::abs(c.x), std::abs(c.y), std::abs(c.z)});
-    if (largest > 0) lengths[column] = largest * glm::length(c / largest);
+    const double most = largest(c);
+    if (most > 0) lengths[column] = most * glm::length(c / most);
     if (!(lengths[column] > 0))
       throw InvalidInput("to_world is singular: an axis is scaled to zero; give it a scale", "invalid_transform");
     linear[column] /= lengths[column];

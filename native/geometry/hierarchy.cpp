@@ -18,6 +18,7 @@
 // If of two points of the mesh (half size 1) one is nearer as seen from there, it is nearer to the point itself too, up
 // to 2 / R, which is below one rounding of the distance, R or more.
 #include "geometry/hierarchy.h"
+#include "geometry/lengths.h"
 
 #include <algorithm>
 #include <cmath>
@@ -52,17 +53,17 @@ bool Hierarchy::is_nearest_slice(const glm::dvec3& q, std::uint32_t place) const
 
 glm::dvec3 Hierarchy::local(const glm::dvec3& p, bool& beyond_reach) const {
   const glm::dvec3 at = scaled(p) - centre_;
-  const double farthest = std::max({std::abs(at.x), std::abs(at.y), std::abs(at.z)});
+  const double farthest = largest(at);
   if (farthest <= kReach) return at;
   beyond_reach = true;
   const glm::dvec3 towards =
       0.5 * p - 0.5 * (centre_ / scale_);  // halved, because p or the difference may be near the largest double
-  return towards * (kReach / std::max({std::abs(towards.x), std::abs(towards.y), std::abs(towards.z)}));
+  return towards * (kReach / largest(towards));
 }
 
 Hierarchy::Nearest Hierarchy::seen_from(const glm::dvec3& p, std::uint32_t triangle) const {
   // From far away the mesh is small, and only p might overflow.
-  const double far = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z), std::numeric_limits<double>::min()});
+  const double far = std::max(largest(p), std::numeric_limits<double>::min());
   const double scale = std::min(scale_, std::ldexp(1.0, -std::clamp(std::ilogb(far), -1000, 1000)));
   const double ratio = scale / scale_;
   const Corners& t = corners_[place_[triangle]];

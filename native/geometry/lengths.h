@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Measures of a vector's length.
+/// Lengths and directions of vectors of any size.
 #pragma once
 
 #include <algorithm>
@@ -19,5 +19,8 @@ inline double norm(const glm::dvec3& v) {
   const double most = largest(v);
   return most > 0 && most < std::numeric_limits<double>::infinity() ? most * glm::length(v / most) : most;
 }
+
+/// The vector with length 1, up to rounding; not finite where the vector is 0 or not finite.
+inline glm::dvec3 unit(const glm::dvec3& v) { return glm::normalize(v / largest(v)); }
 
 }  // namespace tolvol

@@ -13,6 +13,7 @@
 #include <limits>
 
 #include "base/call.h"
+#include "geometry/lengths.h"
 
 namespace tolvol {
 namespace {
@@ -89,7 +90,7 @@ template double OrientedBoxes::fit(int, std::span<const std::array<glm::dvec3, 5
 
 template <class Real>
 void OrientedBoxes::distances(const glm::dvec3& p, Real (&squared)[kWidth]) const {
-  const double slack = kSlack * std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+  const double slack = kSlack * largest(p);
   double sum[kWidth] = {};
   for (int k = 0; k < 3; ++k) {
     for (int i = 0; i < kWidth; ++i) {

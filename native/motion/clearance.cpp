@@ -22,6 +22,7 @@ constexpr double kInside = 1 - 1e-9;
 constexpr double kRounding = 8 * 0x1p-53;
 /// What products that are too small for double precision lose.
 constexpr double kSmallest = 1e-300;
+/// The number of vertices or faces that a thread takes at a time, for what they leave to rooms.
 constexpr std::size_t kRoomsAtOnce = 64;
 /// A vertex that leaves its room at once would do so again. It gets a room again at the kRest-th call of renew(),
 /// counted from the call that finds it gone.

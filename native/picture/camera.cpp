@@ -6,6 +6,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "base/errors.h"
+#include "geometry/lengths.h"
 
 namespace tolvol {
 namespace {
@@ -14,11 +15,6 @@ constexpr double kMargin = 1.04;     // the picture is this many times larger th
 constexpr double kNearest = 1.0e-4;  // the near plane's distance over the far plane's, for a 32-bit depth buffer
 
 bool finite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-
-/// Returns a vector of unit length. It never squares the tiniest and the hugest components.
-glm::dvec3 unit(const glm::dvec3& v) {
-  return glm::normalize(v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}));
-}
 
 /// The directions right, above and forward of a view, all of unit length.
 struct Axes {

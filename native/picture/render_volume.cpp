@@ -7,6 +7,7 @@
 
 #include "base/errors.h"
 #include "base/parallel.h"
+#include "geometry/lengths.h"
 #include "gl/context.h"
 
 namespace tolvol {
@@ -19,8 +20,7 @@ constexpr int kTile = 256;
 constexpr int kFarNodes = 40;
 
 glm::vec4 plane_in_nodes(const VolumeRenderer::Cut& cut, const Frame& frame, const PictureField& field) {
-  const glm::dvec3 normal =
-      cut.normal / glm::max(glm::max(std::abs(cut.normal.x), std::abs(cut.normal.y)), std::abs(cut.normal.z));
+  const glm::dvec3 normal = cut.normal / largest(cut.normal);
   // NaN fails as well.
   if (!(glm::length(normal) >= 1) || !(glm::length(cut.point) < std::numeric_limits<double>::infinity())) {
     throw InvalidInput("the cut's point and normal must be finite and its normal not zero");

@@ -166,7 +166,6 @@ ApartFromFan::ApartFromFan(const Corners& own, const dvec3& hub)
     : hub_(hub), whole_(box_of(own)), opposite_(rim_of(own, hub)) {
   // A side through the hub is turned by so little that the triangle lies strictly on one side of it.
   constexpr double kTurn = 1e-9;
-  const auto unit = [](const dvec3& v) { return glm::normalize(v / largest(v)); };
   dvec3 from_hub[3];
   for (int k = 0; k < 3; ++k) from_hub[k] = own[k] - hub;
   const auto at = std::ranges::find(own, hub);

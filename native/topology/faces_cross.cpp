@@ -4,6 +4,7 @@
 // are asked about are neighbours, and most of these are told apart by the sides of the planes that their corners lie
 // on.
 #include "topology/faces_cross.h"
+#include "geometry/lengths.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/intersections.h>
@@ -67,19 +68,13 @@ bool leads_along(const glm::dvec3& along, const glm::dvec3& side) {
   return glm::dot(along, side) > kDotRounding * glm::dot(glm::abs(along), glm::abs(side)) + kDotLoss;
 }
 
-/// Returns v with length 1, up to rounding, or what is not finite.
-glm::dvec3 direction(const glm::dvec3& v) {
-  return glm::normalize(v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}));
-}
-
 /// Returns true only if a plane through the corner `i` of `a`, which is the corner `k` of `b`, has all other corners of
 /// `a` on one side and those of `b` on the other. Tried is the plane between the middles of the two angles there: it
 /// tells most needles around a corner in one plane from each other, for which the predicates need exact arithmetic.
 bool apart_at_corner(const Corners& a, int i, const Corners& b, int k) {
   const glm::dvec3 of_a[2] = {a[(i + 1) % 3] - a[i], a[(i + 2) % 3] - a[i]};
   const glm::dvec3 of_b[2] = {b[(k + 1) % 3] - a[i], b[(k + 2) % 3] - a[i]};
-  const glm::dvec3 along =
-      direction(direction(of_a[0]) + direction(of_a[1])) - direction(direction(of_b[0]) + direction(of_b[1]));
+  const glm::dvec3 along = unit(unit(of_a[0]) + unit(of_a[1])) - unit(unit(of_b[0]) + unit(of_b[1]));
   return leads_along(along, of_a[0]) && leads_along(along, of_a[1]) && leads_along(-along, of_b[0]) &&
          leads_along(-along, of_b[1]);
 }

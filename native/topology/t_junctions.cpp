@@ -185,8 +185,7 @@ class Finder {
   }
 
   /// Calls add(vertex, triangles near it, what is found) for all these vertices, place by place, in several threads
-  /// but for crowded places, which come last.
-  /// `mesh` has the vertices of mesh_. Returns all that is found.
+  /// but for crowded places, which come last. `mesh` has the vertices of mesh_. Returns all that is found.
   template <class Found, class Add>
   std::vector<Found> at_places(std::vector<std::uint32_t> vertices, const TriangleMesh& mesh, Team& team,
                                Add&& add) const {
